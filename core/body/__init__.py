@@ -1,0 +1,1 @@
+"""Orientations → Poses: segments, joints, lengths, forward kinematics."""

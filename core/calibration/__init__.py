@@ -1,0 +1,1 @@
+"""UniformRecording → CalibratedRecording: sensor-to-segment orientation, gyro bias, heading."""

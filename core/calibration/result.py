@@ -1,0 +1,63 @@
+"""What calibration gives: how each sensor sits on its segment, and the bias of its gyroscope."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from core.errors import Notice
+from core.frames import Bools, Floats, Segment
+from core.recording import UniformRecording
+
+Window = tuple[float, float]
+"""Half-open time range [start, end) in seconds from recording start."""
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentCalibration:
+    """One sensor on its segment.
+
+    Parameters
+    ----------
+    R_segment_sensor : (3, 3) maps sensor coordinates to ISB segment coordinates.
+    gyro_bias : (3,) rad/s, sensor frame, mean over rest.
+    rest_norm : |acc| at rest, m/s².
+    method : how the heading was found: "walking_direction", "gyro_pca", "declared", "neighbour".
+    score : 0 (guess) to 1 (certain); the method's own quality measure, documented there.
+    """
+
+    R_segment_sensor: Floats
+    gyro_bias: Floats
+    rest_norm: float
+    method: str
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """All sensors of a take.
+
+    Parameters
+    ----------
+    heading : segment → rad; turns the arbitrary 6-axis world of that sensor about z into the common W.
+    rest, walking : windows that were used; `walking` may be several straight parts.
+    zero : window whose mean joint angles are subtracted (`angle_zero: standing`).
+    turning : (n,) mask on the uniform axis, True while turning.
+    """
+
+    segments: Mapping[Segment, SegmentCalibration]
+    rest: tuple[Window, ...]
+    walking: tuple[Window, ...]
+    zero: Window
+    turning: Bools
+    method: str
+    notices: tuple[Notice, ...] = ()
+    diagnostics: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class CalibratedRecording:
+    """A uniform recording and how its sensors sit."""
+
+    recording: UniformRecording
+    calibration: Calibration

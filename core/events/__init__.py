@@ -1,0 +1,1 @@
+"""Orientations → gait events and the stride list."""

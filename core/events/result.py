@@ -1,0 +1,87 @@
+"""What event detection gives: contacts with time, and the stride list everything later reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from core.errors import Notice
+from core.frames import Side
+
+EventKind = Literal["ic", "tc"]
+"""ic = initial contact (foot strike), tc = terminal contact (foot off)."""
+
+
+@dataclass(frozen=True)
+class GaitEvent:
+    """One contact event.
+
+    Parameters
+    ----------
+    time_s : when it happened, seconds from recording start.
+    detected_s : when a real-time detector would have known it.
+    source : name of the detector ("foot_pitch") or "manual".
+    """
+
+    time_s: float
+    side: Side
+    kind: EventKind
+    source: str
+    detected_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class GaitEvents:
+    """All events of a take in order of time, and why a side has none."""
+
+    events: tuple[GaitEvent, ...]
+    notices: tuple[Notice, ...] = ()
+    diagnostics: Mapping[str, object] = field(default_factory=dict)
+
+    def times(self, side: Side, kind: EventKind) -> tuple[float, ...]:
+        """Event times in s of one side and kind, increasing."""
+        return tuple(e.time_s for e in self.events if e.side == side and e.kind == kind)
+
+
+@dataclass(frozen=True)
+class Stride:
+    """One gait cycle of one foot, initial contact to the next initial contact of the same foot.
+
+    Parameters
+    ----------
+    start_s, end_s : the two initial contacts; [start, end).
+    tc_s : terminal contact between them, None if not found.
+    opposite_tc_s, opposite_ic_s : the other foot's events inside the cycle, None if not found.
+    turn_rad : heading change of the foot over the stride, left positive; None if not known.
+    excluded_reason : None = counted; else a stable code: "incomplete", "turn", "first", "last", "gap",
+        "implausible_time", "outlier", "manual:<text>".
+    """
+
+    side: Side
+    start_s: float
+    tc_s: float | None
+    end_s: float
+    opposite_tc_s: float | None = None
+    opposite_ic_s: float | None = None
+    turn_rad: float | None = None
+    excluded_reason: str | None = None
+
+    @property
+    def duration_s(self) -> float:
+        """Stride time, s."""
+        return self.end_s - self.start_s
+
+
+@dataclass(frozen=True, eq=False)
+class Strides:
+    """The stride list of a take: the one mechanism every later figure reads."""
+
+    strides: tuple[Stride, ...]
+    notices: tuple[Notice, ...] = ()
+
+    def used(self, side: Side | None = None) -> tuple[Stride, ...]:
+        """Strides that count, of one side or both."""
+        return tuple(
+            s for s in self.strides if s.excluded_reason is None and (side is None or s.side == side)
+        )

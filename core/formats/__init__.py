@@ -1,0 +1,1 @@
+"""Bytes → Recording: one vendor per file, detection by content, never by file name."""

@@ -1,0 +1,1 @@
+"""Reference tables (package data) and their lookup."""

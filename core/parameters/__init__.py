@@ -1,0 +1,1 @@
+"""Strides and angles → parameters and cycle curves."""

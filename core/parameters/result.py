@@ -1,0 +1,47 @@
+"""What a parameter is: a number with its spread, or no number with its reason."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from core.frames import Bools, Floats, Side
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One row of the parameter table.
+
+    Parameters
+    ----------
+    name : field term with its unit, e.g. "stride_time_s" (spec/field.md §4b).
+    side : "left", "right" or None for the whole take.
+    n : strides behind the number. mean, sd : None with a `reason` when undefined (sd also when n < 2).
+    reason : None, or a stable code: "no_strides", "opposite_foot_missing", "no_terminal_contact" …
+    """
+
+    name: str
+    side: Side | None
+    n: int
+    mean: float | None
+    sd: float | None
+    unit: str
+    reason: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CycleCurves:
+    """Angles over the gait cycle, used and unused strides alike.
+
+    Parameters
+    ----------
+    curves : variable without side, e.g. "knee_flexion" → side → (strides, 101) rad, 0 to 100 % of cycle;
+        NaN rows where the stride has gaps. Row i belongs to `stride_index[side][i]` of the stride list.
+    used : side → (strides,) True where the stride counts.
+    foot_off_pct : side → (strides,) terminal contact in % of cycle, NaN if not found.
+    """
+
+    curves: Mapping[str, Mapping[Side, Floats]]
+    stride_index: Mapping[Side, tuple[int, ...]]
+    used: Mapping[Side, Bools]
+    foot_off_pct: Mapping[Side, Floats]

@@ -1,0 +1,203 @@
+"""What was recorded: frozen objects, checked once at construction, SI units.
+
+`Recording` is what the files say (each sensor on its own clock); `UniformRecording` is the same take on
+one time axis with a validity mask per sensor (made by core/timeline.py). Everything after works on the latter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from core.errors import Notice, ParameterError, SignalError
+from core.frames import PROTOCOLS, SEGMENTS, Bools, Floats, Protocol, Segment
+
+
+def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], where: str) -> None:
+    """Check shape and type of an array once and lock it against writing."""
+    if a is None:
+        return
+    if a.ndim != len(shape) or any(want is not None and got != want for got, want in zip(a.shape, shape, strict=True)):
+        raise ParameterError("bad_shape", f"{where}: {name} has shape {a.shape}, expected {shape}.")
+    a.setflags(write=False)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Who was measured; None where nobody said.
+
+    Parameters
+    ----------
+    height_m : body height, 0.5 to 2.5 m.
+    """
+
+    height_m: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:
+            raise ParameterError(
+                "height_implausible",
+                f"Body height {self.height_m:g} m is outside 0.5 to 2.5 m; give it in metres.",
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class ImuStream:
+    """One sensor as its file gives it, in SI units, on its own clock; missing samples are NaN rows.
+
+    Parameters
+    ----------
+    device_id : serial number or column label, unique in a recording.
+    source : name of the file it came from.
+    t_s : (n,) seconds, strictly increasing. From a packet counter (unwrapped) or the device clock.
+        Streams of one recording that share `clock` share the origin of `t_s`.
+    acc : (n, 3) specific force, m/s². gyr : (n, 3) rad/s or None. mag : (n, 3) any unit or None.
+    quat : (n, 4) vendor orientation, scalar first, kept for comparison only, or None.
+    rate_hz : nominal sampling rate.
+    clock : what `t_s` was made from: "counter" (shared packet counter), "device" (own clock), "index".
+    digest : sha256 of the signal values, to find the same stream under two ids.
+    notices : what the reader had to decide or could not read.
+    """
+
+    device_id: str
+    source: str
+    t_s: Floats
+    acc: Floats
+    gyr: Floats | None
+    mag: Floats | None
+    quat: Floats | None
+    rate_hz: float
+    clock: str
+    digest: str
+    notices: tuple[Notice, ...] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.t_s)
+        if n == 0:
+            raise SignalError("empty", f"{self.source}: no samples.", sensor=self.device_id)
+        for name, a, shape in (
+            ("t_s", self.t_s, (n,)),
+            ("acc", self.acc, (n, 3)),
+            ("gyr", self.gyr, (n, 3)),
+            ("mag", self.mag, (n, 3)),
+            ("quat", self.quat, (n, 4)),
+        ):
+            _frozen(a, name, shape, self.source)
+        if np.any(np.diff(self.t_s) <= 0):
+            raise SignalError(
+                "time_not_increasing", f"{self.source}: time does not increase.", sensor=self.device_id
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One take: streams by device id and which segment each is worn on.
+
+    Parameters
+    ----------
+    streams : device id → stream.
+    segments : device id → segment, None = not used. Ids without an entry are unassigned (see `unassigned`).
+    mounting : segment → declared mounting, free text ("sacrum, face backwards").
+    sha256 : file name → sha256 of the source bytes.
+    """
+
+    streams: Mapping[str, ImuStream]
+    segments: Mapping[str, Segment | None]
+    subject: Subject = field(default_factory=Subject)
+    protocol: Protocol = "walk"
+    mounting: Mapping[str, str] = field(default_factory=dict)
+    sha256: Mapping[str, str] = field(default_factory=dict)
+    notices: tuple[Notice, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.protocol not in PROTOCOLS:
+            raise ParameterError(
+                "unknown_protocol", f"Protocol '{self.protocol}' is not one of {', '.join(PROTOCOLS)}."
+            )
+        worn: dict[str, str] = {}
+        for device, segment in self.segments.items():
+            if segment is None:
+                continue
+            if segment not in SEGMENTS:
+                raise ParameterError(
+                    "unknown_segment",
+                    f"Sensor {device} is mapped to '{segment}'; expected one of {', '.join(SEGMENTS)} or null.",
+                    sensor=device,
+                )
+            if segment in worn:
+                raise ParameterError(
+                    "duplicate_segment",
+                    f"Sensors {worn[segment]} and {device} are both mapped to {segment}; choose one.",
+                    sensor=device,
+                )
+            worn[segment] = device
+        for name in ("streams", "segments", "mounting", "sha256"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    @property
+    def unassigned(self) -> tuple[str, ...]:
+        """Device ids that nobody has mapped or set aside."""
+        return tuple(d for d in self.streams if d not in self.segments)
+
+
+@dataclass(frozen=True, eq=False)
+class SensorSignals:
+    """One sensor on the uniform axis.
+
+    Parameters
+    ----------
+    acc, gyr : (n, 3) m/s², rad/s; finite everywhere (invalid samples hold the last value).
+    mag : (n, 3) or None.
+    valid : (n,) measured or interpolated over ≤ 0.1 s. interpolated : (n,) filled, flagged.
+    """
+
+    device_id: str
+    acc: Floats
+    gyr: Floats
+    mag: Floats | None
+    valid: Bools
+    interpolated: Bools
+
+    def __post_init__(self) -> None:
+        n = len(self.acc)
+        for name, a, shape in (
+            ("acc", self.acc, (n, 3)),
+            ("gyr", self.gyr, (n, 3)),
+            ("mag", self.mag, (n, 3)),
+            ("valid", self.valid, (n,)),
+            ("interpolated", self.interpolated, (n,)),
+        ):
+            _frozen(a, name, shape, self.device_id)
+        if not (np.isfinite(self.acc).all() and np.isfinite(self.gyr).all()):
+            raise SignalError("bad_signal", f"{self.device_id}: non-finite samples left.", sensor=self.device_id)
+
+
+@dataclass(frozen=True, eq=False)
+class UniformRecording:
+    """A take on one uniform time axis, by segment.
+
+    Parameters
+    ----------
+    t_s : (n,) seconds from recording start, step 1 / rate_hz.
+    sensors : segment → signals, all of length n.
+    """
+
+    t_s: Floats
+    rate_hz: float
+    sensors: Mapping[Segment, SensorSignals]
+    subject: Subject
+    protocol: Protocol
+    mounting: Mapping[str, str]
+    notices: tuple[Notice, ...] = ()
+
+    def __post_init__(self) -> None:
+        _frozen(self.t_s, "t_s", (None,), "UniformRecording")
+        for segment, s in self.sensors.items():
+            if len(s.acc) != len(self.t_s):
+                raise ParameterError(
+                    "bad_shape", f"{segment} has {len(s.acc)} samples, the axis {len(self.t_s)}.", sensor=segment
+                )
+        object.__setattr__(self, "sensors", MappingProxyType(dict(self.sensors)))

@@ -1,0 +1,134 @@
+"""Quaternions and rotation matrices on (..., 4) and (..., 3, 3) arrays.
+
+Hamilton, scalar first (w, x, y, z); q maps body to world: v_W = q ⊗ v_B ⊗ q*.
+Source: spec/fusion.md §0, spec/estimators.md §1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from core.frames import Floats
+
+_SMALL = 1e-8
+
+
+def normalise(q: Floats) -> Floats:
+    """Scale quaternions (..., 4) to unit norm."""
+    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+
+
+def multiply(p: Floats, q: Floats) -> Floats:
+    """Hamilton product p ⊗ q of (..., 4) arrays, broadcasting."""
+    pw, px, py, pz = np.moveaxis(np.asarray(p, np.float64), -1, 0)
+    qw, qx, qy, qz = np.moveaxis(np.asarray(q, np.float64), -1, 0)
+    return np.stack(
+        (
+            pw * qw - px * qx - py * qy - pz * qz,
+            pw * qx + px * qw + py * qz - pz * qy,
+            pw * qy - px * qz + py * qw + pz * qx,
+            pw * qz + px * qy - py * qx + pz * qw,
+        ),
+        axis=-1,
+    )
+
+
+def conjugate(q: Floats) -> Floats:
+    """Inverse rotation of unit quaternions (..., 4)."""
+    return np.asarray(q, np.float64) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def rotate(q: Floats, v: Floats) -> Floats:
+    """Rotate vectors (..., 3) by unit quaternions (..., 4), broadcasting."""
+    q = np.asarray(q, np.float64)
+    u, w = q[..., 1:], q[..., :1]
+    t = 2.0 * np.cross(u, v)
+    return np.asarray(v + w * t + np.cross(u, t))
+
+
+def to_matrix(q: Floats) -> Floats:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    w, x, y, z = np.moveaxis(np.asarray(q, np.float64), -1, 0)
+    rows = (
+        np.stack((1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)), axis=-1),
+        np.stack((2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)), axis=-1),
+        np.stack((2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)), axis=-1),
+    )
+    return np.stack(rows, axis=-2)
+
+
+def from_matrix(R: Floats) -> Floats:
+    """Unit quaternions (..., 4), w ≥ 0, of rotation matrices (..., 3, 3).
+
+    Shepperd's choice of the largest of the four components keeps full precision for every angle.
+    """
+    R = np.asarray(R, np.float64)
+    d0, d1, d2 = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
+    squares = np.stack((1 + d0 + d1 + d2, 1 + d0 - d1 - d2, 1 - d0 + d1 - d2, 1 - d0 - d1 + d2), axis=-1)
+    a, b, c = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
+    d, e, f = R[..., 1, 0] + R[..., 0, 1], R[..., 0, 2] + R[..., 2, 0], R[..., 2, 1] + R[..., 1, 2]
+    candidates = np.stack(
+        (
+            np.stack((squares[..., 0], a, b, c), axis=-1),
+            np.stack((a, squares[..., 1], d, e), axis=-1),
+            np.stack((b, d, squares[..., 2], f), axis=-1),
+            np.stack((c, e, f, squares[..., 3]), axis=-1),
+        ),
+        axis=-2,
+    )
+    largest = np.argmax(squares, axis=-1)[..., None, None]
+    q = normalise(np.take_along_axis(candidates, largest, axis=-2)[..., 0, :])
+    return np.where(q[..., :1] < 0, -q, q)
+
+
+def exp(phi: Floats) -> Floats:
+    """Unit quaternions (..., 4) of rotation vectors (..., 3) in rad."""
+    phi = np.asarray(phi, np.float64)
+    angle = np.linalg.norm(phi, axis=-1, keepdims=True)
+    half = 0.5 * angle
+    scale = np.where(angle < _SMALL, 0.5 - angle**2 / 48.0, np.sin(half) / np.where(angle < _SMALL, 1.0, angle))
+    return np.concatenate((np.cos(half), scale * phi), axis=-1)
+
+
+def log(q: Floats) -> Floats:
+    """Rotation vectors (..., 3) in rad, norm ≤ π, of unit quaternions (..., 4)."""
+    q = np.asarray(q, np.float64)
+    q = np.where(q[..., :1] < 0, -q, q)
+    v = q[..., 1:]
+    sine = np.linalg.norm(v, axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, q[..., :1])
+    return v * np.where(sine < _SMALL, 2.0, angle / np.where(sine < _SMALL, 1.0, sine))
+
+
+def angle_between(p: Floats, q: Floats) -> Floats:
+    """Angle in rad, [0, π], between orientations (..., 4) (thesis Eq 51, stable near 0)."""
+    return np.asarray(np.linalg.norm(log(multiply(conjugate(p), q)), axis=-1))
+
+
+def mean(q: Floats, weights: Floats | None = None) -> Floats:
+    """Mean orientation (4,) of unit quaternions (n, 4): the eigenvector of Markley et al. 2007, eq 12–13."""
+    q = np.asarray(q, np.float64)
+    w = np.ones(len(q)) if weights is None else np.asarray(weights, np.float64)
+    m = np.asarray(np.linalg.eigh((q * w[:, None]).T @ q)[1][:, -1])
+    return -m if m[0] < 0 else m
+
+
+def slerp(p: Floats, q: Floats, u: Floats | float) -> Floats:
+    """Interpolate from p (u = 0) to q (u = 1) along the shorter arc; p, q (..., 4), u (...)."""
+    step = log(multiply(conjugate(p), q))
+    return multiply(p, exp(np.asarray(u, np.float64)[..., None] * step))
+
+
+def about(axis: int, angle: Floats | float) -> Floats:
+    """Unit quaternions (..., 4) of rotations by `angle` (...) rad about coordinate axis 0, 1 or 2."""
+    angle = np.asarray(angle, np.float64)
+    q = np.zeros((*angle.shape, 4))
+    q[..., 0] = np.cos(angle / 2)
+    q[..., 1 + axis] = np.sin(angle / 2)
+    return q
+
+
+def yaw(q: Floats) -> Floats:
+    """Heading (...) in rad of the body's x axis in the world's floor plane, from x towards y."""
+    x = rotate(q, np.array([1.0, 0.0, 0.0]))
+    return np.asarray(np.arctan2(x[..., 1], x[..., 0]))

@@ -1,0 +1,1 @@
+"""Simulated walkers and sensors with exact truth, for tests, demo and CLI."""

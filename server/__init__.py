@@ -1,0 +1,1 @@
+"""Everything with effects: HTTP, database, files, jobs, 3D views, command line."""

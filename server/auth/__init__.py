@@ -1,0 +1,1 @@
+"""Passwords, login sessions, roles, CSRF."""

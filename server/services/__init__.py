@@ -1,0 +1,1 @@
+"""Use cases shared by API, pages, CLI and jobs."""

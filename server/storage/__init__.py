@@ -1,0 +1,1 @@
+"""Database, tables, blobs, and the only module that opens files for writing."""

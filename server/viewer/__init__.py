@@ -1,0 +1,1 @@
+"""Poses → viser scene, one server per view, behind our proxy."""
