@@ -1,0 +1,26 @@
+# Sagittal: one image for web and worker. Build: docker build -t sagittal .
+# Run: docker run -p 127.0.0.1:8000:8000 -v sagittal:/data sagittal   (put a TLS proxy in front for other hosts)
+FROM python:3.13-slim AS build
+WORKDIR /src
+COPY pyproject.toml README.md LICENSE ./
+COPY core core
+COPY server server
+COPY web web
+COPY migrations migrations
+RUN python -m venv /opt/sagittal && /opt/sagittal/bin/pip install --no-cache-dir .
+
+FROM python:3.13-slim
+RUN useradd --uid 10001 --create-home --shell /usr/sbin/nologin sagittal \
+    && mkdir /data && chown sagittal:sagittal /data
+COPY --from=build /opt/sagittal /opt/sagittal
+ENV PATH=/opt/sagittal/bin:$PATH \
+    PYTHONUNBUFFERED=1 \
+    SAGITTAL_HOME=/data \
+    SAGITTAL_HOST=0.0.0.0 \
+    NUMBA_CACHE_DIR=/data/cache/numba
+USER sagittal
+VOLUME ["/data"]
+EXPOSE 8000
+STOPSIGNAL SIGTERM
+HEALTHCHECK --interval=30s --timeout=5s --start-period=60s CMD ["python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8000/health/live', timeout=4)"]
+CMD ["sagittal", "serve"]
