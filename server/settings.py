@@ -1,0 +1,167 @@
+"""Everything an operator may set, read once at start from the command line and the environment, then frozen.
+
+Every field `some_name` has the environment variable `SAGITTAL_SOME_NAME` (data_dir: `SAGITTAL_HOME`); the
+command line goes before the environment, the environment before the defaults below:
+
+    settings = load_settings({"port": 8080})        # what the command line gave; None = not given
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+MB = 1_000_000
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
+
+class SettingsError(ValueError):
+    """A setting is outside its domain; the message names it, what was given and what is possible."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """One installation.
+
+    Parameters
+    ----------
+    data_dir : folder of database, blobs and caches; made at first start, readable by its owner only.
+    host, port : address the web server listens on.
+    allowed_hosts : names a request may carry in `Host` besides loopback (DNS rebinding, service.md §d).
+    behind_tls : a reverse proxy speaks HTTPS for us: cookies are `Secure`, any address may be bound.
+    max_file_bytes, max_set_bytes, max_files : limits of one upload and of one recording's upload set.
+    min_free_bytes : uploads are refused below this free disk space.
+    workers : worker processes started by `sagittal serve`; each keeps one warm child.
+    lease_s : a worker that has not renewed its job for so long is taken for dead; renewed every third of it.
+    job_timeout_s : longest run of one job.
+    child_memory_bytes : address space of the computing child (RLIMIT_AS; libraries alone map 1 GB), 0 = none.
+    sweep_grace_s : age from which a file that nothing refers to is removed.
+    idle_minutes, absolute_hours : life of a sign-in (service.md §d).
+    task_modules : modules whose import registers kinds of jobs.
+    """
+
+    data_dir: Path = field(default_factory=lambda: Path.home() / ".sagittal")
+    host: str = "127.0.0.1"
+    port: int = 8000
+    allowed_hosts: tuple[str, ...] = ()
+    behind_tls: bool = False
+    max_file_bytes: int = 500 * MB
+    max_set_bytes: int = 1000 * MB
+    max_files: int = 200
+    min_free_bytes: int = 200 * MB
+    workers: int = 1
+    lease_s: float = 15.0
+    job_timeout_s: float = 1800.0
+    child_memory_bytes: int = 8000 * MB
+    sweep_grace_s: float = 3600.0
+    idle_minutes: float = 15.0
+    absolute_hours: float = 12.0
+    task_modules: tuple[str, ...] = ("server.jobs.tasks",)
+
+    def __post_init__(self) -> None:
+        _require(0 <= self.port <= 65535, "port", self.port, "0 to 65535 (0 = any free port)")
+        _require(self.workers >= 0, "workers", self.workers, "0 or more")
+        for name in ("lease_s", "job_timeout_s", "idle_minutes", "absolute_hours"):
+            _require(getattr(self, name) > 0, name, getattr(self, name), "more than 0")
+        for name in ("max_file_bytes", "max_set_bytes", "max_files"):
+            _require(getattr(self, name) >= 1, name, getattr(self, name), "1 or more")
+        for name in ("min_free_bytes", "child_memory_bytes", "sweep_grace_s"):
+            _require(getattr(self, name) >= 0, name, getattr(self, name), "0 or more")
+        if self.host not in LOOPBACK and not self.behind_tls:
+            raise SettingsError(
+                f"host is '{self.host}': patients' data would cross the network unencrypted. Put a TLS proxy "
+                "in front and set SAGITTAL_BEHIND_TLS=1, or listen on 127.0.0.1."
+            )
+
+    @property
+    def secure_cookies(self) -> bool:
+        """Whether cookies carry `Secure` (browsers drop those on plain http)."""
+        return self.behind_tls
+
+    @property
+    def hosts(self) -> tuple[str, ...]:
+        """Every host name a request may carry."""
+        return (*LOOPBACK, *self.allowed_hosts)
+
+    @property
+    def database(self) -> Path:
+        """The SQLite file."""
+        return self.data_dir / "sagittal.db"
+
+    @property
+    def blobs(self) -> Path:
+        """Folder of the content-addressed files."""
+        return self.data_dir / "blobs"
+
+    @property
+    def cache(self) -> Path:
+        """Folder of compiled kernels; may be deleted at any time."""
+        return self.data_dir / "cache"
+
+    @property
+    def lock(self) -> Path:
+        """The file whose lock says that a server is running on this data folder."""
+        return self.data_dir / "server.lock"
+
+    def environment(self) -> dict[str, str]:
+        """These settings as environment variables, for a process started by us."""
+        return {_variable(f.name): _text(getattr(self, f.name)) for f in dataclasses.fields(self)}
+
+
+def load_settings(
+    given: Mapping[str, object] | None = None, environment: Mapping[str, str] | None = None
+) -> Settings:
+    """Merge command line (None = not given), environment and defaults.
+
+    Raises
+    ------
+    SettingsError
+        a value cannot be read or is outside its domain.
+    """
+    env = os.environ if environment is None else environment
+    values: dict[str, object] = {}
+    for f in dataclasses.fields(Settings):
+        text = env.get(_variable(f.name))
+        if text is not None:
+            values[f.name] = _parse(f.name, str(f.type), text)
+    values |= {name: value for name, value in (given or {}).items() if value is not None}
+    if "data_dir" in values:
+        values["data_dir"] = Path(str(values["data_dir"])).expanduser().absolute()
+    return Settings(**values)  # type: ignore[arg-type]
+
+
+def _variable(name: str) -> str:
+    return "SAGITTAL_HOME" if name == "data_dir" else f"SAGITTAL_{name.upper()}"
+
+
+def _text(value: object) -> str:
+    if isinstance(value, bool):
+        return "1" if value else "0"
+    return ",".join(value) if isinstance(value, tuple) else str(value)
+
+
+def _parse(name: str, kind: str, text: str) -> object:
+    try:
+        match kind:
+            case "int":
+                return int(text)
+            case "float":
+                return float(text)
+            case "bool":
+                return {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}[
+                    text.lower()
+                ]
+            case "tuple[str, ...]":
+                return tuple(part.strip() for part in text.split(",") if part.strip())
+            case _:
+                return text
+    except (ValueError, KeyError):
+        raise SettingsError(f"{_variable(name)} is '{text}', expected {kind}.") from None
+
+
+def _require(ok: bool, name: str, value: object, domain: str) -> None:
+    if not ok:
+        raise SettingsError(f"{name} is {value}, expected {domain}.")

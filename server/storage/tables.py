@@ -1,0 +1,280 @@
+"""All tables, in portable types: string ids (uuid4 hex), JSON, UTC times, CHECK constraints, no native enums.
+
+Nothing is deleted by cascade (RESTRICT everywhere): clinical rows leave only through services/erasure.py.
+
+patient ─< session ─< recording ─< recording_file          user ─< login_session, one_time_token
+                          ├──< analysis ─< analysis_file    audit (append-only, refers to nothing)
+                          └──< job ─── analysis
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import uuid
+from collections.abc import Sequence
+
+from sqlalchemy import (
+    DDL,
+    JSON,
+    Boolean,
+    CheckConstraint,
+    Column,
+    Date,
+    DateTime,
+    Dialect,
+    Float,
+    ForeignKey,
+    Index,
+    Integer,
+    MetaData,
+    String,
+    Table,
+    Text,
+    TypeDecorator,
+    UniqueConstraint,
+    event,
+    text,
+)
+
+SEXES = ("female", "male")
+ROLES = ("admin", "clinician", "assistant", "viewer")
+RECORDING_STATES = ("draft", "ready", "failed")
+JOB_STATES = ("queued", "running", "done", "failed", "cancelled")
+ACTIVE_STATES = ("queued", "running")
+TOKEN_PURPOSES = ("set_up", "sign_in")
+
+
+def new_id() -> str:
+    """A fresh random id: 32 hex digits of a uuid4."""
+    return uuid.uuid4().hex
+
+
+def now() -> dt.datetime:
+    """The time as tables keep it: aware, UTC."""
+    return dt.datetime.now(dt.UTC)
+
+
+class Utc(TypeDecorator[dt.datetime]):
+    """An aware time, stored as UTC; naive times are refused."""
+
+    impl = DateTime(timezone=True)
+    cache_ok = True
+
+    def process_bind_param(self, value: dt.datetime | None, dialect: Dialect) -> dt.datetime | None:
+        """Refuse a naive time, store UTC."""
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError(f"{value} has no time zone; give an aware time.")
+        utc = value.astimezone(dt.UTC)
+        return utc.replace(tzinfo=None) if dialect.name == "sqlite" else utc
+
+    def process_result_value(self, value: dt.datetime | None, dialect: Dialect) -> dt.datetime | None:
+        """Give back an aware UTC time."""
+        if value is None:
+            return None
+        return value.replace(tzinfo=dt.UTC) if value.tzinfo is None else value.astimezone(dt.UTC)
+
+
+metadata = MetaData(
+    naming_convention={
+        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+        "ck": "ck_%(table_name)s_%(constraint_name)s",
+        "fk": "fk_%(table_name)s_%(column_0_N_name)s_%(referred_table_name)s",
+        "pk": "pk_%(table_name)s",
+    }
+)
+
+Json = JSON(none_as_null=True)
+
+
+def _id() -> Column[str]:
+    return Column("id", String(32), primary_key=True)
+
+
+def _ref(name: str, target: str, *, nullable: bool = False, index: bool = True) -> Column[str]:
+    key = ForeignKey(f"{target}.id", ondelete="RESTRICT")
+    return Column(name, String(32), key, nullable=nullable, index=index)
+
+
+def _one_of(column: str, values: Sequence[str]) -> CheckConstraint:
+    quoted = ", ".join(f"'{v}'" for v in values)
+    return CheckConstraint(f"{column} IN ({quoted})", name=column)
+
+
+patient = Table(
+    "patient",
+    metadata,
+    _id(),
+    Column("code", String(64), nullable=False, unique=True),  # the clinic's pseudonym, shown everywhere
+    Column("sex", String(8)),
+    Column("birth_year", Integer),
+    Column("height_m", Float),
+    Column("note", Text, nullable=False, server_default=""),
+    Column("created_at", Utc, nullable=False),
+    _one_of("sex", SEXES),
+    CheckConstraint("birth_year BETWEEN 1850 AND 2200", name="birth_year"),
+    CheckConstraint("height_m BETWEEN 0.5 AND 2.5", name="height_m"),
+)
+
+session = Table(
+    "session",
+    metadata,
+    _id(),
+    _ref("patient_id", "patient"),
+    Column("title", String(200), nullable=False),
+    Column("performed_on", Date, nullable=False),
+    Column("protocol", String(32), nullable=False),
+    Column("height_m", Float),
+    Column("note", Text, nullable=False, server_default=""),
+    Column("created_at", Utc, nullable=False),
+    CheckConstraint("height_m BETWEEN 0.5 AND 2.5", name="height_m"),
+)
+
+recording = Table(
+    "recording",
+    metadata,
+    _id(),
+    _ref("session_id", "session"),
+    Column("state", String(8), nullable=False),
+    Column("manifest", Json),  # the mapping as last confirmed; every analysis keeps its own copy
+    Column("inspection", Json),  # what was found in the files, before any mapping
+    Column("created_at", Utc, nullable=False),
+    _one_of("state", RECORDING_STATES),
+)
+
+recording_file = Table(
+    "recording_file",
+    metadata,
+    Column("recording_id", ForeignKey("recording.id", ondelete="RESTRICT"), primary_key=True),
+    Column("name", String(500), primary_key=True),  # as uploaded, with its folders; any Unicode
+    Column("size", Integer, nullable=False),
+    Column("sha256", String(64), nullable=False, index=True),
+    Column("added_at", Utc, nullable=False),
+    CheckConstraint("size >= 0", name="size"),
+)
+
+user = Table(
+    "user",
+    metadata,
+    _id(),
+    Column("name", String(64), nullable=False, unique=True),  # sign-in name, lower case
+    Column("display_name", String(200), nullable=False),
+    Column("role", String(16), nullable=False),
+    Column("password_hash", String(255)),  # None until the set-up link was used
+    Column("active", Boolean, nullable=False),
+    Column("created_at", Utc, nullable=False),
+    _one_of("role", ROLES),
+)
+
+login_session = Table(
+    "login_session",
+    metadata,
+    Column("token_sha256", String(64), primary_key=True),  # the token itself is only in the browser's cookie
+    _ref("user_id", "user"),
+    Column("created_at", Utc, nullable=False),
+    Column("last_seen_at", Utc, nullable=False),
+    Column("expires_at", Utc, nullable=False),
+)
+
+one_time_token = Table(
+    "one_time_token",
+    metadata,
+    Column("token_sha256", String(64), primary_key=True),
+    _ref("user_id", "user", nullable=True),  # None: the first administrator, who does not exist yet
+    Column("purpose", String(16), nullable=False),
+    Column("expires_at", Utc, nullable=False),
+    Column("used_at", Utc),
+    _one_of("purpose", TOKEN_PURPOSES),
+)
+
+job = Table(
+    "job",
+    metadata,
+    Column("seq", Integer, primary_key=True, autoincrement=True),  # order of submission
+    Column("id", String(32), nullable=False, unique=True),
+    Column(
+        "key", String(300), nullable=False
+    ),  # what is computed; at most one live or successful job per key
+    Column("kind", String(32), nullable=False),
+    _ref("recording_id", "recording", nullable=True),
+    _ref("requested_by", "user", nullable=True),
+    Column("params", Json, nullable=False),
+    Column("priority", Integer, nullable=False),  # smaller first
+    Column("state", String(16), nullable=False),
+    Column("attempt", Integer, nullable=False),  # number of claims: the fence
+    Column("deaths", Integer, nullable=False),  # claims that ended without a word
+    Column("worker", String(100)),
+    Column("lease_until", Utc),
+    Column("cancel_requested", Boolean, nullable=False),
+    Column("stage", String(64)),
+    Column("fraction", Float),
+    Column("message", String(500)),
+    Column("error_code", String(64)),
+    Column("error_message", Text),
+    Column("created_at", Utc, nullable=False),
+    Column("started_at", Utc),
+    Column("finished_at", Utc),
+    _one_of("state", JOB_STATES),
+    CheckConstraint("fraction BETWEEN 0 AND 1", name="fraction"),
+    CheckConstraint("(state = 'running') = (lease_until IS NOT NULL AND worker IS NOT NULL)", name="lease"),
+    CheckConstraint("(state = 'failed') = (error_code IS NOT NULL)", name="error"),
+    CheckConstraint(
+        "(state IN ('done', 'failed', 'cancelled')) = (finished_at IS NOT NULL)", name="finished"
+    ),
+)
+
+_LIVE_OR_DONE = text("state IN ('queued', 'running', 'done')")
+Index("uq_job_key", job.c.key, unique=True, sqlite_where=_LIVE_OR_DONE, postgresql_where=_LIVE_OR_DONE)
+Index("ix_job_state", job.c.state, job.c.priority, job.c.seq)
+
+analysis = Table(
+    "analysis",
+    metadata,
+    _id(),
+    _ref("recording_id", "recording"),
+    Column("job_id", ForeignKey("job.id", ondelete="RESTRICT"), nullable=False),
+    Column("input_sha256", String(64), nullable=False),
+    Column("config_sha256", String(64), nullable=False),
+    Column("code_version", String(64), nullable=False),
+    Column("manifest", Json),
+    Column("config", Json, nullable=False),
+    Column("created_at", Utc, nullable=False),
+    UniqueConstraint("job_id"),  # one job, one visible result
+)
+
+analysis_file = Table(
+    "analysis_file",
+    metadata,
+    Column("analysis_id", ForeignKey("analysis.id", ondelete="RESTRICT"), primary_key=True),
+    Column("name", String(100), primary_key=True),
+    Column("size", Integer, nullable=False),
+    Column("sha256", String(64), nullable=False, index=True),
+    CheckConstraint("size >= 0", name="size"),
+)
+
+audit = Table(
+    "audit",
+    metadata,
+    Column("seq", Integer, primary_key=True, autoincrement=True),
+    Column("at", Utc, nullable=False),
+    Column("user_id", String(32)),  # no foreign key: the trail outlives everything it speaks of
+    Column("user_name", String(64)),
+    Column("action", String(64), nullable=False),
+    Column("resource", String(32), nullable=False),
+    Column("resource_id", String(64)),
+    Column("detail", Json, nullable=False),
+    Column("previous", String(64), nullable=False),
+    Column("hash", String(64), nullable=False, unique=True),
+    sqlite_autoincrement=True,  # a removed last row leaves a hole that `check` sees
+)
+Index("ix_audit_resource", audit.c.resource, audit.c.resource_id)
+
+AUDIT_TRIGGERS = tuple(
+    f"CREATE TRIGGER audit_no_{verb.lower()} BEFORE {verb} ON audit "
+    "BEGIN SELECT RAISE(ABORT, 'audit rows are append-only'); END"
+    for verb in ("UPDATE", "DELETE")
+)
+for _trigger in AUDIT_TRIGGERS:
+    event.listen(audit, "after_create", DDL(_trigger).execute_if(dialect="sqlite"))  # type: ignore[no-untyped-call]
