@@ -1,1 +1,1 @@
-"""Passwords, login sessions, roles, CSRF."""
+"""Who is asking, from where, and what that person may do."""

@@ -1,0 +1,45 @@
+"""The door of every route: a dependency that declares the route's action and lets in only who may do it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+from server.auth.cookie import read_token
+from server.auth.identity import Identity
+from server.auth.roles import PUBLIC, Action
+from server.problems import SENTENCES, Problem
+
+
+class Door:
+    """Dependency of one route; `action` is what the walk over all routes reads."""
+
+    def __init__(self, action: Action) -> None:
+        self.action = action
+
+    def __call__(self, connection: HTTPConnection) -> Identity | None:
+        """Return who is asking; raise Problem 401 without a sign-in and 403 without the right."""
+        identity = identify(connection)
+        if self.action in PUBLIC:
+            return identity
+        if identity is None:
+            raise Problem(401, "not_signed_in", SENTENCES["not_signed_in"])
+        if not identity.may(self.action):
+            raise Problem(403, "forbidden", SENTENCES["forbidden"])
+        return identity
+
+
+def require(action: Action) -> Any:
+    """Declare a route's action: `who: Annotated[Identity, require(Action.READ_SESSION)]`, http and websocket."""
+    return Depends(Door(action))
+
+
+def identify(connection: HTTPConnection) -> Identity | None:
+    """Return who is signed in on this connection, None when nobody is."""
+    token = read_token(connection)
+    if token is None:
+        return None
+    identity: Identity | None = connection.app.state.logins.find(token)
+    return identity

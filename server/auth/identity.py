@@ -1,0 +1,28 @@
+"""A signed-in person, as one request knows him or her."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from server.auth.roles import Action, Role, may
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Who is asking.
+
+    Parameters
+    ----------
+    user_id, name, display_name, role : the account.
+    login_id : which sign-in this is (two browsers of one person are two); the hash of its token.
+    """
+
+    user_id: str
+    name: str
+    display_name: str
+    role: Role
+    login_id: str
+
+    def may(self, action: Action) -> bool:
+        """Tell whether this person's role allows the action; pages ask it what to offer."""
+        return may(self.role, action)

@@ -1,0 +1,45 @@
+"""Passwords: argon2id, at most two at a time, and the same cost whether or not the account exists."""
+
+from __future__ import annotations
+
+import threading
+
+from pwdlib import PasswordHash
+from pwdlib.exceptions import PwdlibError
+from pwdlib.hashers.argon2 import Argon2Hasher
+
+from server.problems import Problem
+
+MIN_LENGTH = 12  # OWASP ASVS 4.0.3, 2.1.1
+MAX_LENGTH = 128  # OWASP ASVS 4.0.3, 2.1.2
+
+# argon2id m=64 MiB, t=3, p=4 (RFC 9106 §4, second recommended option) are the hasher's defaults
+_HASHER = PasswordHash((Argon2Hasher(),))
+# each hash takes 64 MiB: without a bound a burst of sign-ins would take the machine's memory
+_SLOTS = threading.BoundedSemaphore(2)
+_UNKNOWN = _HASHER.hash("no account has this hash")
+
+
+def hash_password(password: str) -> str:
+    """Return the argon2id hash of a new password; raise Problem when it is too short or too long."""
+    if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
+        raise Problem(
+            422,
+            "weak_password",
+            f"A password needs {MIN_LENGTH} to {MAX_LENGTH} characters; this one has {len(password)}. "
+            "A few unrelated words make a good one.",
+        )
+    with _SLOTS:
+        return _HASHER.hash(password)
+
+
+def verify_password(password: str, stored: str | None) -> bool:
+    """Tell whether the password is right; None (no such account) takes as long as a wrong password."""
+    if len(password) > MAX_LENGTH:
+        password = ""
+    with _SLOTS:
+        try:
+            right = _HASHER.verify(password, stored or _UNKNOWN)
+        except PwdlibError:
+            return False
+    return right and stored is not None

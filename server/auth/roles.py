@@ -1,0 +1,72 @@
+"""The one policy table: which role may do what; what is not in it is refused."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Role(StrEnum):
+    """What a person is in this clinic."""
+
+    ADMIN = "admin"
+    CLINICIAN = "clinician"
+    ASSISTANT = "assistant"
+    """Uploads recordings and sees what was found in them, not the results."""
+    VIEWER = "viewer"
+
+
+class Action(StrEnum):
+    """What a route does; every route declares exactly one."""
+
+    SIGN_IN = "sign_in"
+    SET_UP = "set_up"
+    CHECK_HEALTH = "check_health"
+    LOAD_ASSET = "load_asset"
+    USE_ACCOUNT = "use_account"
+    READ_API = "read_api"
+    READ_PATIENT = "read_patient"
+    WRITE_PATIENT = "write_patient"
+    DELETE_PATIENT = "delete_patient"
+    READ_SESSION = "read_session"
+    CREATE_SESSION = "create_session"
+    WRITE_SESSION = "write_session"
+    UPLOAD = "upload"
+    ANALYSE = "analyse"
+    READ_RESULT = "read_result"
+    READ_JOB = "read_job"
+    CANCEL_JOB = "cancel_job"
+    MANAGE_USERS = "manage_users"
+    READ_AUDIT = "read_audit"
+
+
+PUBLIC: frozenset[Action] = frozenset({Action.SIGN_IN, Action.SET_UP, Action.CHECK_HEALTH, Action.LOAD_ASSET})
+"""Actions that need no sign-in; all others do."""
+
+_ALL = frozenset(Role)
+_CLINICAL = frozenset({Role.ADMIN, Role.CLINICIAN})
+_UPLOADERS = _CLINICAL | {Role.ASSISTANT}
+_READERS = _CLINICAL | {Role.VIEWER}
+_ADMIN = frozenset({Role.ADMIN})
+
+POLICY: dict[Action, frozenset[Role]] = {
+    Action.USE_ACCOUNT: _ALL,
+    Action.READ_API: _ALL,
+    Action.READ_PATIENT: _ALL,
+    Action.WRITE_PATIENT: _CLINICAL,
+    Action.DELETE_PATIENT: _CLINICAL,
+    Action.READ_SESSION: _ALL,
+    Action.CREATE_SESSION: _UPLOADERS,
+    Action.WRITE_SESSION: _CLINICAL,
+    Action.UPLOAD: _UPLOADERS,
+    Action.ANALYSE: _CLINICAL,
+    Action.READ_RESULT: _READERS,
+    Action.READ_JOB: _ALL,
+    Action.CANCEL_JOB: _UPLOADERS,
+    Action.MANAGE_USERS: _ADMIN,
+    Action.READ_AUDIT: _ADMIN,
+}
+
+
+def may(role: Role, action: Action) -> bool:
+    """Tell whether a signed-in person with this role may do this; an action without a row is refused."""
+    return action in PUBLIC or role in POLICY.get(action, frozenset())

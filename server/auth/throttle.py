@@ -1,0 +1,72 @@
+"""Counts failed sign-ins per account and per address, so that guessing passwords takes years."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import defaultdict, deque
+from collections.abc import Callable
+
+from server.problems import Problem
+
+WINDOW_S = 15 * 60.0
+MAX_PER_ACCOUNT = 10
+MAX_PER_ADDRESS = 30
+# NIST SP 800-63B §5.2.2 allows at most 100 failures in a row; a clinic shares one address, hence two limits
+_MAX_KEYS = 10_000
+
+
+class Throttle:
+    """Sliding window over failures; in memory, because one process serves the web."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._failures: defaultdict[tuple[str, str], deque[float]] = defaultdict(deque)
+
+    def check(self, account: str, address: str) -> None:
+        """Raise Problem 429 with Retry-After while one of the two has failed too often."""
+        now = self._clock()
+        with self._lock:
+            wait = max(
+                self._wait(("account", account), MAX_PER_ACCOUNT, now),
+                self._wait(("address", address), MAX_PER_ADDRESS, now),
+            )
+        if wait > 0:
+            seconds = int(wait) + 1
+            minutes = -(-seconds // 60)
+            raise Problem(
+                429,
+                "too_many_attempts",
+                f"Too many failed attempts. Wait {minutes} min and try again, or ask an administrator.",
+                headers={"Retry-After": str(seconds)},
+            )
+
+    def fail(self, account: str, address: str) -> None:
+        """Count one failure of this account from this address."""
+        now = self._clock()
+        with self._lock:
+            if len(self._failures) > _MAX_KEYS:
+                self._forget(now)
+            self._failures["account", account].append(now)
+            self._failures["address", address].append(now)
+
+    def succeed(self, account: str) -> None:
+        """Forget the failures of an account whose owner has just signed in."""
+        with self._lock:
+            self._failures.pop(("account", account), None)
+
+    def _wait(self, key: tuple[str, str], limit: int, now: float) -> float:
+        failures = self._failures.get(key)
+        if failures is None:
+            return 0.0
+        while failures and failures[0] <= now - WINDOW_S:
+            failures.popleft()
+        if not failures:
+            del self._failures[key]
+            return 0.0
+        return failures[-limit] + WINDOW_S - now if len(failures) >= limit else 0.0
+
+    def _forget(self, now: float) -> None:
+        for key in [k for k, times in self._failures.items() if times[-1] <= now - WINDOW_S]:
+            del self._failures[key]

@@ -1,0 +1,184 @@
+"""The one place where an error becomes an answer: RFC 9457 problem+json, or a page when a browser wants one."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from fastapi import FastAPI
+from fastapi.exceptions import RequestValidationError
+from jinja2 import TemplateNotFound
+from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.templating import Jinja2Templates
+from starlette.types import Receive, Scope, Send
+from starlette.websockets import WebSocket, WebSocketState
+
+import web
+from core.errors import SagittalError
+from server.auth.headers import add_security_headers
+
+log = logging.getLogger(__name__)
+MEDIA_TYPE = "application/problem+json"
+TEMPLATES = Jinja2Templates(Path(web.__file__).parent / "templates")
+
+
+class Problem(Exception):  # noqa: N818 - the name RFC 9457 gives to this thing
+    """A refusal with its HTTP status, a stable code and a sentence that says what to do."""
+
+    def __init__(
+        self,
+        status: int,
+        code: str,
+        detail: str,
+        *,
+        headers: Mapping[str, str] | None = None,
+        errors: list[dict[str, str]] | None = None,
+    ) -> None:
+        super().__init__(detail)
+        self.status = status
+        self.code = code
+        self.detail = detail
+        self.headers = dict(headers or {})
+        self.errors = errors
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the members of RFC 9457 §3.1 plus `code` and, for bad fields, `errors`."""
+        body: dict[str, Any] = {
+            "type": "about:blank",
+            "title": HTTPStatus(self.status).phrase,
+            "status": self.status,
+            "detail": self.detail,
+            "code": self.code,
+        }
+        if self.errors is not None:
+            body["errors"] = self.errors
+        return body
+
+
+def as_problem(error: Exception) -> Problem:
+    """Translate any exception; what we did not foresee says nothing about its cause."""
+    if isinstance(error, Problem):
+        return error
+    if isinstance(error, SagittalError):
+        return Problem(STATUS_OF_CODE.get(error.code, 422), error.code, error.message)
+    if isinstance(error, RequestValidationError):
+        fields = [
+            {"where": ".".join(str(part) for part in item["loc"]), "message": _without_input(item)}
+            for item in error.errors()
+        ]
+        return Problem(
+            422,
+            "invalid_request",
+            "The request does not have the expected form: "
+            + "; ".join(f"{f['where']}: {f['message']}" for f in fields[:5]),
+            errors=fields,
+        )
+    if isinstance(error, HTTPException):
+        code = CODE_OF_STATUS.get(error.status_code, "http_error")
+        said = str(error.detail)
+        is_bare = said == HTTPStatus(error.status_code).phrase
+        return Problem(
+            error.status_code, code, SENTENCES.get(code, said) if is_bare else said, headers=error.headers
+        )
+    return Problem(500, "internal_error", SENTENCES["internal_error"])
+
+
+def problem_response(problem: Problem, connection: HTTPConnection) -> Response:
+    """Answer with JSON, or for a browser's page request with a page (401: with the sign-in page)."""
+    if _wants_page(connection):
+        if problem.status == HTTPStatus.UNAUTHORIZED:
+            path = connection.url.path + (f"?{connection.url.query}" if connection.url.query else "")
+            return RedirectResponse(f"/sign-in?next={quote(path)}", status_code=303)
+        try:
+            return TEMPLATES.TemplateResponse(
+                Request(connection.scope),
+                "error.html",
+                {"problem": problem.to_json()},
+                status_code=problem.status,
+                headers=problem.headers,
+            )
+        except TemplateNotFound:
+            log.warning("error page template is missing; answering with JSON")
+    return JSONResponse(problem.to_json(), problem.status, problem.headers, MEDIA_TYPE)
+
+
+async def send_problem(problem: Problem, scope: Scope, receive: Receive, send: Send) -> None:
+    """Refuse a request from inside a middleware; a websocket is refused before it is accepted (HTTP 403)."""
+    if scope["type"] == "websocket":
+        await refuse_websocket(WebSocket(scope, receive, send), problem)
+    else:
+        await problem_response(problem, HTTPConnection(scope))(scope, receive, send)
+
+
+async def refuse_websocket(websocket: WebSocket, problem: Problem) -> None:
+    """Refuse with the problem's own status where the server can, else by closing (uvicorn answers 403)."""
+    if websocket.application_state is not WebSocketState.CONNECTING:
+        await websocket.close(1008, problem.code)
+    elif "websocket.http.response" in websocket.scope.get("extensions", {}):
+        body = JSONResponse(problem.to_json(), problem.status, problem.headers, MEDIA_TYPE)
+        await websocket.send_denial_response(body)
+    else:
+        await websocket.close(1008, problem.code)
+
+
+def install(app: FastAPI) -> None:
+    """Register the one handler for everything an endpoint may raise."""
+
+    async def handle(connection: HTTPConnection, error: Exception) -> Response | None:
+        problem = as_problem(error)
+        if isinstance(connection, WebSocket):
+            await refuse_websocket(connection, problem)
+            return None
+        response = problem_response(problem, connection)
+        # Starlette answers 500 outside of all middleware
+        add_security_headers(response.headers)
+        return response
+
+    for kind in (Problem, SagittalError, RequestValidationError, HTTPException, Exception):
+        app.add_exception_handler(kind, handle)  # type: ignore[arg-type]
+
+
+def _wants_page(connection: HTTPConnection) -> bool:
+    if connection.scope["type"] != "http" or connection.url.path.startswith(
+        ("/api/", "/health/", "/static/")
+    ):
+        return False
+    return "text/html" in connection.headers.get("accept", "")
+
+
+def _without_input(item: Mapping[str, Any]) -> str:
+    # pydantic's text of a failed validator may quote the value, and the value may be a patient's name
+    message = str(item["msg"])
+    return message if item["type"] != "value_error" or item.get("ctx") is None else str(item["ctx"]["error"])
+
+
+STATUS_OF_CODE: dict[str, int] = {}
+"""Status of the service errors that are not plain bad input (422)."""
+
+CODE_OF_STATUS = {
+    400: "bad_request",
+    401: "not_signed_in",
+    403: "forbidden",
+    404: "not_found",
+    405: "method_not_allowed",
+    413: "too_large",
+    415: "unsupported_media_type",
+    422: "invalid_request",
+    429: "too_many_attempts",
+    503: "unavailable",
+}
+
+SENTENCES = {
+    "bad_request": "The request could not be read. Check that its body is valid and complete.",
+    "not_signed_in": "You are not signed in, or the session has ended. Sign in and try again.",
+    "forbidden": "Your role does not allow this. Ask an administrator if you need it.",
+    "not_found": "There is nothing at this address, or it has been deleted.",
+    "method_not_allowed": "This address does not offer that method. See /api/v1/openapi.json for what it offers.",
+    "internal_error": "Something went wrong on the server. The server's log has the details; try again.",
+}
