@@ -1,12 +1,36 @@
-"""Joint angles: one sequence, one sign table (spec/clinic.md §1)."""
+"""Joint angles: one sequence, one sign table (spec/clinic.md §1, spec/estimators.md §1).
+
+Joints: R = R_proximalᵀ R_distal = Rz(a) Rx(b) Ry(c), the joint coordinate system of Grood and Suntay 1983 in
+ISB frames: a about the proximal medio-lateral axis, b about the floating axis, c about the distal long axis.
+Pelvis: R_W_neutralᵀ R_pelvis = Ry(rotation) Rx(b) Rz(tilt), intrinsic Y-X-Z (Baker 2001), so that tilt and
+obliquity do not depend on the direction of walking.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import radians
+from typing import Final
+
+import numpy as np
 
 from core.errors import Notice
-from core.frames import Floats
+from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
+from core.fusion.orientations import Orientations
+from core.rest import Window, samples
+from core.rotation import conjugate, from_matrix, multiply, to_matrix
+
+GIMBAL_LIMIT: Final = radians(80.0)
+"""|b| beyond which a and c cannot be told apart (spec/fusion.md §7)."""
+
+SIGNS: Final[dict[str, tuple[tuple[str, float, float], ...]]] = {
+    "hip": (("hip_flexion", 1, 1), ("hip_adduction", 1, -1), ("hip_rotation", 1, -1)),
+    "knee": (("knee_flexion", -1, -1), ("knee_adduction", 1, -1), ("knee_rotation", 1, -1)),
+    "ankle": (("ankle_dorsiflexion", 1, 1), ("ankle_inversion", 1, -1), ("ankle_rotation", 1, -1)),
+}
+"""Joint → (name, sign right, sign left) of a, b, c. Positive: flexion, dorsiflexion, adduction, varus, inversion,
+internal rotation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,6 +42,7 @@ class JointAngles:
     angles : name → (n,), names as in the exports without the unit: "pelvis_tilt", "pelvis_obliquity",
         "hip_flexion_l", "hip_adduction_l", "hip_rotation_l", "knee_flexion_l", "knee_adduction_l",
         "knee_rotation_l", "ankle_dorsiflexion_l", "ankle_inversion_l", "ankle_rotation_l", right alike.
+        Pelvis tilt: anterior positive. Pelvis obliquity: right side up is positive.
         Zero is the mean over the calibration's standing window.
     zero_offset : name → rad that was subtracted (the raw standing angle).
     zero : "standing" (the only zero so far).
@@ -29,3 +54,92 @@ class JointAngles:
     zero: str = "standing"
     notices: tuple[Notice, ...] = ()
     diagnostics: Mapping[str, object] = field(default_factory=dict)
+
+
+def joint_angles(orientations: Orientations, zero: Window) -> JointAngles:
+    """Angles of every joint whose two segments are there, zeroed on the mean over the standing window.
+
+    Parameters
+    ----------
+    orientations : segment orientations in W.
+    zero : window whose mean angles are subtracted, seconds.
+
+    Returns
+    -------
+    JointAngles; a joint with a missing segment has no entry and a notice `joint_missing`, a joint whose |b|
+    passes 80° a notice `gimbal`.
+    """
+    raw: dict[str, Floats] = {}
+    notices: list[Notice] = []
+    if "pelvis" in orientations.q:
+        tilt, obliquity = pelvis_angles(orientations.q["pelvis"])
+        lost = ~orientations.valid["pelvis"]
+        for name, value in (("pelvis_tilt", tilt), ("pelvis_obliquity", obliquity)):
+            raw[name] = np.where(lost, np.nan, value)
+    for side in SIDES:
+        for joint, proximal, distal in joints(side):
+            missing = [s for s in (proximal, distal) if s not in orientations.q]
+            if missing:
+                message = (
+                    f"{side} {joint}: no angles, no sensor on {' and '.join(missing)}; wear one or map one to it."
+                )
+                notices.append(Notice("joint_missing", message, sensor=missing[0]))
+                continue
+            ok = orientations.valid[proximal] & orientations.valid[distal]
+            abc = cardan_zxy(multiply(conjugate(orientations.q[proximal]), orientations.q[distal]))
+            notices += _gimbal(abc[:, 1], ok, side, joint, orientations.t_s)
+            for (name, right, left), value in zip(SIGNS[joint], abc.T, strict=True):
+                sign = right if side == "right" else left
+                raw[f"{name}_{SUFFIX[side]}"] = np.where(ok, sign * value, np.nan)
+    part = samples(zero, orientations.rate_hz)
+    offset = {name: _circular_mean(value[part]) for name, value in raw.items()}
+    angles = {name: _wrap(value - offset[name]) for name, value in raw.items()}
+    return JointAngles(orientations.t_s, angles, offset, notices=tuple(notices))
+
+
+def joints(side: Side) -> tuple[tuple[str, Segment, Segment], ...]:
+    """Joints of one leg as (joint, proximal segment, distal segment)."""
+    return (
+        ("hip", "pelvis", THIGH[side]),
+        ("knee", THIGH[side], SHANK[side]),
+        ("ankle", SHANK[side], FOOT[side]),
+    )
+
+
+def cardan_zxy(q: Floats) -> Floats:
+    """Angles (..., 3) = (a, b, c) in rad of q (..., 4) = Rz(a) Rx(b) Ry(c) (spec/estimators.md §1)."""
+    R = to_matrix(q)
+    a = np.arctan2(-R[..., 0, 1], R[..., 1, 1])
+    b = np.arcsin(np.clip(R[..., 2, 1], -1.0, 1.0))
+    c = np.arctan2(-R[..., 2, 0], R[..., 2, 2])
+    return np.stack((a, b, c), axis=-1)
+
+
+def pelvis_angles(q: Floats) -> tuple[Floats, Floats]:
+    """Anterior tilt and obliquity (right side up) in rad of the pelvis q (..., 4) in W (clinic.md §1)."""
+    R = to_matrix(multiply(conjugate(from_matrix(R_NEUTRAL)), q))
+    tilt = -np.arctan2(R[..., 1, 0], R[..., 1, 1])
+    obliquity = -np.arcsin(np.clip(-R[..., 1, 2], -1.0, 1.0))
+    return np.asarray(tilt), np.asarray(obliquity)
+
+
+def _gimbal(b: Floats, ok: Bools, side: Side, joint: str, t_s: Floats) -> list[Notice]:
+    beyond = ok & (np.abs(b) > GIMBAL_LIMIT)
+    if not beyond.any():
+        return []
+    share = beyond.mean()
+    message = (
+        f"{side} {joint}: the frontal angle passes 80° in {share:.1%} of the take, there flexion and rotation "
+        "cannot be told apart; check which segment each sensor is on."
+    )
+    return [Notice("gimbal", message, t_s=float(t_s[int(np.argmax(beyond))]))]
+
+
+def _circular_mean(x: Floats) -> float:
+    """Mean angle in rad over the finite samples, 0 when there are none."""
+    x = x[np.isfinite(x)]
+    return float(np.arctan2(np.sin(x).mean(), np.cos(x).mean())) if len(x) else 0.0
+
+
+def _wrap(x: Floats) -> Floats:
+    return np.asarray((x + np.pi) % (2 * np.pi) - np.pi)

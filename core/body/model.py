@@ -4,6 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+NOMINAL_HEIGHT_M = 1.70
+"""Body height assumed when nobody gave one (spec/real-data.md: ±5 cm change joint angles by ±0.2°)."""
+
+THIGH_FRACTION, SHANK_FRACTION, ANKLE_FRACTION, FOOT_FRACTION = 0.245, 0.246, 0.039, 0.152
+"""Segment lengths as fractions of body height: Winter 2009, fig 4.1."""
+
+HIP_FRACTION = 0.11
+"""Distance of the hip centres as a fraction of body height (spec/real-data.md §2.7)."""
+
 
 @dataclass(frozen=True)
 class BodyModel:
@@ -22,3 +31,15 @@ class BodyModel:
     ankle_height: float
     foot: float
     estimated: bool
+
+    @classmethod
+    def from_height(cls, height_m: float) -> BodyModel:
+        """Lengths by fractions of body height in m (Winter 2009, fig 4.1), marked estimated."""
+        return cls(
+            hip_width=HIP_FRACTION * height_m,
+            thigh=THIGH_FRACTION * height_m,
+            shank=SHANK_FRACTION * height_m,
+            ankle_height=ANKLE_FRACTION * height_m,
+            foot=FOOT_FRACTION * height_m,
+            estimated=True,
+        )

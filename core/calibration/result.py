@@ -8,9 +8,7 @@ from dataclasses import dataclass, field
 from core.errors import Notice
 from core.frames import Bools, Floats, Segment
 from core.recording import UniformRecording
-
-Window = tuple[float, float]
-"""Half-open time range [start, end) in seconds from recording start."""
+from core.rest import Window as Window  # the calibration's windows are windows of rest and walking
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +37,6 @@ class Calibration:
 
     Parameters
     ----------
-    heading : segment → rad; turns the arbitrary 6-axis world of that sensor about z into the common W.
     rest, walking : windows that were used; `walking` may be several straight parts.
     zero : window whose mean joint angles are subtracted (`angle_zero: standing`).
     turning : (n,) mask on the uniform axis, True while turning.

@@ -1,0 +1,127 @@
+"""Where the sensors are at rest: quiet windows anywhere in a take, for all sensors together or for one.
+
+A sample is quiet when the 1-s window around it has mean |ω − b| below 6 °/s and std |f| below 0.25 m/s²
+(spec/real-data.md §2.1). b is the sensor's own offset, taken from its quietest window instead of the median
+of the take: in a take that is mostly walking the median is a property of the gait, not of the gyroscope.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import radians
+from typing import TypeVar
+
+import numpy as np
+
+from core.frames import Bools, Floats, Segment
+from core.recording import SensorSignals, UniformRecording
+
+A = TypeVar("A", Floats, Bools)
+
+Window = tuple[float, float]
+"""Half-open time range [start, end) in seconds from recording start."""
+
+
+@dataclass(frozen=True)
+class RestParams:
+    """What counts as rest (spec/real-data.md §2.1; shortest window spec/fusion.md §2)."""
+
+    window_s: float = 1.0
+    gyro_limit: float = radians(6.0)
+    acc_std_limit: float = 0.25
+    shortest_s: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Quietness:
+    """How quiet one sensor is around each sample.
+
+    Parameters
+    ----------
+    gyro : (n,) mean |ω − b| over the window in rad/s. acc : (n,) std |f| over the window in m/s².
+    quiet : (n,) both below their limits and every sample of the window valid.
+    """
+
+    gyro: Floats
+    acc: Floats
+    quiet: Bools
+
+
+def quietness(signals: SensorSignals, rate_hz: float, params: RestParams | None = None) -> Quietness:
+    """Measure how quiet a sensor is in the window around every sample; borders hold the nearest window."""
+    params = params or RestParams()
+    width = max(2, round(params.window_s * rate_hz))
+    if len(signals.acc) < width:
+        never = np.full(len(signals.acc), np.inf)
+        return Quietness(never, never, np.zeros(len(signals.acc), bool))
+    mean_rate = _moving_mean(signals.gyr, width)
+    spread = (_moving_mean(signals.gyr**2, width) - mean_rate**2).sum(axis=1)
+    whole = _moving_mean(signals.valid.astype(np.float64)[:, None], width)[:, 0] > 1 - 0.5 / width
+    offset = mean_rate[int(np.argmin(np.where(whole, spread, np.inf)))]
+    if np.linalg.norm(offset) > params.gyro_limit:
+        offset = np.zeros(3)
+    gyro = _moving_mean(np.linalg.norm(signals.gyr - offset, axis=1)[:, None], width)[:, 0]
+    norm = np.linalg.norm(signals.acc, axis=1)[:, None]
+    norm = norm - norm.mean()
+    acc = np.sqrt(np.maximum(_moving_mean(norm**2, width) - _moving_mean(norm, width) ** 2, 0.0))[:, 0]
+    quiet = whole & (gyro < params.gyro_limit) & (acc < params.acc_std_limit)
+    n = len(norm)
+    return Quietness(_centred(gyro, n, width), _centred(acc, n, width), _centred(quiet, n, width))
+
+
+def rest_windows(
+    recording: UniformRecording,
+    params: RestParams | None = None,
+    segments: Iterable[Segment] | None = None,
+) -> tuple[Window, ...]:
+    """Windows in which all sensors (or those of `segments`) are at rest together, in order of time.
+
+    The quarter window at each end of a run that may already hold the onset of movement is left out.
+    """
+    params = params or RestParams()
+    chosen = tuple(recording.sensors if segments is None else segments)
+    if not chosen:
+        return ()
+    quiet = np.ones(len(recording.t_s), bool)
+    for segment in chosen:
+        quiet &= quietness(recording.sensors[segment], recording.rate_hz, params).quiet
+    return windows_of(quiet, recording.rate_hz, params)
+
+
+def windows_of(
+    quiet: Bools, recording: UniformRecording, params: RestParams | None = None
+) -> tuple[Window, ...]:
+    """Turn a mask of quiet window centres into rest windows of at least `shortest_s`."""
+    params = params or RestParams()
+    n = len(quiet)
+    reach = round(0.25 * params.window_s * rate_hz)
+    found = []
+    for start, end in runs(quiet):
+        first, last = max(0, start - reach), min(n, end + reach)
+        if last - first >= params.shortest_s * rate_hz - 1:
+            found.append((first / rate_hz, last / rate_hz))
+    return tuple(found)
+
+
+def runs(mask: Bools) -> list[tuple[int, int]]:
+    """Half-open index ranges of the True runs of a mask (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def samples(window: Window, rate_hz: float) -> slice:
+    """Index range of a time window on the uniform axis."""
+    return slice(max(0, round(window[0] * rate_hz)), max(0, round(window[1] * rate_hz)))
+
+
+def _moving_mean(x: Floats, width: int) -> Floats:
+    """Means (n − width + 1, c) of every full window of x (n, c)."""
+    total = np.concatenate((np.zeros((1, x.shape[1])), np.cumsum(x, axis=0)))
+    return (total[width:] - total[:-width]) / width
+
+
+def _centred(x: A, n: int, width: int) -> A:
+    """Place full-window values at the window centres of an axis of n samples, borders held."""
+    index = np.clip(np.arange(n) - width // 2, 0, len(x) - 1)
+    return x[index]
