@@ -17,12 +17,18 @@ Every message says what was expected, what was found, where (sensor, seconds) an
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
+
+Severity = Literal["info", "warning", "error"]
+"""error: numbers made from it would be wrong, so the analysis stops; warning: they are less certain."""
 
 
 class SagittalError(Exception):
     """Base of all errors that are shown to a person; `code` is stable, the message is a sentence."""
 
-    def __init__(self, code: str, message: str, *, sensor: str | None = None, t_s: float | None = None) -> None:
+    def __init__(
+        self, code: str, message: str, *, sensor: str | None = None, t_s: float | None = None
+    ) -> None:
         super().__init__(message)
         self.code = code
         self.message = message
@@ -82,9 +88,11 @@ class Notice:
     message : one or two sentences: what was found (measured value, limit), what to do.
     sensor : segment or device id it concerns, None for the whole recording.
     t_s : start in seconds from recording start, None if it has no place in time.
+    severity : info, warning or error (see `Severity`).
     """
 
     code: str
     message: str
     sensor: str | None = None
     t_s: float | None = None
+    severity: Severity = "warning"
