@@ -29,8 +29,10 @@ SIGNS: Final[dict[str, tuple[tuple[str, float, float], ...]]] = {
     "knee": (("knee_flexion", -1, -1), ("knee_adduction", 1, -1), ("knee_rotation", 1, -1)),
     "ankle": (("ankle_dorsiflexion", 1, 1), ("ankle_inversion", 1, -1), ("ankle_rotation", 1, -1)),
 }
-"""Joint → (name, sign right, sign left) of a, b, c. Positive: flexion, dorsiflexion, adduction, varus, inversion,
-internal rotation."""
+"""Joint → (name, sign right, sign left) of a, b, c.
+
+Positive: flexion, dorsiflexion; adduction, varus, inversion; internal rotation.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,7 @@ def joint_angles(orientations: Orientations, zero: Window) -> JointAngles:
             missing = [s for s in (proximal, distal) if s not in orientations.q]
             if missing:
                 message = (
-                    f"{side} {joint}: no angles, no sensor on {' and '.join(missing)}; wear one or map one to it."
+                    f"{side} {joint}: no angles, no sensor on {' and '.join(missing)}; wear or map one there."
                 )
                 notices.append(Notice("joint_missing", message, sensor=missing[0]))
                 continue
@@ -129,8 +131,8 @@ def _gimbal(b: Floats, ok: Bools, side: Side, joint: str, t_s: Floats) -> list[N
         return []
     share = beyond.mean()
     message = (
-        f"{side} {joint}: the frontal angle passes 80° in {share:.1%} of the take, there flexion and rotation "
-        "cannot be told apart; check which segment each sensor is on."
+        f"{side} {joint}: the frontal angle passes 80° in {share:.1%} of the take; there flexion and "
+        "rotation cannot be told apart; check which segment each sensor is on."
     )
     return [Notice("gimbal", message, t_s=float(t_s[int(np.argmax(beyond))]))]
 

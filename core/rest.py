@@ -89,9 +89,7 @@ def rest_windows(
     return windows_of(quiet, recording.rate_hz, params)
 
 
-def windows_of(
-    quiet: Bools, recording: UniformRecording, params: RestParams | None = None
-) -> tuple[Window, ...]:
+def windows_of(quiet: Bools, rate_hz: float, params: RestParams | None = None) -> tuple[Window, ...]:
     """Turn a mask of quiet window centres into rest windows of at least `shortest_s`."""
     params = params or RestParams()
     n = len(quiet)

@@ -1,0 +1,192 @@
+"""Tilt and turn of one sensor: the explicit complementary filter, six axes, gyro bias already removed.
+
+Mahony, Hamel and Pflimlin 2008 (IEEE TAC 53(5)), eq 32 with k_I = 0: q̇ = ½ q ⊗ (ω + k_P e), e = a × â, where a is
+the unit specific force and â = R(q)ᵀ e₃ the predicted vertical. The integral term is left out because without
+a magnetometer the bias about the vertical is unobservable and runs away (spec/fusion.md §4.6, rule i); the
+bias is the mean over rest instead. Heading is arbitrary and only as good as the gyroscope.
+
+The module sits beside core/rest.py because calibration needs tilt to find the walking direction and fusion
+needs it for the result; both run this one filter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numba
+import numpy as np
+
+from core.errors import EstimationError, ParameterError
+from core.frames import Bools, Floats
+from core.rotation import multiply, normalise, slerp
+
+
+@dataclass(frozen=True)
+class AttitudeParams:
+    """Gain and gate.
+
+    Parameters
+    ----------
+    kp : 1/s; a tilt error decays with time constant 1/kp. 0.1 is the untuned gain of spec/fusion.md §4.6.
+    relearn_s : shortest invalid stretch after which the tilt is learnt anew (spec/fusion.md §3: ≤ 0.1 s is
+        interpolated upstream and never seen here).
+    """
+
+    kp: float = 0.1
+    relearn_s: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.kp <= 10.0:
+            raise ParameterError("gain_out_of_range", f"kp = {self.kp:g} 1/s is outside 0 to 10.")
+
+
+@dataclass(frozen=True, eq=False)
+class AttitudeState:
+    """What the filter carries from one sample to the next.
+
+    Parameters
+    ----------
+    q : (4,) sensor to world. rate : (3,) rad/s of the last sample. age_s : time since the tilt was (re)learnt,
+    inf when it is known. lost_s : length of the invalid stretch that is going on.
+    """
+
+    q: Floats
+    rate: Floats
+    age_s: float = np.inf
+    lost_s: float = 0.0
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _advance(
+    gyr: Floats, acc: Floats, valid: Bools, dt: float, kp: float, relearn_s: float, x: Floats, out: Floats
+) -> None:
+    """Advance the state x = (q, rate, age, lost) over a block and write q (n, 4)."""
+    w, i, j, k = x[0], x[1], x[2], x[3]
+    rx, ry, rz = x[4], x[5], x[6]
+    age, lost = x[7], x[8]
+    for n in range(gyr.shape[0]):
+        if not valid[n]:
+            # a held rate would spin the segment on for the whole gap: the orientation is held instead
+            lost += dt
+            rx, ry, rz = 0.0, 0.0, 0.0
+            out[n, 0], out[n, 1], out[n, 2], out[n, 3] = w, i, j, k
+            continue
+        if lost > 0.0:
+            if lost > relearn_s:
+                age = 0.0
+            lost = 0.0
+            rx, ry, rz = gyr[n, 0], gyr[n, 1], gyr[n, 2]
+        # the mean of two samples is the rate between them, forwards and backwards alike
+        half = 0.25 * dt
+        px, py, pz = half * (rx + gyr[n, 0]), half * (ry + gyr[n, 1]), half * (rz + gyr[n, 2])
+        rx, ry, rz = gyr[n, 0], gyr[n, 1], gyr[n, 2]
+        square = px * px + py * py + pz * pz
+        if square < 0.01:
+            # series of sin(p)/p and cos(p) for half a turn angle p < 0.1 rad: exact to 3e-14
+            s = 1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0)))
+            c = 1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0)))
+        else:
+            p = np.sqrt(square)
+            s, c = np.sin(p) / p, np.cos(p)
+        px, py, pz = s * px, s * py, s * pz
+        w, i, j, k = (
+            w * c - i * px - j * py - k * pz,
+            w * px + i * c + j * pz - k * py,
+            w * py - i * pz + j * c + k * px,
+            w * pz + i * py - j * px + k * c,
+        )
+        gain = kp
+        if age < np.inf:
+            age += dt
+            if age * kp < 1.0:
+                gain = 1.0 / age
+            else:
+                age = np.inf
+        ax, ay, az = acc[n, 0], acc[n, 1], acc[n, 2]
+        norm = np.sqrt(ax * ax + ay * ay + az * az)
+        if norm > 1.0:
+            # below 1 m/s² a sensor falls freely and shows no vertical (spec/fusion.md §4.1: 0.1 g)
+            g = 0.5 * dt * gain / norm
+            vx = 2.0 * (i * k - w * j)
+            vy = 2.0 * (j * k + w * i)
+            vz = w * w - i * i - j * j + k * k
+            ex, ey, ez = g * (ay * vz - az * vy), g * (az * vx - ax * vz), g * (ax * vy - ay * vx)
+            w, i, j, k = (
+                w - i * ex - j * ey - k * ez,
+                i + w * ex + j * ez - k * ey,
+                j + w * ey - i * ez + k * ex,
+                k + w * ez + i * ey - j * ex,
+            )
+        r = 1.0 / np.sqrt(w * w + i * i + j * j + k * k)
+        w, i, j, k = w * r, i * r, j * r, k * r
+        out[n, 0], out[n, 1], out[n, 2], out[n, 3] = w, i, j, k
+    x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8] = w, i, j, k, rx, ry, rz, age, lost
+
+
+def advance(
+    state: AttitudeState, gyr: Floats, acc: Floats, valid: Bools, rate_hz: float, params: AttitudeParams
+) -> tuple[Floats, AttitudeState]:
+    """Run the filter over a block of samples.
+
+    Parameters
+    ----------
+    gyr, acc : (n, 3) rad/s with the bias removed, m/s². valid : (n,).
+
+    Returns
+    -------
+    q (n, 4) sensor to world after each sample, and the state to go on with. One run over n samples equals any
+    split of it into blocks, bit for bit.
+
+    Raises
+    ------
+    EstimationError `filter_diverged` when a valid sample is not finite.
+    """
+    gyr, acc = np.ascontiguousarray(gyr, np.float64), np.ascontiguousarray(acc, np.float64)
+    x = np.array([*state.q, *state.rate, state.age_s, state.lost_s], np.float64)
+    out = np.empty((len(gyr), 4))
+    _advance(gyr, acc, np.ascontiguousarray(valid), 1.0 / rate_hz, params.kp, params.relearn_s, x, out)
+    if not np.isfinite(x[:7]).all():
+        raise EstimationError(
+            "filter_diverged",
+            "The orientation filter met a sample that is not a number; mark it invalid or interpolate it.",
+        )
+    return out, AttitudeState(x[:4].copy(), x[4:7].copy(), float(x[7]), float(x[8]))
+
+
+def orientation(
+    q_rest: Floats, at: int, gyr: Floats, acc: Floats, valid: Bools, rate_hz: float, params: AttitudeParams
+) -> Floats:
+    """Orientation (n, 4) of a whole take from a known orientation at one sample, without phase lag.
+
+    The filter runs from sample `at` to the end, from there back to the start and forward again; the result is
+    halfway between the last backward and the last forward run. Backwards the rates are negated and the order
+    reversed, which with the mean of two samples as rate is exactly the inverse motion, so that the two runs
+    differ only in what the accelerometer corrected, and its phase lag cancels.
+    """
+
+    def run(q0: Floats, part: slice) -> Floats:
+        sign = -1.0 if part.step == -1 else 1.0
+        w, f, ok = sign * gyr[part], acc[part], valid[part]
+        return advance(AttitudeState(q0, w[0]), w, f, ok, rate_hz, params)[0]
+
+    # without a first sample to step from, the first update of a run would move by one step: it repeats `at`
+    last = run(q_rest, slice(at, None))[-1]
+    backward = run(last, slice(None, None, -1))[::-1]
+    forward = run(backward[0], slice(None))
+    return normalise(slerp(backward, forward, np.full(len(gyr), 0.5)))
+
+
+def warm() -> None:
+    """Compile or load the kernel, so that the first recording does not wait for it."""
+    still = np.zeros((2, 3))
+    up = np.tile([0.0, 0.0, 9.81], (2, 1))
+    advance(
+        AttitudeState(np.array([1.0, 0, 0, 0]), np.zeros(3)),
+        still,
+        up,
+        np.ones(2, bool),
+        100.0,
+        AttitudeParams(),
+    )
