@@ -1,0 +1,40 @@
+// The JSON API as the pages use it. Errors are RFC 9457 problems: a title, a sentence, a stable code.
+export class Problem extends Error {
+  constructor(status, body) {
+    super(body.detail || body.title || `The server answered ${status}.`);
+    this.status = status;
+    this.title = body.title || "That did not work";
+    this.detail = body.detail || "";
+    this.code = body.code || String(status);
+  }
+}
+
+export async function request(method, path, body) {
+  const init = { method, headers: { Accept: "application/json" }, credentials: "same-origin" };
+  if (body !== undefined) {
+    init.headers["Content-Type"] = "application/json";
+    init.body = JSON.stringify(body);
+  }
+  let answer;
+  try {
+    answer = await fetch(path, init);
+  } catch {
+    throw new Problem(0, { title: "No connection to the server", detail: "Nothing was changed. Check the network and try again." });
+  }
+  if (answer.status === 401 && !location.pathname.startsWith("/sign-in")) {
+    location.assign(`/sign-in?next=${encodeURIComponent(location.pathname)}`);
+  }
+  const text = await answer.text();
+  const isJson = (answer.headers.get("Content-Type") || "").includes("json");
+  const data = isJson && text ? JSON.parse(text) : {};
+  if (!answer.ok) throw new Problem(answer.status, data);
+  return data;
+}
+
+// Any element with the parts of a .form-error note shows a problem as title and sentence.
+export function showProblem(note, problem) {
+  note.hidden = false;
+  note.querySelector("[data-title]").textContent = problem.title || "That did not work";
+  note.querySelector("[data-detail]").textContent = problem.detail;
+  note.scrollIntoView({ block: "nearest" });
+}

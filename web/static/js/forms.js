@@ -1,0 +1,63 @@
+// Forms that speak to the API, dialogs, whole-row links and back buttons: behaviour by data attributes, for every page.
+import { request, showProblem } from "./api.js";
+
+const TYPES = { int: (v) => parseInt(v, 10), float: (v) => parseFloat(v.replace(",", ".")), bool: (v) => v === "true" };
+
+function values(form) {
+  const body = {};
+  for (const el of form.elements) {
+    if (!el.name || el.disabled || "skip" in el.dataset) continue;
+    if (el.type === "checkbox") body[el.name] = el.checked;
+    else if (el.value === "" && !el.required) body[el.name] = "keepEmpty" in el.dataset ? "" : null;
+    else body[el.name] = (TYPES[el.dataset.type] || String)(el.value);
+  }
+  return body;
+}
+
+function same(form) {
+  for (const el of form.querySelectorAll("[data-same]")) {
+    const ok = el.value === form.elements[el.dataset.same].value;
+    el.setCustomValidity(ok ? "" : "The two passwords differ.");
+  }
+  return form.reportValidity();
+}
+
+// "/sessions/{id}" is filled from the answer, so a form can lead to what it made.
+const fill = (pattern, data) => pattern.replace(/\{(\w+)\}/g, (_, k) => encodeURIComponent(data[k]));
+
+async function send(form) {
+  const [method, path] = form.dataset.api.split(" ");
+  const note = form.querySelector(".form-error");
+  const buttons = form.querySelectorAll("button");
+  buttons.forEach((b) => (b.disabled = true));
+  form.setAttribute("aria-busy", "true");
+  try {
+    const data = await request(method, path, method === "DELETE" ? undefined : values(form));
+    const then = form.dataset.then;
+    if (then === "reload" || !then) location.reload();
+    else location.assign(fill(then, data));
+  } catch (problem) {
+    buttons.forEach((b) => (b.disabled = false));
+    form.removeAttribute("aria-busy");
+    if (!note) throw problem;
+    showProblem(note, problem);
+  }
+}
+
+document.addEventListener("submit", (e) => {
+  const form = e.target;
+  if (!form.dataset.api) return;
+  e.preventDefault();
+  if (same(form)) send(form);
+});
+document.addEventListener("input", (e) => e.target.matches("[data-same]") && e.target.setCustomValidity(""));
+
+document.addEventListener("click", (e) => {
+  const opener = e.target.closest("[data-open]");
+  if (opener) return document.getElementById(opener.dataset.open).showModal(); // Escape closes, focus returns: native
+  if (e.target.closest("[data-close]")) return e.target.closest("dialog").close();
+  if (e.target.closest("[data-back]")) return history.back();
+  if (e.target.closest("[data-print]")) return window.print();
+  const row = e.target.closest("tr[data-href]");
+  if (row && !e.target.closest("a,button,select,input,label") && !String(getSelection())) location.assign(row.dataset.href);
+});

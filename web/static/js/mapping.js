@@ -1,0 +1,136 @@
+// <sensor-map>: which sensor is on which segment. The selects are the truth; the body is a second way to set them.
+import { request, showProblem } from "./api.js";
+
+const SVG = "http://www.w3.org/2000/svg";
+const PLACES = {
+  pelvis: [150, 236], thigh_r: [121, 312], thigh_l: [179, 312], shank_r: [123, 412], shank_l: [177, 412],
+  foot_r: [116, 484], foot_l: [184, 484], chest: [150, 130],
+};
+const sideOf = (segment) => (segment.endsWith("_l") ? "l" : segment.endsWith("_r") ? "r" : "");
+
+function node(name, attributes, parent) {
+  const el = document.createElementNS(SVG, name);
+  for (const [k, v] of Object.entries(attributes)) el.setAttribute(k, v);
+  parent.append(el);
+  return el;
+}
+
+class SensorMap extends HTMLElement {
+  connectedCallback() {
+    this.rows = [...this.querySelectorAll("tr[data-device]")];
+    this.layer = this.querySelector("[data-sensors]");
+    this.selected = null;
+    for (const row of this.rows) {
+      row.querySelector("select").addEventListener("change", () => this.draw());
+      row.addEventListener("click", () => this.select(row));
+      row.addEventListener("focusin", () => this.select(row));
+    }
+    this.querySelector("[data-swap]").addEventListener("click", () => this.swap());
+    this.querySelector("[data-analyse]")?.addEventListener("click", (e) => this.analyse(e.target.closest("button")));
+    this.draw();
+  }
+
+  segment(row) { return row.querySelector("select").value; }
+  name(segment) { return this.rows[0].querySelector(`option[value="${segment}"]`).textContent; }
+
+  select(row) {
+    if (this.selected === row) return;
+    this.selected = row;
+    for (const r of this.rows) r.classList.toggle("on", r === row);
+    this.draw();
+  }
+
+  swap() {
+    for (const row of this.rows) {
+      const select = row.querySelector("select");
+      const side = sideOf(select.value);
+      if (side) select.value = select.value.slice(0, -1) + (side === "l" ? "r" : "l");
+    }
+    this.draw();
+  }
+
+  place(segment) {
+    const there = this.rows.find((r) => this.segment(r) === segment);
+    if (there && there !== this.selected) return this.select(there);
+    if (!this.selected || there) return;
+    this.selected.querySelector("select").value = segment;
+    this.draw();
+  }
+
+  draw() {
+    const focused = this.layer.contains(document.activeElement) ? document.activeElement.dataset.segment : null;
+    const worn = new Map();
+    const clashes = new Set();
+    for (const row of this.rows) {
+      const segment = this.segment(row);
+      const side = row.querySelector("[data-side]");
+      side.className = `lr ${sideOf(segment) || "none"}`;
+      side.textContent = sideOf(segment).toUpperCase() || "–";
+      row.classList.toggle("unused", !segment);
+      if (!segment) continue;
+      if (worn.has(segment)) clashes.add(segment);
+      worn.set(segment, row);
+    }
+    this.layer.replaceChildren();
+    for (const [segment, [x, y]] of Object.entries(PLACES)) this.mark(segment, x, y, worn.get(segment), clashes.has(segment));
+    if (focused) this.layer.querySelector(`[data-segment=${focused}]`)?.focus();
+    this.report(worn, clashes);
+  }
+
+  mark(segment, x, y, row, clash) {
+    const g = node("g", { class: "slotg", tabindex: 0, role: "button", "data-segment": segment }, this.layer);
+    node("circle", { class: "hit", cx: x, cy: y, r: 26 }, g);
+    if (row) {
+      const on = row === this.selected ? " on" : "";
+      g.setAttribute("class", `sens ${sideOf(segment) || "c"}${clash ? " warn" : ""}${on}`);
+      g.setAttribute("aria-label", `${this.name(segment)}: sensor ${row.dataset.number}`);
+      node("rect", { x: x - 14, y: y - 14, width: 28, height: 28, rx: 7 }, g);
+      node("text", { x, y: y + 4.5, "text-anchor": "middle" }, g).textContent = row.dataset.number;
+    } else {
+      g.setAttribute("aria-label", `${this.name(segment)}: no sensor`);
+      node("rect", { class: "slot", x: x - 13, y: y - 13, width: 26, height: 26, rx: 6 }, g);
+    }
+    g.addEventListener("click", () => this.place(segment));
+    g.addEventListener("keydown", (e) => {
+      if (e.key !== "Enter" && e.key !== " ") return;
+      e.preventDefault();
+      this.place(segment);
+    });
+  }
+
+  report(worn, clashes) {
+    const clash = this.querySelector("[data-clash]");
+    clash.hidden = clashes.size === 0;
+    if (clashes.size) {
+      clash.querySelector("[data-title]").textContent = `Two sensors on one segment: ${[...clashes].map((s) => this.name(s)).join(", ")}`;
+      clash.querySelector("[data-detail]").textContent = "A segment carries one sensor. Set the other one to Not used.";
+    }
+    const feet = worn.has("foot_l") && worn.has("foot_r");
+    const sum = this.querySelector("[data-sum]");
+    sum.textContent = `${worn.size} of ${this.rows.length} sensors placed${feet || !worn.size ? "" : "; without both feet there are no strides"}`;
+    const button = this.querySelector("[data-analyse]");
+    if (button) button.disabled = worn.size === 0 || clashes.size > 0;
+  }
+
+  manifest() {
+    const manifest = JSON.parse(this.getAttribute("manifest") || "{}") || {};
+    manifest.sensors = Object.fromEntries(this.rows.map((r) => [r.dataset.device, this.segment(r) || null]));
+    const height = parseFloat(this.querySelector("#height").value.replace(",", "."));
+    if (Number.isFinite(height)) manifest.subject = { ...manifest.subject, height_m: height };
+    return manifest;
+  }
+
+  async analyse(button) {
+    const session = this.getAttribute("session");
+    if (!this.querySelector("#height").reportValidity()) return;
+    button.disabled = true;
+    try {
+      await request("POST", `/api/v1/sessions/${session}/analyses`, { manifest: this.manifest() });
+      location.assign(`/sessions/${session}`);
+    } catch (problem) {
+      button.disabled = false;
+      showProblem(this.querySelector(".form-error"), problem);
+    }
+  }
+}
+customElements.define("sensor-map", SensorMap);

@@ -1,0 +1,76 @@
+// <job-progress job="…" done="/where"> follows one job by server-sent events: stage names, bar, cancel.
+import { request, showProblem } from "./api.js";
+
+const ENDS = new Set(["done", "failed", "cancelled"]);
+
+class JobProgress extends HTMLElement {
+  connectedCallback() {
+    this.started = Date.parse(this.getAttribute("since")) || Date.now();
+    this.source = new EventSource(`/api/v1/jobs/${this.getAttribute("job")}/events`);
+    this.source.onmessage = (e) => this.show(JSON.parse(e.data));
+    this.source.onerror = () => this.say("Connection lost, trying again…");
+    this.querySelector("[data-cancel]")?.addEventListener("click", () => this.cancel());
+    this.clock = setInterval(() => this.tick(), 1000);
+    this.tick();
+  }
+
+  disconnectedCallback() {
+    this.source?.close();
+    clearInterval(this.clock);
+  }
+
+  tick() {
+    const el = this.querySelector("[data-clock]");
+    if (el) el.textContent = `${Math.max(0, Math.round((Date.now() - this.started) / 1000))} s`;
+  }
+
+  say(text) {
+    const el = this.querySelector("[data-message]");
+    if (el && el.textContent !== text) el.textContent = text;
+  }
+
+  show(job) {
+    if (ENDS.has(job.state)) {
+      this.source.close();
+      clearInterval(this.clock);
+      this.dispatchEvent(new CustomEvent("job-end", { bubbles: true, detail: job }));
+      const target = this.getAttribute(job.state === "done" ? "done" : "failed") || this.getAttribute("done");
+      if (target === "reload" || target === location.pathname) location.reload();
+      else if (target) location.assign(target);
+      return;
+    }
+    const fraction = job.fraction ?? 0;
+    const bar = this.querySelector("progress");
+    if (bar) bar.value = fraction;
+    const percent = this.querySelector("[data-percent]");
+    if (percent) percent.textContent = `${Math.round(100 * fraction)} %`;
+    this.say(job.state === "queued" ? "Waiting for the worker" : job.message || job.stage || "Working");
+    this.markStages(job);
+  }
+
+  // Stages before the current one are done, it runs, the rest wait; unknown names change nothing.
+  markStages(job) {
+    const items = [...this.querySelectorAll("[data-stage]")];
+    const at = items.findIndex((li) => li.dataset.stage === job.stage);
+    if (at < 0) return;
+    items.forEach((li, i) => {
+      const now = i < at ? "ok" : i === at ? "run" : "none";
+      if (li.dataset.now === now) return;
+      li.dataset.now = now;
+      li.querySelector(".state").className = `state ${now}`;
+      li.querySelectorAll("[data-shape]").forEach((s) => (s.hidden = s.dataset.shape !== now));
+    });
+  }
+
+  async cancel() {
+    this.say("Stopping…");
+    try {
+      await request("POST", `/api/v1/jobs/${this.getAttribute("job")}/cancel`);
+    } catch (problem) {
+      const note = this.querySelector(".form-error");
+      if (note) showProblem(note, problem);
+      else this.say(problem.message);
+    }
+  }
+}
+customElements.define("job-progress", JobProgress);
