@@ -16,14 +16,12 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from sqlalchemy import Connection, Engine, Row, create_engine, event
+from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.pool import ConnectionPoolEntry
 
 BUSY_TIMEOUT_MS = 5000
 """How long a writer waits for another one before SQLITE_BUSY."""
-
-__all__ = ["Connection", "Database", "Row"]
 
 
 class Database:
@@ -61,11 +59,8 @@ class Database:
         """Complaints of SQLite's own checks: page structure, indexes, CHECK and NOT NULL, foreign keys."""
         with self.read() as c:
             rows = [str(row[0]) for row in c.exec_driver_sql("PRAGMA integrity_check(100)")]
-            keys = c.exec_driver_sql("PRAGMA foreign_key_check").all()
-        found = [] if rows == ["ok"] else rows
-        return found + [
-            f"row {rowid} of {table} refers to a missing row of {parent}" for table, rowid, parent, _ in keys
-        ]
+            dangling = foreign_key_violations(c)
+        return ([] if rows == ["ok"] else rows) + dangling
 
     def backup(self, target: Path) -> None:
         """Write a consistent copy while others read and write (a plain copy is unusable under WAL)."""
@@ -98,14 +93,30 @@ class ChangeWatch:
         return changed
 
 
-def _engine(path: Path, *, begin: str, query_only: bool) -> Engine:
+def migration_engine(path: Path) -> Engine:
+    """Return an engine for Alembic: BEGIN IMMEDIATE, foreign keys not enforced.
+
+    A batch migration drops and renames whole tables; with enforcement on, references act on that (measured: a
+    cascading child lost all its rows and foreign_key_check was clean). The pragma only works outside a
+    transaction.
+    """
+    return _engine(path, begin="BEGIN IMMEDIATE", query_only=False, foreign_keys=False)
+
+
+def foreign_key_violations(connection: Connection) -> list[str]:
+    """Rows that refer to nothing, as sentences."""
+    rows = connection.exec_driver_sql("PRAGMA foreign_key_check").all()
+    return [f"row {rowid} of {table} refers to a missing row of {parent}" for table, rowid, parent, _ in rows]
+
+
+def _engine(path: Path, *, begin: str, query_only: bool, foreign_keys: bool = True) -> Engine:
     engine = create_engine(f"sqlite:///{path}", connect_args={"timeout": BUSY_TIMEOUT_MS / 1000})
 
     @event.listens_for(engine, "connect")
     def _prepare(connection: DBAPIConnection, entry: ConnectionPoolEntry) -> None:
         # None: the driver starts no transactions of its own; "begin" below is the only place that does
         connection.isolation_level = None
-        prepare_connection(connection, query_only=query_only)
+        _set_pragmas(connection, query_only, foreign_keys)
 
     @event.listens_for(engine, "begin")
     def _begin(connection: Connection) -> None:
@@ -114,9 +125,7 @@ def _engine(path: Path, *, begin: str, query_only: bool) -> Engine:
     return engine
 
 
-def prepare_connection(
-    connection: DBAPIConnection, *, query_only: bool = False, foreign_keys: bool = True
-) -> None:
+def _set_pragmas(connection: DBAPIConnection, query_only: bool, foreign_keys: bool) -> None:
     """Set what SQLite keeps per connection: WAL, durable commits, enforced keys, a schema not trusted."""
     cursor = connection.cursor()
     for pragma in (

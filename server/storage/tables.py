@@ -111,7 +111,7 @@ patient = Table(
     Column("sex", String(8)),
     Column("birth_year", Integer),
     Column("height_m", Float),
-    Column("note", Text, nullable=False, server_default=""),
+    Column("note", Text, nullable=False),
     Column("created_at", Utc, nullable=False),
     _one_of("sex", SEXES),
     CheckConstraint("birth_year BETWEEN 1850 AND 2200", name="birth_year"),
@@ -127,7 +127,7 @@ session = Table(
     Column("performed_on", Date, nullable=False),
     Column("protocol", String(32), nullable=False),
     Column("height_m", Float),
-    Column("note", Text, nullable=False, server_default=""),
+    Column("note", Text, nullable=False),
     Column("created_at", Utc, nullable=False),
     CheckConstraint("height_m BETWEEN 0.5 AND 2.5", name="height_m"),
 )
@@ -267,7 +267,7 @@ audit = Table(
     Column("detail", Json, nullable=False),
     Column("previous", String(64), nullable=False),
     Column("hash", String(64), nullable=False, unique=True),
-    sqlite_autoincrement=True,  # a removed last row leaves a hole that `check` sees
+    sqlite_autoincrement=True,
 )
 Index("ix_audit_resource", audit.c.resource, audit.c.resource_id)
 

@@ -1,0 +1,88 @@
+"""The audit trail: append-only rows sealed with the hash of the one before, in the change's own transaction.
+
+    with db.write() as c:
+        c.execute(...)
+        audit.record(c, actor, "patient.renamed", "patient", pid, {"fields": ["code"]})
+
+One row per opened or changed resource; never a patient's code or name in `detail` (it outlives an erasure).
+Triggers forbid UPDATE and DELETE; who gets around them breaks the chain, which `sagittal check` sees.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from sqlalchemy import Connection, Row, insert, select
+
+from server.storage.tables import audit, now
+
+GENESIS = "0" * 64
+"""What the first row follows."""
+
+
+class Actor(Protocol):
+    """Who does something: a signed-in person."""
+
+    @property
+    def user_id(self) -> str:
+        """Row of `user`."""
+
+    @property
+    def name(self) -> str:
+        """Sign-in name at that time."""
+
+
+def record(
+    c: Connection,
+    actor: Actor | None,
+    action: str,
+    resource: str,
+    resource_id: str | None,
+    detail: Mapping[str, Any] | None = None,
+) -> None:
+    """Append one row; the connection must be a writing one, actor None = the system itself."""
+    last = c.execute(select(audit.c.seq, audit.c.hash).order_by(audit.c.seq.desc()).limit(1)).first()
+    row = {
+        "seq": 1 if last is None else last.seq + 1,
+        "at": now(),
+        "user_id": actor.user_id if actor else None,
+        "user_name": actor.name if actor else None,
+        "action": action,
+        "resource": resource,
+        "resource_id": resource_id,
+        "detail": dict(detail or {}),
+        "previous": GENESIS if last is None else last.hash,
+    }
+    c.execute(insert(audit).values(**row, hash=_seal(row)))
+
+
+def entries(c: Connection, *, before: int | None = None, limit: int = 100) -> list[Row[Any]]:
+    """The newest rows, or the newest before a sequence number (for paging)."""
+    query = select(audit).order_by(audit.c.seq.desc()).limit(limit)
+    return list(c.execute(query if before is None else query.where(audit.c.seq < before)))
+
+
+def problems(c: Connection) -> list[str]:
+    """Where the chain is broken: changed rows, removed rows, a cut-off beginning."""
+    found = []
+    expected, previous = 1, GENESIS
+    for row in c.execute(select(audit).order_by(audit.c.seq)):
+        if row.seq != expected:
+            found.append(f"audit rows {expected} to {row.seq - 1} have been removed")
+        elif row.previous != previous:
+            found.append(f"audit row {row.seq} does not follow the row before it")
+        if _seal(row._asdict()) != row.hash:
+            found.append(f"audit row {row.seq} has been changed")
+        expected, previous = row.seq + 1, row.hash
+    return found
+
+
+def _seal(row: Mapping[str, Any]) -> str:
+    """sha256 over every column but the hash itself, as canonical JSON."""
+    content = {k: v.astimezone(dt.UTC).isoformat() if k == "at" else v for k, v in row.items() if k != "hash"}
+    text = json.dumps(content, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()

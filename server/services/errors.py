@@ -1,0 +1,36 @@
+"""What a use case may refuse, beside the errors of core; `status` is the HTTP status that says the same.
+
+404 not_found · 409 code_taken, name_taken, no_files, last_admin · 413 file_too_large, set_too_large,
+too_many_files · 422 bad_value · 507 disk_full · 500 blob_damaged, blob_missing
+"""
+
+from __future__ import annotations
+
+from core.errors import SagittalError
+
+
+class ServiceError(SagittalError):
+    """A use case cannot be carried out as asked."""
+
+    status = 422
+
+
+class NotFound(ServiceError):  # noqa: N818 - the name of the HTTP status
+    """The thing asked for does not exist (or has been deleted)."""
+
+    status = 404
+
+    def __init__(self, what: str, identity: str) -> None:
+        super().__init__("not_found", f"There is no {what} '{identity}', or it has been deleted.")
+
+
+class Conflict(ServiceError):  # noqa: N818 - the name of the HTTP status
+    """The present state does not allow it; the message says what to do first."""
+
+    status = 409
+
+
+class TooLarge(ServiceError):  # noqa: N818 - the name of the HTTP status
+    """A limit of the settings is exceeded."""
+
+    status = 413
