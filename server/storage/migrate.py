@@ -1,6 +1,6 @@
 """Bring a database to the schema of this version; never start on one we do not know.
 
-upgrade(settings.database)          # at start of the server and by `sagittal migrate`; makes the file if absent
+    upgrade(settings.database)          # at start of the server and by `sagittal migrate`
 require_current(settings.database)  # in a worker: refuses instead of migrating
 """
 
