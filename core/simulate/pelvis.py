@@ -1,0 +1,158 @@
+"""The pelvis: its way over the floor, its angles, and its height from the knee of the loaded leg.
+
+Height from the loaded knee (not from a fixed vertical wave) is what brings the stance knee to the norm
+(spec/patients.md §0.2, §1 "Pelvis").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from core.frames import SIDES, Bools, Floats, Side
+from core.rotation import about, multiply, rotate
+from core.simulate.curves import KNEE_FLEXION, PELVIS_OBLIQUITY, PELVIS_ROTATION, PELVIS_TILT
+from core.simulate.script import Plan
+from core.simulate.shapes import smooth, smooth_max, smoothstep
+from core.simulate.stance import Q_NEUTRAL
+from core.simulate.timing import FootTiming, window
+from core.simulate.walker import SIGN, Walker, leg_reach
+
+DEGREE = float(np.radians(1.0))
+
+FULL_FORWARD = 0.94
+"""From this share of the reference step on the pelvis is fully ahead of the feet at contact."""
+
+GUARD_S = 0.16
+"""Width of a dip of the pelvis where a leg would have to be longer than it is."""
+
+
+def hip_offset(walker: Walker, side: Side) -> Floats:
+    """Hip centre (3,) in the pelvis frame, m."""
+    return np.array([0.0, 0.0, SIGN[side] * walker.anatomy.hip_width / 2.0])
+
+
+def floor_path(
+    t: Floats, plan: Plan, walker: Walker, phase: Floats, amplitude: Floats, rate_hz: float
+) -> tuple[Floats, Floats]:
+    """Mid-hip on the floor plane (n, 2) in m, and heading of the path (n,) in rad, unwrapped.
+
+    Knots at each contact (middle of the feet, a little ahead) and at mid-step (towards the stance foot).
+    """
+    feet = {s: np.array([plan.footprints[s][0].x_m, plan.footprints[s][0].y_m]) for s in SIDES}
+    headings = dict.fromkeys(SIDES, 0.0)
+    times, places, yaws = [0.0], [0.5 * (feet["left"] + feet["right"])], [0.0]
+    for step in plan.steps:
+        if step.opens:
+            times.append(step.start_s)
+            places.append(places[-1])
+            yaws.append(yaws[-1])
+        feet[step.side] = np.array([step.x_m, step.y_m])
+        headings[step.side] = step.path_rad
+        stance_foot = feet["left" if step.side == "right" else "right"]
+        ahead = np.array([np.cos(step.path_rad), np.sin(step.path_rad)])
+        share = (
+            0.0 if step.closes else min(1.0, max(step.step_m, 0.0) / (FULL_FORWARD * walker.reference_step_m))
+        )
+        place = 0.5 * (feet["left"] + feet["right"]) + share * walker.forward_m * ahead
+        halfway = 0.5 * (places[-1] + place)
+        aside = stance_foot - halfway
+        middle = halfway + walker.lateral * (aside - (aside @ ahead) * ahead)
+        yaw = 0.5 * (headings["left"] + headings["right"])
+        times += [step.time_s - 0.5 * step.step_s, step.time_s]
+        places += [middle, place]
+        yaws += [0.5 * (yaws[-1] + yaw), yaw]
+    width = window(plan, rate_hz, 0.16)
+    knots = np.array(places)
+    xy = np.stack([smooth(np.interp(t, times, knots[:, k]), width) for k in (0, 1)], axis=-1)
+    heading = smooth(np.interp(t, times, np.array(yaws)), width)
+    c, s = walker.forward_wave_m
+    wave = amplitude * (c * np.cos(4.0 * np.pi * phase) + s * np.sin(4.0 * np.pi * phase))
+    return xy + wave[:, None] * np.stack((np.cos(heading), np.sin(heading)), axis=-1), heading
+
+
+def orientation(heading: Floats, phase: Floats, amplitude: Floats) -> Floats:
+    """Pelvis quaternions (n, 4): rotation, then obliquity, then tilt (Baker 2001)."""
+    yaw = heading + amplitude * PELVIS_ROTATION(phase)
+    obliquity = -amplitude * PELVIS_OBLIQUITY(phase)
+    tilt = PELVIS_TILT.mean + amplitude * (PELVIS_TILT(phase) - PELVIS_TILT.mean)
+    turned = multiply(about(2, yaw), Q_NEUTRAL)
+    return multiply(multiply(turned, about(0, obliquity)), about(2, -tilt))
+
+
+def load_share(t: Floats, plan: Plan, timings: Mapping[Side, FootTiming], side: Side) -> Floats:
+    """Share (n,) of body weight on one leg, 0 to 1: shifts over double support, one half while standing."""
+    swings = dict.fromkeys(SIDES, 0)
+    shifts: list[tuple[float, float, float]] = []
+    for step in plan.steps:
+        release = float(timings[step.side].release[swings[step.side]])
+        swings[step.side] += 1
+        lead = 0.25 if step.opens else 0.5 * (release - step.start_s) + 0.1 * step.step_s
+        shifts.append((step.start_s - lead, release, 0.0 if step.side == side else 1.0))
+        if step.closes:
+            shifts.append((step.time_s, step.time_s + 0.35, 0.5))
+    share, jumps, now = np.zeros(len(t)), np.zeros(len(t) + 1), 0.5
+    for start, end, then in shifts:
+        i, j = np.searchsorted(t, (start, end))
+        share[i:j] += (then - now) * smoothstep((t[i:j] - start) / (end - start))
+        jumps[j] += then - now
+        now = then
+    return 0.5 + share + np.cumsum(jumps[:-1])
+
+
+def height(
+    plan: Plan,
+    walker: Walker,
+    phases: Mapping[Side, Floats],
+    amplitude: Floats,
+    shares: Mapping[Side, Floats],
+    xy: Floats,
+    q: Floats,
+    ankles: Mapping[Side, Floats],
+    rate_hz: float,
+) -> Floats:
+    """Mid-hip height (n,) in m that gives the loaded leg its target knee flexion."""
+    total = np.zeros(len(q))
+    for side in SIDES:
+        rest = walker.standing_knee_rad
+        least = walker.sides[side].knee_min_rad
+        knee = smooth_max(rest + amplitude * (KNEE_FLEXION(phases[side]) - rest), least, DEGREE)
+        reach = leg_reach(walker.anatomy, smooth(knee, window(plan, rate_hz, 0.02)))
+        total += shares[side] * _hip_height(walker, side, xy, q, ankles[side], reach)
+    return smooth(total, window(plan, rate_hz, 0.01))
+
+
+def guard(
+    z: Floats,
+    walker: Walker,
+    xy: Floats,
+    q: Floats,
+    ankles: Mapping[Side, Floats],
+    where: Mapping[Side, Bools],
+    rate_hz: float,
+) -> tuple[Floats, float]:
+    """Lower the pelvis (n,) where a leg would be overstretched; also returns the largest need in m."""
+    excess = np.zeros(len(z))
+    for side in SIDES:
+        reach = leg_reach(walker.anatomy, walker.sides[side].knee_min_rad - 0.5 * DEGREE)
+        limit = _hip_height(walker, side, xy, q, ankles[side], reach)
+        excess = np.maximum(excess, np.where(where[side], z - limit, 0.0))
+    worst = float(excess.max())
+    if worst <= 0.0:
+        return z, 0.0
+    half = int(GUARD_S * rate_hz) // 2
+    # the four running means together are no wider than the maximum filter: the need is met everywhere
+    passes = max(1, (half // 2 - 1) | 1)
+    return z - smooth(maximum_filter1d(excess, 2 * half + 3, mode="nearest"), passes), worst
+
+
+def _hip_height(walker: Walker, side: Side, xy: Floats, q: Floats, ankle: Floats, reach: Floats) -> Floats:
+    """Mid-hip height (n,) at which hip and ankle are `reach` apart."""
+    hip = rotate(q, hip_offset(walker, side))
+    apart = xy + hip[:, :2] - ankle[:, :2]
+    # far behind (a foot that is not loaded) the root is held real; its load share is zero there
+    least = (0.53 * (walker.anatomy.thigh + walker.anatomy.shank)) ** 2
+    drop = np.sqrt(np.maximum(reach**2 - np.sum(apart**2, axis=1), least))
+    return np.asarray(ankle[:, 2] - hip[:, 2] + drop)

@@ -1,0 +1,226 @@
+"""What the person does: script items, and the footprints they lead to.
+
+Each walking item is cut into steps; before standing a short closing step brings the feet together. A step
+carries its own drawn deviations, so the footprints are the exact truth (spec/estimators.md §2.2, patients.md §1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, inf, sin, sqrt
+
+import numpy as np
+
+from core.errors import ParameterError
+from core.frames import SIDES, Side
+from core.simulate.walker import SIGN, Walker
+
+CLOSING = 0.4
+"""Length of a closing step relative to the step before."""
+
+CLIP = 2.5
+"""Drawn deviations are limited to so many standard deviations."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """One step as planned: forward length in m, turn in rad (left positive), duration in s."""
+
+    length_m: float
+    turn_rad: float
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class Stand:
+    """Stand still."""
+
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class Straight:
+    """Walk straight ahead."""
+
+    length_m: float
+    step_m: float
+    step_s: float
+
+    def moves(self) -> list[Move]:
+        """Steps of this item."""
+        n = max(1, round(self.length_m / self.step_m))
+        return [Move(self.step_m, 0.0, self.step_s)] * n
+
+
+@dataclass(frozen=True)
+class Arc:
+    """Walk along a circle of `radius_m` through `angle_rad` (left positive)."""
+
+    radius_m: float
+    angle_rad: float
+    step_m: float
+    step_s: float
+
+    def moves(self) -> list[Move]:
+        """Steps of this item, all alike."""
+        length = self.radius_m * abs(self.angle_rad)
+        n = max(1, round(length / self.step_m))
+        return [Move(length / n, self.angle_rad / n, self.step_s)] * n
+
+
+@dataclass(frozen=True)
+class Pivot:
+    """Turn on the spot by `angle_rad` (left positive) with about `per_step_rad` a step."""
+
+    angle_rad: float
+    per_step_rad: float
+    step_s: float
+
+    def moves(self) -> list[Move]:
+        """Steps of this item, all alike."""
+        n = max(1, round(abs(self.angle_rad) / self.per_step_rad))
+        return [Move(0.0, self.angle_rad / n, self.step_s)] * n
+
+
+Item = Stand | Straight | Arc | Pivot
+Script = tuple[Item, ...]
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """Where and when a foot lands.
+
+    Parameters
+    ----------
+    time_s : initial contact; −inf for the two footprints the take starts on.
+    x_m, y_m : floor point under the ankle centre while the foot is flat.
+    path_rad : heading of the body's path. foot_rad : heading of the foot (with toe-out). Both unwrapped.
+    step_m, step_s : length and duration of the step that led here, as drawn.
+    opens, closes : first step after standing, last before standing.
+    pitch_rad, knee_rad, hip_rad : drawn deviations of this step's angles.
+    """
+
+    side: Side
+    time_s: float
+    x_m: float
+    y_m: float
+    path_rad: float
+    foot_rad: float
+    step_m: float
+    step_s: float
+    opens: bool = False
+    closes: bool = False
+    pitch_rad: float = 0.0
+    knee_rad: float = 0.0
+    hip_rad: float = 0.0
+
+    @property
+    def start_s(self) -> float:
+        """Start of the step: the other foot's contact, or the end of standing."""
+        return self.time_s - self.step_s
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A script worked out.
+
+    Parameters
+    ----------
+    steps : every step in order of time.
+    footprints : side → the footprint it starts on, then its steps.
+    stands : (start, end) of each standing in s.
+    """
+
+    steps: tuple[Footprint, ...]
+    footprints: dict[Side, tuple[Footprint, ...]]
+    stands: tuple[tuple[float, float], ...]
+    duration_s: float
+
+    @property
+    def typical_step_s(self) -> float:
+        """Median step time; smoothing windows are fractions of it."""
+        return float(np.median([s.step_s for s in self.steps])) if self.steps else 0.5
+
+
+def plan(script: Script, walker: Walker, rng: np.random.Generator) -> Plan:
+    """Work a script out into footprints, starting at the origin with heading +x, right foot first.
+
+    Raises
+    ------
+    ParameterError : "script_standing" when it does not start and end with standing, "script_item" when a
+        length, a radius or a time is not positive.
+    """
+    _check(script)
+    spread = walker.variability
+    x = y = heading = t = 0.0
+    side: Side = "right"
+    opens = True
+    steps: list[Footprint] = []
+    stands: list[tuple[float, float]] = []
+
+    def landing(of: Side, wider_m: float) -> tuple[float, float, float]:
+        lateral = -SIGN[of] * (walker.width_m / 2.0 + wider_m)
+        foot = heading - SIGN[of] * walker.sides[of].toe_out_rad
+        return x - lateral * sin(heading), y + lateral * cos(heading), foot
+
+    first = {
+        s: Footprint(s, -inf, fx, fy, 0.0, foot, 0.0, inf)
+        for s in SIDES
+        for fx, fy, foot in (landing(s, 0.0),)
+    }
+    for item, following in zip(script, (*script[1:], Stand(1.0)), strict=True):
+        if isinstance(item, Stand):
+            stands.append((t, t + item.duration_s))
+            t += item.duration_s
+            opens = True
+            continue
+        moves = item.moves()
+        closing = isinstance(following, Stand)
+        if closing:
+            moves = [*moves, Move(CLOSING * moves[-1].length_m, 0.0, moves[-1].duration_s)]
+        for i, move in enumerate(moves):
+            g = np.clip(rng.standard_normal(6), -CLIP, CLIP)
+            length = move.length_m * (1.0 + spread.step_length * g[0])
+            # two steps make a stride: √2 keeps the stride's variation at the asked value
+            duration = move.duration_s * (1.0 + sqrt(2.0) * spread.step_time * g[1])
+            heading += move.turn_rad / 2.0
+            x += length * cos(heading)
+            y += length * sin(heading)
+            heading += move.turn_rad / 2.0
+            t += duration
+            fx, fy, foot = landing(side, spread.width_m * g[2])
+            steps.append(
+                Footprint(
+                    side=side,
+                    time_s=t,
+                    x_m=fx,
+                    y_m=fy,
+                    path_rad=heading,
+                    foot_rad=foot,
+                    step_m=length,
+                    step_s=duration,
+                    opens=opens,
+                    closes=closing and i == len(moves) - 1,
+                    pitch_rad=spread.pitch_rad * g[3],
+                    knee_rad=spread.knee_rad * g[4],
+                    hip_rad=spread.hip_rad * g[5],
+                )
+            )
+            opens = False
+            side = "left" if side == "right" else "right"
+    footprints = {s: (first[s], *(f for f in steps if f.side == s)) for s in SIDES}
+    return Plan(tuple(steps), footprints, tuple(stands), t)
+
+
+def _check(script: Script) -> None:
+    if not script or not isinstance(script[0], Stand) or not isinstance(script[-1], Stand):
+        raise ParameterError(
+            "script_standing", "A script starts and ends with standing; add Stand(5) at both ends."
+        )
+    for i, item in enumerate(script):
+        for name, value in vars(item).items():
+            if not (np.isfinite(value) and (value > 0.0 or name == "angle_rad")):
+                raise ParameterError(
+                    "script_item",
+                    f"Item {i} of the script ({type(item).__name__}): {name} is {value:g}, expected more than 0.",
+                )

@@ -1,0 +1,125 @@
+"""When things happen in each leg's cycle, and the gait phase that reads the target curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.frames import Floats, Side
+from core.simulate.script import Plan
+from core.simulate.shapes import smooth
+from core.simulate.walker import Walker
+
+RELEASE_PHASE = 0.59
+"""Phase at which the foot leaves the floor (WBDS foot-off is at 0.62 of the cycle, about when the sole is 5 mm up)."""
+
+STANDING_PHASE = 0.3
+"""The phase is held here while standing: mid-stance, both knees nearly straight."""
+
+PAUSE = 2.4
+"""A stride longer than so many step times had standing in it."""
+
+
+@dataclass(frozen=True, eq=False)
+class FootTiming:
+    """Times in s of swing i of one foot, from its footprint i to i + 1; arrays (swings,).
+
+    Parameters
+    ----------
+    heel_off : the heel rises. opposite : the other foot's contact before, or the start of the first step.
+    release : end of contact. contact : next initial contact. flat : the foot is flat and still from here.
+    paused : standing lies between the two contacts.
+    """
+
+    heel_off: Floats
+    opposite: Floats
+    release: Floats
+    contact: Floats
+    flat: Floats
+    paused: np.ndarray[tuple[int], np.dtype[np.bool_]]
+
+
+def foot_timing(plan: Plan, walker: Walker, side: Side) -> FootTiming:
+    """Times of one foot (spec/patients.md §1 "Events")."""
+    gait = walker.sides[side]
+    prints = plan.footprints[side]
+    rows = []
+    for before, landing in zip(prints[:-1], prints[1:], strict=True):
+        step = landing.step_s
+        stride = landing.time_s - before.time_s
+        paused = stride > PAUSE * step
+        cycle = 2.0 * step if paused else stride
+        opposite = landing.start_s
+        release = min(opposite + gait.double_support * cycle, landing.time_s - 0.5 * step)
+        heel_off = max(
+            release - (RELEASE_PHASE - gait.heel_off) * cycle,
+            before.time_s + (gait.flat_from + 0.02) * cycle,
+        )
+        rows.append(
+            (
+                heel_off,
+                opposite,
+                release,
+                landing.time_s,
+                landing.time_s + 2.0 * gait.flat_from * step,
+                paused,
+            )
+        )
+    table = np.array(rows, np.float64).reshape(-1, 6)
+    flat = table[:, 4].copy()
+    flat[:-1] = np.minimum(flat[:-1], table[1:, 0] - 0.01)
+    return FootTiming(*(table[:, k].copy() for k in range(4)), flat, table[:, 5].astype(bool))
+
+
+def window(plan: Plan, rate_hz: float, share: float) -> int:
+    """Odd number of samples of a smoothing window of `share` of a typical stride."""
+    return max(3, int(share * 2.0 * plan.typical_step_s * rate_hz) | 1)
+
+
+def gait_phase(t: Floats, plan: Plan, timing: FootTiming, rate_hz: float) -> Floats:
+    """Unwrapped phase (n,) of one leg: whole numbers at its contacts.
+
+    The other foot's contact is pinned to one half: without it slow or uneven gaits land with 20–29° knee flexion
+    instead of 4–9° (spec/patients.md §1 "Phase").
+    """
+    if not len(timing.contact):
+        return np.full(len(t), STANDING_PHASE)
+    knots = [(0.0, STANDING_PHASE)]
+    for i, contact in enumerate(timing.contact):
+        step = contact - timing.opposite[i]
+        if timing.paused[i]:
+            if i:
+                knots.append((timing.contact[i - 1] + 0.6 * step, i + STANDING_PHASE))
+            knots.append(
+                (timing.release[i] - (RELEASE_PHASE - STANDING_PHASE) * 2.0 * step, i + STANDING_PHASE)
+            )
+        knots += [(timing.opposite[i], i + 0.5), (timing.release[i], i + RELEASE_PHASE), (contact, i + 1.0)]
+    knots.append((knots[-1][0] + 0.6 * plan.typical_step_s, knots[-1][1] + STANDING_PHASE))
+    at, value = np.array(sorted(knots)).T
+    return smooth(np.interp(t, at, value), window(plan, rate_hz, 0.025))
+
+
+def body_phase(t: Floats, plan: Plan, rate_hz: float) -> Floats:
+    """Unwrapped phase (n,) of the pelvis curves: whole numbers at right contacts, halves at left ones."""
+    phase = 0.5 if plan.steps and plan.steps[0].side == "right" else 0.0
+    knots = [(0.0, phase)]
+    for step in plan.steps:
+        knots += [(step.start_s, phase), (step.time_s, phase + 0.5)]
+        phase += 0.5
+    at, value = np.array(knots).T
+    return smooth(np.interp(t, at, value), window(plan, rate_hz, 0.04))
+
+
+def amplitude(t: Floats, plan: Plan, walker: Walker, rate_hz: float) -> Floats:
+    """Factor (n,) on the pelvis and stance curves: 0 while standing, about 1 at the reference step length."""
+    knots = [(0.0, 0.0)]
+    for step in plan.steps:
+        a = walker.amplitude(step.step_m)
+        if step.opens:
+            knots += [(step.start_s - 0.15, 0.0), (step.start_s + 0.2 * step.step_s, a)]
+        knots.append((step.time_s - 0.5 * step.step_s, a))
+        if step.closes:
+            knots += [(step.time_s - 0.2 * step.step_s, 0.6 * a), (step.time_s + 0.25, 0.0)]
+    at, value = np.array(sorted(knots)).T
+    return smooth(np.interp(t, at, value), window(plan, rate_hz, 0.05))

@@ -1,0 +1,166 @@
+"""Who walks: the lengths of the body and the parameters of the gait, per side where the sides may differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import radians
+
+import numpy as np
+
+from core.body.model import BodyModel
+from core.errors import ParameterError
+from core.frames import Floats, Side
+
+REFERENCE_HEIGHT_M = 1.745
+"""Height of the person the target curves were fitted for: leg and ankle height 0.925 m = 0.53 of body height
+(Winter 2009, table 4.1)."""
+
+SIGN: Mapping[Side, float] = {"right": 1.0, "left": -1.0}
+"""Side of the body on the segment's z axis (right positive)."""
+
+
+@dataclass(frozen=True)
+class Anatomy:
+    """Lengths in m (spec/patients.md §1); the sole is a heel point, a flat part and a rolling forefoot.
+
+    Parameters
+    ----------
+    ankle_height : ankle centre above the sole. heel : heel point behind the ankle (positive).
+    rocker_start : forward of the ankle, where the sole begins to curve up with `rocker_radius`. toe : toe tip.
+    """
+
+    hip_width: float = 0.17
+    thigh: float = 0.42
+    shank: float = 0.42
+    ankle_height: float = 0.085
+    heel: float = 0.055
+    rocker_start: float = 0.12
+    rocker_radius: float = 0.10
+    toe: float = 0.18
+
+    def scaled(self, k: float) -> Anatomy:
+        """The same shape, k times as large."""
+        return Anatomy(**{name: k * length for name, length in vars(self).items()})
+
+    def body_model(self) -> BodyModel:
+        """These lengths as the body model of the analysis, marked as measured."""
+        return BodyModel(
+            hip_width=self.hip_width,
+            thigh=self.thigh,
+            shank=self.shank,
+            ankle_height=self.ankle_height,
+            foot=self.heel + self.toe,
+            estimated=False,
+        )
+
+
+@dataclass(frozen=True)
+class SideGait:
+    """How one leg walks; phases are fractions of the own stride (spec/patients.md §3 "Default SIDE").
+
+    Parameters
+    ----------
+    double_support : opposite contact to own release. flat_from : foot flat after own contact.
+    heel_off : phase at which the heel rises. toe_out_rad : foot heading outward of the path.
+    contact_pitch_rad : toes up at contact. knee_min_rad : least knee flexion. clearance_m : sole at mid-swing.
+    """
+
+    double_support: float = 0.0928
+    flat_from: float = 0.0985
+    heel_off: float = 0.3149
+    toe_out_rad: float = radians(9.0)
+    contact_pitch_rad: float = radians(16.12)
+    knee_min_rad: float = radians(3.5)
+    clearance_m: float = 0.008
+
+
+@dataclass(frozen=True)
+class Variability:
+    """Standard deviations from step to step; times and lengths relative (spec/patients.md §2 "Variability")."""
+
+    step_time: float = 0.012
+    step_length: float = 0.027
+    width_m: float = 0.008
+    knee_rad: float = radians(2.0)
+    pitch_rad: float = radians(1.5)
+    hip_rad: float = radians(1.0)
+
+
+STEADY = Variability(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""Every step alike, for comparing mean curves."""
+
+
+@dataclass(frozen=True)
+class Walker:
+    """One person's body and gait.
+
+    Parameters
+    ----------
+    width_m : between the two lines of footprints (ankle centres).
+    forward_m, forward_wave_m : pelvis ahead of the middle of the feet at contact; cos and sin of its double
+        step wave. lateral : share of the stance foot's lateral offset the pelvis moves over it.
+    standing_knee_rad : knee flexion at rest. reference_step_m : step with amplitude 1.
+    """
+
+    height_m: float = REFERENCE_HEIGHT_M
+    anatomy: Anatomy = Anatomy()
+    sides: Mapping[Side, SideGait] = field(default_factory=lambda: {"left": SideGait(), "right": SideGait()})
+    width_m: float = 0.10
+    forward_m: float = 0.0485
+    forward_wave_m: tuple[float, float] = (0.0026, -0.0019)
+    lateral: float = 0.45
+    standing_knee_rad: float = radians(5.0)
+    reference_step_m: float = 0.641
+    variability: Variability = Variability()
+
+    @classmethod
+    def of_height(cls, height_m: float, variability: Variability | None = None) -> Walker:
+        """A geometrically similar healthy person of another height; all lengths grow alike.
+
+        Raises
+        ------
+        ParameterError : "height_implausible" outside 1.0 to 2.3 m.
+        """
+        if not 1.0 <= height_m <= 2.3:
+            raise ParameterError(
+                "height_implausible",
+                f"Height {height_m:g} m is outside the 1.0 to 2.3 m this walker can have.",
+            )
+        k = height_m / REFERENCE_HEIGHT_M
+        base = cls()
+        spread = variability or base.variability
+        return replace(
+            base,
+            height_m=height_m,
+            anatomy=base.anatomy.scaled(k),
+            sides={s: replace(g, clearance_m=k * g.clearance_m) for s, g in base.sides.items()},
+            width_m=k * base.width_m,
+            forward_m=k * base.forward_m,
+            forward_wave_m=(k * base.forward_wave_m[0], k * base.forward_wave_m[1]),
+            reference_step_m=k * base.reference_step_m,
+            variability=replace(spread, width_m=k * spread.width_m),
+        )
+
+    @property
+    def scale(self) -> float:
+        """Size relative to the person the curves were fitted for."""
+        return self.height_m / REFERENCE_HEIGHT_M
+
+    def amplitude(self, step_m: float) -> float:
+        """Factor on the angle curves for a step of this length; steps on the spot keep a lifted knee."""
+        if step_m <= 0.05 * self.scale:
+            return 0.35
+        return min(1.15, (step_m / self.reference_step_m) ** 0.5)
+
+    def landing_amplitude(self, step_m: float) -> float:
+        """Factor on the pitch at contact; short and closing steps land flat."""
+        if step_m <= 0.3 * self.reference_step_m:
+            return 0.15
+        return min(1.0, (step_m / self.reference_step_m) ** 0.5)
+
+
+def leg_reach(anatomy: Anatomy, knee_rad: Floats | float) -> Floats:
+    """Hip to ankle distance in m at a knee flexion in rad."""
+    a, b = anatomy.thigh, anatomy.shank
+    return np.asarray(np.sqrt(a**2 + b**2 + 2.0 * a * b * np.cos(knee_rad)))
