@@ -86,6 +86,10 @@ class Figure:
         """What is shown."""
         return self._motion
 
+    def is_valid(self, t_s: float) -> bool:
+        """Tell whether all sensors were there at the frame nearest to `t_s`."""
+        return bool(self._motion.valid[self._motion.index(t_s)])
+
     def pose(self, t_s: float) -> float:
         """Show the frame nearest to `t_s`, send it at once, and return its time in s."""
         m = self._motion

@@ -1,0 +1,161 @@
+"""Reads the files of a finished analysis back into the objects they were made from."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from core.angles import JointAngles
+from core.body.model import BodyModel
+from core.body.poses import Poses
+from core.errors import FormatError, Notice
+from core.events.result import EventKind, GaitEvent, GaitEvents, Stride, Strides
+from core.frames import SEGMENTS, Bools, Floats, Segment, Side
+from core.parameters.result import Parameter
+from server.report.exports import SCHEMA
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """A finished analysis as stored; a part that was not reached is None or empty.
+
+    Parameters
+    ----------
+    quality, calibration, provenance : the JSON of analysis.json.
+    """
+
+    quality: Mapping[str, Any]
+    calibration: Mapping[str, Any] | None
+    parameters: tuple[Parameter, ...]
+    warnings: tuple[Notice, ...]
+    provenance: Mapping[str, Any]
+    angles: JointAngles | None = None
+    events: GaitEvents = field(default_factory=lambda: GaitEvents(()))
+    strides: Strides = field(default_factory=lambda: Strides(()))
+
+
+def load_bundle(files: Mapping[str, bytes]) -> Bundle:
+    """Read the files of `analysis_files`; poses are left to `read_poses`, only the replay needs them.
+
+    Raises
+    ------
+    FormatError
+        `no_analysis` without analysis.json, `newer_analysis` if a later version wrote it.
+    """
+    if "analysis.json" not in files:
+        raise FormatError("no_analysis", "analysis.json is missing; run the analysis again.")
+    data = json.loads(files["analysis.json"])
+    if data.get("schema") != SCHEMA:
+        raise FormatError(
+            "newer_analysis",
+            f"analysis.json has schema {data.get('schema')}, this version reads {SCHEMA}; update Sagittal.",
+        )
+    return Bundle(
+        quality=data["quality"],
+        calibration=data["calibration"],
+        parameters=tuple(Parameter(**row) for row in data["parameters"]),
+        warnings=tuple(Notice(**row) for row in data["warnings"]),
+        provenance=data["provenance"],
+        angles=read_angles(files["angles.parquet"]) if "angles.parquet" in files else None,
+        events=read_events(files["events.csv"]) if "events.csv" in files else GaitEvents(()),
+        strides=read_strides(files["strides.csv"]) if "strides.csv" in files else Strides(()),
+    )
+
+
+def read_angles(data: bytes) -> JointAngles:
+    """Joint angles of angles.parquet in rad; null becomes NaN again."""
+    table, meta = _table(data)
+    angles = {
+        name.removesuffix("_deg"): np.radians(_floats(table, name))
+        for name in table.column_names
+        if name != "t_s"
+    }
+    zero = {name: math.radians(offset) for name, offset in meta["zero_offset_deg"].items()}
+    return JointAngles(_floats(table, "t_s"), angles, zero, meta["angle_zero"])
+
+
+def read_poses(data: bytes) -> Poses:
+    """Segment poses of poses.parquet."""
+    table, meta = _table(data)
+    present: list[Segment] = [s for s in SEGMENTS if f"{s}_q_w" in table.column_names]
+    return Poses(
+        t_s=_floats(table, "t_s"),
+        rate_hz=float(meta["rate_hz"]),
+        q={s: np.stack([_floats(table, f"{s}_q_{c}") for c in "wxyz"], axis=1) for s in present},
+        p={s: np.stack([_floats(table, f"{s}_p_{c}") for c in "xyz"], axis=1) for s in present},
+        valid=_bools(table, "valid"),
+        contact={
+            cast("Segment", f"foot_{k}"): _bools(table, f"contact_{k}")
+            for k in "lr"
+            if f"contact_{k}" in table.column_names
+        },
+        body=BodyModel(**meta["body"]),
+        method=str(meta["method"]),
+    )
+
+
+def read_events(data: bytes) -> GaitEvents:
+    """Contacts of events.csv; the time of detection is not stored, so it is the event time."""
+    return GaitEvents(
+        tuple(
+            GaitEvent(
+                time_s=(t := float(row["time_s"])),
+                side=cast("Side", row["side"]),
+                kind=cast("EventKind", row["kind"]),
+                source=row["source"],
+                detected_s=t,
+            )
+            for row in _rows(data)
+        )
+    )
+
+
+def read_strides(data: bytes) -> Strides:
+    """The stride list of strides.csv; the parameter columns are derived and not read."""
+    return Strides(
+        tuple(
+            Stride(
+                side=cast("Side", row["side"]),
+                start_s=float(row["start_s"]),
+                tc_s=_number(row["tc_s"]),
+                end_s=float(row["end_s"]),
+                opposite_tc_s=_number(row["opposite_tc_s"]),
+                opposite_ic_s=_number(row["opposite_ic_s"]),
+                turn_rad=None if (turn := _number(row["turn_deg"])) is None else math.radians(turn),
+                excluded_reason=row["excluded_reason"] or None,
+            )
+            for row in _rows(data)
+        )
+    )
+
+
+def _rows(data: bytes) -> csv.DictReader[str]:
+    return csv.DictReader(io.StringIO(data.decode()))
+
+
+def _number(text: str) -> float | None:
+    return float(text) if text else None
+
+
+def _table(data: bytes) -> tuple[pa.Table, dict[str, Any]]:
+    table = pq.read_table(pa.BufferReader(data))
+    meta: dict[str, Any] = json.loads((table.schema.metadata or {})[b"sagittal"])
+    return table, meta
+
+
+def _floats(table: pa.Table, name: str) -> Floats:
+    column = table.column(name).to_numpy(zero_copy_only=False)
+    return np.asarray(column, dtype=np.float64)
+
+
+def _bools(table: pa.Table, name: str) -> Bools:
+    return np.asarray(table.column(name).to_numpy(zero_copy_only=False), dtype=np.bool_)

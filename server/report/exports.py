@@ -1,0 +1,218 @@
+"""The files an analysis yields, the same for the command line, the worker and the downloads page.
+
+analysis.json   quality, calibration, parameters, warnings, provenance (schema 1)
+angles.parquet  joint angles in degrees on the uniform axis
+poses.parquet   segment poses for the replay
+events.csv      contacts: time_s, side, kind (ic | tc), source
+strides.csv     one row per stride with its temporal parameters and why it was left out
+
+Undefined is an empty cell or null, never NaN. `server.report.bundle` reads them back.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from core.angles import JointAngles
+from core.body.poses import Poses
+from core.calibration.result import Calibration
+from core.errors import Notice
+from core.events.result import GaitEvents, Strides
+from core.frames import Floats
+from core.parameters.result import Parameter
+from core.parameters.temporal import NAMES, per_stride
+
+if TYPE_CHECKING:
+    from core.pipeline import Analysis
+
+SCHEMA = 1
+"""Version of analysis.json and of the columns beside it; readers refuse a newer one."""
+
+STRIDE_COLUMNS = ("side", "start_s", "tc_s", "end_s", "opposite_tc_s", "opposite_ic_s", "turn_deg")
+"""What a stride is; its parameters and `excluded_reason` follow in strides.csv."""
+
+
+def analysis_files(analysis: Analysis) -> dict[str, bytes]:
+    """Write an analysis as files, name → bytes; a stage that gave nothing leaves its file out."""
+    files = {"analysis.json": _json_bytes(summary(analysis))}
+    if analysis.events is not None:
+        files["events.csv"] = events_csv(analysis.events)
+    if analysis.strides is not None:
+        files["strides.csv"] = strides_csv(analysis.strides)
+    if analysis.angles is not None:
+        files["angles.parquet"] = angles_parquet(analysis.angles)
+    if analysis.poses is not None:
+        files["poses.parquet"] = poses_parquet(analysis.poses)
+    return files
+
+
+def summary(analysis: Analysis) -> dict[str, object]:
+    """Content of analysis.json (schema 1) as plain JSON values."""
+    return {
+        "schema": SCHEMA,
+        "quality": plain(analysis.quality.to_json()),
+        "calibration": _calibration(analysis.calibration, analysis.angles),
+        "parameters": [parameter_row(p) for p in analysis.parameters],
+        "warnings": [notice_row(n) for n in analysis.notices],
+        "provenance": plain(analysis.provenance),
+    }
+
+
+def parameter_row(p: Parameter) -> dict[str, object]:
+    """One parameter as JSON; a number that is not finite is null."""
+    return {
+        "name": p.name,
+        "side": p.side,
+        "n": p.n,
+        "mean": plain(p.mean),
+        "sd": plain(p.sd),
+        "unit": p.unit,
+        "reason": p.reason,
+    }
+
+
+def notice_row(n: Notice) -> dict[str, object]:
+    """One warning as JSON."""
+    return {
+        "code": n.code,
+        "message": n.message,
+        "sensor": n.sensor,
+        "t_s": plain(n.t_s),
+        "severity": n.severity,
+    }
+
+
+def angles_parquet(angles: JointAngles) -> bytes:
+    """Joint angles as Parquet: `t_s` (float64) and `<name>_deg` (float32); lost samples are null."""
+    columns = {f"{name}_deg": np.degrees(a).astype(np.float32) for name, a in angles.angles.items()}
+    zero = {name: math.degrees(offset) for name, offset in angles.zero_offset.items()}
+    meta = {"schema": SCHEMA, "angle_zero": angles.zero, "zero_offset_deg": zero}
+    return _parquet(angles.t_s, columns, meta)
+
+
+def poses_parquet(poses: Poses) -> bytes:
+    """Segment poses as Parquet: per segment `<segment>_q_w…z`, `<segment>_p_x…z` (float32), masks (bool)."""
+    columns: dict[str, np.ndarray] = {}
+    for segment, q in poses.q.items():
+        p = poses.p[segment]
+        columns |= {f"{segment}_q_{c}": q[:, i].astype(np.float32) for i, c in enumerate("wxyz")}
+        columns |= {f"{segment}_p_{c}": p[:, i].astype(np.float32) for i, c in enumerate("xyz")}
+    columns["valid"] = poses.valid
+    columns |= {f"contact_{segment.removeprefix('foot_')}": c for segment, c in poses.contact.items()}
+    body = {name: getattr(poses.body, name) for name in poses.body.__dataclass_fields__}
+    meta = {"schema": SCHEMA, "rate_hz": poses.rate_hz, "method": poses.method, "body": body}
+    return _parquet(poses.t_s, columns, meta)
+
+
+def events_csv(events: GaitEvents) -> bytes:
+    """All contacts in order of time."""
+    return write_csv(
+        ("time_s", "side", "kind", "source"), ((e.time_s, e.side, e.kind, e.source) for e in events.events)
+    )
+
+
+def strides_csv(strides: Strides) -> bytes:
+    """Every stride, used or not, with its own parameters (spec/field.md §4b)."""
+    values = per_stride(strides)
+    rows = (
+        (
+            s.side,
+            s.start_s,
+            s.tc_s,
+            s.end_s,
+            s.opposite_tc_s,
+            s.opposite_ic_s,
+            None if s.turn_rad is None else math.degrees(s.turn_rad),
+            *(values[name][i] for name in NAMES),
+            s.excluded_reason,
+        )
+        for i, s in enumerate(strides.strides)
+    )
+    return write_csv((*STRIDE_COLUMNS, *NAMES, "excluded_reason"), rows)
+
+
+def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
+    """UTF-8 comma-separated text with a header; None and non-finite numbers are empty, numbers to 1e-6."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([_cell(v) for v in row] for row in rows)
+    return text.getvalue().encode()
+
+
+def plain(value: object) -> object:
+    """Reduce mappings, sequences and numpy values to what JSON knows; non-finite numbers become null."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, (str, bool, int)):
+        return value
+    return str(value)
+
+
+def _calibration(calibration: Calibration | None, angles: JointAngles | None) -> dict[str, object] | None:
+    if calibration is None:
+        return None
+    offsets = {} if angles is None else {k: math.degrees(v) for k, v in angles.zero_offset.items()}
+    segments = {
+        name: {
+            "method": s.method,
+            "score": s.score,
+            "rest_norm_mps2": s.rest_norm,
+            "gyro_bias_dps": np.degrees(s.gyro_bias),
+            "R_segment_sensor": s.R_segment_sensor,
+        }
+        for name, s in calibration.segments.items()
+    }
+    result = plain(
+        {
+            "method": calibration.method,
+            "segments": segments,
+            "rest_s": calibration.rest,
+            "walking_s": calibration.walking,
+            "zero_s": calibration.zero,
+            "angle_zero": None if angles is None else angles.zero,
+            "zero_offset_deg": offsets,
+            "diagnostics": calibration.diagnostics,
+        }
+    )
+    assert isinstance(result, dict)  # noqa: S101 (narrows the type; `plain` keeps mappings)
+    return result
+
+
+def _parquet(t_s: Floats, columns: Mapping[str, np.ndarray], meta: Mapping[str, object]) -> bytes:
+    arrays = {"t_s": pa.array(t_s)} | {k: pa.array(v, from_pandas=True) for k, v in columns.items()}
+    table = pa.table(arrays).replace_schema_metadata({"sagittal": json.dumps(plain(meta))})
+    # neighbouring samples share their high bytes: splitting the bytes halves the file (spec/kernels.md §6)
+    split = [k for k, a in arrays.items() if pa.types.is_floating(a.type)]
+    sink = io.BytesIO()
+    pq.write_table(table, sink, compression="zstd", use_dictionary=False, use_byte_stream_split=split)
+    return sink.getvalue()
+
+
+def _json_bytes(value: object) -> bytes:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False, indent=1).encode()
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return repr(round(value, 6) + 0.0) if math.isfinite(value) else ""
+    return "" if value is None else value

@@ -1,0 +1,167 @@
+"""The open 3D views: one viser server each, on loopback, stopped when nobody has looked for a while.
+
+Separate server objects keep patients apart by structure: nothing is ever drawn into a shared scene. A view
+belongs to the sign-in that opened it. One web process only: the registry lives in memory.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import secrets
+import time
+import weakref
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass, field
+
+import rich
+import viser
+from viser._messages import ShareUrlRequest
+
+from core.errors import EstimationError
+from server.viewer.figure import Figure
+from server.viewer.motion import Motion
+
+IDLE_S = 30.0
+"""A view without a viewer is stopped after this; a page reload comes back well within it."""
+
+SWEEP_S = 1.0
+MAX_VIEWS = 48
+"""Open views at most, about 13 MB each for a 10 min walk if all show different ones."""
+
+Key = tuple[str, ...]
+
+
+@dataclass(eq=False)
+class View:
+    """One figure in one viser server.
+
+    Parameters
+    ----------
+    id : unguessable, part of the address. key : what is shown, to whom. login_id : who may look.
+    viewers : open connections. left_at : monotonic time since when there are none.
+    """
+
+    id: str
+    key: Key
+    login_id: str
+    server: viser.ViserServer
+    figure: Figure
+    viewers: int = 0
+    left_at: float = field(default_factory=time.monotonic)
+
+    @property
+    def port(self) -> int:
+        """Loopback port of the viser server."""
+        return self.server.get_port()
+
+    @contextlib.contextmanager
+    def watched(self) -> Iterator[None]:
+        """Keep the view open while a connection lasts."""
+        self.viewers += 1
+        try:
+            yield
+        finally:
+            self.viewers -= 1
+            self.left_at = time.monotonic()
+
+
+class Views:
+    """Registry of the open views of this process; used from its event loop only."""
+
+    def __init__(self, idle_s: float = IDLE_S, limit: int = MAX_VIEWS) -> None:
+        self._idle_s, self._limit = idle_s, limit
+        self._views: dict[str, View] = {}
+        self._motions: weakref.WeakValueDictionary[str, Motion] = weakref.WeakValueDictionary()
+        self._opening = asyncio.Lock()
+
+    def __len__(self) -> int:
+        return len(self._views)
+
+    def find(self, view_id: str, login_id: str) -> View | None:
+        """Return a view to the sign-in that opened it, None to everybody else."""
+        view = self._views.get(view_id)
+        return view if view is not None and view.login_id == login_id else None
+
+    async def open(
+        self, login_id: str, tab: str, source: str, load: Callable[[], Motion], dark: bool = False
+    ) -> View:
+        """Return the view of one browser tab on one source, made at need.
+
+        Parameters
+        ----------
+        source : id of the analysis shown; `load` reads and prepares it and is called in a thread.
+
+        Raises
+        ------
+        EstimationError
+            `too_many_views` when the limit is reached and every view is being watched.
+        """
+        key = (login_id, tab, source)
+        async with self._opening:
+            for view in self._views.values():
+                if view.key == key:
+                    view.left_at = time.monotonic()
+                    return view
+            await self._make_room()
+            motion = self._motions.get(source)
+            if motion is None:
+                motion = await asyncio.to_thread(load)
+                self._motions[source] = motion
+            server, figure = await asyncio.to_thread(_start, motion, dark)
+            view = View(secrets.token_hex(16), key, login_id, server, figure)
+            self._views[view.id] = view
+            return view
+
+    async def sweep(self) -> None:
+        """Stop every view that nobody has watched for the idle time."""
+        now = time.monotonic()
+        for view in list(self._views.values()):
+            if view.viewers == 0 and now - view.left_at >= self._idle_s:
+                await self._stop(view)
+
+    async def close(self) -> None:
+        """Stop all views."""
+        for view in list(self._views.values()):
+            await self._stop(view)
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[Views]:
+        """Sweep in the background; stop everything at the end."""
+        sweeper = asyncio.create_task(self._sweep_for_ever())
+        try:
+            yield self
+        finally:
+            sweeper.cancel()
+            await asyncio.gather(sweeper, return_exceptions=True)
+            await self.close()
+
+    async def _sweep_for_ever(self) -> None:
+        while True:
+            await asyncio.sleep(SWEEP_S)
+            await self.sweep()
+
+    async def _make_room(self) -> None:
+        if len(self._views) < self._limit:
+            return
+        unwatched = [v for v in self._views.values() if v.viewers == 0]
+        if not unwatched:
+            raise EstimationError(
+                "too_many_views",
+                f"{self._limit} 3D views are open, the most this server keeps; close one and try again.",
+            )
+        await self._stop(min(unwatched, key=lambda v: v.left_at))
+
+    async def _stop(self, view: View) -> None:
+        self._views.pop(view.id, None)
+        await asyncio.to_thread(view.server.stop)
+
+
+def _start(motion: Motion, dark: bool) -> tuple[viser.ViserServer, Figure]:
+    """Start a viser server on a free loopback port and draw the figure in it."""
+    # viser prints a banner per server even when told not to be verbose
+    rich.get_console().quiet = True
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    # a client could ask for a public tunnel through a third party; the proxy drops the request, this one too
+    server._websock_server.unregister_handler(ShareUrlRequest)  # noqa: SLF001
+    return server, Figure(server, motion, dark)
