@@ -1,4 +1,4 @@
-"""The one place where an error becomes an answer: RFC 9457 problem+json, or a page when a browser wants one."""
+"""The one place where an error becomes an answer: RFC 9457 problem+json, or a page for a browser."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Any
 from urllib.parse import quote
 
 from fastapi import FastAPI
-from fastapi.exceptions import RequestValidationError
+from fastapi.exceptions import HTTPException, RequestValidationError
 from jinja2 import TemplateNotFound
-from starlette.exceptions import HTTPException
+from starlette.exceptions import HTTPException as AnyHttpException
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.templating import Jinja2Templates
@@ -28,7 +28,7 @@ MEDIA_TYPE = "application/problem+json"
 TEMPLATES = Jinja2Templates(Path(web.__file__).parent / "templates")
 
 
-class Problem(Exception):  # noqa: N818 - the name RFC 9457 gives to this thing
+class Problem(HTTPException):
     """A refusal with its HTTP status, a stable code and a sentence that says what to do."""
 
     def __init__(
@@ -40,11 +40,11 @@ class Problem(Exception):  # noqa: N818 - the name RFC 9457 gives to this thing
         headers: Mapping[str, str] | None = None,
         errors: list[dict[str, str]] | None = None,
     ) -> None:
-        super().__init__(detail)
+        # an HTTPException, because FastAPI lets only those through when reading a body fails
+        super().__init__(status, detail, dict(headers or {}))
         self.status = status
         self.code = code
-        self.detail = detail
-        self.headers = dict(headers or {})
+        self.sentence = detail
         self.errors = errors
 
     def to_json(self) -> dict[str, Any]:
@@ -53,7 +53,7 @@ class Problem(Exception):  # noqa: N818 - the name RFC 9457 gives to this thing
             "type": "about:blank",
             "title": HTTPStatus(self.status).phrase,
             "status": self.status,
-            "detail": self.detail,
+            "detail": self.sentence,
             "code": self.code,
         }
         if self.errors is not None:
@@ -66,20 +66,20 @@ def as_problem(error: Exception) -> Problem:
     if isinstance(error, Problem):
         return error
     if isinstance(error, SagittalError):
-        return Problem(STATUS_OF_CODE.get(error.code, 422), error.code, error.message)
+        return Problem(getattr(error, "status", 422), error.code, error.message)
     if isinstance(error, RequestValidationError):
         fields = [
-            {"where": ".".join(str(part) for part in item["loc"]), "message": _without_input(item)}
+            {"field": ".".join(str(part) for part in item["loc"][1:]), "message": _without_input(item)}
             for item in error.errors()
         ]
         return Problem(
             422,
             "invalid_request",
             "The request does not have the expected form: "
-            + "; ".join(f"{f['where']}: {f['message']}" for f in fields[:5]),
+            + "; ".join(f"{f['field']}: {f['message']}" for f in fields[:5]),
             errors=fields,
         )
-    if isinstance(error, HTTPException):
+    if isinstance(error, AnyHttpException):
         code = CODE_OF_STATUS.get(error.status_code, "http_error")
         said = str(error.detail)
         is_bare = said == HTTPStatus(error.status_code).phrase
@@ -92,7 +92,7 @@ def as_problem(error: Exception) -> Problem:
 def problem_response(problem: Problem, connection: HTTPConnection) -> Response:
     """Answer with JSON, or for a browser's page request with a page (401: with the sign-in page)."""
     if _wants_page(connection):
-        if problem.status == HTTPStatus.UNAUTHORIZED:
+        if problem.status == HTTPStatus.UNAUTHORIZED and connection.scope["method"] == "GET":
             path = connection.url.path + (f"?{connection.url.query}" if connection.url.query else "")
             return RedirectResponse(f"/sign-in?next={quote(path)}", status_code=303)
         try:
@@ -140,16 +140,16 @@ def install(app: FastAPI) -> None:
         add_security_headers(response.headers)
         return response
 
-    for kind in (Problem, SagittalError, RequestValidationError, HTTPException, Exception):
+    for kind in (AnyHttpException, SagittalError, RequestValidationError, Exception):
         app.add_exception_handler(kind, handle)  # type: ignore[arg-type]
 
 
 def _wants_page(connection: HTTPConnection) -> bool:
-    if connection.scope["type"] != "http" or connection.url.path.startswith(
-        ("/api/", "/health/", "/static/")
-    ):
+    if connection.scope["type"] != "http" or "text/html" not in connection.headers.get("accept", ""):
         return False
-    return "text/html" in connection.headers.get("accept", "")
+    # a form of a page without scripts posts to the API and is a browser's page request all the same
+    is_form = connection.headers.get("content-type", "").startswith("application/x-www-form-urlencoded")
+    return is_form or not connection.url.path.startswith(("/api/", "/health/", "/static/"))
 
 
 def _without_input(item: Mapping[str, Any]) -> str:
@@ -157,9 +157,6 @@ def _without_input(item: Mapping[str, Any]) -> str:
     message = str(item["msg"])
     return message if item["type"] != "value_error" or item.get("ctx") is None else str(item["ctx"]["error"])
 
-
-STATUS_OF_CODE: dict[str, int] = {}
-"""Status of the service errors that are not plain bad input (422)."""
 
 CODE_OF_STATUS = {
     400: "bad_request",
@@ -179,6 +176,6 @@ SENTENCES = {
     "not_signed_in": "You are not signed in, or the session has ended. Sign in and try again.",
     "forbidden": "Your role does not allow this. Ask an administrator if you need it.",
     "not_found": "There is nothing at this address, or it has been deleted.",
-    "method_not_allowed": "This address does not offer that method. See /api/v1/openapi.json for what it offers.",
+    "method_not_allowed": "This address does not offer that method; see /api/v1/openapi.json.",
     "internal_error": "Something went wrong on the server. The server's log has the details; try again.",
 }

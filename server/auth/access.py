@@ -32,7 +32,7 @@ class Door:
 
 
 def require(action: Action) -> Any:
-    """Declare a route's action: `who: Annotated[Identity, require(Action.READ_SESSION)]`, http and websocket."""
+    """Declare a route's action: `who: Annotated[Identity, require(Action.UPLOAD)]`, http or websocket."""
     return Depends(Door(action))
 
 

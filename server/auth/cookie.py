@@ -1,4 +1,4 @@
-"""The session cookie: `__Host-sid` behind TLS; plain `sid` on loopback http, where Secure cookies are dropped."""
+"""The session cookie: `__Host-sid` behind TLS, plain `sid` on loopback http (no Secure there)."""
 
 from __future__ import annotations
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import datetime as dt
 
-from sqlalchemy import delete, func, insert, select, update
+from sqlalchemy import Connection, delete, func, insert, select, update
 
 from server.auth.tokens import new_token, token_hash
 from server.problems import Problem
-from server.storage.db import Connection
 from server.storage.tables import now, one_time_token, user
 
 LIFE = dt.timedelta(hours=24)

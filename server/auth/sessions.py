@@ -5,12 +5,12 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Callable
 
-from sqlalchemy import delete, insert, select, update
+from sqlalchemy import Connection, delete, insert, select, update
 
 from server.auth.identity import Identity
 from server.auth.roles import Role
 from server.auth.tokens import new_token, token_hash
-from server.storage.db import Connection, Database
+from server.storage.db import Database
 from server.storage.tables import login_session, now, user
 
 TOUCH_EVERY = dt.timedelta(seconds=30)
@@ -58,11 +58,11 @@ class Logins:
         return token
 
     def find(self, token: str) -> Identity | None:
-        """Return who holds this token and count the visit as activity; None when it is unknown or has ended."""
+        """Return who holds this token and count the visit as activity; None when it is unknown or over."""
         return self.touch(token_hash(token))
 
     def touch(self, login_id: str) -> Identity | None:
-        """Count a running view or replay as activity; None when the sign-in has ended, so the view must too."""
+        """Count a running view or replay as activity; None when the sign-in is over, so the view must end."""
         at = self._clock()
         with self._db.read() as c:
             row = c.execute(
@@ -86,6 +86,22 @@ class Logins:
                     .values(last_seen_at=at)
                 )
         return Identity(row.id, row.name, row.display_name, Role(row.role), login_id)
+
+    def is_open(self, login_id: str) -> bool:
+        """Tell whether a sign-in still holds, without counting this as activity."""
+        at = self._clock()
+        with self._db.read() as c:
+            row = c.execute(
+                select(login_session.c.user_id)
+                .join(user, user.c.id == login_session.c.user_id)
+                .where(
+                    login_session.c.token_sha256 == login_id,
+                    login_session.c.expires_at > at,
+                    login_session.c.last_seen_at > at - self._idle,
+                    user.c.active,
+                )
+            ).one_or_none()
+        return row is not None
 
     def end(self, c: Connection, login_id: str) -> None:
         """End one sign-in."""

@@ -1,0 +1,28 @@
+"""The audit trail, for administrators."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+from sqlalchemy import Row
+
+from server import audit, schemas
+from server.api.context import Db
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+
+router = APIRouter(prefix="/audit", tags=["audit"])
+
+
+@router.get("", response_model=list[schemas.AuditRow])
+def list_audit(
+    db: Db,
+    who: Annotated[Identity, require(Action.READ_AUDIT)],
+    before: Annotated[int | None, Query(ge=1, le=2**53, description="rows older than this number")] = None,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+) -> list[Row[Any]]:
+    """The newest rows first."""
+    with db.read() as c:
+        return audit.entries(c, before=before, limit=limit)

@@ -1,0 +1,45 @@
+"""Bounds the body of every request that is no file upload, before anything reads it into memory."""
+
+from __future__ import annotations
+
+import re
+
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from server.problems import Problem, send_problem
+
+MAX_BODY_BYTES = 1_000_000
+"""A manifest of eight sensors has some 4 kB."""
+_UPLOAD = re.compile(r"/api/v1/sessions/[^/]+/files(/|$)")
+
+
+class BodyLimit:
+    """ASGI middleware; uploads have limits of their own (settings.max_file_bytes)."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request, or refuse its body with 413."""
+        if scope["type"] != "http" or _UPLOAD.match(scope["path"]):
+            await self.app(scope, receive, send)
+            return
+        problem = Problem(
+            413, "too_large", f"A request other than a file has at most {MAX_BODY_BYTES} bytes. Send less."
+        )
+        declared = Headers(scope=scope).get("content-length", "0")
+        if not declared.isdecimal() or int(declared) > MAX_BODY_BYTES:
+            await send_problem(problem, scope, receive, send)
+            return
+        total = 0
+
+        async def counted() -> Message:
+            nonlocal total
+            message = await receive()
+            total += len(message.get("body", b""))
+            if total > MAX_BODY_BYTES:
+                raise problem
+            return message
+
+        await self.app(scope, counted, send)

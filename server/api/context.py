@@ -1,0 +1,48 @@
+"""What endpoints take from the running application, as typed dependencies."""
+
+from __future__ import annotations
+
+from typing import Annotated, cast
+
+from fastapi import Depends, Path
+from starlette.requests import HTTPConnection
+
+from server.auth.sessions import Logins
+from server.auth.throttle import Throttle
+from server.settings import Settings
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+
+
+def _settings(connection: HTTPConnection) -> Settings:
+    return cast("Settings", connection.app.state.settings)
+
+
+def _db(connection: HTTPConnection) -> Database:
+    return cast("Database", connection.app.state.db)
+
+
+def _blobs(connection: HTTPConnection) -> BlobStore:
+    return cast("BlobStore", connection.app.state.blobs)
+
+
+def _logins(connection: HTTPConnection) -> Logins:
+    return cast("Logins", connection.app.state.logins)
+
+
+def _throttle(connection: HTTPConnection) -> Throttle:
+    return cast("Throttle", connection.app.state.throttle)
+
+
+Config = Annotated[Settings, Depends(_settings)]
+Db = Annotated[Database, Depends(_db)]
+Blobs = Annotated[BlobStore, Depends(_blobs)]
+OpenLogins = Annotated[Logins, Depends(_logins)]
+Failures = Annotated[Throttle, Depends(_throttle)]
+
+Id = Annotated[str, Path(pattern=r"^[0-9a-f]{32}$", description="32 hex digits")]
+
+
+def address_of(connection: HTTPConnection) -> str:
+    """Return the caller's address; behind a proxy uvicorn has already put the forwarded one there."""
+    return connection.client.host if connection.client else "unknown"

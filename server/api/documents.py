@@ -1,0 +1,73 @@
+"""The OpenAPI document: every refusal of every operation is in it, as problem+json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+
+from server.problems import MEDIA_TYPE
+from server.schemas import ProblemDetails
+
+_WORDS = {
+    "400": "The request cannot be read, or its host name is not ours",
+    "401": "Not signed in, or wrong name or password",
+    "403": "The role does not allow it, or the request came from another site",
+    "404": "There is no such thing, or it has been deleted",
+    "409": "The present state does not allow it",
+    "413": "Larger than a limit of the settings",
+    "422": "A field or the data is not as expected",
+    "429": "Too many failed attempts",
+    "507": "Not enough free disk space",
+}
+_PROBLEM = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/ProblemDetails"}}}
+
+
+def openapi(app: FastAPI) -> dict[str, Any]:
+    """Return the OpenAPI document of the application, made once."""
+    if app.openapi_schema is None:
+        app.openapi_schema = _complete(
+            get_openapi(
+                title=app.title, version=app.version, summary=app.summary, routes=app.routes, servers=None
+            )
+        )
+    return app.openapi_schema
+
+
+def refusals(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """Declare what an operation may answer beside the refusals that all share."""
+    return {status: {"description": _WORDS[str(status)]} for status in statuses}
+
+
+def _complete(document: dict[str, Any]) -> dict[str, Any]:
+    components = document.setdefault("components", {})
+    schemas = components.setdefault("schemas", {})
+    whole = ProblemDetails.model_json_schema(ref_template="#/components/schemas/{model}")
+    schemas.update(whole.pop("$defs", {}))
+    schemas["ProblemDetails"] = whole
+    for unused in ("HTTPValidationError", "ValidationError"):
+        schemas.pop(unused, None)
+    components["securitySchemes"] = {"session": {"type": "apiKey", "in": "cookie", "name": "sid"}}
+    document["security"] = [{"session": []}]
+    for path, item in document["paths"].items():
+        for method, operation in item.items():
+            responses = operation["responses"]
+            common = {"400", "422"} if path.startswith("/api/") else {"400"}
+            if operation.get("security") != []:
+                common |= {"401", "403"}
+            if method not in {"get", "head"}:
+                common |= {"403", "413"}
+            if "{" in path:
+                common.add("404")
+            for status in common:
+                responses.setdefault(status, {"description": _WORDS[status]})
+            for status, response in responses.items():
+                if status in _WORDS:
+                    response["description"] = _WORDS[status]
+                    response["content"] = _PROBLEM
+    return document
+
+
+PUBLIC: dict[str, Any] = {"security": []}
+"""`openapi_extra` of an operation that needs no sign-in."""

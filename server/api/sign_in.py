@@ -1,0 +1,178 @@
+"""Sign in and out, the first administrator, one's own account."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Request, Response
+from fastapi.exceptions import RequestValidationError
+from pydantic import ValidationError
+from sqlalchemy import Connection, Row
+from starlette.responses import JSONResponse, RedirectResponse
+
+from server import audit, schemas
+from server.api.context import Db, Failures, OpenLogins, address_of
+from server.api.documents import PUBLIC, refusals
+from server.auth import accounts, one_time
+from server.auth.access import require
+from server.auth.cookie import clear_token, read_token, set_token
+from server.auth.identity import Identity
+from server.auth.passwords import hash_password
+from server.auth.roles import POLICY, Action, Role
+from server.auth.sessions import Logins
+from server.auth.tokens import token_hash
+from server.problems import Problem
+
+router = APIRouter(tags=["account"])
+address_router = APIRouter(include_in_schema=False)
+
+_FORM = "application/x-www-form-urlencoded"
+_BODY = {"schema": schemas.SignIn.model_json_schema()}
+
+
+async def _credentials(request: Request) -> schemas.SignIn:
+    """Read JSON, or the form of a page without scripts."""
+    is_form = request.headers.get("content-type", "").startswith(_FORM)
+    body = await request.body()
+    try:
+        if is_form:
+            return schemas.SignIn.model_validate(dict(await request.form()))
+        return schemas.SignIn.model_validate_json(body)
+    except ValidationError as error:
+        items = [{**item, "loc": ("body", *item["loc"])} for item in error.errors()]
+        raise RequestValidationError(items) from error
+
+
+@router.post(
+    "/sign-in",
+    dependencies=[require(Action.SIGN_IN)],
+    response_model=schemas.User,
+    responses=refusals(401, 429),
+    openapi_extra=PUBLIC
+    | {"requestBody": {"required": True, "content": {"application/json": _BODY, _FORM: _BODY}}},
+)
+def sign_in(
+    request: Request,
+    body: Annotated[schemas.SignIn, Depends(_credentials)],
+    db: Db,
+    logins: OpenLogins,
+    failures: Failures,
+) -> Any:
+    """Sign in with name and password; the answer sets the session cookie."""
+    row = accounts.check_password(db, failures, body.name, body.password, address_of(request))
+    with db.write() as c:
+        token = _open(c, logins, row, request, "sign_in")
+    response: Response
+    if request.headers.get("content-type", "").startswith(_FORM):
+        response = RedirectResponse(local_path(body.next), status_code=303)
+    else:
+        response = JSONResponse(schemas.User.model_validate(row).model_dump(mode="json"))
+    set_token(response, request, token)
+    return response
+
+
+@router.post("/sign-out", status_code=204)
+def sign_out(
+    request: Request, db: Db, logins: OpenLogins, who: Annotated[Identity, require(Action.USE_ACCOUNT)]
+) -> Response:
+    """End this sign-in."""
+    with db.write() as c:
+        logins.end(c, who.login_id)
+        audit.record(c, who, "sign_out", "user", who.user_id)
+    response = Response(status_code=204)
+    clear_token(response, request)
+    return response
+
+
+@router.post(
+    "/set-up/{token}",
+    status_code=201,
+    dependencies=[require(Action.SET_UP)],
+    response_model=schemas.User,
+    responses=refusals(404, 409, 429),
+    openapi_extra=PUBLIC,
+)
+def set_up(
+    token: str, body: schemas.SetUp, request: Request, db: Db, logins: OpenLogins, failures: Failures
+) -> Any:
+    """Make the first administrator with the token of the printed address, and sign in."""
+    failures.check("set-up", address_of(request))
+    with db.read() as c:
+        valid = one_time.is_valid(c, token, "set_up")
+    # the hash takes long: outside of the transaction, and not for everybody who guesses
+    hashed = hash_password(body.password) if valid else ""
+    try:
+        with db.write() as c:
+            one_time.use(c, token, "set_up")
+            row = accounts.create(c, body.name, body.display_name, Role.ADMIN, hashed)
+            audit.record(c, None, "user.set_up", "user", row.id)
+            session = _open(c, logins, row, request, "sign_in")
+    except Problem:
+        failures.fail("set-up", address_of(request))
+        raise
+    response = JSONResponse(schemas.User.model_validate(row).model_dump(mode="json"), 201)
+    set_token(response, request, session)
+    return response
+
+
+@router.get("/account", response_model=schemas.Account)
+def read_account(who: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> schemas.Account:
+    """Tell who is signed in and what this person may do."""
+    return schemas.Account(
+        id=who.user_id,
+        name=who.name,
+        display_name=who.display_name,
+        role=who.role,
+        actions=sorted(action for action in POLICY if who.may(action)),
+    )
+
+
+@router.post("/account/password", status_code=204, responses=refusals(429))
+def change_password(
+    body: schemas.PasswordChange,
+    request: Request,
+    db: Db,
+    logins: OpenLogins,
+    failures: Failures,
+    who: Annotated[Identity, require(Action.USE_ACCOUNT)],
+) -> None:
+    """Change one's own password; all other sign-ins of this person end."""
+    # 422, not 401: the person is signed in and must not be sent to the sign-in page
+    accounts.check_password(db, failures, who.name, body.current, address_of(request), status=422)
+    hashed = hash_password(body.password)
+    with db.write() as c:
+        accounts.change(c, who.user_id, {"password_hash": hashed})
+        logins.end_all(c, who.user_id, but=who.login_id)
+        audit.record(c, who, "user.password_changed", "user", who.user_id)
+
+
+@address_router.get("/sign-in/{token}", dependencies=[require(Action.SIGN_IN)])
+def sign_in_once(token: str, request: Request, db: Db, logins: OpenLogins, failures: Failures) -> Response:
+    """Sign in with a printed one-time address and go to the patients."""
+    failures.check("one-time", address_of(request))
+    try:
+        with db.write() as c:
+            user_id = one_time.use(c, token, "sign_in")
+            row = accounts.get(c, user_id or "")
+            session = _open(c, logins, row, request, "sign_in.one_time")
+    except Problem:
+        failures.fail("one-time", address_of(request))
+        raise
+    response = RedirectResponse("/patients", status_code=303)
+    set_token(response, request, session)
+    return response
+
+
+def local_path(path: str | None) -> str:
+    """Return where to go after signing in: a path of this server, else the patients."""
+    # browsers read // and /\\ as the start of another host, and drop control characters first
+    if not path or not path.isprintable() or not path.startswith("/") or path[1:2] in {"/", "\\"}:
+        return "/patients"
+    return path
+
+
+def _open(c: Connection, logins: Logins, row: Row[Any], request: Request, action: str) -> str:
+    token = logins.start(c, row.id, replaces=read_token(request))
+    actor = Identity(row.id, row.name, row.display_name, Role(row.role), token_hash(token))
+    audit.record(c, actor, action, "user", row.id)
+    return token

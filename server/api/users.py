@@ -1,0 +1,53 @@
+"""Accounts, for administrators."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter
+from sqlalchemy import Row
+
+from server import audit, schemas
+from server.api.context import Db, Id, OpenLogins
+from server.api.documents import refusals
+from server.auth import accounts
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.passwords import hash_password
+from server.auth.roles import Action
+
+router = APIRouter(prefix="/users", tags=["users"])
+Admin = Annotated[Identity, require(Action.MANAGE_USERS)]
+
+
+@router.get("", response_model=list[schemas.User])
+def list_users(db: Db, who: Admin) -> list[Row[Any]]:
+    """All accounts in order of their names."""
+    with db.read() as c:
+        return accounts.everyone(c)
+
+
+@router.post("", status_code=201, response_model=schemas.User, responses=refusals(409))
+def add_user(body: schemas.UserNew, db: Db, who: Admin) -> Row[Any]:
+    """Add an account with its first password."""
+    hashed = hash_password(body.password)
+    with db.write() as c:
+        row = accounts.create(c, body.name, body.display_name, body.role, hashed)
+        audit.record(c, who, "user.created", "user", row.id, {"role": row.role})
+    return row
+
+
+@router.patch("/{user_id}", response_model=schemas.User, responses=refusals(409))
+def change_user(user_id: Id, body: schemas.UserChange, db: Db, logins: OpenLogins, who: Admin) -> Row[Any]:
+    """Change role, shown name, password, or close the account; sign-ins end with a new role."""
+    values = body.model_dump(exclude_unset=True, mode="json")
+    fields = sorted(values)
+    if "password" in values:
+        values["password_hash"] = hash_password(values.pop("password"))
+    with db.write() as c:
+        before = accounts.get(c, user_id)
+        row = accounts.change(c, user_id, values)
+        if "password_hash" in values or (row.role, row.active) != (before.role, before.active):
+            logins.end_all(c, user_id, but=who.login_id)
+        audit.record(c, who, "user.changed", "user", user_id, {"fields": fields, "role": row.role})
+    return row

@@ -1,0 +1,124 @@
+"""Wires the web process together; nothing is computed here."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime as dt
+import os
+from collections.abc import AsyncIterator
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import APIRouter, FastAPI
+from starlette.middleware import Middleware
+from starlette.responses import Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+import web
+from server import problems
+from server.api import audit_log, health, sign_in, users
+from server.api.body_limit import BodyLimit
+from server.api.documents import openapi
+from server.auth.access import require
+from server.auth.csrf import CrossSiteGuard
+from server.auth.headers import SecurityHeaders
+from server.auth.hosts import HostGuard
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.auth.routes import declared_actions
+from server.auth.sessions import Logins
+from server.auth.throttle import Throttle
+from server.settings import Settings
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from server.storage.migrate import upgrade
+
+STATIC = Path(web.__file__).parent / "static"
+
+
+class Assets(StaticFiles):
+    """Style sheets, scripts and icons; browsers keep them and ask whether they are still the same."""
+
+    action = Action.LOAD_ASSET
+
+    def file_response(
+        self,
+        full_path: str | os.PathLike[str],
+        stat_result: os.stat_result,
+        scope: Scope,
+        status_code: int = 200,
+    ) -> Response:
+        """Let caches keep the file but ask each time: names carry no version."""
+        response = super().file_response(full_path, stat_result, scope, status_code)
+        response.headers["Cache-Control"] = "no-cache"
+        return response
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """Return the application of one installation; its lifespan opens and closes what it needs.
+
+    Raises
+    ------
+    UndeclaredRouteError
+        a route declares no action.
+    """
+    app = FastAPI(
+        title="Sagittal",
+        summary="Gait analysis from body-worn IMUs; research software, not a medical device.",
+        version=_version(),
+        # the interactive pages load scripts from elsewhere; the document itself is served below
+        openapi_url=None,
+        docs_url=None,
+        redoc_url=None,
+        lifespan=_lifespan,
+        middleware=[
+            Middleware(SecurityHeaders),
+            Middleware(HostGuard, allowed=settings.hosts),
+            Middleware(CrossSiteGuard),
+            Middleware(BodyLimit),
+        ],
+    )
+    app.state.settings = settings
+    problems.install(app)
+
+    api = APIRouter(prefix="/api/v1")
+    for part in (sign_in.router, users.router, audit_log.router):
+        api.include_router(part)
+
+    @api.get("/openapi.json", include_in_schema=False)
+    def document(who: Annotated[Identity, require(Action.READ_API)]) -> dict[str, Any]:
+        """Describe this API as OpenAPI."""
+        return openapi(app)
+
+    app.include_router(api)
+    app.include_router(sign_in.address_router)
+    app.include_router(health.router)
+    app.mount("/static", Assets(directory=STATIC), name="static")
+    declared_actions(app.routes)
+    return app
+
+
+@contextlib.asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    settings: Settings = app.state.settings
+    upgrade(settings.database)
+    db = Database(settings.database)
+    app.state.db = db
+    app.state.blobs = BlobStore(settings.blobs)
+    app.state.throttle = Throttle()
+    app.state.logins = Logins(
+        db, dt.timedelta(minutes=settings.idle_minutes), dt.timedelta(hours=settings.absolute_hours)
+    )
+    try:
+        yield
+    finally:
+        db.close()
+
+
+def _version() -> str:
+    try:
+        return version("sagittal")
+    except PackageNotFoundError:
+        return "0"

@@ -1,0 +1,84 @@
+"""The accounts of the clinic: who may sign in, and as what."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import Connection, Row, func, insert, select, update
+from sqlalchemy.exc import IntegrityError
+
+from server.auth.passwords import verify_password
+from server.auth.roles import Role
+from server.auth.throttle import Throttle
+from server.problems import Problem
+from server.storage.db import Database
+from server.storage.tables import new_id, now, user
+
+
+def create(c: Connection, name: str, display_name: str | None, role: Role, password_hash: str) -> Row[Any]:
+    """Add an account and return its row; raise Problem 409 when the name is taken."""
+    values = {
+        "id": new_id(),
+        "name": name,
+        "display_name": display_name or name,
+        "role": role.value,
+        "password_hash": password_hash,
+        "active": True,
+        "created_at": now(),
+    }
+    try:
+        c.execute(insert(user).values(values))
+    except IntegrityError as error:
+        raise Problem(409, "name_taken", "An account with this name exists. Choose another name.") from error
+    return get(c, str(values["id"]))
+
+
+def get(c: Connection, user_id: str) -> Row[Any]:
+    """Return one account; raise Problem 404 when there is none."""
+    row = c.execute(select(user).where(user.c.id == user_id)).one_or_none()
+    if row is None:
+        raise Problem(404, "user_not_found", "There is no such account.")
+    return row
+
+
+def everyone(c: Connection) -> list[Row[Any]]:
+    """Return all accounts in order of their names."""
+    return list(c.execute(select(user).order_by(user.c.name)).all())
+
+
+def change(c: Connection, user_id: str, values: dict[str, object]) -> Row[Any]:
+    """Change an account and return it; raise Problem 409 when nobody could administer the clinic any more."""
+    get(c, user_id)
+    if values:
+        c.execute(update(user).where(user.c.id == user_id).values(values))
+    admins = select(func.count()).select_from(user).where(user.c.role == Role.ADMIN.value, user.c.active)
+    if not c.execute(admins).scalar_one():
+        raise Problem(
+            409,
+            "last_administrator",
+            "This is the last active administrator. Make somebody else an administrator first.",
+        )
+    return get(c, user_id)
+
+
+def check_password(
+    db: Database, throttle: Throttle, name: str, password: str, address: str, *, status: int = 401
+) -> Row[Any]:
+    """Return the account that this name and password open.
+
+    Raises
+    ------
+    Problem
+        429 after too many failures, else `status` with the same words for an unknown name, a wrong password
+        and a closed account.
+    """
+    name = name.strip().lower()
+    throttle.check(name, address)
+    with db.read() as c:
+        row = c.execute(select(user).where(user.c.name == name)).one_or_none()
+    stored = row.password_hash if row is not None and row.active else None
+    if not verify_password(password, stored) or row is None:
+        throttle.fail(name, address)
+        raise Problem(status, "wrong_password", "Name or password is wrong. Check both and try again.")
+    throttle.succeed(name)
+    return row
