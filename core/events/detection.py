@@ -1,0 +1,168 @@
+"""Orientations → GaitEvents: the foot-pitch rule on each foot, and what must be said about its result.
+
+Source: spec/fusion.md §5.2–5.4 and §9 (codes).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from core.errors import Notice, SignalError
+from core.events.foot_pitch import FootPitchParams, FootPitchState, pitch_signal, push
+from core.events.result import EventKind, GaitEvent, GaitEvents
+from core.frames import FOOT, SIDES, Bools, Floats, Side
+from core.fusion.orientations import Orientations
+from core.rotation import angle_between
+
+SOURCE: Final = "foot_pitch"
+KINDS: Final[tuple[EventKind, EventKind]] = ("tc", "ic")
+
+
+@dataclass(frozen=True)
+class PitchFigures:
+    """What one foot did: extremes of s, its level in quiet standing (None without any), events found."""
+
+    s_min: float
+    s_max: float
+    s_quiet: float | None
+    n_ic: int
+    n_tc: int
+
+
+def detect(orientations: Orientations, params: FootPitchParams | None = None) -> GaitEvents:
+    """Contacts of each foot that carries a sensor.
+
+    Parameters
+    ----------
+    orientations : with "foot_l", "foot_r" or both; a missing foot gives the notice `foot_missing`.
+
+    Returns
+    -------
+    events in order of time; diagnostics: foot → PitchFigures.
+
+    Raises
+    ------
+    SignalError : `sample_rate_too_low`.
+    """
+    params = params or FootPitchParams()
+    if orientations.rate_hz < params.min_rate_hz:
+        raise SignalError(
+            "sample_rate_too_low",
+            f"Gait events need at least {params.min_rate_hz:g} Hz, the recording has"
+            f" {orientations.rate_hz:g} Hz. Record at a higher rate.",
+        )
+    events: list[GaitEvent] = []
+    notices: list[Notice] = []
+    figures: dict[str, PitchFigures] = {}
+    for side in SIDES:
+        foot = FOOT[side]
+        if foot not in orientations.q:
+            notices.append(Notice("foot_missing", f"No sensor on the {side} foot: no contacts of it.", foot))
+            continue
+        no_rest = [n for n in orientations.notices if n.code == "no_rest" and n.sensor in (None, foot)]
+        if no_rest:
+            # without rest the foot's attitude means nothing (spec/fusion.md §5.4: patient without rest)
+            notices.extend(n for n in no_rest if n not in notices)
+            continue
+        s, valid = pitch_signal(orientations.q[foot]), orientations.valid[foot]
+        found = _events(side, s, valid, orientations, params)
+        events.extend(found)
+        figures[foot] = PitchFigures(
+            s_min=float(s[valid].min(initial=1.0)),
+            s_max=float(s[valid].max(initial=-1.0)),
+            s_quiet=_quiet_level(orientations.q[foot], s, valid, orientations.rate_hz, params),
+            n_ic=sum(e.kind == "ic" for e in found),
+            n_tc=sum(e.kind == "tc" for e in found),
+        )
+        notices.extend(_remarks(side, figures[foot], params))
+    if params.threshold != FootPitchParams.threshold and figures:
+        notices.append(_threshold_notice(figures, params))
+    events.sort(key=lambda e: (e.time_s, e.side, e.kind))
+    return GaitEvents(tuple(events), tuple(notices), figures)
+
+
+def _events(
+    side: Side, s: Floats, valid: Bools, orientations: Orientations, params: FootPitchParams
+) -> list[GaitEvent]:
+    """Run the rule over the whole take of one foot."""
+    kind, index, offset = push(FootPitchState.start(orientations.rate_hz, params), s, valid)
+    step = 1.0 / orientations.rate_hz
+    return [
+        GaitEvent(
+            time_s=float(orientations.t_s[j] + o * step),
+            side=side,
+            kind=KINDS[k],
+            source=SOURCE,
+            detected_s=float(orientations.t_s[j + 1]),
+        )
+        for k, j, o in zip(kind, index, offset, strict=True)
+    ]
+
+
+def _quiet_level(q: Floats, s: Floats, valid: Bools, rate_hz: float, params: FootPitchParams) -> float | None:
+    """Mean s over the quiet seconds of a foot, None if it has none."""
+    second = max(2, round(rate_hz))
+    whole = len(s) // second
+    if whole == 0:
+        return None
+    speed = np.append(angle_between(q[:-1], q[1:]) * rate_hz, 0.0)
+    seconds = (whole, second)
+    quiet = speed[: whole * second].reshape(seconds).mean(axis=1) < params.quiet_rad_s
+    quiet &= valid[: whole * second].reshape(seconds).all(axis=1)
+    return float(s[: whole * second].reshape(seconds)[quiet].mean()) if quiet.any() else None
+
+
+def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list[Notice]:
+    """Say what makes the events of one foot absent or doubtful."""
+    foot = FOOT[side]
+    remarks = []
+    if figures.s_min >= params.threshold:
+        remarks.append(
+            Notice(
+                "no_toe_off",
+                f"The {side} foot never pitched below {_degrees(params.threshold)} (lowest was"
+                f" {_degrees(figures.s_min)}), so no contacts were found on it. A shuffling gait, no walking,"
+                " or a sensor on another segment looks like this.",
+                foot,
+            )
+        )
+    if figures.s_max < params.suspect_max:
+        remarks.append(
+            Notice(
+                "rest_pose_suspect",
+                f"The {side} foot never pitched above {_degrees(params.suspect_max)} (highest was"
+                f" {_degrees(figures.s_max)}). Check that the person stood with the whole sole on the floor"
+                " during the rest.",
+                foot,
+            )
+        )
+    elif figures.s_quiet is not None and abs(figures.s_quiet) > params.suspect_quiet:
+        remarks.append(
+            Notice(
+                "rest_pose_suspect",
+                f"The {side} foot is pitched by {_degrees(figures.s_quiet)} on average while it is quiet"
+                f" (expected within ±{_degrees(params.suspect_quiet)}). Check that the person stood with the"
+                " whole sole on the floor during the rest.",
+                foot,
+            )
+        )
+    return remarks
+
+
+def _threshold_notice(figures: dict[str, PitchFigures], params: FootPitchParams) -> Notice:
+    """Show both feet's counts when the threshold is not the published one (spec/fusion.md §5.3)."""
+    counts = ", ".join(f"{foot} {f.n_ic} initial contacts" for foot, f in figures.items())
+    return Notice(
+        "event_threshold_changed",
+        f"Contacts were found with a push-off threshold of {params.threshold:g} instead of"
+        f" {FootPitchParams.threshold:g}: {counts}. Compare the feet: a higher threshold can lose most"
+        " contacts of a drop foot.",
+    )
+
+
+def _degrees(s: float) -> str:
+    """Pitch of a value of s, in words for a person."""
+    return f"{np.degrees(np.arcsin(np.clip(s, -1.0, 1.0))):.1f}°".replace("-", "−")

@@ -1,0 +1,154 @@
+"""Initial and terminal contact from the pitch of the foot: a real-time rule with two extrema per stride.
+
+Signal: s = upward component of the foot's forward axis, 0 at standing, toes up positive; it knows neither
+heading nor Euler angles. The foot leaves the floor at a minimum of s below −0.2, lands at the maximum after.
+Source: Nazarahari thesis ch. 6 with the corrections of spec/fusion.md §5.1–5.3 (times in seconds, both the
+time of the extremum and the time it is known).
+
+How near the maximum is to the true contact is a property of how a person lands, not of the rule: with a foot
+that pitches up until it touches it is within a few ms, otherwise early by up to 0.1 s (spec/patients.md §3).
+An initial contact before the first terminal contact is not reported, by design.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from core.frames import Bools, Floats
+from core.rotation import rotate
+
+
+@dataclass(frozen=True)
+class FootPitchParams:
+    """Parameters of the rule.
+
+    Parameters
+    ----------
+    window_s : an extremum must be extreme over this long before it; also the least time between two events
+        of one kind (thesis Alg 1: 15 samples at 100 Hz).
+    monotone_share : share of the window's steps that must lead towards the extremum (thesis Alg 1: 0.8).
+    threshold : level of s between stance and push-off (thesis Alg 1: −0.2 = 11.5° toes down). Do not raise
+        it: at −0.1 a drop foot loses most of its contacts (spec/patients.md §0.5).
+    min_rate_hz : below it the window holds too few samples (spec/fusion.md §5.3).
+    suspect_max : a foot that never pitches up beyond this was not level at rest (spec/fusion.md §5.3).
+    suspect_quiet : largest mean |s| of quiet standing (spec/fusion.md §5.3).
+    quiet_rad_s : a second counts as quiet below this mean angular speed (spec/fusion.md §3).
+    """
+
+    window_s: float = 0.150
+    monotone_share: float = 0.8
+    threshold: float = -0.2
+    min_rate_hz: float = 40.0
+    suspect_max: float = 0.1
+    suspect_quiet: float = 0.1
+    quiet_rad_s: float = float(np.radians(3.0))
+
+
+@dataclass(eq=False)
+class FootPitchState:
+    """What the rule remembers between two blocks of one foot.
+
+    Parameters
+    ----------
+    ring : (window + 3,) the last values of s. counters : (5,) samples seen, valid samples in a row,
+        0 = stance or 1 = swing, sample of the last detection of TC and of IC.
+    """
+
+    ring: Floats
+    counters: NDArray[np.int64]
+    window: int
+    need: int
+    threshold: float
+
+    @classmethod
+    def start(cls, rate_hz: float, params: FootPitchParams) -> FootPitchState:
+        """State before the first sample at `rate_hz`."""
+        window = round(params.window_s * rate_hz)
+        never = -(1 << 40)
+        return cls(
+            ring=np.zeros(window + 3),
+            counters=np.array([0, 0, 0, never, never], np.int64),
+            window=window,
+            need=int(np.ceil(params.monotone_share * window - 1e-9)),
+            threshold=params.threshold,
+        )
+
+
+@njit(cache=True, nogil=True)
+def _foot_pitch_kernel(s, valid, ring, counters, window, need, threshold, kind, index, offset):  # type: ignore[no-untyped-def]
+    """Run over a block; write kind (0 = TC, 1 = IC), sample and sub-sample offset of each extremum."""
+    size = window + 3
+    found = 0
+    for i in range(s.shape[0]):
+        k = counters[0]
+        counters[0] = k + 1
+        if not valid[i]:
+            # nothing is concluded across a gap: the phase is unknown after it
+            counters[1] = 0
+            counters[2] = 0
+            continue
+        ring[k % size] = s[i]
+        counters[1] += 1
+        if counters[1] < size:
+            continue
+        swing = counters[2]
+        if k - counters[3 + swing] <= window or (s[i] < threshold) == (swing == 1):
+            continue
+        # look for a maximum in swing and for a minimum in stance by turning the sign
+        sign = 1.0 if swing == 0 else -1.0
+        here = sign * ring[(k - 1) % size]
+        if here >= sign * s[i]:
+            continue
+        towards = 0
+        extreme = True
+        later = here
+        for back in range(2, window + 3):
+            earlier = sign * ring[(k - back) % size]
+            if back <= window + 1 and earlier <= here:
+                extreme = False
+                break
+            if back >= 3 and later < earlier:
+                towards += 1
+            later = earlier
+        if not extreme or towards < need:
+            continue
+        before, after = sign * ring[(k - 2) % size], sign * s[i]
+        kind[found] = swing
+        index[found] = k - 1
+        offset[found] = 0.5 * (before - after) / (before - 2.0 * here + after)
+        found += 1
+        counters[3 + swing] = k
+        counters[2] = 1 - swing
+    return found
+
+
+def push(
+    state: FootPitchState, s: Floats, valid: Bools
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+    """Advance one foot by a block of samples, in place.
+
+    Parameters
+    ----------
+    s : (n,) foot pitch signal. valid : (n,) False where the sensor was lost.
+
+    Returns
+    -------
+    (m,) kind 0 = TC, 1 = IC; (m,) sample of the extremum since the start, detected one sample later;
+    (m,) offset of the parabola through the three samples around it, within ±0.5 samples.
+    """
+    room = 2 * (len(s) // (state.window + 1) + 1)
+    kind, index, offset = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)
+    m = _foot_pitch_kernel(
+        np.ascontiguousarray(s, np.float64), np.ascontiguousarray(valid, np.bool_), state.ring,
+        state.counters, state.window, state.need, state.threshold, kind, index, offset,
+    )  # fmt: skip
+    return kind[:m], index[:m], offset[:m]
+
+
+def pitch_signal(q_foot: Floats) -> Floats:
+    """s (n,) of foot orientations (n, 4): sine of the foot's pitch, toes up positive (thesis Eq 52)."""
+    return np.ascontiguousarray(rotate(q_foot, np.array([1.0, 0.0, 0.0]))[:, 2])

@@ -1,0 +1,105 @@
+"""Reference curves of healthy adults over the gait cycle (spec/clinic.md §2, §8).
+
+The reference angles are anatomical, ours are zero at the person's own standing: bands of sagittal and frontal
+angles show the shape, not the level, and say so; what has no meaning left is marked not comparable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Final, Literal
+
+import numpy as np
+
+from core.frames import Floats
+from core.norms.tables import WBDS, WBDS_N, rows, wbds_group
+
+SLOW_MPS: Final = 0.8
+"""No adult reference exists for walking slower than this (spec/clinic.md §8.3)."""
+
+_ZERO = (
+    "The zero differs: measured from the person's own standing, the reference is anatomical; compare shapes."
+)
+_PLANE = "Low confidence outside the sagittal plane."
+_HEADING = "Low confidence: the transverse plane depends on the sensors' headings."
+_JUDGEMENT: Final[Mapping[str, tuple[bool, Literal["normal", "low"], str]]] = {
+    "hip_flexion": (True, "normal", _ZERO),
+    "knee_flexion": (True, "normal", _ZERO),
+    "ankle_dorsiflexion": (True, "normal", _ZERO),
+    "pelvis_obliquity": (True, "low", f"{_ZERO} {_PLANE}"),
+    "hip_adduction": (True, "low", f"{_ZERO} {_PLANE}"),
+    "hip_rotation": (True, "low", f"{_ZERO} {_HEADING}"),
+    "pelvis_tilt": (False, "low", "Not comparable: measured from standing, pelvic tilt has lost its level."),
+    "pelvis_rotation": (
+        False,
+        "low",
+        "Not comparable: rotation against the walking direction is not measured.",
+    ),
+    "foot_progression": (False, "low", "Not comparable: the walking direction of the foot is not measured."),
+}
+"""Variable → may the band stand behind our curve, how much to trust it, what to say beside it."""
+
+
+@dataclass(frozen=True, eq=False)
+class NormBand:
+    """Reference of one variable.
+
+    Parameters
+    ----------
+    variable : as in CycleCurves, e.g. "knee_flexion".
+    mean_deg, sd_deg : (101,) mean, and standard deviation of a single side between people.
+    n : people. group, source : who and from where; both are printed.
+    comparable : the band may stand behind our curve. confidence, note : what to print beside it.
+    """
+
+    variable: str
+    mean_deg: Floats
+    sd_deg: Floats
+    n: int
+    group: str
+    source: str
+    comparable: bool
+    confidence: Literal["normal", "low"]
+    note: str
+
+
+@dataclass(frozen=True, eq=False)
+class NormBands:
+    """Bands by variable, or none and the reason: "no_norm_for_age", "no_speed_matched_norm"."""
+
+    bands: Mapping[str, NormBand] = field(default_factory=dict)
+    reason: str | None = None
+
+
+def adult_kinematics(age: float | None, speed_mps: float | None = None) -> NormBands:
+    """Reference bands for a person of this age, walking overground at comfortable speed (1.25 ± 0.16 m/s).
+
+    Parameters
+    ----------
+    age : years; None = all adults.
+    speed_mps : walking speed if known; below 0.8 m/s no reference applies.
+    """
+    group = wbds_group(age)
+    if group is None:
+        return NormBands(reason="no_norm_for_age")
+    if speed_mps is not None and speed_mps < SLOW_MPS:
+        return NormBands(reason="no_speed_matched_norm")
+    return NormBands(_bands(group))
+
+
+@cache
+def _bands(group: str) -> Mapping[str, NormBand]:
+    table = [r for r in rows("kinematics_wbds_adult") if r["group"] == group]
+    bands = {}
+    for variable, (comparable, confidence, note) in _JUDGEMENT.items():
+        own = sorted((r for r in table if r["variable"] == variable), key=lambda r: float(r["pct_cycle"]))
+        mean = np.array([float(r["mean_deg"]) for r in own])
+        sd = np.array([float(r["sd_single_side_deg"]) for r in own])
+        mean.setflags(write=False)
+        sd.setflags(write=False)
+        bands[variable] = NormBand(
+            variable, mean, sd, WBDS_N[group], group, WBDS, comparable, confidence, note
+        )
+    return bands

@@ -1,0 +1,35 @@
+"""The reference tables as shipped: package data, read once. Origin and licence of each: data/SOURCES.md."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+
+WBDS = "Fukuchi, Fukuchi & Duarte 2018 (PeerJ 6:e4640), WBDS data set, CC BY 4.0"
+"""Source line of everything computed from the WBDS strides; printed wherever a norm is shown."""
+
+WBDS_N: Mapping[str, int] = {"adult_21_84": 42, "adult_21_54": 25, "adult_55_84": 17}
+"""Subjects per age group of the WBDS tables."""
+
+ADULT_AGE = 18.0
+"""Below it no adult table applies (spec/clinic.md §2: the tables start at 21; 18 to 20 use all adults)."""
+
+
+@cache
+def rows(name: str) -> tuple[Mapping[str, str], ...]:
+    """Rows of one table by column name."""
+    text = files("core.norms").joinpath("data", f"{name}.csv").read_text(encoding="utf-8")
+    return tuple(csv.DictReader(text.splitlines()))
+
+
+def wbds_group(age: float | None) -> str | None:
+    """WBDS age group of a person; all adults when the age is not known, None below 18 years."""
+    if age is None:
+        return "adult_21_84"
+    if age < ADULT_AGE:
+        return None
+    if age < 21:
+        return "adult_21_84"
+    return "adult_21_54" if age < 55 else "adult_55_84"

@@ -1,0 +1,210 @@
+"""JointAngles and Strides → curves over the gait cycle and the figures read from them.
+
+A curve has 101 points, 0 to 100 % from initial contact to the next of the same foot, by linear interpolation.
+The windows of the figures are those of the reference table (spec/clinic.md §2), so that both mean the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from core.angles import JointAngles
+from core.events.foot_pitch import pitch_signal
+from core.events.result import Strides
+from core.frames import FOOT, SIDES, SUFFIX, Floats, Side
+from core.fusion.orientations import Orientations
+from core.parameters.result import CycleCurves, Parameter
+from core.parameters.temporal import Column, summary
+
+POINTS: Final = 101
+"""Points of a curve: 0, 1, … 100 % of the cycle."""
+
+
+@dataclass(frozen=True)
+class CurveFigure:
+    """A statistic of one curve between two percentages of the cycle, both included."""
+
+    variable: str
+    statistic: Literal["at", "max", "min", "range"]
+    start_pct: int = 0
+    end_pct: int = 100
+
+
+FIGURES: Final[Mapping[str, CurveFigure]] = {
+    "hip_flexion_ic_deg": CurveFigure("hip_flexion", "at"),
+    "hip_flexion_min_deg": CurveFigure("hip_flexion", "min"),
+    "hip_flexion_rom_deg": CurveFigure("hip_flexion", "range"),
+    "knee_flexion_ic_deg": CurveFigure("knee_flexion", "at"),
+    "knee_flexion_max_loading_deg": CurveFigure("knee_flexion", "max", 0, 30),
+    "knee_flexion_min_stance_deg": CurveFigure("knee_flexion", "min", 20, 60),
+    "knee_flexion_max_swing_deg": CurveFigure("knee_flexion", "max", 50, 100),
+    "knee_flexion_rom_deg": CurveFigure("knee_flexion", "range"),
+    "ankle_dorsiflexion_ic_deg": CurveFigure("ankle_dorsiflexion", "at"),
+    "ankle_dorsiflexion_max_stance_deg": CurveFigure("ankle_dorsiflexion", "max", 0, 60),
+    "ankle_dorsiflexion_min_deg": CurveFigure("ankle_dorsiflexion", "min"),
+    "ankle_dorsiflexion_max_swing_deg": CurveFigure("ankle_dorsiflexion", "max", 75, 100),
+    "ankle_dorsiflexion_rom_deg": CurveFigure("ankle_dorsiflexion", "range"),
+}
+"""Parameter name → how it is read from the cycle curve."""
+
+FOOT_PITCH: Final = ("foot_pitch_ic_deg", "foot_pitch_tc_deg")
+"""Sole to floor at the contacts, toes up positive, 0 at standing (spec/field.md §4b)."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeanCurve:
+    """Mean and standard deviation over the counted strides.
+
+    Parameters
+    ----------
+    mean, sd : (101,) rad; None without strides, sd also with fewer than two. n : strides behind them.
+    """
+
+    mean: Floats | None
+    sd: Floats | None
+    n: int
+
+
+def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
+    """Cut every angle into gait cycles.
+
+    Pelvis angles appear once per side, over that side's cycles; obliquity is positive with that side up.
+    A stride in which the angle is not known throughout is a row of NaN.
+    """
+    index = {side: tuple(i for i, s in enumerate(strides.strides) if s.side == side) for side in SIDES}
+    curves: dict[str, dict[Side, Floats]] = {}
+    for side in SIDES:
+        own = [strides.strides[i] for i in index[side]]
+        bounds = np.array([(s.start_s, s.end_s) for s in own]).reshape(-1, 2)
+        names = {}
+        for name in angles.angles:
+            base, _, suffix = name.rpartition("_")
+            if suffix == SUFFIX[side]:
+                names[name] = base
+            elif suffix not in SUFFIX.values():
+                names[name] = name
+        if not names:
+            continue
+        rows = _cut(np.stack([angles.angles[name] for name in names]), angles.t_s, bounds)
+        for (name, base), row in zip(names.items(), rows, strict=True):
+            sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
+            curves.setdefault(base, {})[side] = sign * row
+    return CycleCurves(
+        curves=curves,
+        stride_index=index,
+        used={
+            side: np.array([strides.strides[i].excluded_reason is None for i in rows], np.bool_)
+            for side, rows in index.items()
+        },
+        foot_off_pct={
+            side: np.array([_foot_off(strides, i) for i in rows], np.float64) for side, rows in index.items()
+        },
+    )
+
+
+def mean_curve(curves: CycleCurves, variable: str, side: Side) -> MeanCurve:
+    """Mean curve of the counted strides of a side; strides with gaps in this variable are left out."""
+    rows = curves.curves.get(variable, {}).get(side)
+    if rows is None:
+        return MeanCurve(None, None, 0)
+    rows = rows[curves.used[side] & np.isfinite(rows).all(axis=1)]
+    n = len(rows)
+    return MeanCurve(rows.mean(axis=0) if n else None, rows.std(axis=0, ddof=1) if n > 1 else None, n)
+
+
+def stride_figures(curves: CycleCurves) -> dict[str, dict[Side, Floats]]:
+    """Angle parameters of every stride: name → side → (strides,) degrees, NaN where undefined."""
+    values: dict[str, dict[Side, Floats]] = {}
+    for name, figure in FIGURES.items():
+        for side, rows in curves.curves.get(figure.variable, {}).items():
+            part = np.degrees(rows[:, figure.start_pct : figure.end_pct + 1])
+            if figure.statistic == "at":
+                value = part[:, 0]
+            elif figure.statistic == "max":
+                value = part.max(axis=1)
+            elif figure.statistic == "min":
+                value = part.min(axis=1)
+            else:
+                value = np.ptp(part, axis=1)
+            values.setdefault(name, {})[side] = np.asarray(value)
+    return values
+
+
+def foot_pitch(orientations: Orientations, strides: Strides) -> dict[str, dict[Side, Floats]]:
+    """Pitch of the foot at IC and TC of every stride: name → side → (strides,) degrees, NaN if undefined."""
+    values: dict[str, dict[Side, Floats]] = {name: {} for name in FOOT_PITCH}
+    for side in SIDES:
+        if FOOT[side] not in orientations.q:
+            continue
+        s = pitch_signal(orientations.q[FOOT[side]])
+        pitch = np.where(orientations.valid[FOOT[side]], np.degrees(np.arcsin(np.clip(s, -1.0, 1.0))), np.nan)
+        own = [s for s in strides.strides if s.side == side]
+        moments = {
+            "foot_pitch_ic_deg": [s.start_s for s in own],
+            "foot_pitch_tc_deg": [np.nan if s.tc_s is None else s.tc_s for s in own],
+        }
+        for name, times in moments.items():
+            values[name][side] = np.interp(np.asarray(times, np.float64), orientations.t_s, pitch)
+    return values
+
+
+def kinematic(
+    curves: CycleCurves, pitch: Mapping[str, Mapping[Side, Floats]] | None = None
+) -> tuple[Parameter, ...]:
+    """Angle parameters over the counted strides of each side, degrees.
+
+    Parameters
+    ----------
+    pitch : result of `foot_pitch`, None leaves those two out.
+
+    Returns
+    -------
+    without a value a reason: "joint_missing" (a segment carries no sensor), "no_strides", "gap".
+    """
+    figures: dict[str, Mapping[Side, Floats]] = {name: {} for name in FIGURES}
+    figures |= stride_figures(curves)
+    figures |= pitch or {}
+    parameters = []
+    for side in SIDES:
+        used = curves.used[side]
+        for name, sides in figures.items():
+            if side not in sides:
+                reason = "joint_missing"
+                values: list[float] = []
+            else:
+                reason = "gap" if used.any() else "no_strides"
+                counted = sides[side][used]
+                values = counted[np.isfinite(counted)].tolist()
+            parameters.append(summary(name, side, values, "deg", None if values else reason))
+    return tuple(parameters)
+
+
+def per_stride_figures(strides: Strides, figures: Mapping[str, Mapping[Side, Floats]]) -> dict[str, Column]:
+    """Columns of the stride table, one entry per stride of the list in its order, from values per side."""
+    columns: dict[str, Column] = {}
+    for name, sides in figures.items():
+        queue = {side: iter(values.tolist()) for side, values in sides.items()}
+        column = (next(queue[s.side]) if s.side in queue else np.nan for s in strides.strides)
+        columns[name] = tuple(v if np.isfinite(v) else None for v in column)
+    return columns
+
+
+def _cut(signals: Floats, t_s: Floats, bounds: Floats) -> Floats:
+    """Interpolate (k, n) signals on a uniform axis to (k, strides, 101); rows that touch NaN become NaN."""
+    times = bounds[:, :1] + (bounds[:, 1:] - bounds[:, :1]) * np.linspace(0.0, 1.0, POINTS)
+    place = (times - t_s[0]) * ((len(t_s) - 1) / (t_s[-1] - t_s[0]))
+    low = np.clip(np.floor(place).astype(np.int64), 0, len(t_s) - 2)
+    u = place - low
+    rows = signals[:, low] * (1.0 - u) + signals[:, low + 1] * u
+    rows[~np.isfinite(rows).all(axis=-1)] = np.nan
+    return np.asarray(rows)
+
+
+def _foot_off(strides: Strides, i: int) -> float:
+    """Terminal contact in % of the cycle, NaN if not found."""
+    s = strides.strides[i]
+    return float("nan") if s.tc_s is None else 100.0 * (s.tc_s - s.start_s) / s.duration_s
