@@ -118,11 +118,10 @@ def upgrade() -> None:
         "recording",
         sa.Column("id", sa.String(length=32), nullable=False),
         sa.Column("session_id", sa.String(length=32), nullable=False),
-        sa.Column("state", sa.String(length=8), nullable=False),
         sa.Column("manifest", sa.JSON(), nullable=True),
         sa.Column("inspection", sa.JSON(), nullable=True),
+        sa.Column("wanted_key", sa.String(length=300), nullable=True),
         sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
-        sa.CheckConstraint("state IN ('draft', 'ready', 'failed')", name=op.f("ck_recording_state")),
         sa.ForeignKeyConstraint(
             ["session_id"], ["session.id"], name=op.f("fk_recording_session_id_session"), ondelete="RESTRICT"
         ),

@@ -3,7 +3,7 @@
 Nothing is deleted by cascade (RESTRICT everywhere): clinical rows leave only through services/erasure.py.
 
 patient ─< session ─< recording ─< recording_file          user ─< login_session, one_time_token
-                          ├──< analysis ─< analysis_file    audit (append-only, refers to nothing)
+                          └──< analysis ─< analysis_file    audit (append-only, refers to nothing)
                           └──< job ─── analysis
 """
 
@@ -38,7 +38,6 @@ from sqlalchemy import (
 
 SEXES = ("female", "male")
 ROLES = ("admin", "clinician", "assistant", "viewer")
-RECORDING_STATES = ("draft", "ready", "failed")
 JOB_STATES = ("queued", "running", "done", "failed", "cancelled")
 ACTIVE_STATES = ("queued", "running")
 TOKEN_PURPOSES = ("set_up", "sign_in")
@@ -137,11 +136,10 @@ recording = Table(
     metadata,
     _id(),
     _ref("session_id", "session"),
-    Column("state", String(8), nullable=False),
     Column("manifest", Json),  # the mapping as last confirmed; every analysis keeps its own copy
     Column("inspection", Json),  # what was found in the files, before any mapping
+    Column("wanted_key", String(300)),  # key of the analysis that was asked for last
     Column("created_at", Utc, nullable=False),
-    _one_of("state", RECORDING_STATES),
 )
 
 recording_file = Table(

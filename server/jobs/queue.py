@@ -1,0 +1,135 @@
+"""The port every part of the server sees of the jobs, whatever engine stands behind it.
+
+    queued → running → done | failed | cancelled          running → queued when its worker died or let go
+
+The job's row is the truth. A worker owns a job through its claim (job, attempt, worker): every write carries it
+as a fence, and a write that meets no row means that the job has gone to somebody else: stop, publish nothing.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Protocol
+
+from sqlalchemy import Connection, Row
+
+from server.storage.tables import job
+
+Publish = Callable[[Connection], None]
+"""Writes a result's rows; called inside the transaction that marks the job done."""
+
+
+@dataclass(frozen=True)
+class JobView:
+    """A job as people may see it.
+
+    Parameters
+    ----------
+    state : queued, running, done, failed or cancelled.
+    stage, fraction, message : progress of the running attempt, None before its first word; fraction 0 to 1.
+    cancel_requested : somebody asked to stop it; it will within two seconds.
+    error_code, error_message : why it failed, else None.
+    """
+
+    id: str
+    kind: str
+    recording_id: str | None
+    requested_by: str | None
+    state: str
+    attempt: int
+    stage: str | None
+    fraction: float | None
+    message: str | None
+    cancel_requested: bool
+    error_code: str | None
+    error_message: str | None
+    created_at: dt.datetime
+    started_at: dt.datetime | None
+    finished_at: dt.datetime | None
+
+    @property
+    def finished(self) -> bool:
+        """Nothing will change any more."""
+        return self.finished_at is not None
+
+
+VIEW_COLUMNS = tuple(job.c[name] for name in JobView.__dataclass_fields__)
+
+
+def job_view(row: Row[Any]) -> JobView:
+    """Read a view from a row of VIEW_COLUMNS (further columns are ignored)."""
+    return JobView(**{name: getattr(row, name) for name in JobView.__dataclass_fields__})
+
+
+@dataclass(frozen=True)
+class Claim:
+    """The right of one worker to one attempt; what it may write is fenced by it."""
+
+    job_id: str
+    attempt: int
+    worker: str
+    kind: str
+    recording_id: str | None
+    requested_by: str | None
+    params: Mapping[str, Any]
+
+
+class Hold(Enum):
+    """What a heartbeat found: the job is still ours, is to be stopped, or is somebody else's."""
+
+    OURS = "ours"
+    CANCEL = "cancel"
+    LOST = "lost"
+
+
+class JobQueue(Protocol):
+    """What the server needs of any queue engine; False from a fenced write = the claim is lost."""
+
+    def submit(
+        self,
+        c: Connection,
+        *,
+        key: str,
+        kind: str,
+        params: Mapping[str, Any],
+        recording_id: str | None = None,
+        requested_by: str | None = None,
+        priority: int = 0,
+    ) -> JobView:
+        """Queue a job in the caller's transaction, or return the live or successful one of the same key."""
+
+    def get(self, job_id: str) -> JobView | None:
+        """Read one job."""
+
+    def cancel(self, c: Connection, job_id: str) -> JobView | None:
+        """Stop a job: at once if queued, through its worker if running; a finished one stays as it is."""
+
+    def claim(self, worker: str, kinds: Collection[str]) -> Claim | None:
+        """Take the next job of these kinds, if there is one."""
+
+    def heartbeat(self, claim: Claim) -> Hold:
+        """Renew the lease."""
+
+    def look(self, claim: Claim) -> Hold:
+        """Ask whether the job is still ours, without renewing anything."""
+
+    def progress(self, claim: Claim, stage: str, fraction: float, message: str | None = None) -> bool:
+        """Say how far the attempt is."""
+
+    def finish(self, claim: Claim, publish: Publish) -> bool:
+        """Publish and mark done in one transaction; refused also after a request to cancel."""
+
+    def fail(self, claim: Claim, code: str, message: str) -> bool:
+        """End the job with a reason."""
+
+    def stop(self, claim: Claim) -> bool:
+        """Confirm a requested cancel."""
+
+    def died(self, claim: Claim) -> bool:
+        """Report that the attempt ended without a word: run again, the third time give up."""
+
+    def release(self, claim: Claim) -> bool:
+        """Give the job back unharmed because the worker shuts down."""

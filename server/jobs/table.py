@@ -1,0 +1,216 @@
+"""The embedded queue: the job table itself, claimed by the workers of `sagittal serve`.
+
+Three silent deaths on one job end it (a poisonous recording must not loop). A lease in the far future
+is taken for a dead one: the clock was set back; the fence keeps a mistake in that harmless.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable, Collection, Mapping
+from typing import Any
+
+from sqlalchemy import ColumnElement, Connection, and_, insert, or_, select, update
+
+from server.jobs.queue import VIEW_COLUMNS, Claim, Hold, JobView, Publish, job_view
+from server.storage.db import Database
+from server.storage.tables import ACTIVE_STATES, job, new_id, now
+
+MAX_DEATHS = 3
+"""Silent deaths of workers after which a job is given up."""
+
+POISONED = (
+    f"worker died {MAX_DEATHS} times on this job without a word: it may need more memory than allowed, or the "
+    "recording breaks a library. Try fewer or shorter files; the server's log has the signal."
+)
+
+_CLAIMED = tuple(job.c[k] for k in ("id", "attempt", "kind", "recording_id", "requested_by", "params"))
+
+
+class TableQueue:
+    """JobQueue on the job table.
+
+    Parameters
+    ----------
+    lease_s : a claim that has not been renewed for so long is dead.
+    clock : aware UTC now, replaced in tests.
+    """
+
+    def __init__(self, db: Database, lease_s: float, clock: Callable[[], dt.datetime] = now) -> None:
+        self._db = db
+        self._lease = dt.timedelta(seconds=lease_s)
+        self._clock = clock
+
+    def submit(
+        self,
+        c: Connection,
+        *,
+        key: str,
+        kind: str,
+        params: Mapping[str, Any],
+        recording_id: str | None = None,
+        requested_by: str | None = None,
+        priority: int = 0,
+    ) -> JobView:
+        """See JobQueue."""
+        same = and_(job.c.key == key, job.c.state.in_((*ACTIVE_STATES, "done")), ~job.c.cancel_requested)
+        found = c.execute(select(*VIEW_COLUMNS).where(same)).first()
+        if found:
+            return job_view(found)
+        # one that is being cancelled still holds the key; it is not the one that was asked for now
+        c.execute(
+            update(job)
+            .where(job.c.key == key, job.c.state.in_(ACTIVE_STATES))
+            .values(**self._ended("cancelled"))
+        )
+        values = {
+            "id": new_id(),
+            "key": key,
+            "kind": kind,
+            "recording_id": recording_id,
+            "requested_by": requested_by,
+            "params": dict(params),
+            "priority": priority,
+            "state": "queued",
+            "attempt": 0,
+            "deaths": 0,
+            "cancel_requested": False,
+            "created_at": self._clock(),
+        }
+        return job_view(c.execute(insert(job).values(values).returning(*VIEW_COLUMNS)).one())
+
+    def get(self, job_id: str) -> JobView | None:
+        """See JobQueue."""
+        with self._db.read() as c:
+            row = c.execute(select(*VIEW_COLUMNS).where(job.c.id == job_id)).first()
+        return job_view(row) if row else None
+
+    def cancel(self, c: Connection, job_id: str) -> JobView | None:
+        """See JobQueue."""
+        mine = job.c.id == job_id
+        c.execute(update(job).where(mine, job.c.state == "running").values(cancel_requested=True))
+        c.execute(
+            update(job)
+            .where(mine, job.c.state == "queued")
+            .values(cancel_requested=True, **self._ended("cancelled"))
+        )
+        row = c.execute(select(*VIEW_COLUMNS).where(mine)).first()
+        return job_view(row) if row else None
+
+    def claim(self, worker: str, kinds: Collection[str]) -> Claim | None:
+        """See JobQueue; an idle worker only reads, so it does not stand in the way of writers."""
+        time = self._clock()
+        claimable = and_(job.c.state == "queued", job.c.kind.in_(kinds))
+        with self._db.read() as c:
+            if c.execute(select(job.c.seq).where(or_(claimable, self._dead(time))).limit(1)).first() is None:
+                return None
+        with self._db.write() as c:
+            self._bury(c, self._dead(time))
+            first = (
+                select(job.c.seq)
+                .where(claimable)
+                .order_by(job.c.priority, job.c.seq)
+                .limit(1)
+                .with_for_update(skip_locked=True)
+                .scalar_subquery()
+            )
+            taken = (
+                update(job)
+                .where(job.c.seq == first)
+                .values(
+                    state="running",
+                    attempt=job.c.attempt + 1,
+                    worker=worker,
+                    lease_until=time + self._lease,
+                    started_at=time,
+                    stage=None,
+                    fraction=None,
+                    message=None,
+                )
+                .returning(
+                    *(job.c[k] for k in ("id", "attempt", "kind", "recording_id", "requested_by", "params"))
+                )
+            )
+            row = c.execute(taken).first()
+        if row is None:
+            return None
+        return Claim(row.id, row.attempt, worker, row.kind, row.recording_id, row.requested_by, row.params)
+
+    def heartbeat(self, claim: Claim) -> Hold:
+        """See JobQueue."""
+        return self.look(claim) if self._fenced(claim, lease_until=self._clock() + self._lease) else Hold.LOST
+
+    def look(self, claim: Claim) -> Hold:
+        """See JobQueue."""
+        with self._db.read() as c:
+            row = c.execute(select(job.c.cancel_requested).where(_fence(claim))).first()
+        if row is None:
+            return Hold.LOST
+        return Hold.CANCEL if row.cancel_requested else Hold.OURS
+
+    def progress(self, claim: Claim, stage: str, fraction: float, message: str | None = None) -> bool:
+        """See JobQueue."""
+        share = min(max(fraction, 0.0), 1.0)
+        return self._fenced(claim, stage=stage[:64], fraction=share, message=message and message[:500])
+
+    def finish(self, claim: Claim, publish: Publish) -> bool:
+        """See JobQueue."""
+        with self._db.write() as c:
+            ours = and_(_fence(claim), ~job.c.cancel_requested)
+            if c.execute(update(job).where(ours).values(**self._ended("done"), fraction=1.0)).rowcount != 1:
+                return False
+            publish(c)
+        return True
+
+    def fail(self, claim: Claim, code: str, message: str) -> bool:
+        """See JobQueue."""
+        return self._fenced(claim, **self._ended("failed"), error_code=code[:64], error_message=message)
+
+    def stop(self, claim: Claim) -> bool:
+        """See JobQueue."""
+        return self._fenced(claim, **self._ended("cancelled"))
+
+    def died(self, claim: Claim) -> bool:
+        """See JobQueue."""
+        with self._db.write() as c:
+            return self._bury(c, _fence(claim)) == 1
+
+    def release(self, claim: Claim) -> bool:
+        """See JobQueue."""
+        return self._fenced(claim, state="queued", worker=None, lease_until=None)
+
+    def _fenced(self, claim: Claim, **values: object) -> bool:
+        with self._db.write() as c:
+            return c.execute(update(job).where(_fence(claim)).values(**values)).rowcount == 1
+
+    def _ended(self, state: str) -> dict[str, object]:
+        return {"state": state, "worker": None, "lease_until": None, "finished_at": self._clock()}
+
+    def _dead(self, time: dt.datetime) -> ColumnElement[bool]:
+        expired = or_(job.c.lease_until < time, job.c.lease_until > time + 2 * self._lease)
+        return and_(job.c.state == "running", expired)
+
+    def _bury(self, c: Connection, which: ColumnElement[bool]) -> int:
+        """Count a death on running jobs: cancelled if that was wanted, given up at the third, else queued again."""
+        buried = 0
+        for row in c.execute(select(job.c.seq, job.c.deaths, job.c.cancel_requested).where(which)).all():
+            values: dict[str, object] = {"deaths": row.deaths + 1}
+            if row.cancel_requested:
+                values |= self._ended("cancelled")
+            elif row.deaths + 1 >= MAX_DEATHS:
+                values |= self._ended("failed")
+                values |= {"error_code": "worker_died", "error_message": POISONED}
+            else:
+                values |= {"state": "queued", "worker": None, "lease_until": None}
+            c.execute(update(job).where(job.c.seq == row.seq).values(**values))
+            buried += 1
+        return buried
+
+
+def _fence(claim: Claim) -> ColumnElement[bool]:
+    return and_(
+        job.c.id == claim.job_id,
+        job.c.attempt == claim.attempt,
+        job.c.worker == claim.worker,
+        job.c.state == "running",
+    )
