@@ -1,1 +1,20 @@
 """Bytes → Recording: one vendor per file, detection by content, never by file name."""
+
+from __future__ import annotations
+
+from core.formats.archive import ArchiveLimits, expand
+from core.formats.manifest import Manifest, manifest_of, parse_manifest
+from core.formats.parquet import write_recording
+from core.formats.reader import read_recording
+from core.formats.source import SourceFile
+
+__all__ = [
+    "ArchiveLimits",
+    "Manifest",
+    "SourceFile",
+    "expand",
+    "manifest_of",
+    "parse_manifest",
+    "read_recording",
+    "write_recording",
+]

@@ -1,0 +1,87 @@
+"""What a file is, decided by its content, never by its name."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from typing import Literal
+
+from core.formats import mapping_xml, parquet, text, xsens
+from core.formats.manifest import is_manifest
+
+Kind = Literal["xsens", "parquet", "manifest", "mapping", "table", "known", "empty", "other"]
+"""known = a sensor format we recognise but do not read; other = neither signals nor manifest."""
+
+_MAGIC = {
+    b"\x89HDF": "HDF5 (APDM, MATLAB 7.3)",
+    b"MATLAB": "MATLAB",
+    b"MD\xfc\x03": "Axivity CWA",
+    b"XTF\x00": "Xsens MTB",
+    b"\xfa\xff": "Xsens MTB",
+}
+_TEXT = {
+    b"<mvnx": "Xsens MVNX",
+    b"DeviceTag:": "Xsens/Movella DOT",
+    b"DataType=Quaternion": "OpenSim STO",
+    b"inDegrees=": "OpenSim MOT",
+    b"Format=7": "APDM Motion Studio",
+    b"Shimmer_": "Shimmer Consensys",
+}
+
+
+def sniff(data: bytes) -> tuple[Kind, str]:
+    """Kind of a file and its name for people.
+
+    Parameters
+    ----------
+    data : all bytes, after unpacking; text already as UTF-8.
+    """
+    if not data.strip():
+        return "empty", "an empty file"
+    if parquet.looks_like(data):
+        return "parquet", "Parquet"
+    for magic, name in _MAGIC.items():
+        if data.startswith(magic):
+            return "known", name
+    if not text.is_text(data):
+        return "other", "a binary file"
+    if data.lstrip()[:1] in (b"{", b"["):
+        return _sniff_json(data)
+    if mapping_xml.looks_like(data):
+        return "mapping", "OpenSense mapping"
+    if xsens.looks_like(data):
+        return "xsens", "Xsens MT Manager text"
+    head = data[:4096]
+    for mark, name in _TEXT.items():
+        if mark in head:
+            return "known", name
+    return ("table", "a table of numbers") if _is_table(data) else ("other", "a text")
+
+
+def _sniff_json(data: bytes) -> tuple[Kind, str]:
+    try:
+        value = json.loads(data)
+    except (ValueError, RecursionError):
+        return "other", "a damaged JSON file"
+    return ("manifest", "a manifest") if is_manifest(value) else ("other", "a JSON file")
+
+
+def _is_table(data: bytes) -> bool:
+    """Tell a table by two neighbouring rows with the same number of at least four numbers."""
+    rows = [r for r in text.head_lines(data, 30) if r.strip()]
+    for a, b in pairwise(rows):
+        for separator in text.SEPARATORS:
+            if _numbers(a, separator) >= 4 and _numbers(a, separator) == _numbers(b, separator):
+                return True
+    return False
+
+
+def _numbers(line: bytes, separator: bytes) -> int:
+    n = 0
+    for cell in line.split(separator):
+        try:
+            float(cell.replace(b",", b"."))
+        except ValueError:
+            continue
+        n += 1
+    return n

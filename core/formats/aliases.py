@@ -1,0 +1,50 @@
+"""What vendors and laboratories call the segments, and how file names say them (spec/field.md §4d)."""
+
+from __future__ import annotations
+
+import re
+from typing import Final, cast
+
+from core.frames import SEGMENTS, Segment
+
+_WHOLE: Final[dict[str, str]] = {
+    "pelvis": "pelvis", "sacrum": "pelvis", "hip": "pelvis", "hips": "pelvis", "lumbar": "pelvis",
+    "lowerback": "pelvis", "chest": "chest", "sternum": "chest", "torso": "chest", "trunk": "chest",
+    "t8": "chest", "thorax": "chest",
+}  # fmt: skip
+_LEG: Final[dict[str, str]] = {
+    "thigh": "thigh", "femur": "thigh", "upperleg": "thigh", "upleg": "thigh",
+    "shank": "shank", "tibia": "shank", "lowerleg": "shank", "lowleg": "shank", "calf": "shank",
+    "foot": "foot", "calcn": "foot", "shoe": "foot", "toes": "foot",
+}  # fmt: skip
+_SIDE: Final[dict[str, str]] = {"left": "l", "l": "l", "right": "r", "r": "r"}
+_FILLER: Final = re.compile(r"(imu|sensor)$")
+
+
+def segment_named(name: str) -> Segment | None:
+    """Segment of a name or alias ("tibia_r_imu", "RightLowerLeg", "Left Foot", "LTibia"), else None."""
+    if name in SEGMENTS:
+        return name
+    flat = _FILLER.sub("", re.sub(r"[\s_\-./]+", "", name).lower())
+    if flat in _WHOLE:
+        return cast("Segment", _WHOLE[flat])
+    for side, letter in _SIDE.items():
+        for part in (flat.removeprefix(side), flat.removesuffix(side)):
+            if part != flat and part in _LEG:
+                return cast("Segment", f"{_LEG[part]}_{letter}")
+    return None
+
+
+def segment_in(text: str) -> Segment | None:
+    """Segment that a file name or a column label speaks of, None if none or more than one."""
+    stem = re.sub(
+        r"\.(txt|csv|tsv|gz|parquet)$", "", text.replace("\\", "/").rsplit("/", 1)[-1], flags=re.IGNORECASE
+    )
+    words = [w for w in re.split(r"[\s_\-.]+", stem) if w]
+    found = {
+        s
+        for n in (1, 2, 3)
+        for i in range(len(words) - n + 1)
+        if (s := segment_named("_".join(words[i : i + n])))
+    }
+    return found.pop() if len(found) == 1 else None

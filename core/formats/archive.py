@@ -1,0 +1,199 @@
+"""Zip and gzip opened in memory, within limits that are checked against real bytes.
+
+The directory of a zip may lie, so the declared sizes are checked before anything is unpacked and no member
+may give more than it declared. Limits: service.md §e (entries, total, ratio 100, no nesting, no absolute or
+parent paths, no links, no encryption).
+"""
+
+from __future__ import annotations
+
+import io
+import stat
+import zipfile
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+
+from core.errors import ArchiveError
+from core.formats.source import SourceFile
+
+ZIP_MAGIC = (b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")
+GZIP_MAGIC = b"\x1f\x8b"
+_CHUNK = 1 << 20
+_RATIO_FLOOR = 1 << 20
+"""Below 1 MB no ratio is alarming: a file of a few blank lines packs 200 to 1."""
+
+
+@dataclass(frozen=True)
+class ArchiveLimits:
+    """What an archive may unpack to (service.md §e; 1 GB holds 7 sensors × 4 h × 100 Hz as text).
+
+    Parameters
+    ----------
+    entries : files and folders per zip.
+    total : bytes unpacked, over all members.
+    ratio : unpacked / packed, for files over 1 MB.
+    """
+
+    entries: int = 1000
+    total: int = 1_000_000_000
+    ratio: float = 100.0
+
+
+def is_zip(head: bytes | bytearray) -> bool:
+    """Tell a zip by its first four bytes."""
+    return head[:4] in ZIP_MAGIC
+
+
+def is_gzip(head: bytes | bytearray) -> bool:
+    """Tell a gzip by its first two bytes."""
+    return head[:2] == GZIP_MAGIC
+
+
+def expand(files: Iterable[SourceFile], limits: ArchiveLimits | None = None) -> list[SourceFile]:
+    """Replace every zip by its members and every gzip by its content; other files pass unread.
+
+    Raises
+    ------
+    ArchiveError
+        zip_bomb, zip_traversal, zip_link, zip_nested, zip_encrypted, zip_bad.
+    """
+    limits = limits or ArchiveLimits()
+    out: list[SourceFile] = []
+    taken: set[str] = set()
+    for file in files:
+        if not _looks_packed(file):
+            members = [file]
+        else:
+            data = file.read()
+            if is_zip(data):
+                members = _members(file.name, data, limits)
+            elif is_gzip(data):
+                members = [_unpacked(file.name, data, limits)]
+            else:
+                members = [file]
+        for m in members:
+            name = m.name if m.name not in taken else f"{file.name}/{m.name}"
+            taken.add(name)
+            out.append(m if name == m.name else SourceFile(name, m.size, m.read))
+    return out
+
+
+def _looks_packed(file: SourceFile) -> bool:
+    """Everything but the plainest names is looked into: content decides, the name only saves a read."""
+    return not file.name.lower().endswith((".txt", ".csv", ".tsv", ".json", ".parquet", ".xml", ".md"))
+
+
+def _members(name: str, data: bytes, limits: ArchiveLimits) -> list[SourceFile]:
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(data))
+    except (zipfile.BadZipFile, ValueError, NotImplementedError, OverflowError) as e:
+        raise ArchiveError("zip_bad", f"{name} is damaged and cannot be opened ({e}); zip it again.") from e
+    infos = archive.infolist()
+    if len(infos) > limits.entries:
+        raise ArchiveError(
+            "zip_bomb",
+            f"{name} has {len(infos)} entries, at most {limits.entries} are accepted; "
+            "upload one session per zip.",
+        )
+    total = sum(i.file_size for i in infos)
+    if total > limits.total:
+        raise ArchiveError(
+            "zip_bomb",
+            f"{name} unpacks to {total / 1e6:.0f} MB, at most {limits.total / 1e6:.0f} MB are accepted; "
+            "upload fewer files at once.",
+        )
+    for info in infos:
+        _check_entry(name, info, limits)
+    return [
+        SourceFile(info.filename, info.file_size, _MemberReader(name, archive, info))
+        for info in infos
+        if not info.is_dir() and "__MACOSX" not in PurePosixPath(info.filename).parts
+    ]
+
+
+def _check_entry(name: str, info: zipfile.ZipInfo, limits: ArchiveLimits) -> None:
+    path = info.filename.replace("\\", "/")
+    if path.startswith("/") or path[1:2] == ":" or ".." in path.split("/") or "\0" in info.orig_filename:
+        raise ArchiveError(
+            "zip_traversal",
+            f"{name} contains the path '{info.filename}', which leads out of it; zip the files again.",
+        )
+    if stat.S_ISLNK(info.external_attr >> 16):
+        raise ArchiveError(
+            "zip_link", f"{name} contains the link '{info.filename}'; zip the file itself instead of a link."
+        )
+    if info.flag_bits & 0x1:
+        raise ArchiveError("zip_encrypted", f"{name} is protected by a password; zip it without one.")
+    _check_ratio(name, info.file_size, info.compress_size, limits)
+
+
+def _check_ratio(name: str, unpacked: int, packed: int, limits: ArchiveLimits) -> None:
+    if unpacked > _RATIO_FLOOR and unpacked > limits.ratio * max(packed, 1):
+        raise ArchiveError(
+            "zip_bomb",
+            f"{name} unpacks to {unpacked / max(packed, 1):.0f} times its size, at most "
+            f"{limits.ratio:.0f} times is accepted; recordings pack 3 to 10 times, so this is not one.",
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _MemberReader:
+    """Unpacks one member; refuses more bytes than its directory entry declared."""
+
+    name: str
+    archive: zipfile.ZipFile
+    info: zipfile.ZipInfo
+
+    def __call__(self) -> bytes:
+        where = f"{self.name}, member '{self.info.filename}'"
+        out = bytearray()
+        try:
+            with self.archive.open(self.info) as stream:
+                while chunk := stream.read(_CHUNK):
+                    out += chunk
+                    if len(out) > self.info.file_size:
+                        raise ArchiveError(
+                            "zip_bomb", f"{where}: more bytes than declared; zip the files again."
+                        )
+        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as e:
+            raise ArchiveError("zip_bad", f"{where} is damaged ({e}); zip the files again.") from e
+        if len(out) != self.info.file_size:
+            raise ArchiveError("zip_bad", f"{where} ends early; zip the files again.")
+        if is_zip(out[:4]) or is_gzip(out[:2]):
+            raise ArchiveError(
+                "zip_nested", f"{where} is an archive itself; put the recordings directly into one zip."
+            )
+        return bytes(out)
+
+
+def _unpacked(name: str, data: bytes, limits: ArchiveLimits) -> SourceFile:
+    """Unpack a gzip, all its members, counting what comes out."""
+    out = bytearray()
+    rest = data
+    try:
+        while is_gzip(rest):
+            stream = zlib.decompressobj(wbits=31)
+            while not stream.eof:
+                before = len(out)
+                out += stream.decompress(rest, _CHUNK)
+                rest = stream.unconsumed_tail
+                if len(out) > limits.total:
+                    raise ArchiveError(
+                        "zip_bomb",
+                        f"{name} unpacks to more than {limits.total / 1e6:.0f} MB; upload it in parts.",
+                    )
+                _check_ratio(name, len(out), len(data), limits)
+                if len(out) == before and not rest and not stream.eof:
+                    raise ArchiveError("zip_bad", f"{name} ends in the middle; upload it again.")
+            rest = stream.unused_data
+    except zlib.error as e:
+        raise ArchiveError("zip_bad", f"{name} is damaged ({e}); upload it again.") from e
+    if is_zip(out[:4]) or is_gzip(out[:2]):
+        raise ArchiveError(
+            "zip_nested", f"{name} is an archive inside an archive; upload the files themselves."
+        )
+    shown = PurePosixPath(name)
+    plain = shown.with_suffix("") if shown.suffix.lower() == ".gz" else shown
+    return SourceFile.of_bytes(str(plain), bytes(out))

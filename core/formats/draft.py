@@ -1,0 +1,246 @@
+"""Between a file and a stream: signals in SI units whose common time origin is not known yet.
+
+A packet counter says when a sample was taken only relative to the counters of the other sensors of the take
+(they wrap at 16 bit and may start on both sides of the wrap), so time is made for all files together.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.errors import FormatError, Notice
+from core.frames import Floats
+from core.recording import ImuStream
+
+WRAP_16: Final = 1 << 16
+WRAP_32: Final = 1 << 32
+ASSUMED_RATE_HZ: Final = 100.0
+"""Shown, never used for results: the notice `rate_unknown` is an error."""
+MOST_OUT_OF_ORDER: Final = 0.01
+"""Share of rows that may run backwards before we say that the file holds two takes [our choice]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """One sensor of one file.
+
+    Parameters
+    ----------
+    clock : what `ticks` (n,) are: "counter" packet counter as written, "device" seconds, "index" row number.
+    acc, gyr, mag : (n, 3), quat : (n, 4); SI units, NaN where missing; None without such columns.
+    rate_hz : None = the file does not say.
+    """
+
+    device_id: str
+    source: str
+    clock: str
+    ticks: Floats
+    acc: Floats
+    gyr: Floats | None
+    mag: Floats | None
+    quat: Floats | None
+    rate_hz: float | None
+    notices: tuple[Notice, ...] = ()
+
+
+def finish(drafts: Sequence[Draft]) -> dict[str, ImuStream]:
+    """Give all drafts of a take one time origin per clock.
+
+    Raises
+    ------
+    FormatError
+        duplicate_device (two different files of one sensor), counter_restart, empty.
+    """
+    drafts = _without_second_copies([_with_rate(d, drafts) for d in drafts])
+    streams: dict[str, ImuStream] = {}
+    for clock in sorted({d.clock for d in drafts}):
+        group = [_in_order(d) for d in drafts if d.clock == clock]
+        if clock == "counter":
+            group = _shared_counter(group)
+        origin = min(float(d.ticks[0]) for d in group)
+        for d in group:
+            scale = 1.0 if clock == "device" else 1.0 / _rate(d)
+            streams[d.device_id] = _stream(d, (d.ticks - origin) * scale)
+    return {d.device_id: streams[d.device_id] for d in drafts}
+
+
+def _rate(d: Draft) -> float:
+    return d.rate_hz or ASSUMED_RATE_HZ
+
+
+def _with_rate(d: Draft, all_of_take: Sequence[Draft]) -> Draft:
+    """Fill a rate the file does not name: from its clock, from the other sensors of the take, else say so."""
+    if d.rate_hz is not None:
+        return d
+    if d.clock == "device" and len(d.ticks) > 1:
+        step = float(np.median(np.diff(d.ticks)))
+        if step > 0:
+            return replace(d, rate_hz=1.0 / step)
+    known = {o.rate_hz for o in all_of_take if o.clock == d.clock and o.rate_hz is not None}
+    if len(known) == 1:
+        rate = known.pop()
+        note = Notice(
+            "rate_from_others",
+            f"{d.source} names no sampling rate; {rate:g} Hz was taken from the other sensors.",
+            d.device_id,
+            severity="info",
+        )
+        return replace(d, rate_hz=rate, notices=(*d.notices, note))
+    note = Notice(
+        "rate_unknown",
+        f"{d.source} names no sampling rate ({ASSUMED_RATE_HZ:g} Hz is only assumed for display); "
+        'give it in the manifest: {"sources": [{"file": "*.txt", "rate_hz": 100}]}.',
+        d.device_id,
+        severity="error",
+    )
+    return replace(d, notices=(*d.notices, note))
+
+
+def _without_second_copies(drafts: Sequence[Draft]) -> list[Draft]:
+    """Drop a file that was given twice; refuse two different takes of one sensor."""
+    kept: dict[str, Draft] = {}
+    for d in drafts:
+        other = kept.get(d.device_id)
+        if other is None:
+            kept[d.device_id] = d
+        elif digest(other) == digest(d) and np.array_equal(other.ticks, d.ticks):
+            note = Notice(
+                "file_given_twice",
+                f"{d.source} repeats {other.source} and was left out.",
+                d.device_id,
+                severity="info",
+            )
+            kept[d.device_id] = replace(other, notices=(*other.notices, note))
+        else:
+            raise FormatError(
+                "duplicate_device",
+                f"{other.source} and {d.source} both come from sensor {d.device_id} but differ; "
+                "upload one take at a time (each sensor once).",
+                sensor=d.device_id,
+            )
+    return list(kept.values())
+
+
+def _in_order(d: Draft) -> Draft:
+    """Unwrap the counter and drop rows that repeat or run backwards."""
+    good = np.isfinite(d.ticks)
+    lost = int(np.count_nonzero(~good))
+    ticks = _unwrapped(d.ticks[good]) if d.clock == "counter" else d.ticks[good]
+    if not len(ticks):
+        raise FormatError("empty", f"{d.source} has no row with a valid counter or time.", sensor=d.device_id)
+    highest = np.maximum.accumulate(ticks)
+    rising = np.concatenate(([True], ticks[1:] > highest[:-1]))
+    back = int(np.count_nonzero(~rising))
+    if back > max(5, MOST_OUT_OF_ORDER * len(ticks)):
+        t = float(np.argmin(rising)) / _rate(d)
+        raise FormatError(
+            "counter_restart",
+            f"{d.source}: the packet counter or time runs backwards in {back} of {len(ticks)} rows, "
+            f"first at row {int(np.argmin(rising)) + 1}; if the file holds two takes, export them apart.",
+            sensor=d.device_id,
+            t_s=t,
+        )
+    keep = np.flatnonzero(good)[rising]
+    notices = d.notices
+    if back or lost:
+        notices = (
+            *notices,
+            Notice(
+                "out_of_order",
+                f"{d.source}: {back + lost} rows with a repeated, reversed or missing counter were left out.",
+                d.device_id,
+            ),
+        )
+    if len(keep) == len(d.ticks):
+        return replace(d, ticks=ticks, notices=notices)
+    return replace(
+        d,
+        ticks=ticks[rising],
+        acc=d.acc[keep],
+        gyr=None if d.gyr is None else d.gyr[keep],
+        mag=None if d.mag is None else d.mag[keep],
+        quat=None if d.quat is None else d.quat[keep],
+        notices=notices,
+    )
+
+
+def _wrap(ticks: Floats) -> int:
+    """Range of the counter: 16 bit in Xsens MT exports, unless it shows a larger value."""
+    return WRAP_16 if not len(ticks) or ticks.max() < WRAP_16 else WRAP_32
+
+
+def _unwrapped(ticks: Floats) -> Floats:
+    """Counter without wraps: steps are taken modulo its range, to the nearer side."""
+    wrap = _wrap(ticks)
+    step = np.mod(np.diff(ticks) + wrap // 2, wrap) - wrap // 2
+    return np.concatenate((ticks[:1], ticks[:1] + np.cumsum(step)))
+
+
+def _shared_counter(group: Sequence[Draft]) -> list[Draft]:
+    """Shift whole wraps so that all sensors start within half a wrap of each other.
+
+    A sensor at another rate than most counts other packets; its time cannot be compared and this is an error.
+    """
+    rate = Counter(_rate(d) for d in group).most_common(1)[0][0]
+    start = float(group[0].ticks[0])
+    wrap = max(_wrap(d.ticks[:1]) for d in group)
+    out = []
+    for d in group:
+        if abs(_rate(d) - rate) > 1e-6 * rate:
+            note = Notice(
+                "rates_differ",
+                f"{d.source} runs at {_rate(d):g} Hz, the others at {rate:g} Hz; their packet counters "
+                "cannot be compared. Export all sensors of the take at one rate.",
+                d.device_id,
+                severity="error",
+            )
+            out.append(replace(d, notices=(*d.notices, note)))
+            continue
+        turns = np.round((start - float(d.ticks[0])) / wrap)
+        out.append(replace(d, ticks=d.ticks + turns * wrap))
+    return out
+
+
+def digest(d: Draft) -> str:
+    """sha256 over the signals as float32, so that a stored and re-read stream keeps its digest."""
+    return signal_digest(d.acc, d.gyr, d.mag)
+
+
+def signal_digest(acc: Floats, gyr: Floats | None, mag: Floats | None) -> str:
+    """See `digest`."""
+    h = hashlib.sha256()
+    for name, a in (("acc", acc), ("gyr", gyr), ("mag", mag)):
+        if a is not None:
+            h.update(name.encode())
+            h.update(_bits(a).tobytes())
+    return h.hexdigest()
+
+
+def _bits(a: Floats) -> NDArray[np.float32]:
+    """float32 in C order with one bit pattern for NaN and one for zero."""
+    b = np.ascontiguousarray(a, np.float32) + np.float32(0)
+    b[np.isnan(b)] = np.nan
+    return b
+
+
+def _stream(d: Draft, t_s: Floats) -> ImuStream:
+    return ImuStream(
+        device_id=d.device_id,
+        source=d.source,
+        t_s=t_s,
+        acc=d.acc,
+        gyr=d.gyr,
+        mag=d.mag,
+        quat=d.quat,
+        rate_hz=_rate(d),
+        clock=d.clock,
+        digest=digest(d),
+        notices=d.notices,
+    )

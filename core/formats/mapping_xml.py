@@ -1,0 +1,39 @@
+"""OpenSense mapping files (XsensDataReaderSettings): which sensor is worn on which segment."""
+
+from __future__ import annotations
+
+from xml.etree.ElementTree import ParseError
+
+from defusedxml import DefusedXmlException
+from defusedxml.ElementTree import fromstring
+
+from core.errors import FormatError
+from core.formats.aliases import segment_named
+from core.frames import Segment
+
+
+def looks_like(data: bytes) -> bool:
+    """Tell an OpenSense mapping by its element names."""
+    return data.lstrip()[:1] == b"<" and b"<ExperimentalSensor " in data
+
+
+def read(data: bytes, source: str) -> dict[str, Segment | None]:
+    """Sensor id → segment; models with bodies that we do not know (hands) map to None.
+
+    Raises
+    ------
+    FormatError
+        bad_xml (not well formed, or with entities, which are refused).
+    """
+    try:
+        root = fromstring(data, forbid_dtd=True)
+    except (ParseError, DefusedXmlException, ValueError) as e:
+        raise FormatError(
+            "bad_xml", f"{source} is not readable XML ({type(e).__name__}); export it again."
+        ) from e
+    out: dict[str, Segment | None] = {}
+    for sensor in root.iter("ExperimentalSensor"):
+        device = (sensor.get("name") or "").strip().lstrip("_")
+        if device:
+            out[device.upper()] = segment_named((sensor.findtext("name_in_model") or "").strip())
+    return out

@@ -1,0 +1,199 @@
+"""Sagittal's own recording file: Parquet with one column per channel (spec/kernels.md §6).
+
+int64 time in µs, float32 signals, zstd with byte-stream split and no dictionary; what is not a signal
+(units, sensor → segment, subject, protocol, hashes of the originals) is JSON in the schema metadata. Rows are
+the union of the times of all streams; a row that a stream does not have is null, a missing sample is NaN.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any, Final, cast
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from core.errors import FormatError, Notice, SagittalError
+from core.formats.draft import signal_digest
+from core.frames import Floats, Protocol, Segment
+from core.recording import ImuStream, Recording, Subject
+
+MAGIC: Final = b"PAR1"
+SCHEMA: Final = 1
+_KEY: Final = b"sagittal.recording"
+_TIME: Final = "t_us"
+_AXES: Final = {
+    "acc": ("acc_x", "acc_y", "acc_z"),
+    "gyr": ("gyr_x", "gyr_y", "gyr_z"),
+    "mag": ("mag_x", "mag_y", "mag_z"),
+    "quat": ("quat_w", "quat_x", "quat_y", "quat_z"),
+}
+_MAX_ROWS: Final = 50_000_000
+_MAX_BYTES: Final = 4_000_000_000
+"""Declared sizes are checked before anything is allocated (service.md §e)."""
+
+
+def write_recording(recording: Recording) -> bytes:
+    """Serialise a recording; equal recordings give equal bytes."""
+    times = {d: _micros(s.t_s) for d, s in recording.streams.items()}
+    axis = np.unique(np.concatenate(list(times.values())))
+    columns: dict[str, pa.Array[Any]] = {_TIME: pa.array(axis)}
+    for device, stream in recording.streams.items():
+        rows = np.searchsorted(axis, times[device])
+        absent = np.ones(len(axis), np.bool_)
+        absent[rows] = False
+        for kind, names in _AXES.items():
+            signal: Floats | None = getattr(stream, kind)
+            for i, name in enumerate(names if signal is not None else ()):
+                assert signal is not None  # noqa: S101 - for mypy, the loop is empty otherwise
+                channel = np.zeros(len(axis), np.float32)
+                channel[rows] = signal[:, i]
+                columns[f"{device}.{name}"] = pa.array(channel, mask=absent if absent.any() else None)
+    text = json.dumps(_metadata(recording), ensure_ascii=False, sort_keys=True)
+    table = pa.table(columns).replace_schema_metadata({_KEY: text.encode()})
+    sink = pa.BufferOutputStream()
+    signals = [c for c in table.column_names if c != _TIME]
+    pq.write_table(
+        table,
+        sink,
+        compression="zstd",
+        use_dictionary=False,
+        use_byte_stream_split=cast("bool", signals),  # the stubs know only True and False
+        row_group_size=1 << 20,
+    )
+    return bytes(sink.getvalue().to_pybytes())
+
+
+def _micros(t_s: Floats) -> NDArray[np.int64]:
+    return np.round(t_s * 1e6).astype(np.int64)
+
+
+def _metadata(r: Recording) -> dict[str, object]:
+    return {
+        "schema": SCHEMA,
+        "units": {"t": "us", "acc": "m/s2", "gyr": "rad/s", "quat": "wxyz, sensor to world"},
+        "subject": {"height_m": r.subject.height_m},
+        "protocol": r.protocol,
+        "mounting": dict(r.mounting),
+        "sha256": dict(r.sha256),
+        "notices": [_notice(n) for n in r.notices],
+        "sensors": [
+            {
+                "id": s.device_id,
+                "segment": r.segments.get(s.device_id),
+                "mapped": s.device_id in r.segments,
+                "source": s.source,
+                "rate_hz": s.rate_hz,
+                "clock": s.clock,
+                "notices": [_notice(n) for n in s.notices],
+            }
+            for s in r.streams.values()
+        ],
+    }
+
+
+def _notice(n: Notice) -> dict[str, object]:
+    return {"code": n.code, "message": n.message, "sensor": n.sensor, "t_s": n.t_s, "severity": n.severity}
+
+
+def _read_notice(n: Mapping[str, Any]) -> Notice:
+    return Notice(n["code"], n["message"], n["sensor"], n["t_s"], n["severity"])
+
+
+def looks_like(data: bytes) -> bool:
+    """Tell Parquet by its magic at both ends."""
+    return data[:4] == MAGIC
+
+
+def read_recording(data: bytes, source: str) -> Recording:
+    """Read what `write_recording` wrote.
+
+    Raises
+    ------
+    FormatError
+        bad_parquet (damaged or too large), foreign_parquet (not written by Sagittal), newer_schema.
+    """
+    try:
+        file = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=False)
+        meta = file.metadata
+        unpacked = sum(meta.row_group(i).total_byte_size for i in range(meta.num_row_groups))
+        if meta.num_rows > _MAX_ROWS or unpacked > _MAX_BYTES:
+            raise FormatError(
+                "bad_parquet", f"{source} declares {meta.num_rows} rows, {unpacked} bytes: too large."
+            )
+        stored = (meta.metadata or {}).get(_KEY)
+        if stored is None:
+            raise FormatError(
+                "foreign_parquet",
+                f"{source} is a Parquet file that Sagittal did not write; export the recording as CSV and "
+                "describe it in a manifest (docs/formats.md).",
+            )
+        info = json.loads(stored)
+        if info["schema"] > SCHEMA:
+            raise FormatError(
+                "newer_schema",
+                f"{source} was written by a newer Sagittal (schema {info['schema']}); update this one.",
+            )
+        return _recording(file.read(use_threads=False), info, source)
+    except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, AttributeError, IndexError) as e:
+        raise FormatError("bad_parquet", f"{source} is a damaged recording ({e}); upload it again.") from e
+    except SagittalError:
+        raise
+
+
+def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Recording:
+    axis = table[_TIME].to_numpy()
+    streams: dict[str, ImuStream] = {}
+    segments: dict[str, object] = {}
+    for sensor in _list(info["sensors"]):
+        device = str(sensor["id"])
+        first = table[f"{device}.acc_x"].combine_chunks()
+        rows = np.flatnonzero(np.asarray(first.is_valid(), np.bool_)) if first.null_count else slice(None)
+        signals = {kind: _signal(table, device, names, rows) for kind, names in _AXES.items()}
+        acc = signals["acc"]
+        if acc is None:
+            raise KeyError(f"{device}.acc")
+        streams[device] = ImuStream(
+            device_id=device,
+            source=str(sensor["source"]),
+            t_s=axis[rows] * 1e-6,
+            acc=acc,
+            gyr=signals["gyr"],
+            mag=signals["mag"],
+            quat=signals["quat"],
+            rate_hz=float(str(sensor["rate_hz"])),
+            clock=str(sensor["clock"]),
+            digest=signal_digest(acc, signals["gyr"], signals["mag"]),
+            notices=tuple(_read_notice(n) for n in _list(sensor["notices"])),
+        )
+        if sensor["mapped"]:
+            segments[device] = sensor["segment"]
+    subject, mounting, sha = info["subject"], info["mounting"], info["sha256"]
+    if not (isinstance(subject, dict) and isinstance(mounting, dict) and isinstance(sha, dict)):
+        raise TypeError("metadata")
+    return Recording(
+        streams=streams,
+        segments=cast("dict[str, Segment | None]", segments),  # Recording checks them
+        subject=Subject(subject["height_m"]),
+        protocol=cast("Protocol", info["protocol"]),
+        mounting=mounting,
+        sha256=sha,
+        notices=tuple(_read_notice(n) for n in _list(info["notices"])),
+    )
+
+
+def _signal(
+    table: pa.Table, device: str, names: tuple[str, ...], rows: NDArray[np.int64] | slice
+) -> Floats | None:
+    if f"{device}.{names[0]}" not in table.column_names:
+        return None
+    return np.stack([table[f"{device}.{n}"].to_numpy()[rows] for n in names], axis=-1).astype(np.float64)
+
+
+def _list(value: object) -> list[dict[str, object]]:
+    if not isinstance(value, list):
+        raise TypeError("metadata: expected a list")
+    return value

@@ -1,0 +1,164 @@
+"""CSV and TSV tables of any laboratory, described by a manifest: header rows, units, columns per sensor."""
+
+from __future__ import annotations
+
+import difflib
+
+import numpy as np
+
+from core.errors import FormatError, ManifestError, Notice
+from core.formats import text
+from core.formats.draft import Draft
+from core.formats.manifest import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, SourceSpec
+from core.frames import Floats
+
+_ROWS_TO_LOOK_AT = 4
+
+
+def read(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
+    """Read all sensors of one table.
+
+    Parameters
+    ----------
+    data : UTF-8 text. spec : the manifest's entry with `columns`.
+
+    Raises
+    ------
+    ManifestError
+        unit_missing, rate_missing, unknown_column.
+    FormatError
+        empty, bad_table.
+    """
+    _check(spec, source)
+    lines = text.head_lines(data, spec.skip_rows + spec.header_rows + _ROWS_TO_LOOK_AT)
+    header = lines[spec.skip_rows : spec.skip_rows + spec.header_rows]
+    rows = [r for r in lines[spec.skip_rows + spec.header_rows :] if r.strip()]
+    if not rows:
+        raise FormatError("empty", f"{source} has a header but no samples; record or export it again.")
+    chosen = (
+        spec.separator.encode() if spec.separator else text.guess_separator(rows[: max(1, len(rows) - 1)])
+    )
+    separator = chosen or b","
+    names = _names(header, rows[0], separator, spec)
+    wanted = _wanted(spec, names, source)
+    body = text.after_lines(data, spec.skip_rows + spec.header_rows)
+    comma = text.has_decimal_comma(rows[0], separator)
+    table = text.read_columns(body, source, separator, names, wanted, decimal_comma=comma)
+    ticks, clock, rate = _time(table, spec)
+    return [
+        _sensor(device, channels, table, spec, source, ticks, clock, rate)
+        for device, channels in spec.columns.items()
+    ]
+
+
+def _check(spec: SourceSpec, source: str) -> None:
+    where = f"sources entry for '{spec.file}'"
+    if not spec.columns:
+        raise ManifestError(
+            "unknown_column", f"{where} names no columns; say which columns of {source} are which sensor."
+        )
+    if spec.acc_unit is None:
+        raise ManifestError(
+            "unit_missing", f"{where}: acc_unit is missing; expected one of {', '.join(ACC_UNITS)}."
+        )
+    if spec.gyr_unit is None and any(c.gyr for c in spec.columns.values()):
+        raise ManifestError(
+            "unit_missing", f"{where}: gyr_unit is missing; expected one of {', '.join(GYR_UNITS)}."
+        )
+    if spec.rate_hz is None and spec.time_column is None:
+        raise ManifestError("rate_missing", f"{where}: give rate_hz (samples per second) or time_column.")
+    if spec.quat_order is None and any(c.quat for c in spec.columns.values()):
+        raise ManifestError("manifest_bad_value", f"{where}: quat columns need quat_order, 'wxyz' or 'xyzw'.")
+
+
+def _names(header: list[bytes], row: bytes, separator: bytes, spec: SourceSpec) -> list[str]:
+    """Column names; several header rows are joined by "/", a table without a header counts 1, 2, 3 …"""
+    cells = row.count(separator) + 1
+    parts = [text.split(line, separator) for line in header]
+    parts = [[*p, *[""] * (cells - len(p))][:cells] if len(p) >= cells else p for p in parts]
+    if not parts:
+        return [str(i + 1) for i in range(cells)]
+    width = max(len(p) for p in parts)
+    names = ["/".join(p[i] for p in parts if i < len(p) and p[i]) for i in range(width)]
+    if spec.index_column and width == cells - 1:
+        names = ["", *names]
+    names += [""] * (cells - len(names))
+    return text.unique(names)
+
+
+def _wanted(spec: SourceSpec, names: list[str], source: str) -> list[str]:
+    there = names[1:] if spec.index_column else names
+    wanted: list[str] = []
+    asked = [(f"columns.{d}.{kind}", n) for d, c in spec.columns.items() for kind, n in _asked(c)]
+    if spec.time_column is not None:
+        asked.append(("time_column", spec.time_column))
+        there = names
+    for path, name in asked:
+        if name not in there:
+            near = difflib.get_close_matches(name, there, 1, 0.4)
+            hint = f"did you mean '{near[0]}'?" if near else f"columns found: {', '.join(there[:20])}."
+            raise ManifestError("unknown_column", f"{path}: {source} has no column '{name}'; {hint}")
+        if name not in wanted:
+            wanted.append(name)
+    return wanted
+
+
+def _asked(c: Channels) -> list[tuple[str, str]]:
+    groups = (("acc", c.acc), ("gyr", c.gyr), ("mag", c.mag), ("quat", c.quat))
+    return [(kind, name) for kind, group in groups for name in group or ()]
+
+
+def _time(table: text.Columns, spec: SourceSpec) -> tuple[Floats, str, float | None]:
+    if spec.time_column is None:
+        n = len(next(iter(table.values.values())))
+        return np.arange(n, dtype=np.float64), "index", spec.rate_hz
+    ticks = table.values[spec.time_column] * TIME_UNITS[spec.time_unit]
+    return ticks, "device", spec.rate_hz
+
+
+def _sensor(
+    device: str,
+    channels: Channels,
+    table: text.Columns,
+    spec: SourceSpec,
+    source: str,
+    ticks: Floats,
+    clock: str,
+    rate: float | None,
+) -> Draft:
+    notices = [Notice(n.code, n.message, device, n.t_s, n.severity) for n in table.notices]
+    acc = _stack(table, channels.acc) * ACC_UNITS[spec.acc_unit or "m/s2"]
+    gyr = None if channels.gyr is None else _stack(table, channels.gyr) * GYR_UNITS[spec.gyr_unit or "rad/s"]
+    if not np.isfinite(acc).any():
+        raise FormatError(
+            "missing_acc", f"{source}: the acc columns of {device} hold no numbers.", sensor=device
+        )
+    if gyr is None or not np.isfinite(gyr).any():
+        gyr = None
+        notices.append(
+            Notice(
+                "missing_gyro",
+                f"{source}: sensor {device} has no gyroscope signal, so nothing can be computed from it; "
+                "name its gyr columns in the manifest or record with the gyroscope on.",
+                device,
+            )
+        )
+    if not spec.gravity_included:
+        notices.append(
+            Notice(
+                "gravity_removed",
+                f"{source}: the manifest says that gravity was removed from the acceleration; "
+                "it is needed for orientation, export the raw acceleration.",
+                device,
+                severity="error",
+            )
+        )
+    quat = None if channels.quat is None else _stack(table, channels.quat)
+    if quat is not None and spec.quat_order == "xyzw":
+        quat = quat[:, [3, 0, 1, 2]]
+    mag = None if channels.mag is None else _stack(table, channels.mag)
+    return Draft(device, source, clock, ticks, acc, gyr, mag, quat, rate, tuple(notices))
+
+
+def _stack(table: text.Columns, names: tuple[str, ...]) -> Floats:
+    return np.stack([table.values[n] for n in names], axis=-1)

@@ -1,0 +1,200 @@
+"""Number tables from text, fast: decoding, separators and pyarrow's CSV reader with errors made readable."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal, cast
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pc
+
+from core.errors import FormatError, Notice
+from core.frames import Floats
+
+SEPARATORS: Final = (b"\t", b";", b",", b"|", b" ")
+MISSING: Final = ["", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "-", "None"]
+_LONGEST_LINE: Final = 1_000_000
+_HEAD: Final = 1 << 16
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns by name; a missing or unreadable cell is NaN."""
+
+    values: dict[str, Floats]
+    notices: tuple[Notice, ...]
+
+
+def to_utf8(data: bytes) -> bytes:
+    """Strip a byte order mark and turn UTF-16 (Excel's "Unicode text") into UTF-8; other bytes pass."""
+    if data[:3] == b"\xef\xbb\xbf":
+        return data[3:]
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return data.decode("utf-16", errors="replace").encode()
+    return data
+
+
+def is_text(data: bytes) -> bool:
+    """Tell text by the absence of NUL in its head."""
+    return b"\0" not in data[:_HEAD]
+
+
+def head_lines(data: bytes, most: int = 64) -> list[bytes]:
+    """First lines without line ends; a line longer than 1 MB is cut."""
+    lines: list[bytes] = []
+    at = 0
+    while len(lines) < most and at < len(data):
+        end = data.find(b"\n", at, at + _LONGEST_LINE)
+        end = len(data) if end < 0 else end
+        lines.append(data[at:end].rstrip(b"\r"))
+        at = end + 1
+    return lines
+
+
+def after_lines(data: bytes, n: int) -> memoryview:
+    """What follows the first n lines, without a copy."""
+    at = 0
+    for _ in range(n):
+        at = data.find(b"\n", at) + 1
+        if at == 0:
+            return memoryview(b"")
+    return memoryview(data)[at:]
+
+
+def split(line: bytes, separator: bytes) -> list[str]:
+    """Cells of a line as text, quotes and blanks stripped."""
+    text = line.decode("utf-8", errors="replace")
+    return [c.strip().strip('"').strip() for c in text.split(separator.decode())]
+
+
+def has_decimal_comma(line: bytes, separator: bytes) -> bool:
+    """Tell "0,074;9,922" from "0.074;9.922"."""
+    return separator != b"," and b"." not in line and re.search(rb"\d,\d", line) is not None
+
+
+def read_columns(
+    body: memoryview,
+    source: str,
+    separator: bytes,
+    names: Sequence[str],
+    wanted: Sequence[str],
+    *,
+    decimal_comma: bool,
+) -> Columns:
+    """Read the wanted columns of a table without its header.
+
+    Parameters
+    ----------
+    body : rows, starting at a line start. names : all columns in order, unique. wanted : some of them.
+
+    Raises
+    ------
+    FormatError
+        bad_table when most rows do not have the columns of the header.
+    """
+    if not bytes(body[:_HEAD]).strip():
+        raise FormatError("empty", f"{source} has a header but no samples; record or export it again.")
+    broken: list[int] = []
+
+    def skip(row: pc.InvalidRow) -> Literal["skip"]:
+        broken.append(row.actual_columns)
+        return "skip"
+
+    read = pc.ReadOptions(column_names=list(names), use_threads=False, block_size=1 << 22)
+    parse = pc.ParseOptions(delimiter=separator.decode(), invalid_row_handler=skip, ignore_empty_lines=True)
+    point = "," if decimal_comma else "."
+
+    def table(kind: pa.DataType) -> pa.Table:
+        broken.clear()
+        convert = pc.ConvertOptions(
+            column_types=dict.fromkeys(wanted, kind),
+            include_columns=list(wanted),
+            null_values=MISSING,
+            strings_can_be_null=True,
+            decimal_point=point,
+        )
+        return pc.read_csv(cast("Any", pa.BufferReader(pa.py_buffer(body))), read, parse, convert)
+
+    notices: list[Notice] = []
+    try:
+        found = table(pa.float64())
+        values = {n: _as_floats(found[n]) for n in wanted}
+    except pa.ArrowInvalid:
+        try:
+            found = table(pa.string())
+        except pa.ArrowInvalid as e:
+            raise FormatError("bad_table", f"{source} is not a readable table ({e}); export it again.") from e
+        values, bad = _cell_by_cell(found, wanted, decimal_comma)
+        notices.append(
+            Notice(
+                "bad_cells",
+                f"{source}: {bad} cells are not numbers and count as missing; the export may be damaged.",
+            )
+        )
+    rows = len(found)
+    if rows == 0 or len(broken) > max(2, rows // 2):
+        raise FormatError(
+            "bad_table",
+            f"{source}: {len(broken)} of {rows + len(broken)} rows do not have the {len(names)} columns "
+            f"of the header (found {broken[0] if broken else 0}); export it again with one separator.",
+        )
+    if broken:
+        notices.append(
+            Notice(
+                "truncated_line",
+                f"{source}: {len(broken)} of {rows + len(broken)} lines do not have {len(names)} columns "
+                "and were left out; the file may have been cut off while it was written.",
+            )
+        )
+    return Columns(values, tuple(notices))
+
+
+def _as_floats(column: pa.ChunkedArray[Any]) -> Floats:
+    """Arrow column to float64 with NaN for null and for infinities."""
+    out = np.array(column.to_numpy(), np.float64)
+    out[~np.isfinite(out)] = np.nan
+    return out
+
+
+def _cell_by_cell(
+    found: pa.Table, wanted: Sequence[str], decimal_comma: bool
+) -> tuple[dict[str, Floats], int]:
+    """Read text cells one by one (damaged file: speed does not matter); count those that are no numbers."""
+    bad = 0
+    values: dict[str, Floats] = {}
+    for name in wanted:
+        out = np.full(len(found), np.nan)
+        for i, cell in enumerate(found[name].to_pylist()):
+            if cell is None:
+                continue
+            try:
+                out[i] = float(cell.replace(",", ".") if decimal_comma else cell)
+            except ValueError:
+                bad += 1
+        out[~np.isfinite(out)] = np.nan
+        values[name] = out
+    return values, bad
+
+
+def guess_separator(lines: Sequence[bytes]) -> bytes | None:
+    """Separator that cuts all given lines into the same number of cells, the most if several do."""
+    best, most = None, 1
+    for separator in SEPARATORS:
+        counts = {line.count(separator) for line in lines if line.strip()}
+        if len(counts) == 1 and (n := counts.pop() + 1) > most:
+            best, most = separator, n
+    return best
+
+
+def unique(names: Sequence[str]) -> list[str]:
+    """Make column names unique: a second "acc_x" becomes "acc_x#2"; a blank one gets its position."""
+    seen: dict[str, int] = {}
+    out = []
+    for i, name in enumerate(names):
+        name = name or f"column {i + 1}"
+        seen[name] = seen.get(name, 0) + 1
+        out.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
+    return out
