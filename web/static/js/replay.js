@@ -1,0 +1,118 @@
+// <gait-view> shows the 3D figure (an iframe) and sends it the time; <time-bar> plays, pauses and seeks.
+import { clock } from "./clock.js";
+
+const RATE_MS = 33; // the figure is posed at most 30 times a second (viewer.md §3)
+const RETRY_MS = [500, 1000, 2000, 5000];
+
+const isDark = () => getComputedStyle(document.documentElement).colorScheme.startsWith("dark");
+
+// One view per browser tab: a reload finds it again, a second tab has its own.
+function tabId() {
+  try {
+    sessionStorage.tab ??= crypto.getRandomValues(new Uint32Array(2)).join("");
+    return sessionStorage.tab;
+  } catch {
+    return "";
+  }
+}
+
+class GaitView extends HTMLElement {
+  connectedCallback() {
+    this.frame = this.querySelector("iframe");
+    this.tries = 0;
+    this.onTick = () => this.request();
+    clock.addEventListener("tick", this.onTick);
+    const recolour = () => this.socket?.readyState === WebSocket.OPEN && this.socket.send(JSON.stringify({ dark: isDark() }));
+    new MutationObserver(recolour).observe(document.documentElement, { attributeFilter: ["data-theme"] });
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
+    this.connect();
+  }
+
+  disconnectedCallback() {
+    clock.removeEventListener("tick", this.onTick);
+    clearTimeout(this.timer);
+    this.socket?.close();
+  }
+
+  connect() {
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    const query = new URLSearchParams({ tab: tabId(), dark: isDark() });
+    this.socket = new WebSocket(`${scheme}://${location.host}${this.getAttribute("replay")}?${query}`);
+    this.socket.onmessage = (e) => this.receive(JSON.parse(e.data));
+    this.socket.onclose = (e) => {
+      this.dataset.state = "lost";
+      this.waiting = false;
+      if (e.code === 1008 || this.refused) return; // signed out or nothing to show: trying again would not help
+      this.say("Connection lost, trying again…");
+      this.timer = setTimeout(() => this.connect(), RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)]);
+    };
+  }
+
+  // The server answers with the address of this tab's private view; after a restart it is a new one, so the frame
+  // is loaded again rather than left to a client that only retries while it has focus (viewer.md §5).
+  receive(message) {
+    if (message.error) {
+      this.refused = message.error.code !== "bad_message";
+      this.say(message.error.detail);
+    } else if (message.src) {
+      this.tries = 0;
+      this.frame.src = isDark() ? `${message.src}?darkMode` : message.src;
+      this.frame.hidden = false;
+      this.dataset.state = "open";
+      this.say("");
+      this.send();
+    } else if (message.t !== undefined) {
+      this.waiting = false;
+      this.dataset.shown = message.t;
+      this.say(message.valid === false ? "No data at this moment" : "");
+      if (this.sent !== clock.t) this.request();
+    }
+  }
+
+  say(text) {
+    const el = this.querySelector("[data-say]");
+    if (el && el.textContent !== text) el.textContent = text;
+  }
+
+  request() {
+    if (this.waiting || this.queued) return;
+    this.queued = setTimeout(() => { this.queued = null; this.send(); }, RATE_MS);
+  }
+
+  send() {
+    if (this.socket?.readyState !== WebSocket.OPEN) return;
+    this.sent = clock.t;
+    this.waiting = true;
+    this.socket.send(JSON.stringify({ t: clock.t }));
+  }
+}
+
+class TimeBar extends HTMLElement {
+  connectedCallback() {
+    this.button = this.querySelector("[data-play]");
+    this.range = this.querySelector("input");
+    this.out = this.querySelector("output");
+    this.range.max = clock.duration;
+    this.button.addEventListener("click", () => clock.toggle());
+    this.range.addEventListener("input", () => clock.set(Number(this.range.value)));
+    document.querySelector("[data-speed]")?.addEventListener("change", (e) => (clock.speed = Number(e.target.value)));
+    clock.addEventListener("tick", () => this.show());
+    this.show();
+  }
+
+  show() {
+    this.range.value = clock.t;
+    this.range.style.setProperty("--at", clock.duration ? clock.t / clock.duration : 0);
+    this.out.textContent = `${clock.t.toFixed(clock.duration < 100 ? 1 : 0)} s`;
+    const p = clock.percent;
+    const where = p === null ? "" : `, ${Math.round(p)} percent of a ${clock.stride.side} stride`;
+    this.range.setAttribute("aria-valuetext", `${clock.t.toFixed(1)} seconds${where}`);
+    if (this.button.dataset.on === String(clock.playing)) return;
+    this.button.dataset.on = clock.playing;
+    this.button.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
+    this.button.querySelector("use").setAttribute("href", clock.playing ? "#i-pause" : "#i-play");
+  }
+}
+
+customElements.define("gait-view", GaitView);
+customElements.define("time-bar", TimeBar);

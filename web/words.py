@@ -1,0 +1,63 @@
+"""Dates, sizes and numbers as the pages write them: English, a real minus, thin space before a unit."""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+from collections.abc import Callable
+
+MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+
+
+def day(value: dt.date | dt.datetime) -> str:
+    """A date as "18 Nov 2026"."""
+    return f"{value.day} {MONTHS[value.month - 1]} {value.year}"
+
+
+def moment(value: dt.datetime) -> str:
+    """A time as "18 Nov 2026, 10:42" in UTC, the only time zone the server knows."""
+    utc = value.astimezone(dt.UTC)
+    return f"{day(utc)}, {utc:%H:%M}"
+
+
+def filesize(size: float) -> str:
+    """Bytes as "18.4 MB", decimal prefixes."""
+    for unit in ("B", "kB", "MB"):
+        if size < 1000:
+            return f"{size:.0f} {unit}" if unit == "B" or size >= 100 else f"{size:.1f} {unit}"
+        size /= 1000
+    return f"{size:.1f} GB"
+
+
+def number(value: float | None, digits: int = 0) -> str:
+    """A number with a real minus and no negative zero; a dash where there is none."""
+    if value is None:
+        return "–"
+    text = f"{value:.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0 else text.replace("-", "−")
+
+
+def seconds(value: float | None) -> str:
+    """A duration as "42.6 s" or "3 min 5 s"."""
+    if value is None:
+        return "–"
+    if value < 120:
+        return f"{value:.1f} s" if value < 60 else f"{value:.0f} s"
+    minutes, rest = divmod(round(value), 60)
+    return f"{minutes} min {rest} s"
+
+
+def pattern(text: str) -> str:
+    """Escape text for the pattern attribute of an input, which is a regular expression of the `v` kind."""
+    return re.sub(r"[^A-Za-z0-9 _]", lambda m: f"\\{m[0]}" if m[0] in r"-()[]{}|/\^$*+?.&!#%,:;<=>@`~" else m[0], text)
+
+
+FILTERS: dict[str, Callable[..., str]] = {
+    "day": day,
+    "moment": moment,
+    "filesize": filesize,
+    "number": number,
+    "seconds": seconds,
+    "pattern": pattern,
+}
+"""By the name templates use."""
