@@ -1,1 +1,35 @@
-"""Simulated walkers and sensors with exact truth, for tests, demo and CLI."""
+"""Simulated walkers and sensors with exact truth, for tests, demo and CLI (docs/simulation.md)."""
+
+from core.simulate.mt_text import mt_files, mt_text
+from core.simulate.recorder import Dropout, Setup, Simulation, simulate
+from core.simulate.script import Arc, Pivot, Script, Stand, Straight
+from core.simulate.scripts import SCRIPTS, Scenario, simulate_scenario
+from core.simulate.sensors import SensorNoise
+from core.simulate.tables import angle_table, event_table, stride_table
+from core.simulate.truth import Truth
+from core.simulate.walker import STEADY, Variability, Walker
+
+__all__ = [
+    "SCRIPTS",
+    "STEADY",
+    "Arc",
+    "Dropout",
+    "Pivot",
+    "Scenario",
+    "Script",
+    "SensorNoise",
+    "Setup",
+    "Simulation",
+    "Stand",
+    "Straight",
+    "Truth",
+    "Variability",
+    "Walker",
+    "angle_table",
+    "event_table",
+    "mt_files",
+    "mt_text",
+    "simulate",
+    "simulate_scenario",
+    "stride_table",
+]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.errors import ParameterError
-from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment, Side
+from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from core.rotation import from_matrix, rotate
 from core.simulate import pelvis
 from core.simulate.script import Plan
@@ -31,7 +31,7 @@ class Motion:
 
     Parameters
     ----------
-    t_s : (n,), step 1 / rate_hz. q : segment → (n, 4). p : segment → (n, 3) m, origins as in core/body/poses.py.
+    t_s : (n,), step 1 / rate_hz. q : segment → (n, 4). p : segment → (n, 3) m, origins as in core.body.poses.
     timings : side → events of each swing. sole_height : side → (n,) lowest sole point, m.
     guard_m : largest lowering of the pelvis because a leg would have been too short.
     lifts_m : side → lift of each swing added for clearance; it costs knee flexion.
@@ -93,7 +93,7 @@ def move(plan: Plan, walker: Walker, rate_hz: float) -> Motion:
     return Motion(t, rate_hz, plan, walker, q, p, timings, sole_height, lowered, lifts)
 
 
-def _touching(t: Floats, timing: FootTiming, margin_s: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _touching(t: Floats, timing: FootTiming, margin_s: float) -> Bools:
     """Samples (n,) at which the foot is on the floor, widened by a margin."""
     free = np.zeros(len(t), bool)
     for release, contact in zip(timing.release, timing.contact, strict=True):

@@ -1,12 +1,13 @@
 """What the person does: script items, and the footprints they lead to.
 
 Each walking item is cut into steps; before standing a short closing step brings the feet together. A step
-carries its own drawn deviations, so the footprints are the exact truth (spec/estimators.md §2.2, patients.md §1).
+carries its own drawn deviations, so the footprints are the exact truth (spec/estimators.md §2.2,
+patients.md §1).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, inf, sin, sqrt
 
 import numpy as np
@@ -84,6 +85,14 @@ class Pivot:
 
 Item = Stand | Straight | Arc | Pivot
 Script = tuple[Item, ...]
+
+
+def scaled(script: Script, k: float) -> Script:
+    """The same script with all lengths k times as long, for a person k times as tall."""
+    return tuple(
+        replace(item, **{name: k * value for name, value in vars(item).items() if name.endswith("_m")})
+        for item in script
+    )
 
 
 @dataclass(frozen=True)
@@ -222,5 +231,5 @@ def _check(script: Script) -> None:
             if not (np.isfinite(value) and (value > 0.0 or name == "angle_rad")):
                 raise ParameterError(
                     "script_item",
-                    f"Item {i} of the script ({type(item).__name__}): {name} is {value:g}, expected more than 0.",
+                    f"Item {i} of the script ({type(item).__name__}): {name} is {value:g}, expected above 0.",
                 )

@@ -1,7 +1,7 @@
 """The smooth pieces every simulated path is made of: all are at least C³, so accelerations have no steps.
 
-A hard maximum on the knee gives acceleration spikes of 1,800 m/s², a blend weight that is not zero at foot-off
-290 m/s² (spec/patients.md §1 "Continuity").
+A hard maximum on the knee gives acceleration spikes of 1,800 m/s², a blend weight that is not zero at
+foot-off 290 m/s² (spec/patients.md §1 "Continuity").
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ def bump(u: Floats) -> Floats:
 def phase_bump(phase: Floats, centre: float, half_width: float) -> Floats:
     """Hump in gait phase, periodic in 1: raised cosine to the fourth, height 1 at `centre`."""
     distance = np.abs((phase - centre + 0.5) % 1.0 - 0.5) / half_width
-    return np.cos(0.5 * np.pi * np.clip(distance, 0.0, 1.0)) ** 4
+    return np.asarray(np.cos(0.5 * np.pi * np.clip(distance, 0.0, 1.0)) ** 4)
 
 
 def smooth_max(x: Floats, floor: float | Floats, width: float) -> Floats:
     """Maximum of x and `floor` with a rounded corner: above it by width/2 where both are equal."""
     d = x - floor
-    return floor + 0.5 * (d + np.sqrt(d**2 + width**2))
+    return np.asarray(floor + 0.5 * (d + np.sqrt(d**2 + width**2)))
 
 
 def smooth(x: Floats, window: int) -> Floats:
@@ -60,10 +60,10 @@ def join(u: Floats, start: Floats, end: Floats) -> Floats:
     column = u.reshape(-1, *(1,) * (start.ndim - 1))
     s = smoothstep(column)
     if len(u) < 8:
-        return (1.0 - s) * start[0] + s * end[-1]
+        return np.asarray((1.0 - s) * start[0] + s * end[-1])
     # the outermost samples are clipped in u, so the rates are taken one sample inside
     rate_0 = (start[2] - start[1]) / (u[2] - u[1])
     rate_1 = (end[-2] - end[-3]) / (u[-2] - u[-3])
     leave = column * (1.0 - smoothstep(column / ends))
     arrive = (column - 1.0) * smoothstep((column - 1.0 + ends) / ends)
-    return (1.0 - s) * start[0] + s * end[-1] + leave * rate_0 + arrive * rate_1
+    return np.asarray((1.0 - s) * start[0] + s * end[-1] + leave * rate_0 + arrive * rate_1)

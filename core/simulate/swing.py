@@ -26,8 +26,8 @@ HIP_STANDING = 10.0 * DEGREE
 """Hip flexion that comes with the pelvic tilt at rest, on top of half the knee's."""
 
 LANDING_RISE = 6.0 * DEGREE
-"""Rise of the pitch over the last 30 % of swing, so that its maximum is at contact; without it the pitch peaks
-up to 0.1 s early (spec/patients.md §1)."""
+"""Rise of the pitch over the last 30 % of swing, so that its maximum is at contact; without it the pitch
+peaks up to 0.1 s early (spec/patients.md §1)."""
 
 ROLL = 5.0 * DEGREE
 """Supination of the free foot."""
@@ -38,7 +38,7 @@ MOST_LIFT = 0.095
 
 @dataclass(frozen=True, eq=False)
 class FootMotion:
-    """One foot over the take: ankle (n, 3) m, pitch, heading, roll (n,) rad, and the lift of each swing, m."""
+    """One foot over the take: ankle (n, 3) m; pitch, heading, roll (n,) rad; the lift of each swing, m."""
 
     ankle: Floats
     pitch: Floats

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from core.frames import Floats, Side
+from core.frames import Bools, Floats, Side
 from core.simulate.script import Plan
 from core.simulate.shapes import smooth
 from core.simulate.walker import Walker
 
 RELEASE_PHASE = 0.59
-"""Phase at which the foot leaves the floor (WBDS foot-off is at 0.62 of the cycle, about when the sole is 5 mm up)."""
+"""Phase at which the foot leaves the floor; WBDS foot-off, 0.62, is about when the sole is 5 mm up."""
 
 STANDING_PHASE = 0.3
 """The phase is held here while standing: mid-stance, both knees nearly straight."""
@@ -37,7 +38,7 @@ class FootTiming:
     release: Floats
     contact: Floats
     flat: Floats
-    paused: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    paused: Bools
 
 
 def foot_timing(plan: Plan, walker: Walker, side: Side) -> FootTiming:
@@ -45,7 +46,7 @@ def foot_timing(plan: Plan, walker: Walker, side: Side) -> FootTiming:
     gait = walker.sides[side]
     prints = plan.footprints[side]
     rows = []
-    for before, landing in zip(prints[:-1], prints[1:], strict=True):
+    for before, landing in pairwise(prints):
         step = landing.step_s
         stride = landing.time_s - before.time_s
         paused = stride > PAUSE * step
@@ -69,7 +70,8 @@ def foot_timing(plan: Plan, walker: Walker, side: Side) -> FootTiming:
     table = np.array(rows, np.float64).reshape(-1, 6)
     flat = table[:, 4].copy()
     flat[:-1] = np.minimum(flat[:-1], table[1:, 0] - 0.01)
-    return FootTiming(*(table[:, k].copy() for k in range(4)), flat, table[:, 5].astype(bool))
+    heel_off, opposite, release, contact = table[:, :4].T.copy()
+    return FootTiming(heel_off, opposite, release, contact, flat, table[:, 5].astype(bool))
 
 
 def window(plan: Plan, rate_hz: float, share: float) -> int:
@@ -80,8 +82,8 @@ def window(plan: Plan, rate_hz: float, share: float) -> int:
 def gait_phase(t: Floats, plan: Plan, timing: FootTiming, rate_hz: float) -> Floats:
     """Unwrapped phase (n,) of one leg: whole numbers at its contacts.
 
-    The other foot's contact is pinned to one half: without it slow or uneven gaits land with 20–29° knee flexion
-    instead of 4–9° (spec/patients.md §1 "Phase").
+    The other foot's contact is pinned to one half: without it slow or uneven gaits land with 20–29° knee
+    flexion instead of 4–9° (spec/patients.md §1 "Phase").
     """
     if not len(timing.contact):
         return np.full(len(t), STANDING_PHASE)

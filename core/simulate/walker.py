@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import radians
@@ -27,7 +28,7 @@ class Anatomy:
     Parameters
     ----------
     ankle_height : ankle centre above the sole. heel : heel point behind the ankle (positive).
-    rocker_start : forward of the ankle, where the sole begins to curve up with `rocker_radius`. toe : toe tip.
+    rocker_start : forward of the ankle, where the sole begins to curve up by `rocker_radius`. toe : tip.
     """
 
     hip_width: float = 0.17
@@ -63,7 +64,8 @@ class SideGait:
     ----------
     double_support : opposite contact to own release. flat_from : foot flat after own contact.
     heel_off : phase at which the heel rises. toe_out_rad : foot heading outward of the path.
-    contact_pitch_rad : toes up at contact. knee_min_rad : least knee flexion. clearance_m : sole at mid-swing.
+    contact_pitch_rad : toes up at contact. knee_min_rad : least knee flexion.
+    clearance_m : height of the sole at mid-swing.
     """
 
     double_support: float = 0.0928
@@ -77,7 +79,7 @@ class SideGait:
 
 @dataclass(frozen=True)
 class Variability:
-    """Standard deviations from step to step; times and lengths relative (spec/patients.md §2 "Variability")."""
+    """Standard deviations from step to step; time and length relative (spec/patients.md §2 "Variability")."""
 
     step_time: float = 0.012
     step_length: float = 0.027
@@ -151,13 +153,13 @@ class Walker:
         """Factor on the angle curves for a step of this length; steps on the spot keep a lifted knee."""
         if step_m <= 0.05 * self.scale:
             return 0.35
-        return min(1.15, (step_m / self.reference_step_m) ** 0.5)
+        return min(1.15, math.sqrt(step_m / self.reference_step_m))
 
     def landing_amplitude(self, step_m: float) -> float:
         """Factor on the pitch at contact; short and closing steps land flat."""
         if step_m <= 0.3 * self.reference_step_m:
             return 0.15
-        return min(1.0, (step_m / self.reference_step_m) ** 0.5)
+        return min(1.0, math.sqrt(step_m / self.reference_step_m))
 
 
 def leg_reach(anatomy: Anatomy, knee_rad: Floats | float) -> Floats:

@@ -1,0 +1,38 @@
+"""Velocities and accelerations of sampled poses: exact derivatives of quintic interpolating splines.
+
+Truth and signals come from one curve, so integrating the signals gives the truth back (spec/estimators.md
+§2.2).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from core.frames import Floats
+from core.rotation import conjugate, multiply, normalise
+
+
+def kinematics(t: Floats, p: Floats, q: Floats) -> tuple[Floats, Floats, Floats]:
+    """Differentiate a pose at its own samples.
+
+    Parameters
+    ----------
+    t : (n,) s, n ≥ 6. p : (n, 3) m. q : (n, 4) unit quaternions, sign-continuous, body to world.
+
+    Returns
+    -------
+    velocity (n, 3) m/s and acceleration (n, 3) m/s² in the world, angular rate (n, 3) rad/s in the body:
+    ω = vec(2 q* ⊗ q̇); what the spline does to the norm of q only reaches the scalar part.
+    """
+    spline = make_interp_spline(t, np.column_stack((p, q)), k=5)
+    first = spline.derivative(1)(t)
+    acceleration = spline.derivative(2)(t)[:, :3]
+    rate = 2.0 * multiply(conjugate(normalise(q)), first[:, 3:])[:, 1:]
+    return np.ascontiguousarray(first[:, :3]), np.ascontiguousarray(acceleration), rate
+
+
+def sign_continuous(q: Floats) -> Floats:
+    """The same rotations (n, 4) without sign flips from sample to sample."""
+    flips = np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0)
+    return q * np.concatenate(([1.0], np.cumprod(flips)))[:, None]
