@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 
+import fastapi.routing
 from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute, APIWebSocketRoute
 from starlette.routing import BaseRoute
 
 from server.auth.access import Door
-from server.auth.roles import PUBLIC, Action
+from server.auth.roles import Action
 
 
 class UndeclaredRouteError(RuntimeError):
     """A route says not exactly one action; name it with `require(Action.…)`."""
 
 
-def declared_actions(routes: Iterable[BaseRoute]) -> dict[str, Action]:
+def declared_actions(routes: Sequence[BaseRoute]) -> dict[str, Action]:
     """Return each route's action by its methods and path, websockets and static mounts included.
 
     Raises
@@ -25,9 +26,9 @@ def declared_actions(routes: Iterable[BaseRoute]) -> dict[str, Action]:
         a route declares no action, or several.
     """
     found: dict[str, Action] = {}
-    for route in _leaves(routes):
+    for path, route in _leaves(routes):
         actions = _actions(route)
-        name = f"{_methods(route)} {getattr(route, 'path', route)}"
+        name = f"{_methods(route)} {path}"
         if len(actions) != 1:
             said = ", ".join(sorted(actions)) or "none"
             raise UndeclaredRouteError(f"Route {name}: expected one declared action, found {said}.")
@@ -35,19 +36,14 @@ def declared_actions(routes: Iterable[BaseRoute]) -> dict[str, Action]:
     return found
 
 
-def is_public(route: BaseRoute) -> bool:
-    """Tell whether a route needs no sign-in."""
-    return _actions(route) <= PUBLIC
-
-
-def _leaves(routes: Iterable[BaseRoute]) -> Iterator[BaseRoute]:
-    for route in routes:
-        # FastAPI keeps an included router as one route around the original (0.13x and later)
-        inner = getattr(route, "original_router", None)
-        if inner is None:
-            yield route
-        else:
-            yield from _leaves(inner.routes)
+def _leaves(routes: Sequence[BaseRoute]) -> Iterator[tuple[str, BaseRoute]]:
+    """Yield every route with its whole path."""
+    # newer FastAPI keeps an included router as one entry and has this walk; older ones copy its routes
+    contexts = getattr(fastapi.routing, "iter_route_contexts", None)
+    if contexts is None:
+        yield from ((getattr(route, "path", ""), route) for route in routes)
+    else:
+        yield from ((context.path or "", context.original_route) for context in contexts(routes))
 
 
 def _actions(route: BaseRoute) -> set[Action]:

@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from server.auth.passwords import MAX_LENGTH, hash_password, verify_password
+from server.auth.throttle import MAX_PER_ACCOUNT, MAX_PER_ADDRESS, WINDOW_S, Throttle
+from server.problems import Problem
+from tests.server.clinic import PASSWORD, password_hash
+
+
+def test_a_password_is_stored_as_argon2id_and_only_it_verifies() -> None:
+    stored = password_hash()
+    assert stored.startswith("$argon2id$v=19$m=65536,t=3,p=4$")
+    assert PASSWORD not in stored
+    assert verify_password(PASSWORD, stored)
+    assert not verify_password(PASSWORD + "x", stored)
+    assert not verify_password(PASSWORD, "not a hash")
+
+
+def test_an_unknown_account_takes_as_long_as_a_wrong_password() -> None:
+    def seconds(stored: str | None) -> float:
+        start = time.perf_counter()
+        assert not verify_password("wrong password", stored)
+        return time.perf_counter() - start
+
+    stored = password_hash()
+    known = min(seconds(stored) for _ in range(3))
+    unknown = min(seconds(None) for _ in range(3))
+    # without the dummy hash the ratio is below 0.001
+    assert 0.3 < unknown / known < 3
+
+
+@pytest.mark.parametrize("password", ["", "eleven char", "x" * (MAX_LENGTH + 1)])
+def test_too_short_and_too_long_passwords_are_refused(password: str) -> None:
+    with pytest.raises(Problem) as refused:
+        hash_password(password)
+    assert refused.value.code == "weak_password"
+    assert not password or password not in refused.value.sentence
+
+
+class Clock:
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_an_account_is_closed_for_a_while_after_too_many_failures_from_anywhere() -> None:
+    clock = Clock()
+    throttle = Throttle(clock)
+    for i in range(MAX_PER_ACCOUNT):
+        throttle.check("anna", f"10.0.0.{i}")
+        throttle.fail("anna", f"10.0.0.{i}")
+    with pytest.raises(Problem) as refused:
+        throttle.check("anna", "10.0.0.99")
+    assert refused.value.status == 429
+    assert refused.value.headers is not None
+    assert 0 < int(refused.value.headers["Retry-After"]) <= WINDOW_S + 1
+    throttle.check("berta", "10.0.0.99")
+    clock.now = WINDOW_S + 1
+    throttle.check("anna", "10.0.0.99")
+
+
+def test_an_address_is_closed_after_failures_on_many_accounts() -> None:
+    throttle = Throttle(Clock())
+    for i in range(MAX_PER_ADDRESS):
+        throttle.check(f"user{i}", "10.0.0.1")
+        throttle.fail(f"user{i}", "10.0.0.1")
+    with pytest.raises(Problem):
+        throttle.check("somebody", "10.0.0.1")
+    throttle.check("somebody", "10.0.0.2")
+
+
+def test_success_forgets_the_failures_of_the_account() -> None:
+    throttle = Throttle(Clock())
+    for _ in range(MAX_PER_ACCOUNT - 1):
+        throttle.fail("anna", "10.0.0.1")
+    throttle.succeed("anna")
+    throttle.fail("anna", "10.0.0.1")
+    throttle.check("anna", "10.0.0.1")

@@ -1,0 +1,75 @@
+"""A whole web process on an empty data folder, and people of every role to ask it things."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+from collections.abc import AsyncIterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import httpx
+from fastapi import FastAPI
+
+from server.app import create_app
+from server.auth import accounts
+from server.auth.passwords import hash_password
+from server.auth.roles import Role
+from server.settings import Settings
+from server.storage.db import Database
+
+PASSWORD = "correct horse battery"
+ORIGIN = "http://127.0.0.1"
+
+
+@functools.cache
+def password_hash() -> str:
+    """One hash for all test accounts: argon2 takes a third of a second."""
+    return hash_password(PASSWORD)
+
+
+@dataclass
+class Clinic:
+    """A running application."""
+
+    app: FastAPI
+    settings: Settings
+    users: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def db(self) -> Database:
+        db: Database = self.app.state.db
+        return db
+
+    def user(self, role: str, name: str | None = None) -> str:
+        """Id of an account with this role, made at first use; its sign-in name is the role."""
+        name = name or role
+        if name not in self.users:
+            with self.db.write() as c:
+                self.users[name] = accounts.create(c, name, None, Role(role), password_hash()).id
+        return self.users[name]
+
+    def token(self, role: str, name: str | None = None) -> str:
+        """A fresh sign-in of the person with this role."""
+        user_id = self.user(role, name)
+        with self.db.write() as c:
+            token: str = self.app.state.logins.start(c, user_id, None)
+        return token
+
+    def client(
+        self, role: str | None = None, headers: Mapping[str, str] | None = None, **options: Any
+    ) -> httpx.AsyncClient:
+        """A client that is signed in with this role, or not at all."""
+        cookies = {"sid": self.token(role)} if role else {}
+        transport = httpx.ASGITransport(self.app, raise_app_exceptions=options.pop("raises", True))
+        return httpx.AsyncClient(transport=transport, base_url=ORIGIN, cookies=cookies, headers=headers, **options)
+
+
+@contextlib.asynccontextmanager
+async def open_clinic(folder: Path, **settings: Any) -> AsyncIterator[Clinic]:
+    """Start an application on a folder and stop it again."""
+    options = Settings(data_dir=folder, **settings)
+    app = create_app(options)
+    async with app.router.lifespan_context(app):
+        yield Clinic(app, options)
