@@ -2,8 +2,8 @@
 
     queued → running → done | failed | cancelled          running → queued when its worker died or let go
 
-The job's row is the truth. A worker owns a job through its claim (job, attempt, worker): every write carries it
-as a fence, and a write that meets no row means that the job has gone to somebody else: stop, publish nothing.
+The job's row is the truth. A worker owns a job through its claim (job, attempt, worker): every write carries
+it as a fence. A write that meets no row means that the job has gone to somebody else: stop, publish nothing.
 """
 
 from __future__ import annotations

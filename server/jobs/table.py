@@ -1,7 +1,7 @@
 """The embedded queue: the job table itself, claimed by the workers of `sagittal serve`.
 
-Three silent deaths on one job end it (a poisonous recording must not loop). A lease in the far future
-is taken for a dead one: the clock was set back; the fence keeps a mistake in that harmless.
+Three silent deaths on one job end it (a poisonous recording must not loop). A lease in the far future is
+taken for a dead one: the clock was set back; the fence keeps a mistake in that harmless.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ MAX_DEATHS = 3
 """Silent deaths of workers after which a job is given up."""
 
 POISONED = (
-    f"worker died {MAX_DEATHS} times on this job without a word: it may need more memory than allowed, or the "
-    "recording breaks a library. Try fewer or shorter files; the server's log has the signal."
+    f"worker died {MAX_DEATHS} times on this job without a word: it may need more memory than allowed, or "
+    "the recording breaks a library. Try fewer or shorter files; the server's log has the signal."
 )
 
 _CLAIMED = tuple(job.c[k] for k in ("id", "attempt", "kind", "recording_id", "requested_by", "params"))
@@ -191,7 +191,7 @@ class TableQueue:
         return and_(job.c.state == "running", expired)
 
     def _bury(self, c: Connection, which: ColumnElement[bool]) -> int:
-        """Count a death on running jobs: cancelled if that was wanted, given up at the third, else queued again."""
+        """Count a death of running jobs: cancel if that was wanted, give up at the third, else requeue."""
         buried = 0
         for row in c.execute(select(job.c.seq, job.c.deaths, job.c.cancel_requested).where(which)).all():
             values: dict[str, object] = {"deaths": row.deaths + 1}

@@ -1,6 +1,6 @@
 """What a use case may refuse, beside the errors of core; `status` is the HTTP status that says the same.
 
-404 not_found · 409 code_taken, name_taken, no_files, last_admin · 413 file_too_large, set_too_large,
+404 not_found · 409 code_taken, name_taken, no_files, not_confirmed · 413 file_too_large, set_too_large,
 too_many_files · 422 bad_value · 507 disk_full · 500 blob_damaged, blob_missing
 """
 

@@ -1,0 +1,230 @@
+"""Analyses: run (command line and worker alike), ask for one, publish and read the results."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime as dt
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from sqlalchemy import Connection, insert, select, update
+
+from core.errors import ParameterError
+from server import audit
+from server.jobs.queue import Claim, JobQueue, JobView
+from server.services import recordings
+from server.services.errors import NotFound
+from server.services.provenance import CODE_VERSION
+from server.storage.blobs import Blob, BlobStore
+from server.storage.tables import analysis, analysis_file, job, new_id, now, patient, recording, session
+
+if TYPE_CHECKING:
+    from core.formats.source import SourceFile
+
+Progress = Callable[[str, float], None]
+"""Called with the stage that starts and the share of the work done before it, 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """A finished analysis: what went in, by what, and which files came out (name → stored bytes)."""
+
+    id: str
+    recording_id: str
+    session_id: str
+    patient_id: str
+    job_id: str
+    input_sha256: str
+    config_sha256: str
+    code_version: str
+    manifest: Mapping[str, Any] | None
+    config: Mapping[str, Any]
+    created_at: dt.datetime
+    files: Mapping[str, Blob]
+
+
+def run(
+    files: Sequence[SourceFile],
+    manifest: bytes | None,
+    config: Mapping[str, Any] | None,
+    progress: Progress,
+) -> dict[str, bytes]:
+    """Files of one take in, result files out (server/report/exports.py); pure but for `progress`.
+
+    Parameters
+    ----------
+    manifest : JSON text, None = nothing declared.
+    config : overrides of PipelineConfig by stage, {"fusion": {"k_acc": 1.0}}; None = the defaults.
+
+    Raises
+    ------
+    SagittalError
+        nothing can be analysed; the code and the sentence say why.
+    """
+    from core.formats import read_recording
+    from core.formats.manifest import parse_manifest
+    from core.pipeline import PipelineConfig, analyse
+    from server.report.exports import analysis_files
+
+    progress("reading", 0.0)
+    take = read_recording(files, parse_manifest(manifest) if manifest is not None else None)
+    chosen = configured(PipelineConfig(), config) if config else None
+    result = analyse(take, chosen, progress, CODE_VERSION)
+    return analysis_files(result)
+
+
+def configured(defaults: Any, overrides: Mapping[str, Any], path: str = "config") -> Any:
+    """Replace fields of nested frozen dataclasses; raises ParameterError unknown_parameter, bad_parameter."""
+    names = {f.name for f in dataclasses.fields(defaults)}
+    values = {}
+    for name, value in overrides.items():
+        if name not in names:
+            raise ParameterError(
+                "unknown_parameter", f"There is no {path}.{name}; expected one of {', '.join(sorted(names))}."
+            )
+        default = getattr(defaults, name)
+        if dataclasses.is_dataclass(default) and isinstance(value, Mapping):
+            values[name] = configured(default, value, f"{path}.{name}")
+        elif _fits(value, default):
+            values[name] = tuple(value) if isinstance(default, tuple) else value
+        else:
+            raise ParameterError(
+                "bad_parameter", f"{path}.{name} is {value!r}, expected the like of {default!r}."
+            )
+    return dataclasses.replace(defaults, **values)
+
+
+def _fits(value: object, default: object) -> bool:
+    if isinstance(default, bool) or isinstance(value, bool):
+        return isinstance(default, bool) and isinstance(value, bool)
+    if isinstance(default, int | float):
+        return isinstance(value, int | float)
+    return isinstance(value, list if isinstance(default, tuple) else type(default))
+
+
+def submit(
+    c: Connection,
+    queue: JobQueue,
+    actor: audit.Actor | None,
+    session_id: str,
+    *,
+    config: Mapping[str, Any] | None = None,
+) -> JobView:
+    """Ask for an analysis of the current recording with its manifest as last set.
+
+    Height and protocol of the session (or the patient) fill in what the manifest leaves open. The same files,
+    mapping, parameters and version are analysed once; after a failure or another mapping they are analysed again.
+
+    Raises
+    ------
+    Conflict
+        no_files. NotFound: the session.
+    """
+    this = recordings.require_current(c, session_id)
+    manifest = _completed(c, session_id, this.manifest)
+    chosen = dict(config or {})
+    params = {**recordings.job_inputs(this), "manifest": manifest, "config": chosen}
+    key = f"{this.id}:{recordings.ANALYSE}:{_digest(params)}:{CODE_VERSION}"
+    view = queue.submit(
+        c,
+        key=key,
+        kind=recordings.ANALYSE,
+        params=params,
+        recording_id=this.id,
+        requested_by=actor.user_id if actor else None,
+    )
+    c.execute(update(recording).where(recording.c.id == this.id).values(wanted_key=key))
+    audit.record(c, actor, "analysis.requested", "session", session_id, {"job_id": view.id})
+    return view
+
+
+def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob]) -> None:
+    """Write the rows of a result, in the transaction that marks its job done."""
+    params = claim.params
+    analysis_id = new_id()
+    row = {
+        "id": analysis_id,
+        "recording_id": claim.recording_id,
+        "job_id": claim.job_id,
+        "input_sha256": params["input_sha256"],
+        "config_sha256": _digest(params["config"]),
+        "code_version": CODE_VERSION,
+        "manifest": params["manifest"],
+        "config": params["config"],
+        "created_at": now(),
+    }
+    c.execute(insert(analysis).values(row))
+    for name, blob in stored.items():
+        file = {"analysis_id": analysis_id, "name": name, "size": blob.size, "sha256": blob.sha256}
+        c.execute(insert(analysis_file).values(file))
+
+
+def get(c: Connection, analysis_id: str) -> Analysis:
+    """One analysis; raises NotFound."""
+    row = c.execute(_QUERY.where(analysis.c.id == analysis_id)).first()
+    if row is None:
+        raise NotFound("analysis", analysis_id)
+    return _analysis(c, row)
+
+
+def of_session(c: Connection, session_id: str) -> list[Analysis]:
+    """All analyses of a session, the one that counts first: last asked for, else newest."""
+    asked = (job.c.key == recording.c.wanted_key).desc()
+    query = _QUERY.where(session.c.id == session_id).order_by(
+        recording.c.created_at.desc(), asked, analysis.c.created_at.desc()
+    )
+    return [_analysis(c, row) for row in c.execute(query).all()]
+
+
+def latest(c: Connection, session_id: str) -> Analysis | None:
+    """The analysis a session's pages show, None before the first result."""
+    found = of_session(c, session_id)
+    return found[0] if found else None
+
+
+def file_bytes(blobs: BlobStore, found: Analysis, name: str) -> bytes:
+    """A result file, verified; raises NotFound, IntegrityError."""
+    if name not in found.files:
+        raise NotFound("file", name)
+    return blobs.read(found.patient_id, found.files[name].sha256)
+
+
+_QUERY = (
+    select(analysis, recording.c.session_id, session.c.patient_id)
+    .join(recording, recording.c.id == analysis.c.recording_id)
+    .join(session, session.c.id == recording.c.session_id)
+    .join(job, job.c.id == analysis.c.job_id)
+)
+
+
+def _analysis(c: Connection, row: Any) -> Analysis:
+    files = c.execute(
+        select(analysis_file).where(analysis_file.c.analysis_id == row.id).order_by(analysis_file.c.name)
+    )
+    return Analysis(**row._asdict(), files={f.name: Blob(f.sha256, f.size) for f in files})
+
+
+def _completed(c: Connection, session_id: str, manifest: Mapping[str, Any] | None) -> dict[str, Any]:
+    said = dict(manifest or {})
+    row = c.execute(
+        select(session.c.protocol, session.c.height_m, patient.c.height_m.label("usual_height_m"))
+        .join(patient, patient.c.id == session.c.patient_id)
+        .where(session.c.id == session_id)
+    ).one()
+    height = row.height_m if row.height_m is not None else row.usual_height_m
+    subject = dict(said.get("subject") or {})
+    if subject.get("height_m") is None and height is not None:
+        subject["height_m"] = height
+    if subject:
+        said["subject"] = subject
+    if said.get("protocol") is None:
+        said["protocol"] = row.protocol
+    return said
+
+
+def _digest(value: object) -> str:
+    text = json.dumps(value, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()

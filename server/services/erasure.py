@@ -1,0 +1,56 @@
+"""Removing a session or a patient for good: rows in one transaction, then the bytes; the audit remembers.
+
+A running job of theirs loses its row, so its worker meets a closed fence and publishes nothing; what it may
+have written goes with the sweep.
+"""
+
+from __future__ import annotations
+
+from sqlalchemy import Connection, delete, select
+
+from server import audit
+from server.services import patients, sessions
+from server.services.errors import Conflict
+from server.services.sweep import referenced, sweep
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from server.storage.tables import analysis, analysis_file, job, patient, recording, recording_file, session
+
+
+def erase_patient(
+    db: Database, blobs: BlobStore, actor: audit.Actor | None, patient_id: str, *, confirm: str
+) -> None:
+    """Erase a patient with everything; `confirm` repeats the code; raises NotFound, Conflict not_confirmed."""
+    with db.write() as c:
+        found = patients.get(c, patient_id)
+        if confirm.strip() != found.code:
+            raise Conflict(
+                "not_confirmed", f"To delete this patient for good, repeat the code '{found.code}'."
+            )
+        mine = select(session.c.id).where(session.c.patient_id == patient_id)
+        for session_id in c.execute(mine).scalars().all():
+            _erase_session_rows(c, session_id)
+        c.execute(delete(patient).where(patient.c.id == patient_id))
+        audit.record(c, actor, "patient.erased", "patient", patient_id, {"sessions": found.sessions})
+    blobs.erase(patient_id)
+
+
+def erase_session(db: Database, blobs: BlobStore, actor: audit.Actor | None, session_id: str) -> None:
+    """Erase one session with its recordings and results; raises NotFound."""
+    with db.write() as c:
+        found = sessions.get(c, session_id)
+        own = {sha256 for space, sha256 in referenced(c, session_id) if space == found.patient_id}
+        _erase_session_rows(c, session_id)
+        audit.record(c, actor, "session.erased", "session", session_id, {"patient_id": found.patient_id})
+    sweep(db, blobs, grace_s=0.0, only={(found.patient_id, sha256) for sha256 in own})
+
+
+def _erase_session_rows(c: Connection, session_id: str) -> None:
+    recordings = select(recording.c.id).where(recording.c.session_id == session_id).scalar_subquery()
+    analyses = select(analysis.c.id).where(analysis.c.recording_id.in_(recordings)).scalar_subquery()
+    c.execute(delete(analysis_file).where(analysis_file.c.analysis_id.in_(analyses)))
+    c.execute(delete(analysis).where(analysis.c.recording_id.in_(recordings)))
+    c.execute(delete(job).where(job.c.recording_id.in_(recordings)))
+    c.execute(delete(recording_file).where(recording_file.c.recording_id.in_(recordings)))
+    c.execute(delete(recording).where(recording.c.session_id == session_id))
+    c.execute(delete(session).where(session.c.id == session_id))

@@ -1,0 +1,76 @@
+"""Jobs as the pages list them: with the session and the patient they belong to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, select
+
+from server import audit
+from server.jobs.queue import VIEW_COLUMNS, JobQueue, JobView, job_view
+from server.services.errors import NotFound
+from server.storage.tables import ACTIVE_STATES, job, patient, recording, session
+
+
+@dataclass(frozen=True)
+class ListedJob:
+    """A job and whose it is (None for jobs that belong to no recording)."""
+
+    job: JobView
+    session_id: str | None
+    session_title: str | None
+    patient_id: str | None
+    patient_code: str | None
+
+
+def listing(c: Connection, *, active_only: bool = False, limit: int = 100) -> list[ListedJob]:
+    """Jobs, the newest first."""
+    query = _QUERY.order_by(job.c.seq.desc()).limit(limit)
+    if active_only:
+        query = query.where(job.c.state.in_(ACTIVE_STATES))
+    return [_listed(row) for row in c.execute(query)]
+
+
+def of_session(c: Connection, session_id: str, *, kind: str | None = None) -> list[JobView]:
+    """Jobs of one session, the newest first."""
+    query = _QUERY.where(session.c.id == session_id).order_by(job.c.seq.desc())
+    if kind is not None:
+        query = query.where(job.c.kind == kind)
+    return [_listed(row).job for row in c.execute(query)]
+
+
+def get(c: Connection, job_id: str) -> ListedJob:
+    """One job; raises NotFound."""
+    row = c.execute(_QUERY.where(job.c.id == job_id)).first()
+    if row is None:
+        raise NotFound("job", job_id)
+    return _listed(row)
+
+
+def cancel(c: Connection, queue: JobQueue, actor: audit.Actor | None, job_id: str) -> JobView:
+    """Ask a job to stop (a finished one stays as it is); raises NotFound."""
+    view = queue.cancel(c, job_id)
+    if view is None:
+        raise NotFound("job", job_id)
+    audit.record(c, actor, "job.cancelled", "job", job_id, {"state": view.state})
+    return view
+
+
+_QUERY = (
+    select(
+        *VIEW_COLUMNS,
+        session.c.id.label("session_id"),
+        session.c.title.label("session_title"),
+        patient.c.id.label("patient_id"),
+        patient.c.code.label("patient_code"),
+    )
+    .select_from(job)
+    .outerjoin(recording, recording.c.id == job.c.recording_id)
+    .outerjoin(session, session.c.id == recording.c.session_id)
+    .outerjoin(patient, patient.c.id == session.c.patient_id)
+)
+
+
+def _listed(row: Any) -> ListedJob:
+    return ListedJob(job_view(row), row.session_id, row.session_title, row.patient_id, row.patient_code)

@@ -1,0 +1,154 @@
+"""Patients by pseudonym: made, changed, found; erasing one is server/services/erasure.py."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, func, insert, select, update
+from sqlalchemy.exc import IntegrityError
+
+from server import audit
+from server.services.errors import Conflict, NotFound, ServiceError
+from server.storage.tables import ACTIVE_STATES, job, new_id, now, patient, recording, session
+
+CHANGEABLE = frozenset({"code", "sex", "birth_year", "height_m", "note"})
+
+
+@dataclass(frozen=True)
+class Patient:
+    """A patient with what a list shows of the visits.
+
+    Parameters
+    ----------
+    code : the clinic's pseudonym, unique. sex : female, male or None. height_m : metres or None.
+    sessions : number of visits. last_visit : day of the newest, None without one.
+    running : a job of one of the visits is queued or running.
+    """
+
+    id: str
+    code: str
+    sex: str | None
+    birth_year: int | None
+    height_m: float | None
+    note: str
+    created_at: dt.datetime
+    sessions: int
+    last_visit: dt.date | None
+    running: bool
+
+
+def create(
+    c: Connection,
+    actor: audit.Actor | None,
+    *,
+    code: str,
+    sex: str | None = None,
+    birth_year: int | None = None,
+    height_m: float | None = None,
+    note: str = "",
+) -> Patient:
+    """Add a patient; raises Conflict code_taken, ServiceError bad_value."""
+    patient_id = new_id()
+    values = {"code": code, "sex": sex, "birth_year": birth_year, "height_m": height_m, "note": note}
+    with _explained(code):
+        c.execute(insert(patient).values(id=patient_id, created_at=now(), **_checked(values)))
+    audit.record(c, actor, "patient.created", "patient", patient_id)
+    return get(c, patient_id)
+
+
+def change(
+    c: Connection, actor: audit.Actor | None, patient_id: str, values: Mapping[str, object]
+) -> Patient:
+    """Change some of CHANGEABLE; raises NotFound, Conflict code_taken, ServiceError bad_value."""
+    before = get(c, patient_id)
+    checked = _checked(values)
+    changed = {name: value for name, value in checked.items() if getattr(before, name) != value}
+    if changed:
+        with _explained(str(changed.get("code"))):
+            c.execute(update(patient).where(patient.c.id == patient_id).values(**changed))
+        audit.record(c, actor, "patient.changed", "patient", patient_id, {"fields": sorted(changed)})
+    return get(c, patient_id)
+
+
+def get(c: Connection, patient_id: str) -> Patient:
+    """One patient; raises NotFound."""
+    row = c.execute(_listing().where(patient.c.id == patient_id)).first()
+    if row is None:
+        raise NotFound("patient", patient_id)
+    return Patient(**row._asdict())
+
+
+def listing(c: Connection, *, search: str = "", limit: int = 200, offset: int = 0) -> list[Patient]:
+    """Patients whose code or note contains `search` (any case), the latest visit first."""
+    query = _listing().order_by(_LAST_VISIT.desc().nulls_last(), patient.c.created_at.desc(), patient.c.id)
+    if search.strip():
+        text = search.strip()
+        query = query.where(
+            patient.c.code.icontains(text, autoescape=True) | patient.c.note.icontains(text, autoescape=True)
+        )
+    return [Patient(**row._asdict()) for row in c.execute(query.limit(limit).offset(offset))]
+
+
+_LAST_VISIT = (
+    select(func.max(session.c.performed_on))
+    .where(session.c.patient_id == patient.c.id)
+    .correlate(patient)
+    .scalar_subquery()
+)
+
+
+def _listing() -> Any:
+    count = (
+        select(func.count())
+        .select_from(session)
+        .where(session.c.patient_id == patient.c.id)
+        .correlate(patient)
+        .scalar_subquery()
+    )
+    running = (
+        select(job.c.seq)
+        .join(recording, recording.c.id == job.c.recording_id)
+        .join(session, session.c.id == recording.c.session_id)
+        .where(session.c.patient_id == patient.c.id, job.c.state.in_(ACTIVE_STATES))
+        .correlate(patient)
+        .exists()
+    )
+    return select(patient, count.label("sessions"), _LAST_VISIT.label("last_visit"), running.label("running"))
+
+
+def _checked(values: Mapping[str, object]) -> dict[str, Any]:
+    unknown = values.keys() - CHANGEABLE
+    if unknown:
+        raise ServiceError("bad_value", f"A patient has no {', '.join(sorted(unknown))}.")
+    checked = dict(values)
+    if "code" in checked:
+        code = str(checked["code"]).strip()
+        if not 1 <= len(code) <= 64:
+            raise ServiceError("bad_value", "A patient's code has 1 to 64 characters.")
+        checked["code"] = code
+    return checked
+
+
+class _explained:  # noqa: N801 - reads as a word: with _explained(code)
+    """Turn the database's refusal into a sentence."""
+
+    def __init__(self, code: str) -> None:
+        self._code = code
+
+    def __enter__(self) -> None:
+        """Nothing to prepare."""
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if not isinstance(error, IntegrityError):
+            return
+        if "code" in str(error.orig) and "UNIQUE" in str(error.orig).upper():
+            raise Conflict(
+                "code_taken", f"The code '{self._code}' belongs to another patient; choose a new one."
+            ) from error
+        raise ServiceError(
+            "bad_value",
+            "Expected sex female, male or none, a year of birth from 1850 and a height of 0.5 to 2.5 m.",
+        ) from error
