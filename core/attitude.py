@@ -1,7 +1,7 @@
 """Tilt and turn of one sensor: the explicit complementary filter, six axes, gyro bias already removed.
 
-Mahony, Hamel and Pflimlin 2008 (IEEE TAC 53(5)), eq 32 with k_I = 0: q̇ = ½ q ⊗ (ω + k_P e), e = a × â, where a is
-the unit specific force and â = R(q)ᵀ e₃ the predicted vertical. The integral term is left out because without
+Mahony, Hamel and Pflimlin 2008 (IEEE TAC 53(5)), eq 32 with k_I = 0: q̇ = ½ q ⊗ (ω + k_P e), e = a × â, where a
+is the unit specific force and â = R(q)ᵀ e₃ the predicted vertical. The integral term is left out because without
 a magnetometer the bias about the vertical is unobservable and runs away (spec/fusion.md §4.6, rule i); the
 bias is the mean over rest instead. Heading is arbitrary and only as good as the gyroscope.
 
@@ -11,16 +11,14 @@ needs it for the result; both run this one filter.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numba
 import numpy as np
 
 from core.errors import EstimationError, ParameterError
 from core.frames import Bools, Floats
-from core.rotation import multiply, normalise, slerp
+from core.rotation import normalise, slerp
 
 
 @dataclass(frozen=True)
@@ -48,8 +46,8 @@ class AttitudeState:
 
     Parameters
     ----------
-    q : (4,) sensor to world. rate : (3,) rad/s of the last sample. age_s : time since the tilt was (re)learnt,
-    inf when it is known. lost_s : length of the invalid stretch that is going on.
+    q : (4,) sensor to world. rate : (3,) rad/s of the last sample. age_s : time since the tilt was lost, inf
+    when it is known. lost_s : length of the invalid stretch that is going on.
     """
 
     q: Floats
@@ -167,26 +165,18 @@ def orientation(
     """
 
     def run(q0: Floats, part: slice) -> Floats:
-        sign = -1.0 if part.step == -1 else 1.0
-        w, f, ok = sign * gyr[part], acc[part], valid[part]
-        return advance(AttitudeState(q0, w[0]), w, f, ok, rate_hz, params)[0]
+        w = gyr[part] if part.step is None else -gyr[part]
+        stepped, _ = advance(AttitudeState(q0, w[0]), w[1:], acc[part][1:], valid[part][1:], rate_hz, params)
+        return np.concatenate((q0[None], stepped))
 
-    # without a first sample to step from, the first update of a run would move by one step: it repeats `at`
     last = run(q_rest, slice(at, None))[-1]
     backward = run(last, slice(None, None, -1))[::-1]
     forward = run(backward[0], slice(None))
-    return normalise(slerp(backward, forward, np.full(len(gyr), 0.5)))
+    return normalise(slerp(backward, forward, 0.5))
 
 
 def warm() -> None:
     """Compile or load the kernel, so that the first recording does not wait for it."""
-    still = np.zeros((2, 3))
+    state = AttitudeState(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3))
     up = np.tile([0.0, 0.0, 9.81], (2, 1))
-    advance(
-        AttitudeState(np.array([1.0, 0, 0, 0]), np.zeros(3)),
-        still,
-        up,
-        np.ones(2, bool),
-        100.0,
-        AttitudeParams(),
-    )
+    advance(state, np.zeros((2, 3)), up, np.ones(2, bool), 100.0, AttitudeParams())

@@ -1,0 +1,252 @@
+"""Where is forward in a sensor: the anterior axis of one segment, from whatever the take offers for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import degrees, radians
+from typing import Literal
+
+import numpy as np
+
+from core.calibration.gyro_pca import (
+    GOOD_AXIS,
+    WEAK_MARGIN,
+    about_vertical,
+    flexion_axis,
+    gait_margin,
+    sagittal_angle,
+)
+from core.calibration.heading import (
+    HeadingParams,
+    Part,
+    acceleration_axis,
+    difference,
+    horizontal_acceleration,
+    nearest_sign,
+    rest_to_rest_velocity,
+    start_direction,
+    velocity_direction,
+)
+from core.calibration.mounting import declared_angle
+from core.calibration.standing import Standing, vertical_frame
+from core.calibration.walking import TRUNK
+from core.errors import CalibrationError, Notice
+from core.frames import Bools, Floats, Segment
+from core.recording import SensorSignals
+from core.rest import Window
+from core.rotation import conjugate, rotate
+
+DISAGREEMENT = radians(15.0)
+"""Difference of two measures of the walking direction that is told (spec/real-data.md §3, heading)."""
+
+CONFLICT = radians(120.0)
+"""Difference from the declared mounting that is a contradiction: within the rule's 60° of the opposite way."""
+
+Method = Literal["walking_direction", "gyro_pca"]
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """The straight walking that shows the direction, as seen from the rest that calibration uses.
+
+    Parameters
+    ----------
+    rest : the whole rest window. leads : it comes before the walk. parts : straight parts, the nearest first.
+    bearing : turn of each part since standing, rad. span : index range between two rests, None if there is no
+    second rest near enough. mask : (n,) samples of the parts. step_s : step time of the trunk, 0 if unknown.
+    """
+
+    rest: Window
+    leads: bool
+    parts: list[Part]
+    bearing: list[float]
+    span: Part | None
+    mask: Bools
+    step_s: float
+    rate_hz: float
+
+
+@dataclass(frozen=True, eq=False)
+class Anterior:
+    """Angle in rad of a segment's anterior axis in the sensor's rest world, how it was found, what to tell."""
+
+    angle: float
+    method: str
+    score: float
+    notices: tuple[Notice, ...] = ()
+    facts: Mapping[str, object] = field(default_factory=dict)
+
+
+def anterior(
+    segment: Segment,
+    signals: SensorSignals,
+    standing: Standing,
+    q: Floats,
+    walk: Walk,
+    declared: str,
+    method: Method,
+    params: HeadingParams,
+) -> Anterior:
+    """Find the anterior axis of one segment.
+
+    Parameters
+    ----------
+    q : (n, 4) sensor to its rest world. declared : mounting text, "" if nobody said.
+
+    Raises
+    ------
+    CalibrationError `no_walking`, `pelvis_heading_unknown`, `not_single_axis`, `calibration_sign_conflict`.
+    """
+    R_vertical = vertical_frame(standing.up)
+    written = declared_angle(declared, R_vertical, segment)
+    if not walk.parts:
+        if written is None:
+            raise CalibrationError(
+                "no_walking",
+                f"{segment}: no straight walking of 1.5 s or more was found and no mounting is declared. Record at "
+                "least 8 steps straight ahead, or declare the mounting, for example “lateral, face right”.",
+                sensor=segment,
+            )
+        return Anterior(written, "declared", 0.5)
+    if method == "gyro_pca" and segment not in TRUNK:
+        found = _by_gyro(segment, signals, standing, R_vertical, q, walk, written)
+    else:
+        found = _by_walking(segment, signals, R_vertical, q, walk, written, params)
+    if written is not None and abs(difference(found.angle, written)) > CONFLICT:
+        raise CalibrationError(
+            "calibration_sign_conflict",
+            f"{segment}: the walk and the declared mounting “{declared}” differ by "
+            f"{abs(degrees(difference(found.angle, written))):.0f}°, allowed are {degrees(CONFLICT):.0f}°. Correct "
+            "the mounting in the manifest, or the segment this sensor is mapped to.",
+            sensor=segment,
+        )
+    return found
+
+
+def _by_walking(
+    segment: Segment,
+    signals: SensorSignals,
+    R_vertical: Floats,
+    q: Floats,
+    walk: Walk,
+    written: float | None,
+    params: HeadingParams,
+) -> Anterior:
+    """Direction of the rest-to-rest velocity, or the axis of the acceleration with a sign from elsewhere."""
+    a = horizontal_acceleration(q, signals.acc)
+    step_s = walk.step_s if segment in TRUNK else 0.0
+    axis = acceleration_axis(a, walk.parts, walk.bearing, walk.rate_hz, params, step_s)
+    velocity = None
+    if walk.span is not None:
+        first, last = walk.span
+        v = rest_to_rest_velocity(a[first:last], True, walk.rate_hz)
+        inside = [
+            (p, b) for p, b in zip(walk.parts, walk.bearing, strict=True) if first <= p[0] and p[1] <= last
+        ]
+        velocity = velocity_direction(v, first, [p for p, _ in inside], [b for _, b in inside], params)
+    facts: dict[str, object] = {"axis_share": axis.score}
+    if velocity is not None:
+        off = difference(nearest_sign(axis.angle, velocity.angle), velocity.angle)
+        facts |= {"source": "velocity", "axis_disagreement_rad": off}
+        notices = _margin_notices(segment, velocity.angle, R_vertical, q, walk)
+        if abs(off) > DISAGREEMENT:
+            notices += (
+                Notice(
+                    "heading_disagreement",
+                    f"{segment}: velocity and acceleration show walking directions {abs(degrees(off)):.0f}° apart, "
+                    f"expected within {degrees(DISAGREEMENT):.0f}°. Frontal and transverse angles of this segment "
+                    "are doubtful; look at the mounting.",
+                    sensor=segment,
+                ),
+            )
+        return Anterior(velocity.angle, "walking_direction", velocity.score, notices, facts)
+    start = start_direction(a, walk.rest, walk.parts[0], walk.bearing[0], walk.leads, walk.rate_hz, params)
+    if start is not None:
+        angle = nearest_sign(axis.angle, start.angle)
+        facts |= {"source": "acceleration", "sign": "velocity"}
+        return Anterior(
+            angle,
+            "walking_direction",
+            axis.score,
+            _margin_notices(segment, angle, R_vertical, q, walk),
+            facts,
+        )
+    facts |= {"source": "acceleration", "sign": "declared" if written is not None else "gait"}
+    angle, notices = _signed(segment, axis.angle, written, R_vertical, q, walk)
+    return Anterior(angle, "walking_direction", axis.score, notices, facts)
+
+
+def _by_gyro(
+    segment: Segment,
+    signals: SensorSignals,
+    standing: Standing,
+    R_vertical: Floats,
+    q: Floats,
+    walk: Walk,
+    written: float | None,
+) -> Anterior:
+    """Flexion axis by gyro PCA, sign by declared mounting or the gait rules."""
+    axis = flexion_axis(signals.gyr[walk.mask] - standing.gyro_bias, R_vertical, segment)
+    angle, notices = _signed(segment, -axis.gamma, written, R_vertical, q, walk)
+    if axis.rho < GOOD_AXIS:
+        notices += (
+            Notice(
+                "not_single_axis",
+                f"{segment}: the first component holds {axis.rho:.0%} of the movement, {GOOD_AXIS:.0%} or more is "
+                "good; the flexion axis may be off by 10° and more.",
+                sensor=segment,
+            ),
+        )
+    return Anterior(angle, "gyro_pca", axis.rho, notices, {"rho": axis.rho})
+
+
+def _signed(
+    segment: Segment, axis: float, written: float | None, R_vertical: Floats, q: Floats, walk: Walk
+) -> tuple[float, tuple[Notice, ...]]:
+    """Choose the sign of an axis: by declared mounting first, then by the gait rules (fusion.md §2.3)."""
+    if written is not None:
+        angle = nearest_sign(axis, written)
+        return angle, _margin_notices(segment, angle, R_vertical, q, walk)
+    if segment in TRUNK:
+        raise CalibrationError(
+            "pelvis_heading_unknown",
+            f"{segment}: which way it faces is not known, no standing is next to the walk. Stand still for 3 s "
+            "directly before walking, or declare the mounting, for example “sacrum, face backwards”.",
+            sensor=segment,
+        )
+    margin = _margin(segment, axis, R_vertical, q, walk)
+    if abs(margin) < WEAK_MARGIN:
+        weak = Notice(
+            "calibration_sign_weak",
+            f"{segment}: forward and backward swing differ by {degrees(abs(margin)):.1f}° only, at least "
+            f"{degrees(WEAK_MARGIN):.0f}° decide which way is forward. Check the sign of the curves, or declare the "
+            "mounting.",
+            sensor=segment,
+        )
+        return (axis if margin >= 0 else nearest_sign(axis, axis + np.pi)), (weak,)
+    return (axis if margin > 0 else nearest_sign(axis, axis + np.pi)), ()
+
+
+def _margin(segment: Segment, angle: float, R_vertical: Floats, q: Floats, walk: Walk) -> float:
+    up = rotate(conjugate(q), np.array([0.0, 0.0, 1.0]))
+    return gait_margin(sagittal_angle(up, about_vertical(-angle) @ R_vertical), walk.mask, segment)
+
+
+def _margin_notices(
+    segment: Segment, angle: float, R_vertical: Floats, q: Floats, walk: Walk
+) -> tuple[Notice, ...]:
+    """Tell when the gait rule contradicts a sign that was found otherwise; velocity and declaration go first."""
+    if segment in TRUNK:
+        return ()
+    margin = _margin(segment, angle, R_vertical, q, walk)
+    if margin > -WEAK_MARGIN:
+        return ()
+    return (
+        Notice(
+            "calibration_sign_conflict",
+            f"{segment}: it swings {degrees(-margin):.0f}° further to the side where gait swings less. Check that it "
+            "is mapped to the right segment and that the walk was forwards.",
+            sensor=segment,
+        ),
+    )

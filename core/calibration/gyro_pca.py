@@ -1,0 +1,86 @@
+"""The flexion axis as principal axis of the angular rate, and the sign rules of gait.
+
+Thesis ch. 3 with the corrections of spec/fusion.md §1–2: rows instead of columns in Eq 14, another seed axis when
+the sensor's x is vertical, γ = atan2(−p_x, p_z) instead of Eq 15.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+
+from core.errors import CalibrationError
+from core.frames import Bools, Floats, Segment
+
+SINGLE_AXIS, GOOD_AXIS = 0.70, 0.85
+"""Share of the first principal component: below the first an error, below the second a notice (fusion.md §2)."""
+
+WEAK_MARGIN = radians(5.0)
+"""Difference of the two sides of the sagittal angle below which its sign is weak (fusion.md §2.3d)."""
+
+
+@dataclass(frozen=True, eq=False)
+class FlexionAxis:
+    """The axis a segment turns about, sign still open.
+
+    Parameters
+    ----------
+    gamma : rad, R_y(γ) R_vertical has z along the axis or against it. rho : share of the first component.
+    """
+
+    gamma: float
+    rho: float
+
+
+def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionAxis:
+    """Find the turn of the vertical frame about its y that lays z along the axis the segment turns about.
+
+    Parameters
+    ----------
+    rate : (n, 3) bias-free angular rate in sensor coordinates while moving. R_vertical : (3, 3), rows.
+
+    Raises
+    ------
+    CalibrationError `not_single_axis` when the movement has no main axis (ρ < 0.70).
+    """
+    W = (rate @ R_vertical.T)[:, [0, 2]]
+    W = W - W.mean(axis=0)
+    values, vectors = np.linalg.eigh(W.T @ W)
+    rho = float(values[1] / max(values.sum(), 1e-12))
+    if rho < SINGLE_AXIS:
+        raise CalibrationError(
+            "not_single_axis",
+            f"{segment}: the movement has no single axis, the first component holds {rho:.0%} of it, at least "
+            f"{SINGLE_AXIS:.0%} is needed. Walk straight for at least 8 steps, or calibrate by walking direction.",
+            sensor=segment,
+        )
+    px, pz = vectors[:, 1]
+    return FlexionAxis(float(np.arctan2(-px, pz)), rho)
+
+
+def about_vertical(gamma: float) -> Floats:
+    """Matrix R_y(γ) of the ISB vertical, R_y(γ) p = +z for γ = atan2(−p_x, p_z) (fusion.md §1, Eq 15 corrected)."""
+    c, s = np.cos(gamma), np.sin(gamma)
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+
+
+def sagittal_angle(up: Floats, R_segment_sensor: Floats) -> Floats:
+    """Sagittal inclination (n,) in rad, distal end forward positive, from the vertical (n, 3) in the sensor.
+
+    From inclination, not from an integrated rate: 6 of 6 signs right (spec/real-data.md §2, mount methods).
+    """
+    v = up @ R_segment_sensor.T
+    return np.asarray(np.arctan2(v[:, 0], v[:, 1]))
+
+
+def gait_margin(angle: Floats, walking: Bools, segment: Segment) -> float:
+    """How clearly the sagittal angle is the right way round, rad; negative: the wrong way round.
+
+    In walking, heel rise tips foot and shank further back than they ever tip forward, and the thigh swings
+    further forward than back (spec/fusion.md §2.3c; percentiles 2 and 98).
+    """
+    low, high = np.percentile(angle[walking], [2.0, 98.0])
+    margin = abs(high) - abs(low) if segment.startswith("thigh") else abs(low) - abs(high)
+    return float(margin)

@@ -1,0 +1,199 @@
+"""The direction of walking in each sensor's own world, from its accelerometer and gyroscope alone.
+
+Horizontal vectors are complex numbers x + iy. Every sensor has its own z-up world whose heading is arbitrary; the
+direction of walking, seen in each of them, is what they have in common (spec/real-data.md §2.5).
+
+Two measures, both over the straight parts of a walk, each part turned back by the angle walked since the first:
+- rest-to-rest velocity with linear de-drift: ≤ 2° on a short walk out and back (spec/real-data.md §0.4);
+- principal axis of the horizontal acceleration below 4 Hz: legs ≤ 3.4°, any length of walk, without a sign.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.frames import Floats
+from core.rest import Window
+from core.rotation import rotate
+
+Complexes = NDArray[np.complex128]
+Part = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class HeadingParams:
+    """How directions are found.
+
+    Parameters
+    ----------
+    cutoff_hz : low-pass of the acceleration before its principal axis (spec/real-data.md §0, mount methods).
+    longest_velocity_s : longest time between two rests over which velocity is integrated, s. An accelerometer
+        bias of 0.05 m/s² that the linear de-drift leaves over to 10 % bends a 1 m/s walk by 7° after 25 s.
+    start_s : time after (before) a rest over which velocity gives the sign, s. longest_gap_s : time between
+        that rest and the straight part beyond which it does not.
+    speed : plausible walking speed, m/s.
+    coherence : least agreement of the parts' velocities, 0 to 1.
+    reach_s : parts that start further from the rest are left out: heading drifts.
+    """
+
+    cutoff_hz: float = 4.0
+    longest_velocity_s: float = 40.0
+    start_s: float = 5.0
+    longest_gap_s: float = 1.5
+    speed: tuple[float, float] = (0.15, 3.0)
+    coherence: float = 0.8
+    reach_s: float = 60.0
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A direction of walking in a sensor's world.
+
+    Parameters
+    ----------
+    angle : rad from x towards y. score : 0 to 1; velocity: agreement of the parts, |Σ v| / Σ |v|; axis: share of
+    the larger principal component less the smaller.
+    """
+
+    angle: float
+    score: float
+
+
+def horizontal_acceleration(q: Floats, acc: Floats) -> Complexes:
+    """Horizontal acceleration (n,) in m/s² of a sensor with orientations q (n, 4) and specific force (n, 3)."""
+    f = rotate(q, acc)
+    return np.asarray(f[:, 0] + 1j * f[:, 1])
+
+
+def rest_to_rest_velocity(a: Complexes, rests_at_end: bool, rate_hz: float) -> Complexes:
+    """Velocity (n,) in m/s since a rest; with a rest at the end too, its linear drift is removed."""
+    v = np.cumsum(a) / rate_hz
+    u = np.linspace(0.0, 1.0, len(v)) if rests_at_end else np.zeros(len(v))
+    return np.asarray(v - u * v[-1])
+
+
+def velocity_direction(
+    v: Complexes, offset: int, parts: list[Part], bearing: list[float], params: HeadingParams
+) -> Direction | None:
+    """Direction of the mean velocity over the parts, each turned back by its bearing; None if implausible.
+
+    For a walk out and back this is mean(out) − mean(back): a constant velocity error cancels.
+
+    Parameters
+    ----------
+    v : (m,) velocity, its first sample at index `offset` of the axis.
+    """
+    means, weights = [], []
+    for (start, end), turn in zip(parts, bearing, strict=True):
+        piece = v[max(0, start - offset) : max(0, end - offset)]
+        if len(piece):
+            means.append(piece.mean() * np.exp(-1j * turn))
+            weights.append(len(piece))
+    if not means:
+        return None
+    m, w = np.array(means), np.array(weights)
+    total, path = (m * w).sum() / w.sum(), (np.abs(m) * w).sum() / w.sum()
+    coherence = float(np.abs(total) / path)
+    if not params.speed[0] <= np.abs(total) <= params.speed[1] or coherence < params.coherence:
+        return None
+    return Direction(float(np.angle(total)), coherence)
+
+
+def start_direction(
+    a: Complexes, rest: Window, part: Part, turn: float, leads: bool, rate_hz: float, params: HeadingParams
+) -> Direction | None:
+    """Direction from the velocity gained since a rest (lost until it), good enough for a sign.
+
+    Parameters
+    ----------
+    part : the straight part next to the rest, turned by `turn` rad since standing. leads : the rest is before it.
+
+    Returns
+    -------
+    None when rest and part are further apart than `longest_gap_s`, or the speed is implausible.
+    """
+    edge = round(rest[1] * rate_hz) if leads else round(rest[0] * rate_hz)
+    gap = (part[0] - edge) if leads else (edge - part[1])
+    if gap > params.longest_gap_s * rate_hz:
+        return None
+    reach = round(params.start_s * rate_hz)
+    if leads:
+        first, used = edge, (max(part[0], edge), min(part[1], edge + reach))
+        v = rest_to_rest_velocity(a[edge : edge + reach], False, rate_hz)
+    else:
+        first, used = max(0, edge - reach), (max(part[0], edge - reach), min(part[1], edge))
+        v = -rest_to_rest_velocity(a[first:edge][::-1], False, rate_hz)[::-1]
+    if used[1] - used[0] < 0.5 * rate_hz:
+        return None
+    return velocity_direction(v, first, [used], [turn], params)
+
+
+def acceleration_axis(
+    a: Complexes,
+    parts: list[Part],
+    bearing: list[float],
+    rate_hz: float,
+    params: HeadingParams,
+    step_s: float = 0.0,
+) -> Direction:
+    """Principal axis of the low-passed horizontal acceleration, angle mod π.
+
+    Parameters
+    ----------
+    step_s : step time for a trunk sensor: a(t) + a(t + step) is what both steps share, which is forward; what
+        changes side with every step, the sway, cancels. 0 for the legs.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    sos = butter(2, min(0.9, params.cutoff_hz / (0.5 * rate_hz)), output="sos")
+    shift = round(step_s * rate_hz)
+    power, moment = 0.0, 0j
+    for (start, end), turn in zip(parts, bearing, strict=True):
+        piece = np.stack((a[start:end].real, a[start:end].imag))
+        smooth = sosfiltfilt(sos, piece, axis=1, padlen=min(piece.shape[1] - 1, 30))
+        x = (smooth[0] + 1j * smooth[1]) * np.exp(-1j * turn)
+        if 0 < shift < len(x) // 2:
+            x = x[:-shift] + x[shift:]
+        x = x - x.mean()
+        # Σ x² is the second moment about the axis: its phase is twice the axis angle
+        moment += (x**2).sum()
+        power += float((np.abs(x) ** 2).sum())
+    return Direction(0.5 * float(np.angle(moment)), float(np.abs(moment) / max(power, 1e-12)))
+
+
+def step_time(up: Floats, parts: list[Part], rate_hz: float) -> float:
+    """Step time in s from the vertical acceleration (n,) of the trunk: first peak of its autocorrelation.
+
+    Steps of 0.3 to 1.2 s are looked for, the range of adult walking; 0 when there is no peak.
+    """
+    low, high = round(0.3 * rate_hz), round(1.2 * rate_hz)
+    total = np.zeros(high + 1)
+    for start, end in parts:
+        x = up[start:end] - up[start:end].mean()
+        if len(x) <= 2 * high:
+            continue
+        total += np.array([x[: len(x) - high] @ x[k : k + len(x) - high] for k in range(high + 1)])
+    if total[0] <= 0:
+        return 0.0
+    peaks = [k for k in range(low, high) if total[k] >= total[k - 1] and total[k] > total[k + 1]]
+    strong = [k for k in peaks if total[k] > 0.3 * total[0]]
+    return strong[0] / rate_hz if strong else 0.0
+
+
+def nearest_sign(axis: float, towards: float) -> float:
+    """The one of axis and axis + π that is nearer to a direction, rad in (−π, π]."""
+    turned = axis if abs(_wrap(axis - towards)) <= pi / 2 else axis + pi
+    return _wrap(turned)
+
+
+def difference(a: float, b: float) -> float:
+    """Angle a − b in rad, (−π, π]."""
+    return _wrap(a - b)
+
+
+def _wrap(x: float) -> float:
+    return (x + pi) % (2 * pi) - pi

@@ -1,0 +1,61 @@
+"""What somebody wrote about how a sensor is worn, as a direction.
+
+The manifest's `mounting` is free text per segment, e.g. "sacrum, face backwards". The face is the sensor's outer
+side, its +z axis on all devices we read; "x forward" and the like name another axis.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from core.frames import Floats, Segment
+
+FACE = np.array([0.0, 0.0, 1.0])
+"""Outward axis of a sensor's housing in sensor coordinates (Xsens MTw and DOT: z away from the skin)."""
+
+AXES = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0]), "z": FACE}
+WAYS = {"forward": 0.0, "front": 0.0, "left": 90.0, "back": 180.0, "rear": 180.0, "right": -90.0}
+"""Horizontal way → angle in degrees from anterior, counter-clockwise seen from above."""
+
+_PHRASE = re.compile(
+    r"\b(?:(?P<sign>[+-])?(?P<axis>[xyz])(?:[- ]axis)?|face|facing|faces)\s+(?:to\s+the\s+)?"
+    r"(?P<way>forward|front|left|back|rear|right)(?:s|wards?)?\b",
+    re.IGNORECASE,
+)
+
+
+def declared_direction(text: str) -> tuple[Floats, float] | None:
+    """Sensor axis (3,) and the angle from anterior in rad it points to, or None if the text does not say.
+
+    >>> declared_direction("sacrum, face backwards")[1]
+    3.141592653589793
+    """
+    found = _PHRASE.search(text)
+    if found is None:
+        return None
+    axis = AXES[(found["axis"] or "z").lower()] * (-1.0 if found["sign"] == "-" else 1.0)
+    return axis, float(np.radians(WAYS[found["way"].lower()]))
+
+
+def declared_angle(text: str, R_vertical: Floats, segment: Segment) -> float | None:
+    """Angle in rad of the anterior axis in the sensor's rest world, from a declared mounting.
+
+    Parameters
+    ----------
+    R_vertical : (3, 3) rows of the vertical frame; its x is the rest world's x, its z the rest world's −y.
+
+    Returns
+    -------
+    None when the text says nothing, or names an axis that stands within 30° of vertical.
+    """
+    declared = declared_direction(text)
+    if declared is None:
+        return None
+    axis, way = declared
+    v = R_vertical @ axis
+    horizontal = complex(v[0], -v[2])
+    if abs(horizontal) < 0.5:
+        return None
+    return float(np.angle(horizontal * np.exp(-1j * way)))

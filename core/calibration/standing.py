@@ -1,0 +1,151 @@
+"""Standing: which way is up in each sensor, what its gyroscope reads at rest, and the rest to take it from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.errors import SignalError
+from core.frames import Bools, Floats, Segment
+from core.recording import SensorSignals, UniformRecording
+from core.rest import RestParams, Window, quietness, rest_windows, runs, samples
+
+LONGEST_S = 8.0
+"""Rest that is used, s; 1, 2, 3, 5 and 8 s gave the same angles within 0.1° (spec/real-data.md §2.1)."""
+
+MARGIN_S = 0.25
+"""Part of a rest next to movement that is left out, s, where the rest is long enough."""
+
+GOOD_S = 2.0
+"""A rest of this length is taken before a longer one further from the walk, s (our choice)."""
+
+NORM_RANGE = (7.0, 13.0)
+"""|f| at rest that can be gravity in m/s²; real sensors are within 6.6 % of 9.81 (spec/estimators.md §1)."""
+
+WOBBLE_FACTOR = 2.5
+"""Up to this many times the gyro limit a failed rest is called not still, beyond it no rest (our choice)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """One sensor at rest.
+
+    Parameters
+    ----------
+    up : (3,) unit vector, vertical in sensor coordinates. gyro_bias : (3,) rad/s. rest_norm : |f|, m/s².
+    """
+
+    up: Floats
+    gyro_bias: Floats
+    rest_norm: float
+
+
+def stand(signals: SensorSignals, rate_hz: float, window: Window, segment: Segment) -> Standing:
+    """Mean specific force and mean rate of a sensor over a rest window.
+
+    Raises
+    ------
+    SignalError `unit_suspect` when what is measured at rest cannot be gravity in m/s².
+    """
+    part = samples(window, rate_hz)
+    ok = signals.valid[part]
+    force, bias = signals.acc[part][ok].mean(axis=0), signals.gyr[part][ok].mean(axis=0)
+    norm = float(np.linalg.norm(force))
+    if not NORM_RANGE[0] <= norm <= NORM_RANGE[1]:
+        raise SignalError(
+            "unit_suspect",
+            f"{segment}: the accelerometer reads {norm:.2f} m/s² at rest, expected 9.81 ± 10 %. Near 1 the unit is g, "
+            "near 0 gravity was removed: declare the unit in the manifest or export raw accelerations.",
+            sensor=segment,
+            t_s=window[0],
+        )
+    return Standing(force / norm, bias, norm)
+
+
+def vertical_frame(up: Floats) -> Floats:
+    """Rows (x, y, z) of the vertical frame in sensor coordinates, y = up (spec/fusion.md §2.1).
+
+    The seed axis is the sensor's x, or its z when x is within 26° of vertical (|up_x| > 0.9).
+    """
+    if abs(up[0]) <= 0.9:
+        z = np.cross([1.0, 0.0, 0.0], up)
+        z /= np.linalg.norm(z)
+        x = np.cross(up, z)
+    else:
+        x = np.cross(up, [0.0, 0.0, 1.0])
+        x /= np.linalg.norm(x)
+        z = np.cross(x, up)
+    return np.stack((x, up, z))
+
+
+def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window, ...]:
+    """All windows in which every sensor is at rest.
+
+    Raises
+    ------
+    SignalError `rest_too_short`, `not_still` or `no_rest`, with the quietest moment that was found.
+    """
+    found = rest_windows(recording, params)
+    if found:
+        return found
+    quietest: list[tuple[float, Segment, float]] = []
+    for segment, signals in recording.sensors.items():
+        q = quietness(signals, recording.rate_hz, params)
+        at = int(np.argmin(q.gyro))
+        quietest.append((float(q.gyro[at]), segment, float(recording.t_s[at])))
+    rate, segment, at_s = max(quietest)
+    short = RestParams(params.window_s / 2, params.gyro_limit, params.acc_std_limit, params.shortest_s / 2)
+    limit = np.degrees(params.gyro_limit)
+    if rest_windows(recording, short):
+        code, what = "rest_too_short", f"the sensors are still together for less than {params.shortest_s:g} s"
+    elif rate < params.gyro_limit:
+        code, what = "no_rest", "every sensor is still at some time, but never all of them together"
+    elif rate < WOBBLE_FACTOR * params.gyro_limit:
+        code = "not_still"
+        what = f"{segment} still moves at {np.degrees(rate):.1f} °/s in its quietest second, limit {limit:.0f} °/s"
+    else:
+        code = "no_rest"
+        what = f"the quietest second of {segment} has {np.degrees(rate):.0f} °/s, limit {limit:.0f} °/s"
+    raise SignalError(
+        code,
+        f"No standing found: {what}. Let the person stand still for 3 to 5 s before or after walking.",
+        sensor=segment if np.isfinite(rate) else None,
+        t_s=at_s,
+    )
+
+
+def choose_rest(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> Window:
+    """The rest to calibrate on: the last one before the first walk, else the one nearest to a walk.
+
+    Parameters
+    ----------
+    rests : rest windows in order. moving : (n,) True while walking.
+
+    Returns
+    -------
+    At most 8 s of the chosen rest, at the side of the walk.
+    """
+    walks = runs(moving)
+    starts = [a / rate_hz for a, _ in walks]
+    before = [r for r in rests if starts and r[1] <= starts[0] + 0.5]
+    good = [r for r in before if r[1] - r[0] >= GOOD_S]
+    if good or not walks:
+        chosen = (good or list(rests))[-1] if good else max(rests, key=lambda r: r[1] - r[0])
+    else:
+        good = [r for r in rests if r[1] - r[0] >= GOOD_S]
+        chosen = good[0] if good else max(rests, key=lambda r: r[1] - r[0])
+    start, end = chosen
+    margin = MARGIN_S if end - start > 1.0 + 2 * MARGIN_S else 0.0
+    leads = any(abs(s - end) < 2.0 or s > end for s in starts) or not starts
+    if leads:
+        end -= margin
+        return max(start, end - LONGEST_S), end
+    start += margin
+    return start, min(end, start + LONGEST_S)
+
+
+def stand_all(recording: UniformRecording, window: Window) -> Mapping[Segment, Standing]:
+    """Standing of every sensor over one window."""
+    return {s: stand(x, recording.rate_hz, window, s) for s, x in recording.sensors.items()}

@@ -1,0 +1,119 @@
+"""Where somebody walks, and where straight: the parts of a take that show the direction of walking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+
+from core.frames import Bools, Floats, Segment
+from core.recording import UniformRecording
+from core.rest import runs
+from core.rotation import conjugate, multiply, rotate
+
+TRUNK: tuple[Segment, ...] = ("pelvis", "chest")
+DOWN: tuple[tuple[Segment, ...], ...] = (
+    TRUNK,
+    ("thigh_l", "thigh_r"),
+    ("shank_l", "shank_r"),
+    ("foot_l", "foot_r"),
+)
+"""Sensors that show a turn, the steadiest first."""
+
+
+@dataclass(frozen=True)
+class WalkingParams:
+    """What counts as walking and as turning.
+
+    Parameters
+    ----------
+    leg_rate : mean |ω| of the leg sensors over 1 s while walking, rad/s. trunk_std : std |f| of a trunk sensor
+        over 1 s, m/s² (both our choice: the slowest walk of the simulator shows 0.9 rad/s and 0.8 m/s²).
+    shortest_s : shortest straight part that is used.
+    turn_rate, turn_margin_s, turn_cutoff_hz : low-passed yaw rate of a turn (spec/real-data.md §2.3). Without a
+        trunk sensor the cut-off is halved, because legs yaw with every step.
+    """
+
+    leg_rate: float = 0.5
+    trunk_std: float = 0.5
+    shortest_s: float = 1.5
+    turn_rate: float = radians(35.0)
+    turn_margin_s: float = 0.15
+    turn_cutoff_hz: float = 0.8
+
+
+def moving_mask(recording: UniformRecording, params: WalkingParams) -> Bools:
+    """Samples (n,) at which somebody moves as in walking, from the legs if they wear sensors, else the trunk."""
+    legs = [s for s in recording.sensors if s not in TRUNK]
+    width = max(1, round(recording.rate_hz))
+    if legs:
+        rate = np.mean([np.linalg.norm(recording.sensors[s].gyr, axis=1) for s in legs], axis=0)
+        return np.asarray(_box(rate, width) > params.leg_rate)
+    norm = np.mean([np.linalg.norm(s.acc, axis=1) for s in recording.sensors.values()], axis=0)
+    norm = norm - norm.mean()
+    return np.asarray(_box(norm**2, width) - _box(norm, width) ** 2 > params.trunk_std**2)
+
+
+def turning_mask(
+    recording: UniformRecording,
+    biases: Mapping[Segment, Floats],
+    q: Mapping[Segment, Floats],
+    params: WalkingParams,
+) -> Bools:
+    """Samples (n,) in a turn: |low-passed yaw rate| above the limit, widened by the margin.
+
+    Parameters
+    ----------
+    q : segment → (n, 4) sensor to its own z-up world.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    group = next(g for g in DOWN if any(s in recording.sensors for s in g))
+    worn = [s for s in group if s in recording.sensors]
+    rate = np.zeros(len(recording.t_s))
+    for s in worn:
+        rate += rotate(q[s], recording.sensors[s].gyr - biases[s])[:, 2] / len(worn)
+    cutoff = params.turn_cutoff_hz if group is TRUNK else 0.5 * params.turn_cutoff_hz
+    sos = butter(2, cutoff / (0.5 * recording.rate_hz), output="sos")
+    turning = (
+        np.abs(sosfiltfilt(sos, rate, padlen=min(len(rate) - 1, round(2 * recording.rate_hz))))
+        > params.turn_rate
+    )
+    reach = round(params.turn_margin_s * recording.rate_hz)
+    for a, b in runs(turning):
+        turning[max(0, a - reach) : b + reach] = True
+    return np.asarray(turning)
+
+
+def straight_parts(
+    moving: Bools, turning: Bools, rate_hz: float, params: WalkingParams
+) -> list[tuple[int, int]]:
+    """Index ranges of straight walking of at least `shortest_s`."""
+    return [r for r in runs(moving & ~turning) if r[1] - r[0] >= params.shortest_s * rate_hz]
+
+
+def mean_turn(q: Floats, q_rest: Floats, part: tuple[int, int]) -> float:
+    """Mean angle in rad turned about the vertical over an index range, circular."""
+    return float(np.angle(np.exp(1j * turned(q[part[0] : part[1]], q_rest)).mean()))
+
+
+def turned(q: Floats, q_rest: Floats) -> Floats:
+    """Angle (n,) in rad that a body with orientations q (n, 4) has turned about the vertical since q_rest (4,).
+
+    The twist of the rotation about z: it exists for any mounting of the sensor.
+    """
+    d = multiply(q, conjugate(q_rest))
+    return np.asarray(_wrap(2.0 * np.arctan2(d[..., 3], d[..., 0])))
+
+
+def _wrap(x: Floats) -> Floats:
+    return np.asarray((x + np.pi) % (2 * np.pi) - np.pi)
+
+
+def _box(x: Floats, width: int) -> Floats:
+    """Centred moving mean (n,), shorter at the ends."""
+    from scipy.ndimage import uniform_filter1d
+
+    return np.asarray(uniform_filter1d(x, min(width, len(x)), mode="nearest"))

@@ -1,0 +1,145 @@
+"""Relative heading over long walks: what six axes cannot see, held by what a walking body does on average.
+
+Each gyroscope drifts about the vertical on its own (0.003 °/s/√s of bias walk make 9° in 5 min), and between two
+segments this shows as rotation and adduction, later as flexion. Nothing in six axes observes it. But while
+somebody walks straight, the heading of a segment relative to the pelvis, averaged over strides, stays what it was
+in the first straight walking next to standing. So the slow change of the stride-averaged relative heading is taken
+out. The price, told in the notice: a true slow change of the mean transverse posture is taken out with it.
+Short walks are left alone (spec/real-data.md: 10 s of walking need none).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import degrees, radians
+
+import numpy as np
+
+from core.calibration.result import Calibration
+from core.errors import Notice
+from core.frames import Bools, Floats, Segment
+from core.rest import runs, samples
+from core.rotation import about, multiply, yaw
+
+
+@dataclass(frozen=True)
+class DriftParams:
+    """Windows of the correction (our choice, tested on simulation with bias walk).
+
+    Parameters
+    ----------
+    reference_s : straight walking next to standing that defines the mean relative heading; walks with no more
+        straight walking than this are left alone. smooth_s : standard deviation of the Gaussian over which the
+        relative heading is averaged: 4 s hold at least 6 strides of 1.5 s at half weight or more.
+    least_s : straight walking within reach below which the correction is held. tell : drift that is told.
+    """
+
+    reference_s: float = 30.0
+    smooth_s: float = 4.0
+    least_s: float = 3.0
+    tell: float = radians(3.0)
+
+
+def remove_relative_drift(
+    q: Mapping[Segment, Floats],
+    valid: Mapping[Segment, Bools],
+    calibration: Calibration,
+    rate_hz: float,
+    params: DriftParams,
+) -> tuple[dict[Segment, Floats], dict[str, float], list[Notice]]:
+    """Turn each segment about the vertical so that its stride-averaged heading to the reference stays.
+
+    Parameters
+    ----------
+    q : segment → (n, 4) in W. The reference is the pelvis, without it the mean of all segments.
+
+    Returns
+    -------
+    Corrected q, the largest correction per segment in rad, notices `heading_rereferenced`.
+    """
+    corrected = {s: x for s, x in q.items()}
+    n = len(next(iter(q.values())))
+    straight = np.zeros(n, bool)
+    for window in calibration.walking:
+        straight[samples(window, rate_hz)] = True
+    gaps = any((~v).any() for v in valid.values())
+    if len(q) < 2 or (np.count_nonzero(straight) <= params.reference_s * rate_hz and not gaps):
+        return corrected, {}, []
+    heading = {s: np.exp(1j * yaw(x)) for s, x in q.items()}
+    reference = heading["pelvis"] if "pelvis" in q else np.asarray(np.sum(list(heading.values()), axis=0))
+    largest: dict[str, float] = {}
+    for segment, x in q.items():
+        if segment == "pelvis":
+            continue
+        relative = heading[segment] * np.conj(reference)
+        turn = _drift(
+            np.asarray(relative), straight & valid[segment], valid[segment], calibration, rate_hz, params
+        )
+        corrected[segment] = multiply(about(2, -turn), x)
+        largest[segment] = float(np.abs(turn).max())
+    notices = []
+    if largest and max(largest.values()) > params.tell:
+        worst = max(largest, key=lambda s: largest[s])
+        message = (
+            f"The heading of {worst} drifted by up to {degrees(largest[worst]):.0f}° against the reference and was "
+            "brought back to its mean over straight walking. Slow changes of rotation posture during the take are "
+            "taken out with it: read transverse angles as changes within a stride."
+        )
+        notices.append(Notice("heading_rereferenced", message, sensor=worst))
+    return corrected, largest, notices
+
+
+def _drift(
+    relative: Floats,
+    straight: Bools,
+    valid: Bools,
+    calibration: Calibration,
+    rate_hz: float,
+    params: DriftParams,
+) -> Floats:
+    """Drift (n,) in rad of one segment's relative heading (n,) complex, zero around standing."""
+    zero = samples(calibration.zero, rate_hz)
+    index = np.flatnonzero(straight)
+    turn = np.zeros(len(straight))
+    if not len(index):
+        return turn
+    middle = 0.5 * (zero.start + zero.stop)
+    near = index[np.argsort(np.abs(index - middle), kind="stable")[: round(params.reference_s * rate_hz)]]
+    mean = relative[near].mean()
+    lost = [r for r in runs(~valid) if r[1] - r[0] > 0.1 * rate_hz]
+    edges = [0, *(b for _, b in lost), len(straight)]
+    for start, end in zip(edges[:-1], edges[1:], strict=True):
+        if end <= start:
+            continue
+        home = start <= middle < end
+        used = straight[start:end]
+        if np.count_nonzero(used) <= (params.reference_s if home else params.least_s) * rate_hz:
+            continue
+        turn[start:end] = _smooth(relative[start:end] * np.conj(mean), used, rate_hz, params)
+        if home:
+            # inside the reference the mean is the reference: its scatter over strides is not drift
+            quiet = slice(min(near.min(), zero.start), max(near.max() + 1, zero.stop))
+            turn[quiet] = 0.0
+    return turn
+
+
+def _smooth(relative: Floats, used: Bools, rate_hz: float, params: DriftParams) -> Floats:
+    """Gaussian mean angle (n,) of the used samples; held where there are too few of them."""
+    from scipy.ndimage import gaussian_filter1d
+
+    step = max(1, round(0.1 * rate_hz))
+    blocks = -(-len(used) // step)
+    pad = blocks * step - len(used)
+    vectors = np.concatenate((np.where(used, relative, 0.0), np.zeros(pad))).reshape(blocks, step).sum(axis=1)
+    weight = np.concatenate((used, np.zeros(pad, bool))).reshape(blocks, step).sum(axis=1) / step
+    sigma = params.smooth_s / (step / rate_hz)
+    total = gaussian_filter1d(vectors.real, sigma, mode="constant") + 1j * gaussian_filter1d(
+        vectors.imag, sigma, mode="constant"
+    )
+    mass = gaussian_filter1d(weight, sigma, mode="constant") * sigma * np.sqrt(2 * np.pi) * step / rate_hz
+    known = np.flatnonzero(mass >= params.least_s)
+    if not len(known):
+        known = np.array([int(np.argmax(mass))])
+    angle = np.unwrap(np.angle(total[known]))
+    return np.interp(np.arange(len(used)), known * step + 0.5 * step, angle)

@@ -1,0 +1,97 @@
+"""The default engine: Mahony 2008, six axes, gyro bias frozen from rest, started from standing.
+
+At standing every segment faces forward by convention, so the calibration itself is the start: the sensor's
+orientation in W at rest is R_neutral R_segment_sensor. From there the filter of core/attitude.py runs to both
+ends of the take. What remains is the turn about the vertical that no accelerometer sees; drift.py treats it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from core.attitude import AttitudeParams, orientation
+from core.calibration.result import CalibratedRecording, SegmentCalibration
+from core.errors import EstimationError, Notice
+from core.frames import R_NEUTRAL, Bools, Floats, Segment
+from core.fusion.drift import DriftParams, remove_relative_drift
+from core.fusion.orientations import Orientations
+from core.recording import SensorSignals
+from core.rest import Window, runs
+from core.rotation import conjugate, from_matrix, multiply
+
+
+@dataclass(frozen=True)
+class MahonyParams:
+    """Parameters of the engine."""
+
+    attitude: AttitudeParams = field(default_factory=AttitudeParams)
+    drift: DriftParams = field(default_factory=DriftParams)
+
+
+def estimate(calibrated: CalibratedRecording, params: MahonyParams | None = None) -> Orientations:
+    """Orientation of every calibrated segment in the common world W (x = facing at standing).
+
+    Parameters
+    ----------
+    calibrated : any subset of segments.
+
+    Returns
+    -------
+    Orientations with `valid` False where a sensor was lost; a notice `gap` tells when and for how long, and
+    `heading_rereferenced` how much relative heading drift was taken out.
+
+    Raises
+    ------
+    EstimationError `no_segment` when calibration found no segment, `filter_diverged` on non-finite samples.
+    """
+    params = params or MahonyParams()
+    recording, calibration = calibrated.recording, calibrated.calibration
+    if not calibration.segments:
+        raise EstimationError("no_segment", "No segment is calibrated; calibrate at least one foot.")
+    q: dict[Segment, Floats] = {}
+    valid: dict[Segment, Bools] = {}
+    notices: list[Notice] = []
+    for segment, mounted in calibration.segments.items():
+        signals = recording.sensors[segment]
+        q[segment] = segment_orientation(
+            signals, mounted, calibration.zero, recording.rate_hz, params.attitude
+        )
+        valid[segment] = signals.valid
+        notices += _gaps(signals.valid, segment, recording.rate_hz)
+    q, drift, told = remove_relative_drift(q, valid, calibration, recording.rate_hz, params.drift)
+    return Orientations(
+        t_s=recording.t_s,
+        rate_hz=recording.rate_hz,
+        q=q,
+        valid=valid,
+        engine="mahony",
+        notices=(*notices, *told),
+        diagnostics={"kp": params.attitude.kp, "largest_drift_rad": drift},
+    )
+
+
+def segment_orientation(
+    signals: SensorSignals, mounted: SegmentCalibration, zero: Window, rate_hz: float, params: AttitudeParams
+) -> Floats:
+    """Orientation (n, 4) of one segment in W, from standing to both ends of the take."""
+    start = from_matrix(R_NEUTRAL @ mounted.R_segment_sensor)
+    at = min(round(0.5 * (zero[0] + zero[1]) * rate_hz), len(signals.acc) - 1)
+    sensor = orientation(
+        start, at, signals.gyr - mounted.gyro_bias, signals.acc, signals.valid, rate_hz, params
+    )
+    return multiply(sensor, conjugate(from_matrix(mounted.R_segment_sensor)))
+
+
+def _gaps(valid: Bools, segment: Segment, rate_hz: float) -> list[Notice]:
+    lost = runs(~valid)
+    if not lost:
+        return []
+    a, b = max(lost, key=lambda r: r[1] - r[0])
+    total = float(np.count_nonzero(~valid)) / rate_hz
+    message = (
+        f"{segment}: no signal for {total:.2f} s in {len(lost)} gaps, the longest {(b - a) / rate_hz:.2f} s. There "
+        "are no angles there, and the heading after a gap is relearnt from straight walking."
+    )
+    return [Notice("gap", message, sensor=segment, t_s=a / rate_hz)]
