@@ -20,7 +20,9 @@ def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], 
     """Check shape and type of an array once and lock it against writing."""
     if a is None:
         return
-    if a.ndim != len(shape) or any(want is not None and got != want for got, want in zip(a.shape, shape, strict=True)):
+    if a.ndim != len(shape) or any(
+        want is not None and got != want for got, want in zip(a.shape, shape, strict=True)
+    ):
         raise ParameterError("bad_shape", f"{where}: {name} has shape {a.shape}, expected {shape}.")
     a.setflags(write=False)
 
@@ -172,7 +174,9 @@ class SensorSignals:
         ):
             _frozen(a, name, shape, self.device_id)
         if not (np.isfinite(self.acc).all() and np.isfinite(self.gyr).all()):
-            raise SignalError("bad_signal", f"{self.device_id}: non-finite samples left.", sensor=self.device_id)
+            raise SignalError(
+                "bad_signal", f"{self.device_id}: non-finite samples left.", sensor=self.device_id
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,6 +202,8 @@ class UniformRecording:
         for segment, s in self.sensors.items():
             if len(s.acc) != len(self.t_s):
                 raise ParameterError(
-                    "bad_shape", f"{segment} has {len(s.acc)} samples, the axis {len(self.t_s)}.", sensor=segment
+                    "bad_shape",
+                    f"{segment} has {len(s.acc)} samples, the axis {len(self.t_s)}.",
+                    sensor=segment,
                 )
         object.__setattr__(self, "sensors", MappingProxyType(dict(self.sensors)))

@@ -86,7 +86,9 @@ def exp(phi: Floats) -> Floats:
     phi = np.asarray(phi, np.float64)
     angle = np.linalg.norm(phi, axis=-1, keepdims=True)
     half = 0.5 * angle
-    scale = np.where(angle < _SMALL, 0.5 - angle**2 / 48.0, np.sin(half) / np.where(angle < _SMALL, 1.0, angle))
+    scale = np.where(
+        angle < _SMALL, 0.5 - angle**2 / 48.0, np.sin(half) / np.where(angle < _SMALL, 1.0, angle)
+    )
     return np.concatenate((np.cos(half), scale * phi), axis=-1)
 
 

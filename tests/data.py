@@ -15,5 +15,7 @@ def data_folder(*parts: str) -> Path:
     base = Path(os.environ.get("SAGITTAL_DATA") or ROOT.parent / "shared" / "data")
     path = base.joinpath(*parts)
     if not path.exists():
-        pytest.skip(f"no recordings: {'/'.join(parts) or 'data'} not found; set SAGITTAL_DATA to the data folder")
+        pytest.skip(
+            f"no recordings: {'/'.join(parts) or 'data'} not found; set SAGITTAL_DATA to the data folder"
+        )
     return path

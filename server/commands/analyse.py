@@ -1,0 +1,94 @@
+"""`sagittal analyse`: recording files in, result files out, by the same code the service runs."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from core.errors import InputError, SagittalError
+from server.storage import fs
+
+
+def analyse(paths: Sequence[Path], manifest: Path | None, out: Path) -> int:
+    """Analyse files, folders or zips as one recording and write the results into `out`.
+
+    Returns
+    -------
+    0 when at least one parameter was found, 1 when nothing could be analysed.
+    """
+    from server.services import analyses
+
+    try:
+        sources = list(source_files(paths))
+        declared = manifest.read_bytes() if manifest else None
+        with _ProgressBar() as bar:
+            files = analyses.run(sources, declared, None, bar.stage)
+    except SagittalError as error:
+        sys.stderr.write(f"Nothing analysable ({error.code}): {error.message}\n")
+        return 1
+    out.mkdir(parents=True, exist_ok=True)
+    for name, content in files.items():
+        fs.write_file(out / name, content)
+    result = json.loads(files["analysis.json"])
+    print_summary(result, out)
+    return 0 if any(p["mean"] is not None for p in result["parameters"]) else 1
+
+
+def source_files(paths: Sequence[Path]) -> Iterator[object]:
+    """Files named on the command line, folders walked, as lazily read sources."""
+    from core.formats.source import SourceFile
+
+    for path in paths:
+        if not path.exists():
+            raise InputError("file_not_found", f"{path} does not exist; give files, a folder or a zip.")
+        for file in sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]:
+            name = str(file.relative_to(path)) if path.is_dir() else file.name
+            yield SourceFile(name, file.stat().st_size, file.read_bytes)
+
+
+def print_summary(result: dict[str, list[dict[str, object]]], out: Path) -> None:
+    """Parameters as a table, warnings as sentences, on stdout."""
+    lines = [f"{'parameter':<32}{'side':<8}{'n':>4}{'mean':>10}{'sd':>9}  unit"]
+    for p in result["parameters"]:
+        if p["mean"] is None:
+            lines.append(f"{p['name']:<32}{p['side'] or '':<8}{p['n']:>4}{'–':>10}{'':>9}  {p['reason']}")
+        else:
+            sd = "" if p["sd"] is None else f"{p['sd']:.3f}"
+            lines.append(
+                f"{p['name']:<32}{p['side'] or '':<8}{p['n']:>4}{p['mean']:>10.3f}{sd:>9}  {p['unit']}"
+            )
+    lines += [f"{w['code']}: {w['message']}" for w in result["warnings"]]
+    lines.append(f"Results in {out}")
+    sys.stdout.write("\n".join(lines) + "\n")
+    sys.stdout.flush()
+
+
+class _ProgressBar:
+    """Progress on stderr: a bar on a terminal, one line per stage elsewhere."""
+
+    def __enter__(self) -> _ProgressBar:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        console = Console(stderr=True)
+        self._progress = Progress(
+            TextColumn("{task.description:<14}"), BarColumn(), TimeElapsedColumn(), console=console
+        )
+        self._plain = not console.is_terminal
+        self._task = self._progress.add_task("reading", total=1.0)
+        if not self._plain:
+            self._progress.start()
+        return self
+
+    def stage(self, name: str, share: float) -> None:
+        """Show the stage that starts."""
+        if self._plain:
+            sys.stderr.write(f"{share:4.0%} {name}\n")
+            sys.stderr.flush()
+        self._progress.update(self._task, description=name, completed=share)
+
+    def __exit__(self, *_: object) -> None:
+        if not self._plain:
+            self._progress.stop()

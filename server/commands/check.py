@@ -1,0 +1,34 @@
+"""`sagittal check`: is everything that is stored still what was stored?"""
+
+from __future__ import annotations
+
+import sys
+from contextlib import closing
+from pathlib import Path
+
+from server.settings import load_settings
+
+
+def check(data_dir: Path | None) -> int:
+    """Check the database, every stored file by its hash, and the audit chain; 1 when something is wrong."""
+    from server.services import checks
+    from server.storage.blobs import BlobStore
+    from server.storage.db import Database
+    from server.storage.migrate import MigrationError, require_current
+
+    settings = load_settings({"data_dir": data_dir})
+    if not settings.database.exists():
+        sys.stderr.write(f"There is no database in {settings.data_dir}; give the folder with --data.\n")
+        return 1
+    try:
+        require_current(settings.database)
+    except MigrationError as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    with closing(Database(settings.database)) as db:
+        findings = checks.check(db, BlobStore(settings.blobs))
+    for finding in findings:
+        sys.stdout.write(f"{finding.area}: {finding.message}\n")
+    sys.stdout.write(f"{len(findings)} problems in {settings.data_dir}\n" if findings else "All is well.\n")
+    sys.stdout.flush()
+    return 1 if findings else 0

@@ -1,0 +1,23 @@
+"""`sagittal migrate`: bring the database to the schema of this version."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from server.settings import load_settings
+
+
+def migrate(data_dir: Path | None) -> int:
+    """Upgrade the database in one transaction, after a backup; 1 when it belongs to a newer version."""
+    from server.storage.migrate import MigrationError, upgrade
+
+    settings = load_settings({"data_dir": data_dir})
+    try:
+        backup = upgrade(settings.database)
+    except MigrationError as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    sys.stdout.write("The database is current." + (f" Backup: {backup}" if backup else "") + "\n")
+    sys.stdout.flush()
+    return 0

@@ -1,0 +1,48 @@
+"""`sagittal user`: add a user or give one a new password, for whoever has the machine's console."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import closing
+from getpass import getpass
+from pathlib import Path
+
+from sqlalchemy import select
+
+from server.settings import load_settings
+
+
+def user(data_dir: Path | None, name: str, role: str) -> int:
+    """Ask for a password and store its hash; an existing user keeps the role and gets the new password."""
+    from server import audit
+    from server.auth import accounts
+    from server.auth.passwords import hash_password
+    from server.auth.roles import Role
+    from server.problems import Problem
+    from server.storage.db import Database
+    from server.storage.migrate import upgrade
+    from server.storage.tables import user as table
+
+    settings = load_settings({"data_dir": data_dir})
+    password = (
+        getpass(f"New password for {name}: ") if sys.stdin.isatty() else sys.stdin.readline().rstrip("\n")
+    )
+    try:
+        hashed = hash_password(password)
+        upgrade(settings.database)
+        with closing(Database(settings.database)) as db, db.write() as c:
+            known = c.execute(
+                select(table.c.id).where(table.c.name == name.strip().lower())
+            ).scalar_one_or_none()
+            if known is None:
+                known = accounts.create(c, name.strip().lower(), None, Role(role), hashed).id
+                audit.record(c, None, "user.created", "user", known, {"role": role, "by": "console"})
+            else:
+                accounts.change(c, known, {"password_hash": hashed})
+                audit.record(c, None, "user.password_changed", "user", known, {"by": "console"})
+    except Problem as error:
+        sys.stderr.write(f"{error.detail}\n")
+        return 1
+    sys.stdout.write(f"{name} can sign in.\n")
+    sys.stdout.flush()
+    return 0

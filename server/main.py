@@ -1,0 +1,113 @@
+"""The console script `sagittal`: one parser, one module of server/commands per command.
+
+Exit codes: 0 = done (analyse: at least one parameter), 1 = it could not be done (analyse: nothing analysable),
+2 = the call's words are off.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code."""
+    _refuse_foreign_packages()
+    arguments = vars(_parser().parse_args(argv))
+    command = arguments.pop("command")
+    return int(_run(command, arguments))
+
+
+def _run(command: str, given: dict[str, object]) -> int:
+    # numba and the web stack take seconds to import: each command loads only what it needs
+    from importlib import import_module
+
+    from server.settings import SettingsError
+
+    run = getattr(import_module(f"server.commands.{command}"), command)
+    try:
+        return int(run(**given))
+    except SettingsError as error:
+        sys.stderr.write(f"{error}\n")
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="sagittal", description="Gait analysis from body-worn IMUs. Not a medical device."
+    )
+    parser.add_argument("--version", action="version", version=_version())
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    def add(name: str, text: str) -> argparse.ArgumentParser:
+        return commands.add_parser(name, help=text, description=text)
+
+    p = add("serve", "Run the web server and its workers.")
+    _server_options(p)
+    p.add_argument("--workers", type=int, help="worker processes (default 1)")
+    _data_option(add("worker", "Run one worker on the data folder of a server."))
+    p = add("demo", "Run a temporary clinic with simulated patients; nothing is kept.")
+    p.add_argument("--port", type=int, default=None, help="port on 127.0.0.1 (default: a free one)")
+    p = add("analyse", "Analyse recording files and write the results into a folder.")
+    p.add_argument(
+        "paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of ONE recording"
+    )
+    p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")
+    p.add_argument("--out", type=Path, required=True, help="folder for the results")
+    p = add("simulate", "Write a simulated recording and its exact truth.")
+    p.add_argument("--out", type=Path, required=True, help="folder for recording and truth")
+    p.add_argument(
+        "--script", default="comfortable", help="comfortable, slow, fast_with_turns, lost_sensor …"
+    )
+    p.add_argument("--seed", type=int, default=1)
+    _data_option(add("check", "Check the database, every stored file by its hash, and the audit chain."))
+    _data_option(add("migrate", "Bring the database to the schema of this version (after a backup)."))
+    p = add("user", "Add a user, or give one a new password, on the command line.")
+    _data_option(p)
+    p.add_argument("name")
+    p.add_argument("--role", default="clinician", choices=("admin", "clinician", "assistant", "viewer"))
+    return parser
+
+
+def _data_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--data", dest="data_dir", type=Path, help="data folder (default: SAGITTAL_HOME, else ~/.sagittal)"
+    )
+
+
+def _server_options(parser: argparse.ArgumentParser) -> None:
+    _data_option(parser)
+    parser.add_argument("--host", help="address to listen on (default 127.0.0.1)")
+    parser.add_argument("--port", type=int, help="port to listen on (default 8000)")
+
+
+def _version() -> str:
+    try:
+        return f"sagittal {version('sagittal')}"
+    except PackageNotFoundError:
+        return "sagittal (source tree)"
+
+
+def _refuse_foreign_packages() -> None:
+    """The wheel installs packages named core, server and web; another distribution may have overwritten one."""
+    import core
+    import server
+    import web
+
+    homes = {Path(p.__file__ or "").parent.parent for p in (core, server, web)}
+    if len(homes) != 1:
+        sys.stderr.write(
+            "The packages core, server and web do not come from one installation: "
+            f"{', '.join(sorted(map(str, homes)))}. Another distribution uses one of these names; "
+            "install Sagittal into a virtual environment of its own.\n"
+        )
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
