@@ -1,0 +1,32 @@
+"""Which foot is on the floor, as data: masks made from the times of initial and terminal contact."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from core.frames import Bools, Floats
+
+
+def contact_mask(t_s: Floats, ic_s: Sequence[float], tc_s: Sequence[float]) -> Bools:
+    """Samples (n,) at which a foot is on the floor: from each initial contact to the next terminal contact.
+
+    Before its first event a foot stands if that event is a terminal contact, and after its last if that is an
+    initial contact. Between two terminal contacts without an initial one (a missed event) the swing is taken to
+    last until half way.
+
+    Parameters
+    ----------
+    t_s : (n,) increasing, s. ic_s, tc_s : event times of one foot, s, increasing.
+    """
+    events = sorted([(t, True) for t in ic_s] + [(t, False) for t in tc_s])
+    if not events:
+        return np.ones(len(t_s), bool)
+    contact = np.full(len(t_s), not events[0][1])
+    for i, (start, down) in enumerate(events):
+        after = t_s >= start
+        contact[after] = down
+        if not down and i + 1 < len(events) and not events[i + 1][1]:
+            contact[after & (t_s >= 0.5 * (start + events[i + 1][0]))] = True
+    return contact

@@ -1,0 +1,165 @@
+"""Forward kinematics: orientations and lengths → poses of a figure that walks, anchored by the standing foot.
+
+The chain gives every point relative to the pelvis. What is on the floor does not move: the pelvis travels with
+minus the velocity of the sole point in contact, integrated, so that there is never a jump; its height puts the
+lowest sole point in contact on z = 0 at every moment, so that height does not drift. The sole rolls: between heel
+and ball the contact point is the lower one, blended smoothly. Horizontal drift is that of the relative chain only
+and is not corrected: positions are for looking at, stride lengths need an estimator (spec/real-data.md §0.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.body.model import NOMINAL_HEIGHT_M, BodyModel
+from core.body.poses import Poses
+from core.errors import Notice
+from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from core.fusion.orientations import Orientations
+from core.rotation import rotate
+
+HEEL, BALL = -0.21, 0.53
+"""Heel and ball contact points in front of the ankle as fractions of foot length: the walker's −.055 and .14 m at
+a foot of .265 m (spec/estimators.md §2.2)."""
+
+
+@dataclass(frozen=True)
+class AnchorParams:
+    """Smoothing of the change from one contact point to the next (our choice, for the eye).
+
+    Parameters
+    ----------
+    blend_s : time over which the weight passes from foot to foot. soft_m : height difference over which the
+    weight passes between heel and ball, and between feet when no contacts are known.
+    """
+
+    blend_s: float = 0.10
+    soft_m: float = 0.01
+
+
+def nominal_body(height_m: float | None) -> tuple[BodyModel, tuple[Notice, ...]]:
+    """Body model from height in m, or from 1.70 m with a notice `height_assumed` when nobody gave one."""
+    if height_m is not None:
+        return BodyModel.from_height(height_m), ()
+    message = (
+        f"Body height is not given; the figure is drawn with {NOMINAL_HEIGHT_M:.2f} m. Enter the height to see true "
+        "proportions and travelled distance; joint angles do not depend on it."
+    )
+    return BodyModel.from_height(NOMINAL_HEIGHT_M), (Notice("height_assumed", message),)
+
+
+def forward_kinematics(
+    orientations: Orientations,
+    body: BodyModel,
+    contacts: Mapping[Side, Bools] | None = None,
+    params: AnchorParams | None = None,
+) -> Poses:
+    """Place the pelvis and every complete leg in W.
+
+    Parameters
+    ----------
+    contacts : side → (n,) True while that foot is on the floor (contacts.contact_mask); without it the lower
+        foot carries.
+
+    Returns
+    -------
+    Poses. Its figure holds the pelvis and the legs with thigh, shank and foot; `figure_incomplete` says what is
+    left out and why. Without the pelvis or without any complete leg `p` and `q` are empty.
+    """
+    params = params or AnchorParams()
+    n = len(orientations.t_s)
+    legs = [s for s in SIDES if all(x in orientations.q for x in (THIGH[s], SHANK[s], FOOT[s]))]
+    notices = _incomplete(orientations, legs)
+    if "pelvis" not in orientations.q or not legs:
+        return Poses(
+            orientations.t_s, orientations.rate_hz, {}, {}, np.zeros(n, bool), {}, body, "none", notices=notices
+        )
+    q: dict[Segment, Floats] = {"pelvis": orientations.q["pelvis"]}
+    relative: dict[Segment, Floats] = {"pelvis": np.zeros((n, 3))}
+    soles: list[Floats] = []
+    for side in legs:
+        q |= {x: orientations.q[x] for x in (THIGH[side], SHANK[side], FOOT[side])}
+        hip, knee, ankle = leg_points(q, body, side)
+        relative |= {THIGH[side]: hip, SHANK[side]: knee, FOOT[side]: ankle}
+        soles += [ankle + rotate(q[FOOT[side]], np.array(p)) for p in sole_points(body)]
+    valid = np.logical_and.reduce([orientations.valid[s] for s in q])
+    carrying = {s: (contacts or {}).get(s, np.ones(n, bool)) for s in legs}
+    if contacts is not None and len(legs) == 2:
+        carrying = _somebody_carries(carrying)
+    travel = _travel(np.stack(soles), carrying, orientations.rate_hz, params)
+    p = {s: x + travel for s, x in relative.items()}
+    return Poses(
+        t_s=orientations.t_s,
+        rate_hz=orientations.rate_hz,
+        q=q,
+        p=p,
+        valid=valid,
+        contact={FOOT[s]: carrying[s] for s in legs},
+        body=body,
+        method="stance_foot_anchor",
+        notices=notices,
+    )
+
+
+def leg_points(q: Mapping[Segment, Floats], body: BodyModel, side: Side) -> tuple[Floats, Floats, Floats]:
+    """Hip, knee and ankle centres (n, 3) of a leg relative to mid-hip, in W."""
+    lateral = 0.5 * body.hip_width * (1.0 if side == "right" else -1.0)
+    hip = rotate(q["pelvis"], np.array([0.0, 0.0, lateral]))
+    knee = hip + rotate(q[THIGH[side]], np.array([0.0, -body.thigh, 0.0]))
+    ankle = knee + rotate(q[SHANK[side]], np.array([0.0, -body.shank, 0.0]))
+    return hip, knee, ankle
+
+
+def sole_points(body: BodyModel) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Heel and ball contact points in foot coordinates, origin at the ankle centre."""
+    return (HEEL * body.foot, -body.ankle_height, 0.0), (BALL * body.foot, -body.ankle_height, 0.0)
+
+
+def _travel(soles: Floats, carrying: Mapping[Side, Bools], rate_hz: float, params: AnchorParams) -> Floats:
+    """Position (n, 3) of mid-hip in W from the sole points (2 legs × heel, ball; n, 3) relative to it."""
+    from scipy.ndimage import uniform_filter1d
+
+    width = max(1, round(params.blend_s * rate_hz))
+    height = soles[..., 2]
+    low = np.exp(-np.clip((height - height.min(axis=0)) / params.soft_m, 0.0, 50.0))
+    carried = np.repeat(np.stack(list(carrying.values())), 2, axis=0)
+    weight = np.where(carried, low, 0.0)
+    # a swinging leg alone in the figure carries nothing: the speed of the last stance is kept until the next
+    borne = weight.sum(axis=0) > 1e-6
+    if not borne.any():
+        weight, borne = low, np.ones(len(borne), bool)
+    index = np.arange(len(borne))
+    weight = weight / np.where(borne, weight.sum(axis=0), 1.0)
+    velocity = -(weight[..., None] * np.gradient(soles, 1.0 / rate_hz, axis=1)).sum(axis=0)
+    z = -(weight * height).sum(axis=0)
+    series = np.column_stack((velocity[:, :2], z))
+    if not borne.all():
+        series = np.column_stack([np.interp(index, index[borne], x[borne]) for x in series.T])
+    series = uniform_filter1d(uniform_filter1d(series, width, axis=0, mode="nearest"), width, axis=0, mode="nearest")
+    travel = np.empty_like(series)
+    travel[:, :2] = np.cumsum(series[:, :2], axis=0) / rate_hz
+    travel[:, :2] -= travel[0, :2]
+    travel[:, 2] = series[:, 2]
+    return travel
+
+
+def _somebody_carries(carrying: Mapping[Side, Bools]) -> dict[Side, Bools]:
+    """Walking has no flight: where both feet are said to swing, both may carry and the lower one will."""
+    nobody = ~np.logical_or.reduce(list(carrying.values()))
+    return {s: c | nobody for s, c in carrying.items()}
+
+
+def _incomplete(orientations: Orientations, legs: list[Side]) -> tuple[Notice, ...]:
+    notices = []
+    if "pelvis" not in orientations.q:
+        message = "No figure: without a pelvis sensor the legs have nothing to hang on; wear one on the sacrum."
+        notices.append(Notice("figure_incomplete", message, sensor="pelvis"))
+    for side in SIDES:
+        missing = [x for x in (THIGH[side], SHANK[side], FOOT[side]) if x not in orientations.q]
+        if side not in legs and len(missing) < 3:
+            message = f"The {side} leg is left out of the figure, no sensor on {' and '.join(missing)}."
+            notices.append(Notice("figure_incomplete", message, sensor=missing[0]))
+    return tuple(notices)
