@@ -59,8 +59,9 @@ def detect(orientations: Orientations, params: FootPitchParams | None = None) ->
     figures: dict[str, PitchFigures] = {}
     for side in SIDES:
         foot = FOOT[side]
-        if foot not in orientations.q:
-            notices.append(Notice("foot_missing", f"No sensor on the {side} foot: no contacts of it.", foot))
+        if foot not in orientations.q or not orientations.valid[foot].any():
+            message = f"No sensor on the {side} foot, or no sample of it: its contacts are unknown."
+            notices.append(Notice("foot_missing", message, foot))
             continue
         no_rest = [n for n in orientations.notices if n.code == "no_rest" and n.sensor in (None, foot)]
         if no_rest:
@@ -129,7 +130,7 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list
                 foot,
             )
         )
-    if figures.s_max < params.suspect_max:
+    elif figures.s_max < params.suspect_max:
         remarks.append(
             Notice(
                 "rest_pose_suspect",
@@ -139,7 +140,7 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list
                 foot,
             )
         )
-    elif figures.s_quiet is not None and abs(figures.s_quiet) > params.suspect_quiet:
+    if figures.s_quiet is not None and abs(figures.s_quiet) > params.suspect_quiet:
         remarks.append(
             Notice(
                 "rest_pose_suspect",

@@ -1,0 +1,185 @@
+"""The stride list: cycles from hand-made events, and the reason for each that does not count."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from core.events import StrideParams, detect, stride_list
+from core.events.result import GaitEvent, GaitEvents, Strides
+from core.frames import FOOT, Bools, Floats, Side
+from core.fusion.orientations import Orientations
+from tests.core.events.foot_signal import orientation, orientations, walk
+
+RATE = 100.0
+
+
+def hand_made(
+    right_ic: list[float], left_ic: list[float], stance: float = 0.6, stride: float = 1.0
+) -> GaitEvents:
+    """Contacts of both feet, each followed by its terminal contact after `stance`."""
+    events = []
+    for side, contacts in (("right", right_ic), ("left", left_ic)):
+        for t in contacts:
+            events.append(GaitEvent(t, side, "ic", "manual", t))  # type: ignore[arg-type]
+            events.append(GaitEvent(t + stance * stride, side, "tc", "manual", t))  # type: ignore[arg-type]
+    return GaitEvents(tuple(sorted(events, key=lambda e: e.time_s)))
+
+
+def standing(seconds: float = 30.0, heading: Floats | float = 0.0, lost: Bools | None = None) -> Orientations:
+    level = np.zeros(round(seconds * RATE))
+    valid = {} if lost is None else {"foot_r": ~lost}
+    return orientations(RATE, {"foot_r": level, "foot_l": level}, valid, heading)  # type: ignore[arg-type]
+
+
+def straight(n: int = 9) -> GaitEvents:
+    return hand_made([1.0 + i for i in range(n)], [1.5 + i for i in range(n)])
+
+
+def reasons(strides: Strides, side: Side = "right") -> list[str | None]:
+    return [s.excluded_reason for s in strides.strides if s.side == side]
+
+
+def test_a_cycle_carries_its_own_and_the_other_foots_events() -> None:
+    second = [s for s in stride_list(straight(), standing()).strides if s.side == "right"][1]
+    assert (second.start_s, second.end_s) == (2.0, 3.0)
+    assert second.tc_s == pytest.approx(2.6)
+    assert second.opposite_tc_s == pytest.approx(2.1)
+    assert second.opposite_ic_s == pytest.approx(2.5)
+    assert second.turn_rad == pytest.approx(0.0, abs=1e-12)
+    assert second.excluded_reason is None
+
+
+def test_the_first_and_last_stride_of_a_bout_are_set_aside() -> None:
+    assert reasons(stride_list(straight(), standing())) == ["first", *[None] * 6, "last"]
+
+
+def test_two_bouts_have_two_starts_and_two_ends() -> None:
+    contacts = [1.0 + i for i in range(6)] + [12.0 + i for i in range(6)]
+    found = stride_list(hand_made(contacts, [t + 0.5 for t in contacts]), standing())
+    bout = ["first", None, None, None, "last"]
+    assert reasons(found) == [*bout, "implausible_time", *bout]
+
+
+def test_a_short_walk_keeps_its_edges_and_says_so() -> None:
+    found = stride_list(straight(4), standing())
+    assert reasons(found) == [None, None, None]
+    assert [n.code for n in found.notices] == ["short_walk"]
+
+
+def test_cycles_of_implausible_time_do_not_count() -> None:
+    events = hand_made([1, 2, 3, 4, 4.3, 5.3, 6.3, 7.3, 8.3, 11.5, 12.5, 13.5], [])
+    listed = reasons(stride_list(events, standing()))
+    assert listed == [
+        "first", None, None, "incomplete", None, None, None, "last", "implausible_time", "first", "last",
+    ]  # fmt: skip
+    quick = hand_made([1, 2, 3, 4, 4.3, 5.3, 6.3, 7.3], [], stance=0.2)
+    assert reasons(stride_list(quick, standing()))[3] == "implausible_time"
+
+
+def test_a_missed_contact_makes_the_cycle_incomplete() -> None:
+    events = hand_made([1.0 + i for i in range(9) if i != 4], [1.5 + i for i in range(9)])
+    found = [s for s in stride_list(events, standing()).strides if s.side == "right"]
+    assert found[3].excluded_reason == "incomplete"
+    assert found[3].opposite_ic_s is None
+    no_tc = GaitEvents(tuple(e for e in straight().events if e.kind == "ic" or not 4 < e.time_s < 5))
+    assert reasons(stride_list(no_tc, standing()))[3] == "incomplete"
+
+
+def test_lost_samples_exclude_the_strides_that_touch_them() -> None:
+    lost = np.zeros(3000, np.bool_)
+    lost[395:405] = True
+    found = stride_list(straight(), standing(lost=lost))
+    assert reasons(found) == ["first", None, "gap", "gap", None, None, None, "last"]
+    assert reasons(found, "left") == ["first", *[None] * 6, "last"]
+    assert found.strides[4].turn_rad is None
+
+
+def test_lost_samples_in_the_signal_exclude_it_end_to_end() -> None:
+    lost = np.ones(1830, np.bool_)
+    lost[700:720] = False
+    take = walk(valid={"foot_r": lost})
+    found = stride_list(detect(take), take)
+    (gap,) = (s for s in found.strides if s.excluded_reason == "gap")
+    assert gap.side == "right"
+    assert gap.start_s < 7.0 < 7.2 < gap.end_s
+
+
+def test_turning_strides_are_found_by_the_foots_heading() -> None:
+    t = np.arange(3000) / RATE
+    heading = np.clip((t - 4.0) * np.pi / 2, 0.0, np.pi) + 3.0
+    found = stride_list(straight(), standing(heading=heading))
+    assert reasons(found) == ["first", None, None, "turn", "turn", None, None, "last"]
+    turned = [s.turn_rad for s in found.strides if s.side == "right" and s.turn_rad is not None]
+    assert turned[3:5] == pytest.approx([np.pi / 2, np.pi / 2], abs=0.02)
+    back = np.clip((t - 4.0) * -np.pi / 2, -np.pi, 0.0)
+    assert stride_list(straight(), standing(heading=back)).strides[6].turn_rad == pytest.approx(
+        -np.pi / 2, abs=0.02
+    )
+
+
+def test_the_pelvis_turning_mask_is_used_too() -> None:
+    turning = np.zeros(3000, np.bool_)
+    turning[400:460] = True
+    assert reasons(stride_list(straight(), standing(), turning))[3] == "turn"
+    turning[:] = False
+    turning[400:410] = True
+    assert reasons(stride_list(straight(), standing(), turning))[3] is None
+
+
+def test_a_foot_of_which_nothing_counts_is_named() -> None:
+    t = np.arange(3000) / RATE
+    found = stride_list(straight(), standing(heading=t * 0.9))
+    assert {n.code for n in found.notices} == {"no_strides"}
+    assert "None of the 8 left strides counts: 8 turn." in {n.message for n in found.notices}
+
+
+@pytest.mark.parametrize("contacts", [[], [1.0]])
+def test_too_few_contacts_give_an_empty_list(contacts: list[float]) -> None:
+    assert stride_list(hand_made(contacts, []), standing()).strides == ()
+
+
+def test_events_at_the_ends_of_the_recording_do_no_harm() -> None:
+    events = hand_made([0.0, 1.0, 2.0, 3.0, 29.99], [0.5])
+    assert len(stride_list(events, standing()).strides) == 4
+
+
+@given(
+    gaps=st.lists(st.floats(0.16, 4.0), min_size=2, max_size=40),
+    seed=st.integers(0, 100),
+)
+@settings(max_examples=80, deadline=None)
+def test_strides_never_overlap_and_their_events_keep_order(gaps: list[float], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(gaps)
+    order = ("ic", "tc")
+    events = tuple(
+        GaitEvent(float(t), rng.choice(["left", "right"]), order[int(rng.integers(2))], "manual", float(t))  # type: ignore[arg-type]
+        for t in times
+    )
+    take = standing(float(times[-1]) + 1.0)
+    listed = stride_list(GaitEvents(events), take).strides
+    for side in FOOT:
+        own = [s for s in listed if s.side == side]
+        assert all(a.end_s <= b.start_s for a, b in pairwise(own))
+    for s in listed:
+        assert s.start_s < s.end_s
+        assert s.tc_s is None or s.start_s < s.tc_s < s.end_s
+        assert s.opposite_ic_s is None or s.start_s < s.opposite_ic_s < s.end_s
+        if s.opposite_tc_s is not None:
+            assert s.start_s < s.opposite_tc_s < (s.opposite_ic_s or s.end_s)
+        if s.excluded_reason is None:
+            assert s.tc_s is not None
+            assert StrideParams().min_s <= s.duration_s <= StrideParams().max_s
+
+
+def test_heading_is_measured_at_the_contacts_even_when_the_foot_is_steep() -> None:
+    take = standing()
+    q = orientation(np.full(3000, np.radians(-60.0)), 0.4)
+    steep = replace(take, q={"foot_r": q, "foot_l": q})
+    assert stride_list(straight(), steep).strides[0].turn_rad == pytest.approx(0.0, abs=1e-9)

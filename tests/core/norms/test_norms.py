@@ -1,0 +1,143 @@
+"""The reference tables: complete, attributed, and honest about what may be compared."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from core.norms import adult_kinematics, angle_values, expected_at_speed, gps_reference, temporal_values
+from core.norms.tables import rows
+from core.parameters.kinematic import FIGURES
+from core.parameters.temporal import NAMES
+from tests.data import data_folder
+
+TABLES = (
+    "kinematics_wbds_adult", "kinematic_parameters_wbds", "gps_reference_wbds", "spatiotemporal_age_sex",
+    "spatiotemporal_speed_regression_h2a",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_every_table_is_shipped_as_prepared_and_its_origin_written_down(name: str) -> None:
+    shipped = files("core.norms").joinpath("data", f"{name}.csv").read_bytes()
+    sources = files("core.norms").joinpath("data", "SOURCES.md").read_text(encoding="utf-8")
+    assert f"| {name}.csv |" in sources
+    assert shipped == (data_folder("norms") / f"{name}.csv").read_bytes()
+
+
+def test_nothing_else_is_shipped() -> None:
+    shipped = {p.name for p in files("core.norms").joinpath("data").iterdir()}
+    assert shipped == {f"{name}.csv" for name in TABLES} | {"SOURCES.md"}
+
+
+def test_the_adult_knee_is_the_published_one() -> None:
+    """Every tenth percent as printed in spec/clinic.md §2."""
+    band = adult_kinematics(None).bands["knee_flexion"]
+    printed = [2.2, 13.2, 9.6, 3.7, 1.5, 7.9, 33.6, 59.9, 48.7, 11.5, 1.4]
+    assert np.round(band.mean_deg[::10], 1) == pytest.approx(printed, abs=0.051)
+    assert (band.n, band.group) == (42, "adult_21_84")
+    assert "Fukuchi" in band.source
+    assert "CC BY 4.0" in band.source
+
+
+@pytest.mark.parametrize(
+    ("age", "group", "n"),
+    [(None, "adult_21_84", 42), (18, "adult_21_84", 42), (21, "adult_21_54", 25), (54.9, "adult_21_54", 25),
+     (55, "adult_55_84", 17), (93, "adult_55_84", 17)],
+)  # fmt: skip
+def test_the_age_chooses_the_group(age: float | None, group: str, n: int) -> None:
+    found = adult_kinematics(age)
+    assert found.reason is None
+    for band in found.bands.values():
+        assert (band.group, band.n) == (group, n)
+        assert band.mean_deg.shape == band.sd_deg.shape == (101,)
+        assert np.isfinite(band.mean_deg).all()
+        assert (band.sd_deg > 0).all()
+        with pytest.raises(ValueError, match="read-only"):
+            band.mean_deg[0] = 0.0
+
+
+def test_no_band_where_no_reference_exists() -> None:
+    child = adult_kinematics(12)
+    assert (dict(child.bands), child.reason) == ({}, "no_norm_for_age")
+    slow = adult_kinematics(60, speed_mps=0.6)
+    assert (dict(slow.bands), slow.reason) == ({}, "no_speed_matched_norm")
+    assert adult_kinematics(60, speed_mps=1.1).reason is None
+    assert angle_values(12).reason == "no_norm_for_age"
+
+
+def test_bands_say_what_may_be_compared() -> None:
+    bands = adult_kinematics(None).bands
+    assert {v for v, b in bands.items() if b.comparable and b.confidence == "normal"} == {
+        "hip_flexion", "knee_flexion", "ankle_dorsiflexion",
+    }  # fmt: skip
+    assert {v for v, b in bands.items() if not b.comparable} == {
+        "pelvis_tilt", "pelvis_rotation", "foot_progression",
+    }  # fmt: skip
+    assert all("zero differs" in b.note for b in bands.values() if b.comparable)
+    assert all(b.note for b in bands.values())
+
+
+def test_angle_references_exist_for_our_angle_parameters_and_only_ranges_compare() -> None:
+    values = angle_values(30).values
+    assert set(values) == set(FIGURES)
+    assert {n for n, v in values.items() if v.comparable} == {
+        "hip_flexion_rom_deg", "knee_flexion_rom_deg", "ankle_dorsiflexion_rom_deg",
+    }  # fmt: skip
+    assert values["knee_flexion_max_swing_deg"].mean == pytest.approx(61.08)
+    assert angle_values(None).values["knee_flexion_rom_deg"].difference_sd == pytest.approx(3.77)
+
+
+def test_temporal_references_by_age_and_sex() -> None:
+    woman = temporal_values(72, "female").values
+    assert woman["cadence_spm"].mean == pytest.approx(113.0)
+    assert woman["cadence_spm"].sd == pytest.approx(20.0)
+    assert woman["cadence_spm"].source == "Hollman2011"
+    assert woman["double_support_pct"].mean == pytest.approx(27.1)
+    assert woman["gait_speed_mps"].comparable
+    man = temporal_values(25.5, "male").values
+    assert man["stride_time_s"].mean == pytest.approx(1.135)
+    assert not man["gait_speed_mps"].comparable, "the band of a pace class is not a spread"
+    assert set(woman) & set(NAMES) == {
+        "stride_time_s", "step_time_s", "stance_pct", "swing_pct", "double_support_pct", "single_support_pct",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("age", "sex", "reason"),
+    [(None, "female", "age_unknown"), (40, None, "sex_unknown"), (95, "male", "no_norm_for_age")],
+)
+def test_no_temporal_reference_says_why(age: float | None, sex: str | None, reason: str) -> None:
+    found = temporal_values(age, sex)  # type: ignore[arg-type]
+    assert (dict(found.values), found.reason) == ({}, reason)
+
+
+@pytest.mark.parametrize("sex", ["F", "M"])
+@pytest.mark.parametrize("pace", ["slow", "normal", "fast"])
+def test_age_bands_do_not_overlap(sex: str, pace: str) -> None:
+    bands: dict[str, list[tuple[float, float]]] = {}
+    for r in rows("spatiotemporal_age_sex"):
+        if (r["sex"], r["pace"]) == (sex, pace):
+            bands.setdefault(r["parameter"], []).append((float(r["age_min"]), float(r["age_max"])))
+    for ranges in bands.values():
+        ordered = sorted(ranges)
+        assert all(a[1] < b[0] for a, b in pairwise(ordered))
+
+
+def test_expected_step_length_and_cadence_at_a_speed() -> None:
+    young = expected_at_speed(1.0, 30)
+    assert young["step_length_m"].mean == pytest.approx(0.575)
+    assert young["cadence_spm"].mean == pytest.approx(104.39, abs=0.01)
+    assert expected_at_speed(1.0, 70)["cadence_spm"].group == "older"
+    assert expected_at_speed(0.3, 30) == {}
+
+
+def test_profile_score_reference() -> None:
+    raw = gps_reference(offset_removed=False)
+    assert raw["GPS_side_9var"].mean_deg == pytest.approx(4.95)
+    assert raw["GPS_side_9var"].mean_ln == pytest.approx(1.5547)
+    assert raw["knee_flexion"].mean_ln is None
+    assert gps_reference(offset_removed=True)["GPS_side_9var"].mean_deg == pytest.approx(2.35)
