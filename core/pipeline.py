@@ -21,6 +21,7 @@ from core.calibration.result import Calibration
 from core.errors import Notice, SagittalError
 from core.events import FootPitchParams, StrideParams
 from core.events.result import GaitEvents, Strides
+from core.frames import SIDES
 from core.fusion import MahonyParams
 from core.fusion.orientations import Orientations
 from core.parameters.result import Parameter
@@ -150,8 +151,13 @@ def _run_stages(
     strides = events.stride_list(found, orientations, calibrated.calibration.turning, config.strides)
     reached["strides"] = strides
     start("poses")
-    poses = body.forward_kinematics(orientations, body.body_model(uniform.subject), found)
-    reached["poses"] = poses
+    lengths, assumed = body.nominal_body(uniform.subject.height_m)
+    contacts = {
+        side: body.contact_mask(uniform.t_s, found.times(side, "ic"), found.times(side, "tc"))
+        for side in SIDES
+    }
+    reached["body"] = assumed
+    reached["poses"] = body.forward_kinematics(orientations, lengths, contacts)
     start("angles")
     joint = angles.joint_angles(orientations, calibrated.calibration.zero)
     reached["angles"] = joint
@@ -171,6 +177,7 @@ def _bundle(
     notices = [*recording.notices, *uniform.notices, *report.notices]
     for name in ("calibration", "orientations", "events", "strides", "poses", "angles"):
         notices.extend(getattr(reached.get(name), "notices", ()))
+    notices.extend(reached.get("body", ()))  # type: ignore[arg-type]
     if problem is not None:
         notices.append(problem)
     return Analysis(

@@ -1,7 +1,7 @@
 """The console script `sagittal`: one parser, one module of server/commands per command.
 
-Exit codes: 0 = done (analyse: at least one parameter), 1 = it could not be done (analyse: nothing analysable),
-2 = the call's words are off.
+Exit codes: 0 = done (analyse: at least one parameter), 1 = not possible (analyse: nothing analysable), 2 =
+the call's words are off.
 """
 
 from __future__ import annotations
@@ -54,9 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     p = add("demo", "Run a temporary clinic with simulated patients; nothing is kept.")
     p.add_argument("--port", type=int, default=None, help="port on 127.0.0.1 (default: a free one)")
     p = add("analyse", "Analyse recording files and write the results into a folder.")
-    p.add_argument(
-        "paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of ONE recording"
-    )
+    p.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of one take")
     p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")
     p.add_argument("--out", type=Path, required=True, help="folder for the results")
     p = add("simulate", "Write a simulated recording and its exact truth.")
@@ -94,7 +92,7 @@ def _version() -> str:
 
 
 def _refuse_foreign_packages() -> None:
-    """The wheel installs packages named core, server and web; another distribution may have overwritten one."""
+    """Our packages are named core, server and web; another distribution may have overwritten one."""
     import core
     import server
     import web

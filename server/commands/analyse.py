@@ -6,9 +6,13 @@ import json
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Self
 
 from core.errors import InputError, SagittalError
 from server.storage import fs
+
+if TYPE_CHECKING:
+    from core.formats.source import SourceFile
 
 
 def analyse(paths: Sequence[Path], manifest: Path | None, out: Path) -> int:
@@ -36,7 +40,7 @@ def analyse(paths: Sequence[Path], manifest: Path | None, out: Path) -> int:
     return 0 if any(p["mean"] is not None for p in result["parameters"]) else 1
 
 
-def source_files(paths: Sequence[Path]) -> Iterator[object]:
+def source_files(paths: Sequence[Path]) -> Iterator[SourceFile]:
     """Files named on the command line, folders walked, as lazily read sources."""
     from core.formats.source import SourceFile
 
@@ -45,7 +49,7 @@ def source_files(paths: Sequence[Path]) -> Iterator[object]:
             raise InputError("file_not_found", f"{path} does not exist; give files, a folder or a zip.")
         for file in sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]:
             name = str(file.relative_to(path)) if path.is_dir() else file.name
-            yield SourceFile(name, file.stat().st_size, file.read_bytes)
+            yield SourceFile.of_path(file, name)
 
 
 def print_summary(result: dict[str, list[dict[str, object]]], out: Path) -> None:
@@ -68,7 +72,7 @@ def print_summary(result: dict[str, list[dict[str, object]]], out: Path) -> None
 class _ProgressBar:
     """Progress on stderr: a bar on a terminal, one line per stage elsewhere."""
 
-    def __enter__(self) -> _ProgressBar:
+    def __enter__(self) -> Self:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 

@@ -13,7 +13,7 @@ from server.storage import fs
 
 
 def simulate(out: Path, script: str, seed: int) -> int:
-    """Write `recording.parquet` and `truth/` (angles.parquet, events.csv, strides.csv, truth.json) into `out`."""
+    """Write `recording.parquet` and `truth/` (angles, events, strides) into `out`; 2 = no such script."""
     from core.angles import JointAngles
     from core.formats import write_recording
     from core.simulate import SCRIPTS, event_table, simulate_scenario, stride_table
