@@ -1,7 +1,6 @@
 // <cycle-charts>: one cursor in all charts inside it, tied to the clock; values of both means beside each title.
 import { clock } from "./clock.js";
 
-const SVG = "http://www.w3.org/2000/svg";
 const degrees = (v) => (v === null || v === undefined ? "–" : `${Math.round(v) === 0 ? 0 : String(Math.round(v)).replace("-", "−")}°`);
 
 class CycleCharts extends HTMLElement {
@@ -18,25 +17,18 @@ class CycleCharts extends HTMLElement {
   }
 
   prepare(figure) {
-    const plot = figure.querySelector("svg svg"); // the stretched plot area, 0…1000 both ways
-    if (!plot) return null;
-    let line = plot.querySelector(".cursor");
-    if (!line) {
-      line = document.createElementNS(SVG, "line");
-      line.setAttribute("class", "cursor");
-      line.setAttribute("y1", 0);
-      line.setAttribute("y2", 1000);
-      plot.append(line);
-    }
+    const chart = figure.querySelector("[data-variable]");
+    const plot = chart?.querySelector("svg svg"); // the stretched plot area, 0…1000 both ways
+    const line = plot?.querySelector(".cursor");
+    if (!line) return null; // a chart without curves says why in words
     const move = (e) => {
       const box = plot.parentElement.getBoundingClientRect();
       const p = (100 * (e.clientX - box.left)) / box.width;
       if (p >= -2 && p <= 102) clock.setPercent(p);
     };
-    const chart = figure.querySelector(".chart");
     chart.addEventListener("pointermove", move);
     chart.addEventListener("pointerdown", move);
-    return { line, mean: clock.curves[figure.dataset.chart] ?? {}, left: figure.querySelector("[data-left]"), right: figure.querySelector("[data-right]") };
+    return { line, mean: clock.curves[chart.dataset.variable] ?? {}, left: figure.querySelector("[data-left]"), right: figure.querySelector("[data-right]") };
   }
 
   show() {
@@ -56,7 +48,7 @@ class CycleCharts extends HTMLElement {
 
 class StrideStrip extends HTMLElement {
   connectedCallback() {
-    this.marks = [...this.querySelectorAll("[data-stride]")];
+    this.marks = [...this.querySelectorAll("g[data-stride]")];
     for (const mark of this.marks) mark.addEventListener("click", () => clock.pick(clock.strides[mark.dataset.stride]));
     clock.addEventListener("tick", () => this.show());
     this.show();

@@ -1,0 +1,227 @@
+"""The pages: server-made HTML over the same services as the API; every change goes through the API itself."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse, RedirectResponse
+from starlette.responses import Response
+
+from server import audit, page_views, session_views
+from server.api.context import Blobs, Db, Id
+from server.auth import accounts, one_time
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.passwords import MIN_LENGTH
+from server.auth.roles import Action, Role
+from server.problems import TEMPLATES
+from server.services import analyses, patients, recordings, sessions
+from server.services.provenance import CODE_VERSION
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from web.words import FILTERS
+
+TEMPLATES.env.filters.update(FILTERS)
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+NAVIGATION = (
+    ("patients", "people", "Patients", "/patients", Action.READ_PATIENT),
+    ("jobs", "jobs", "Jobs", "/jobs", Action.READ_JOB),
+    ("users", "users", "Users", "/users", Action.MANAGE_USERS),
+    ("audit", "audit", "Audit", "/audit", Action.READ_AUDIT),
+)
+"""Rail entries: page, icon, word, address, and what one must be allowed to do to see it."""
+
+AUDIT_ROWS = 100
+
+
+@router.get("/")
+def home(who: Annotated[Identity, require(Action.READ_PATIENT)]) -> Response:
+    """Go to the patients."""
+    return RedirectResponse("/patients", status_code=303)
+
+
+@router.get("/sign-in", dependencies=[require(Action.SIGN_IN)])
+def sign_in(request: Request, next: Annotated[str, Query(max_length=2000)] = "/patients") -> Response:  # noqa: A002 - the name in the address
+    """Ask for name and password."""
+    local = next if next.startswith("/") and next[1:2] not in {"/", "\\"} else "/patients"
+    return TEMPLATES.TemplateResponse(request, "sign-in.html", {"next": local})
+
+
+@router.get("/set-up/{token}", dependencies=[require(Action.SET_UP)])
+def set_up(request: Request, db: Db, token: str) -> Response:
+    """Make the first account, from the address printed at the first start."""
+    with db.read() as c:
+        valid = one_time.is_valid(c, token, "set_up")
+    context = {"token": token, "valid": valid, "min_password": MIN_LENGTH}
+    return TEMPLATES.TemplateResponse(request, "set-up.html", context, status_code=200 if valid else 404)
+
+
+@router.get("/patients")
+def patient_list(
+    request: Request,
+    db: Db,
+    who: Annotated[Identity, require(Action.READ_PATIENT)],
+    q: Annotated[str, Query(max_length=200)] = "",
+) -> Response:
+    """All patients, the latest visit first."""
+    with db.read() as c:
+        rows = page_views.patient_rows(c, patients.listing(c, search=q, limit=1000))
+        total = page_views.patient_count(c)
+    return _page(request, db, who, "patients.html", "patients", patients=rows, query=q, total=total)
+
+
+@router.get("/patients/{pid}")
+def patient_page(
+    request: Request, db: Db, blobs: Blobs, pid: Id, who: Annotated[Identity, require(Action.READ_PATIENT)]
+) -> Response:
+    """One patient: visits on a time line, results by visit."""
+    with db.read() as c:
+        patient = patients.get(c, pid)
+        visits = page_views.visits(c, blobs, pid, results=who.may(Action.READ_RESULT))
+    _opened(db, who, "patient", pid)
+    return _page(
+        request, db, who, "patient.html", "patients",
+        patient=page_views.patient_view(patient), visits=visits, keys=page_views.KEY_PARAMETERS,
+    )  # fmt: skip
+
+
+@router.get("/patients/{pid}/sessions/new")
+def new_session(
+    request: Request, db: Db, pid: Id, who: Annotated[Identity, require(Action.CREATE_SESSION)]
+) -> Response:
+    """Ask for protocol, date, height and aids of a new visit."""
+    with db.read() as c:
+        patient = patients.get(c, pid)
+    today = dt.datetime.now(dt.UTC).date().isoformat()
+    return _page(
+        request, db, who, "session-new.html", "patients",
+        patient=patient, protocols=page_views.PROTOCOLS, today=today,
+    )  # fmt: skip
+
+
+@router.get("/sessions/{sid}/upload")
+def upload(
+    request: Request, db: Db, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+) -> Response:
+    """Upload files, see what was found in them, say which sensor is where."""
+    with db.read() as c:
+        session = sessions.get(c, sid)
+        patient = patients.get(c, session.patient_id)
+        view = page_views.upload_view(recordings.current(c, sid), session, patient)
+    return _page(request, db, who, "upload.html", "patients", session=session, patient=patient, **view)
+
+
+@router.get("/sessions/{sid}")
+def overview(
+    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+) -> Response:
+    """Is the data good, how does this person walk."""
+    return _session_page(request, db, blobs, sid, who, "session.html")
+
+
+@router.get("/sessions/{sid}/kinematics")
+def kinematics(
+    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+) -> Response:
+    """All cycle curves with the replay."""
+    return _session_page(request, db, blobs, sid, who, "kinematics.html")
+
+
+@router.get("/sessions/{sid}/print")
+def print_view(
+    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+) -> Response:
+    """Two sheets of A4 for the browser's own print."""
+    return _session_page(request, db, blobs, sid, who, "print.html", paper=True)
+
+
+@router.get("/sessions/{sid}/data")
+def data(
+    request: Request, db: Db, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+) -> Response:
+    """Downloads, provenance, running again."""
+    with db.read() as c:
+        context = session_views.base(c, sid)
+        context |= session_views.downloads(c, sid, results=who.may(Action.READ_RESULT))
+    return _page(request, db, who, "data.html", "patients", **context)
+
+
+@router.get("/jobs")
+def jobs(request: Request, db: Db, who: Annotated[Identity, require(Action.READ_JOB)]) -> Response:
+    """What is being computed, and what was."""
+    with db.read() as c:
+        rows = page_views.job_rows(c)
+    return _page(request, db, who, "jobs.html", "jobs", jobs=rows)
+
+
+@router.get("/users")
+def users(request: Request, db: Db, who: Annotated[Identity, require(Action.MANAGE_USERS)]) -> Response:
+    """Who may sign in, and as what."""
+    with db.read() as c:
+        rows = accounts.everyone(c)
+    roles = [(role.value, page_views.ROLE_WORDS[role]) for role in Role]
+    options = [(role.value, role.value) for role in Role]
+    return _page(
+        request, db, who, "users.html", "users",
+        users=rows, roles=roles, role_options=options, min_password=MIN_LENGTH,
+    )  # fmt: skip
+
+
+@router.get("/audit")
+def audit_log(
+    request: Request,
+    db: Db,
+    who: Annotated[Identity, require(Action.READ_AUDIT)],
+    before: Annotated[int | None, Query(ge=1, le=2**53)] = None,
+) -> Response:
+    """Who opened or changed what, the newest first."""
+    with db.read() as c:
+        rows = audit.entries(c, before=before, limit=AUDIT_ROWS)
+    older = rows[-1].seq if len(rows) == AUDIT_ROWS else None
+    return _page(request, db, who, "audit.html", "audit", rows=rows, older=older)
+
+
+@router.get("/account")
+def account(request: Request, db: Db, who: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> Response:
+    """One's own password, and signing out."""
+    return _page(
+        request, db, who, "account.html", "account",
+        user=who, role_text=page_views.ROLE_WORDS[who.role], min_password=MIN_LENGTH,
+    )  # fmt: skip
+
+
+def _session_page(
+    request: Request, db: Database, blobs: BlobStore, sid: str, who: Identity, template: str, *, paper: bool = False
+) -> Response:
+    with db.read() as c:
+        context = session_views.base(c, sid)
+        latest = analyses.latest(c, sid) if who.may(Action.READ_RESULT) else None
+    if latest is not None:
+        context["report"] = session_views.report(blobs, latest, context, paper=paper)
+        _opened(db, who, "session", sid)
+    elif paper:
+        return RedirectResponse(f"/sessions/{sid}", status_code=303)
+    return _page(request, db, who, template, "patients", **context)
+
+
+def _opened(db: Database, who: Identity, resource: str, resource_id: str) -> None:
+    with db.write() as c:
+        audit.record(c, who, f"{resource}.opened", resource, resource_id)
+
+
+def _page(
+    request: Request, db: Database, who: Identity, template: str, here: str, **context: object
+) -> Response:
+    with db.read() as c:
+        running = page_views.running_jobs(c)
+    shell = {
+        "nav": NAVIGATION,
+        "here": here,
+        "running": running,
+        "version": CODE_VERSION,
+        "may": lambda action: who.may(Action(action)),
+    }
+    return TEMPLATES.TemplateResponse(request, template, shell | context)

@@ -1,0 +1,164 @@
+"""What the pages of one session show, as plain values for the templates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+from urllib.parse import quote
+
+from sqlalchemy import Connection
+
+from core.pipeline import STAGES
+from server.page_views import PROTOCOL_NAMES, SEGMENT_NAMES, job_dict, newest_job, who_words
+from server.report.bundle import load_bundle
+from server.report.curves import cycle_svg, strip_svg
+from server.report.model import report_model
+from server.report.panels import CurvePanel
+from server.services import analyses, patients, recordings, sessions
+from server.storage.blobs import BlobStore
+from web.words import day
+
+COLUMNS: Final = 3
+"""Charts per row: sagittal, frontal, transverse."""
+
+PAGE_HEIGHTS: Final = {False: 144, True: 158}
+PAPER_HEIGHTS: Final = {False: 168, True: 182}
+KEY_HEIGHT: Final = 186
+"""Chart heights in px; the last row also carries the unit of the x axis."""
+
+SHOWN: Final = (
+    "problem",
+    "quality",
+    "warnings",
+    "kpis",
+    "groups",
+    "strides",
+    "duration_s",
+    "norm_note",
+    "norm_source",
+    "curve_notes",
+    "used",
+    "replay",
+)
+"""Members of ReportModel that templates use as they are."""
+
+STAGE_NAMES: Final[Mapping[str, str]] = {
+    "reading": "Read the files",
+    "timeline": "Lay all sensors on one time axis",
+    "quality": "Check the data",
+    "calibration": "Calibrate: how each sensor sits on its segment",
+    "orientation": "Find the orientation of each segment",
+    "events": "Find contacts and strides",
+    "poses": "Build the figure",
+    "angles": "Compute joint angles",
+    "parameters": "Compute parameters",
+}
+"""Stage of core.pipeline → what it does, in words."""
+
+FILE_WORDS: Final[Mapping[str, str]] = {
+    "analysis.json": "Quality, calibration, parameters, warnings, provenance",
+    "angles.parquet": "Joint angles in degrees over time",
+    "poses.parquet": "Orientation and position of every segment over time",
+    "events.csv": "Contacts and foot-offs",
+    "strides.csv": "Every stride with its parameters, and why it was left out",
+}
+
+
+def base(c: Connection, session_id: str) -> dict[str, Any]:
+    """Session, patient, recording and the newest job: what every page of a session needs."""
+    session = sessions.get(c, session_id)
+    job = newest_job(c, session_id)
+    return {
+        "session": session,
+        "patient": patients.get(c, session.patient_id),
+        "recording": recordings.current(c, session_id),
+        "job": None if job is None else job_dict(job),
+        "stages": [("reading", STAGE_NAMES["reading"]), *((s, STAGE_NAMES[s]) for s, _ in STAGES)],
+        "report": None,
+    }
+
+
+def downloads(c: Connection, session_id: str, *, results: bool) -> dict[str, Any]:
+    """Files to download, provenance and the mapping behind the shown analysis."""
+    this = recordings.current(c, session_id)
+    found = analyses.of_session(c, session_id) if results else []
+    shown = found[0] if found else None
+    return {
+        "analysis": shown,
+        "earlier": found[1:],
+        "results": [
+            {
+                "name": name,
+                "what": FILE_WORDS.get(name, ""),
+                "size": blob.size,
+                "href": f"/api/v1/analyses/{shown.id}/files/{quote(name)}",
+            }
+            for name, blob in (shown.files.items() if shown else ())
+        ],
+        "originals": [
+            {**vars(f), "href": f"/api/v1/sessions/{session_id}/files/{quote(f.name)}"}
+            for f in (this.files if this else ())
+        ],
+        "provenance": _provenance(shown) if shown else [],
+        "mapping": _mapping(shown.manifest if shown else None),
+    }
+
+
+def _provenance(shown: analyses.Analysis) -> list[tuple[str, str]]:
+    return [
+        ("Input sha256", shown.input_sha256),
+        ("Settings sha256", shown.config_sha256),
+        ("Version", shown.code_version),
+        ("Analysis", shown.id),
+    ]
+
+
+def _mapping(manifest: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+    sensors = (manifest or {}).get("sensors") or {}
+    return [(device, SEGMENT_NAMES.get(segment, "not used")) for device, segment in sensors.items()]
+
+
+def report(blobs: BlobStore, found: analyses.Analysis, context: Mapping[str, Any], *, paper: bool) -> dict[str, Any]:
+    """The report of an analysis with its charts drawn, for the page or for paper."""
+    patient, session = context["patient"], context["session"]
+    files = {name: analyses.file_bytes(blobs, found, name) for name in found.files if name != "poses.parquet"}
+    bundle = load_bundle(files)
+    age = session.performed_on.year - patient.birth_year if patient.birth_year else None
+    model = report_model(bundle, age=age, sex=patient.sex)
+    last_row = len(model.panels) - COLUMNS
+    heights = PAPER_HEIGHTS if paper else PAGE_HEIGHTS
+    curves = [_chart(p, heights[i >= last_row], x_unit=i >= last_row) for i, p in enumerate(model.panels)]
+    used, total = sum(model.used.values()), len(model.strides)
+    return {
+        **{name: getattr(model, name) for name in SHOWN},
+        "curves": curves,
+        "key_curve": _chart(model.key_curve, KEY_HEIGHT, x_unit=True),
+        "strip": strip_svg(bundle.strides, model.duration_s) if model.strides else "",
+        "stride_words": f"{used} of {total} used",
+        "empty_reason": model.problem or "No complete stride was found in the recording.",
+        "identity": _identity(patient, session),
+        "provenance_line": f"Sagittal {found.code_version} · settings {found.config_sha256[:8]} · "
+        f"input {found.input_sha256[:8]} · {day(found.created_at)}",
+        "has_poses": "poses.parquet" in found.files,
+    }
+
+
+def _chart(panel: CurvePanel, height: int, *, x_unit: bool) -> dict[str, Any]:
+    return {
+        "name": panel.variable.name,
+        "title": panel.title,
+        "low": panel.low_confidence,
+        "reason": panel.reason,
+        "svg": cycle_svg(panel, height=height, x_unit=x_unit),
+    }
+
+
+def _identity(patient: Any, session: Any) -> list[tuple[str, str]]:
+    height = session.height_m or patient.height_m
+    return [
+        ("Code", patient.code),
+        ("Age, sex", who_words(patient.sex, patient.birth_year) or "not given"),
+        ("Height", f"{height:.2f} m" if height else "not given"),
+        ("Protocol", PROTOCOL_NAMES.get(session.protocol, session.protocol)),
+        ("Date", day(session.performed_on)),
+    ]
