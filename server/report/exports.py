@@ -202,7 +202,7 @@ def _parquet(t_s: Floats, columns: Mapping[str, np.ndarray], meta: Mapping[str, 
     # neighbouring samples share their high bytes: splitting the bytes halves the file (spec/kernels.md §6)
     split = [k for k, a in arrays.items() if pa.types.is_floating(a.type)]
     sink = io.BytesIO()
-    pq.write_table(table, sink, compression="zstd", use_dictionary=False, use_byte_stream_split=split)
+    pq.write_table(table, sink, compression="zstd", use_dictionary=False, use_byte_stream_split=split)  # type: ignore[arg-type] # the stubs know bool only
     return sink.getvalue()
 
 

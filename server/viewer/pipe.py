@@ -1,4 +1,4 @@
-"""Carries messages between a browser and a viser server, and keeps out what a viewer has no business to send."""
+"""Carries messages between a browser and a viser server, and keeps out what a viewer need not send."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ class View:
     @property
     def port(self) -> int:
         """Loopback port of the viser server."""
-        return self.server.get_port()
+        return int(self.server.get_port())
 
     @contextlib.contextmanager
     def watched(self) -> Iterator[None]:

@@ -1,0 +1,323 @@
+"""Bundle + norms → what a page, a print or an API client shows: degrees and words, no arrays of signals.
+
+A pure function of stored results (law 10): under 50 ms for a 10 min session.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from core.errors import Notice
+from core.frames import SIDES, Floats, Side
+from core.norms import NormBands, NormValues, adult_kinematics, angle_values, temporal_values
+from server.report.bundle import Bundle
+from server.report.exports import notice_row, plain
+from server.report.panels import DRAWN_STRIDES, CurvePanel, SideCurve, curve_panels
+from server.report.quality_box import QualityBox, quality_box
+from server.report.table import Row, grouped, parameter_rows
+from server.report.wording import NO_NORM, VARIABLES, ZERO_WORDS, excluded_words, number
+
+Sex = Literal["female", "male"]
+
+KEY_NUMBERS: Final = ("cadence_spm", "stride_time_s", "stance_pct", "knee_flexion_rom_deg")
+"""Parameters shown large on the overview."""
+
+KEY_CURVE: Final = "knee_flexion"
+
+_GROUPS: Final = {
+    "adult_21_84": "adults 21–84 years",
+    "adult_21_54": "adults 21–54 years",
+    "adult_55_84": "adults 55–84 years",
+}
+_KINDS: Final = {"error": "bad", "warning": "warn", "info": "info"}
+
+
+@dataclass(frozen=True)
+class KeyNumber:
+    """One large number, or a left-right pair, with its meaning in words."""
+
+    name: str
+    title: str
+    unit: str
+    pair: bool
+    text: str
+    left: str
+    right: str
+    words: str
+
+
+@dataclass(frozen=True)
+class Warning_:  # noqa: N801 (Warning is Python's own)
+    """A notice for the reader: `kind` is bad, warn or info."""
+
+    kind: str
+    code: str
+    title: str
+    message: str
+    sensor: str | None
+    t_s: float | None
+
+
+@dataclass(frozen=True)
+class StrideRow:
+    """A stride of the list; `excluded` says in words why it does not count."""
+
+    side: Side
+    start_s: float
+    tc_s: float | None
+    end_s: float
+    used: bool
+    excluded: str | None
+
+
+@dataclass(frozen=True, eq=False)
+class ReportModel:
+    """Everything a session page shows.
+
+    Parameters
+    ----------
+    problem : what stopped the analysis, None when it ran to its end.
+    groups : parameter rows under their headings. key_curve : the panel shown on the overview.
+    norm_note : source, number and speed of the reference people, or why there is none.
+    curve_notes : how to read the curves, in sentences: zero, offsets, confidence, what is drawn.
+    """
+
+    problem: str | None
+    quality: QualityBox
+    warnings: tuple[Warning_, ...]
+    kpis: tuple[KeyNumber, ...]
+    groups: tuple[tuple[str, tuple[Row, ...]], ...]
+    panels: tuple[CurvePanel, ...]
+    strides: tuple[StrideRow, ...]
+    duration_s: float
+    norm_note: str
+    norm_source: str | None
+    curve_notes: tuple[str, ...]
+    angle_zero: str | None
+    zero_offset_deg: Mapping[str, float]
+    provenance: Mapping[str, object]
+
+    @property
+    def key_curve(self) -> CurvePanel:
+        """Panel of knee flexion."""
+        return next(p for p in self.panels if p.variable.name == KEY_CURVE)
+
+    @property
+    def used(self) -> dict[Side, int]:
+        """Strides that count, by side."""
+        return {side: sum(s.used for s in self.strides if s.side == side) for side in SIDES}
+
+    @property
+    def replay(self) -> dict[str, object]:
+        """What the clock of the page needs: duration, strides, mean curves by variable and side (deg)."""
+        return {
+            "duration_s": self.duration_s,
+            "strides": [
+                {"side": s.side, "start_s": s.start_s, "end_s": s.end_s, "used": s.used} for s in self.strides
+            ],
+            "curves": {
+                p.variable.name: {side: rounded(c.mean_deg) for side, c in p.sides.items()}
+                for p in self.panels
+            },
+        }
+
+    def to_json(self) -> dict[str, object]:
+        """Plain JSON; single strides are left to curves.csv and angles.parquet."""
+        result = plain(
+            {
+                "problem": self.problem,
+                "quality": asdict(self.quality),
+                "warnings": [asdict(w) for w in self.warnings],
+                "key_numbers": [asdict(k) for k in self.kpis],
+                "parameters": [asdict(row) for _, rows in self.groups for row in rows],
+                "curves": [_panel_json(p) for p in self.panels],
+                "strides": [asdict(s) for s in self.strides],
+                "duration_s": self.duration_s,
+                "norm_note": self.norm_note,
+                "curve_notes": self.curve_notes,
+                "angle_zero": self.angle_zero,
+                "zero_offset_deg": self.zero_offset_deg,
+                "provenance": self.provenance,
+            }
+        )
+        return result if isinstance(result, dict) else {}
+
+
+def report_model(
+    bundle: Bundle, *, age: float | None = None, sex: Sex | None = None, speed_mps: float | None = None
+) -> ReportModel:
+    """Build the report of a finished analysis.
+
+    Parameters
+    ----------
+    age : years at the visit; without it curves are compared with all adults, timing with nobody.
+    speed_mps : walking speed if measured; below 0.8 m/s no reference applies.
+    """
+    bands = adult_kinematics(age, speed_mps)
+    angle_norms, time_norms = angle_values(age), temporal_values(age, sex)
+    values = {} if bands.reason else {**time_norms.values, **angle_norms.values}
+    rows = parameter_rows(bundle.parameters, values)
+    panels = curve_panels(bundle, bands)
+    stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
+    angles = bundle.angles
+    return ReportModel(
+        problem=stopped,
+        quality=quality_box(bundle),
+        warnings=tuple(_warning(n) for n in bundle.warnings),
+        kpis=tuple(
+            _key_number(r) for name in KEY_NUMBERS for r in rows if r.name == name and r.reason is None
+        ),
+        groups=grouped(rows),
+        panels=panels,
+        strides=tuple(
+            StrideRow(
+                s.side,
+                s.start_s,
+                s.tc_s,
+                s.end_s,
+                s.excluded_reason is None,
+                None if s.excluded_reason is None else excluded_words(s.excluded_reason),
+            )
+            for s in bundle.strides.strides
+        ),
+        duration_s=_duration(bundle),
+        norm_note=_norm_note(rows, panels, bands, time_norms),
+        norm_source=next((p.norm.source for p in panels if p.norm is not None), None),
+        curve_notes=_curve_notes(bundle, panels),
+        angle_zero=None if angles is None else angles.zero,
+        zero_offset_deg={}
+        if angles is None
+        else {k: float(np.degrees(v)) for k, v in angles.zero_offset.items()},
+        provenance=bundle.provenance,
+    )
+
+
+def rounded(values: Floats | None) -> list[float] | None:
+    """A curve for the wire, to 0.01°."""
+    return None if values is None else np.round(values, 2).tolist()
+
+
+def _duration(bundle: Bundle) -> float:
+    if bundle.angles is not None and len(bundle.angles.t_s):
+        return float(bundle.angles.t_s[-1])
+    return max((s.end_s for s in bundle.strides.strides), default=0.0)
+
+
+def _warning(n: Notice) -> Warning_:
+    row = notice_row(n)
+    title = n.code.replace("_", " ").capitalize()
+    where = "" if n.sensor is None else f", {n.sensor.replace('_', ' ')}"
+    t_s = row["t_s"]
+    return Warning_(
+        kind=_KINDS[n.severity],
+        code=n.code,
+        title=f"{title}{where}",
+        message=n.message,
+        sensor=n.sensor,
+        t_s=t_s if isinstance(t_s, float) else None,
+    )
+
+
+def _key_number(row: Row) -> KeyNumber:
+    pair = row.both is None
+    norm = f"norm {row.norm}" if row.norm else ""
+    return KeyNumber(
+        name=row.name,
+        title=row.title,
+        unit=row.unit,
+        pair=pair,
+        text="" if row.both is None else row.both.text,
+        left="–" if row.left is None else row.left.text,
+        right="–" if row.right is None else row.right.text,
+        words=", ".join(w for w in (row.difference, norm) if w),
+    )
+
+
+def _norm_note(
+    rows: tuple[Row, ...], panels: tuple[CurvePanel, ...], bands: NormBands, timing: NormValues
+) -> str:
+    """Who the reference people are, or why there are none; always something."""
+    if bands.reason is not None:
+        return NO_NORM.get(bands.reason, bands.reason)
+    sentences = []
+    band = next((p.norm for p in panels if p.norm is not None), None)
+    if band is not None:
+        who = _GROUPS.get(band.group, band.group)
+        sentences.append(
+            f"Norm: {band.n} {who}, overground at their comfortable 1.25 ± 0.16 m/s, mean ± 1 SD "
+            f"({band.source})."
+        )
+    if timing.reason is not None:
+        sentences.append(NO_NORM.get(timing.reason, timing.reason))
+    elif shown := [r for r in rows if r.norm is not None and r.name in timing.values]:
+        sentences.append(f"Timing: {timing.values[shown[0].name].group} ({shown[0].norm_source}).")
+    return " ".join(sentences)
+
+
+def _curve_notes(bundle: Bundle, panels: tuple[CurvePanel, ...]) -> tuple[str, ...]:
+    if bundle.angles is None:
+        return ()
+    zero = ZERO_WORDS.get(bundle.angles.zero, bundle.angles.zero)
+    labels = {v.name: v.label.lower() for v in VARIABLES if v.plane == "sagittal"}
+    offsets = []
+    for name, value in bundle.angles.zero_offset.items():
+        base, _, suffix = name.rpartition("_")
+        side = {"l": " left", "r": " right"}.get(suffix)
+        label = labels.get(base if side else name)
+        if label is not None:
+            offsets.append(f"{label}{side or ''} {number(float(np.degrees(value)))}°")
+    about_zero = (
+        f"Angles are measured {zero}: the posture of the standing part is 0°. "
+        f"Subtracted: {', '.join(offsets)}. A person who stands bent gets curves shifted by that much."
+    )
+    notes = [
+        about_zero,
+        *dict.fromkeys(p.norm_note for p in panels if p.norm_note and p.reason is None),
+    ]
+    drawn = max((len(c.strides) for p in panels for c in p.sides.values()), default=0)
+    most = max((c.n for p in panels for c in p.sides.values()), default=0)
+    if most > drawn:
+        notes.append(
+            f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the take; means are of all."
+        )
+    return tuple(notes)
+
+
+def _panel_json(p: CurvePanel) -> dict[str, object]:
+    v = p.variable
+    norm = None
+    if p.norm is not None:
+        norm = {
+            "mean_deg": rounded(p.norm.mean_deg),
+            "sd_deg": rounded(p.norm.sd_deg),
+            "n": p.norm.n,
+            "group": p.norm.group,
+            "source": p.norm.source,
+        }
+    return {
+        "variable": v.name,
+        "title": p.title,
+        "plane": v.plane,
+        "low_confidence": p.low_confidence,
+        "reason": p.reason,
+        "y_range_deg": v.y_range,
+        "up": v.up,
+        "down": v.down,
+        "norm": norm,
+        "norm_note": p.norm_note,
+        "sides": {side: _side_json(c) for side, c in p.sides.items()},
+    }
+
+
+def _side_json(c: SideCurve) -> dict[str, object]:
+    return {
+        "n": c.n,
+        "mean_deg": rounded(c.mean_deg),
+        "sd_deg": rounded(c.sd_deg),
+        "foot_off_pct": c.foot_off_pct,
+        "foot_off_sd": c.foot_off_sd,
+    }

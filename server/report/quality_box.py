@@ -1,0 +1,110 @@
+"""Is the data good: the box above everything else, in words and a few numbers (clinic.md §7)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from server.report.bundle import Bundle
+from server.report.wording import number
+
+_METHODS: Final[Mapping[str, str]] = {
+    "walking_direction": "from standing and walking",
+    "gyro_pca": "from leg rotation",
+    "declared": "mounting as declared",
+    "neighbour": "guessed from neighbours",
+}
+
+
+@dataclass(frozen=True)
+class QualityItem:
+    """One fact: a text, or a count of strides per side; `kind` ok, warn or bad where it is a judgement."""
+
+    label: str
+    value: str = ""
+    extra: str = ""
+    kind: str | None = None
+    sides: bool = False
+    left: int = 0
+    left_of: int = 0
+    right: int = 0
+    right_of: int = 0
+
+
+@dataclass(frozen=True)
+class QualityBox:
+    """Verdict (`kind` ok, warn, bad and its word) and the facts behind it."""
+
+    kind: str
+    word: str
+    items: tuple[QualityItem, ...]
+
+
+def quality_box(bundle: Bundle) -> QualityBox:
+    """Judge a finished analysis.
+
+    Bad when the analysis stopped or no stride counts; warn when any notice is a warning; else ok.
+    """
+    severities = {n.severity for n in bundle.warnings}
+    if "error" in severities or not bundle.strides.used():
+        kind, word = "bad", "Not usable" if bundle.angles is None else "No strides"
+    elif "warning" in severities:
+        kind, word = "warn", "Read the notices"
+    else:
+        kind, word = "ok", "Good data"
+    items = [_strides(bundle), *_signals(bundle.quality), *_calibration(bundle.calibration)]
+    return QualityBox(kind, word, tuple(items))
+
+
+def _strides(bundle: Bundle) -> QualityItem:
+    left, right = ([s for s in bundle.strides.strides if s.side == side] for side in ("left", "right"))
+    return QualityItem(
+        "Strides used",
+        sides=True,
+        left=sum(s.excluded_reason is None for s in left),
+        left_of=len(left),
+        right=sum(s.excluded_reason is None for s in right),
+        right_of=len(right),
+    )
+
+
+def _signals(quality: Mapping[str, Any]) -> list[QualityItem]:
+    """Lost samples of the worst sensor, rest, magnetic field."""
+    items = []
+    sensors = [s for s in quality.get("sensors", ()) if isinstance(s, Mapping)]
+    lost = [(float(s["lost_pct"]), _sensor_name(s)) for s in sensors if s.get("lost_pct") is not None]
+    if lost:
+        worst, name = max(lost)
+        extra = "" if worst == 0 else f"at most, {name}"
+        items.append(QualityItem("Lost samples", f"{number(worst, 1)} %", extra))
+    rest = quality.get("rest_s")
+    if rest is not None:
+        total = sum(end - start for start, end in rest)
+        items.append(
+            QualityItem(
+                "Standing still", f"{number(total, 1)} s", f"{len(rest)} times" if len(rest) > 1 else ""
+            )
+        )
+    disturbed = [
+        float(s["magnetic_disturbed_pct"]) for s in sensors if s.get("magnetic_disturbed_pct") is not None
+    ]
+    if disturbed:
+        items.append(QualityItem("Magnetic field", f"{number(max(disturbed))} % disturbed", "not used"))
+    return items
+
+
+def _calibration(calibration: Mapping[str, Any] | None) -> list[QualityItem]:
+    if calibration is None:
+        return [QualityItem("Calibration", "not reached", kind="bad")]
+    scores = [float(s["score"]) for s in calibration["segments"].values() if s.get("score") is not None]
+    method = _METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
+    value = f"{number(100 * min(scores))}" if scores else method
+    items = [QualityItem("Calibration", value, f"/ 100, {method}" if scores else "")]
+    if calibration.get("angle_zero") is not None:
+        items.append(QualityItem("Angle zero", str(calibration["angle_zero"])))
+    return items
+
+
+def _sensor_name(sensor: Mapping[str, Any]) -> str:
+    return str(sensor.get("segment") or sensor.get("device_id") or "").replace("_", " ")

@@ -1,0 +1,69 @@
+"""CSV twins of what the page shows: the parameter table and the cycle curves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from core.parameters.kinematic import POINTS
+from server.report.exports import write_csv
+from server.report.model import ReportModel
+
+
+def parameters_csv(report: ReportModel) -> bytes:
+    """One row per parameter and side, numbers in full, norm where comparable, reason where no number."""
+    header = (
+        "name",
+        "side",
+        "n",
+        "mean",
+        "sd",
+        "unit",
+        "difference",
+        "norm_mean",
+        "norm_sd",
+        "norm_source",
+        "reason",
+    )
+
+    def rows() -> Iterator[Sequence[object]]:
+        for _, group in report.groups:
+            for r in group:
+                cells = (("", r.both),) if r.both is not None else (("left", r.left), ("right", r.right))
+                for side, c in cells:
+                    numbers = (0, None, None) if c is None else (c.n, c.value, c.sd)
+                    norm = (r.norm_mean, r.norm_sd, r.norm_source)
+                    yield (
+                        r.name,
+                        side,
+                        *numbers,
+                        r.unit,
+                        r.difference,
+                        *norm,
+                        r.reason if c is None else None,
+                    )
+
+    return write_csv(header, rows())
+
+
+def curves_csv(report: ReportModel) -> bytes:
+    """One row per variable, side and % of cycle: mean and sd over the counted strides, and the norm."""
+    header = ("variable", "side", "pct_cycle", "n", "mean_deg", "sd_deg", "norm_mean_deg", "norm_sd_deg")
+
+    def rows() -> Iterator[Sequence[object]]:
+        for p in report.panels:
+            for side, c in p.sides.items():
+                if c.mean_deg is None:
+                    continue
+                for i in range(POINTS):
+                    yield (
+                        p.variable.name,
+                        side,
+                        i,
+                        c.n,
+                        float(c.mean_deg[i]),
+                        None if c.sd_deg is None else float(c.sd_deg[i]),
+                        None if p.norm is None else float(p.norm.mean_deg[i]),
+                        None if p.norm is None else float(p.norm.sd_deg[i]),
+                    )
+
+    return write_csv(header, rows())

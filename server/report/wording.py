@@ -1,0 +1,198 @@
+"""How variables, parameters, reasons and differences are called in front of people (clinic.md §1, §7)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+Plane = Literal["sagittal", "frontal", "transverse"]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A joint angle over the gait cycle.
+
+    Parameters
+    ----------
+    label : title of its chart. y_range, ticks : degrees, fixed in all sessions (DESIGN.md §6.3).
+    up, down : words at the two ends of the axis.
+    """
+
+    name: str
+    label: str
+    plane: Plane
+    y_range: tuple[float, float]
+    ticks: tuple[float, ...]
+    up: str
+    down: str
+
+
+def _variable(
+    name: str, label: str, plane: Plane, limit: tuple[int, int], step: int, up: str, down: str
+) -> Variable:
+    low, high = limit
+    ticks = tuple(float(t) for t in range(-180, 181, step) if low <= t <= high)
+    return Variable(name, label, plane, (float(low), float(high)), ticks, up, down)
+
+
+VARIABLES: Final[tuple[Variable, ...]] = (
+    _variable("pelvis_tilt", "Pelvic tilt", "sagittal", (-25, 25), 10, "Anterior", "Posterior"),
+    _variable("pelvis_obliquity", "Pelvic obliquity", "frontal", (-25, 25), 10, "Side up", "Side down"),
+    _variable("pelvis_rotation", "Pelvic rotation", "transverse", (-25, 25), 10, "Forward", "Backward"),
+    _variable("hip_flexion", "Hip flexion", "sagittal", (-40, 60), 20, "Flexion", "Extension"),
+    _variable("hip_adduction", "Hip adduction", "frontal", (-25, 25), 10, "Adduction", "Abduction"),
+    _variable("hip_rotation", "Hip rotation", "transverse", (-30, 30), 15, "Internal", "External"),
+    _variable("knee_flexion", "Knee flexion", "sagittal", (-15, 75), 20, "Flexion", "Extension"),
+    _variable("knee_adduction", "Knee adduction", "frontal", (-25, 25), 10, "Adduction", "Abduction"),
+    _variable("knee_rotation", "Knee rotation", "transverse", (-30, 30), 15, "Internal", "External"),
+    _variable(
+        "ankle_dorsiflexion",
+        "Ankle dorsiflexion",
+        "sagittal",
+        (-40, 30),
+        10,
+        "Dorsiflexion",
+        "Plantarflexion",
+    ),
+    _variable("ankle_inversion", "Ankle inversion", "frontal", (-30, 30), 15, "Inversion", "Eversion"),
+    _variable("ankle_rotation", "Ankle rotation", "transverse", (-30, 30), 15, "Internal", "External"),
+)
+"""In reading order: pelvis, hip, knee, ankle; sagittal, frontal, transverse.
+
+Ranges are those of clinic.md §7, lower where an angle measured from standing goes lower than an anatomical one.
+"""
+
+
+Comparison = tuple[str, str]
+"""What the left side is when its value is larger, and when it is smaller."""
+
+_TIME: Final[Comparison] = ("longer", "shorter")
+_SIZE: Final[Comparison] = ("larger", "smaller")
+_FLEX: Final[Comparison] = ("more flexed", "straighter")
+_ANKLE: Final[Comparison] = ("more dorsiflexed", "more plantarflexed")
+_TOES: Final[Comparison] = ("toes higher", "toes lower")
+
+
+@dataclass(frozen=True)
+class Term:
+    """A parameter in the table.
+
+    Parameters
+    ----------
+    label, unit : as printed. digits : decimals of the value.
+    scale : fixed ends of its range bar. comparison : words for left against right.
+    """
+
+    label: str
+    unit: str
+    group: str
+    digits: int
+    scale: tuple[float, float]
+    comparison: Comparison
+
+
+_TIMING, _PHASES, _SUPPORT = "Timing", "Phases of the stride", "Support in seconds"
+_HIP_KNEE, _ANKLE_FOOT = "Hip and knee angles", "Ankle and foot angles"
+
+TERMS: Final[Mapping[str, Term]] = {
+    "cadence_spm": Term("Cadence", "steps/min", _TIMING, 0, (40, 150), _SIZE),
+    "stride_time_s": Term("Stride time", "s", _TIMING, 2, (0.7, 2.1), _TIME),
+    "step_time_s": Term("Step time", "s", _TIMING, 2, (0.3, 1.1), _TIME),
+    "stance_time_s": Term("Stance time", "s", _TIMING, 2, (0.4, 1.6), _TIME),
+    "swing_time_s": Term("Swing time", "s", _TIMING, 2, (0.2, 0.8), _TIME),
+    "stance_pct": Term("Stance", "%", _PHASES, 1, (50, 80), _TIME),
+    "swing_pct": Term("Swing", "%", _PHASES, 1, (20, 50), _TIME),
+    "double_support_pct": Term("Double support", "%", _PHASES, 1, (0, 55), _TIME),
+    "initial_double_support_pct": Term("Initial double support", "%", _PHASES, 1, (0, 30), _TIME),
+    "terminal_double_support_pct": Term("Terminal double support", "%", _PHASES, 1, (0, 30), _TIME),
+    "single_support_pct": Term("Single support", "%", _PHASES, 1, (15, 50), _TIME),
+    "hip_flexion_ic_deg": Term("Hip flexion at contact", "°", _HIP_KNEE, 1, (-10, 60), _FLEX),
+    "hip_flexion_min_deg": Term("Hip flexion, least", "°", _HIP_KNEE, 1, (-40, 30), _FLEX),
+    "hip_flexion_rom_deg": Term("Hip flexion range", "°", _HIP_KNEE, 1, (0, 70), _SIZE),
+    "knee_flexion_ic_deg": Term("Knee flexion at contact", "°", _HIP_KNEE, 1, (-20, 40), _FLEX),
+    "knee_flexion_max_loading_deg": Term("Knee flexion, loading peak", "°", _HIP_KNEE, 1, (-10, 50), _FLEX),
+    "knee_flexion_min_stance_deg": Term("Knee flexion, least in stance", "°", _HIP_KNEE, 1, (-20, 40), _FLEX),
+    "knee_flexion_max_swing_deg": Term("Knee flexion, swing peak", "°", _HIP_KNEE, 1, (10, 90), _FLEX),
+    "knee_flexion_rom_deg": Term("Knee flexion range", "°", _HIP_KNEE, 1, (0, 90), _SIZE),
+    "ankle_dorsiflexion_ic_deg": Term("Dorsiflexion at contact", "°", _ANKLE_FOOT, 1, (-30, 30), _ANKLE),
+    "ankle_dorsiflexion_max_stance_deg": Term(
+        "Dorsiflexion, stance peak", "°", _ANKLE_FOOT, 1, (-20, 40), _ANKLE
+    ),
+    "ankle_dorsiflexion_min_deg": Term("Dorsiflexion, least", "°", _ANKLE_FOOT, 1, (-50, 20), _ANKLE),
+    "ankle_dorsiflexion_max_swing_deg": Term(
+        "Dorsiflexion, swing peak", "°", _ANKLE_FOOT, 1, (-30, 30), _ANKLE
+    ),
+    "ankle_dorsiflexion_rom_deg": Term("Dorsiflexion range", "°", _ANKLE_FOOT, 1, (0, 60), _SIZE),
+    "foot_pitch_ic_deg": Term("Foot pitch at contact", "°", _ANKLE_FOOT, 1, (-30, 45), _TOES),
+    "foot_pitch_tc_deg": Term("Foot pitch at foot-off", "°", _ANKLE_FOOT, 1, (-90, 10), _TOES),
+    "double_support_s": Term("Double support", "s", _SUPPORT, 2, (0, 0.8), _TIME),
+    "initial_double_support_s": Term("Initial double support", "s", _SUPPORT, 2, (0, 0.4), _TIME),
+    "terminal_double_support_s": Term("Terminal double support", "s", _SUPPORT, 2, (0, 0.4), _TIME),
+    "single_support_s": Term("Single support", "s", _SUPPORT, 2, (0.2, 0.8), _TIME),
+}
+"""Parameter name → how the table shows it, in the order of the table."""
+
+ZERO_WORDS: Final[Mapping[str, str]] = {"standing": "from standing"}
+"""`angle_zero` → what is added to titles of angles."""
+
+REASONS: Final[Mapping[str, str]] = {
+    "no_strides": "not measured: no complete stride of this side",
+    "no_terminal_contact": "not measured: no foot-off was found",
+    "opposite_foot_missing": "not measured: needs sensors on both feet",
+    "no_double_support": "not measured: the feet were never on the floor together",
+    "joint_missing": "not measured: a segment of this joint carries no sensor",
+    "gap": "not measured: the sensor was lost in every stride",
+    "no_heading": "not measured: needs a heading reference shared by the sensors",
+    "not_reached": "not measured: the analysis stopped before this",
+}
+"""Reason code → words in place of a number."""
+
+EXCLUDED: Final[Mapping[str, str]] = {
+    "incomplete": "incomplete",
+    "turn": "in a turn",
+    "first": "first of a walk",
+    "last": "last of a walk",
+    "gap": "sensor lost",
+    "implausible_time": "implausible duration",
+    "outlier": "unlike the others",
+    "non_periodic": "not periodic",
+}
+"""Code of a stride left out → words."""
+
+NO_NORM: Final[Mapping[str, str]] = {
+    "no_norm_for_age": "No norm for this age: the reference people are adults.",
+    "no_speed_matched_norm": "No speed-matched norm: no adult reference exists below 0.8 m/s.",
+    "age_unknown": "No norm for timing: enter the year of birth.",
+    "sex_unknown": "No norm for timing: enter the sex.",
+}
+"""Why there is no reference at all."""
+
+
+def reason_words(code: str | None) -> str:
+    """Words for a missing number; a code without words shows itself."""
+    return "not measured" if code is None else REASONS.get(code, f"not measured: {code.replace('_', ' ')}")
+
+
+def excluded_words(code: str) -> str:
+    """Words for a stride left out; a therapist's own reason is shown as typed."""
+    return code.removeprefix("manual:").strip() if code.startswith("manual:") else EXCLUDED.get(code, code)
+
+
+def number(value: float, digits: int = 0) -> str:
+    """A number with a real minus sign and without a negative zero."""
+    text = f"{value:.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0 else text.replace("-", "−")
+
+
+def difference_words(left: float, right: float, term: Term) -> str:
+    """Left against right in words: "left longer by 0.04 s", "no difference" where the printed digits agree.
+
+    Angles are compared in whole degrees: tenths are far below what repeats between visits (clinic.md §2).
+    """
+    digits = 0 if term.unit == "°" else term.digits
+    shown = round(abs(left - right), digits)
+    if shown == 0:
+        return "no difference"
+    unit = {"%": " points", "°": "°"}.get(term.unit, f"\u202f{term.unit}")
+    return f"left {term.comparison[0 if left > right else 1]} by {number(shown, digits)}{unit}"

@@ -1,0 +1,181 @@
+"""The routes of the 3D replay: the viewer page, the pipe to its viser server, and the time cursor.
+
+    WS  /sessions/{sid}/replay?tab=…&dark=…   the time cursor; the page around owns the clock
+            sends {"t": seconds} or {"dark": true|false}
+            first answer {"view": id, "src": "/views/<id>/", "start_s", "duration_s"},
+            then {"t": shown, "valid": bool} for every {"t"}
+    GET /views/{view}/   viser's own client page, for an iframe
+    WS  /views/{view}    the pipe; the client finds it from its own address
+
+A view can be seen by the sign-in that opened it only.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import functools
+import json
+import math
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import viser
+from fastapi import APIRouter, FastAPI, Query, Request, WebSocket
+from fastapi.responses import HTMLResponse
+from starlette.websockets import WebSocketDisconnect
+
+from core.errors import SagittalError
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.problems import Problem, as_problem
+from server.report.bundle import read_poses
+from server.services import analyses
+from server.viewer.motion import Motion, prepare
+from server.viewer.pipe import POLICY_VIOLATION, Activity, carry, subprotocols_of, until_over, upstream
+from server.viewer.views import View, Views
+
+CONTENT_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; "
+    "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; connect-src 'self' data: blob:; "
+    "frame-ancestors 'self'"
+)
+"""What viser's single-file client needs, and nothing from elsewhere."""
+
+_HIDE_PANEL = "<style>.mantine-Paper-root,.mantine-Notifications-root{display:none!important}</style>"
+_GONE = 4404
+"""Close code: the view is not there (any more); the page around should connect again."""
+
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+
+
+@contextlib.asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    async with Views().running() as views:
+        app.state.views = views
+        yield
+
+
+router = APIRouter(lifespan=_lifespan, include_in_schema=False)
+
+
+@functools.cache
+def client_page() -> str:
+    """Viser's client page from its wheel, without the control panel, which has no switch of its own."""
+    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
+    head, found, body = page.partition("</head>")
+    if not found:
+        raise RuntimeError("viser's client page has no </head>; this version of viser is not supported.")
+    return f"{head}{_HIDE_PANEL}{found}{body}"
+
+
+@router.get("/views/{view_id}/", response_class=HTMLResponse)
+def page(view_id: str, who: Reader, request: Request) -> HTMLResponse:
+    """The document of the 3D view."""
+    if _views(request).find(view_id, who.login_id) is None:
+        raise Problem(404, "view_not_found", "This 3D view has ended. Reload the session page.")
+    return HTMLResponse(
+        client_page(), headers={"Content-Security-Policy": CONTENT_POLICY, "Cache-Control": "no-store"}
+    )
+
+
+@router.websocket("/views/{view_id}")
+async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
+    """Carry viser's messages."""
+    view = _views(ws).find(view_id, who.login_id)
+    if view is None:
+        await ws.accept(subprotocol=next(iter(subprotocols_of(ws)), None))
+        await ws.close(_GONE, "view_not_found")
+        return
+    with view.watched():
+        async with upstream(view.port, subprotocols_of(ws)) as up:
+            await ws.accept(subprotocol=up.subprotocol)
+            await carry(ws, up, functools.partial(ws.app.state.logins.is_open, who.login_id))
+
+
+@router.websocket("/sessions/{sid}/replay")
+async def replay(
+    ws: WebSocket, sid: str, who: Reader, tab: Annotated[str, Query(max_length=64)] = "", dark: bool = False
+) -> None:
+    """Open the view of this browser tab and let the page move its cursor."""
+    await ws.accept()
+    try:
+        view = await _open(ws, sid, who, tab, dark)
+    except (Problem, SagittalError) as error:
+        problem = as_problem(error)
+        await ws.send_json({"error": {"code": problem.code, "detail": problem.detail}})
+        await ws.close(_GONE, problem.code)
+        return
+    logins = ws.app.state.logins
+    with view.watched():
+        motion = view.figure.motion
+        await ws.send_json(
+            {
+                "view": view.id,
+                "src": f"/views/{view.id}/",
+                "start_s": float(motion.t_s[0]),
+                "duration_s": motion.duration_s,
+            }
+        )
+        cursor = asyncio.create_task(_follow(ws, view, Activity(lambda: logins.touch(who.login_id))))
+        over = asyncio.create_task(until_over(lambda: logins.is_open(who.login_id)))
+        await asyncio.wait((cursor, over), return_when=asyncio.FIRST_COMPLETED)
+        ended = over.done()
+        for task in (cursor, over):
+            task.cancel()
+        await asyncio.gather(cursor, over, return_exceptions=True)
+        if ended:
+            with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+                await ws.close(POLICY_VIOLATION, "not_signed_in")
+
+
+async def _open(ws: WebSocket, sid: str, who: Identity, tab: str, dark: bool) -> View:
+    db, blobs = ws.app.state.db, ws.app.state.blobs
+
+    def latest() -> analyses.Analysis | None:
+        with db.read() as c:
+            return analyses.latest(c, sid)
+
+    found = await asyncio.to_thread(latest)
+    if found is None or "poses.parquet" not in found.files:
+        raise Problem(404, "no_poses", "There is nothing to replay: no analysis has reached the poses yet.")
+
+    def load() -> Motion:
+        return prepare(read_poses(analyses.file_bytes(blobs, found, "poses.parquet")))
+
+    return await _views(ws).open(who.login_id, tab, found.id, load, dark)
+
+
+async def _follow(ws: WebSocket, view: View, activity: Activity) -> None:
+    """Pose the figure at every {"t"} and answer with what is shown."""
+    while True:
+        try:
+            message = await ws.receive_text()
+        except WebSocketDisconnect:
+            return
+        await ws.send_json(_act(view, message))
+        await activity.seen()
+
+
+def _act(view: View, text: str) -> dict[str, Any]:
+    try:
+        message = json.loads(text)
+    except ValueError:
+        message = None
+    if isinstance(message, dict):
+        t, dark = message.get("t"), message.get("dark")
+        if isinstance(t, (int, float)) and not isinstance(t, bool) and math.isfinite(t):
+            shown = view.figure.pose(float(t))
+            return {"t": shown, "valid": view.figure.is_valid(shown)}
+        if isinstance(dark, bool):
+            view.figure.set_dark(dark)
+            return {"dark": dark}
+    detail = 'Expected {"t": seconds} or {"dark": true or false}.'
+    return {"error": {"code": "bad_message", "detail": detail}}
+
+
+def _views(connection: Request | WebSocket) -> Views:
+    views: Views = connection.app.state.views
+    return views
