@@ -76,6 +76,25 @@ def run(
     return analysis_files(result)
 
 
+def inspect(files: Sequence[SourceFile], manifest: Mapping[str, Any] | None, progress: Progress) -> bytes:
+    """What is in the files, as JSON, before any mapping; only `sources` of the manifest is heeded.
+
+    Raises
+    ------
+    SagittalError
+        the files cannot be read; the code and the sentence say why.
+    """
+    from core import quality
+    from core.formats import read_recording
+    from core.formats.manifest import manifest_of
+
+    progress("reading", 0.0)
+    sources = (manifest or {}).get("sources")
+    take = read_recording(files, manifest_of({"sources": sources}) if sources else None)
+    progress("looking", 0.7)
+    return json.dumps(quality.describe(take), ensure_ascii=False, allow_nan=False).encode()
+
+
 def configured(defaults: Any, overrides: Mapping[str, Any], path: str = "config") -> Any:
     """Replace fields of nested frozen dataclasses; raises ParameterError unknown_parameter, bad_parameter."""
     names = {f.name for f in dataclasses.fields(defaults)}
@@ -116,7 +135,7 @@ def submit(
     """Ask for an analysis of the current recording with its manifest as last set.
 
     Height and protocol of the session (or the patient) fill in what the manifest leaves open. The same files,
-    mapping, parameters and version are analysed once; after a failure or another mapping they are analysed again.
+    mapping, parameters and version are analysed once; after a failure or another mapping, again.
 
     Raises
     ------

@@ -20,7 +20,7 @@ from server.storage.tables import analysis, analysis_file, job, patient, recordi
 def erase_patient(
     db: Database, blobs: BlobStore, actor: audit.Actor | None, patient_id: str, *, confirm: str
 ) -> None:
-    """Erase a patient with everything; `confirm` repeats the code; raises NotFound, Conflict not_confirmed."""
+    """Erase a patient with everything; `confirm` repeats the code, else Conflict not_confirmed."""
     with db.write() as c:
         found = patients.get(c, patient_id)
         if confirm.strip() != found.code:

@@ -140,6 +140,13 @@ def inspect(c: Connection, queue: JobQueue, actor: audit.Actor | None, session_i
     return view
 
 
+def publish_inspection(c: Connection, recording_id: str, input_sha256: str, found: Mapping[str, Any]) -> None:
+    """Keep what was found; raises Conflict files_changed when the set is no longer the one that was read."""
+    if get(c, recording_id).input_sha256 != input_sha256:
+        raise Conflict("files_changed", "Files were added or removed meanwhile; the new set is looked at.")
+    c.execute(update(recording).where(recording.c.id == recording_id).values(inspection=dict(found)))
+
+
 def require_current(c: Connection, session_id: str) -> Recording:
     """The current recording with at least one file; raises Conflict no_files."""
     this = current(c, session_id)

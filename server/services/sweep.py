@@ -1,8 +1,8 @@
 """Removing stored files that no row refers to: cut uploads, results of lost claims, replaced files.
 
 A file may be young because somebody is about to refer to it, so only files older than a grace time go. They
-go while the write lock is held: a publisher either has committed (the reference is seen) or will find its file
-gone in its own transaction (BlobStore.require) and fail cleanly.
+go while the write lock is held: a publisher either has committed (the reference is seen) or will find its
+file gone in its own transaction (BlobStore.require) and fail cleanly.
 """
 
 from __future__ import annotations

@@ -48,6 +48,13 @@ class StoredFile:
     path: Path
     age_s: float
 
+    def is_older(self, age_s: float) -> bool:
+        """Look again: nobody has written it anew since it was found."""
+        try:
+            return time.time() - self.path.stat().st_mtime >= age_s
+        except FileNotFoundError:
+            return False
+
 
 class BlobStore:
     """The folder of all blobs.

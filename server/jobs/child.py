@@ -1,0 +1,79 @@
+"""The computing process: warm, killable, limited in memory, without a connection to the database.
+
+Started by server/jobs/runner.py as `python -m server.jobs.child <socket> <parent pid>`.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import resource
+import sys
+from multiprocessing.connection import Connection
+
+from core.errors import SagittalError
+from core.formats.source import SourceFile
+from server.jobs.lifeline import die_with, when_parent_ends
+from server.jobs.messages import Failure, Input, Order, Ready, Result, Stage, decode_order, encode
+from server.jobs.task import TASKS, load
+from server.settings import load_settings
+from server.storage.blobs import BlobStore
+
+log = logging.getLogger(__name__)
+
+
+def main() -> None:
+    """Answer orders until the worker closes the socket."""
+    line = Connection(int(sys.argv[1]))
+    die_with(int(sys.argv[2]))
+    when_parent_ends(lambda: os._exit(1))
+    logging.basicConfig(level=logging.INFO)
+    settings = load_settings()
+    if settings.child_memory_bytes:
+        limit = settings.child_memory_bytes
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    load(settings.task_modules)
+    for task in TASKS.values():
+        task.warm()
+    store = BlobStore(settings.blobs)
+    line.send_bytes(encode(Ready()))
+    while True:
+        try:
+            order = decode_order(line.recv_bytes())
+        except EOFError:
+            return
+        line.send_bytes(encode(compute(order, store, line)))
+
+
+def compute(order: Order, store: BlobStore, line: Connection) -> Result | Failure:
+    """Carry out one order; whatever goes wrong is an answer, never the end of the process."""
+    try:
+        files = [source(store, order.space, file) for file in order.files]
+        progress = lambda stage, share: line.send_bytes(encode(Stage(stage, float(share))))  # noqa: E731
+        return Result(TASKS[order.kind].run(files, order.params, progress))
+    except SagittalError as error:
+        return Failure(error.code, error.message)
+    except MemoryError:
+        return Failure(
+            "out_of_memory",
+            "The recording needs more memory than one analysis may use. Analyse a shorter part of it, or ask "
+            "the administrator (SAGITTAL_CHILD_MEMORY_BYTES).",
+        )
+    except Exception:
+        log.exception("job of kind %s failed unexpectedly", order.kind)
+        return Failure(
+            "internal_error",
+            "The analysis stopped on an error of the program, not of the recording. "
+            "The server's log has the details; please report it.",
+        )
+
+
+def source(store: BlobStore, space: str | None, file: Input) -> SourceFile:
+    """A blob as a source, read and verified when somebody needs it."""
+    if space is None:
+        raise ValueError("An order with files names the space they lie in.")
+    return SourceFile(file.name, file.size, lambda: store.read(space, file.sha256))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,58 @@
+"""What worker and child say to each other: MessagePack over a socket pair.
+
+Not pickle: the child reads files from outside, and who got hold of it must not get hold of the worker too.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+
+class Input(msgspec.Struct, frozen=True, tag=True):
+    """One file of the job, read by the child from the blob store."""
+
+    name: str
+    size: int
+    sha256: str
+
+
+class Order(msgspec.Struct, frozen=True, tag=True):
+    """Worker to child: compute this."""
+
+    kind: str
+    space: str | None
+    files: list[Input]
+    params: dict[str, Any]
+
+
+class Ready(msgspec.Struct, frozen=True, tag=True):
+    """Child to worker: everything is imported and compiled."""
+
+
+class Stage(msgspec.Struct, frozen=True, tag=True):
+    """Child to worker: a stage starts."""
+
+    name: str
+    fraction: float
+
+
+class Result(msgspec.Struct, frozen=True, tag=True):
+    """Child to worker: the result files."""
+
+    files: dict[str, bytes]
+
+
+class Failure(msgspec.Struct, frozen=True, tag=True):
+    """Child to worker: nothing came out, and why."""
+
+    code: str
+    message: str
+
+
+Reply = Ready | Stage | Result | Failure
+
+encode = msgspec.msgpack.encode
+decode_order = msgspec.msgpack.Decoder(Order).decode
+decode_reply = msgspec.msgpack.Decoder(Reply).decode

@@ -1,0 +1,89 @@
+"""The worker processes of `sagittal serve`: started, replaced when they die, ended with the server.
+
+workers = Workers(settings); workers.start(); ...; workers.stop()
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import subprocess
+import sys
+import threading
+import time
+
+from server.jobs.runner import environment
+from server.settings import Settings
+
+log = logging.getLogger(__name__)
+
+LOOK_S = 0.2
+"""Pause between two looks whether all workers live."""
+RESTART_S = 1.0
+"""A worker that has just been started is not replaced more often than this."""
+GRACE_S = 5.0
+"""Time a worker has to give its job back before it is killed."""
+
+
+class Workers:
+    """As many worker processes as settings.workers says."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._stop = threading.Event()
+        self._processes: list[subprocess.Popen[bytes]] = []
+        self._thread = threading.Thread(target=self._watch, name="workers", daemon=True)
+
+    def start(self) -> None:
+        """Start all; returns at once, they get warm by themselves."""
+        self._processes = [self._spawn() for _ in range(self._settings.workers)]
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Let each give its job back, and wait until all are gone."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        for process in self._processes:
+            process.terminate()
+        limit = time.monotonic() + GRACE_S
+        for process in self._processes:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(max(limit - time.monotonic(), 0.1))
+            _close(process)
+
+    @property
+    def pids(self) -> list[int]:
+        """Process ids of the workers that live."""
+        return [p.pid for p in self._processes if p.poll() is None]
+
+    @property
+    def healthy(self) -> bool:
+        """Whether every worker lives."""
+        return len(self.pids) == self._settings.workers
+
+    def _spawn(self) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "server.jobs.worker"]
+        env = environment(self._settings)
+        return subprocess.Popen(command, env=env, stdin=subprocess.PIPE)  # noqa: S603 - our own module
+
+    def _watch(self) -> None:
+        began = time.monotonic()
+        while not self._stop.wait(LOOK_S):
+            for i, process in enumerate(self._processes):
+                if process.poll() is None:
+                    continue
+                log.warning(
+                    "worker %d ended with status %d; starting another", process.pid, process.returncode
+                )
+                _close(process)
+                self._stop.wait(max(0.0, began + RESTART_S - time.monotonic()))
+                began = time.monotonic()
+                self._processes[i] = self._spawn()
+
+
+def _close(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.wait()
+    if process.stdin:
+        process.stdin.close()

@@ -1,0 +1,60 @@
+"""A kind of job: what the child computes, and how the worker publishes what came out."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from sqlalchemy import Connection
+
+from server.jobs.queue import Claim
+from server.storage.blobs import Blob
+
+if TYPE_CHECKING:
+    from core.formats.source import SourceFile
+
+Progress = Callable[[str, float], None]
+"""Called by the computation with its stage and the share of the work done, 0 to 1."""
+
+
+def _nothing() -> None:
+    """Nothing to warm."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One kind of job.
+
+    Parameters
+    ----------
+    run : in the child: (files, params of the job, progress) → result files; raises SagittalError with a reason.
+    publish : in the worker, inside the transaction that marks the job done: (connection, claim, result files,
+        the same as blobs). It may raise SagittalError: then the job fails and nothing is written.
+    keeps_files : whether the result files are stored as blobs before the transaction.
+    warm : imports and compiles what `run` needs, once per child.
+    """
+
+    kind: str
+    run: Callable[[Sequence[SourceFile], Mapping[str, Any], Progress], dict[str, bytes]]
+    publish: Callable[[Connection, Claim, Mapping[str, bytes], Mapping[str, Blob]], None]
+    keeps_files: bool
+    warm: Callable[[], None] = _nothing
+
+
+TASKS: dict[str, Task] = {}
+"""Kind → task; filled by the modules that settings.task_modules names."""
+
+
+def register(task: Task) -> Task:
+    """Add a kind; the same kind twice is a mistake."""
+    if TASKS.setdefault(task.kind, task) is not task:
+        raise ValueError(f"Two tasks are named {task.kind}.")
+    return task
+
+
+def load(modules: Iterable[str]) -> None:
+    """Import the modules that register kinds."""
+    for module in modules:
+        importlib.import_module(module)

@@ -1,0 +1,50 @@
+"""The two kinds of job of this version: look into a recording, and analyse it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from sqlalchemy import Connection
+
+from server.jobs.queue import Claim
+from server.jobs.task import Progress, Task, register
+from server.services import analyses, recordings
+from server.storage.blobs import Blob
+
+if TYPE_CHECKING:
+    from core.formats.source import SourceFile
+
+FOUND = "inspection.json"
+
+
+def _inspect(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progress) -> dict[str, bytes]:
+    return {FOUND: analyses.inspect(files, params["manifest"], progress)}
+
+
+def _publish_inspection(
+    c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
+) -> None:
+    found = json.loads(files[FOUND])
+    recordings.publish_inspection(c, str(claim.recording_id), claim.params["input_sha256"], found)
+
+
+def _analyse(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progress) -> dict[str, bytes]:
+    manifest = json.dumps(params["manifest"], ensure_ascii=False).encode()
+    return analyses.run(files, manifest, params["config"], progress)
+
+
+def _publish_analysis(
+    c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
+) -> None:
+    analyses.publish(c, claim, blobs)
+
+
+def _warm() -> None:
+    """Import the readers and the pipeline; numba loads its compiled kernels from the cache at the first call."""
+    import server.report.exports  # noqa: F401
+
+
+register(Task(recordings.INSPECT, _inspect, _publish_inspection, keeps_files=False))
+register(Task(recordings.ANALYSE, _analyse, _publish_analysis, keeps_files=True, warm=_warm))
