@@ -1,9 +1,11 @@
 """Tilt and turn of one sensor: the explicit complementary filter, six axes, gyro bias already removed.
 
-Mahony, Hamel and Pflimlin 2008 (IEEE TAC 53(5)), eq 32 with k_I = 0: q̇ = ½ q ⊗ (ω + k_P e), e = a × â, where a
-is the unit specific force and â = R(q)ᵀ e₃ the predicted vertical. The integral term is left out because without
-a magnetometer the bias about the vertical is unobservable and runs away (spec/fusion.md §4.6, rule i); the
-bias is the mean over rest instead. Heading is arbitrary and only as good as the gyroscope.
+Mahony, Hamel and Pflimlin 2008 (IEEE TAC 53(5)), eq 32 with k_I = 0: q̇ = ½ q ⊗ (ω + k_P e), e = a × â, where â =
+R(q)ᵀ e₃ is the predicted vertical and a the specific force. Two differences, both for walking:
+- a is divided by its norm at rest, not by its own (spec/fusion.md §1, Eq 31). Over a stride the horizontal
+  acceleration averages to zero; divided by its own norm it does not and pulls the vertical aside.
+- the integral term is left out: without a magnetometer the bias about the vertical is unobservable and runs away
+  (spec/fusion.md §4.6, rule i). The bias is the mean over rest. Heading is only as good as the gyroscope.
 
 The module sits beside core/rest.py because calibration needs tilt to find the walking direction and fusion
 needs it for the result; both run this one filter.
@@ -58,7 +60,15 @@ class AttitudeState:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _advance(
-    gyr: Floats, acc: Floats, valid: Bools, dt: float, kp: float, relearn_s: float, x: Floats, out: Floats
+    gyr: Floats,
+    acc: Floats,
+    valid: Bools,
+    dt: float,
+    rest_norm: float,
+    kp: float,
+    relearn_s: float,
+    x: Floats,
+    out: Floats,
 ) -> None:
     """Advance the state x = (q, rate, age, lost) over a block and write q (n, 4)."""
     w, i, j, k = x[0], x[1], x[2], x[3]
@@ -103,20 +113,18 @@ def _advance(
             else:
                 age = np.inf
         ax, ay, az = acc[n, 0], acc[n, 1], acc[n, 2]
-        norm = np.sqrt(ax * ax + ay * ay + az * az)
-        if norm > 1.0:
-            # below 1 m/s² a sensor falls freely and shows no vertical (spec/fusion.md §4.1: 0.1 g)
-            g = 0.5 * dt * gain / norm
-            vx = 2.0 * (i * k - w * j)
-            vy = 2.0 * (j * k + w * i)
-            vz = w * w - i * i - j * j + k * k
-            ex, ey, ez = g * (ay * vz - az * vy), g * (az * vx - ax * vz), g * (ax * vy - ay * vx)
-            w, i, j, k = (
-                w - i * ex - j * ey - k * ez,
-                i + w * ex + j * ez - k * ey,
-                j + w * ey - i * ez + k * ex,
-                k + w * ez + i * ey - j * ex,
-            )
+        # e = a × â turns the estimated vertical â towards the measured a
+        g = 0.5 * dt * gain / rest_norm
+        vx = 2.0 * (i * k - w * j)
+        vy = 2.0 * (j * k + w * i)
+        vz = w * w - i * i - j * j + k * k
+        ex, ey, ez = g * (ay * vz - az * vy), g * (az * vx - ax * vz), g * (ax * vy - ay * vx)
+        w, i, j, k = (
+            w - i * ex - j * ey - k * ez,
+            i + w * ex + j * ez - k * ey,
+            j + w * ey - i * ez + k * ex,
+            k + w * ez + i * ey - j * ex,
+        )
         r = 1.0 / np.sqrt(w * w + i * i + j * j + k * k)
         w, i, j, k = w * r, i * r, j * r, k * r
         out[n, 0], out[n, 1], out[n, 2], out[n, 3] = w, i, j, k
@@ -124,7 +132,7 @@ def _advance(
 
 
 def advance(
-    state: AttitudeState, gyr: Floats, acc: Floats, valid: Bools, rate_hz: float, params: AttitudeParams
+    state: AttitudeState, gyr: Floats, acc: Floats, valid: Bools, rate_hz: float, rest_norm: float, params: AttitudeParams
 ) -> tuple[Floats, AttitudeState]:
     """Run the filter over a block of samples.
 
@@ -144,7 +152,7 @@ def advance(
     gyr, acc = np.ascontiguousarray(gyr, np.float64), np.ascontiguousarray(acc, np.float64)
     x = np.array([*state.q, *state.rate, state.age_s, state.lost_s], np.float64)
     out = np.empty((len(gyr), 4))
-    _advance(gyr, acc, np.ascontiguousarray(valid), 1.0 / rate_hz, params.kp, params.relearn_s, x, out)
+    _advance(gyr, acc, np.ascontiguousarray(valid), 1.0 / rate_hz, rest_norm, params.kp, params.relearn_s, x, out)
     if not np.isfinite(x[:7]).all():
         raise EstimationError(
             "filter_diverged",
@@ -154,7 +162,7 @@ def advance(
 
 
 def orientation(
-    q_rest: Floats, at: int, gyr: Floats, acc: Floats, valid: Bools, rate_hz: float, params: AttitudeParams
+    q_rest: Floats, at: int, gyr: Floats, acc: Floats, valid: Bools, rate_hz: float, rest_norm: float, params: AttitudeParams
 ) -> Floats:
     """Orientation (n, 4) of a whole take from a known orientation at one sample, without phase lag.
 
@@ -166,7 +174,7 @@ def orientation(
 
     def run(q0: Floats, part: slice) -> Floats:
         w = gyr[part] if part.step is None else -gyr[part]
-        stepped, _ = advance(AttitudeState(q0, w[0]), w[1:], acc[part][1:], valid[part][1:], rate_hz, params)
+        stepped, _ = advance(AttitudeState(q0, w[0]), w[1:], acc[part][1:], valid[part][1:], rate_hz, rest_norm, params)
         return np.concatenate((q0[None], stepped))
 
     last = run(q_rest, slice(at, None))[-1]
@@ -179,4 +187,4 @@ def warm() -> None:
     """Compile or load the kernel, so that the first recording does not wait for it."""
     state = AttitudeState(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3))
     up = np.tile([0.0, 0.0, 9.81], (2, 1))
-    advance(state, np.zeros((2, 3)), up, np.ones(2, bool), 100.0, AttitudeParams())
+    advance(state, np.zeros((2, 3)), up, np.ones(2, bool), 100.0, 9.81, AttitudeParams())

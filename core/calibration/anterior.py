@@ -164,7 +164,7 @@ def _by_walking(
     start = start_direction(a, walk.rest, walk.parts[0], walk.bearing[0], walk.leads, walk.rate_hz, params)
     if start is not None:
         angle = nearest_sign(axis.angle, start.angle)
-        facts |= {"source": "acceleration", "sign": "velocity"}
+        facts |= {"source": "acceleration", "sign": "velocity", "start_rad": difference(start.angle, angle)}
         return Anterior(
             angle,
             "walking_direction",

@@ -128,7 +128,9 @@ def _rest_world(
     at = round(0.5 * (zero[0] + zero[1]) * recording.rate_hz)
     q_rest = from_matrix(R_NEUTRAL @ vertical_frame(standing.up))
     gyr = signals.gyr - standing.gyro_bias
-    return orientation(q_rest, at, gyr, signals.acc, signals.valid, recording.rate_hz, params)
+    return orientation(
+        q_rest, at, gyr, signals.acc, signals.valid, recording.rate_hz, standing.rest_norm, params
+    )
 
 
 def _walk(

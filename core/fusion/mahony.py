@@ -78,9 +78,8 @@ def segment_orientation(
     """Orientation (n, 4) of one segment in W, from standing to both ends of the take."""
     start = from_matrix(R_NEUTRAL @ mounted.R_segment_sensor)
     at = min(round(0.5 * (zero[0] + zero[1]) * rate_hz), len(signals.acc) - 1)
-    sensor = orientation(
-        start, at, signals.gyr - mounted.gyro_bias, signals.acc, signals.valid, rate_hz, params
-    )
+    gyr = signals.gyr - mounted.gyro_bias
+    sensor = orientation(start, at, gyr, signals.acc, signals.valid, rate_hz, mounted.rest_norm, params)
     return multiply(sensor, conjugate(from_matrix(mounted.R_segment_sensor)))
 
 
