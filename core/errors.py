@@ -96,3 +96,13 @@ class Notice:
     sensor: str | None = None
     t_s: float | None = None
     severity: Severity = "warning"
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values for the wire."""
+        return {
+            "code": self.code,
+            "message": self.message,
+            "sensor": self.sensor,
+            "t_s": self.t_s,
+            "severity": self.severity,
+        }

@@ -1,0 +1,20 @@
+"""Can these signals be trusted? What was found (before mapping), how good it is, who wears what."""
+
+from __future__ import annotations
+
+from core.quality.assessment import QualityParams, QualityReport, SensorQuality, assess
+from core.quality.inspection import DeviceFacts, Inspection, describe
+from core.quality.suggestion import Suggestion, suggest, suggest_segments
+
+__all__ = [
+    "DeviceFacts",
+    "Inspection",
+    "QualityParams",
+    "QualityReport",
+    "SensorQuality",
+    "Suggestion",
+    "assess",
+    "describe",
+    "suggest",
+    "suggest_segments",
+]

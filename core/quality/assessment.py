@@ -1,0 +1,307 @@
+"""How good a take is on its common axis: per sensor figures, warnings and one overall level with reasons."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+
+from core.errors import Notice
+from core.frames import GRAVITY, Segment
+from core.quality.inspection import losses
+from core.quality.signals import facts, magnetic_share, saturation
+from core.quality.suspicion import suspicions
+from core.recording import Recording, SensorSignals, UniformRecording
+from core.rest import RestParams, Window, rest_windows, runs, samples
+
+Level = Literal["good", "usable", "poor"]
+
+
+@dataclass(frozen=True)
+class QualityParams:
+    """Limits of the report.
+
+    Parameters
+    ----------
+    saturated : share of samples at range (spec/fusion.md §9). magnetic : |m| off its rest norm, and
+    magnetic_share : of samples that are (spec/fusion.md §4.6).
+    invalid_usable, invalid_poor : share of the take without data of a sensor [our choice].
+    interpolated : share that was filled [our choice].
+    acc_floor, gyr_floor : m/s², rad/s below which nothing can be at its range (±2 g, ±250 °/s: the narrowest
+    that wearables are set to).
+    """
+
+    saturated: float = 0.001
+    magnetic: float = 0.10
+    magnetic_share: float = 0.10
+    invalid_usable: float = 0.01
+    invalid_poor: float = 0.20
+    interpolated: float = 0.02
+    acc_floor: float = 1.9 * GRAVITY
+    gyr_floor: float = float(np.radians(245.0))
+    rest: RestParams = field(default_factory=RestParams)
+
+
+@dataclass(frozen=True)
+class SensorQuality:
+    """One sensor of the take; percentages 0 to 100, SI units.
+
+    Parameters
+    ----------
+    rest_norm : median |acc| over the rest windows, m/s²; gravity_scale : that / 9.80665. None without rest.
+    gyro_bias : norm of the mean rate at rest, rad/s. magnetic_pct : None without magnetometer or rest.
+    saturated_at : value of the plateau or None.
+    """
+
+    segment: Segment
+    device_id: str
+    source: str
+    rate_hz: float
+    lost_pct: float
+    longest_gap_s: float
+    gaps: int
+    interpolated_pct: float
+    invalid_pct: float
+    rest_norm: float | None
+    gravity_scale: float | None
+    gyro_bias: float | None
+    acc_saturated_pct: float
+    gyr_saturated_pct: float
+    magnetic_pct: float | None
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values; what is not defined is None."""
+        return {
+            "segment": self.segment,
+            "device_id": self.device_id,
+            "source": self.source,
+            "rate_hz": round(self.rate_hz, 3),
+            "lost_pct": round(self.lost_pct, 3),
+            "longest_gap_s": round(self.longest_gap_s, 3),
+            "gaps": self.gaps,
+            "interpolated_pct": round(self.interpolated_pct, 3),
+            "invalid_pct": round(self.invalid_pct, 3),
+            "rest_norm_mps2": _rounded(self.rest_norm, 4),
+            "gravity_scale": _rounded(self.gravity_scale, 5),
+            "gyro_bias_rad_s": _rounded(self.gyro_bias, 6),
+            "acc_saturated_pct": round(self.acc_saturated_pct, 3),
+            "gyr_saturated_pct": round(self.gyr_saturated_pct, 3),
+            "magnetic_pct": _rounded(self.magnetic_pct, 2),
+        }
+
+
+@dataclass(frozen=True)
+class QualityReport:
+    """What travels with the results.
+
+    Parameters
+    ----------
+    level : good, usable or poor; `reasons` says why it is not good.
+    rest : windows in which all sensors are at rest.
+    notices : an error among them means that numbers would be wrong: the analysis stops.
+    """
+
+    level: Level
+    reasons: tuple[str, ...]
+    duration_s: float
+    rate_hz: float
+    sensors: Mapping[Segment, SensorQuality]
+    rest: tuple[Window, ...]
+    notices: tuple[Notice, ...]
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values for analysis.json and the quality box."""
+        return {
+            "level": self.level,
+            "reasons": list(self.reasons),
+            "duration_s": round(self.duration_s, 3),
+            "rate_hz": round(self.rate_hz, 3),
+            "sensors": [s.to_json() for s in self.sensors.values()],
+            "rest_s": [[round(a, 3), round(b, 3)] for a, b in self.rest],
+            "notices": [n.to_json() for n in self.notices],
+        }
+
+
+def assess(
+    recording: Recording, uniform: UniformRecording, params: QualityParams | None = None
+) -> QualityReport:
+    """Judge the sensors that are worn on a segment.
+
+    Parameters
+    ----------
+    recording : as read; units, signs and losses are judged on the original samples.
+    uniform : the same take on its axis.
+    """
+    params = params or QualityParams()
+    rest = rest_windows(uniform, params.rest)
+    sensors: dict[Segment, SensorQuality] = {}
+    notices: list[Notice] = [n for n in (*recording.notices, *uniform.notices) if n.severity == "error"]
+    if not rest:
+        notices.append(
+            Notice(
+                "no_rest",
+                "The sensors are never at rest together for 1 s; gyroscope bias and standing posture need "
+                "it. "
+                "Ask the person to stand still for 3 to 5 s at the start.",
+            )
+        )
+    for segment, signals in uniform.sensors.items():
+        quality, found = _sensor(segment, signals, recording, uniform, rest, params)
+        sensors[segment] = quality
+        notices += found
+    notices += _copies(recording)
+    level, reasons = _level(sensors, [*uniform.notices, *notices], params)
+    return QualityReport(
+        level=level,
+        reasons=reasons,
+        duration_s=len(uniform.t_s) / uniform.rate_hz,
+        rate_hz=uniform.rate_hz,
+        sensors=MappingProxyType(sensors),
+        rest=rest,
+        notices=tuple(dict.fromkeys(notices)),
+    )
+
+
+def _sensor(
+    segment: Segment,
+    signals: SensorSignals,
+    recording: Recording,
+    uniform: UniformRecording,
+    rest: tuple[Window, ...],
+    params: QualityParams,
+) -> tuple[SensorQuality, list[Notice]]:
+    stream = recording.streams[signals.device_id]
+    f = facts(stream.acc, stream.gyr, stream.rate_hz)
+    notices = suspicions(signals.device_id, f, stream.acc, stream.quat)
+    lost, longest = losses(stream)
+    gaps = runs(~signals.valid | signals.interpolated)
+    at_rest = np.zeros(len(uniform.t_s), np.bool_)
+    for window in rest:
+        at_rest[samples(window, uniform.rate_hz)] = True
+    at_rest &= signals.valid
+    norm = bias = None
+    if at_rest.any():
+        norm = float(np.median(np.linalg.norm(signals.acc[at_rest], axis=1)))
+        bias = float(np.linalg.norm(signals.gyr[at_rest].mean(axis=0)))
+    invalid = float(np.mean(~signals.valid))
+    notices += _gap_notice(segment, signals, uniform, invalid, params)
+    acc_share, acc_top = saturation(stream.acc, params.acc_floor)
+    gyr_share, gyr_top = saturation(stream.gyr, params.gyr_floor) if stream.gyr is not None else (0.0, None)
+    notices += _saturated(segment, "acceleration", acc_share, acc_top, "m/s²", params)
+    notices += _saturated(segment, "angular rate", gyr_share, gyr_top, "rad/s", params)
+    magnetic = (
+        None
+        if stream.mag is None or not f.still
+        else magnetic_share(stream.mag, f.still_slice, params.magnetic)
+    )
+    if magnetic is not None and magnetic > params.magnetic_share:
+        notices.append(
+            Notice(
+                "magnetic_disturbed",
+                f"The magnetic field at {segment} is off its value at rest in {100 * magnetic:.0f} % of "
+                "the samples "
+                f"(limit {100 * params.magnetic_share:.0f} %); the magnetometer is not used for joint "
+                "angles.",
+                segment,
+                severity="info",
+            )
+        )
+    quality = SensorQuality(
+        segment=segment,
+        device_id=signals.device_id,
+        source=stream.source,
+        rate_hz=stream.rate_hz,
+        lost_pct=100 * lost,
+        longest_gap_s=longest,
+        gaps=len(gaps),
+        interpolated_pct=100 * float(np.mean(signals.interpolated)),
+        invalid_pct=100 * invalid,
+        rest_norm=norm,
+        gravity_scale=None if norm is None else norm / GRAVITY,
+        gyro_bias=bias,
+        acc_saturated_pct=100 * acc_share,
+        gyr_saturated_pct=100 * gyr_share,
+        magnetic_pct=None if magnetic is None else 100 * magnetic,
+    )
+    return quality, notices
+
+
+def _gap_notice(
+    segment: Segment, signals: SensorSignals, uniform: UniformRecording, invalid: float, params: QualityParams
+) -> list[Notice]:
+    holes = runs(~signals.valid)
+    if not holes:
+        return []
+    start, end = max(holes, key=lambda h: h[1] - h[0])
+    return [
+        Notice(
+            "gap",
+            f"{segment} has no data in {len(holes)} stretch(es) longer than 0.1 s, {100 * invalid:.1f} % "
+            "of the take; "
+            f"the longest is {(end - start) / uniform.rate_hz:.2f} s. Strides that touch them are left out.",
+            segment,
+            start / uniform.rate_hz,
+            severity="warning" if invalid > params.invalid_usable else "info",
+        )
+    ]
+
+
+def _saturated(
+    segment: Segment, what: str, share: float, top: float | None, unit: str, params: QualityParams
+) -> list[Notice]:
+    if top is None:
+        return []
+    return [
+        Notice(
+            "saturated",
+            f"The {what} of {segment} stays at {top:.1f} {unit} in {100 * share:.2f} % of the samples (limit "
+            f"{100 * params.saturated:.1f} %): its range is too small for this movement. Set a wider range.",
+            segment,
+            severity="warning" if share > params.saturated else "info",
+        )
+    ]
+
+
+def _copies(recording: Recording) -> list[Notice]:
+    """A stream under a second id that nobody mapped: said, not analysed."""
+    worn = {d for d, s in recording.segments.items() if s is not None}
+    by_digest: dict[str, list[str]] = {}
+    for device, stream in recording.streams.items():
+        by_digest.setdefault(stream.digest, []).append(device)
+    found = []
+    for group in by_digest.values():
+        if len(group) < 2:
+            continue
+        used = [d for d in group if d in worn]
+        which = f"only {used[0]} is analysed" if used else "none of them is analysed"
+        found.append(
+            Notice(
+                "duplicate_stream",
+                f"Sensors {' and '.join(group)} hold identical samples (a copy under another id); {which}.",
+                used[0] if used else group[0],
+                severity="info",
+            )
+        )
+    return found
+
+
+def _level(
+    sensors: Mapping[Segment, SensorQuality], notices: list[Notice], params: QualityParams
+) -> tuple[Level, tuple[str, ...]]:
+    """Poor: wrong or missing signals; usable: something to keep in mind; good: nothing."""
+    poor = [n.message for n in notices if n.severity == "error" or n.code == "no_rest"]
+    usable = [n.message for n in notices if n.severity == "warning" and n.code != "no_rest"]
+    for s in sensors.values():
+        if s.invalid_pct > 100 * params.invalid_poor:
+            poor.append(f"{s.segment} has no data in {s.invalid_pct:.0f} % of the take.")
+        if s.interpolated_pct > 100 * params.interpolated:
+            usable.append(f"{s.interpolated_pct:.1f} % of the samples of {s.segment} are interpolated.")
+    level: Level = "poor" if poor else "usable" if usable else "good"
+    return level, tuple(dict.fromkeys([*poor, *usable]))
+
+
+def _rounded(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(value, digits)

@@ -1,0 +1,186 @@
+"""What we found in an upload, before anybody said which sensor is worn where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.errors import Notice
+from core.frames import Segment
+from core.quality.signals import facts
+from core.quality.suggestion import suggest
+from core.quality.suspicion import suspicions
+from core.recording import ImuStream, Recording
+
+
+@dataclass(frozen=True)
+class DeviceFacts:
+    """One sensor as found.
+
+    Parameters
+    ----------
+    samples : rows with a complete acceleration. lost_pct : missing between first and last, % of samples.
+    longest_gap_s : longest stretch without a sample, 0 = none.
+    start_s : first sample relative to the take's first. still_norm : mean |acc| of the quietest second, m/s².
+    segment : as declared, None = not used or not declared (see `declared`).
+    suggested, basis : what the name or the movement suggests and why ("label", "movement"), or None.
+    duplicate_of : id of the sensor that holds the same samples, else None.
+    """
+
+    device_id: str
+    source: str
+    rate_hz: float
+    clock: str
+    start_s: float
+    duration_s: float
+    samples: int
+    lost_pct: float
+    longest_gap_s: float
+    has_gyro: bool
+    has_mag: bool
+    has_orientation: bool
+    still_norm: float
+    declared: bool
+    segment: Segment | None
+    suggested: Segment | None
+    basis: str | None
+    duplicate_of: str | None
+    notices: tuple[Notice, ...]
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values, rounded to what a reader can use."""
+        return {
+            "device_id": self.device_id,
+            "source": self.source,
+            "rate_hz": round(self.rate_hz, 3),
+            "clock": self.clock,
+            "start_s": round(self.start_s, 3),
+            "duration_s": round(self.duration_s, 3),
+            "samples": self.samples,
+            "lost_pct": round(self.lost_pct, 2),
+            "longest_gap_s": round(self.longest_gap_s, 3),
+            "has_gyro": self.has_gyro,
+            "has_mag": self.has_mag,
+            "has_orientation": self.has_orientation,
+            "units": {"acc": "m/s2", "gyr": "rad/s" if self.has_gyro else None},
+            "still_norm_mps2": round(self.still_norm, 3),
+            "declared": self.declared,
+            "segment": self.segment,
+            "suggested": self.suggested,
+            "basis": self.basis,
+            "duplicate_of": self.duplicate_of,
+            "notices": [n.to_json() for n in self.notices],
+        }
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """A whole upload as found."""
+
+    devices: tuple[DeviceFacts, ...]
+    duration_s: float
+    height_m: float | None
+    protocol: str
+    notices: tuple[Notice, ...]
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values for the upload page."""
+        return {
+            "devices": [d.to_json() for d in self.devices],
+            "duration_s": round(self.duration_s, 3),
+            "height_m": self.height_m,
+            "protocol": self.protocol,
+            "notices": [n.to_json() for n in self.notices],
+        }
+
+
+def describe(recording: Recording) -> Inspection:
+    """Say what an upload holds, sensor by sensor; never raises for a readable recording."""
+    first: dict[str, str] = {}
+    copies: dict[str, str] = {}
+    for device, stream in recording.streams.items():
+        original = first.setdefault(stream.digest, device)
+        if original != device:
+            copies[device] = original
+    suggestions = suggest(recording)
+    devices = []
+    for device, stream in recording.streams.items():
+        suggestion = suggestions.get(device)
+        devices.append(
+            _device(
+                stream,
+                declared=device in recording.segments,
+                segment=recording.segments.get(device),
+                suggested=suggestion.segment if suggestion else None,
+                basis=suggestion.basis if suggestion else None,
+                duplicate_of=copies.get(device),
+            )
+        )
+    starts = [float(s.t_s[0]) for s in recording.streams.values()]
+    ends = [float(s.t_s[-1]) for s in recording.streams.values()]
+    return Inspection(
+        devices=tuple(devices),
+        duration_s=max(ends) - min(starts) if ends else 0.0,
+        height_m=recording.subject.height_m,
+        protocol=recording.protocol,
+        notices=recording.notices,
+    )
+
+
+def _device(
+    s: ImuStream,
+    *,
+    declared: bool,
+    segment: Segment | None,
+    suggested: Segment | None,
+    basis: str | None,
+    duplicate_of: str | None,
+) -> DeviceFacts:
+    f = facts(s.acc, s.gyr, s.rate_hz)
+    lost, longest = losses(s)
+    notices = [*s.notices, *suspicions(s.device_id, f, s.acc, s.quat)]
+    if duplicate_of is not None:
+        notices.append(
+            Notice(
+                "duplicate_stream",
+                f"Sensor {s.device_id} holds the same samples as {duplicate_of}: a copy under another id. "
+                "Only the one that is assigned to a segment is analysed.",
+                s.device_id,
+            )
+        )
+    return DeviceFacts(
+        device_id=s.device_id,
+        source=s.source,
+        rate_hz=s.rate_hz,
+        clock=s.clock,
+        start_s=float(s.t_s[0]),
+        duration_s=float(s.t_s[-1] - s.t_s[0]),
+        samples=int(np.count_nonzero(np.isfinite(s.acc).all(axis=1))),
+        lost_pct=100.0 * lost,
+        longest_gap_s=longest,
+        has_gyro=s.gyr is not None,
+        has_mag=s.mag is not None,
+        has_orientation=s.quat is not None,
+        still_norm=f.still_norm,
+        declared=declared,
+        segment=segment,
+        suggested=suggested,
+        basis=basis,
+        duplicate_of=duplicate_of,
+        notices=tuple(notices),
+    )
+
+
+def losses(s: ImuStream) -> tuple[float, float]:
+    """Share (0 to 1) of samples missing between a stream's first and last, and its longest hole in s."""
+    good = np.isfinite(s.acc).all(axis=1)
+    if s.gyr is not None:
+        good = good & np.isfinite(s.gyr).all(axis=1)
+    t = s.t_s[good]
+    expected = round(float(s.t_s[-1] - s.t_s[0]) * s.rate_hz) + 1
+    if len(t) < 2:
+        return 1.0 if len(t) == 0 else 0.0, 0.0
+    hole = float(np.diff(t).max()) - 1.0 / s.rate_hz
+    longest = hole if hole > 0.5 / s.rate_hz else 0.0
+    return float(np.clip(1.0 - len(t) / expected, 0.0, 1.0)), longest

@@ -1,0 +1,124 @@
+"""Plain facts of one sensor's signals, none of which needs a rest window of the whole take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from core.frames import Floats
+
+STILL: Final = 0.03
+"""A second is still when acc varies less than this share of its mean (0.25 m/s², spec/real-data.md §2.1)."""
+PLATEAU: Final = 3
+"""Neighbouring samples at the largest value that make a plateau: noise does not repeat it [our choice]."""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a sensor showed.
+
+    Parameters
+    ----------
+    still : the quietest second is quiet enough to be standing still (whatever the unit).
+    still_norm : mean |acc| in the quietest second, m/s² if the unit is right. still_gyro : mean |ω| there.
+    still_slice : samples of that second.
+    median_norm, acc_std : median and standard deviation of |acc| over the take.
+    gyro_top : 99.9th percentile of |ω|, rad/s, None without gyroscope.
+    """
+
+    still: bool
+    still_norm: float
+    still_gyro: float | None
+    still_slice: slice
+    median_norm: float
+    acc_std: float
+    gyro_top: float | None
+
+
+def facts(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
+    """Measure a sensor; rows with a missing value are left out.
+
+    Parameters
+    ----------
+    acc : (n, 3). gyr : (n, 3) or None. At least one complete row.
+    """
+    good = np.flatnonzero(np.isfinite(acc).all(axis=1))
+    a = acc[good]
+    norm = np.linalg.norm(a, axis=1)
+    width = int(min(len(a), max(2, round(rate_hz))))
+    mean = _moving_mean(a, width)
+    away = a - a.mean(axis=0)
+    spread = np.sqrt(
+        np.maximum((_moving_mean(away**2, width) - _moving_mean(away, width) ** 2).sum(axis=1), 0.0)
+    )
+    k = int(np.argmin(spread))
+    at = slice(k, k + width)
+    still_norm = float(norm[at].mean())
+    speed = None if gyr is None else np.linalg.norm(gyr, axis=1)
+    quiet_speed = None if speed is None else speed[good][at]
+    known = None if speed is None else speed[np.isfinite(speed)]
+    return Facts(
+        still=bool(spread[k] < STILL * np.linalg.norm(mean[k])),
+        still_norm=still_norm,
+        still_gyro=_mean(quiet_speed),
+        still_slice=slice(int(good[at][0]), int(good[at][-1]) + 1),
+        median_norm=float(np.median(norm)),
+        acc_std=float(norm.std()),
+        gyro_top=None if known is None or not len(known) else float(np.percentile(known, 99.9)),
+    )
+
+
+def _mean(x: Floats | None) -> float | None:
+    if x is None or not np.isfinite(x).any():
+        return None
+    return float(np.nanmean(x))
+
+
+def saturation(x: Floats, floor: float) -> tuple[float, float | None]:
+    """Share of samples on a plateau at the largest value of an axis, and that value.
+
+    Parameters
+    ----------
+    x : (n, 3). floor : an axis whose largest value is below this cannot be at its range.
+
+    Returns
+    -------
+    share (0 to 1) of samples with any axis clipped, largest clipped value or None.
+    """
+    clipped = np.zeros(len(x), np.bool_)
+    value: float | None = None
+    for axis in np.nan_to_num(x, nan=0.0).T:
+        for signed in (axis, -axis):
+            top = float(signed.max())
+            if top < floor:
+                continue
+            at_top = signed >= top * (1 - 1e-6)
+            edges = np.flatnonzero(np.diff(np.concatenate(([False], at_top, [False])).astype(np.int8)))
+            for start, end in zip(edges[::2], edges[1::2], strict=True):
+                if end - start >= PLATEAU:
+                    clipped[start:end] = True
+                    value = max(top, value or 0.0)
+    return float(clipped.mean()), value
+
+
+def magnetic_share(mag: Floats, still: slice, limit: float) -> float | None:
+    """Share of samples whose |m| differs from its own norm at rest by more than `limit` (fraction).
+
+    None when the magnetometer has no reading at rest. Source: spec/fusion.md §4.6.
+    """
+    norm = np.linalg.norm(mag, axis=1)
+    rest = norm[still]
+    rest = rest[np.isfinite(rest)]
+    known = norm[np.isfinite(norm)]
+    if not len(rest) or not len(known) or np.median(rest) <= 0:
+        return None
+    return float(np.mean(np.abs(known / np.median(rest) - 1.0) > limit))
+
+
+def _moving_mean(x: Floats, width: int) -> Floats:
+    """Means (n − width + 1, c) of every full window of x (n, c)."""
+    centre = x.mean(axis=0)
+    total = np.concatenate((np.zeros((1, x.shape[1])), np.cumsum(x - centre, axis=0)))
+    return np.asarray((total[width:] - total[:-width]) / width + centre)

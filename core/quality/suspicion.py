@@ -1,0 +1,165 @@
+"""Units and signs that make every later number wrong: found by physics, said before anything is computed.
+
+Thresholds: spec/fusion.md §9 (rest norm 9.81 m/s² or 1 g ± 10 %, gyroscope at rest below 0.2 rad/s, largest
+rate above 10 °/s) unless marked as our choice.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from core import rotation
+from core.errors import Notice, Severity
+from core.frames import GRAVITY, Floats
+from core.quality.signals import Facts
+
+TOLERANCE: Final = 0.10
+FAR_OFF: Final = 0.25
+"""Beyond this a scale error is no longer a scale error [our choice]; the worst real sensor was 6.6 % off."""
+GYRO_REST: Final = 0.2
+GYRO_RANGE: Final = 40.0
+"""rad/s; 2000 °/s, the widest range of wearable gyroscopes, is 34.9 [our choice]."""
+GYRO_LEAST: Final = np.radians(10.0)
+WALKING_STD: Final = 1.0
+"""m/s² of |acc| over the take that only a moving body shows (pelvis 1.6, foot 4 on neura_walk)."""
+NO_GRAVITY: Final = 0.5
+"""m/s² at rest: only noise is left when gravity was removed [our choice]."""
+
+_FIX_ACC = 'declare the unit in the manifest (sources[].acc_unit: "g" or "m/s2")'
+_FIX_GYR = 'declare the unit in the manifest (sources[].gyr_unit: "deg/s" or "rad/s")'
+
+
+def suspicions(device: str, f: Facts, acc: Floats, quat: Floats | None) -> list[Notice]:
+    """All suspicions about one sensor, the grave ones as errors."""
+    found = [*_acceleration(device, f), *_rate(device, f)]
+    if quat is not None:
+        found += _sign(device, acc, quat)
+    return found
+
+
+def _say(code: str, message: str, device: str, severity: Severity = "error") -> Notice:
+    return Notice(code, message, device, severity=severity)
+
+
+def _acceleration(device: str, f: Facts) -> list[Notice]:
+    n = f.still_norm
+    if not f.still:
+        return _moving_acceleration(device, f)
+    off = abs(n / GRAVITY - 1.0)
+    if off <= TOLERANCE:
+        return []
+    if abs(n - 1.0) <= TOLERANCE:
+        return [
+            _say(
+                "unit_suspect",
+                f"Sensor {device}: acceleration at rest is {n:.2f}, expected 9.81 m/s² (±10 %); it is in "
+                "g but was read "
+                f"as m/s²: {_FIX_ACC}.",
+                device,
+            )
+        ]
+    if n < NO_GRAVITY:
+        return [_no_gravity(device, n, "at rest")]
+    return [
+        _say(
+            "unit_suspect",
+            f"Sensor {device}: acceleration at rest is {n:.2f} m/s², expected 9.81 m/s² (±10 %); "
+            f"check its calibration, or {_FIX_ACC}.",
+            device,
+            "error" if off > FAR_OFF else "warning",
+        )
+    ]
+
+
+def _moving_acceleration(device: str, f: Facts) -> list[Notice]:
+    """Without a still second only the median over the take can be judged: walking keeps it near gravity."""
+    m = f.median_norm
+    if 0.5 * GRAVITY <= m <= 2 * GRAVITY:
+        return []
+    if 0.7 <= m <= 1.5 and f.still_norm > NO_GRAVITY and f.acc_std < 1.5:
+        return [
+            _say(
+                "unit_suspect",
+                f"Sensor {device}: acceleration is around {m:.2f}, expected about 9.81 m/s²; it looks "
+                "like g read as "
+                f"m/s²: {_FIX_ACC}.",
+                device,
+            )
+        ]
+    if m < 0.5 * GRAVITY:
+        return [_no_gravity(device, m, "in the middle of the take")]
+    return [
+        _say(
+            "unit_suspect",
+            f"Sensor {device}: acceleration is around {m:.1f} m/s², expected about 9.81 m/s²; {_FIX_ACC}.",
+            device,
+        )
+    ]
+
+
+def _no_gravity(device: str, n: float, when: str) -> Notice:
+    return _say(
+        "gravity_removed",
+        f"Sensor {device}: acceleration {when} is {n:.2f} m/s², expected 9.81; gravity seems to have been "
+        "removed, but "
+        "it is needed for orientation. Export the raw acceleration (Acc, not FreeAcc).",
+        device,
+    )
+
+
+def _rate(device: str, f: Facts) -> list[Notice]:
+    if f.gyro_top is None:
+        return []
+    if f.gyro_top > GYRO_RANGE:
+        return [
+            _say(
+                "unit_suspect",
+                f"Sensor {device}: angular rate reaches {f.gyro_top:.0f} rad/s, more than any sensor "
+                "measures "
+                f"({GYRO_RANGE:.0f}); it is in deg/s but was read as rad/s: {_FIX_GYR}.",
+                device,
+            )
+        ]
+    if f.still and f.still_gyro is not None and f.still_gyro > GYRO_REST:
+        return [
+            _say(
+                "unit_suspect",
+                f"Sensor {device}: angular rate is {f.still_gyro:.2f} rad/s while the acceleration is "
+                "still, expected "
+                f"less than {GYRO_REST}; it may be in deg/s but read as rad/s ({_FIX_GYR}), or the bias "
+                "is broken.",
+                device,
+            )
+        ]
+    if f.acc_std > WALKING_STD and f.gyro_top < GYRO_LEAST:
+        return [
+            _say(
+                "unit_suspect",
+                f"Sensor {device}: angular rate never exceeds {np.degrees(f.gyro_top):.1f} deg/s although "
+                "the sensor moves, "
+                f"expected more than 10; it is in rad/s but was read as deg/s: {_FIX_GYR}.",
+                device,
+            )
+        ]
+    return []
+
+
+def _sign(device: str, acc: Floats, quat: Floats) -> list[Notice]:
+    """With the vendor's orientation (sensor → z up) specific force must point up on average."""
+    good = np.isfinite(acc).all(axis=1) & np.isfinite(quat).all(axis=1)
+    if np.count_nonzero(good) < 10:
+        return []
+    world = rotation.rotate(rotation.normalise(quat[good]), acc[good]).mean(axis=0)
+    if world[2] > -0.5 * GRAVITY:
+        return []
+    return [
+        _say(
+            "gravity_sign",
+            f"Sensor {device}: acceleration points down ({world[2]:.1f} m/s² along the sensor's own "
+            "vertical), expected "
+            "up (+9.8) at rest; the exporting software reversed its sign. Export specific force.",
+            device,
+        )
+    ]
