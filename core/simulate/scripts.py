@@ -32,14 +32,14 @@ _COMFORTABLE: Script = (
 )
 
 _LAP: Script = (
-    Straight(20.0, 0.64, 0.54),
+    Straight(24.0, 0.64, 0.54),
     Arc(1.5, pi, 0.52, 0.56),
-    Straight(16.0, 0.56, 0.58),
+    Straight(18.0, 0.56, 0.58),
     Pivot(-pi, radians(40.0), 0.56),
-    Straight(20.0, 0.68, 0.51),
-    Stand(3.0),
+    Straight(24.0, 0.67, 0.50),
+    Stand(5.0),
     Arc(2.0, -pi, 0.55, 0.55),
-    Straight(20.0, 0.64, 0.54),
+    Straight(22.0, 0.64, 0.54),
     Pivot(pi, radians(45.0), 0.55),
 )
 
@@ -54,13 +54,13 @@ SCRIPTS: Mapping[str, Scenario] = MappingProxyType(
             "Fast walk with turns",
             (
                 Stand(6.0),
-                Straight(12.0, 0.68, 0.50),
+                Straight(12.0, 0.66, 0.47),
                 Arc(1.4, pi, 0.55, 0.53),
-                Straight(12.0, 0.68, 0.50),
+                Straight(12.0, 0.66, 0.47),
                 Pivot(-pi, radians(45.0), 0.54),
-                Straight(12.0, 0.68, 0.50),
+                Straight(12.0, 0.66, 0.47),
                 Arc(1.4, -pi, 0.55, 0.53),
-                Straight(8.0, 0.68, 0.50),
+                Straight(8.0, 0.66, 0.47),
                 Stand(4.0),
             ),
         ),

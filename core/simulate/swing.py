@@ -32,6 +32,10 @@ peaks up to 0.1 s early (spec/patients.md §1)."""
 ROLL = 5.0 * DEGREE
 """Supination of the free foot."""
 
+HELD_BACK = 0.9
+"""Up to this share of the swing the leg is kept from straightening; released at 0.86 the knee dips to its least
+just before contact and the thigh shakes half as much again."""
+
 MOST_LIFT = 0.095
 """Largest added lift for clearance, as a share of the leg (8 cm of 84)."""
 
@@ -129,7 +133,7 @@ def _within_reach(stance: StanceFoot, u: Floats, hip: Floats, ankle: Floats) -> 
     along = ankle - hip
     length = np.linalg.norm(along, axis=1)
     shortened = length + limit - smooth_max(length, limit, 0.004 * walker.scale)
-    free = smoothstep(u / 0.2) * (1.0 - smoothstep((u - 0.86) / 0.14))
+    free = smoothstep(u / 0.2) * (1.0 - smoothstep((u - HELD_BACK) / (1.0 - HELD_BACK)))
     return np.asarray(ankle + along * (free * (shortened / length - 1.0))[:, None])
 
 

@@ -190,7 +190,7 @@ def _contacts(motion: Motion, side: Side) -> Contacts:
 
 
 def _lift5(motion: Motion, side: Side, timing: FootTiming) -> Floats:
-    """First time (swings,) after release at which the sole is 5 mm up, interpolated; NaN where it never is."""
+    """First time (swings,) after release with the sole 5 mm up, interpolated; NaN where it never is."""
     t, sole = motion.t_s, motion.sole_height[side]
     out = np.full(len(timing.release), np.nan)
     for i, (release, contact) in enumerate(zip(timing.release, timing.contact, strict=True)):
