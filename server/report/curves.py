@@ -1,4 +1,4 @@
-"""The one SVG renderer: cycle curves and range bars, for page and print alike.
+"""The one SVG renderer: cycle curves, range bars and the stride strip, for page and print alike.
 
 The margins are the padding of `<div class="chart cycle">`; the `<svg>` is the plot area. Curves live in a
 nested `viewBox="0 0 1000 1000"` that stretches while strokes and text do not; labels are placed in percent.
@@ -14,9 +14,10 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import Floats, Side
+from core.events.result import Stride, Strides
+from core.frames import SIDES, Floats, Side
 from server.report.panels import CurvePanel, SideCurve
-from server.report.wording import number
+from server.report.wording import excluded_words, number
 
 KEY: Final[dict[Side, str]] = {"left": "l", "right": "r"}
 """Letter of a side in CSS classes."""
@@ -100,6 +101,50 @@ def range_svg(
     return (
         f'<svg class="chart range" width="{width}" height="26" viewBox="0 0 {width} 26" aria-hidden="true">'
         f"{''.join(parts)}</svg>"
+    )
+
+
+def strip_svg(strides: Strides, duration_s: float, height: int = 92) -> str:
+    """Draw all strides over time: stance full, swing light, left out faded with a cross, a line for now.
+
+    Every stride is a `<g data-stride>` with its number in the stride list and a title in words.
+    """
+    plot_height = height - 24
+    marks = "".join(_stride_mark(i, s, duration_s) for i, s in enumerate(strides.strides))
+    letters = "".join(
+        f'<text class="t{KEY[side]}" x="0" y="{_f(plot_height * (0.25 + 0.5 * i))}" dx="-9" dy="4" '
+        f'text-anchor="end">{side[0].upper()}</text>'
+        for i, side in enumerate(SIDES)
+    )
+    step = next((s for s in (1, 2, 5, 10, 30, 60) if duration_s / s <= 12), 120)
+    ticks = "".join(
+        f'<text x="{_f(100 * t / duration_s)}%" y="{plot_height}" dy="15" text-anchor="middle">{t}\u2009s</text>'
+        for t in range(0, int(duration_s) + 1, step)
+    )
+    return (
+        f'<div class="chart strip"><svg width="100%" height="{plot_height}" overflow="visible" role="img">'
+        "<title>Strides of this take over time; a cross marks a stride left out</title>"
+        '<svg viewBox="0 0 1000 1000" preserveAspectRatio="none" width="100%" height="100%" '
+        f'overflow="hidden">{marks}</svg><line class="cursor now" x1="0" x2="0" y1="0" y2="100%"/>'
+        f"{letters}{ticks}</svg></div>"
+    )
+
+
+def _stride_mark(index: int, s: Stride, duration_s: float) -> str:
+    k, top, out = KEY[s.side], 40 if s.side == "left" else 540, s.excluded_reason is not None
+    start, end = 1000 * s.start_s / duration_s, 1000 * s.end_s / duration_s
+    off = end if s.tc_s is None else 1000 * s.tc_s / duration_s
+    said = f"{s.side} stride, {s.start_s:.2f} to {s.end_s:.2f} s"
+    cross = ""
+    if s.excluded_reason is not None:
+        said += f", left out: {excluded_words(s.excluded_reason)}"
+        a, b = f"{start:.2f}", f"{end:.2f}"
+        cross = f'<path class="xx" d="M{a} {top + 60}L{b} {top + 360}M{a} {top + 360}L{b} {top + 60}"/>'
+    faded = " x" if out else ""
+    return (
+        f'<g data-stride="{index}"><title>{escape(said)}</title>'
+        f'<rect class="st{k}{faded}" x="{start:.2f}" width="{off - start:.2f}" y="{top}" height="420"/>'
+        f'<rect class="sw{k}{faded}" x="{off:.2f}" width="{end - off:.2f}" y="{top}" height="420"/>{cross}</g>'
     )
 
 

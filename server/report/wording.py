@@ -60,7 +60,7 @@ VARIABLES: Final[tuple[Variable, ...]] = (
 )
 """In reading order: pelvis, hip, knee, ankle; sagittal, frontal, transverse.
 
-Ranges are those of clinic.md §7, lower where an angle measured from standing goes lower than an anatomical one.
+Ranges are those of clinic.md §7, wider where an angle measured from standing goes below an anatomical one.
 """
 
 
