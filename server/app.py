@@ -17,8 +17,19 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 import web
-from server import problems
-from server.api import audit_log, health, sign_in, users
+from server import pages, problems
+from server.api import (
+    analyses,
+    audit_log,
+    files,
+    health,
+    jobs,
+    patients,
+    reports,
+    sessions,
+    sign_in,
+    users,
+)
 from server.api.body_limit import BodyLimit
 from server.api.documents import openapi
 from server.auth.access import require
@@ -30,10 +41,13 @@ from server.auth.roles import Action
 from server.auth.routes import declared_actions
 from server.auth.sessions import Logins
 from server.auth.throttle import Throttle
+from server.jobs.feed import JobFeed
+from server.jobs.table import TableQueue
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.migrate import upgrade
+from server.viewer import proxy
 
 STATIC = Path(web.__file__).parent / "static"
 
@@ -84,17 +98,16 @@ def create_app(settings: Settings) -> FastAPI:
     problems.install(app)
 
     api = APIRouter(prefix="/api/v1")
-    for part in (sign_in.router, users.router, audit_log.router):
-        api.include_router(part)
+    for part in (sign_in, patients, sessions, files, analyses, reports, jobs, users, audit_log):
+        api.include_router(part.router)
 
     @api.get("/openapi.json", include_in_schema=False)
     def document(who: Annotated[Identity, require(Action.READ_API)]) -> dict[str, Any]:
         """Describe this API as OpenAPI."""
         return openapi(app)
 
-    app.include_router(api)
-    app.include_router(sign_in.address_router)
-    app.include_router(health.router)
+    for router in (api, sign_in.address_router, health.router, pages.router, proxy.router):
+        app.include_router(router)
     app.mount("/static", Assets(directory=STATIC), name="static")
     declared_actions(app.routes)
     return app
@@ -107,6 +120,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     db = Database(settings.database)
     app.state.db = db
     app.state.blobs = BlobStore(settings.blobs)
+    app.state.queue = TableQueue(db, settings.lease_s)
+    app.state.feed = JobFeed(db)
     app.state.throttle = Throttle()
     app.state.logins = Logins(
         db, dt.timedelta(minutes=settings.idle_minutes), dt.timedelta(hours=settings.absolute_hours)
@@ -114,6 +129,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     try:
         yield
     finally:
+        app.state.feed.close()
         db.close()
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import datetime as dt
+import json
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
+from core.frames import Protocol
 from server.auth.passwords import MAX_LENGTH, MIN_LENGTH
 from server.auth.roles import Role
 
@@ -17,19 +19,34 @@ Code = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=_LI
 SignInName = Annotated[
     str, StringConstraints(min_length=1, max_length=64, pattern=r"^[a-z0-9][a-z0-9._@-]*$")
 ]
-Note = Annotated[str, StringConstraints(max_length=10_000)]
+Note = Annotated[str, StringConstraints(max_length=10_000)] | None
 Password = Annotated[str, StringConstraints(min_length=MIN_LENGTH, max_length=MAX_LENGTH)]
 Height = Annotated[float, Field(ge=0.5, le=2.5, allow_inf_nan=False, description="m")]
 BirthYear = Annotated[int, Field(ge=1850, le=2200)]
 Sex = Literal["female", "male"]
-ProtocolName = Literal["walk", "treadmill"]
-Json = dict[str, Any]
+
+
+def _storable(value: dict[str, Any]) -> dict[str, Any]:
+    # Python reads NaN and lone surrogates from JSON, but they are neither JSON nor UTF-8
+    try:
+        json.dumps(value, allow_nan=False, ensure_ascii=False).encode()
+    except (ValueError, RecursionError):
+        raise ValueError("expected JSON with finite numbers and valid Unicode") from None
+    return value
+
+
+Json = Annotated[dict[str, Any], AfterValidator(_storable)]
 
 
 class Request(BaseModel):
     """A body we receive: unknown members are refused, so a misspelt one is not silently ignored."""
 
     model_config = ConfigDict(extra="forbid")
+
+    def values(self) -> dict[str, Any]:
+        """Return the members that were sent; an empty note is stored as text."""
+        sent = self.model_dump(exclude_unset=True)
+        return sent | ({"note": ""} if "note" in sent and sent["note"] is None else {})
 
 
 class Response(BaseModel):
@@ -125,21 +142,17 @@ class PatientNew(Request):
     sex: Sex | None = None
     birth_year: BirthYear | None = None
     height_m: Height | None = None
-    note: Note = ""
+    note: Note = None
 
 
-class PatientChange(Request):
+class PatientChange(PatientNew):
     """What to change of a patient; members left out stay as they are."""
 
     code: Code = ""
-    sex: Sex | None = None
-    birth_year: BirthYear | None = None
-    height_m: Height | None = None
-    note: Note = ""
 
 
 class Patient(Response):
-    """A patient."""
+    """A patient, with what a list shows of the visits."""
 
     id: str
     code: str
@@ -148,39 +161,38 @@ class Patient(Response):
     height_m: float | None
     note: str
     created_at: dt.datetime
+    sessions: int
+    last_visit: dt.date | None
+    running: bool
 
 
 class SessionNew(Request):
-    """A new visit."""
-
-    title: Line
-    performed_on: dt.date
-    protocol: ProtocolName = "walk"
-    height_m: Height | None = None
-    note: Note = ""
-
-
-class SessionChange(Request):
-    """What to change of a session; members left out stay as they are."""
+    """A new visit, today unless said otherwise."""
 
     title: Line = ""
     performed_on: dt.date = dt.date.min
-    protocol: ProtocolName = "walk"
+    protocol: Protocol = "walk"
     height_m: Height | None = None
-    note: Note = ""
+    note: Note = None
+
+
+class SessionChange(SessionNew):
+    """What to change of a session; members left out stay as they are."""
 
 
 class Session(Response):
-    """A visit."""
+    """A visit; its state: empty, uploaded, running, done or failed."""
 
     id: str
     patient_id: str
+    patient_code: str
     title: str
     performed_on: dt.date
     protocol: str
     height_m: float | None
     note: str
     created_at: dt.datetime
+    state: str
 
 
 class StoredFile(Response):
@@ -191,6 +203,34 @@ class StoredFile(Response):
     sha256: str
 
 
+class Job(Response):
+    """A piece of work for a worker; `stage`, `fraction` and `message` are its progress."""
+
+    id: str
+    kind: str
+    recording_id: str | None
+    state: Literal["queued", "running", "done", "failed", "cancelled"]
+    attempt: int
+    stage: str | None
+    fraction: float | None
+    message: str | None
+    cancel_requested: bool
+    error_code: str | None
+    error_message: str | None
+    created_at: dt.datetime
+    started_at: dt.datetime | None
+    finished_at: dt.datetime | None
+
+
+class ListedJob(Job):
+    """A job and whose it is."""
+
+    session_id: str | None
+    session_title: str | None
+    patient_id: str | None
+    patient_code: str | None
+
+
 class Recording(Response):
     """The upload set of a session; `inspection` is what was found in it, before any mapping."""
 
@@ -198,12 +238,13 @@ class Recording(Response):
     session_id: str
     state: Literal["draft", "ready", "failed"]
     files: list[StoredFile]
-    manifest: Json | None
-    inspection: Json | None
+    manifest: dict[str, Any] | None
+    inspection: dict[str, Any] | None
+    job: Job | None
 
 
 class AnalysisNew(Request):
-    """What to analyse with; without a manifest the stored one is used."""
+    """What to analyse with: a manifest (else the stored one), and settings that differ from the defaults."""
 
     manifest: Json | None = None
     config: Json | None = None
@@ -214,32 +255,35 @@ class Analysis(Response):
 
     id: str
     recording_id: str
+    session_id: str
     job_id: str
     input_sha256: str
     config_sha256: str
     code_version: str
-    manifest: Json | None
-    config: Json
+    manifest: dict[str, Any] | None
+    config: dict[str, Any]
     created_at: dt.datetime
     files: list[StoredFile]
 
 
-class Job(Response):
-    """A piece of work for a worker."""
+class Report(Response):
+    """Everything the pages of a session show, in degrees and words; undefined is null with a reason."""
 
-    id: str
-    kind: str
-    recording_id: str | None
-    state: Literal["queued", "running", "done", "failed", "cancelled"]
-    stage: str | None
-    fraction: float | None
-    message: str | None
-    error_code: str | None
-    error_message: str | None
-    cancel_requested: bool
-    created_at: dt.datetime
-    started_at: dt.datetime | None
-    finished_at: dt.datetime | None
+    model_config = ConfigDict(extra="allow")
+
+    problem: str | None
+    quality: dict[str, Any]
+    warnings: list[dict[str, Any]]
+    key_numbers: list[dict[str, Any]]
+    parameters: list[dict[str, Any]]
+    curves: list[dict[str, Any]]
+    strides: list[dict[str, Any]]
+    duration_s: float
+    norm_note: str
+    curve_notes: list[str]
+    angle_zero: str | None
+    zero_offset_deg: dict[str, float]
+    provenance: dict[str, Any]
 
 
 class AuditRow(Response):
@@ -252,7 +296,7 @@ class AuditRow(Response):
     action: str
     resource: str
     resource_id: str | None
-    detail: Json
+    detail: dict[str, Any]
     hash: str
 
 

@@ -9,6 +9,8 @@ from starlette.requests import HTTPConnection
 
 from server.auth.sessions import Logins
 from server.auth.throttle import Throttle
+from server.jobs.feed import JobFeed
+from server.jobs.queue import JobQueue
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -34,9 +36,19 @@ def _throttle(connection: HTTPConnection) -> Throttle:
     return cast("Throttle", connection.app.state.throttle)
 
 
+def _queue(connection: HTTPConnection) -> JobQueue:
+    return cast("JobQueue", connection.app.state.queue)
+
+
+def _feed(connection: HTTPConnection) -> JobFeed:
+    return cast("JobFeed", connection.app.state.feed)
+
+
 Config = Annotated[Settings, Depends(_settings)]
 Db = Annotated[Database, Depends(_db)]
 Blobs = Annotated[BlobStore, Depends(_blobs)]
+Queue = Annotated[JobQueue, Depends(_queue)]
+Feed = Annotated[JobFeed, Depends(_feed)]
 OpenLogins = Annotated[Logins, Depends(_logins)]
 Failures = Annotated[Throttle, Depends(_throttle)]
 

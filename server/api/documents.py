@@ -16,6 +16,7 @@ _WORDS = {
     "403": "The role does not allow it, or the request came from another site",
     "404": "There is no such thing, or it has been deleted",
     "409": "The present state does not allow it",
+    "411": "The length of the body must be declared",
     "413": "Larger than a limit of the settings",
     "422": "A field or the data is not as expected",
     "429": "Too many failed attempts",

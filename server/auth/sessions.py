@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable
+from typing import Any
 
-from sqlalchemy import Connection, delete, insert, select, update
+from sqlalchemy import Connection, Row, delete, insert, select, update
 
 from server.auth.identity import Identity
 from server.auth.roles import Role
@@ -64,17 +65,7 @@ class Logins:
     def touch(self, login_id: str) -> Identity | None:
         """Count a running view or replay as activity; None when the sign-in is over, so the view must end."""
         at = self._clock()
-        with self._db.read() as c:
-            row = c.execute(
-                select(login_session.c.last_seen_at, user)
-                .join(user, user.c.id == login_session.c.user_id)
-                .where(
-                    login_session.c.token_sha256 == login_id,
-                    login_session.c.expires_at > at,
-                    login_session.c.last_seen_at > at - self._idle,
-                    user.c.active,
-                )
-            ).one_or_none()
+        row = self._open(login_id, at)
         if row is None:
             return None
         # a short idle time must not end between two writes
@@ -88,20 +79,8 @@ class Logins:
         return Identity(row.id, row.name, row.display_name, Role(row.role), login_id)
 
     def is_open(self, login_id: str) -> bool:
-        """Tell whether a sign-in still holds, without counting this as activity."""
-        at = self._clock()
-        with self._db.read() as c:
-            row = c.execute(
-                select(login_session.c.user_id)
-                .join(user, user.c.id == login_session.c.user_id)
-                .where(
-                    login_session.c.token_sha256 == login_id,
-                    login_session.c.expires_at > at,
-                    login_session.c.last_seen_at > at - self._idle,
-                    user.c.active,
-                )
-            ).one_or_none()
-        return row is not None
+        """Tell whether a sign-in goes on, without counting as activity."""
+        return self._open(login_id, self._clock()) is not None
 
     def end(self, c: Connection, login_id: str) -> None:
         """End one sign-in."""
@@ -114,3 +93,16 @@ class Logins:
                 login_session.c.user_id == user_id, login_session.c.token_sha256 != (but or "")
             )
         )
+
+    def _open(self, login_id: str, at: dt.datetime) -> Row[Any] | None:
+        with self._db.read() as c:
+            return c.execute(
+                select(login_session.c.last_seen_at, user)
+                .join(user, user.c.id == login_session.c.user_id)
+                .where(
+                    login_session.c.token_sha256 == login_id,
+                    login_session.c.expires_at > at,
+                    login_session.c.last_seen_at > at - self._idle,
+                    user.c.active,
+                )
+            ).one_or_none()

@@ -1,0 +1,83 @@
+"""Analyses: asked for, listed, and their files downloaded."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter
+from starlette.responses import Response
+
+from server import audit, schemas
+from server.api.context import Blobs, Db, Id, Queue
+from server.api.documents import refusals
+from server.api.downloads import attachment
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.jobs.queue import JobView
+from server.services import analyses, recordings, sessions
+
+router = APIRouter(tags=["analyses"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+
+
+@router.post(
+    "/sessions/{session_id}/analyses", status_code=202, response_model=schemas.Job, responses=refusals(409)
+)
+def analyse(
+    session_id: Id,
+    body: schemas.AnalysisNew,
+    db: Db,
+    queue: Queue,
+    who: Annotated[Identity, require(Action.ANALYSE)],
+) -> JobView:
+    """Ask for an analysis; the same files, mapping, settings and version are analysed once."""
+    with db.write() as c:
+        if body.manifest is not None:
+            recordings.set_manifest(c, who, session_id, body.manifest)
+        return analyses.submit(c, queue, who, session_id, config=body.config)
+
+
+@router.get("/sessions/{session_id}/analyses", response_model=list[schemas.Analysis])
+def list_analyses(session_id: Id, db: Db, who: Reader) -> list[schemas.Analysis]:
+    """The finished analyses of a session, the one its pages show first."""
+    with db.read() as c:
+        sessions.get(c, session_id)
+        return [_shown(found) for found in analyses.of_session(c, session_id)]
+
+
+@router.get("/analyses/{analysis_id}", response_model=schemas.Analysis)
+def read_analysis(analysis_id: Id, db: Db, who: Reader) -> schemas.Analysis:
+    """Open an analysis: what went in, by what version, and which files came out."""
+    with db.write() as c:
+        found = analyses.get(c, analysis_id)
+        audit.record(c, who, "analysis.opened", "analysis", analysis_id)
+    return _shown(found)
+
+
+@router.get(
+    "/analyses/{analysis_id}/files/{name}",
+    response_class=Response,
+    responses={
+        200: {
+            "description": "The file",
+            "content": {"*/*": {"schema": {"type": "string", "format": "binary"}}},
+        }
+    },
+)
+def read_file(analysis_id: Id, name: str, db: Db, blobs: Blobs, who: Reader) -> Response:
+    """Download a result file; its name says which analysis it is of, never of whom."""
+    with db.write() as c:
+        found = analyses.get(c, analysis_id)
+        content = analyses.file_bytes(blobs, found, name)
+        audit.record(c, who, "analysis.file_opened", "analysis", analysis_id, {"file": name})
+    stem, dot, ending = name.rpartition(".")
+    return attachment(content, f"{stem}-{analysis_id[:8]}{dot}{ending}")
+
+
+def _shown(found: analyses.Analysis) -> schemas.Analysis:
+    files = [
+        schemas.StoredFile(name=name, size=blob.size, sha256=blob.sha256)
+        for name, blob in found.files.items()
+    ]
+    return schemas.Analysis.model_validate({**vars(found), "files": files})

@@ -1,0 +1,25 @@
+"""Answers that a browser saves as a file."""
+
+from __future__ import annotations
+
+from urllib.parse import quote
+
+from starlette.responses import Response
+
+BINARY = {"type": "string", "format": "binary"}
+"""Schema of a body of plain bytes."""
+
+TYPES = {
+    ".json": "application/json",
+    ".csv": "text/csv; charset=utf-8",
+    ".parquet": "application/vnd.apache.parquet",
+}
+
+
+def attachment(content: bytes, name: str, media_type: str | None = None) -> Response:
+    """Return a file to save; its name may be any Unicode (RFC 6266, RFC 8187)."""
+    if media_type is None:
+        media_type = TYPES.get(name[name.rfind(".") :], "application/octet-stream")
+    plain = "".join(ch if ch.isascii() and ch.isprintable() and ch not in '"\\%' else "_" for ch in name)
+    disposition = f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quote(name, safe='')}"
+    return Response(content, media_type=media_type, headers={"Content-Disposition": disposition})

@@ -1,0 +1,110 @@
+"""Jobs: what the workers do, pushed while it happens."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncGenerator, AsyncIterator, Callable
+from typing import Annotated, cast
+
+from fastapi import APIRouter, Query
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import StreamingResponse
+
+from server import schemas
+from server.api import context
+from server.api.context import Db, Id
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.jobs.feed import JobFeed
+from server.jobs.queue import JobView
+from server.services import jobs
+
+router = APIRouter(prefix="/jobs", tags=["jobs"])
+KEEP_ALIVE_S = 15.0
+"""Proxies cut lines that are silent for longer (nginx: 60 s); a sign-in that ended is noticed as often."""
+RETRY_MS = 2000
+"""How long a browser waits before it connects again."""
+
+Reader = Annotated[Identity, require(Action.READ_JOB)]
+
+
+@router.get("", response_model=list[schemas.ListedJob])
+def list_jobs(
+    db: Db,
+    who: Reader,
+    active: Annotated[bool, Query(description="only queued and running ones")] = False,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+) -> list[schemas.ListedJob]:
+    """Jobs, the newest first."""
+    with db.read() as c:
+        return [_shown(found) for found in jobs.listing(c, active_only=active, limit=limit)]
+
+
+@router.get("/{job_id}", response_model=schemas.ListedJob)
+def read_job(job_id: Id, db: Db, who: Reader) -> schemas.ListedJob:
+    """One job: its progress, or why it failed."""
+    with db.read() as c:
+        return _shown(jobs.get(c, job_id))
+
+
+@router.get(
+    "/{job_id}/events",
+    response_class=StreamingResponse,
+    responses={
+        200: {"description": "The job now and after every change", "content": {"text/event-stream": {}}}
+    },
+)
+async def watch_job(
+    job_id: Id, db: Db, feed: context.Feed, logins: context.OpenLogins, who: Reader
+) -> StreamingResponse:
+    """Push the job as server-sent events, each one a Job as JSON; the stream ends with the job."""
+
+    def check() -> None:
+        with db.read() as c:
+            jobs.get(c, job_id)
+
+    await run_in_threadpool(check)
+    events = _events(feed, job_id, lambda: logins.is_open(who.login_id))
+    return StreamingResponse(events, media_type="text/event-stream", headers={"X-Accel-Buffering": "no"})
+
+
+@router.post("/{job_id}/cancel", status_code=202, response_model=schemas.Job)
+def cancel_job(
+    job_id: Id,
+    db: Db,
+    queue: context.Queue,
+    who: Annotated[Identity, require(Action.CANCEL_JOB)],
+) -> JobView:
+    """Ask a job to stop, which it does within two seconds; a finished one stays as it is."""
+    with db.write() as c:
+        return jobs.cancel(c, queue, who, job_id)
+
+
+def _shown(found: jobs.ListedJob) -> schemas.ListedJob:
+    return schemas.ListedJob.model_validate({**vars(found.job), **vars(found)})
+
+
+async def _events(feed: JobFeed, job_id: str, is_open: Callable[[], bool]) -> AsyncIterator[str]:
+    """Format what the feed says; between changes say now and then that the line is alive."""
+    watch = cast("AsyncGenerator[JobView, None]", feed.watch(job_id))
+    async with contextlib.aclosing(watch) as views:
+        pending = asyncio.ensure_future(anext(views, None))
+        try:
+            yield f"retry: {RETRY_MS}\n\n"
+            while True:
+                done, _ = await asyncio.wait({pending}, timeout=KEEP_ALIVE_S)
+                if not done:
+                    if not await run_in_threadpool(is_open):
+                        return
+                    yield ": waiting\n\n"
+                    continue
+                view = pending.result()
+                if view is None:
+                    return
+                yield f"data: {schemas.Job.model_validate(view).model_dump_json()}\n\n"
+                pending = asyncio.ensure_future(anext(views, None))
+        finally:
+            pending.cancel()
+            await asyncio.gather(pending, return_exceptions=True)

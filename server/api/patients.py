@@ -1,0 +1,96 @@
+"""Patients, under the clinic's own pseudonyms."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from server import audit, schemas
+from server.api.context import Blobs, Db, Id
+from server.api.documents import refusals
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.services import erasure, patients, sessions
+
+router = APIRouter(prefix="/patients", tags=["patients"])
+
+
+@router.get("", response_model=list[schemas.Patient])
+def list_patients(
+    db: Db,
+    who: Annotated[Identity, require(Action.READ_PATIENT)],
+    q: Annotated[str, Query(max_length=200, description="part of a code or a note")] = "",
+    limit: Annotated[int, Query(ge=1, le=1000)] = 200,
+    offset: Annotated[int, Query(ge=0, le=10**9)] = 0,
+) -> list[patients.Patient]:
+    """All patients, the latest visit first."""
+    with db.read() as c:
+        return patients.listing(c, search=q, limit=limit, offset=offset)
+
+
+@router.post("", status_code=201, response_model=schemas.Patient, responses=refusals(409))
+def add_patient(
+    body: schemas.PatientNew, db: Db, who: Annotated[Identity, require(Action.WRITE_PATIENT)]
+) -> patients.Patient:
+    """Add a patient."""
+    with db.write() as c:
+        return patients.create(c, who, **body.values())
+
+
+@router.get("/{patient_id}", response_model=schemas.Patient)
+def read_patient(
+    patient_id: Id, db: Db, who: Annotated[Identity, require(Action.READ_PATIENT)]
+) -> patients.Patient:
+    """Open a patient."""
+    with db.write() as c:
+        found = patients.get(c, patient_id)
+        audit.record(c, who, "patient.opened", "patient", patient_id)
+    return found
+
+
+@router.patch("/{patient_id}", response_model=schemas.Patient, responses=refusals(409))
+def change_patient(
+    patient_id: Id,
+    body: schemas.PatientChange,
+    db: Db,
+    who: Annotated[Identity, require(Action.WRITE_PATIENT)],
+) -> patients.Patient:
+    """Change a patient; members left out stay as they are."""
+    with db.write() as c:
+        return patients.change(c, who, patient_id, body.values())
+
+
+@router.delete("/{patient_id}", status_code=204, responses=refusals(409))
+def delete_patient(
+    patient_id: Id,
+    confirm: Annotated[str, Query(max_length=64, description="the patient's code, as confirmation")],
+    db: Db,
+    blobs: Blobs,
+    who: Annotated[Identity, require(Action.DELETE_PATIENT)],
+) -> None:
+    """Remove a patient with every session, recording and result, for ever; only the audit rows stay."""
+    erasure.erase_patient(db, blobs, who, patient_id, confirm=confirm)
+
+
+@router.get("/{patient_id}/sessions", response_model=list[schemas.Session])
+def list_sessions(
+    patient_id: Id, db: Db, who: Annotated[Identity, require(Action.READ_SESSION)]
+) -> list[sessions.Session]:
+    """The patient's visits, the newest first."""
+    with db.read() as c:
+        patients.get(c, patient_id)
+        return sessions.of_patient(c, patient_id)
+
+
+@router.post("/{patient_id}/sessions", status_code=201, response_model=schemas.Session)
+def add_session(
+    patient_id: Id,
+    body: schemas.SessionNew,
+    db: Db,
+    who: Annotated[Identity, require(Action.CREATE_SESSION)],
+) -> sessions.Session:
+    """Add a visit."""
+    with db.write() as c:
+        return sessions.create(c, who, patient_id, **body.values())

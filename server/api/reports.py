@@ -1,0 +1,60 @@
+"""The report of a session's analysis: everything its pages show, as JSON and as tables."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter
+from starlette.responses import Response
+
+from server import audit, schemas
+from server.api.context import Blobs, Db, Id
+from server.api.downloads import BINARY, attachment
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.report.bundle import load_bundle
+from server.report.model import ReportModel, report_model
+from server.report.tables import curves_csv, parameters_csv
+from server.services import analyses, patients, sessions
+from server.services.errors import NotFound
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+
+router = APIRouter(prefix="/sessions/{session_id}", tags=["report"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+_CSV: dict[int | str, dict[str, Any]] = {
+    200: {"description": "The table", "content": {"text/csv": {"schema": BINARY}}}
+}
+
+
+@router.get("/report", response_model=schemas.Report)
+def read_report(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> dict[str, object]:
+    """Quality, parameters with norms, cycle curves with norm bands, strides, provenance."""
+    return _opened(db, blobs, who, session_id).to_json()
+
+
+@router.get("/parameters.csv", response_class=Response, responses=_CSV)
+def read_parameters(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+    """The table of parameters, left and right, with the norm."""
+    report = _opened(db, blobs, who, session_id)
+    return attachment(parameters_csv(report), f"parameters-{session_id[:8]}.csv")
+
+
+@router.get("/curves.csv", response_class=Response, responses=_CSV)
+def read_curves(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+    """The cycle curves: mean and spread by side and per cent of the cycle, with the norm."""
+    return attachment(curves_csv(_opened(db, blobs, who, session_id)), f"curves-{session_id[:8]}.csv")
+
+
+def _opened(db: Database, blobs: BlobStore, who: Identity, session_id: str) -> ReportModel:
+    with db.write() as c:
+        session = sessions.get(c, session_id)
+        patient = patients.get(c, session.patient_id)
+        found = analyses.latest(c, session_id)
+        if found is None:
+            raise NotFound("analysis of session", session_id)
+        audit.record(c, who, "report.opened", "session", session_id, {"analysis_id": found.id})
+    files = {name: analyses.file_bytes(blobs, found, name) for name in found.files if name != "poses.parquet"}
+    age = session.performed_on.year - patient.birth_year if patient.birth_year else None
+    return report_model(load_bundle(files), age=age, sex=patient.sex)  # type: ignore[arg-type]

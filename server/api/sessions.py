@@ -1,0 +1,80 @@
+"""Sessions: one visit's recording, what was found in it, and its mapping."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter
+
+from server import audit, schemas
+from server.api.context import Blobs, Db, Id, Queue
+from server.api.documents import refusals
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.jobs.queue import JobView
+from server.services import erasure, recordings, sessions
+from server.services.errors import NotFound
+
+router = APIRouter(prefix="/sessions/{session_id}", tags=["sessions"])
+
+
+@router.get("", response_model=schemas.Session)
+def read_session(
+    session_id: Id, db: Db, who: Annotated[Identity, require(Action.READ_SESSION)]
+) -> sessions.Session:
+    """Open a session."""
+    with db.write() as c:
+        found = sessions.get(c, session_id)
+        audit.record(c, who, "session.opened", "session", session_id)
+    return found
+
+
+@router.patch("", response_model=schemas.Session)
+def change_session(
+    session_id: Id,
+    body: schemas.SessionChange,
+    db: Db,
+    who: Annotated[Identity, require(Action.WRITE_SESSION)],
+) -> sessions.Session:
+    """Change a session; members left out stay as they are."""
+    with db.write() as c:
+        return sessions.change(c, who, session_id, body.values())
+
+
+@router.delete("", status_code=204)
+def delete_session(
+    session_id: Id, db: Db, blobs: Blobs, who: Annotated[Identity, require(Action.WRITE_SESSION)]
+) -> None:
+    """Remove a session with its recordings and results, for ever; only the audit rows stay."""
+    erasure.erase_session(db, blobs, who, session_id)
+
+
+@router.get("/recording", response_model=schemas.Recording)
+def read_recording(
+    session_id: Id, db: Db, who: Annotated[Identity, require(Action.READ_SESSION)]
+) -> recordings.Recording:
+    """The current upload set: its files, what was found in them, the mapping."""
+    with db.read() as c:
+        found = recordings.current(c, session_id)
+    if found is None:
+        raise NotFound("recording of session", session_id)
+    return found
+
+
+@router.put("/manifest", response_model=schemas.Recording, responses=refusals(409))
+def set_manifest(
+    session_id: Id, body: schemas.Json, db: Db, who: Annotated[Identity, require(Action.UPLOAD)]
+) -> recordings.Recording:
+    """Set the mapping (docs/formats.md); the next analysis uses it."""
+    with db.write() as c:
+        return recordings.set_manifest(c, who, session_id, body)
+
+
+@router.post("/inspections", status_code=202, response_model=schemas.Job, responses=refusals(409))
+def inspect(
+    session_id: Id, db: Db, queue: Queue, who: Annotated[Identity, require(Action.UPLOAD)]
+) -> JobView:
+    """Ask a worker what is in the files; the same files are looked at once."""
+    with db.write() as c:
+        return recordings.inspect(c, queue, who, session_id)
