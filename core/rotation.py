@@ -15,7 +15,7 @@ _SMALL = 1e-8
 
 def normalise(q: Floats) -> Floats:
     """Scale quaternions (..., 4) to unit norm."""
-    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True))
 
 
 def multiply(p: Floats, q: Floats) -> Floats:
@@ -35,7 +35,7 @@ def multiply(p: Floats, q: Floats) -> Floats:
 
 def conjugate(q: Floats) -> Floats:
     """Inverse rotation of unit quaternions (..., 4)."""
-    return np.asarray(q, np.float64) * np.array([1.0, -1.0, -1.0, -1.0])
+    return np.asarray(np.asarray(q, np.float64) * np.array([1.0, -1.0, -1.0, -1.0]))
 
 
 def rotate(q: Floats, v: Floats) -> Floats:

@@ -108,7 +108,8 @@ class StanceFoot:
             ),
             axis=-1,
         )
-        return self._floor_point(i, self.sole.forefoot) + centre - rotate(q, self.sole.rocker_centre)
+        ankle = self._floor_point(i, self.sole.forefoot) + centre - rotate(q, self.sole.rocker_centre)
+        return np.asarray(ankle)
 
     def path(self, t: Floats) -> tuple[Floats, Floats, Floats]:
         """Ankle (n, 3), pitch (n,) and heading (n,) over the whole take; only contact times are meant.

@@ -33,8 +33,8 @@ ROLL = 5.0 * DEGREE
 """Supination of the free foot."""
 
 HELD_BACK = 0.9
-"""Up to this share of the swing the leg is kept from straightening; released at 0.86 the knee dips to its least
-just before contact and the thigh shakes half as much again."""
+"""Up to this share of the swing the leg is kept from straightening; released at 0.86 the knee dips to its
+least just before contact and the thigh shakes half as much again."""
 
 MOST_LIFT = 0.095
 """Largest added lift for clearance, as a share of the leg (8 cm of 84)."""
