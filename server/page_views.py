@@ -210,3 +210,8 @@ def upload_view(this: Recording | None, s: Session, p: Patient) -> dict[str, Any
         "segments": SEGMENT_CHOICES,
         "height_m": s.height_m or p.height_m,
     }
+
+
+def found_view(this: Recording) -> dict[str, Any]:
+    """What the inspection found: facts, sensors with a suggested segment, notices."""
+    return {}

@@ -8,7 +8,6 @@ from urllib.parse import quote
 
 from sqlalchemy import Connection
 
-from core.pipeline import STAGES
 from server.page_views import PROTOCOL_NAMES, SEGMENT_NAMES, job_dict, newest_job, who_words
 from server.report.bundle import load_bundle
 from server.report.curves import cycle_svg, strip_svg
@@ -53,7 +52,7 @@ STAGE_NAMES: Final[Mapping[str, str]] = {
     "angles": "Compute joint angles",
     "parameters": "Compute parameters",
 }
-"""Stage of core.pipeline → what it does, in words."""
+"""Stages of an analysis in order → what each does, in words; core.pipeline itself takes seconds to import."""
 
 FILE_WORDS: Final[Mapping[str, str]] = {
     "analysis.json": "Quality, calibration, parameters, warnings, provenance",
@@ -73,7 +72,7 @@ def base(c: Connection, session_id: str) -> dict[str, Any]:
         "patient": patients.get(c, session.patient_id),
         "recording": recordings.current(c, session_id),
         "job": None if job is None else job_dict(job),
-        "stages": [("reading", STAGE_NAMES["reading"]), *((s, STAGE_NAMES[s]) for s, _ in STAGES)],
+        "stages": list(STAGE_NAMES.items()),
         "report": None,
     }
 
@@ -96,7 +95,7 @@ def downloads(c: Connection, session_id: str, *, results: bool) -> dict[str, Any
             for name, blob in (shown.files.items() if shown else ())
         ],
         "originals": [
-            {**vars(f), "href": f"/api/v1/sessions/{session_id}/files/{quote(f.name)}"}
+            {**vars(f), "href": f"/api/v1/sessions/{session_id}/files/{quote(f.name)}" if results else None}
             for f in (this.files if this else ())
         ],
         "provenance": _provenance(shown) if shown else [],
@@ -146,7 +145,8 @@ def report(blobs: BlobStore, found: analyses.Analysis, context: Mapping[str, Any
 def _chart(panel: CurvePanel, height: int, *, x_unit: bool) -> dict[str, Any]:
     return {
         "name": panel.variable.name,
-        "title": panel.title,
+        "title": panel.variable.label,
+        "zero": panel.title.removeprefix(panel.variable.label).lstrip(", "),
         "low": panel.low_confidence,
         "reason": panel.reason,
         "svg": cycle_svg(panel, height=height, x_unit=x_unit),
