@@ -142,9 +142,10 @@ def push(
     """
     room = 2 * (len(s) // (state.window + 1) + 1)
     kind, index, offset = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)
+    # copies: the kernel is compiled once, for writable contiguous arrays of these types
     m = _foot_pitch_kernel(
-        np.ascontiguousarray(s, np.float64), np.ascontiguousarray(valid, np.bool_), state.ring,
-        state.counters, state.window, state.need, state.threshold, kind, index, offset,
+        np.array(s, np.float64), np.array(valid, np.bool_), state.ring, state.counters, state.window,
+        state.need, state.threshold, kind, index, offset,
     )  # fmt: skip
     return kind[:m], index[:m], offset[:m]
 
@@ -152,3 +153,8 @@ def push(
 def pitch_signal(q_foot: Floats) -> Floats:
     """s (n,) of foot orientations (n, 4): sine of the foot's pitch, toes up positive (thesis Eq 52)."""
     return np.ascontiguousarray(rotate(q_foot, np.array([1.0, 0.0, 0.0]))[:, 2])
+
+
+def warm() -> None:
+    """Compile (or load from the cache) the kernel, so that the first analysis does not wait for it."""
+    push(FootPitchState.start(100.0, FootPitchParams()), np.zeros(1), np.ones(1, np.bool_))

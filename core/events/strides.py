@@ -10,8 +10,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import remainder, tau
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.errors import Notice
 from core.events.result import GaitEvents, Stride, Strides
@@ -105,34 +107,41 @@ def _side_strides(
     other: Side = "right" if side == "left" else "left"
     contacts, leavings = events.times(side, "ic"), events.times(side, "tc")
     other_contacts, other_leavings = events.times(other, "ic"), events.times(other, "tc")
+    n = len(orientations.t_s)
+    places = np.searchsorted(orientations.t_s, contacts)
+    foot = FOOT[side]
+    lost = _total(~orientations.valid[foot] if foot in orientations.q else np.zeros(n, np.bool_))
+    turned = _total(np.zeros(n, np.bool_) if turning is None else turning)
+    heading = yaw(orientations.q[foot][np.minimum(places, n - 1)]) if foot in orientations.q else None
     strides = []
-    for start, end in pairwise(contacts):
+    for i, (start, end) in enumerate(pairwise(contacts)):
         tc = _first(leavings, start, end)
         landings = _between(other_contacts, start, end)
         opposite_ic = landings[0] if len(landings) == 1 else None
         opposite_tc = _first(other_leavings, start, end if opposite_ic is None else opposite_ic)
-        first, past = np.searchsorted(orientations.t_s, (start, end))
-        inside = slice(int(first), max(int(past), int(first) + 1))
-        foot = FOOT[side]
+        first, past = places[i : i + 2]
+        gap = lost[past] > lost[first]
         turn = None
-        lost = False
-        if foot in orientations.q:
-            lost = not bool(orientations.valid[foot][inside].all())
-            q = orientations.q[foot][[inside.start, min(inside.stop, len(orientations.t_s) - 1)]]
-            turn = None if lost else float(np.angle(np.exp(1j * np.diff(yaw(q))))[0])
+        if heading is not None and not gap:
+            turn = remainder(heading[i + 1] - heading[i], tau)
         reason = None
-        if lost:
+        if gap:
             reason = "gap"
         elif tc is None or len(landings) > 1:
             reason = "incomplete"
         elif not params.min_s <= end - start <= params.max_s:
             reason = "implausible_time"
         elif (turn is not None and abs(turn) > params.turn_rad) or (
-            turning is not None and float(turning[inside].mean()) > params.turn_share
+            turned[past] - turned[first] > params.turn_share * (past - first)
         ):
             reason = "turn"
         strides.append(Stride(side, start, tc, end, opposite_tc, opposite_ic, turn, reason))
     return strides
+
+
+def _total(mask: Bools) -> NDArray[np.int64]:
+    """How often a mask (n,) is true before each sample, (n + 1,)."""
+    return np.concatenate(([0], np.cumsum(mask, dtype=np.int64)))
 
 
 def _between(times: Sequence[float], after: float, before: float) -> Sequence[float]:
