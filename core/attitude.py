@@ -132,7 +132,13 @@ def _advance(
 
 
 def advance(
-    state: AttitudeState, gyr: Floats, acc: Floats, valid: Bools, rate_hz: float, rest_norm: float, params: AttitudeParams
+    state: AttitudeState,
+    gyr: Floats,
+    acc: Floats,
+    valid: Bools,
+    rate_hz: float,
+    rest_norm: float,
+    params: AttitudeParams,
 ) -> tuple[Floats, AttitudeState]:
     """Run the filter over a block of samples.
 
@@ -152,7 +158,9 @@ def advance(
     gyr, acc = np.ascontiguousarray(gyr, np.float64), np.ascontiguousarray(acc, np.float64)
     x = np.array([*state.q, *state.rate, state.age_s, state.lost_s], np.float64)
     out = np.empty((len(gyr), 4))
-    _advance(gyr, acc, np.ascontiguousarray(valid), 1.0 / rate_hz, rest_norm, params.kp, params.relearn_s, x, out)
+    _advance(
+        gyr, acc, np.ascontiguousarray(valid), 1.0 / rate_hz, rest_norm, params.kp, params.relearn_s, x, out
+    )
     if not np.isfinite(x[:7]).all():
         raise EstimationError(
             "filter_diverged",
@@ -162,25 +170,69 @@ def advance(
 
 
 def orientation(
-    q_rest: Floats, at: int, gyr: Floats, acc: Floats, valid: Bools, rate_hz: float, rest_norm: float, params: AttitudeParams
+    q_rest: Floats,
+    at: int,
+    gyr: Floats,
+    acc: Floats,
+    valid: Bools,
+    rate_hz: float,
+    rest_norm: float,
+    params: AttitudeParams,
 ) -> Floats:
-    """Orientation (n, 4) of a whole take from a known orientation at one sample, without phase lag.
+    """Orientation (n, 4) of a whole take from a known orientation at sample `at`, without phase lag.
 
-    The filter runs from sample `at` to the end, from there back to the start and forward again; the result is
-    halfway between the last backward and the last forward run. Backwards the rates are negated and the order
-    reversed, which with the mean of two samples as rate is exactly the inverse motion, so that the two runs
-    differ only in what the accelerometer corrected, and its phase lag cancels.
+    The filter runs to the end, back to the start and forward again; the result is halfway between the last
+    backward and the last forward run. Backwards the rates are negated and the order reversed, which with the mean
+    of two samples as rate is exactly the inverse motion: the two runs differ only in what the accelerometer
+    corrected, and its lag cancels. A stretch behind a gap starts from where the gap began, learns its tilt by the
+    first run, and keeps an unknown heading (core/fusion/drift.py). Inside a gap the orientation is held.
     """
 
-    def run(q0: Floats, part: slice) -> Floats:
-        w = gyr[part] if part.step is None else -gyr[part]
-        stepped, _ = advance(AttitudeState(q0, w[0]), w[1:], acc[part][1:], valid[part][1:], rate_hz, rest_norm, params)
-        return np.concatenate((q0[None], stepped))
+    def run(q0: Floats, first: int, last: int, age_s: float = np.inf) -> Floats:
+        """Orientations from sample `first` to `last`, both included, in that order of time."""
+        step = 1 if last >= first else -1
+        part = slice(first, last + step if last + step >= 0 else None, step)
+        state = AttitudeState(q0, step * gyr[first], age_s)
+        rate, force, ok = step * gyr[part][1:], acc[part][1:], valid[part][1:]
+        return np.concatenate((q0[None], advance(state, rate, force, ok, rate_hz, rest_norm, params)[0]))
 
-    last = run(q_rest, slice(at, None))[-1]
-    backward = run(last, slice(None, None, -1))[::-1]
-    forward = run(backward[0], slice(None))
-    return normalise(slerp(backward, forward, 0.5))
+    def smooth(q0: Floats, start: int, a: int, b: int, age_s: float = np.inf) -> Floats:
+        """Orientations of the samples a to b, both included, from q0 at one of them."""
+        if start == b and start != a:
+            first = run(q0, b, a, age_s)[-1]
+        else:
+            first = run(run(q0, start, b, age_s)[-1], b, a)[-1]
+        forward = run(first, a, b)
+        backward = run(forward[-1], b, a)[::-1]
+        return normalise(slerp(backward, forward, 0.5))
+
+    out = np.tile(q_rest, (len(gyr), 1))
+    stretches = _stretches(valid, round(params.relearn_s * rate_hz))
+    if not stretches:
+        return out
+    home = min(range(len(stretches)), key=lambda k: max(stretches[k][0] - at, at - stretches[k][1], 0))
+    a, b = stretches[home]
+    start = min(max(at, a), b)
+    out[a : b + 1] = smooth(q_rest, start, a, b)
+    out[:a], out[b + 1 :] = out[a], out[b]
+    for a, b in stretches[home + 1 :]:
+        out[a : b + 1] = smooth(out[a - 1], a, a, b, 0.0)
+        out[b + 1 :] = out[b]
+    for a, b in reversed(stretches[:home]):
+        out[a : b + 1] = smooth(out[b + 1], b, a, b, 0.0)
+        out[:a] = out[a]
+    return out
+
+
+def _stretches(valid: Bools, bridge: int) -> list[tuple[int, int]]:
+    """First and last index of the valid stretches; gaps of up to `bridge` samples do not part them."""
+    index = np.flatnonzero(valid)
+    if not len(index):
+        return []
+    cuts = np.flatnonzero(np.diff(index) - 1 > bridge)
+    firsts = index[np.concatenate(([0], cuts + 1))]
+    lasts = index[np.concatenate((cuts, [len(index) - 1]))]
+    return [(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]
 
 
 def warm() -> None:

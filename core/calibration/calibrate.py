@@ -167,10 +167,11 @@ def _walk(
     for a, b in near:
         mask[a:b] = True
     trunk = next((s for s in TRUNK if s in q), None)
-    step_s = 0.0
-    if trunk is not None and near:
-        step_s = step_time(rotate(q[trunk], recording.sensors[trunk].acc)[:, 2], near, rate)
-    return Walk(rest, leads, near, bearing, span, mask, step_s, rate), facing
+    steps_s = None
+    if trunk is not None:
+        up = rotate(q[trunk], recording.sensors[trunk].acc)[:, 2]
+        steps_s = [step_time(up[a:b], rate) for a, b in near]
+    return Walk(rest, leads, near, bearing, span, mask, steps_s, rate), facing
 
 
 def _mounted(standing: Standing, found: Anterior) -> SegmentCalibration:

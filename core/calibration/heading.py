@@ -138,21 +138,23 @@ def acceleration_axis(
     bearing: list[float],
     rate_hz: float,
     params: HeadingParams,
-    step_s: float = 0.0,
+    steps_s: list[float] | None = None,
 ) -> Direction:
     """Principal axis of the low-passed horizontal acceleration, angle mod π.
 
     Parameters
     ----------
-    step_s : step time for a trunk sensor: a(t) + a(t + step) is what both steps share, which is forward; what
-        changes side with every step, the sway, cancels. 0 for the legs.
+    steps_s : step time in each part for a trunk sensor: a(t) + a(t + step) is what both steps share, which is
+        forward; what changes side with every step, the sway, cancels. None for the legs.
     """
     from scipy.signal import butter, sosfiltfilt
 
     sos = butter(2, min(0.9, params.cutoff_hz / (0.5 * rate_hz)), output="sos")
-    shift = round(step_s * rate_hz)
     power, moment = 0.0, 0j
-    for (start, end), turn in zip(parts, bearing, strict=True):
+    for (start, end), turn, step_s in zip(parts, bearing, steps_s or [0.0] * len(parts), strict=True):
+        shift = round(step_s * rate_hz)
+        if steps_s and any(steps_s) and not shift:
+            continue
         piece = np.stack((a[start:end].real, a[start:end].imag))
         smooth = sosfiltfilt(sos, piece, axis=1, padlen=min(piece.shape[1] - 1, 30))
         x = (smooth[0] + 1j * smooth[1]) * np.exp(-1j * turn)
@@ -165,23 +167,22 @@ def acceleration_axis(
     return Direction(0.5 * float(np.angle(moment)), float(np.abs(moment) / max(power, 1e-12)))
 
 
-def step_time(up: Floats, parts: list[Part], rate_hz: float) -> float:
-    """Step time in s from the vertical acceleration (n,) of the trunk: first peak of its autocorrelation.
+def step_time(up: Floats, rate_hz: float) -> float:
+    """Step time in s from the vertical acceleration (n,) of the trunk over a straight part, 0 if it has none.
 
-    Steps of 0.3 to 1.2 s are looked for, the range of adult walking; 0 when there is no peak.
+    The first peak of the autocorrelation between 0.3 and 1.2 s, the range of walking, that is nearly as high as
+    the highest: the highest may be the stride.
     """
     low, high = round(0.3 * rate_hz), round(1.2 * rate_hz)
-    total = np.zeros(high + 1)
-    for start, end in parts:
-        x = up[start:end] - up[start:end].mean()
-        if len(x) <= 2 * high:
-            continue
-        total += np.array([x[: len(x) - high] @ x[k : k + len(x) - high] for k in range(high + 1)])
-    if total[0] <= 0:
+    x = up - up.mean()
+    if len(x) < 2 * high:
         return 0.0
-    peaks = [k for k in range(low, high) if total[k] >= total[k - 1] and total[k] > total[k + 1]]
-    strong = [k for k in peaks if total[k] > 0.3 * total[0]]
-    return strong[0] / rate_hz if strong else 0.0
+    r = np.array([x[: len(x) - k] @ x[k:] / (len(x) - k) for k in range(high + 2)])
+    peaks = [k for k in range(low, high + 1) if r[k] >= r[k - 1] and r[k] > r[k + 1] and r[k] > 0]
+    if not peaks:
+        return 0.0
+    best = max(r[k] for k in peaks)
+    return next(k for k in peaks if r[k] >= 0.7 * best) / rate_hz
 
 
 def nearest_sign(axis: float, towards: float) -> float:
