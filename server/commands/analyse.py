@@ -54,14 +54,14 @@ def source_files(paths: Sequence[Path]) -> Iterator[SourceFile]:
 
 def print_summary(result: dict[str, list[dict[str, object]]], out: Path) -> None:
     """Parameters as a table, warnings as sentences, on stdout."""
-    lines = [f"{'parameter':<32}{'side':<8}{'n':>4}{'mean':>10}{'sd':>9}  unit"]
+    lines = [f"{'parameter':<36}{'side':<8}{'n':>4}{'mean':>10}{'sd':>9}  unit"]
     for p in result["parameters"]:
         if p["mean"] is None:
-            lines.append(f"{p['name']:<32}{p['side'] or '':<8}{p['n']:>4}{'–':>10}{'':>9}  {p['reason']}")
+            lines.append(f"{p['name']:<36}{p['side'] or '':<8}{p['n']:>4}{'–':>10}{'':>9}  {p['reason']}")
         else:
             sd = "" if p["sd"] is None else f"{p['sd']:.3f}"
             lines.append(
-                f"{p['name']:<32}{p['side'] or '':<8}{p['n']:>4}{p['mean']:>10.3f}{sd:>9}  {p['unit']}"
+                f"{p['name']:<36}{p['side'] or '':<8}{p['n']:>4}{p['mean']:>10.3f}{sd:>9}  {p['unit']}"
             )
     lines += [f"{w['code']}: {w['message']}" for w in result["warnings"]]
     lines.append(f"Results in {out}")

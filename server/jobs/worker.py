@@ -1,7 +1,7 @@
 """A worker: claims jobs, has its child compute them, keeps the lease alive, publishes.
 
-It runs in a process of its own (`sagittal serve` starts one, `sagittal worker` is one); run as a module it ends
-with its starter. Numbers are computed in the child only: that one may be killed at any moment.
+It runs in a process of its own (`sagittal serve` starts one, `sagittal worker` is one); run as a module it
+ends with its starter. Numbers are computed in the child only: that one may be killed at any moment.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ class Worker:
                 self._queue.release(claim)
 
     def _listen(self, claim: Claim, child: Child) -> Result | Failure | Hold:
-        """Keep the lease, pass on progress until the child is done or must not go on (OURS: we are stopped)."""
+        """Keep the lease, pass on progress until the child is done or must end (OURS: we are stopped)."""
         beat_s = self._settings.lease_s / 3
         began = time.monotonic()
         next_beat, next_look = began + beat_s, began + LOOK_S
@@ -236,5 +236,6 @@ def run_worker(settings: Settings, *, with_starter: bool = False) -> None:
 
 
 if __name__ == "__main__":
-    logging.basicConfig(level=logging.INFO)
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    logging.getLogger("alembic").setLevel(logging.WARNING)
     run_worker(load_settings(), with_starter=True)

@@ -1,0 +1,81 @@
+"""`sagittal demo`: a temporary clinic with simulated patients; nothing is kept."""
+
+from __future__ import annotations
+
+import secrets
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from contextlib import closing
+from pathlib import Path
+
+from sqlalchemy import func, select
+
+from server.commands.serve import run, say
+from server.settings import load_settings
+from server.storage.db import Database
+
+DEMO_WORKERS = 2
+
+
+def demo(port: int | None) -> int:
+    """Serve a clinic of simulated patients on 127.0.0.1 until Ctrl-C; the folder is removed at the end."""
+    from server.auth import accounts, one_time
+    from server.auth.passwords import hash_password
+    from server.auth.roles import Role
+    from server.jobs.runner import environment
+
+    with tempfile.TemporaryDirectory(prefix="sagittal-demo-") as folder:
+        settings = load_settings(
+            {"data_dir": Path(folder), "host": "127.0.0.1", "port": port or 0, "workers": DEMO_WORKERS}
+        )
+        helpers: list[subprocess.Popen[bytes]] = []
+
+        def announce(address: str) -> None:
+            with closing(Database(settings.database)) as db, db.write() as c:
+                person = accounts.create(
+                    c, "demo", "Demo", Role.ADMIN, hash_password(secrets.token_urlsafe(24))
+                )
+                token = one_time.issue_sign_in(c, person.id)
+            say(f"Open {address}/sign-in/{token}")
+            say("(signs you in once; everything is simulated and is removed when you stop with Ctrl-C)")
+            # simulating takes seconds of computing: never in the web process
+            helpers.append(
+                subprocess.Popen(
+                    [sys.executable, "-m", "server.services.demo_clinic"], env=environment(settings)
+                )
+            )
+            _report(settings.database)
+
+        try:
+            return run(settings, announce)
+        finally:
+            for process in helpers:
+                process.terminate()
+                process.wait()
+
+
+def _report(database: Path) -> None:
+    """Say on the console what is being waited for, until every session is analysed."""
+    from server.services.demo_clinic import VISITS
+    from server.storage.tables import job
+
+    began, told = time.monotonic(), ""
+    say("Compiling the filters (once per machine, about half a minute) …")
+    pause = threading.Event()
+    with closing(Database(database)) as db:
+        while True:
+            with db.read() as c:
+                states = dict(
+                    c.execute(select(job.c.state, func.count()).group_by(job.c.state)).tuples().all()
+                )
+            ended = sum(states.get(s, 0) for s in ("done", "failed", "cancelled"))
+            text = f"{ended} of {len(VISITS)} sessions analysed ({time.monotonic() - began:.0f} s)"
+            if ended and text.split(" (")[0] != told:
+                told = text.split(" (")[0]
+                say(text)
+            if ended >= len(VISITS):
+                return
+            pause.wait(0.5)

@@ -1,0 +1,120 @@
+"""`sagittal serve`: the web server and its workers on one data folder."""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+from server.settings import Settings, load_settings
+
+GRACE_S = 4
+"""Time open requests (event streams, views) have to end after SIGTERM; all in all it ends within 10 s."""
+
+
+def serve(data_dir: Path | None, host: str | None, port: int | None, workers: int | None) -> int:
+    """Serve until SIGTERM or Ctrl-C; 1 when the folder is in use or belongs to a newer version."""
+    from server.auth import one_time
+    from server.storage.db import Database
+
+    settings = load_settings({"data_dir": data_dir, "host": host, "port": port, "workers": workers})
+
+    def announce(address: str) -> None:
+        with closing(Database(settings.database)) as db, db.write() as c:
+            token = one_time.issue_set_up(c) if one_time.needs_set_up(c) else None
+        if token:
+            say(f"First start: set up the first administrator at {address}/set-up/{token}")
+        say(f"Sagittal is at {address} (data in {settings.data_dir})")
+
+    return run(settings, announce)
+
+
+def run(settings: Settings, announce: Callable[[str], None]) -> int:
+    """Run web server and workers; `announce` gets the address once requests are answered."""
+    import uvicorn
+
+    from server.app import create_app
+    from server.jobs.supervisor import Workers
+    from server.storage import fs
+    from server.storage.migrate import MigrationError, upgrade
+
+    start_log()
+    fs.make_folder(settings.data_dir)
+    try:
+        lock = fs.Lock(settings.lock, f"process {os.getpid()}")
+    except fs.LockedError as error:
+        sys.stderr.write(
+            f"Another server ({error.holder}) is running on {settings.data_dir}; stop it first.\n"
+        )
+        return 1
+    try:
+        upgrade(settings.database)
+        listener = _listen(settings)
+    except (MigrationError, OSError) as error:
+        sys.stderr.write(f"{error}\n")
+        lock.release()
+        return 1
+    workers = Workers(settings)
+    server = uvicorn.Server(
+        uvicorn.Config(
+            create_app(settings),
+            log_level="warning",
+            access_log=False,
+            proxy_headers=settings.behind_tls,
+            timeout_graceful_shutdown=GRACE_S,
+            ws_per_message_deflate=False,
+        )
+    )
+    host = f"[{settings.host}]" if ":" in settings.host else settings.host
+    address = f"http://{host}:{listener.getsockname()[1]}"
+    threading.Thread(target=_when_started, args=(server, lambda: announce(address)), daemon=True).start()
+    try:
+        workers.start()
+        server.run(sockets=[listener])
+    finally:
+        workers.stop()
+        listener.close()
+        lock.release()
+    return 0 if server.started else 1
+
+
+def start_log() -> None:
+    """Log to stderr: what we do, and of the migrations only what goes wrong."""
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    logging.getLogger("alembic").setLevel(logging.WARNING)
+
+
+def say(text: str) -> None:
+    """Print one line at once, also into a pipe."""
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def _listen(settings: Settings) -> socket.socket:
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((settings.host, settings.port))
+    except OSError as error:
+        listener.close()
+        raise OSError(
+            f"Port {settings.port} on {settings.host} cannot be used ({error.strerror}); "
+            "choose another with --port."
+        ) from None
+    return listener
+
+
+def _when_started(server: object, then: Callable[[], None]) -> None:
+    """Call `then` once the server answers."""
+    pause = threading.Event()
+    while not getattr(server, "started", False):
+        if getattr(server, "should_exit", False):
+            return
+        pause.wait(0.05)
+    then()

@@ -1,0 +1,23 @@
+"""`sagittal worker`: one more worker on the data folder of a server."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from server.commands.serve import start_log
+from server.settings import load_settings
+
+
+def worker(data_dir: Path | None) -> int:
+    """Work until SIGTERM or Ctrl-C; 1 when the database is not of this version."""
+    from server.jobs.worker import run_worker
+    from server.storage.migrate import MigrationError
+
+    start_log()
+    try:
+        run_worker(load_settings({"data_dir": data_dir}))
+    except MigrationError as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    return 0
