@@ -118,7 +118,8 @@ def strip_svg(strides: Strides, duration_s: float, height: int = 92) -> str:
     )
     step = next((s for s in (1, 2, 5, 10, 30, 60) if duration_s / s <= 12), 120)
     ticks = "".join(
-        f'<text x="{_f(100 * t / duration_s)}%" y="{plot_height}" dy="15" text-anchor="middle">{t}\u2009s</text>'
+        f'<text x="{_f(100 * t / duration_s)}%" y="{plot_height}" dy="15" text-anchor="middle">'
+        f"{t}\u2009s</text>"
         for t in range(0, int(duration_s) + 1, step)
     )
     return (
@@ -144,7 +145,8 @@ def _stride_mark(index: int, s: Stride, duration_s: float) -> str:
     return (
         f'<g data-stride="{index}"><title>{escape(said)}</title>'
         f'<rect class="st{k}{faded}" x="{start:.2f}" width="{off - start:.2f}" y="{top}" height="420"/>'
-        f'<rect class="sw{k}{faded}" x="{off:.2f}" width="{end - off:.2f}" y="{top}" height="420"/>{cross}</g>'
+        f'<rect class="sw{k}{faded}" x="{off:.2f}" width="{end - off:.2f}" y="{top}" height="420"/>'
+        f"{cross}</g>"
     )
 
 

@@ -25,7 +25,6 @@ import pyarrow.parquet as pq
 from core.angles import JointAngles
 from core.body.poses import Poses
 from core.calibration.result import Calibration
-from core.errors import Notice
 from core.events.result import GaitEvents, Strides
 from core.frames import Floats
 from core.parameters.result import Parameter
@@ -62,7 +61,7 @@ def summary(analysis: Analysis) -> dict[str, object]:
         "quality": plain(analysis.quality.to_json()),
         "calibration": _calibration(analysis.calibration, analysis.angles),
         "parameters": [parameter_row(p) for p in analysis.parameters],
-        "warnings": [notice_row(n) for n in analysis.notices],
+        "warnings": [n.to_json() for n in analysis.notices],
         "provenance": plain(analysis.provenance),
     }
 
@@ -77,17 +76,6 @@ def parameter_row(p: Parameter) -> dict[str, object]:
         "sd": plain(p.sd),
         "unit": p.unit,
         "reason": p.reason,
-    }
-
-
-def notice_row(n: Notice) -> dict[str, object]:
-    """One warning as JSON."""
-    return {
-        "code": n.code,
-        "message": n.message,
-        "sensor": n.sensor,
-        "t_s": plain(n.t_s),
-        "severity": n.severity,
     }
 
 

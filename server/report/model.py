@@ -15,11 +15,11 @@ from core.errors import Notice
 from core.frames import SIDES, Floats, Side
 from core.norms import NormBands, NormValues, adult_kinematics, angle_values, temporal_values
 from server.report.bundle import Bundle
-from server.report.exports import notice_row, plain
+from server.report.exports import plain
 from server.report.panels import DRAWN_STRIDES, CurvePanel, SideCurve, curve_panels
 from server.report.quality_box import QualityBox, quality_box
 from server.report.table import Row, grouped, parameter_rows
-from server.report.wording import NO_NORM, VARIABLES, ZERO_WORDS, excluded_words, number
+from server.report.wording import NO_NORM, VARIABLES, ZERO_WORDS, excluded_words, number, place_words
 
 Sex = Literal["female", "male"]
 
@@ -204,21 +204,19 @@ def rounded(values: Floats | None) -> list[float] | None:
 def _duration(bundle: Bundle) -> float:
     if bundle.angles is not None and len(bundle.angles.t_s):
         return float(bundle.angles.t_s[-1])
-    return max((s.end_s for s in bundle.strides.strides), default=0.0)
+    return float(bundle.quality.get("duration_s") or 0.0)
 
 
 def _warning(n: Notice) -> Warning_:
-    row = notice_row(n)
     title = n.code.replace("_", " ").capitalize()
-    where = "" if n.sensor is None else f", {n.sensor.replace('_', ' ')}"
-    t_s = row["t_s"]
+    where = "" if n.sensor is None else f", {place_words(n.sensor)}"
     return Warning_(
         kind=_KINDS[n.severity],
         code=n.code,
         title=f"{title}{where}",
         message=n.message,
         sensor=n.sensor,
-        t_s=t_s if isinstance(t_s, float) else None,
+        t_s=n.t_s,
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from server.report.bundle import Bundle
-from server.report.wording import number
+from server.report.wording import number, place_words
 
 _METHODS: Final[Mapping[str, str]] = {
     "walking_direction": "from standing and walking",
@@ -44,13 +44,19 @@ class QualityBox:
 def quality_box(bundle: Bundle) -> QualityBox:
     """Judge a finished analysis.
 
-    Bad when the analysis stopped or no stride counts; warn when any notice is a warning; else ok.
+    Bad when the analysis stopped, no stride counts or the signals are poor; warn when the signals are only
+    usable or any stage has a warning; else ok.
     """
+    level = bundle.quality.get("level", "good")
     severities = {n.severity for n in bundle.warnings}
-    if "error" in severities or not bundle.strides.used():
-        kind, word = "bad", "Not usable" if bundle.angles is None else "No strides"
-    elif "warning" in severities:
-        kind, word = "warn", "Read the notices"
+    if "error" in severities:
+        kind, word = "bad", "Analysis stopped"
+    elif not bundle.strides.used():
+        kind, word = "bad", "No strides"
+    elif level == "poor":
+        kind, word = "bad", "Poor data"
+    elif level == "usable" or "warning" in severities:
+        kind, word = "warn", "Usable, see notices"
     else:
         kind, word = "ok", "Good data"
     items = [_strides(bundle), *_signals(bundle.quality), *_calibration(bundle.calibration)]
@@ -81,16 +87,12 @@ def _signals(quality: Mapping[str, Any]) -> list[QualityItem]:
     rest = quality.get("rest_s")
     if rest is not None:
         total = sum(end - start for start, end in rest)
-        items.append(
-            QualityItem(
-                "Standing still", f"{number(total, 1)} s", f"{len(rest)} times" if len(rest) > 1 else ""
-            )
-        )
-    disturbed = [
-        float(s["magnetic_disturbed_pct"]) for s in sensors if s.get("magnetic_disturbed_pct") is not None
-    ]
-    if disturbed:
-        items.append(QualityItem("Magnetic field", f"{number(max(disturbed))} % disturbed", "not used"))
+        times = f"in {len(rest)} parts" if len(rest) > 1 else ""
+        items.append(QualityItem("Standing still", f"{number(total, 1)} s", times))
+    magnetic = [float(s["magnetic_pct"]) for s in sensors if s.get("magnetic_pct") is not None]
+    if magnetic:
+        share = f"disturbed {number(max(magnetic))} % of the time" if max(magnetic) >= 1 else "steady"
+        items.append(QualityItem("Magnetic field", share, "not used"))
     return items
 
 
@@ -107,4 +109,4 @@ def _calibration(calibration: Mapping[str, Any] | None) -> list[QualityItem]:
 
 
 def _sensor_name(sensor: Mapping[str, Any]) -> str:
-    return str(sensor.get("segment") or sensor.get("device_id") or "").replace("_", " ")
+    return place_words(str(sensor.get("segment") or sensor.get("device_id") or ""))

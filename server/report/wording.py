@@ -174,6 +174,13 @@ def reason_words(code: str | None) -> str:
     return "not measured" if code is None else REASONS.get(code, f"not measured: {code.replace('_', ' ')}")
 
 
+def place_words(sensor: str) -> str:
+    """A segment in words, "right shank"; a device id as it is."""
+    name, _, suffix = sensor.rpartition("_")
+    side = {"l": "left", "r": "right"}.get(suffix)
+    return sensor if side is None or not name else f"{side} {name}"
+
+
 def excluded_words(code: str) -> str:
     """Words for a stride left out; a therapist's own reason is shown as typed."""
     return code.removeprefix("manual:").strip() if code.startswith("manual:") else EXCLUDED.get(code, code)
@@ -186,11 +193,13 @@ def number(value: float, digits: int = 0) -> str:
 
 
 def difference_words(left: float, right: float, term: Term) -> str:
-    """Left against right in words: "left longer by 0.04 s", "no difference" where the printed digits agree.
+    """Left against right in words: "left longer by 0.04 s", "no difference" where the printed values agree.
 
     Angles are compared in whole degrees: tenths are far below what repeats between visits (clinic.md §2).
     """
     digits = 0 if term.unit == "°" else term.digits
+    if term.unit != "°":
+        left, right = round(left, digits), round(right, digits)
     shown = round(abs(left - right), digits)
     if shown == 0:
         return "no difference"

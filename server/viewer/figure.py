@@ -27,7 +27,7 @@ _FLOOR: dict[bool, tuple[Rgb, Rgb]] = {
 }
 _SECTION_M = 1.0
 _NOWHERE = -50.0
-_FOV_RAD = np.deg2rad(34.0)
+_FOV_RAD = np.deg2rad(31.0)
 
 
 def linear(colour: Rgb) -> Rgb:

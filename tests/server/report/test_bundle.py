@@ -1,0 +1,150 @@
+"""What is written is what is read: the files of an analysis and back."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from core.calibration.result import Calibration, SegmentCalibration
+from core.errors import FormatError, Notice
+from core.parameters import gait_parameters
+from core.parameters.temporal import NAMES
+from core.pipeline import Analysis
+from core.quality import QualityReport
+from core.recording import SensorSignals, Subject, UniformRecording
+from server.report.bundle import load_bundle, read_poses
+from server.report.exports import analysis_files
+from tests.server import walk
+
+
+def analysis(*, reached: bool = True) -> Analysis:
+    n = len(walk.angles().t_s)
+    zeros = np.zeros((n, 3))
+    sensor = SensorSignals("A1", zeros, zeros, None, np.ones(n, bool), np.zeros(n, bool))
+    problem = None if reached else Notice("no_rest", "No rest found.", severity="error")
+    segment = SegmentCalibration(np.eye(3), np.array([0.01, 0.0, np.nan]), 9.8, "walking_direction", 0.9)
+    angles, strides = walk.angles(), walk.strides()
+    return Analysis(
+        recording=UniformRecording(walk.angles().t_s, 100.0, {"pelvis": sensor}, Subject(1.75), "walk", {}),
+        quality=QualityReport("good", (), 12.0, 100.0, MappingProxyType({}), ((0.0, 2.0),), ()),
+        calibration=Calibration(
+            {"pelvis": segment},
+            ((0.0, 2.0),),
+            ((2.0, 9.0),),
+            (0.0, 2.0),
+            np.zeros(n, bool),
+            "walking_direction",
+        )
+        if reached
+        else None,
+        orientations=None,
+        events=walk.events() if reached else None,
+        strides=strides if reached else None,
+        poses=walk.poses() if reached else None,
+        angles=angles if reached else None,
+        parameters=gait_parameters(strides, angles) if reached else (),
+        problem=problem,
+        notices=(Notice("gap", "0.3 s lost.", "pelvis", 1.0), *(() if problem is None else (problem,))),
+        provenance={"input_sha256": {"a.txt": "ff"}, "version": "1"},
+    )
+
+
+@pytest.fixture(scope="module")
+def files() -> Mapping[str, bytes]:
+    return analysis_files(analysis())
+
+
+def test_names_of_the_files(files: Mapping[str, bytes]) -> None:
+    assert set(files) == {"analysis.json", "angles.parquet", "poses.parquet", "events.csv", "strides.csv"}
+
+
+def test_analysis_json_is_strict_json_of_schema_1(files: Mapping[str, bytes]) -> None:
+    def refuse(token: str) -> Any:
+        raise AssertionError(f"{token} on the wire")
+
+    data = json.loads(files["analysis.json"], parse_constant=refuse)
+    assert data["schema"] == 1
+    assert set(data) == {"schema", "quality", "calibration", "parameters", "warnings", "provenance"}
+    assert data["calibration"]["segments"]["pelvis"]["gyro_bias_dps"][2] is None
+    assert data["warnings"][0] | {"code": "gap", "sensor": "pelvis", "t_s": 1.0} == data["warnings"][0]
+    row = next(p for p in data["parameters"] if p["name"] == "stride_time_s" and p["side"] == "left")
+    assert row["mean"] == pytest.approx(walk.STRIDE_S)
+    assert set(row) == {"name", "side", "n", "mean", "sd", "unit", "reason"}
+
+
+def test_angles_parquet_is_float32_degrees_with_null_where_lost() -> None:
+    angles = walk.angles()
+    angles.angles["knee_flexion_l"][100:120] = np.nan
+    lost = analysis()
+    object.__setattr__(lost, "angles", angles)
+    table = pq.read_table(io.BytesIO(analysis_files(lost)["angles.parquet"]))
+    column = table.column("knee_flexion_l_deg")
+    assert str(column.type) == "float"
+    assert column.null_count == 20
+    assert table.column("t_s").null_count == 0
+    assert column[0].as_py() == pytest.approx(math.degrees(angles.angles["knee_flexion_l"][0]), abs=1e-4)
+
+
+def test_bundle_gives_back_angles_strides_events_and_parameters(files: Mapping[str, bytes]) -> None:
+    bundle, source = load_bundle(files), analysis()
+    assert bundle.angles is not None
+    assert source.angles is not None
+    for name, angle in source.angles.angles.items():
+        np.testing.assert_allclose(bundle.angles.angles[name], angle, atol=1e-6)
+    assert bundle.angles.zero_offset == pytest.approx(source.angles.zero_offset)
+    assert bundle.parameters == source.parameters
+    assert source.strides is not None
+    assert len(bundle.strides.strides) == len(source.strides.strides)
+    for read, written in zip(bundle.strides.strides, source.strides.strides, strict=True):
+        assert (read.side, read.excluded_reason) == (written.side, written.excluded_reason)
+        assert read.start_s == pytest.approx(written.start_s, abs=1e-6)
+        assert read.turn_rad == pytest.approx(written.turn_rad, abs=1e-6)
+    assert source.events is not None
+    assert [(e.side, e.kind) for e in bundle.events.events] == [
+        (e.side, e.kind) for e in source.events.events
+    ]
+
+
+def test_poses_come_back_within_float32(files: Mapping[str, bytes]) -> None:
+    read, written = read_poses(files["poses.parquet"]), walk.poses()
+    assert read.body == written.body
+    for segment, q in written.q.items():
+        np.testing.assert_allclose(read.q[segment], q, atol=1e-6)
+        np.testing.assert_allclose(read.p[segment], written.p[segment], atol=1e-5)
+    np.testing.assert_array_equal(read.contact["foot_l"], written.contact["foot_l"])
+
+
+def test_strides_csv_carries_the_parameters_of_each_stride(files: Mapping[str, bytes]) -> None:
+    header, first, *_ = files["strides.csv"].decode().splitlines()
+    columns = header.split(",")
+    assert columns[:4] == ["side", "start_s", "tc_s", "end_s"]
+    assert columns[-1] == "excluded_reason"
+    assert set(NAMES) <= set(columns)
+    assert "nan" not in first.lower()
+
+
+def test_an_analysis_that_stopped_early_still_says_why() -> None:
+    files = analysis_files(analysis(reached=False))
+    assert set(files) == {"analysis.json"}
+    bundle = load_bundle(files)
+    assert bundle.angles is None
+    assert bundle.calibration is None
+    assert bundle.warnings[-1].code == "no_rest"
+    assert bundle.warnings[-1].severity == "error"
+
+
+@pytest.mark.parametrize(
+    ("content", "code"), [({}, "no_analysis"), ({"analysis.json": b'{"schema": 2}'}, "newer_analysis")]
+)
+def test_a_bundle_that_cannot_be_read_says_what_to_do(content: dict[str, bytes], code: str) -> None:
+    with pytest.raises(FormatError) as caught:
+        load_bundle(content)
+    assert caught.value.code == code

@@ -1,0 +1,196 @@
+from __future__ import annotations
+
+import csv
+import io
+import json
+import time
+from collections.abc import Callable
+
+import pytest
+
+from core.errors import Notice
+from core.events.result import Strides
+from core.parameters.result import Parameter
+from server.report.bundle import Bundle
+from server.report.model import report_model
+from server.report.table import Row, parameter_rows
+from server.report.tables import curves_csv, parameters_csv
+from server.report.wording import TERMS, VARIABLES, difference_words, place_words
+
+MakeBundle = Callable[..., Bundle]
+
+
+def row(rows: tuple[Row, ...], name: str) -> Row:
+    return next(r for r in rows if r.name == name)
+
+
+def rows_of(*parameters: Parameter) -> tuple[Row, ...]:
+    return parameter_rows(parameters, {})
+
+
+def of(name: str, side: str | None, mean: float | None, reason: str | None = None) -> Parameter:
+    return Parameter(name, side, 12 if mean is not None else 0, mean, None, "s", reason)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("name", "left", "right", "words"),
+    [
+        ("stride_time_s", 1.21, 1.17, "left longer by 0.04\u202fs"),
+        ("stride_time_s", 1.171, 1.169, "no difference"),
+        ("stance_pct", 62.0, 70.5, "left shorter by 8.5 points"),
+        ("knee_flexion_rom_deg", 60.6, 52.2, "left larger by 8°"),
+        ("knee_flexion_ic_deg", -3.0, 4.0, "left straighter by 7°"),
+        ("knee_flexion_ic_deg", 3.4, 3.0, "no difference"),
+        ("foot_pitch_ic_deg", 25.0, 10.0, "left toes higher by 15°"),
+    ],
+)
+def test_difference_is_said_in_words(name: str, left: float, right: float, words: str) -> None:
+    assert difference_words(left, right, TERMS[name]) == words
+
+
+def test_words_agree_with_the_printed_numbers() -> None:
+    found = row(rows_of(of("step_time_s", "left", 0.6851), of("step_time_s", "right", 0.7049)), "step_time_s")
+    assert found.left is not None
+    assert found.right is not None
+    assert (found.left.text, found.right.text) == ("0.69", "0.70")
+    assert found.difference == "left shorter by 0.01\u202fs"
+
+
+def test_a_missing_number_gives_its_reason_never_zero() -> None:
+    both = rows_of(
+        of("stance_pct", "left", None, "no_terminal_contact"),
+        of("stance_pct", "right", None, "no_terminal_contact"),
+    )
+    assert both[0].reason == "not measured: no foot-off was found"
+    assert both[0].left is None
+    one = rows_of(of("stance_pct", "left", 61.0), of("stance_pct", "right", None, "no_strides"))[0]
+    assert one.reason is None
+    assert one.right is None
+    assert one.difference == "right not measured: no complete stride of this side"
+
+
+def test_an_unknown_parameter_is_shown_under_its_own_name() -> None:
+    found = rows_of(of("new_index", None, 3.0))[0]
+    assert (found.title, found.group) == ("new_index", "Other")
+    assert found.both is not None
+
+
+def test_box_counts_strides_and_names_the_worst_sensor(bundle: Bundle) -> None:
+    box = report_model(bundle).quality
+    items = {i.label: i for i in box.items}
+    assert (box.kind, box.word) == ("ok", "Good data")
+    strides = items["Strides used"]
+    used = len(bundle.strides.used("left"))
+    assert (strides.left, strides.left_of) == (used, used + 1)
+    assert (items["Lost samples"].value, items["Lost samples"].extra) == ("0.3 %", "at most, right shank")
+    assert items["Calibration"].value == "92"
+    assert items["Angle zero"].value == "standing"
+
+
+@pytest.mark.parametrize(
+    ("severity", "level", "kind"),
+    [("warning", "good", "warn"), ("info", "good", "ok"), ("error", "good", "bad"), ("info", "poor", "bad")],
+)
+def test_verdict_follows_the_worst_notice(
+    make_bundle: MakeBundle, severity: str, level: str, kind: str
+) -> None:
+    notice = Notice("gap", "0.3 s lost.", "pelvis", severity=severity)  # type: ignore[arg-type]
+    model = report_model(make_bundle(warnings=(notice,), quality={"level": level}))
+    assert model.quality.kind == kind
+    assert model.warnings[0].title == "Gap, pelvis"
+    assert (model.problem is not None) == (severity == "error")
+
+
+def test_a_take_without_strides_keeps_every_panel_in_its_place(make_bundle: MakeBundle) -> None:
+    model = report_model(make_bundle(strides=Strides(()), parameters=()))
+    assert model.quality.kind == "bad"
+    assert [p.variable for p in model.panels] == list(VARIABLES)
+    assert all(p.reason is not None and p.norm is None for p in model.panels)
+    assert model.used == {"left": 0, "right": 0}
+
+
+def test_a_stopped_analysis_is_a_report_too(make_bundle: MakeBundle) -> None:
+    stop = Notice("no_rest", "Nobody stood still.", severity="error")
+    model = report_model(
+        make_bundle(warnings=(stop,), angles=None, strides=Strides(()), parameters=(), calibration=None)
+    )
+    assert model.problem == "Nobody stood still."
+    assert model.duration_s == 12.0
+    json.dumps(model.to_json(), allow_nan=False)
+
+
+def test_norm_stands_behind_comparable_curves_only(bundle: Bundle) -> None:
+    panels = {p.variable.name: p for p in report_model(bundle, age=40).panels}
+    assert panels["knee_flexion"].norm is not None
+    assert panels["pelvis_tilt"].norm is None
+    assert panels["pelvis_tilt"].reason is None
+    assert panels["pelvis_rotation"].reason is not None
+    assert panels["hip_rotation"].low_confidence
+    assert not panels["hip_flexion"].low_confidence
+    assert panels["knee_flexion"].title == "Knee flexion, from standing"
+
+
+def test_source_and_number_of_the_norm_are_printed_or_why_there_is_none(bundle: Bundle) -> None:
+    adult = report_model(bundle, age=40, sex="female")
+    assert "25 adults 21–54 years" in adult.norm_note
+    assert "Fukuchi" in adult.norm_note
+    assert "year of birth" in report_model(bundle).norm_note
+    child = report_model(bundle, age=10, sex="female")
+    assert child.norm_note.startswith("No norm for this age")
+    assert all(p.norm is None for p in child.panels)
+    assert all(r.norm is None for _, rows in child.groups for r in rows)
+    assert report_model(bundle, age=40, speed_mps=0.5).norm_note.startswith("No speed-matched norm")
+
+
+def test_offsets_that_were_subtracted_are_printed(bundle: Bundle) -> None:
+    assert "hip flexion left 6°" in report_model(bundle).curve_notes[0]
+
+
+def test_json_has_no_nan_and_the_same_means_as_the_stored_parameters(bundle: Bundle) -> None:
+    data = json.loads(json.dumps(report_model(bundle, age=40, sex="male").to_json(), allow_nan=False))
+    stored = {(p.name, p.side): p.mean for p in bundle.parameters}
+    for r in data["parameters"]:
+        for side in ("left", "right"):
+            if r[side] is not None:
+                assert r[side]["value"] == stored[r["name"], side]
+    knee = next(c for c in data["curves"] if c["variable"] == "knee_flexion")
+    assert len(knee["sides"]["left"]["mean_deg"]) == 101
+
+
+def test_replay_data_is_what_the_clock_needs(bundle: Bundle) -> None:
+    replay = json.loads(json.dumps(report_model(bundle).replay, allow_nan=False))
+    assert replay["duration_s"] == pytest.approx(11.99)
+    assert len(replay["strides"]) == len(bundle.strides.strides)
+    assert set(replay["curves"]["knee_flexion"]) == {"left", "right"}
+
+
+def test_tables_have_a_csv_twin(bundle: Bundle) -> None:
+    model = report_model(bundle, age=40, sex="male")
+    parameters = list(csv.DictReader(io.StringIO(parameters_csv(model).decode())))
+    stance = [r for r in parameters if r["name"] == "stance_pct"]
+    assert [r["side"] for r in stance] == ["left", "right"]
+    assert float(stance[0]["mean"]) == pytest.approx(62.0, abs=0.1)
+    curves = list(csv.DictReader(io.StringIO(curves_csv(model).decode())))
+    knee = [r for r in curves if r["variable"] == "knee_flexion" and r["side"] == "right"]
+    assert len(knee) == 101
+    assert knee[0]["norm_sd_deg"] != ""
+    assert not any(value in ("nan", "None") for r in curves for value in r.values())
+
+
+def test_segments_are_said_in_words() -> None:
+    assert [place_words(s) for s in ("shank_r", "pelvis", "00B40C44")] == [
+        "right shank",
+        "pelvis",
+        "00B40C44",
+    ]
+
+
+@pytest.mark.bench
+def test_ten_minutes_are_reported_within_50_ms(make_bundle: MakeBundle) -> None:
+    long = make_bundle(600.0)
+    best = 1.0
+    for _ in range(5):
+        start = time.perf_counter()
+        report_model(long, age=40, sex="male")
+        best = min(best, time.perf_counter() - start)
+    assert best < 0.05
