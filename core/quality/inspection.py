@@ -9,7 +9,7 @@ import numpy as np
 from core.errors import Notice
 from core.frames import Segment
 from core.quality.signals import facts
-from core.quality.suggestion import suggest
+from core.quality.suggestion import Suggestion, suggest
 from core.quality.suspicion import suspicions
 from core.recording import ImuStream, Recording
 
@@ -24,7 +24,7 @@ class DeviceFacts:
     longest_gap_s : longest stretch without a sample, 0 = none.
     start_s : first sample relative to the take's first. still_norm : mean |acc| of the quietest second, m/s².
     segment : as declared, None = not used or not declared (see `declared`).
-    suggested, basis : what the name or the movement suggests and why ("label", "movement"), or None.
+    suggestion : what the name or the movement suggests.
     duplicate_of : id of the sensor that holds the same samples, else None.
     """
 
@@ -43,8 +43,7 @@ class DeviceFacts:
     still_norm: float
     declared: bool
     segment: Segment | None
-    suggested: Segment | None
-    basis: str | None
+    suggestion: Suggestion
     duplicate_of: str | None
     notices: tuple[Notice, ...]
 
@@ -67,8 +66,10 @@ class DeviceFacts:
             "still_norm_mps2": round(self.still_norm, 3),
             "declared": self.declared,
             "segment": self.segment,
-            "suggested": self.suggested,
-            "basis": self.basis,
+            "suggested": self.suggestion.segment,
+            "suggested_part": self.suggestion.part,
+            "suggested_leg": self.suggestion.leg,
+            "basis": self.suggestion.basis,
             "duplicate_of": self.duplicate_of,
             "notices": [n.to_json() for n in self.notices],
         }
@@ -106,14 +107,12 @@ def describe(recording: Recording) -> Inspection:
     suggestions = suggest(recording)
     devices = []
     for device, stream in recording.streams.items():
-        suggestion = suggestions.get(device)
         devices.append(
             _device(
                 stream,
                 declared=device in recording.segments,
                 segment=recording.segments.get(device),
-                suggested=suggestion.segment if suggestion else None,
-                basis=suggestion.basis if suggestion else None,
+                suggestion=suggestions[device],
                 duplicate_of=copies.get(device),
             )
         )
@@ -133,8 +132,7 @@ def _device(
     *,
     declared: bool,
     segment: Segment | None,
-    suggested: Segment | None,
-    basis: str | None,
+    suggestion: Suggestion,
     duplicate_of: str | None,
 ) -> DeviceFacts:
     f = facts(s.acc, s.gyr, s.rate_hz)
@@ -165,8 +163,7 @@ def _device(
         still_norm=f.still_norm,
         declared=declared,
         segment=segment,
-        suggested=suggested,
-        basis=basis,
+        suggestion=suggestion,
         duplicate_of=duplicate_of,
         notices=tuple(notices),
     )

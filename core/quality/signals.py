@@ -7,12 +7,20 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import Floats
+from core.frames import GRAVITY, Floats
 
 STILL: Final = 0.03
 """A second is still when acc varies less than this share of its mean (0.25 m/s², spec/real-data.md §2.1)."""
 PLATEAU: Final = 3
 """Neighbouring samples at the largest value that make a plateau: noise does not repeat it [our choice]."""
+RANGES: Final = (
+    *(g * GRAVITY for g in (2, 4, 8, 16)),
+    *(float(np.radians(d)) for d in (250, 500, 1000, 2000)),
+)
+"""Full scales that wearables are set to, m/s² and rad/s."""
+CROWD: Final = 5
+"""Samples within 1 % of a largest value that is itself within 1 % of a full scale: clipped, then calibrated,
+so that the plateau is no longer exact (gaitmap_foot: 6 samples at 155.9 to 157.2 m/s²) [our choice]."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +103,10 @@ def saturation(x: Floats, floor: float) -> tuple[float, float | None]:
             if top < floor:
                 continue
             at_top = signed >= top * (1 - 1e-6)
+            crowd = signed >= 0.99 * top
+            if any(abs(top / full - 1) < 0.01 for full in RANGES) and np.count_nonzero(crowd) >= CROWD:
+                clipped |= crowd
+                value = max(top, value or 0.0)
             edges = np.flatnonzero(np.diff(np.concatenate(([False], at_top, [False])).astype(np.int8)))
             for start, end in zip(edges[::2], edges[1::2], strict=True):
                 if end - start >= PLATEAU:
