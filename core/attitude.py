@@ -1,11 +1,12 @@
 """Tilt and turn of one sensor: the explicit complementary filter, six axes, gyro bias already removed.
 
-Mahony, Hamel and Pflimlin 2008 (IEEE TAC 53(5)), eq 32 with k_I = 0: q̇ = ½ q ⊗ (ω + k_P e), e = a × â, where â =
-R(q)ᵀ e₃ is the predicted vertical and a the specific force. Two differences, both for walking:
+Mahony, Hamel and Pflimlin 2008 (IEEE TAC 53(5)), eq 32 with k_I = 0: q̇ = ½ q ⊗ (ω + k_P e), e = a × â, where
+â = R(q)ᵀ e₃ is the predicted vertical and a the specific force. Two differences, both for walking:
 - a is divided by its norm at rest, not by its own (spec/fusion.md §1, Eq 31). Over a stride the horizontal
   acceleration averages to zero; divided by its own norm it does not and pulls the vertical aside.
-- the integral term is left out: without a magnetometer the bias about the vertical is unobservable and runs away
-  (spec/fusion.md §4.6, rule i). The bias is the mean over rest. Heading is only as good as the gyroscope.
+- the integral term is left out: without a magnetometer the bias about the vertical is unobservable and runs
+  away (spec/fusion.md §4.6, rule i). The bias is the mean over rest. Heading is only as good as the
+  gyroscope.
 
 The module sits beside core/rest.py because calibration needs tilt to find the walking direction and fusion
 needs it for the result; both run this one filter.
@@ -182,10 +183,11 @@ def orientation(
     """Orientation (n, 4) of a whole take from a known orientation at sample `at`, without phase lag.
 
     The filter runs to the end, back to the start and forward again; the result is halfway between the last
-    backward and the last forward run. Backwards the rates are negated and the order reversed, which with the mean
-    of two samples as rate is exactly the inverse motion: the two runs differ only in what the accelerometer
-    corrected, and its lag cancels. A stretch behind a gap starts from where the gap began, learns its tilt by the
-    first run, and keeps an unknown heading (core/fusion/drift.py). Inside a gap the orientation is held.
+    backward and the last forward run. Backwards the rates are negated and the order reversed, which with the
+    mean of two samples as rate is exactly the inverse motion: the two runs differ only in what the
+    accelerometer corrected, and its lag cancels. A stretch behind a gap starts from where the gap began,
+    learns its tilt by the first run, and keeps an unknown heading (core/fusion/drift.py). Inside a gap the
+    orientation is held.
     """
 
     def run(q0: Floats, first: int, last: int, age_s: float = np.inf) -> Floats:

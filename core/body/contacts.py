@@ -13,8 +13,8 @@ def contact_mask(t_s: Floats, ic_s: Sequence[float], tc_s: Sequence[float]) -> B
     """Samples (n,) at which a foot is on the floor: from each initial contact to the next terminal contact.
 
     Before its first event a foot stands if that event is a terminal contact, and after its last if that is an
-    initial contact. Between two terminal contacts without an initial one (a missed event) the swing is taken to
-    last until half way.
+    initial contact. Between two terminal contacts without an initial one (a missed event) the swing is taken
+    to last until half way.
 
     Parameters
     ----------

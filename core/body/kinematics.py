@@ -1,10 +1,11 @@
 """Forward kinematics: orientations and lengths → poses of a figure that walks, anchored by the standing foot.
 
-The chain gives every point relative to the pelvis. What is on the floor does not move: the pelvis travels with
-minus the velocity of the sole point in contact, integrated, so that there is never a jump; its height puts the
-lowest sole point in contact on z = 0 at every moment, so that height does not drift. The sole rolls: between heel
-and ball the contact point is the lower one, blended smoothly. Horizontal drift is that of the relative chain only
-and is not corrected: positions are for looking at, stride lengths need an estimator (spec/real-data.md §0.3).
+The chain gives every point relative to the pelvis. What is on the floor does not move: the pelvis travels
+with minus the velocity of the sole point in contact, integrated, so that there is never a jump; its height
+puts the lowest sole point in contact on z = 0 at every moment, so that height does not drift. The sole rolls:
+between heel and ball the contact point is the lower one, blended smoothly. Horizontal drift is that of the
+relative chain only and is not corrected: positions are for looking at, stride lengths need an estimator
+(spec/real-data.md §0.3).
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from core.fusion.orientations import Orientations
 from core.rotation import rotate
 
 HEEL, BALL = -0.21, 0.53
-"""Heel and ball contact points in front of the ankle as fractions of foot length: the walker's −.055 and .14 m at
-a foot of .265 m (spec/estimators.md §2.2)."""
+"""Heel and ball contact points in front of the ankle as fractions of foot length: the −.055 and .14 m of the
+walker at a foot of .265 m (spec/estimators.md §2.2)."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,8 @@ def nominal_body(height_m: float | None) -> tuple[BodyModel, tuple[Notice, ...]]
     if height_m is not None:
         return BodyModel.from_height(height_m), ()
     message = (
-        f"Body height is not given; the figure is drawn with {NOMINAL_HEIGHT_M:.2f} m. Enter the height to see true "
-        "proportions and travelled distance; joint angles do not depend on it."
+        f"Body height is not given; the figure is drawn with {NOMINAL_HEIGHT_M:.2f} m. Enter the height "
+        "to see true proportions and distances; joint angles do not depend on it."
     )
     return BodyModel.from_height(NOMINAL_HEIGHT_M), (Notice("height_assumed", message),)
 
@@ -66,8 +67,8 @@ def forward_kinematics(
 
     Returns
     -------
-    Poses. Its figure holds the pelvis and the legs with thigh, shank and foot; `figure_incomplete` says what is
-    left out and why. Without the pelvis or without any complete leg `p` and `q` are empty.
+    Poses. Its figure holds the pelvis and the legs with thigh, shank and foot; `figure_incomplete` says what
+    is left out and why. Without the pelvis or without any complete leg `p` and `q` are empty.
     """
     params = params or AnchorParams()
     n = len(orientations.t_s)
@@ -75,7 +76,15 @@ def forward_kinematics(
     notices = _incomplete(orientations, legs)
     if "pelvis" not in orientations.q or not legs:
         return Poses(
-            orientations.t_s, orientations.rate_hz, {}, {}, np.zeros(n, bool), {}, body, "none", notices=notices
+            orientations.t_s,
+            orientations.rate_hz,
+            {},
+            {},
+            np.zeros(n, bool),
+            {},
+            body,
+            "none",
+            notices=notices,
         )
     q: dict[Segment, Floats] = {"pelvis": orientations.q["pelvis"]}
     relative: dict[Segment, Floats] = {"pelvis": np.zeros((n, 3))}
@@ -138,7 +147,8 @@ def _travel(soles: Floats, carrying: Mapping[Side, Bools], rate_hz: float, param
     series = np.column_stack((velocity[:, :2], z))
     if not borne.all():
         series = np.column_stack([np.interp(index, index[borne], x[borne]) for x in series.T])
-    series = uniform_filter1d(uniform_filter1d(series, width, axis=0, mode="nearest"), width, axis=0, mode="nearest")
+    for _ in range(2):
+        series = uniform_filter1d(series, width, axis=0, mode="nearest")
     travel = np.empty_like(series)
     travel[:, :2] = np.cumsum(series[:, :2], axis=0) / rate_hz
     travel[:, :2] -= travel[0, :2]
@@ -155,7 +165,7 @@ def _somebody_carries(carrying: Mapping[Side, Bools]) -> dict[Side, Bools]:
 def _incomplete(orientations: Orientations, legs: list[Side]) -> tuple[Notice, ...]:
     notices = []
     if "pelvis" not in orientations.q:
-        message = "No figure: without a pelvis sensor the legs have nothing to hang on; wear one on the sacrum."
+        message = "No figure: without a pelvis sensor the legs have nothing to hang on; wear one there."
         notices.append(Notice("figure_incomplete", message, sensor="pelvis"))
     for side in SIDES:
         missing = [x for x in (THIGH[side], SHANK[side], FOOT[side]) if x not in orientations.q]

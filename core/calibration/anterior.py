@@ -42,11 +42,12 @@ DISAGREEMENT = radians(15.0)
 """Difference of two measures of the walking direction that is told (spec/real-data.md §3, heading)."""
 
 CONFLICT = radians(120.0)
-"""Difference from the declared mounting that is a contradiction: within the rule's 60° of the opposite way."""
+"""Difference from the declared mounting that is a contradiction: within 60° of the opposite way."""
 
 STRONG_AXIS = 0.6
-"""Share of the acceleration axis from which it goes before a velocity that disagrees with it. Fitted to nothing:
-the shares were .73 to .97 on neura_walk and gaitmap_foot, .22 where the axis of a simulated pelvis was wrong."""
+"""Share of the acceleration axis from which it goes before a velocity that disagrees with it. Fitted to
+nothing: the shares were .73 to .97 on neura_walk and gaitmap_foot, .22 where the axis of a simulated pelvis
+was wrong."""
 
 CLEAR_MARGIN = radians(15.0)
 """Gait-rule margin that contradicts a measured direction: right signs had 18 to 40° on neura_walk
@@ -79,7 +80,7 @@ class Walk:
 
 @dataclass(frozen=True, eq=False)
 class Anterior:
-    """Angle in rad of a segment's anterior axis in the sensor's rest world, how it was found, what to tell."""
+    """Angle in rad of the anterior axis in the sensor's rest world, how it was found and what to tell."""
 
     angle: float
     method: str
@@ -114,8 +115,8 @@ def anterior(
         if written is None:
             raise CalibrationError(
                 "no_walking",
-                f"{segment}: no straight walking of 1.5 s or more was found and no mounting is declared. Record at "
-                "least 8 steps straight ahead, or declare the mounting, for example “lateral, face right”.",
+                f"{segment}: no straight walking of 1.5 s or more was found and no mounting is declared. "
+                "Record at least 8 steps straight ahead, or declare the mounting: “lateral, face right”.",
                 sensor=segment,
             )
         return Anterior(written, "declared", 0.5)
@@ -127,8 +128,8 @@ def anterior(
         raise CalibrationError(
             "calibration_sign_conflict",
             f"{segment}: the walk and the declared mounting “{declared}” differ by "
-            f"{abs(degrees(difference(found.angle, written))):.0f}°, allowed are {degrees(CONFLICT):.0f}°. Correct "
-            "the mounting in the manifest, or the segment this sensor is mapped to.",
+            f"{abs(degrees(difference(found.angle, written))):.0f}°, allowed are {degrees(CONFLICT):.0f}°. "
+            "Correct the mounting in the manifest, or the segment this sensor is mapped to.",
             sensor=segment,
         )
     return found
@@ -206,8 +207,8 @@ def _by_gyro(
         notices += (
             Notice(
                 "not_single_axis",
-                f"{segment}: the first component holds {axis.rho:.0%} of the movement, {GOOD_AXIS:.0%} or more is "
-                "good; the flexion axis may be off by 10° and more.",
+                f"{segment}: the first component holds {axis.rho:.0%} of the movement, {GOOD_AXIS:.0%} or "
+                "more is good; the flexion axis may be off by 10° and more.",
                 sensor=segment,
             ),
         )
@@ -224,8 +225,8 @@ def _signed(
     if segment in TRUNK:
         raise CalibrationError(
             "pelvis_heading_unknown",
-            f"{segment}: which way it faces is not known, no standing is next to the walk. Stand still for 3 s "
-            "directly before walking, or declare the mounting, for example “sacrum, face backwards”.",
+            f"{segment}: which way it faces is not known, no standing is next to the walk. Stand still for "
+            "3 s directly before walking, or declare the mounting, for example “sacrum, face backwards”.",
             sensor=segment,
         )
     margin = _margin(segment, axis, R_vertical, q, walk)
@@ -233,8 +234,8 @@ def _signed(
         weak = Notice(
             "calibration_sign_weak",
             f"{segment}: forward and backward swing differ by {degrees(abs(margin)):.1f}° only, at least "
-            f"{degrees(WEAK_MARGIN):.0f}° decide which way is forward. Check the sign of the curves, or declare the "
-            "mounting.",
+            f"{degrees(WEAK_MARGIN):.0f}° decide which way is forward. Check the sign of the curves, or "
+            "declare the mounting.",
             sensor=segment,
         )
         return (axis if margin >= 0 else nearest_sign(axis, axis + np.pi)), (weak,)
@@ -249,7 +250,7 @@ def _margin(segment: Segment, angle: float, R_vertical: Floats, q: Floats, walk:
 def _sign_notices(
     segment: Segment, angle: float, R_vertical: Floats, q: Floats, walk: Walk
 ) -> tuple[Notice, ...]:
-    """Tell when the gait rule contradicts a sign that was found otherwise; velocity and declaration go first."""
+    """Tell when the gait rule contradicts a sign found otherwise; velocity and declaration go first."""
     if segment in TRUNK:
         return ()
     margin = _margin(segment, angle, R_vertical, q, walk)
@@ -258,8 +259,8 @@ def _sign_notices(
     return (
         Notice(
             "calibration_sign_conflict",
-            f"{segment}: it swings {degrees(-margin):.0f}° further to the side where gait swings less. Check that it "
-            "is mapped to the right segment and that the walk was forwards.",
+            f"{segment}: it swings {degrees(-margin):.0f}° further to the side where gait swings less. Check "
+            "that it is mapped to the right segment and that the walk was forwards.",
             sensor=segment,
         ),
     )

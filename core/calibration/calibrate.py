@@ -29,7 +29,7 @@ from core.rest import RestParams, Window
 from core.rotation import conjugate, from_matrix, rotate
 
 FACING = radians(20.0)
-"""Turn between standing and the first straight part up to which the person stood facing the walk (our choice)."""
+"""Turn between standing and the first straight part that still counts as facing the walk (our choice)."""
 
 FEW_STEPS = 8
 """Steps below which calibration says how few there were (spec/fusion.md §2)."""
@@ -103,8 +103,8 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
         notices.append(
             Notice(
                 "facing_not_walking",
-                f"The person turned by {abs(degrees(facing)):.0f}° between standing and walking; forward is where "
-                "they stood facing. Start straight ahead from standing where possible.",
+                f"The person turned by {abs(degrees(facing)):.0f}° between standing and walking; forward is "
+                "where they stood facing. Start straight ahead from standing where possible.",
             )
         )
     calibration = Calibration(
@@ -123,7 +123,7 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
 def _rest_world(
     recording: UniformRecording, segment: Segment, standing: Standing, zero: Window, params: AttitudeParams
 ) -> Floats:
-    """Orientations (n, 4) of a sensor in its rest world: z up, x along the vertical frame's x while at rest."""
+    """Orientations (n, 4) of a sensor in its rest world: z up, x along its vertical frame's x at rest."""
     signals = recording.sensors[segment]
     at = round(0.5 * (zero[0] + zero[1]) * recording.rate_hz)
     q_rest = from_matrix(R_NEUTRAL @ vertical_frame(standing.up))
@@ -141,7 +141,7 @@ def _walk(
     q: Mapping[Segment, Floats],
     params: HeadingParams,
 ) -> tuple[Walk, float]:
-    """The straight parts to take the direction from, and how far they turn from where the person stood facing."""
+    """The straight parts to take the direction from, and their turn from where the person stood facing."""
     rate = recording.rate_hz
     rest = next(r for r in rests if r[0] <= zero[0] and zero[1] <= r[1])
     first, last = round(rest[0] * rate), round(rest[1] * rate)
@@ -190,7 +190,7 @@ def _few_steps(
     q: Mapping[Segment, Floats],
     walk: Walk,
 ) -> list[Notice]:
-    """Say so when the direction rests on fewer than eight steps, counted as swings of one leg sensor, twice."""
+    """Say so when the direction rests on fewer than eight steps: twice the swings of one leg sensor."""
     leg = next((s for s in found if s not in TRUNK), None)
     if leg is None or not walk.parts:
         return []
@@ -206,7 +206,7 @@ def _few_steps(
 
 
 def _swings(angle: Floats, walking: Bools) -> int:
-    """Number of times an oscillating angle rises through the upper third after having been in the lower third."""
+    """Number of times an oscillating angle rises from its lower into its upper third."""
     x = angle[walking]
     low, high = np.percentile(x, [2.0, 98.0])
     state = np.where(x > high - (high - low) / 3, 1, np.where(x < low + (high - low) / 3, -1, 0))

@@ -1,7 +1,7 @@
 """The flexion axis as principal axis of the angular rate, and the sign rules of gait.
 
-Thesis ch. 3 with the corrections of spec/fusion.md §1–2: rows instead of columns in Eq 14, another seed axis when
-the sensor's x is vertical, γ = atan2(−p_x, p_z) instead of Eq 15.
+Thesis ch. 3 with the corrections of spec/fusion.md §1–2: rows instead of columns in Eq 14, another seed axis
+when the sensor's x is vertical, γ = atan2(−p_x, p_z) instead of Eq 15.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from core.errors import CalibrationError
 from core.frames import Bools, Floats, Segment
 
 SINGLE_AXIS, GOOD_AXIS = 0.70, 0.85
-"""Share of the first principal component: below the first an error, below the second a notice (fusion.md §2)."""
+"""Share of the first component: below the first an error, below the second a notice (fusion.md §2)."""
 
 WEAK_MARGIN = radians(5.0)
 """Difference of the two sides of the sagittal angle below which its sign is weak (fusion.md §2.3d)."""
@@ -52,8 +52,9 @@ def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionA
     if rho < SINGLE_AXIS:
         raise CalibrationError(
             "not_single_axis",
-            f"{segment}: the movement has no single axis, the first component holds {rho:.0%} of it, at least "
-            f"{SINGLE_AXIS:.0%} is needed. Walk straight for at least 8 steps, or calibrate by walking direction.",
+            f"{segment}: the movement has no single axis, the first component holds {rho:.0%} of it, at "
+            f"least {SINGLE_AXIS:.0%} is needed. Walk straight for at least 8 steps, or calibrate by "
+            "walking direction.",
             sensor=segment,
         )
     px, pz = vectors[:, 1]
@@ -61,7 +62,7 @@ def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionA
 
 
 def about_vertical(gamma: float) -> Floats:
-    """Matrix R_y(γ) of the ISB vertical, R_y(γ) p = +z for γ = atan2(−p_x, p_z) (fusion.md §1, Eq 15 corrected)."""
+    """Matrix R_y(γ): R_y(γ) p = +z for γ = atan2(−p_x, p_z) (fusion.md §1, Eq 15 corrected)."""
     c, s = np.cos(gamma), np.sin(gamma)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 

@@ -1,9 +1,10 @@
 """The direction of walking in each sensor's own world, from its accelerometer and gyroscope alone.
 
-Horizontal vectors are complex numbers x + iy. Every sensor has its own z-up world whose heading is arbitrary; the
-direction of walking, seen in each of them, is what they have in common (spec/real-data.md §2.5).
+Horizontal vectors are complex numbers x + iy. Every sensor has its own z-up world whose heading is arbitrary;
+the direction of walking, seen in each of them, is what they have in common (spec/real-data.md §2.5).
 
-Two measures, both over the straight parts of a walk, each part turned back by the angle walked since the first:
+Two measures, both over the straight parts of a walk, each part turned back by the angle walked since the
+first:
 - rest-to-rest velocity with linear de-drift: ≤ 2° on a short walk out and back (spec/real-data.md §0.4);
 - principal axis of the horizontal acceleration below 4 Hz: legs ≤ 3.4°, any length of walk, without a sign.
 """
@@ -55,8 +56,8 @@ class Direction:
 
     Parameters
     ----------
-    angle : rad from x towards y. score : 0 to 1; velocity: agreement of the parts, |Σ v| / Σ |v|; axis: share of
-    the larger principal component less the smaller.
+    angle : rad from x towards y. score : 0 to 1; velocity: agreement of the parts, |Σ v| / Σ |v|; axis: share
+    of the larger principal component less the smaller.
     """
 
     angle: float
@@ -64,7 +65,7 @@ class Direction:
 
 
 def horizontal_acceleration(q: Floats, acc: Floats) -> Complexes:
-    """Horizontal acceleration (n,) in m/s² of a sensor with orientations q (n, 4) and specific force (n, 3)."""
+    """Horizontal acceleration (n,), m/s², from orientations q (n, 4) and specific force acc (n, 3)."""
     f = rotate(q, acc)
     return np.asarray(f[:, 0] + 1j * f[:, 1])
 
@@ -110,7 +111,8 @@ def start_direction(
 
     Parameters
     ----------
-    part : the straight part next to the rest, turned by `turn` rad since standing. leads : the rest is before it.
+    part : the straight part next to the rest, turned by `turn` rad since standing. leads : the rest is before
+        it.
 
     Returns
     -------
@@ -170,8 +172,8 @@ def acceleration_axis(
 def step_time(up: Floats, rate_hz: float) -> float:
     """Step time in s from the vertical acceleration (n,) of the trunk over a straight part, 0 if it has none.
 
-    The first peak of the autocorrelation between 0.3 and 1.2 s, the range of walking, that is nearly as high as
-    the highest: the highest may be the stride.
+    The first peak of the autocorrelation between 0.3 and 1.2 s, the range of walking, that is nearly as high
+    as the highest: the highest may be the stride.
     """
     low, high = round(0.3 * rate_hz), round(1.2 * rate_hz)
     x = up - up.mean()

@@ -1,7 +1,7 @@
 """What somebody wrote about how a sensor is worn, as a direction.
 
-The manifest's `mounting` is free text per segment, e.g. "sacrum, face backwards". The face is the sensor's outer
-side, its +z axis on all devices we read; "x forward" and the like name another axis.
+The manifest's `mounting` is free text per segment, e.g. "sacrum, face backwards". The face is the sensor's
+outer side, its +z axis on all devices we read; "x forward" and the like name another axis.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Standing: which way is up in each sensor, what its gyroscope reads at rest, and the rest to take it from."""
+"""Standing: the rest to calibrate on, which way is up in each sensor, what its gyroscope reads at rest."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def stand(signals: SensorSignals, rate_hz: float, window: Window, segment: Segme
     if not NORM_RANGE[0] <= norm <= NORM_RANGE[1]:
         raise SignalError(
             "unit_suspect",
-            f"{segment}: the accelerometer reads {norm:.2f} m/s² at rest, expected 9.81 ± 10 %. Near 1 the unit is g, "
-            "near 0 gravity was removed: declare the unit in the manifest or export raw accelerations.",
+            f"{segment}: the accelerometer reads {norm:.2f} m/s² at rest, expected 9.81 ± 10 %. Near 1 the "
+            "unit is g, near 0 gravity was removed: declare the unit, or export raw accelerations.",
             sensor=segment,
             t_s=window[0],
         )
@@ -104,7 +104,7 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
         code, what = "no_rest", "every sensor is still at some time, but never all of them together"
     elif rate < WOBBLE_FACTOR * params.gyro_limit:
         code = "not_still"
-        what = f"{segment} still moves at {np.degrees(rate):.1f} °/s in its quietest second, limit {limit:.0f} °/s"
+        what = f"{segment} moves at {np.degrees(rate):.1f} °/s in its quietest second, limit {limit:.0f} °/s"
     else:
         code = "no_rest"
         what = f"the quietest second of {segment} has {np.degrees(rate):.0f} °/s, limit {limit:.0f} °/s"

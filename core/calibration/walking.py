@@ -29,15 +29,16 @@ class WalkingParams:
 
     Parameters
     ----------
-    leg_rate : mean |ω| of the leg sensors over 1 s while walking, rad/s. trunk_std : std |f| of a trunk sensor
-        over 1 s, m/s² (both our choice: the slowest walk of the simulator shows 0.9 rad/s and 0.8 m/s²).
+    leg_rate : mean |ω| of the leg sensors over 1 s while walking, rad/s. trunk_std : std |f| of a trunk
+        sensor over 1 s, m/s² (both our choice: straight walking on neura_walk has at least 1.9 rad/s and 0.73
+        m/s², the simulator's slow walk 1.3 and 2.2, standing at most 0.04 and 0.07).
     shortest_s : shortest straight part that is used.
-    turn_rate, turn_margin_s, turn_cutoff_hz : low-passed yaw rate of a turn (spec/real-data.md §2.3). Without a
-        trunk sensor the cut-off is halved, because legs yaw with every step.
+    turn_rate, turn_margin_s, turn_cutoff_hz : low-passed yaw rate of a turn (spec/real-data.md §2.3). Without
+        a trunk sensor the cut-off is halved, because legs yaw with every step.
     """
 
     leg_rate: float = 0.5
-    trunk_std: float = 0.5
+    trunk_std: float = 0.35
     shortest_s: float = 1.5
     turn_rate: float = radians(35.0)
     turn_margin_s: float = 0.15
@@ -45,7 +46,7 @@ class WalkingParams:
 
 
 def moving_mask(recording: UniformRecording, params: WalkingParams) -> Bools:
-    """Samples (n,) at which somebody moves as in walking, from the legs if they wear sensors, else the trunk."""
+    """Samples (n,) at which somebody moves as in walking: by the legs, without leg sensors by the trunk."""
     legs = [s for s in recording.sensors if s not in TRUNK]
     width = max(1, round(recording.rate_hz))
     if legs:
@@ -100,7 +101,7 @@ def mean_turn(q: Floats, q_rest: Floats, part: tuple[int, int]) -> float:
 
 
 def turned(q: Floats, q_rest: Floats) -> Floats:
-    """Angle (n,) in rad that a body with orientations q (n, 4) has turned about the vertical since q_rest (4,).
+    """Angle (n,) in rad by which q (n, 4) is turned about the vertical against q_rest (4,).
 
     The twist of the rotation about z: it exists for any mounting of the sensor.
     """

@@ -1,17 +1,18 @@
 """Relative heading over long walks: what six axes cannot see, held by what a walking body does on average.
 
-Each gyroscope drifts about the vertical on its own (0.003 °/s/√s of bias walk make 9° in 5 min), and between two
-segments this shows as rotation and adduction, later as flexion. Nothing in six axes observes it. But while
-somebody walks straight, the heading of a segment relative to the pelvis, averaged over strides, stays what it was
-in the first straight walking next to standing. So the slow change of the stride-averaged relative heading is taken
-out. The price, told in the notice: a true slow change of the mean transverse posture is taken out with it.
-Short walks are left alone (spec/real-data.md: 10 s of walking need none).
+Each gyroscope drifts about the vertical on its own (0.003 °/s/√s of bias walk make 9° in 5 min), and between
+two segments this shows as rotation and adduction, later as flexion. Nothing in six axes observes it. But
+while somebody walks straight, the heading of a segment relative to the pelvis, averaged over strides, stays
+what it was in the first straight walking next to standing. So the slow change of the stride-averaged relative
+heading is taken out. The price, told in the notice: a true slow change of the mean transverse posture is
+taken out with it. Short walks are left alone (spec/real-data.md: 10 s of walking need none).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from math import degrees, radians
 
 import numpy as np
@@ -30,8 +31,8 @@ class DriftParams:
     Parameters
     ----------
     reference_s : straight walking next to standing that defines the mean relative heading; walks with no more
-        straight walking than this are left alone. smooth_s : standard deviation of the Gaussian over which the
-        relative heading is averaged: 4 s hold at least 6 strides of 1.5 s at half weight or more.
+        straight walking than this are left alone. smooth_s : standard deviation of the Gaussian over which
+        the relative heading is averaged: 4 s hold at least 6 strides of 1.5 s at half weight or more.
     least_s : straight walking within reach below which the correction is held. tell : drift that is told.
     """
 
@@ -58,7 +59,7 @@ def remove_relative_drift(
     -------
     Corrected q, the largest correction per segment in rad, notices `heading_rereferenced`.
     """
-    corrected = {s: x for s, x in q.items()}
+    corrected = dict(q)
     n = len(next(iter(q.values())))
     straight = np.zeros(n, bool)
     for window in calibration.walking:
@@ -82,9 +83,9 @@ def remove_relative_drift(
     if largest and max(largest.values()) > params.tell:
         worst = max(largest, key=lambda s: largest[s])
         message = (
-            f"The heading of {worst} drifted by up to {degrees(largest[worst]):.0f}° against the reference and was "
-            "brought back to its mean over straight walking. Slow changes of rotation posture during the take are "
-            "taken out with it: read transverse angles as changes within a stride."
+            f"The heading of {worst} drifted by up to {degrees(largest[worst]):.0f}° against the reference "
+            "and was brought back to its mean over straight walking. Slow changes of rotation posture during "
+            "the take are taken out with it: read transverse angles as changes within a stride."
         )
         notices.append(Notice("heading_rereferenced", message, sensor=worst))
     return corrected, largest, notices
@@ -109,7 +110,7 @@ def _drift(
     mean = relative[near].mean()
     lost = [r for r in runs(~valid) if r[1] - r[0] > 0.1 * rate_hz]
     edges = [0, *(b for _, b in lost), len(straight)]
-    for start, end in zip(edges[:-1], edges[1:], strict=True):
+    for start, end in pairwise(edges):
         if end <= start:
             continue
         home = start <= middle < end

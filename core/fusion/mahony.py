@@ -90,7 +90,8 @@ def _gaps(valid: Bools, segment: Segment, rate_hz: float) -> list[Notice]:
     a, b = max(lost, key=lambda r: r[1] - r[0])
     total = float(np.count_nonzero(~valid)) / rate_hz
     message = (
-        f"{segment}: no signal for {total:.2f} s in {len(lost)} gaps, the longest {(b - a) / rate_hz:.2f} s. There "
+        f"{segment}: no signal for {total:.2f} s in {len(lost)} gaps, the longest {(b - a) / rate_hz:.2f} s. "
+        "There "
         "are no angles there, and the heading after a gap is relearnt from straight walking."
     )
     return [Notice("gap", message, sensor=segment, t_s=a / rate_hz)]
