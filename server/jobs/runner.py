@@ -24,7 +24,7 @@ class ChildDiedError(Exception):
 
 
 def environment(settings: Settings) -> dict[str, str]:
-    """What a process of ours inherits: our settings, the path to our code, one thread, a lasting kernel cache."""
+    """What a process of ours inherits: settings, the path to our code, one thread, a lasting kernel cache."""
     root = str(Path(server.__file__).parent.parent)
     path = os.pathsep.join(p for p in (root, os.environ.get("PYTHONPATH")) if p)
     cache = {"NUMBA_CACHE_DIR": os.environ.get("NUMBA_CACHE_DIR") or str(settings.cache / "numba")}

@@ -29,7 +29,7 @@ class Task:
 
     Parameters
     ----------
-    run : in the child: (files, params of the job, progress) → result files; raises SagittalError with a reason.
+    run : in the child: (files, the job's params, progress) → result files; raises SagittalError.
     publish : in the worker, inside the transaction that marks the job done: (connection, claim, result files,
         the same as blobs). It may raise SagittalError: then the job fails and nothing is written.
     keeps_files : whether the result files are stored as blobs before the transaction.

@@ -42,7 +42,7 @@ def _publish_analysis(
 
 
 def _warm() -> None:
-    """Import the readers and the pipeline; numba loads its compiled kernels from the cache at the first call."""
+    """Import readers and pipeline; numba loads its compiled kernels from the cache at the first call."""
     import server.report.exports  # noqa: F401
 
 

@@ -1,0 +1,98 @@
+"""A clinic on a temporary folder, for real worker processes and the tiny kind of job."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from sqlalchemy import select
+
+from server.jobs.queue import JobView
+from server.jobs.table import TableQueue
+from server.services import analyses, patients, recordings, sessions
+from server.settings import Settings
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from server.storage.migrate import upgrade
+from server.storage.tables import job
+
+PATIENCE_S = 60.0
+"""Longest wait for what must happen: far beyond what it takes, so that a loaded machine is no failure."""
+
+
+T = TypeVar("T")
+
+
+def until(look: Callable[[], T | None]) -> T:
+    limit = time.monotonic() + PATIENCE_S
+    while time.monotonic() < limit:
+        found = look()
+        if found:
+            return found
+        time.sleep(0.02)
+    raise AssertionError(f"waited {PATIENCE_S:g} s in vain for {look}")
+
+
+def alive(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state not in {"Z", "X"}
+
+
+class Clinic:
+    """One data folder with a patient, a session and a recording."""
+
+    def __init__(self, folder: Path, lease_s: float) -> None:
+        self.settings = Settings(
+            data_dir=folder,
+            workers=1,
+            lease_s=lease_s,
+            min_free_bytes=0,
+            child_memory_bytes=4_000_000_000,
+            task_modules=("tests.faults.tiny_tasks",),
+        )
+        upgrade(self.settings.database)
+        self.db = Database(self.settings.database)
+        self.blobs = BlobStore(self.settings.blobs)
+        self.queue = TableQueue(self.db, lease_s)
+        self.folder = folder
+        with self.db.write() as c:
+            self.patient = patients.create(c, None, code="P-1")
+            self.session = sessions.create(c, None, self.patient.id)
+        with recordings.receive(self.db, self.blobs, self.settings, None, self.session.id, "a.txt") as upload:
+            upload.write(b"signals")
+            upload.keep()
+        self._number = itertools.count()
+
+    def submit(self, **params: Any) -> JobView:
+        number = next(self._number)
+        with self.db.write() as c:
+            this = recordings.require_current(c, self.session.id)
+            fixed = {**recordings.job_inputs(this), "manifest": None, "config": {}, **params}
+            return self.queue.submit(c, key=f"tiny:{number}", kind="tiny", params=fixed, recording_id=this.id)
+
+    def hold(self, stage: str) -> tuple[JobView, Path, Path]:
+        """Submit a job that waits at a stage; the files that say it is there and that let it go on."""
+        reached = self.folder / f"reached-{stage}"
+        gate = self.folder / f"gate-{stage}"
+        return self.submit(hold_at=stage, reached=str(reached), gate=str(gate)), reached, gate
+
+    def ended(self, view: JobView) -> JobView:
+        def look() -> JobView | None:
+            found = self.queue.get(view.id)
+            return found if found is not None and found.finished else None
+
+        return until(look)
+
+    def row(self, view: JobView) -> Any:
+        with self.db.read() as c:
+            return c.execute(select(job).where(job.c.id == view.id)).one()
+
+    def results(self) -> list[analyses.Analysis]:
+        with self.db.read() as c:
+            return analyses.of_session(c, self.session.id)

@@ -1,0 +1,36 @@
+"""A clinic and its workers."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from server.jobs.supervisor import Workers
+from tests.faults.clinic import Clinic, alive
+
+
+@pytest.fixture
+def clinic(tmp_path: Path) -> Iterator[Clinic]:
+    made = Clinic(tmp_path, lease_s=1.5)
+    yield made
+    made.db.close()
+
+
+@pytest.fixture
+def workers(clinic: Clinic, monkeypatch: pytest.MonkeyPatch) -> Iterator[Workers]:
+    monkeypatch.setenv("PYTHONWARNINGS", "error")
+    started = Workers(clinic.settings)
+    started.start()
+    yield started
+    pids = started.pids
+    started.stop()
+    assert not any(alive(pid) for pid in pids)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _small_arenas() -> None:
+    # a test that allocates until refused must not take the machine with it
+    os.environ.setdefault("MALLOC_ARENA_MAX", "2")

@@ -1,0 +1,195 @@
+"""Jobs survive the death of whoever works on them, with one visible result (service.md §b)."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+
+from server.jobs.runner import environment
+from server.jobs.supervisor import Workers
+from tests.faults.clinic import Clinic, alive, until
+from tests.faults.tiny_tasks import STAGES
+
+
+def children_of(pid: int) -> list[int]:
+    text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+    return [int(word) for word in text.split()]
+
+
+def test_a_job_is_done_with_its_result_stored(clinic: Clinic, workers: Workers) -> None:
+    view = clinic.ended(clinic.submit())
+    assert (view.state, view.attempt, view.stage, view.fraction) == ("done", 1, view.stage, 1.0)
+    [result] = clinic.results()
+    assert result.job_id == view.id
+    assert clinic.blobs.read(clinic.patient.id, result.files["result.txt"].sha256) == b"signals"
+
+
+@pytest.mark.parametrize("stage", [*STAGES, "publish"])
+def test_a_killed_worker_is_replaced_and_the_job_has_one_result(
+    clinic: Clinic, workers: Workers, stage: str
+) -> None:
+    view, reached, gate = clinic.hold(stage)
+    until(reached.exists)
+    [worker] = workers.pids
+    os.kill(worker, signal.SIGKILL)
+    gate.touch()
+    done = clinic.ended(view)
+    assert (done.state, done.attempt) == ("done", 2)
+    assert [r.job_id for r in clinic.results()] == [view.id]
+    assert workers.pids != [worker]
+
+
+def test_a_killed_child_is_replaced_by_the_same_worker(clinic: Clinic, workers: Workers) -> None:
+    view, reached, gate = clinic.hold("second")
+    until(reached.exists)
+    [worker] = workers.pids
+    os.kill(int(reached.read_text()), signal.SIGKILL)
+    gate.touch()
+    assert clinic.ended(view).state == "done"
+    assert clinic.row(view).deaths == 1
+    assert workers.pids == [worker]
+    assert len(clinic.results()) == 1
+
+
+def test_a_job_that_kills_three_workers_is_given_up(clinic: Clinic, workers: Workers) -> None:
+    view = clinic.ended(clinic.submit(die_at="second"))
+    assert (view.state, view.error_code, view.attempt) == ("failed", "worker_died", 3)
+    assert view.error_message is not None
+    assert "worker died 3 times" in view.error_message
+    assert clinic.results() == []
+    assert clinic.ended(clinic.submit()).state == "done"
+
+
+def test_a_frozen_worker_is_fenced_when_it_wakes(clinic: Clinic, workers: Workers) -> None:
+    view, reached, gate = clinic.hold("third")
+    until(reached.exists)
+    [frozen] = workers.pids
+    other = Workers(clinic.settings)
+    os.kill(frozen, signal.SIGSTOP)
+    try:
+        reached.unlink()
+        other.start()
+        until(reached.exists)  # the second attempt is at the gate: the first one's lease has run out
+        gate.touch()
+        done = clinic.ended(view)
+    finally:
+        os.kill(frozen, signal.SIGCONT)
+    other.stop()
+    assert (done.state, done.attempt) == ("done", 2)
+    assert clinic.ended(clinic.submit()).state == "done"  # the woken one threw its result away and works on
+    assert workers.pids == [frozen]
+    assert clinic.row(view).attempt == 2
+    assert [r.job_id for r in clinic.results()].count(view.id) == 1
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_cancel_stops_the_child_within_two_seconds(clinic: Clinic, workers: Workers, stage: str) -> None:
+    view, reached, _ = clinic.hold(stage)
+    until(reached.exists)
+    child = int(reached.read_text())
+    with clinic.db.write() as c:
+        asked = clinic.queue.cancel(c, view.id)
+    began = time.monotonic()
+    assert asked is not None
+    assert (asked.state, asked.cancel_requested) == ("running", True)
+    assert clinic.ended(view).state == "cancelled"
+    assert time.monotonic() - began < 2.0
+    assert not alive(child)
+    assert clinic.results() == []
+
+
+def test_cancel_stops_a_child_that_never_speaks(clinic: Clinic, workers: Workers) -> None:
+    view = clinic.submit(spin=True)
+    until(lambda: clinic.row(view).stage == STAGES[-1])
+    with clinic.db.write() as c:
+        clinic.queue.cancel(c, view.id)
+    began = time.monotonic()
+    assert clinic.ended(view).state == "cancelled"
+    assert time.monotonic() - began < 2.0
+
+
+@pytest.mark.parametrize(
+    ("error", "code"), [("known", "no_walking"), ("bug", "internal_error"), ("memory", "out_of_memory")]
+)
+def test_a_failure_keeps_its_reason_and_the_worker(
+    clinic: Clinic, workers: Workers, error: str, code: str
+) -> None:
+    view = clinic.ended(clinic.submit(error=error))
+    assert (view.state, view.error_code, view.attempt) == ("failed", code, 1)
+    assert view.error_message
+    assert clinic.ended(clinic.submit()).state == "done"
+
+
+def test_a_job_beyond_its_time_is_stopped(clinic: Clinic, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(clinic, "settings", _with(clinic, job_timeout_s=1.0))
+    workers = Workers(clinic.settings)
+    workers.start()
+    try:
+        view = clinic.ended(clinic.submit(spin=True))
+    finally:
+        workers.stop()
+    assert (view.state, view.error_code) == ("failed", "job_timeout")
+
+
+def test_stopping_gives_the_job_back_unharmed(clinic: Clinic, workers: Workers) -> None:
+    view, reached, _ = clinic.hold("second")
+    until(reached.exists)
+    child = int(reached.read_text())
+    began = time.monotonic()
+    workers.stop()
+    assert time.monotonic() - began < 10.0
+    assert not alive(child)
+    row = clinic.row(view)
+    assert (row.state, row.deaths, row.worker) == ("queued", 0, None)
+
+
+def test_a_killed_server_takes_worker_and_child_along_and_the_next_one_goes_on(clinic: Clinic) -> None:
+    script = textwrap.dedent("""
+        import sys, time
+        from server.jobs.supervisor import Workers
+        from server.settings import load_settings
+        workers = Workers(load_settings())
+        workers.start()
+        print(*workers.pids, flush=True)
+        time.sleep(600)
+    """)
+    server = subprocess.Popen(
+        [sys.executable, "-c", script],
+        env=environment(clinic.settings),
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert server.stdout is not None
+    try:
+        worker = int(server.stdout.readline())
+        view, reached, gate = clinic.hold("second")
+        until(reached.exists)
+        child = int(reached.read_text())
+        assert children_of(worker) == [child]
+    finally:
+        server.kill()
+        server.wait()
+        server.stdout.close()
+    until(lambda: not alive(worker) and not alive(child))
+    gate.touch()
+    next_one = Workers(clinic.settings)
+    next_one.start()
+    try:
+        done = clinic.ended(view)
+    finally:
+        next_one.stop()
+    assert (done.state, done.attempt) == ("done", 2)
+    assert len(clinic.results()) == 1
+
+
+def _with(clinic: Clinic, **values: float) -> object:
+    import dataclasses
+
+    return dataclasses.replace(clinic.settings, **values)  # type: ignore[arg-type]

@@ -1,0 +1,59 @@
+"""A small real kind of job for the fault tests: it walks through stages and stops where its params say.
+
+params: hold_at (a stage, or "publish": waits there until `gate` exists, having made `reached`), die_at,
+error ("known", "bug", "memory"), spin (never ends, never speaks).
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection
+
+from core.errors import SignalError
+from core.formats.source import SourceFile
+from server.jobs.queue import Claim
+from server.jobs.task import Progress, Task, register
+from server.services import analyses
+from server.storage.blobs import Blob
+
+STAGES = ("first", "second", "third")
+
+
+def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progress) -> dict[str, bytes]:
+    for i, stage in enumerate(STAGES):
+        progress(stage, i / len(STAGES))
+        _meet(params, stage)
+        if params.get("die_at") == stage:
+            os.kill(os.getpid(), signal.SIGKILL)
+    match params.get("error"):
+        case "known":
+            raise SignalError("no_walking", "No walking was found; record at least six steps.")
+        case "bug":
+            raise ZeroDivisionError
+        case "memory":
+            bytearray(1 << 46)
+    while params.get("spin"):
+        pass
+    return {"result.txt": b"".join(f.read() for f in files) or b"nothing"}
+
+
+def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]) -> None:
+    analyses.publish(c, claim, blobs)
+    _meet(claim.params, "publish")
+
+
+def _meet(params: Mapping[str, Any], stage: str) -> None:
+    if params.get("hold_at") != stage:
+        return
+    Path(params["reached"]).write_text(str(os.getpid()))
+    while not Path(params["gate"]).exists():
+        time.sleep(0.01)
+
+
+register(Task("tiny", run, publish, keeps_files=True))

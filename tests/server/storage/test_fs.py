@@ -1,0 +1,154 @@
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from server.storage import fs
+from server.storage.blobs import BlobStore, IntegrityError
+from tests.data import ROOT
+
+SPACE = "a" * 32
+CONTENT = b"seven sensors"
+
+
+class FailingSystem(fs.System):
+    """The operating system, but its n-th call fails."""
+
+    def __init__(self, fail_at: int, number: int) -> None:
+        self.calls = 0
+        self._fail_at, self._number = fail_at, number
+
+    def _count(self) -> None:
+        self.calls += 1
+        if self.calls == self._fail_at:
+            raise OSError(self._number, os.strerror(self._number))
+
+    def open(self, path: Path, flags: int) -> int:
+        self._count()
+        return super().open(path, flags)
+
+    def write(self, fd: int, data: bytes | memoryview) -> int:
+        self._count()
+        return super().write(fd, data)
+
+    def fsync(self, fd: int) -> None:
+        self._count()
+        super().fsync(fd)
+
+    def replace(self, source: Path, target: Path) -> None:
+        self._count()
+        super().replace(source, target)
+
+    def mkdir(self, path: Path) -> None:
+        self._count()
+        super().mkdir(path)
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EMFILE])
+def test_an_error_at_any_call_leaves_no_half_file_and_a_retry_works(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    fail_at = 0
+    while True:
+        fail_at += 1
+        root = tmp_path / str(fail_at)
+        store = BlobStore(root)
+        system = FailingSystem(fail_at, number)
+        monkeypatch.setattr(fs, "system", system)
+        try:
+            blob = store.put(SPACE, CONTENT)
+        except OSError as error:
+            assert error.errno == number  # noqa: PT017 - the last round does not raise
+        else:
+            assert system.calls == fail_at - 1  # every call has failed once
+            break
+        finally:
+            monkeypatch.setattr(fs, "system", fs.System())
+        for stored in store.files():
+            assert stored.space == SPACE  # no temporary file is left
+            assert stored.path.read_bytes() == CONTENT
+        blob = store.put(SPACE, CONTENT)
+        assert store.read(SPACE, blob.sha256) == CONTENT
+    assert fail_at > 6
+
+
+def test_every_flipped_bit_is_seen(tmp_path: Path) -> None:
+    store = BlobStore(tmp_path)
+    blob = store.put(SPACE, CONTENT)
+    path = store.path(SPACE, blob.sha256)
+    for bit in range(8 * len(CONTENT)):
+        damaged = bytearray(CONTENT)
+        damaged[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(damaged)
+        with pytest.raises(IntegrityError) as caught:
+            store.read(SPACE, blob.sha256)
+        assert caught.value.code == "blob_damaged"
+    path.unlink()
+    with pytest.raises(IntegrityError) as caught:
+        store.read(SPACE, blob.sha256)
+    assert caught.value.code == "blob_missing"
+    assert store.put(SPACE, CONTENT) == blob  # the same upload again repairs it
+    assert store.read(SPACE, blob.sha256) == CONTENT
+
+
+def test_a_limit_is_kept_while_receiving_and_nothing_is_left(tmp_path: Path) -> None:
+    store = BlobStore(tmp_path)
+    with store.receive(SPACE, limit=10) as receiver:
+        receiver.write(b"12345")
+        with pytest.raises(fs.SizeLimitError):
+            receiver.write(b"678901")
+    assert list(store.files()) == []
+
+
+def test_equal_bytes_of_two_spaces_are_two_files(tmp_path: Path) -> None:
+    store = BlobStore(tmp_path)
+    other = "b" * 32
+    assert store.put(SPACE, CONTENT) == store.put(other, CONTENT)
+    store.erase(SPACE)
+    assert [s.space for s in store.files()] == [other]
+
+
+def test_an_address_cannot_leave_the_store(tmp_path: Path) -> None:
+    store = BlobStore(tmp_path)
+    for space, name in (("..", "0" * 64), (SPACE, "../../etc/passwd"), (SPACE.upper(), "0" * 64)):
+        with pytest.raises(ValueError, match="not the address"):
+            store.path(space, name)
+
+
+def test_files_are_for_their_owner_only(tmp_path: Path) -> None:
+    store = BlobStore(tmp_path / "blobs")
+    blob = store.put(SPACE, CONTENT)
+    path = store.path(SPACE, blob.sha256)
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert path.parent.stat().st_mode & 0o777 == 0o700
+
+
+def test_one_lock_at_a_time_and_it_dies_with_its_holder(tmp_path: Path) -> None:
+    path = tmp_path / "lock"
+    script = f"""
+import pathlib, sys
+from server.storage import fs
+lock = fs.Lock(pathlib.Path({str(path)!r}), "process one")
+print("locked", flush=True)
+sys.stdin.read()
+"""
+    holder = subprocess.Popen(
+        [sys.executable, "-c", script], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert holder.stdout is not None
+    assert holder.stdin is not None
+    assert holder.stdout.readline() == "locked\n"
+    with pytest.raises(fs.LockedError) as caught:
+        fs.Lock(path, "process two")
+    assert caught.value.holder == "process one"
+    holder.kill()
+    holder.wait()
+    holder.stdout.close()
+    holder.stdin.close()
+    fs.Lock(path, "process two").release()
+    fs.Lock(path, "process three").release()

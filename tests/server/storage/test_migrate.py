@@ -1,0 +1,174 @@
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import textwrap
+import time
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from alembic import command
+
+from server.storage import migrate
+from server.storage.db import Database
+from server.storage.tables import metadata
+from tests.data import ROOT
+
+HANG = """
+import pathlib, time
+from alembic import op
+import sqlalchemy as sa
+revision, down_revision = "0002", "0001"
+def upgrade():
+    op.create_table("extra", sa.Column("id", sa.Integer, primary_key=True))
+    with op.batch_alter_table("patient") as batch:
+        batch.add_column(sa.Column("shoe", sa.Integer))
+    {then}
+def downgrade():
+    with op.batch_alter_table("patient") as batch:
+        batch.drop_column("shoe")
+    op.drop_table("extra")
+"""
+
+
+def schema(path: Path) -> set[tuple[str, str, tuple[str, ...]]]:
+    query = "SELECT type, name, coalesce(sql, '') FROM sqlite_master WHERE name NOT LIKE '%alembic%'"
+    with closing(sqlite3.connect(path)) as c:
+        rows = c.execute(query).fetchall()
+    # the order of constraints inside a statement means nothing
+    return {
+        (kind, name, tuple(sorted(s.strip().rstrip(",") for s in sql.splitlines())))
+        for kind, name, sql in rows
+    }
+
+
+def fill(path: Path) -> None:
+    with closing(sqlite3.connect(path)) as c:
+        c.execute("PRAGMA foreign_keys=ON")
+        c.execute(
+            "INSERT INTO patient (id, code, note, created_at) VALUES ('p', 'A', '', '2026-01-01 00:00:00.000000')"
+        )
+        for i in range(2):
+            c.execute(
+                "INSERT INTO session (id, patient_id, title, performed_on, protocol, note, created_at) "
+                "VALUES (?, 'p', 't', '2026-01-01', 'walk', '', '2026-01-01 00:00:00.000000')",
+                (f"s{i}",),
+            )
+        c.commit()
+
+
+def counts(path: Path) -> tuple[int, int]:
+    with closing(sqlite3.connect(path)) as c:
+        return (
+            c.execute("SELECT count(*) FROM patient").fetchone()[0],
+            c.execute("SELECT count(*) FROM session").fetchone()[0],
+        )
+
+
+@pytest.fixture
+def scripts(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(ROOT / "migrations", tmp_path / "migrations"))
+
+
+def test_the_migrated_schema_is_the_one_the_code_declares(tmp_path: Path) -> None:
+    migrate.upgrade(tmp_path / "migrated.db")
+    fresh = Database(tmp_path / "fresh.db")
+    with fresh.write() as c:
+        metadata.create_all(c)
+    fresh.close()
+    assert schema(tmp_path / "migrated.db") == schema(tmp_path / "fresh.db")
+    command.check(migrate.configuration(tmp_path / "migrated.db"))
+
+
+def test_down_and_up_again_leave_the_same_schema(tmp_path: Path) -> None:
+    path = tmp_path / "a.db"
+    migrate.upgrade(path)
+    before = schema(path)
+    command.downgrade(migrate.configuration(path), "base")
+    assert schema(path) <= {row for row in schema(path) if row[1].startswith("sqlite_")}
+    migrate.upgrade(path)
+    assert schema(path) == before
+
+
+def test_data_survive_up_and_down_and_a_backup_is_made_before(tmp_path: Path, scripts: Path) -> None:
+    path = tmp_path / "a.db"
+    assert migrate.upgrade(path, target="0001", scripts=scripts) is None
+    fill(path)
+    (scripts / "versions" / "0002_next.py").write_text(HANG.format(then="pass"))
+    backup = migrate.upgrade(path, scripts=scripts)
+    assert migrate.current(path) == "0002"
+    assert counts(path) == (1, 2)
+    assert backup is not None
+    assert (counts(backup), migrate.current(backup)) == ((1, 2), "0001")
+    command.downgrade(migrate.configuration(path, scripts), "0001")
+    assert counts(path) == (1, 2)
+    assert migrate.upgrade(path, scripts=scripts) is not None
+    assert counts(path) == (1, 2)
+
+
+def test_a_failing_migration_leaves_exactly_the_old_revision(tmp_path: Path, scripts: Path) -> None:
+    path = tmp_path / "a.db"
+    migrate.upgrade(path, target="0001", scripts=scripts)
+    fill(path)
+    before = schema(path)
+    step = scripts / "versions" / "0002_next.py"
+    for wrong in (
+        "raise RuntimeError('broken')",
+        "op.execute(\"UPDATE session SET patient_id = 'nobody'\")",  # dangling: seen before COMMIT
+    ):
+        step.write_text(HANG.format(then=wrong))
+        with pytest.raises(RuntimeError):
+            migrate.upgrade(path, scripts=scripts)
+        assert (schema(path), migrate.current(path), counts(path)) == (before, "0001", (1, 2))
+    step.write_text(HANG.format(then="pass"))
+    migrate.upgrade(path, scripts=scripts)
+    assert migrate.current(path) == "0002"
+
+
+def test_a_migration_killed_in_the_middle_leaves_exactly_the_old_revision(
+    tmp_path: Path, scripts: Path
+) -> None:
+    path, marker = tmp_path / "a.db", tmp_path / "reached"
+    migrate.upgrade(path, target="0001", scripts=scripts)
+    fill(path)
+    before = schema(path)
+    step = scripts / "versions" / "0002_next.py"
+    step.write_text(HANG.format(then=f"pathlib.Path({str(marker)!r}).touch(); time.sleep(600)"))
+    script = textwrap.dedent(f"""
+        from pathlib import Path
+        from server.storage.migrate import upgrade
+        upgrade(Path({str(path)!r}), scripts=Path({str(scripts)!r}))
+    """)
+    process = subprocess.Popen([sys.executable, "-c", script], cwd=ROOT)
+    limit = time.monotonic() + 60
+    while not marker.exists():
+        assert process.poll() is None
+        assert time.monotonic() < limit
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    assert (schema(path), migrate.current(path), counts(path)) == (before, "0001", (1, 2))
+    step.write_text(HANG.format(then="pass"))
+    migrate.upgrade(path, scripts=scripts)
+    assert (migrate.current(path), counts(path)) == ("0002", (1, 2))
+
+
+def test_an_unknown_revision_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.db"
+    migrate.upgrade(path)
+    with closing(sqlite3.connect(path)) as c:
+        c.execute("UPDATE alembic_version SET version_num = 'f00d'")
+        c.commit()
+    for start in (migrate.upgrade, migrate.require_current):
+        with pytest.raises(migrate.MigrationError, match="f00d"):
+            start(path)
+
+
+def test_a_worker_refuses_a_database_that_is_behind(tmp_path: Path) -> None:
+    with pytest.raises(migrate.MigrationError, match="sagittal migrate"):
+        migrate.require_current(tmp_path / "none.db")
