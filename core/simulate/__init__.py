@@ -5,6 +5,7 @@ from core.simulate.recorder import Dropout, Setup, Simulation, simulate
 from core.simulate.script import Arc, Pivot, Script, Stand, Straight
 from core.simulate.scripts import SCRIPTS, Scenario, simulate_scenario
 from core.simulate.sensors import SensorNoise
+from core.simulate.soft_tissue import SoftTissue
 from core.simulate.tables import angle_table, event_table, stride_table
 from core.simulate.truth import Truth
 from core.simulate.walker import STEADY, Variability, Walker
@@ -20,6 +21,7 @@ __all__ = [
     "SensorNoise",
     "Setup",
     "Simulation",
+    "SoftTissue",
     "Stand",
     "Straight",
     "Truth",

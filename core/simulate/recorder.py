@@ -26,6 +26,7 @@ from core.simulate.sensors import (
     ideal_signals,
     with_errors,
 )
+from core.simulate.soft_tissue import SoftTissue
 from core.simulate.truth import Truth, truth_of
 from core.simulate.walker import Walker
 
@@ -52,13 +53,15 @@ class Setup:
     Parameters
     ----------
     rate_hz : 20 to 1000. sampling : see `Sampling`. mount_spread_rad : sensors are turned by up to this.
-    noise : None for ideal sensors. packet_loss : share of lost samples, in short runs, 0 to 0.5.
+    noise : None for ideal sensors. tissue : None for sensors fixed to the bone.
+    packet_loss : share of lost samples, in short runs, 0 to 0.5.
     """
 
     rate_hz: float = 100.0
     sampling: Sampling = "instant"
     mount_spread_rad: float = pi
     noise: SensorNoise | None = MEMS
+    tissue: SoftTissue | None = None
     packet_loss: float = 0.0
     dropouts: tuple[Dropout, ...] = ()
 
@@ -131,7 +134,9 @@ def simulate(
     worn: dict[str, Segment | None] = {}
     for segment, number in zip(PLACES, ids, strict=True):
         device = f"{number:08X}"
-        ideal[segment] = ideal_signals(motion, segment, mounts[segment], every, setup.sampling, north)
+        ideal[segment] = ideal_signals(
+            motion, segment, mounts[segment], setup.tissue, every, setup.sampling, north
+        )
         measured = ideal[segment]
         if setup.noise is not None:
             measured, errors[segment] = with_errors(measured, setup.noise, setup.rate_hz, of_errors)

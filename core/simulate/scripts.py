@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import pi, radians
 from types import MappingProxyType
+from typing import Final
 
 from core.errors import ParameterError
 from core.simulate.recorder import Dropout, Setup, Simulation, simulate
 from core.simulate.script import Arc, Pivot, Script, Stand, Straight, scaled
 from core.simulate.sensors import MEMS
+from core.simulate.soft_tissue import SoftTissue
 from core.simulate.walker import Walker
+
+ON_SKIN: Final = Setup(tissue=SoftTissue())
+"""Named scripts are recorded with sensors on skin: fixed to the bone they would flatter every analysis."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +25,7 @@ class Scenario:
 
     title: str
     script: Script
-    setup: Setup = field(default_factory=Setup)
+    setup: Setup = ON_SKIN
 
 
 _COMFORTABLE: Script = (
@@ -67,7 +72,12 @@ SCRIPTS: Mapping[str, Scenario] = MappingProxyType(
         "lost_sensor": Scenario(
             "Walk with one sensor lost for ten seconds and noisy sensors",
             _COMFORTABLE,
-            Setup(noise=MEMS.times(2.0), packet_loss=0.01, dropouts=(Dropout("shank_r", 18.0, 28.0),)),
+            replace(
+                ON_SKIN,
+                noise=MEMS.times(2.0),
+                packet_loss=0.01,
+                dropouts=(Dropout("shank_r", 18.0, 28.0),),
+            ),
         ),
         "five_minutes": Scenario(
             "Five minutes with turns and changes of speed", (Stand(8.0), *_LAP * 3, Stand(5.0))

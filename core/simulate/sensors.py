@@ -15,6 +15,7 @@ import numpy as np
 from core.frames import GRAVITY, Floats, Segment
 from core.rotation import conjugate, exp, log, multiply, rotate
 from core.simulate.human import Motion
+from core.simulate.soft_tissue import SoftTissue, skin_motion
 from core.simulate.spline import kinematics, sign_continuous
 from core.simulate.walker import Walker
 
@@ -115,16 +116,26 @@ def draw_mounts(walker: Walker, spread_rad: float, rng: np.random.Generator) -> 
 
 
 def ideal_signals(
-    motion: Motion, segment: Segment, mount: Mount, every: int, sampling: Sampling, north_rad: float
+    motion: Motion,
+    segment: Segment,
+    mount: Mount,
+    tissue: SoftTissue | None,
+    every: int,
+    sampling: Sampling,
+    north_rad: float,
 ) -> Signals:
     """Signals of an errorless sensor at every `every`-th sample of the motion.
 
     Parameters
     ----------
-    north_rad : heading of magnetic north in the world.
+    tissue : between sensor and bone, None = stiff. north_rad : heading of magnetic north in the world.
     """
-    q = sign_continuous(multiply(motion.q[segment], mount.q_segment_sensor))
-    p = motion.p[segment] + rotate(motion.q[segment], mount.position_m)
+    place, turn = mount.position_m, mount.q_segment_sensor
+    skin = None if tissue is None else skin_motion(motion, segment, tissue)
+    if skin is not None:
+        place, turn = place + skin[1], multiply(skin[0], turn)
+    p = motion.p[segment] + rotate(motion.q[segment], place)
+    q = sign_continuous(multiply(motion.q[segment], turn))
     velocity, acceleration, rate = kinematics(motion.t_s, p, q)
     up = np.array([0.0, 0.0, GRAVITY])
     north = np.array(
