@@ -1,7 +1,7 @@
 """No process outlives the one that started it.
 
-The starter holds the other end of our standard input and never writes to it. When it is gone, we
-read the end of the file, however it went. On Linux the kernel also kills us at once, in the middle of a computation too.
+The starter holds the other end of our standard input and never writes to it. When it is gone, however it went,
+we read the end of the file. On Linux the kernel also kills us, in the middle of a computation too.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ def fill(path: Path) -> None:
     with closing(sqlite3.connect(path)) as c:
         c.execute("PRAGMA foreign_keys=ON")
         c.execute(
-            "INSERT INTO patient (id, code, note, created_at) VALUES ('p', 'A', '', '2026-01-01 00:00:00.000000')"
+            "INSERT INTO patient (id, code, note, created_at) VALUES ('p', 'A', '', '2026-01-01 00:00:00')"
         )
         for i in range(2):
             c.execute(
