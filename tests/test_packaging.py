@@ -13,7 +13,7 @@ INSTRUCTIONS = re.findall(r"^([A-Z]+)\s+(.*)$", re.sub(r"\\\n\s*", " ", DOCKERFI
 
 
 def last(name: str) -> str:
-    return [value for key, value in INSTRUCTIONS if key == name][-1]
+    return str([value for key, value in INSTRUCTIONS if key == name][-1])
 
 
 def test_container_runs_as_a_plain_user_after_all_root_work() -> None:
