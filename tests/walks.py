@@ -1,0 +1,99 @@
+"""Walks that tests share: simulated ones with their truth, and neura_walk, each made once per process."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from core.formats import SourceFile, parse_manifest, read_recording
+from core.frames import Bools, Floats, Segment
+from core.recording import SensorSignals, UniformRecording
+from core.rotation import rotate
+from core.simulate import SCRIPTS, Truth, simulate, simulate_scenario
+from core.simulate.script import Script
+from core.simulate.walker import Walker
+from core.timeline import synchronise
+from tests.data import data_folder
+
+NEURA = {
+    "00B40B91": "pelvis", "00B40C45": "thigh_l", "00B40C3C": "thigh_r", "00B40BA5": "shank_l",
+    "00B40C35": "shank_r", "00B40C55": "foot_l", "00B40C48": "foot_r", "00B40C44": None, "00B40C47": None,
+    "00B40C49": None, "00B40C4A": None,
+}  # fmt: skip
+
+
+@cache
+def simulated(name: str = "comfortable", seed: int = 0) -> tuple[UniformRecording, Truth]:
+    """A named script on the uniform axis, and its truth."""
+    take = simulate_scenario(name, seed)
+    return synchronise(take.recording), take.truth
+
+
+@cache
+def scripted(script: Script, seed: int = 0) -> tuple[UniformRecording, Truth]:
+    """A script of one's own for the reference person, with the sensors of the comfortable walk."""
+    take = simulate(script, Walker(), seed, SCRIPTS["comfortable"].setup)
+    return synchronise(take.recording), take.truth
+
+
+@cache
+def neura_walk() -> UniformRecording:
+    """The real walk of seven sensors, or skip."""
+    files = [
+        SourceFile(p.name, p.stat().st_size, p.read_bytes)
+        for p in sorted((data_folder("neura_walk") / "rawimu").glob("*.txt"))
+    ]
+    manifest = parse_manifest(json.dumps({"sensors": NEURA, "subject": {"height_m": 1.7}}).encode())
+    return synchronise(read_recording(files, manifest))
+
+
+def only(recording: UniformRecording, *segments: Segment) -> UniformRecording:
+    """The same take with some of its sensors."""
+    return replace(recording, sensors={s: recording.sensors[s] for s in segments})
+
+
+def turned(recording: UniformRecording, by: dict[Segment, Floats]) -> UniformRecording:
+    """The same take with sensors mounted otherwise: v_new = q ⊗ v ⊗ q* for the quaternion of each segment."""
+    sensors = {
+        s: replace(x, acc=rotate(by[s], x.acc), gyr=rotate(by[s], x.gyr), mag=None) if s in by else x
+        for s, x in recording.sensors.items()
+    }
+    return replace(recording, sensors=sensors)
+
+
+def cut(recording: UniformRecording, start_s: float, end_s: float) -> UniformRecording:
+    """A part of a take, its axis from zero again."""
+    part = slice(round(start_s * recording.rate_hz), round(end_s * recording.rate_hz))
+
+    def piece(x: SensorSignals) -> SensorSignals:
+        return replace(
+            x,
+            acc=x.acc[part].copy(),
+            gyr=x.gyr[part].copy(),
+            mag=None,
+            valid=x.valid[part].copy(),
+            interpolated=x.interpolated[part].copy(),
+        )
+
+    t = recording.t_s[part] - recording.t_s[part][0]
+    return replace(recording, t_s=t, sensors={s: piece(x) for s, x in recording.sensors.items()})
+
+
+def lost(recording: UniformRecording, segment: Segment, start_s: float, end_s: float) -> UniformRecording:
+    """The same take with one sensor silent for a while: invalid, the last value held."""
+    x = recording.sensors[segment]
+    a, b = round(start_s * recording.rate_hz), round(end_s * recording.rate_hz)
+    acc, gyr, valid = x.acc.copy(), x.gyr.copy(), x.valid.copy()
+    acc[a:b], gyr[a:b], valid[a:b] = acc[a - 1], gyr[a - 1], False
+    return replace(
+        recording, sensors={**recording.sensors, segment: replace(x, acc=acc, gyr=gyr, valid=valid)}
+    )
+
+
+def rms_deg(x: Floats, where: Bools | None = None) -> float:
+    """Root mean square in degrees of the finite values of x (rad)."""
+    x = x[np.isfinite(x) if where is None else where & np.isfinite(x)]
+    return float(np.degrees(np.sqrt(np.mean(x**2))))
