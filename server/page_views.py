@@ -6,18 +6,14 @@ import datetime as dt
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
-from urllib.parse import quote
 
 from sqlalchemy import Connection, func, select
 
-from core.frames import SEGMENTS
 from server.auth.roles import Role
 from server.jobs.queue import JobView
 from server.report.wording import TERMS
 from server.services import analyses, jobs, sessions
 from server.services.patients import Patient
-from server.services.recordings import Recording
-from server.services.sessions import Session
 from server.storage.blobs import BlobStore
 from server.storage.tables import ACTIVE_STATES, job, patient
 from web.words import number, seconds
@@ -47,7 +43,6 @@ SEGMENT_NAMES: Final = {
     "foot_r": "Right foot",
     "chest": "Chest",
 }
-SEGMENT_CHOICES: Final = (("", "Not used"), *((s, SEGMENT_NAMES[s]) for s in SEGMENTS))
 
 KEY_PARAMETERS: Final = tuple(
     {"name": name, "label": TERMS[name].label, "unit": TERMS[name].unit, "digits": TERMS[name].digits}
@@ -100,7 +95,9 @@ def patient_rows(c: Connection, found: Sequence[Patient]) -> list[dict[str, Any]
         visits = sessions.of_patient(c, p.id)
         running = _running(c, [v.id for v in visits]) if p.running else None
         last = status(visits[0].state) if visits else {"kind": "none", "text": "No session yet"}
-        rows.append(patient_view(p) | {"visits": p.sessions, "last": p.last_visit, "job": running, "status": last})
+        rows.append(
+            patient_view(p) | {"visits": p.sessions, "last": p.last_visit, "job": running, "status": last}
+        )
     return rows
 
 
@@ -189,29 +186,3 @@ def _running(c: Connection, session_ids: Sequence[str]) -> dict[str, Any] | None
     found = [j for sid in session_ids for j in jobs.of_session(c, sid) if not j.finished]
     found.sort(key=lambda j: j.state != "running")
     return job_dict(found[0]) if found else None
-
-
-def upload_view(this: Recording | None, s: Session, p: Patient) -> dict[str, Any]:
-    """Files of the session, the running inspection, what was found."""
-    files = [
-        {"name": f.name, "size": f.size, "href": f"/api/v1/sessions/{s.id}/files/{quote(f.name)}"}
-        for f in (this.files if this else ())
-    ]
-    look = this.job if this else None
-    problem = None
-    if look is not None and look.state == "failed" and this is not None and this.inspection is None:
-        problem = {"title": "These files could not be read", "message": look.error_message}
-    waiting = look is not None and not look.finished
-    return {
-        "files": files,
-        "inspect_job": job_dict(look) if look is not None and waiting else None,
-        "problem": problem,
-        "found": None if this is None or this.inspection is None or waiting else found_view(this),
-        "segments": SEGMENT_CHOICES,
-        "height_m": s.height_m or p.height_m,
-    }
-
-
-def found_view(this: Recording) -> dict[str, Any]:
-    """What the inspection found: facts, sensors with a suggested segment, notices."""
-    return {}

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
-from server import audit, page_views, session_views
+from server import audit, page_views, session_views, upload_views
 from server.api.context import Blobs, Db, Id
 from server.auth import accounts, one_time
 from server.auth.access import require
@@ -110,7 +110,7 @@ def upload(
     with db.read() as c:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
-        view = page_views.upload_view(recordings.current(c, sid), session, patient)
+        view = upload_views.upload_view(recordings.current(c, sid), session, patient)
     return _page(request, db, who, "upload.html", "patients", session=session, patient=patient, **view)
 
 
@@ -194,7 +194,14 @@ def account(request: Request, db: Db, who: Annotated[Identity, require(Action.US
 
 
 def _session_page(
-    request: Request, db: Database, blobs: BlobStore, sid: str, who: Identity, template: str, *, paper: bool = False
+    request: Request,
+    db: Database,
+    blobs: BlobStore,
+    sid: str,
+    who: Identity,
+    template: str,
+    *,
+    paper: bool = False,
 ) -> Response:
     with db.read() as c:
         context = session_views.base(c, sid)

@@ -21,16 +21,18 @@ COLUMNS: Final = 3
 """Charts per row: sagittal, frontal, transverse."""
 
 PAGE_HEIGHTS: Final = {False: 144, True: 158}
-PAPER_HEIGHTS: Final = {False: 168, True: 182}
+PAPER_HEIGHTS: Final = {False: 152, True: 166}
 KEY_HEIGHT: Final = 186
 """Chart heights in px; the last row also carries the unit of the x axis."""
+
+NOT_ON_PAPER: Final = "Support in seconds"
+"""This group says in seconds what another says in percent; the sheet has no room for both."""
 
 SHOWN: Final = (
     "problem",
     "quality",
     "warnings",
     "kpis",
-    "groups",
     "strides",
     "duration_s",
     "norm_note",
@@ -82,6 +84,7 @@ def downloads(c: Connection, session_id: str, *, results: bool) -> dict[str, Any
     this = recordings.current(c, session_id)
     found = analyses.of_session(c, session_id) if results else []
     shown = found[0] if found else None
+    files = [] if shown is None else [(shown.id, name, blob.size) for name, blob in shown.files.items()]
     return {
         "analysis": shown,
         "earlier": found[1:],
@@ -89,10 +92,10 @@ def downloads(c: Connection, session_id: str, *, results: bool) -> dict[str, Any
             {
                 "name": name,
                 "what": FILE_WORDS.get(name, ""),
-                "size": blob.size,
-                "href": f"/api/v1/analyses/{shown.id}/files/{quote(name)}",
+                "size": size,
+                "href": f"/api/v1/analyses/{analysis_id}/files/{quote(name)}",
             }
-            for name, blob in (shown.files.items() if shown else ())
+            for analysis_id, name, size in files
         ],
         "originals": [
             {**vars(f), "href": f"/api/v1/sessions/{session_id}/files/{quote(f.name)}" if results else None}
@@ -117,7 +120,9 @@ def _mapping(manifest: Mapping[str, Any] | None) -> list[tuple[str, str]]:
     return [(device, SEGMENT_NAMES.get(segment, "not used")) for device, segment in sensors.items()]
 
 
-def report(blobs: BlobStore, found: analyses.Analysis, context: Mapping[str, Any], *, paper: bool) -> dict[str, Any]:
+def report(
+    blobs: BlobStore, found: analyses.Analysis, context: Mapping[str, Any], *, paper: bool
+) -> dict[str, Any]:
     """The report of an analysis with its charts drawn, for the page or for paper."""
     patient, session = context["patient"], context["session"]
     files = {name: analyses.file_bytes(blobs, found, name) for name in found.files if name != "poses.parquet"}
@@ -130,6 +135,7 @@ def report(blobs: BlobStore, found: analyses.Analysis, context: Mapping[str, Any
     used, total = sum(model.used.values()), len(model.strides)
     return {
         **{name: getattr(model, name) for name in SHOWN},
+        "groups": [(name, rows) for name, rows in model.groups if not (paper and name == NOT_ON_PAPER)],
         "curves": curves,
         "key_curve": _chart(model.key_curve, KEY_HEIGHT, x_unit=True),
         "strip": strip_svg(bundle.strides, model.duration_s) if model.strides else "",

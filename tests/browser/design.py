@@ -1,76 +1,22 @@
-"""The checks of the design system on a live page: contrast, size of targets and text, clipping, sideways scroll."""
+"""The checks of the design system on a live page: contrast, size of targets and text, clipping, scroll."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from playwright.sync_api import Page
 
-LAYOUT = """() => {
-  const small = [], over = [], clip = [];
-  for (const e of document.querySelectorAll('a.btn,button,select,input,summary,.item,.tabs a,[role=button],a.tap')) {
-    const r = e.getBoundingClientRect();
-    if (!r.width || e.closest('label.check, svg, [hidden]') || e.type === 'file') continue;
-    let [w, h] = [r.width, r.height];
-    for (const p of ['::after', '::before']) {
-      const q = getComputedStyle(e, p);
-      if (q.content !== 'none' && q.position === 'absolute') {
-        h = Math.max(h, parseFloat(q.height) || 0);
-        w = Math.max(w, parseFloat(q.width) || 0);
-      }
-    }
-    const word = (e.textContent.trim() || e.getAttribute('aria-label') || e.className).slice(0, 24);
-    if (h < 43.5 || (w < 43.5 && !e.matches('a.tap'))) small.push(`${word} ${Math.round(w)}x${Math.round(h)}`);
-  }
-  for (const g of document.querySelectorAll('svg [role=button]')) {
-    const r = g.getBoundingClientRect();
-    if (r.width && Math.min(r.width, r.height) < 43.5) small.push(`${g.getAttribute('aria-label')} ${Math.round(r.width)}x${Math.round(r.height)}`);
-  }
-  const scrolls = (e) => { for (let b = e; b; b = b.parentElement) if (['auto', 'scroll'].includes(getComputedStyle(b).overflowX)) return true; return false; };
-  for (const e of document.querySelectorAll('main *')) {
-    if (e.closest('svg, .tabs')) continue;
-    const r = e.getBoundingClientRect();
-    if (r.width && r.right > innerWidth + 1 && !scrolls(e)) over.push(`${e.tagName}.${e.className}`);
-  }
-  for (const e of document.querySelectorAll('.card'))
-    if (e.scrollWidth > e.clientWidth + 1 && !scrolls(e)) clip.push((e.querySelector('h2') || {}).textContent || e.className);
-  return { sideways: Math.max(0, document.documentElement.scrollWidth - innerWidth), small, over, clip };
-}"""
-"""Targets under 44 px, what sticks out of the page or of its card; tables may scroll inside a card."""
-
-TEXT = """() => {
-  const lum = (c) => { const f = (v) => { v /= 255; return v <= .04045 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4; }; return .2126 * f(c[0]) + .7152 * f(c[1]) + .0722 * f(c[2]); };
-  const rgb = (s) => { const m = s.match(/[\\d.]+/g); return m ? m.map(Number) : null; };
-  const bad = {};
-  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-  while (walk.nextNode()) {
-    const text = walk.currentNode.textContent.trim(), e = walk.currentNode.parentElement;
-    if (!text || !e.getClientRects().length || e.closest('title,desc,.vh,.skip,[disabled],[aria-disabled=true],option,script,style')) continue;
-    const cs = getComputedStyle(e), fg = rgb(e.namespaceURI.includes('svg') ? cs.fill : cs.color);
-    if (!fg) continue;
-    let ground = [255, 255, 255];
-    for (let b = e; b; b = b.parentElement) {
-      const c = rgb(getComputedStyle(b).backgroundColor);
-      if (c && (c.length < 4 || c[3] > .99)) { ground = c; break; }
-    }
-    const [hi, lo] = [lum(fg), lum(ground)].sort((p, q) => q - p), ratio = (hi + .05) / (lo + .05);
-    const size = parseFloat(cs.fontSize), big = size >= 24 || (size >= 18.66 && +cs.fontWeight >= 600);
-    const name = e.className.baseVal ?? e.className;
-    if (ratio < (big ? 3 : 4.5) - .005) bad[`${name} contrast ${ratio.toFixed(2)}`] = text.slice(0, 24);
-    if (size < 10.9) bad[`${name} size ${size}`] = text.slice(0, 24);
-  }
-  return bad;
-}"""
-"""Text under WCAG AA contrast (4.5:1, 3:1 from 24 px) or under 11 px."""
+CHECKS = (Path(__file__).parent / "design.js").read_text()
 
 
 def layout_faults(page: Page) -> dict[str, Any]:
     """What of the layout breaks the design rules; empty when nothing does."""
-    found: dict[str, Any] = page.evaluate(LAYOUT)
+    found: dict[str, Any] = page.evaluate(f"{CHECKS}.layout()")
     return {k: v for k, v in found.items() if v}
 
 
 def text_faults(page: Page) -> dict[str, str]:
     """Text that is too faint or too small, with a sample."""
-    faults: dict[str, str] = page.evaluate(TEXT)
+    faults: dict[str, str] = page.evaluate(f"{CHECKS}.text()")
     return faults

@@ -25,7 +25,14 @@ class SensorMap extends HTMLElement {
       row.addEventListener("click", () => this.select(row));
       row.addEventListener("focusin", () => this.select(row));
     }
+    this.ask = this.querySelector("[data-ask]");
     this.querySelector("[data-swap]").addEventListener("click", () => this.swap());
+    for (const b of this.querySelectorAll("[data-sides]")) {
+      b.addEventListener("click", () => {
+        if (b.dataset.sides === "swap") this.swap();
+        this.answered();
+      });
+    }
     this.querySelector("[data-analyse]")?.addEventListener("click", (e) => this.analyse(e.target.closest("button")));
     this.draw();
   }
@@ -47,6 +54,14 @@ class SensorMap extends HTMLElement {
       if (side) select.value = select.value.slice(0, -1) + (side === "l" ? "r" : "l");
     }
     this.draw();
+  }
+
+  // The side of a leg was a try: nothing is analysed before a person has said which leg it is.
+  answered() {
+    this.ask?.remove();
+    this.ask = null;
+    this.draw();
+    this.querySelector("[data-analyse]")?.focus();
   }
 
   place(segment) {
@@ -105,11 +120,20 @@ class SensorMap extends HTMLElement {
       clash.querySelector("[data-title]").textContent = `Two sensors on one segment: ${[...clashes].map((s) => this.name(s)).join(", ")}`;
       clash.querySelector("[data-detail]").textContent = "A segment carries one sensor. Set the other one to Not used.";
     }
+    if (this.ask) {
+      const row = worn.get("foot_l");
+      this.ask.hidden = !row;
+      if (row) {
+        this.ask.querySelector("[data-ask-number]").textContent = row.dataset.number;
+        this.ask.querySelector("[data-ask-id]").textContent = row.dataset.device;
+      }
+    }
     const feet = worn.has("foot_l") && worn.has("foot_r");
     const sum = this.querySelector("[data-sum]");
-    sum.textContent = `${worn.size} of ${this.rows.length} sensors placed${feet || !worn.size ? "" : "; without both feet there are no strides"}`;
+    const asked = this.ask && !this.ask.hidden;
+    sum.textContent = asked ? "First say which foot is the left one" : `${worn.size} of ${this.rows.length} sensors placed${feet || !worn.size ? "" : "; without both feet there are no strides"}`;
     const button = this.querySelector("[data-analyse]");
-    if (button) button.disabled = worn.size === 0 || clashes.size > 0;
+    if (button) button.disabled = worn.size === 0 || clashes.size > 0 || Boolean(asked);
   }
 
   manifest() {

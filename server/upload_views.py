@@ -1,0 +1,170 @@
+"""What the upload page shows: the files, what was found in them, which sensor is probably where."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+from urllib.parse import quote
+
+from core.frames import SEGMENTS
+from server.page_views import SEGMENT_NAMES, job_dict
+from server.services.patients import Patient
+from server.services.recordings import Recording
+from server.services.sessions import Session
+from web.words import number, seconds
+
+SEGMENT_CHOICES: Final = (("", "Not used"), *((s, SEGMENT_NAMES[s]) for s in SEGMENTS))
+
+CLOCK_WORDS: Final = {
+    "counter": "one packet counter",
+    "device": "each sensor's own clock",
+    "index": "row number",
+}
+BASIS_WORDS: Final = {
+    "manifest": "As set before. Change what is not right.",
+    "declared": "As the files say. Change what is not right.",
+    "label": "Guessed from the names. Change what is not right.",
+    "movement": "Guessed from how each sensor moves.",
+}
+KINDS: Final = {"error": "bad", "warning": "warn", "info": ""}
+"""Severity of a notice → its look."""
+
+DUPLICATE: Final = "duplicate_stream"
+
+
+def upload_view(this: Recording | None, s: Session, p: Patient) -> dict[str, Any]:
+    """Files of the session, the waiting inspection, what was found."""
+    files = [
+        {"name": f.name, "size": f.size, "href": f"/api/v1/sessions/{s.id}/files/{quote(f.name)}"}
+        for f in (this.files if this else ())
+    ]
+    said = ((this.manifest if this else None) or {}).get("subject") or {}
+    look = this.job if this else None
+    waiting = look is not None and not look.finished
+    problem = None
+    if this is not None and look is not None and look.state == "failed" and this.inspection is None:
+        problem = {"title": "These files could not be read", "message": look.error_message}
+    return {
+        "files": files,
+        "inspect_job": job_dict(look) if look is not None and waiting else None,
+        "problem": problem,
+        "found": None if this is None or this.inspection is None or waiting else found_view(this),
+        "segments": SEGMENT_CHOICES,
+        "height_m": said.get("height_m") or s.height_m or p.height_m,
+    }
+
+
+def found_view(this: Recording) -> dict[str, Any]:
+    """What the inspection found: facts, sensors with their most likely segment, notices."""
+    found: Mapping[str, Any] = this.inspection or {}
+    devices: Sequence[Mapping[str, Any]] = found["devices"]
+    said: Mapping[str, str | None] = (this.manifest or {}).get("sensors") or {}
+    chosen = {d["device_id"]: _segment(d, said) for d in devices}
+    guessed = any(basis == "movement" for _, basis in chosen.values())
+    known = {basis for segment, basis in chosen.values() if segment and basis}
+    hint = next(
+        (text for basis, text in BASIS_WORDS.items() if basis in known), "Say where each sensor sits."
+    )
+    return {
+        "facts": _facts(found, devices),
+        "sensors": [_sensor(d, chosen[d["device_id"]][0]) for d in devices],
+        "notices": _notices(found, devices),
+        "manifest": dict(this.manifest or {}),
+        "hint": hint,
+        "ask_sides": guessed,
+    }
+
+
+def _segment(device: Mapping[str, Any], said: Mapping[str, str | None]) -> tuple[str | None, str | None]:
+    """Segment to preselect and what that rests on; of a leg whose side is unknown, leg 1 is tried as left."""
+    if device["device_id"] in said:
+        return said[device["device_id"]], "manifest"
+    if device["declared"]:
+        return device["segment"], "declared"
+    if device["duplicate_of"]:
+        return None, None
+    if device["suggested"]:
+        return device["suggested"], device["basis"]
+    if device["suggested_part"] and device["suggested_leg"]:
+        return f"{device['suggested_part']}_{'l' if device['suggested_leg'] == 1 else 'r'}", "movement"
+    return None, None
+
+
+def _sensor(device: Mapping[str, Any], segment: str | None) -> dict[str, Any]:
+    severities = {n["severity"] for n in device["notices"]}
+    if device["duplicate_of"]:
+        state = ("none", f"copy of {device['duplicate_of']}")
+    elif not device["has_gyro"]:
+        state = ("bad", "no gyroscope")
+    elif "error" in severities:
+        state = ("bad", "see the notice")
+    elif "warning" in severities:
+        state = ("warn", "see the notice")
+    else:
+        state = ("ok", f"{device['rate_hz']:g} Hz")
+    return {
+        "id": device["device_id"],
+        "segment": segment,
+        "state": {"kind": state[0], "text": state[1]},
+        "lost": f"{number(device['lost_pct'], 1)} %",
+    }
+
+
+def _facts(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    own = [d for d in devices if not d["duplicate_of"]]
+    copies = len(devices) - len(own)
+    rates = sorted({round(d["rate_hz"], 1) for d in own})
+    still = [d["still_norm_mps2"] for d in own]
+    clocks = sorted({d["clock"] for d in own})
+    signals = [
+        name
+        for name, key in (
+            ("gyroscope", "has_gyro"),
+            ("magnetometer", "has_mag"),
+            ("orientation", "has_orientation"),
+        )
+        if own and all(d[key] for d in own)
+    ]
+    worst = max((d["lost_pct"] for d in own), default=0.0)
+    gap = max((d["longest_gap_s"] for d in own), default=0.0)
+    return [
+        ("Sensors", str(len(own)), f"and {copies} {'copy' if copies == 1 else 'copies'}" if copies else ""),
+        ("Rate", ", ".join(f"{r:g}" for r in rates) + " Hz", ""),
+        ("Length", seconds(found["duration_s"]), ""),
+        ("Lost samples", f"{number(worst, 1)} %", f"longest gap {gap * 1000:.0f} ms" if gap else ""),
+        ("Signals", ", ".join(["acceleration", *signals]), ""),
+        ("Units", "m/s², rad/s" if "gyroscope" in signals else "m/s²", _at_rest(still)),
+        ("Time from", ", ".join(CLOCK_WORDS.get(c, c) for c in clocks), ""),
+    ]
+
+
+def _at_rest(still: Sequence[float]) -> str:
+    return f"(at rest {min(still):.2f} to {max(still):.2f} m/s²)" if still else ""
+
+
+def _notices(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
+    """Every notice once; copies are gathered into one sentence."""
+    copies = [d for d in devices if d["duplicate_of"]]
+    notices = []
+    if copies:
+        pairs = ", ".join(f"{d['device_id']} of {d['duplicate_of']}" for d in copies)
+        title = (
+            "One sensor is a copy of another"
+            if len(copies) == 1
+            else f"{len(copies)} sensors are copies of others"
+        )
+        message = (
+            f"The same samples under another id: {pairs}. Copies are not analysed unless you choose them."
+        )
+        notices.append({"kind": "", "title": title, "message": message})
+    everything = [*found["notices"], *(n for d in devices for n in d["notices"])]
+    for n in everything:
+        if n["code"] == DUPLICATE:
+            continue
+        where = f", {n['sensor']}" if n["sensor"] else ""
+        title = n["code"].replace("_", " ").capitalize() + where
+        notice = {"kind": KINDS[n["severity"]], "title": title, "message": n["message"]}
+        if notice not in notices:
+            notices.append(notice)
+    order = list(KINDS.values())
+    return sorted(notices, key=lambda n: order.index(n["kind"]))

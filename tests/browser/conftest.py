@@ -1,0 +1,170 @@
+"""A real server with its worker, real Chromium, and a clinic filled through the API."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import httpx
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, Playwright, sync_playwright
+
+from server.auth import accounts
+from server.auth.passwords import hash_password
+from server.auth.roles import Role
+from server.storage.db import Database
+from server.storage.migrate import upgrade
+from tests.data import ROOT
+
+NAME, PASSWORD = "anna", "correct horse battery"
+CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or "/usr/bin/chromium"
+FLAGS = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
+         "--disable-component-update", "--disable-sync"]  # fmt: skip
+FLAT = [*FLAGS, "--disable-gpu"]
+SOLID = [*FLAGS, "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+"""Without 3D (fast 2D) and with software WebGL (viewer.md §8)."""
+
+
+@dataclass(frozen=True)
+class RunningServer:
+    """A server process on an empty data folder with one administrator."""
+
+    url: str
+    folder: Path
+
+    def client(self) -> httpx.Client:
+        """A signed-in API client."""
+        client = httpx.Client(base_url=self.url, timeout=60)
+        client.post("/api/v1/sign-in", json={"name": NAME, "password": PASSWORD}).raise_for_status()
+        return client
+
+
+@pytest.fixture(scope="session")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
+    folder = tmp_path_factory.mktemp("clinic")
+    upgrade(folder / "sagittal.db")
+    db = Database(folder / "sagittal.db")
+    with db.write() as c:
+        accounts.create(c, NAME, "Anna", Role.ADMIN, hash_password(PASSWORD))
+    db.close()
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        port = s.getsockname()[1]
+    log = (folder / "server.log").open("wb")
+    # an own process group, so that workers go with their server
+    process = subprocess.Popen(
+        [sys.executable, "-m", "server.main", "serve", "--data", str(folder), "--port", str(port)],
+        cwd=ROOT, stdout=log, stderr=subprocess.STDOUT, start_new_session=True,
+    )  # fmt: skip
+    url = f"http://127.0.0.1:{port}"
+    try:
+        _wait_until_ready(url, process, folder / "server.log")
+        yield RunningServer(url, folder)
+    finally:
+        process.terminate()
+        try:
+            process.wait(15)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        log.close()
+
+
+def _wait_until_ready(url: str, process: subprocess.Popen[bytes], log: Path) -> None:
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        try:
+            if httpx.get(f"{url}/health/live", timeout=2).is_success:
+                return
+        except httpx.TransportError:
+            pass
+        if process.poll() is not None:
+            break
+        time.sleep(0.1)
+    pytest.fail(f"the server did not start:\n{log.read_text(errors='replace')[-3000:]}")
+
+
+@pytest.fixture(scope="session")
+def playwright_() -> Iterator[Playwright]:
+    if not Path(CHROMIUM).exists():
+        pytest.skip(f"no Chromium at {CHROMIUM}; set CHROMIUM to one")
+    with sync_playwright() as p:
+        yield p
+
+
+@pytest.fixture(scope="session")
+def flat(playwright_: Playwright) -> Iterator[Browser]:
+    """Chromium without 3D."""
+    browser = playwright_.chromium.launch(executable_path=CHROMIUM, args=FLAT)
+    yield browser
+    browser.close()
+
+
+@pytest.fixture(scope="session")
+def solid(playwright_: Playwright) -> Iterator[Browser]:
+    """Chromium with software WebGL."""
+    browser = playwright_.chromium.launch(executable_path=CHROMIUM, args=SOLID)
+    yield browser
+    browser.close()
+
+
+@pytest.fixture(scope="session")
+def cookies(running: RunningServer) -> list[dict[str, str]]:
+    """The cookie of one sign-in, so that a page need not sign in each time."""
+    with running.client() as client:
+        return [{"name": k, "value": v, "url": running.url} for k, v in client.cookies.items()]
+
+
+Opener = Callable[..., Page]
+
+
+@pytest.fixture
+def opened(flat: Browser, running: RunningServer, cookies: list[dict[str, str]]) -> Iterator[Opener]:
+    """Opens pages signed in; a script error or a refused style fails the test at its end."""
+    contexts: list[BrowserContext] = []
+    said: list[str] = []
+
+    def open_(
+        path: str,
+        *,
+        width: int = 1280,
+        height: int = 800,
+        scheme: str = "light",
+        browser: Browser = flat,
+        signed_in: bool = True,
+    ) -> Page:
+        context = browser.new_context(
+            base_url=running.url,
+            viewport={"width": width, "height": height},
+            color_scheme=scheme,  # type: ignore[arg-type]
+        )
+        contexts.append(context)
+        if signed_in:
+            context.add_cookies(cookies)  # type: ignore[arg-type]
+        page = context.new_page()
+        page.on("pageerror", lambda e: said.append(f"{path}: {e}") if _ours(str(e)) else None)
+        page.on("console", lambda m: said.append(f"{path}: {m.text}") if _matters(m.type, m.text) else None)
+        page.goto(path)
+        return page
+
+    yield open_
+    for context in contexts:
+        context.close()
+    assert not said, said
+
+
+def _matters(kind: str, text: str) -> bool:
+    # a 4xx that a test provokes is printed by the browser as an error; the page itself says it in words
+    return kind == "error" and "Failed to load resource" not in text and _ours(text)
+
+
+def _ours(text: str) -> bool:
+    # viser's client tries `new Function` once; its own document's policy refuses that, and it goes on without
+    return "unsafe-eval" not in text
