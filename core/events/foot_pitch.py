@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from core.frames import Bools, Floats
@@ -78,54 +77,6 @@ class FootPitchState:
         )
 
 
-@njit(cache=True, nogil=True)
-def _foot_pitch_kernel(s, valid, ring, counters, window, need, threshold, kind, index, offset):  # type: ignore[no-untyped-def]
-    """Run over a block; write kind (0 = TC, 1 = IC), sample and sub-sample offset of each extremum."""
-    size = window + 3
-    found = 0
-    for i in range(s.shape[0]):
-        k = counters[0]
-        counters[0] = k + 1
-        if not valid[i]:
-            # nothing is concluded across a gap: the phase is unknown after it
-            counters[1] = 0
-            counters[2] = 0
-            continue
-        ring[k % size] = s[i]
-        counters[1] += 1
-        if counters[1] < size:
-            continue
-        swing = counters[2]
-        if k - counters[3 + swing] <= window or (s[i] < threshold) == (swing == 1):
-            continue
-        # look for a maximum in swing and for a minimum in stance by turning the sign
-        sign = 1.0 if swing == 0 else -1.0
-        here = sign * ring[(k - 1) % size]
-        if here >= sign * s[i]:
-            continue
-        towards = 0
-        extreme = True
-        later = here
-        for back in range(2, window + 3):
-            earlier = sign * ring[(k - back) % size]
-            if back <= window + 1 and earlier <= here:
-                extreme = False
-                break
-            if back >= 3 and later < earlier:
-                towards += 1
-            later = earlier
-        if not extreme or towards < need:
-            continue
-        before, after = sign * ring[(k - 2) % size], sign * s[i]
-        kind[found] = swing
-        index[found] = k - 1
-        offset[found] = 0.5 * (before - after) / (before - 2.0 * here + after)
-        found += 1
-        counters[3 + swing] = k
-        counters[2] = 1 - swing
-    return found
-
-
 def push(
     state: FootPitchState, s: Floats, valid: Bools
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
@@ -142,8 +93,11 @@ def push(
     """
     room = 2 * (len(s) // (state.window + 1) + 1)
     kind, index, offset = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)
+    # numba is slow to import and only needed here
+    from core.events.foot_pitch_kernel import foot_pitch_kernel
+
     # copies: the kernel is compiled once, for writable contiguous arrays of these types
-    m = _foot_pitch_kernel(
+    m = foot_pitch_kernel(
         np.array(s, np.float64), np.array(valid, np.bool_), state.ring, state.counters, state.window,
         state.need, state.threshold, kind, index, offset,
     )  # fmt: skip
