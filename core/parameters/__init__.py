@@ -5,7 +5,14 @@ from __future__ import annotations
 from core.angles import JointAngles
 from core.events.result import Strides
 from core.fusion.orientations import Orientations
-from core.parameters.kinematic import cycle_curves, foot_pitch, kinematic, mean_curve
+from core.parameters.kinematic import (
+    cycle_curves,
+    foot_pitch,
+    kinematic,
+    mean_curve,
+    per_stride_figures,
+    stride_figures,
+)
 from core.parameters.result import Parameter
 from core.parameters.temporal import per_stride, stride_values, temporal
 
@@ -16,6 +23,8 @@ __all__ = [
     "kinematic",
     "mean_curve",
     "per_stride",
+    "per_stride_figures",
+    "stride_figures",
     "stride_values",
     "temporal",
 ]
