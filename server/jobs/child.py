@@ -19,7 +19,7 @@ from server.jobs.task import TASKS, load
 from server.settings import load_settings
 from server.storage.blobs import BlobStore
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("server.jobs.child")
 
 
 def main() -> None:

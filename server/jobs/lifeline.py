@@ -1,6 +1,6 @@
 """No process outlives the one that started it.
 
-The starter holds the other end of our standard input and never writes to it. When it is gone, however it went,
+The starter holds the other end of our standard input and never writes to it. When it is gone, whatever way,
 we read the end of the file. On Linux the kernel also kills us, in the middle of a computation too.
 """
 

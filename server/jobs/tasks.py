@@ -42,8 +42,13 @@ def _publish_analysis(
 
 
 def _warm() -> None:
-    """Import readers and pipeline; numba loads its compiled kernels from the cache at the first call."""
+    """Import readers and pipeline, compile the kernels or load them from the cache."""
     import server.report.exports  # noqa: F401
+    from core import attitude
+    from core.events import foot_pitch
+
+    attitude.warm()
+    foot_pitch.warm()
 
 
 register(Task(recordings.INSPECT, _inspect, _publish_inspection, keeps_files=False))

@@ -31,7 +31,7 @@ from server.storage.db import Database
 from server.storage.migrate import require_current
 from server.storage.tables import new_id
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("server.jobs.worker")
 
 IDLE_S = 0.2
 """Pause between two looks for work; a look is one read of an index."""

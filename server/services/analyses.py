@@ -92,7 +92,7 @@ def inspect(files: Sequence[SourceFile], manifest: Mapping[str, Any] | None, pro
     sources = (manifest or {}).get("sources")
     take = read_recording(files, manifest_of({"sources": sources}) if sources else None)
     progress("looking", 0.7)
-    return json.dumps(quality.describe(take), ensure_ascii=False, allow_nan=False).encode()
+    return json.dumps(quality.describe(take).to_json(), ensure_ascii=False, allow_nan=False).encode()
 
 
 def configured(defaults: Any, overrides: Mapping[str, Any], path: str = "config") -> Any:

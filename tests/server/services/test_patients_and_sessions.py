@@ -1,0 +1,351 @@
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+
+from core.errors import SagittalError
+from server import audit
+from server.jobs.table import TableQueue
+from server.services import analyses, checks, erasure, jobs, patients, recordings, sessions
+from server.services.errors import Conflict, NotFound, ServiceError
+from server.services.sweep import sweep
+from server.settings import Settings
+from server.storage import tables
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from server.storage.migrate import upgrade
+
+
+@dataclass(frozen=True)
+class Person:
+    user_id: str = "1" * 32
+    name: str = "ada"
+
+
+class Clinic:
+    def __init__(self, folder: Path) -> None:
+        self.settings = Settings(data_dir=folder, min_free_bytes=0, max_file_bytes=1000, max_files=3)
+        upgrade(self.settings.database)
+        self.db = Database(self.settings.database)
+        self.blobs = BlobStore(self.settings.blobs)
+        self.queue = TableQueue(self.db, 15.0)
+        self.who = Person()
+
+    def patient(self, code: str = "P-1") -> str:
+        with self.db.write() as c:
+            return patients.create(c, self.who, code=code, height_m=1.75).id
+
+    def session(self, patient_id: str, day: dt.date = dt.date(2026, 3, 1)) -> str:
+        with self.db.write() as c:
+            return sessions.create(c, self.who, patient_id, performed_on=day).id
+
+    def upload(
+        self, session_id: str, name: str = "a.txt", content: bytes = b"signals"
+    ) -> recordings.RecordedFile:
+        with recordings.receive(self.db, self.blobs, self.settings, self.who, session_id, name) as upload:
+            upload.write(content)
+            return upload.keep()
+
+    def recording(self, session_id: str) -> recordings.Recording:
+        with self.db.read() as c:
+            found = recordings.current(c, session_id)
+        assert found is not None
+        return found
+
+    def analyse(self, session_id: str, content: bytes = b"{}") -> analyses.Analysis:
+        """What the worker does, without the numbers."""
+        with self.db.write() as c:
+            view = analyses.submit(c, self.queue, None, session_id)
+        if view.state == "queued":
+            claim = self.queue.claim("w", (recordings.ANALYSE,))
+            assert claim is not None
+            stored = {"analysis.json": self.blobs.put(claim.params["space"], content)}
+            assert self.queue.finish(claim, lambda c: analyses.publish(c, claim, stored))
+        with self.db.read() as c:
+            found = analyses.latest(c, session_id)
+        assert found is not None
+        return found
+
+    def trail(self) -> list[str]:
+        with self.db.read() as c:
+            return [row.action for row in reversed(audit.entries(c))]
+
+
+@pytest.fixture
+def clinic(tmp_path: Path) -> Iterator[Clinic]:
+    made = Clinic(tmp_path)
+    yield made
+    made.db.close()
+
+
+def test_a_patient_is_made_renamed_and_found(clinic: Clinic) -> None:
+    first = clinic.patient("P-1")
+    clinic.patient("Q_2")
+    clinic.session(first, dt.date(2026, 2, 1))
+    clinic.session(first, dt.date(2026, 4, 1))
+    with clinic.db.write() as c:
+        changed = patients.change(c, clinic.who, first, {"code": " P-9 ", "sex": "female"})
+    assert (changed.code, changed.sex, changed.sessions, changed.last_visit, changed.running) == (
+        "P-9",
+        "female",
+        2,
+        dt.date(2026, 4, 1),
+        False,
+    )
+    with clinic.db.read() as c:
+        assert [p.code for p in patients.listing(c)] == ["P-9", "Q_2"]
+        assert [p.code for p in patients.listing(c, search="p-9")] == ["P-9"]
+        assert [p.code for p in patients.listing(c, search="_")] == ["Q_2"]  # no wildcard
+        assert patients.listing(c, search="%") == []
+    assert clinic.trail() == ["patient.created"] * 2 + ["session.created"] * 2 + ["patient.changed"]
+
+
+def test_what_a_patient_cannot_be_is_refused_with_a_sentence(clinic: Clinic) -> None:
+    first = clinic.patient("P-1")
+    cases: list[tuple[dict[str, object], str]] = [
+        ({"code": "P-2"}, "code_taken"),
+        ({"code": "  "}, "bad_value"),
+        ({"height_m": 175.0}, "bad_value"),
+        ({"sex": "unknown"}, "bad_value"),
+        ({"colour": "red"}, "bad_value"),
+    ]
+    clinic.patient("P-2")
+    for values, code in cases:
+        with pytest.raises(ServiceError) as caught, clinic.db.write() as c:
+            patients.change(c, clinic.who, first, values)
+        assert caught.value.code == code
+    with pytest.raises(NotFound), clinic.db.write() as c:
+        patients.change(c, clinic.who, "0" * 32, {})
+    assert clinic.trail() == ["patient.created"] * 2
+
+
+def test_a_session_knows_its_state(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+
+    def state() -> str:
+        with clinic.db.read() as c:
+            return sessions.get(c, session_id).state
+
+    assert state() == "empty"
+    clinic.upload(session_id)
+    assert state() == "uploaded"
+    with clinic.db.write() as c:
+        analyses.submit(c, clinic.queue, None, session_id)
+    assert state() == "running"
+    with clinic.db.read() as c:
+        assert patients.listing(c)[0].running
+    claim = clinic.queue.claim("w", (recordings.ANALYSE,))
+    assert claim is not None
+    clinic.queue.fail(claim, "no_walking", "No walking was found.")
+    assert state() == "failed"
+    clinic.analyse(session_id)
+    assert state() == "done"
+
+
+def test_files_are_added_replaced_and_removed(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    clinic.upload(session_id, "left 🦶.csv", b"1")
+    clinic.upload(session_id, "trial\\right.csv", b"2")
+    clinic.upload(session_id, "trial/right.csv", b"3")
+    files = {f.name: f.size for f in clinic.recording(session_id).files}
+    assert files == {"left 🦶.csv": 1, "trial/right.csv": 1}
+    this = clinic.recording(session_id)
+    with clinic.db.read() as c:
+        assert recordings.file_bytes(c, clinic.blobs, this.id, "trial/right.csv") == b"3"
+    with clinic.db.write() as c:
+        after = recordings.remove_file(c, clinic.who, session_id, "left 🦶.csv")
+    assert [f.name for f in after.files] == ["trial/right.csv"]
+    assert after.id == this.id
+    with pytest.raises(NotFound), clinic.db.write() as c:
+        recordings.remove_file(c, clinic.who, session_id, "left 🦶.csv")
+
+
+@pytest.mark.parametrize("name", ["", "/", "../a", "a/../b", "a\x00b", "a\nb", "x" * 501])
+def test_a_name_that_is_no_name_is_refused(clinic: Clinic, name: str) -> None:
+    session_id = clinic.session(clinic.patient())
+    with pytest.raises(SagittalError) as caught:
+        clinic.upload(session_id, name)
+    assert caught.value.code == "bad_file_name"
+
+
+def test_limits_of_size_and_number_hold_and_leave_nothing(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    with pytest.raises(ServiceError) as caught:
+        clinic.upload(session_id, "big", bytes(1001))
+    assert caught.value.code == "file_too_large"
+    for i in range(3):
+        clinic.upload(session_id, f"{i}", b"x")
+    with pytest.raises(ServiceError) as caught:
+        clinic.upload(session_id, "fourth", b"x")
+    assert caught.value.code == "too_many_files"
+    assert len(list(clinic.blobs.files())) == 1
+
+
+def test_an_analysed_recording_never_changes(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    clinic.upload(session_id, "a", b"1")
+    result = clinic.analyse(session_id)
+    clinic.upload(session_id, "b", b"2")
+    successor = clinic.recording(session_id)
+    assert successor.id != result.recording_id
+    assert [f.name for f in successor.files] == ["a", "b"]
+    with clinic.db.read() as c:
+        assert [f.name for f in recordings.get(c, result.recording_id).files] == ["a"]
+
+
+def test_the_same_wish_is_one_job_another_mapping_is_another(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    clinic.upload(session_id)
+    first = clinic.analyse(session_id)
+    assert clinic.analyse(session_id).id == first.id
+    with clinic.db.write() as c:
+        recordings.set_manifest(c, clinic.who, session_id, {"sensors": {"x": "pelvis"}})
+    second = clinic.analyse(session_id)
+    assert second.id != first.id
+    assert second.recording_id == first.recording_id
+    with clinic.db.write() as c:
+        recordings.set_manifest(c, clinic.who, session_id, None)
+    assert clinic.analyse(session_id).id == first.id  # the page shows what was asked for last
+    with clinic.db.read() as c:
+        assert len(analyses.of_session(c, session_id)) == 2
+
+
+def test_height_and_protocol_fill_what_the_manifest_leaves_open(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    clinic.upload(session_id)
+    assert clinic.analyse(session_id).manifest == {"subject": {"height_m": 1.75}, "protocol": "walk"}
+    with clinic.db.write() as c:
+        sessions.change(c, clinic.who, session_id, {"height_m": 1.8, "protocol": "treadmill"})
+    assert clinic.analyse(session_id).manifest == {"subject": {"height_m": 1.8}, "protocol": "treadmill"}
+    with clinic.db.write() as c:
+        recordings.set_manifest(c, clinic.who, session_id, {"subject": {"height_m": 1.6}})
+    manifest = clinic.analyse(session_id).manifest
+    assert manifest is not None
+    assert manifest["subject"] == {"height_m": 1.6}
+
+
+def test_a_wrong_manifest_is_refused_and_not_kept(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    clinic.upload(session_id)
+    with pytest.raises(SagittalError) as caught, clinic.db.write() as c:
+        recordings.set_manifest(c, clinic.who, session_id, {"sensors": {"x": "tail"}})
+    assert caught.value.code == "unknown_segment"
+    assert clinic.recording(session_id).manifest is None
+
+
+def test_without_files_there_is_nothing_to_do(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    for wish in (analyses.submit, recordings.inspect):
+        with pytest.raises(Conflict) as caught, clinic.db.write() as c:
+            wish(c, clinic.queue, None, session_id)
+        assert caught.value.code == "no_files"
+
+
+def test_an_inspection_of_files_that_have_changed_is_not_kept(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    clinic.upload(session_id, "a", b"1")
+    before = clinic.recording(session_id)
+    with clinic.db.write() as c:
+        recordings.publish_inspection(c, before.id, before.input_sha256, {"devices": []})
+    assert clinic.recording(session_id).state == "ready"
+    clinic.upload(session_id, "b", b"2")
+    assert clinic.recording(session_id).state == "draft"
+    with pytest.raises(Conflict), clinic.db.write() as c:
+        recordings.publish_inspection(c, before.id, before.input_sha256, {"devices": []})
+
+
+def test_erasing_a_patient_needs_the_code_and_leaves_only_the_trail(clinic: Clinic) -> None:
+    patient_id, other_id = clinic.patient("P-1"), clinic.patient("P-2")
+    session_id, other_session = clinic.session(patient_id), clinic.session(other_id)
+    for s in (session_id, other_session):
+        clinic.upload(s, "same.txt", b"same bytes")
+        clinic.analyse(s)
+    with clinic.db.write() as c:
+        view = recordings.inspect(c, clinic.queue, None, session_id)
+    claim = clinic.queue.claim("w", (recordings.INSPECT,))
+    assert claim is not None
+    with pytest.raises(Conflict) as caught:
+        erasure.erase_patient(clinic.db, clinic.blobs, clinic.who, patient_id, confirm="P-2")
+    assert caught.value.code == "not_confirmed"
+    erasure.erase_patient(clinic.db, clinic.blobs, clinic.who, patient_id, confirm="P-1")
+    assert {f.space for f in clinic.blobs.files()} == {other_id}
+    assert not clinic.queue.finish(claim, lambda c: None)  # its worker finds the fence closed
+    with clinic.db.read() as c:
+        for table in (tables.patient, tables.session, tables.recording, tables.recording_file, tables.job):
+            assert len(c.execute(select(table)).all()) == 1
+        tombstone = audit.entries(c)[0]
+        assert (tombstone.action, tombstone.resource_id) == ("patient.erased", patient_id)
+        with pytest.raises(NotFound):
+            jobs.get(c, view.id)
+        everything = str(c.execute(select(tables.audit)).all())
+    assert "P-1" not in everything
+    assert checks.check(clinic.db, clinic.blobs) == []
+
+
+def test_erasing_a_session_keeps_the_files_another_one_shares(clinic: Clinic) -> None:
+    patient_id = clinic.patient()
+    one, two = clinic.session(patient_id), clinic.session(patient_id)
+    clinic.upload(one, "a", b"shared")
+    clinic.upload(one, "b", b"own")
+    clinic.upload(two, "a", b"shared")
+    erasure.erase_session(clinic.db, clinic.blobs, clinic.who, one)
+    assert [f.path.read_bytes() for f in clinic.blobs.files()] == [b"shared"]
+    assert checks.check(clinic.db, clinic.blobs) == []
+
+
+def test_the_sweep_takes_only_old_files_that_nothing_refers_to(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    clinic.upload(session_id, "a", b"kept")
+    orphan = clinic.blobs.put("f" * 32, b"of a lost claim")
+    assert sweep(clinic.db, clinic.blobs, grace_s=3600.0) == 0
+    assert sweep(clinic.db, clinic.blobs, grace_s=0.0) == 1
+    assert [f.path.read_bytes() for f in clinic.blobs.files()] == [b"kept"]
+    with pytest.raises(SagittalError):
+        clinic.blobs.require("f" * 32, orphan.sha256)
+
+
+def test_the_check_finds_what_is_wrong(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    clinic.upload(session_id, "a", b"one")
+    clinic.upload(session_id, "b", b"two")
+    assert checks.check(clinic.db, clinic.blobs) == []
+    files = list(clinic.blobs.files())
+    files[0].path.write_bytes(b"onf")
+    files[1].path.unlink()
+    with clinic.db.write() as c:
+        c.exec_driver_sql("DROP TRIGGER audit_no_update")
+        c.exec_driver_sql("DROP TRIGGER audit_no_delete")
+        c.exec_driver_sql("UPDATE audit SET user_name = 'somebody else' WHERE seq = 1")
+        c.exec_driver_sql("DELETE FROM audit WHERE seq = 3")
+    findings = checks.check(clinic.db, clinic.blobs)
+    assert sorted(f.area for f in findings) == ["audit", "audit", "files", "files"]
+
+
+def test_audit_rows_cannot_be_changed_or_removed(clinic: Clinic) -> None:
+    from sqlalchemy.exc import IntegrityError
+
+    clinic.patient()
+    for statement in ("UPDATE audit SET action = 'x'", "DELETE FROM audit"):
+        with pytest.raises(IntegrityError, match="append-only"), clinic.db.write() as c:
+            c.exec_driver_sql(statement)
+
+
+def test_jobs_are_listed_with_whose_they_are_and_cancelled_with_a_trail(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    clinic.upload(session_id)
+    with clinic.db.write() as c:
+        view = recordings.inspect(c, clinic.queue, None, session_id)
+    with clinic.db.write() as c:
+        listed = jobs.listing(c, active_only=True)
+        assert [(x.job.id, x.session_id, x.patient_code) for x in listed] == [(view.id, session_id, "P-1")]
+        assert jobs.cancel(c, clinic.queue, clinic.who, view.id).state == "cancelled"
+        assert jobs.listing(c, active_only=True) == []
+        assert [v.id for v in jobs.of_session(c, session_id)] == [view.id]
+        with pytest.raises(NotFound):
+            jobs.cancel(c, clinic.queue, clinic.who, "0" * 32)
+    assert clinic.trail()[-1] == "job.cancelled"

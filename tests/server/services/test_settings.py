@@ -1,0 +1,39 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from server.settings import Settings, SettingsError, load_settings
+
+EVERYWHERE = "0.0.0.0"  # noqa: S104 - never bound here
+
+
+def test_command_line_goes_before_environment_before_defaults() -> None:
+    env = {"SAGITTAL_HOME": "/data", "SAGITTAL_PORT": "9000", "SAGITTAL_ALLOWED_HOSTS": "gait.clinic, b"}
+    settings = load_settings({"port": 9001, "host": None}, env)
+    assert settings.data_dir == Path("/data")
+    assert (settings.port, settings.host, settings.workers) == (9001, "127.0.0.1", 1)
+    assert settings.hosts[-2:] == ("gait.clinic", "b")
+
+
+def test_settings_survive_the_way_to_a_child_process(tmp_path: Path) -> None:
+    settings = Settings(
+        data_dir=tmp_path, lease_s=1.5, behind_tls=True, host=EVERYWHERE, allowed_hosts=("a", "b")
+    )
+    assert load_settings(None, settings.environment()) == settings
+
+
+@pytest.mark.parametrize(
+    ("given", "env", "words"),
+    [
+        ({"host": EVERYWHERE}, {}, "unencrypted"),
+        ({"port": 70000}, {}, "port is 70000"),
+        ({}, {"SAGITTAL_WORKERS": "two"}, "SAGITTAL_WORKERS is 'two'"),
+        ({}, {"SAGITTAL_LEASE_S": "0"}, "lease_s is 0"),
+        ({}, {"SAGITTAL_BEHIND_TLS": "maybe"}, "SAGITTAL_BEHIND_TLS"),
+    ],
+)
+def test_a_wrong_setting_is_named(given: dict[str, object], env: dict[str, str], words: str) -> None:
+    with pytest.raises(SettingsError, match=words):
+        load_settings(given, env)
