@@ -40,12 +40,12 @@ _LAP: Script = (
     Straight(24.0, 0.64, 0.54),
     Arc(1.5, pi, 0.52, 0.56),
     Straight(18.0, 0.56, 0.58),
-    Pivot(-pi, radians(40.0), 0.56),
+    Pivot(-pi, radians(30.0), 0.56),
     Straight(24.0, 0.67, 0.50),
     Stand(5.0),
     Arc(2.0, -pi, 0.55, 0.55),
     Straight(22.0, 0.64, 0.54),
-    Pivot(pi, radians(45.0), 0.55),
+    Pivot(pi, radians(30.0), 0.55),
 )
 
 SCRIPTS: Mapping[str, Scenario] = MappingProxyType(
@@ -62,7 +62,7 @@ SCRIPTS: Mapping[str, Scenario] = MappingProxyType(
                 Straight(12.0, 0.66, 0.47),
                 Arc(1.4, pi, 0.55, 0.53),
                 Straight(12.0, 0.66, 0.47),
-                Pivot(-pi, radians(45.0), 0.54),
+                Pivot(-pi, radians(30.0), 0.54),
                 Straight(12.0, 0.66, 0.47),
                 Arc(1.4, -pi, 0.55, 0.53),
                 Straight(8.0, 0.66, 0.47),
