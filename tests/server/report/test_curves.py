@@ -17,7 +17,8 @@ MakeBundle = Callable[..., Bundle]
 
 @pytest.fixture(scope="module")
 def knee(bundle: Bundle) -> ET.Element:
-    return fromstring(cycle_svg(report_model(bundle).key_curve, x_unit=True))
+    root: ET.Element = fromstring(cycle_svg(report_model(bundle).key_curve, x_unit=True))
+    return root
 
 
 def all_of(root: ET.Element, css: str) -> list[ET.Element]:

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from server.report.exports import poses_parquet
+from server.services import analyses, patients, recordings, sessions
+from server.viewer.motion import Motion, prepare
+from tests.server import walk
+from tests.server.clinic import Clinic, open_clinic
+from tests.server.serving import serve
+
+
+@pytest.fixture(scope="session")
+def anyio_backend() -> str:
+    return "asyncio"
+
+
+@pytest.fixture(scope="session")
+def motion() -> Motion:
+    return prepare(walk.poses())
+
+
+@dataclass
+class Ward:
+    """A clinic on a port with one visit that can be replayed and one that cannot."""
+
+    clinic: Clinic
+    port: int
+    session_id: str
+    empty_session_id: str
+
+    def cookie(self, role: str = "clinician") -> dict[str, str]:
+        """Header of a fresh sign-in."""
+        return {"Cookie": f"sid={self.clinic.token(role)}"}
+
+    def url(self, path: str) -> str:
+        """Websocket address of a path."""
+        return f"ws://127.0.0.1:{self.port}{path}"
+
+
+@asynccontextmanager
+async def open_ward(folder: Path) -> AsyncIterator[Ward]:
+    """Serve a clinic on a folder."""
+    async with open_clinic(folder) as clinic, serve(clinic.app) as port:
+        with clinic.db.write() as c:
+            patient_id = patients.create(c, None, code="V-1").id
+            session_id, empty_id = (sessions.create(c, None, patient_id).id for _ in range(2))
+        _finish_analysis(clinic, patient_id, session_id)
+        yield Ward(clinic, port, session_id, empty_id)
+
+
+@pytest.fixture(scope="module")
+async def ward(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Ward]:
+    async with open_ward(tmp_path_factory.mktemp("clinic")) as opened:
+        yield opened
+
+
+def _finish_analysis(clinic: Clinic, patient_id: str, session_id: str) -> None:
+    """Do what upload and worker do, with poses whose truth is known instead of a computed result."""
+    state = clinic.app.state
+    with recordings.receive(clinic.db, state.blobs, clinic.settings, None, session_id, "walk.txt") as upload:
+        upload.write(b"recording")
+        upload.keep()
+    with clinic.db.write() as c:
+        analyses.submit(c, state.queue, None, session_id)
+    claim = state.queue.claim("test", [recordings.ANALYSE])
+    stored = {"poses.parquet": state.blobs.put(patient_id, poses_parquet(walk.poses()))}
+    assert state.queue.finish(claim, lambda c: analyses.publish(c, claim, stored))

@@ -1,0 +1,124 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core import rotation
+from core.body.poses import Poses
+from core.errors import ParameterError
+from core.frames import FOOT, SIDES, Segment
+from server.viewer.figure import TINTS, linear
+from server.viewer.motion import Motion, prepare
+from tests.server import walk
+
+
+def subset(poses: Poses, *segments: Segment) -> Poses:
+    return Poses(
+        poses.t_s,
+        poses.rate_hz,
+        {s: poses.q[s] for s in segments},
+        {s: poses.p[s] for s in segments},
+        poses.valid,
+        {s: c for s, c in poses.contact.items() if s in segments},
+        poses.body,
+        poses.method,
+    )
+
+
+def transformed(motion: Motion, name: str, k: int, i: int, point: tuple[float, float, float]) -> np.ndarray:
+    """Where the viewer draws a mesh point of copy k at frame i."""
+    batch = motion.batches[name]
+    turned = rotation.rotate(batch.wxyz[i, k].astype(float), np.array(point) * batch.scale[k])
+    return np.asarray(turned + batch.position[i, k])
+
+
+def test_bones_reach_from_joint_to_joint(motion: Motion) -> None:
+    poses = walk.poses()
+    for i in (0, 133, 400):
+        frame = 2 * i  # thinned from 100 to 50 frames a second
+        assert motion.t_s[i] == poses.t_s[frame]
+        ends: dict[Segment, Segment] = {
+            "thigh_l": "shank_l",
+            "shank_l": "foot_l",
+            "thigh_r": "shank_r",
+            "shank_r": "foot_r",
+        }
+        for k, (start, end) in enumerate(ends.items()):
+            np.testing.assert_allclose(
+                transformed(motion, "bones", k, i, (0, 0, 0)),
+                poses.p[start][frame],
+                atol=1e-5,
+            )
+            np.testing.assert_allclose(
+                transformed(motion, "bones", k, i, (0, 0, 1)),
+                poses.p[end][frame],
+                atol=1e-5,
+            )
+
+
+def test_left_and_right_have_the_colours_of_the_charts(motion: Motion) -> None:
+    assert motion.batches["bones"].tint[:4] == ("left", "left", "right", "right")
+    assert motion.batches["shoes"].tint == ("left", "right")
+    assert TINTS["left"] == (0xD5, 0x5E, 0x00)
+    assert TINTS["right"] == (0x00, 0x72, 0xB2)
+
+
+def test_soles_stand_on_the_floor(motion: Motion) -> None:
+    vertices = motion.batches["shoes"].mesh[0]
+    lowest = [
+        min(transformed(motion, "shoes", k, i, tuple(v))[2] for k in (0, 1) for v in vertices[::7])
+        for i in range(0, 200, 40)
+    ]
+    assert max(abs(z) for z in lowest) < 0.02
+
+
+def test_the_figure_stays_in_view_while_its_sway_is_kept(motion: Motion) -> None:
+    poses = walk.poses()
+    middle = slice(50, -50)
+    offset = poses.p["pelvis"][::2, :2][middle] - motion.root[middle]
+    assert np.abs(offset[:, 0]).max() < 0.03
+    assert 0.01 < np.abs(offset[:, 1]).max() < 0.04
+
+
+def test_a_print_lies_under_each_contact(motion: Motion) -> None:
+    for side in SIDES:
+        start, place = motion.prints[side]
+        assert len(start) == len(place) >= 10
+        steps = np.diff(place[1:-1, 0])
+        np.testing.assert_allclose(steps, 1.2 * walk.STRIDE_S, atol=0.1)
+
+
+def test_lost_samples_are_marked_and_never_nan() -> None:
+    poses = walk.poses(lost=(3.0, 4.0))
+    poses.q["shank_l"][300:400] = np.nan
+    found = prepare(poses)
+    assert not found.valid[found.index(3.5)]
+    assert found.valid[found.index(2.9)]
+    assert all(np.isfinite(b.wxyz).all() and np.isfinite(b.position).all() for b in found.batches.values())
+    assert np.isfinite(found.root).all()
+
+
+def test_times_outside_are_held_at_the_ends(motion: Motion) -> None:
+    assert motion.index(-5.0) == 0
+    assert motion.index(1e9) == len(motion.t_s) - 1
+    assert motion.t_s[motion.index(3.009)] == pytest.approx(3.0)
+    assert motion.t_s[motion.index(3.011)] == pytest.approx(3.02)
+
+
+@pytest.mark.parametrize(
+    "segments", [("foot_l", "foot_r"), ("pelvis", "foot_l", "foot_r"), ("pelvis",), ("thigh_r", "shank_r")]
+)
+def test_any_subset_of_segments_makes_a_figure(segments: tuple[Segment, ...]) -> None:
+    found = prepare(subset(walk.poses(), *segments))
+    assert set(found.toes) == {side for side in SIDES if FOOT[side] in segments}
+    assert sum(len(b.tint) for b in found.batches.values()) >= 1
+
+
+def test_no_pose_at_all_says_so() -> None:
+    with pytest.raises(ParameterError) as refused:
+        prepare(subset(walk.poses()))
+    assert refused.value.code == "no_figure"
+
+
+def test_colour_of_an_instance_is_linear_light() -> None:
+    assert linear((0, 128, 255)) == (0, 55, 255)

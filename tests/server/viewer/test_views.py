@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import asyncio
+import threading
+from pathlib import Path
+
+import pytest
+
+from core.errors import EstimationError
+from server.viewer.motion import Motion
+from server.viewer.views import Views
+
+pytestmark = pytest.mark.anyio
+
+
+def open_files() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+async def test_same_tab_shares_and_other_sign_in_does_not(motion: Motion) -> None:
+    loads: list[int] = []
+
+    def load() -> Motion:
+        loads.append(1)
+        return motion
+
+    async with Views().running() as views:
+        mine = await views.open("login-1", "tab", "analysis", load)
+        assert await views.open("login-1", "tab", "analysis", load) is mine
+        theirs = await views.open("login-2", "tab", "analysis", load)
+        assert theirs.server is not mine.server
+        assert views.find(mine.id, "login-1") is mine
+        assert views.find(mine.id, "login-2") is None
+        assert views.find("unknown", "login-1") is None
+        assert loads == [1]
+
+
+async def test_a_view_listens_on_loopback_only(motion: Motion) -> None:
+    async with Views().running() as views:
+        view = await views.open("login", "tab", "analysis", lambda: motion)
+        assert view.server.get_host() == "127.0.0.1"
+        assert view.port > 0
+
+
+async def test_unwatched_views_stop_and_watched_ones_stay(motion: Motion) -> None:
+    async with Views(idle_s=0.0).running() as views:
+        view = await views.open("login", "tab", "analysis", lambda: motion)
+        with view.watched():
+            await views.sweep()
+            assert len(views) == 1
+        await views.sweep()
+        assert len(views) == 0
+
+
+async def test_at_the_limit_the_longest_unwatched_view_gives_way(motion: Motion) -> None:
+    async with Views(limit=2).running() as views:
+        first = await views.open("login", "1", "analysis", lambda: motion)
+        second = await views.open("login", "2", "analysis", lambda: motion)
+        third = await views.open("login", "3", "analysis", lambda: motion)
+        assert views.find(first.id, "login") is None
+        with second.watched(), third.watched(), pytest.raises(EstimationError) as refused:
+            await views.open("login", "4", "analysis", lambda: motion)
+        assert refused.value.code == "too_many_views"
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts open files in /proc")
+async def test_views_leave_no_threads_and_no_files_behind(motion: Motion) -> None:
+    async def one(views: Views) -> None:
+        await views.open("login", "tab", "analysis", lambda: motion)
+        await views.close()
+
+    async with Views().running() as views:
+        await one(views)
+        await asyncio.sleep(0.1)
+        threads, files = threading.active_count(), open_files()
+        for _ in range(15):
+            await one(views)
+        await asyncio.sleep(0.2)
+        assert threading.active_count() <= threads + 1
+        assert open_files() <= files + 2
+
+
+async def test_no_banner_is_printed(motion: Motion, capfd: pytest.CaptureFixture[str]) -> None:
+    async with Views().running() as views:
+        await views.open("login", "tab", "analysis", lambda: motion)
+    out, err = capfd.readouterr()
+    assert (out, err) == ("", "")
