@@ -1,9 +1,9 @@
 """Joint angles on neura_walk, from the sensor files alone, against frames of Vicon joint centres.
 
-Nothing from Vicon enters the estimate. Scoring as in spec/real-data.md §7: rows 1110 to 2080, one lag of −2 to
-+6 samples for all joints, standing is rows 300 to 1000. "offset removed" is the standard deviation of the
-error, "standing zeroed" has the standing means of both sides subtracted. Frontal and transverse planes rest on
-single markers in the reference and are reported without a limit, except that hip adduction must follow.
+Nothing from Vicon enters the estimate. Scoring as in spec/real-data.md §7: rows 1110 to 2080, one lag of −2
+to +6 samples for all joints, standing is rows 300 to 1000. "offset removed" is the standard deviation of the
+error, "standing zeroed" has the standing means of both sides subtracted. Frontal and transverse planes rest
+on single markers in the reference and are reported without a limit, except that hip adduction must follow.
 """
 
 from __future__ import annotations

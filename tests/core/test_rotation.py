@@ -1,0 +1,100 @@
+"""The algebra of rotations: group axioms, and that all representations say the same."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from core import rotation
+from core.frames import Floats
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def _unit(x: Floats) -> Floats:
+    n = np.linalg.norm(x)
+    return np.array([1.0, 0.0, 0.0, 0.0]) if n < 1e-3 else np.asarray(x / n)
+
+
+components = st.floats(-1.0, 1.0, allow_nan=False, width=64)
+quaternions = arrays(np.float64, 4, elements=components).map(_unit)
+vectors = arrays(np.float64, 3, elements=st.floats(-10.0, 10.0, allow_nan=False, width=64))
+
+
+def same_rotation(p: Floats, q: Floats, tolerance: float = 1e-9) -> bool:
+    return bool(min(np.abs(p - q).max(), np.abs(p + q).max()) < tolerance)
+
+
+@given(quaternions, quaternions, quaternions)
+def test_multiplication_is_associative(p: Floats, q: Floats, r: Floats) -> None:
+    left = rotation.multiply(rotation.multiply(p, q), r)
+    np.testing.assert_allclose(left, rotation.multiply(p, rotation.multiply(q, r)), atol=1e-12)
+
+
+@given(quaternions)
+def test_identity_and_inverse_exist(q: Floats) -> None:
+    np.testing.assert_allclose(rotation.multiply(q, IDENTITY), q, atol=1e-15)
+    np.testing.assert_allclose(rotation.multiply(q, rotation.conjugate(q)), IDENTITY, atol=1e-12)
+
+
+@given(quaternions, quaternions, vectors)
+def test_composition_rotates_right_factor_first(p: Floats, q: Floats, v: Floats) -> None:
+    together = rotation.rotate(rotation.multiply(p, q), v)
+    np.testing.assert_allclose(together, rotation.rotate(p, rotation.rotate(q, v)), atol=1e-11)
+
+
+@given(quaternions, vectors)
+def test_rotation_keeps_length_and_equals_its_matrix(q: Floats, v: Floats) -> None:
+    rotated = rotation.rotate(q, v)
+    assert abs(np.linalg.norm(rotated) - np.linalg.norm(v)) < 1e-11
+    np.testing.assert_allclose(rotated, rotation.to_matrix(q) @ v, atol=1e-11)
+
+
+@given(quaternions)
+def test_matrix_round_trip(q: Floats) -> None:
+    R = rotation.to_matrix(q)
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
+    assert abs(np.linalg.det(R) - 1.0) < 1e-12
+    assert same_rotation(rotation.from_matrix(R), q)
+
+
+@given(vectors.map(lambda v: v * (3.0 / 17.4)))
+def test_exp_and_log_are_inverse_within_half_a_turn(phi: Floats) -> None:
+    np.testing.assert_allclose(rotation.log(rotation.exp(phi)), phi, atol=1e-9)
+
+
+@given(st.floats(-12.0, -3.0))
+def test_exp_and_log_keep_small_angles(decade: float) -> None:
+    phi = 10.0**decade * np.array([0.6, -0.64, 0.48])
+    np.testing.assert_allclose(rotation.log(rotation.exp(phi)), phi, rtol=1e-9)
+
+
+@given(quaternions, quaternions)
+def test_slerp_runs_along_the_shorter_arc_at_even_speed(p: Floats, q: Floats) -> None:
+    half = rotation.slerp(p, q, 0.5)
+    whole = float(rotation.angle_between(p, q))
+    assert abs(float(rotation.angle_between(p, half)) - whole / 2) < 1e-7
+    assert same_rotation(rotation.slerp(p, q, 0.0), p)
+    assert same_rotation(rotation.slerp(p, q, 1.0), q, 1e-7)
+
+
+@given(quaternions, arrays(np.float64, (6, 3), elements=st.floats(-0.2, 0.2, width=64)), quaternions)
+def test_mean_moves_with_its_members(q: Floats, spread: Floats, shift: Floats) -> None:
+    members = rotation.multiply(q, rotation.exp(spread))
+    moved = rotation.mean(rotation.multiply(shift, members))
+    assert same_rotation(moved, rotation.multiply(shift, rotation.mean(members)), 1e-7)
+
+
+@given(st.floats(-3.0, 3.0), st.integers(0, 2))
+def test_about_turns_about_one_axis(angle: float, axis: int) -> None:
+    expected = np.zeros(3)
+    expected[axis] = angle
+    np.testing.assert_allclose(rotation.log(rotation.about(axis, angle)), expected, atol=1e-12)
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-1.2, 1.2))
+def test_yaw_reads_the_heading_of_x(heading: float, pitch: float) -> None:
+    q = rotation.multiply(rotation.about(2, heading), rotation.about(1, pitch))
+    assert abs(float(rotation.yaw(q)) - heading) < 1e-9
