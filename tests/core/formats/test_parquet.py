@@ -1,0 +1,104 @@
+"""Our own recording file: exact to float32, and safe against damage."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from core.errors import FormatError, Notice
+from core.formats import SourceFile, read_recording, write_recording
+from core.recording import ImuStream, Recording, Subject
+from tests.core.formats.making import mt_file, signals, stream
+
+
+def back(recording: Recording) -> Recording:
+    return read_recording([SourceFile.of_bytes("take.parquet", write_recording(recording))])
+
+
+def test_everything_that_was_known_comes_back() -> None:
+    acc, gyr = signals(50)
+    s = stream("a.b c", acc, gyr, mag=acc / 10, quat=np.tile([1.0, 0, 0, 0], (50, 1)))
+    recording = Recording(
+        {"a.b c": s, "two": stream("two", acc + 1, None)},
+        {"a.b c": "pelvis", "two": None},
+        Subject(1.7),
+        "treadmill",
+        {"pelvis": "sacrum, face backwards"},
+        {"x.txt": "abc"},
+        (Notice("n", "said 🦶", "two", 1.5, "info"),),
+    )
+    again = back(recording)
+    assert again.subject == recording.subject
+    assert again.protocol == "treadmill"
+    assert dict(again.segments) == dict(recording.segments)
+    assert dict(again.mounting) == dict(recording.mounting)
+    assert again.sha256["x.txt"] == "abc"
+    assert again.notices == recording.notices
+    assert again.streams["two"].gyr is None
+    assert write_recording(again) == write_recording(again)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    n=st.integers(1, 60),
+    m=st.integers(1, 60),
+    offset=st.integers(0, 80),
+    rate=st.sampled_from([60.0, 100.0, 204.8, 512.0]),
+    seed=st.integers(0, 2**31),
+    holes=st.booleans(),
+)
+def test_streams_of_any_length_and_rate_come_back_exact(
+    n: int, m: int, offset: int, rate: float, seed: int, holes: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+
+    def made(device: str, k: int, start: float, hz: float) -> ImuStream:
+        acc = rng.normal(0, 10, (k, 3)).astype(np.float32).astype(np.float64)
+        if holes:
+            acc[rng.random((k, 3)) < 0.2] = np.nan
+        return stream(device, acc, acc[:, ::-1].copy(), t_s=start + np.arange(k) / hz, rate_hz=hz)
+
+    streams = {"a": made("a", n, 0.0, rate), "b": made("b", m, offset / 100, 100.0)}
+    again = back(Recording(streams, {}))
+    for device, s in streams.items():
+        got = again.streams[device]
+        np.testing.assert_array_equal(got.acc, s.acc)
+        np.testing.assert_array_equal(got.gyr, s.gyr)
+        np.testing.assert_allclose(got.t_s, s.t_s, atol=5.1e-7)
+        assert (got.digest, got.rate_hz, got.clock) == (s.digest, s.rate_hz, s.clock)
+
+
+def test_the_columns_are_stored_as_the_specification_says() -> None:
+    data = write_recording(read_recording([mt_file(), mt_file("00B40C44", seed=1)]))
+    file = pq.ParquetFile(pa.BufferReader(data))
+    assert file.schema_arrow.field("t_us").type == pa.int64()
+    assert file.schema_arrow.field("00B40B91.gyr_z").type == pa.float32()
+    column = file.metadata.row_group(0).column(1)
+    assert column.compression == "ZSTD"
+    assert "BYTE_STREAM_SPLIT" in column.encodings
+    assert "PLAIN_DICTIONARY" not in column.encodings
+    assert "RLE_DICTIONARY" not in column.encodings
+
+
+def test_a_foreign_and_a_damaged_file_are_refused() -> None:
+    out = pa.BufferOutputStream()
+    pq.write_table(pa.table({"x": [1.0, 2.0]}), out)
+    with pytest.raises(FormatError) as e:
+        read_recording([SourceFile.of_bytes("x.parquet", out.getvalue().to_pybytes())])
+    assert e.value.code == "foreign_parquet"
+    data = write_recording(read_recording([mt_file()]))
+    for cut in range(5, len(data), max(1, len(data) // 40)):
+        with pytest.raises(FormatError) as e:
+            read_recording([SourceFile.of_bytes("x.parquet", data[:cut])])
+        assert e.value.code == "bad_parquet"
+
+
+def test_a_stored_take_is_uploaded_alone() -> None:
+    stored = SourceFile.of_bytes("x.parquet", write_recording(read_recording([mt_file()])))
+    with pytest.raises(FormatError) as e:
+        read_recording([stored, mt_file("00B40C44")])
+    assert e.value.code == "several_recordings"

@@ -1,0 +1,115 @@
+"""The one door: what belongs to an upload, what is ignored, what is asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core.errors import ArchiveError, FormatError, ManifestError
+from core.formats import SourceFile, manifest_of, read_recording, write_recording
+from tests.core.formats.making import mt_file, source, zipped
+
+MAPPING = """<?xml version="1.0"?><OpenSimDocument><XsensDataReaderSettings><ExperimentalSensors>
+<ExperimentalSensor name="_00B40B91"><name_in_model>pelvis_imu</name_in_model></ExperimentalSensor>
+<ExperimentalSensor name="_00B40C44"><name_in_model>hand_r_imu</name_in_model></ExperimentalSensor>
+</ExperimentalSensors></XsensDataReaderSettings></OpenSimDocument>"""
+
+
+def test_a_manifest_among_the_files_is_used() -> None:
+    text = '{"subject": {"height_m": 1.75}, "sensors": {"00b40b91": "pelvis", "00B40C44": null}}'
+    recording = read_recording([mt_file(), mt_file("00B40C44", seed=1), source("in/manifest.json", text)])
+    assert dict(recording.segments) == {"00B40B91": "pelvis", "00B40C44": None}
+    assert recording.subject.height_m == 1.75
+    assert recording.unassigned == ()
+    assert len(recording.sha256) == 3
+
+
+def test_a_given_manifest_wins_and_the_other_is_said() -> None:
+    inside = source("manifest.json", '{"sensors": {"00B40B91": "foot_l"}}')
+    recording = read_recording([mt_file(), inside], manifest_of({"sensors": {"00B40B91": "pelvis"}}))
+    assert dict(recording.segments) == {"00B40B91": "pelvis"}
+    assert [(n.code, n.severity) for n in recording.notices] == [("ignored_file", "info")]
+
+
+def test_two_manifests_or_a_broken_one_are_refused() -> None:
+    one = source("manifest.json", '{"sensors": {}}')
+    with pytest.raises(ManifestError) as e:
+        read_recording([mt_file(), one, source("b/manifest.json", '{"sensors": {}}')])
+    assert e.value.code == "manifest_twice"
+    with pytest.raises(ManifestError) as e:
+        read_recording([mt_file(), source("manifest.json", "{")])
+    assert e.value.code == "manifest_bad_json"
+
+
+def test_an_opensense_mapping_maps_and_unknown_bodies_are_set_aside() -> None:
+    recording = read_recording([mt_file(), mt_file("00B40C44", seed=1), source("map.xml", MAPPING)])
+    assert dict(recording.segments) == {"00B40B91": "pelvis", "00B40C44": None}
+
+
+def test_an_xml_bomb_is_not_expanded() -> None:
+    bomb = '<?xml version="1.0"?><!DOCTYPE z [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]>' + MAPPING[21:]
+    recording = read_recording([mt_file(), source("map.xml", bomb.replace("pelvis_imu", "&b;"))])
+    assert [n.code for n in recording.notices] == ["file_not_read"]
+    assert dict(recording.segments) == {}
+
+
+def test_readme_and_system_files_are_ignored_and_said() -> None:
+    junk = [
+        source("readme.txt", "my walk"),
+        source(".DS_Store", b"\0\0\0\1Bud1\0"),
+        source("p.png", b"\x89PNG\0"),
+    ]
+    recording = read_recording([mt_file(), *junk])
+    assert list(recording.streams) == ["00B40B91"]
+    assert {(n.code, n.severity) for n in recording.notices} == {("ignored_file", "info")}
+    assert len(recording.notices) == 3
+
+
+def test_a_sensor_file_that_cannot_be_read_does_not_stop_the_others() -> None:
+    recording = read_recording([mt_file(), source("take_00B40C44.txt", "")])
+    assert [(n.code, n.severity) for n in recording.notices] == [("file_not_read", "warning")]
+    assert "take_00B40C44.txt is empty" in recording.notices[0].message
+
+
+def test_a_declared_sensor_without_a_file_is_said() -> None:
+    recording = read_recording(
+        [mt_file()], manifest_of({"sensors": {"00B40B91": "pelvis", "00B40C55": "foot_l"}})
+    )
+    assert [n.code for n in recording.notices] == ["sensor_missing"]
+    assert "foot_l" in recording.notices[0].message
+
+
+def test_nothing_readable_names_what_was_tried() -> None:
+    with pytest.raises(FormatError) as e:
+        read_recording([source("a.txt", "hello"), source("b.bin", b"\0\1\2")])
+    assert e.value.code == "unknown_format"
+    assert "MT Manager" in e.value.message
+    assert "a.txt" in e.value.message
+
+
+def test_no_files_and_an_empty_zip_are_refused() -> None:
+    for files in ([], [SourceFile.of_bytes("a.zip", zipped({}))]):
+        with pytest.raises(FormatError) as e:
+            read_recording(files)
+        assert e.value.code == "empty"
+
+
+def test_a_bad_archive_stops_the_upload() -> None:
+    with pytest.raises(ArchiveError):
+        read_recording([mt_file(), SourceFile.of_bytes("a.zip", zipped({"../x.txt": b""}))])
+
+
+def test_names_with_emoji_just_work() -> None:
+    file = SourceFile.of_bytes("Gehen 🚶‍♀️/Übung_00B40B91.txt", mt_file().read())
+    recording = read_recording([file])
+    assert recording.streams["00B40B91"].source == "Gehen 🚶‍♀️/Übung_00B40B91.txt"
+    again = read_recording([SourceFile.of_bytes("🦶.parquet", write_recording(recording))])
+    assert again.streams["00B40B91"].source == "Gehen 🚶‍♀️/Übung_00B40B91.txt"
+
+
+def test_the_order_of_the_files_does_not_change_the_signals() -> None:
+    files = [mt_file("00B40B91"), mt_file("00B40C44", seed=1, start=40)]
+    a, b = read_recording(files), read_recording(files[::-1])
+    for device in a.streams:
+        np.testing.assert_array_equal(a.streams[device].t_s, b.streams[device].t_s)
+        assert a.streams[device].digest == b.streams[device].digest

@@ -1,0 +1,193 @@
+"""Every real vendor file we have either gives the recording it holds or a sentence that says why not."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from core import rotation
+from core.errors import FormatError, InputError
+from core.formats import SourceFile, parse_manifest, read_recording, write_recording
+from core.recording import Recording
+from tests.data import data_folder
+
+MT = "opensense_xsens_apdm/xsens_formats/"
+WALK = "opensense_xsens_apdm/walk_8imu_noGyr/MT_012005D6_009-001_"
+# file, device, samples, signals besides acc, notices
+READABLE = [
+    (MT + "MT2022_ACC_00B42D4B.txt", "00B42D4B", 5, "", {"missing_gyro", "rate_unknown"}),
+    (MT + "MT2022_ACC_GYRO_ROT_ALL_TAB_NAN_00B42D4B.txt", "00B42D4B", 5, "gq", {"rate_unknown"}),
+    (MT + "MT2022_ACC_GYRO_ROT_EULER_TAB_00B42D4F.txt", "00B42D4F", 5, "gq", {"rate_unknown"}),
+    (MT + "MT2022_ACC_GYRO_ROT_MAT_COMMA_00B42D4B.txt", "00B42D4B", 5, "gq", {"rate_unknown"}),
+    (MT + "MT2022_ACC_GYRO_ROT_MAT_SEMICOLON_00B42D4B.txt", "00B42D4B", 5, "gq", {"rate_unknown"}),
+    (MT + "MT2022_ACC_GYRO_ROT_MAT_SPACE_00B42D4B.txt", "00B42D4B", 5, "gq", {"rate_unknown"}),
+    (MT + "MT46_01-000_00B42D4D.txt", "00B42D4D", 5, "gq", set()),
+    (MT + "MT46_01-000_00B42D4E.txt", "00B42D4E", 5, "gq", set()),
+    (MT + "MT_01200312-002-000_00B474BA.txt", "00B474BA", 5, "q", {"missing_gyro", "rate_unknown"}),
+    (MT + "MT_01200454_000-000_00B40DE4.txt", "00B40DE4", 4, "gmq", {"rate_unknown"}),
+    (MT + "MT_012005D6_031-000_00B421AF.txt", "00B421AF", 3369, "gmq", set()),
+    (MT + "MT_012005D6_031-000_00B4227B.txt", "00B4227B", 3369, "gmq", set()),
+    (MT + "test1_00B421E6.txt", "00B421E6", 3, "gq", set()),
+    ("formats/xsens_full/MT_012005D6_031-000_00B421AF.txt.gz", "00B421AF", 3369, "gmq", set()),
+    ("formats/xsens_mt_manager/MT_012005D6_031-000_00B421AF_first200.txt", "00B421AF", 200, "gmq", set()),
+    ("mtw_csv_sample/mtwawinda/example_calibration_xsens/example_calibration_xsens_00b45c23.csv", "00B45C23", 1253, "gmq", set()),  # noqa: E501
+    ("neura_walk/rawimu/S02-Trial-Walk-1-000_00B40B91.txt", "00B40B91", 2503, "gmq", set()),
+    (WALK + "00B421E6.txt", "00B421E6", 2432, "q", {"missing_gyro"}),
+]  # fmt: skip
+REFUSED = [
+    (MT + "MT_012005D6-000_sit_to_stand-000_00B421ED.txt", "missing_acc"),
+    ("formats/mvnx/SYNTHETIC_lowerbody.mvnx", "unsupported_format"),
+    ("formats/axivity/ax3_sample.cwa", "unsupported_format"),
+    ("formats/apdm/apdm_format7.csv", "unsupported_format"),
+    ("formats/apdm/SYNTHETIC_v5.h5", "unsupported_format"),
+    ("formats/opensense/imuOrientations.sto", "unsupported_format"),
+    (
+        "xsens_dot_samples/Original_XsensDot_Data_Realtime/RTibia_20210820_202113_825.csv",
+        "unsupported_format",
+    ),
+    ("mobgap_lowback/data/lab/HA/001/data.mat", "unsupported_format"),
+    ("formats/mobilised/HA001_TimeMeasure1_Test5_Trial1.csv", "manifest_needed"),
+    ("gaitmap_foot/imu_sample.csv", "manifest_needed"),
+    ("formats/phone/SYNTHETIC_devicemotion.json", "unknown_format"),
+    ("gaitmap_foot/LICENSE_upstream.txt", "unknown_format"),
+]
+
+
+def read(path: str) -> Recording:
+    return read_recording([SourceFile.of_path(data_folder(*path.split("/")))])
+
+
+@pytest.mark.parametrize(
+    ("path", "device", "n", "more", "codes"), READABLE, ids=[r[0][-40:] for r in READABLE]
+)
+def test_a_vendor_file_gives_the_signals_it_holds(
+    path: str, device: str, n: int, more: str, codes: set[str]
+) -> None:
+    recording = read(path)
+    assert list(recording.streams) == [device]
+    stream = recording.streams[device]
+    assert len(stream.t_s) == n
+    assert (stream.gyr is not None, stream.mag is not None, stream.quat is not None) == tuple(
+        c in more for c in "gmq"
+    )
+    assert {x.code for x in stream.notices} == codes
+    assert 9.5 < np.nanmedian(np.linalg.norm(stream.acc, axis=1)) < 10.5
+
+
+@pytest.mark.parametrize(
+    ("path", "device", "n", "more", "codes"), READABLE, ids=[r[0][-40:] for r in READABLE]
+)
+def test_our_own_file_gives_back_what_was_read(
+    path: str, device: str, n: int, more: str, codes: set[str]
+) -> None:
+    first = read(path).streams[device]
+    again = read_recording([SourceFile.of_bytes("x", write_recording(read(path)))]).streams[device]
+    assert again.digest == first.digest
+    assert again.notices == first.notices
+    assert again.rate_hz == first.rate_hz
+    np.testing.assert_array_equal(again.acc.astype(np.float32), first.acc.astype(np.float32))
+    np.testing.assert_allclose(again.t_s, first.t_s, atol=5e-7)
+
+
+@pytest.mark.parametrize(("path", "code"), REFUSED, ids=[r[0][-40:] for r in REFUSED])
+def test_what_cannot_be_read_is_refused_with_its_name(path: str, code: str) -> None:
+    with pytest.raises(FormatError) as e:
+        read(path)
+    assert e.value.code == code
+    assert path.rsplit("/", 1)[-1] in e.value.message
+
+
+def test_no_sample_file_crashes_the_reader() -> None:
+    """Alone and without a manifest every file is either read or refused by one of our errors."""
+    files = [p for p in data_folder().rglob("*") if p.is_file() and p.stat().st_size < 1_500_000]
+    assert len(files) > 50
+    read_ones = 0
+    refusals: dict[str, InputError] = {}
+    for path in files:
+        try:
+            read_recording([SourceFile.of_path(path)])
+            read_ones += 1
+        except InputError as refusal:
+            refusals[path.name] = refusal
+    assert all(r.code and len(r.message) > 20 for r in refusals.values())
+    assert read_ones >= 30
+
+
+def test_separators_and_orientation_forms_of_one_recording_agree() -> None:
+    """The 2022 export exists with four separators and as quaternion + Euler + matrix: same numbers in all."""
+    everything = read(MT + "MT2022_ACC_GYRO_ROT_ALL_TAB_NAN_00B42D4B.txt").streams["00B42D4B"]
+    assert everything.gyr is not None
+    assert everything.quat is not None
+    for name in ("COMMA", "SEMICOLON", "SPACE"):
+        other = read(MT + f"MT2022_ACC_GYRO_ROT_MAT_{name}_00B42D4B.txt").streams["00B42D4B"]
+        assert other.quat is not None
+        np.testing.assert_array_equal(other.gyr, everything.gyr)
+        assert np.max(rotation.angle_between(other.quat, everything.quat)) < 1e-5
+        np.testing.assert_allclose(rotation.rotate(other.quat, other.acc)[:, :2], 0.0, atol=0.2)
+
+
+def test_vendor_euler_angles_turn_gravity_up() -> None:
+    stream = read(MT + "MT2022_ACC_GYRO_ROT_EULER_TAB_00B42D4F.txt").streams["00B42D4F"]
+    assert stream.quat is not None
+    up = rotation.rotate(stream.quat, stream.acc).mean(axis=0)
+    assert np.hypot(up[0], up[1]) < 0.15
+    assert up[2] > 9.7
+
+
+def test_an_opensense_folder_brings_its_own_mapping() -> None:
+    folder = data_folder("opensense_xsens_apdm", "walk_8imu_noGyr")
+    recording = read_recording([SourceFile.of_path(p) for p in sorted(folder.iterdir())])
+    assert recording.segments["00B42279"] == "pelvis"
+    assert sorted(s for s in recording.segments.values() if s) == [
+        "chest", "foot_l", "foot_r", "pelvis", "shank_l", "shank_r", "thigh_l", "thigh_r",
+    ]  # fmt: skip
+    assert {len(s.t_s) for s in recording.streams.values()} >= {2432, 2505}
+    assert {float(s.t_s[0]) for s in recording.streams.values()} == {0.0}
+
+
+def test_the_neura_upload_shows_eleven_files_nine_sensors() -> None:
+    folder = data_folder("neura_walk", "rawimu")
+    recording = read_recording([SourceFile.of_path(p) for p in sorted(folder.iterdir())])
+    assert len(recording.streams) == 11
+    assert len({s.digest for s in recording.streams.values()}) == 9
+    assert len(recording.sha256) == 11
+
+
+def gaitmap(name: str) -> Recording:
+    columns = {
+        f"foot_{side[0]}": {
+            "acc": [f"{side}_sensor/acc_{a}" for a in "xyz"],
+            "gyr": [f"{side}_sensor/gyr_{a}" for a in "xyz"],
+            "mag": None,
+        }
+        for side in ("left", "right")
+    }
+    spec = {
+        "file": name, "header_rows": 2, "index_column": True, "rate_hz": 204.8, "acc_unit": "m/s2",
+        "gyr_unit": "deg/s", "gravity_included": True, "columns": columns, "quat_order": None, "frame": None,
+    }  # fmt: skip
+    manifest = parse_manifest(json.dumps({"sources": [spec]}).encode())
+    return read_recording([SourceFile.of_path(data_folder("gaitmap_foot", name))], manifest)
+
+
+def test_the_manifest_of_the_issue_reads_gaitmap() -> None:
+    recording = gaitmap("imu_sample.csv")
+    assert dict(recording.segments) == {"foot_l": "foot_l", "foot_r": "foot_r"}
+    left = recording.streams["foot_l"]
+    assert left.gyr is not None
+    assert len(left.t_s) == 7928
+    np.testing.assert_allclose(left.t_s[-1], 7927 / 204.8)
+    np.testing.assert_allclose(left.acc[0], [0.8808107066241624, 2.7622080650315652, 9.408650477990726])
+    np.testing.assert_allclose(np.degrees(left.gyr[0, 0]), -0.11240170597252427)
+
+
+def test_both_gaitmap_copies_hold_the_same_norms() -> None:
+    a, b = gaitmap("imu_sample.csv"), gaitmap("imu_sample_not_rotated.csv")
+    for foot in ("foot_l", "foot_r"):
+        np.testing.assert_allclose(
+            np.linalg.norm(a.streams[foot].acc, axis=1),
+            np.linalg.norm(b.streams[foot].acc, axis=1),
+            atol=1e-6,
+        )

@@ -1,0 +1,134 @@
+"""Tables through a manifest: headers, units, time, and mistakes in the description."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core.errors import FormatError, ManifestError
+from core.formats import manifest_of, read_recording
+from core.recording import Recording
+from tests.core.formats.making import signals, source
+
+ACC, GYR = signals(300)
+CHANNELS = {"acc": ["ax", "ay", "az"], "gyr": ["gx", "gy", "gz"]}
+SPEC = {
+    "file": "t.csv",
+    "rate_hz": 100,
+    "acc_unit": "m/s2",
+    "gyr_unit": "rad/s",
+    "columns": {"shank_l": CHANNELS},
+}
+
+
+def table(separator: str = ",", header: str = "ax,ay,az,gx,gy,gz", extra: str = "") -> str:
+    rows = [separator.join(f"{v:.9g}" for v in row) + extra for row in np.hstack([ACC, GYR])]
+    return "\n".join([header.replace(",", separator), *rows]) + "\n"
+
+
+def read(text: str | bytes, **spec: object) -> Recording:
+    return read_recording([source("t.csv", text)], manifest_of({"sources": [SPEC | spec]}))
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", "|", " "])
+def test_the_separator_is_found(separator: str) -> None:
+    stream = read(table(separator)).streams["shank_l"]
+    np.testing.assert_allclose(stream.acc, ACC, rtol=1e-8)
+    assert (stream.clock, stream.rate_hz) == ("index", 100.0)
+
+
+def test_lines_before_the_header_and_its_absence_are_described() -> None:
+    lines = ["comment", "more, of, it", *table().split("\n")]
+    np.testing.assert_allclose(read("\n".join(lines), skip_rows=2).streams["shank_l"].acc, ACC, rtol=1e-8)
+    numbered = {"shank_l": {"acc": ["1", "2", "3"], "gyr": ["4", "5", "6"]}}
+    bare = table().split("\n", 1)[1]
+    np.testing.assert_allclose(
+        read(bare, header_rows=0, columns=numbered).streams["shank_l"].acc, ACC, rtol=1e-8
+    )
+
+
+def test_units_are_converted() -> None:
+    stream = read(table(), acc_unit="g", gyr_unit="deg/s").streams["shank_l"]
+    assert stream.gyr is not None
+    np.testing.assert_allclose(stream.acc, ACC * 9.80665, rtol=1e-8)
+    np.testing.assert_allclose(stream.gyr, np.radians(GYR), rtol=1e-8)
+
+
+def test_a_time_column_makes_the_clock() -> None:
+    t = 1.7e12 + np.arange(300) * 10.0
+    rows = [f"{a:.1f}," + row for a, row in zip(t, table().split("\n")[1:], strict=False)]
+    text = "time,ax,ay,az,gx,gy,gz\n" + "\n".join(rows)
+    stream = read(text, time_column="time", time_unit="ms", rate_hz=None).streams["shank_l"]
+    assert stream.clock == "device"
+    assert stream.rate_hz == pytest.approx(100.0)
+    np.testing.assert_allclose(stream.t_s, np.arange(300) / 100, atol=1e-6)
+
+
+def test_quaternions_come_scalar_first_whatever_the_file_has() -> None:
+    rows = [row + ",0.1,0.2,0.3,0.9" for row in table().split("\n")[1:-1]]
+    text = "ax,ay,az,gx,gy,gz,qx,qy,qz,qw\n" + "\n".join(rows)
+    columns = {"shank_l": CHANNELS | {"quat": ["qx", "qy", "qz", "qw"]}}
+    stream = read(text, columns=columns, quat_order="xyzw").streams["shank_l"]
+    assert stream.quat is not None
+    np.testing.assert_allclose(stream.quat[0], [0.9, 0.1, 0.2, 0.3])
+
+
+def test_removed_gravity_is_an_error_notice() -> None:
+    notices = read(table(), gravity_included=False).streams["shank_l"].notices
+    assert [(n.code, n.severity) for n in notices] == [("gravity_removed", "error")]
+
+
+def test_columns_named_by_segment_map_themselves_others_wait() -> None:
+    assert dict(read(table()).segments) == {"shank_l": "shank_l"}
+    assert dict(read(table(), columns={"box 7": CHANNELS}).segments) == {}
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "word"),
+    [
+        ({"acc_unit": None}, "unit_missing", "acc_unit"),
+        ({"gyr_unit": None}, "unit_missing", "gyr_unit"),
+        ({"rate_hz": None}, "rate_missing", "rate_hz"),
+        ({"columns": {"s": CHANNELS | {"acc": ["ax", "ay", "acz"]}}}, "unknown_column", "did you mean 'az'"),
+        ({"columns": {"s": CHANNELS | {"mag": ["a", "b", "mmmm"]}}}, "unknown_column", "columns.s.mag"),
+        ({"time_column": "when"}, "unknown_column", "time_column"),
+        (
+            {"columns": {"s": CHANNELS | {"quat": ["ax", "ay", "az", "gx"]}}},
+            "manifest_bad_value",
+            "quat_order",
+        ),
+    ],
+)
+def test_a_description_that_does_not_fit_is_refused(change: dict[str, object], code: str, word: str) -> None:
+    with pytest.raises(ManifestError) as e:
+        read(table(), **change)
+    assert e.value.code == code
+    assert word in e.value.message
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("ax,ay,az,gx,gy,gz\n", "empty"),
+        ("ax,ay,az,gx,gy,gz\n" + ",,,,,\n" * 20, "missing_acc"),
+    ],
+)
+def test_a_table_without_numbers_is_refused(text: str, code: str) -> None:
+    with pytest.raises(FormatError) as e:
+        read(text)
+    assert e.value.code == code
+
+
+def test_a_short_last_line_is_left_out_and_said() -> None:
+    stream = read(table()[:-25]).streams["shank_l"]
+    assert len(stream.t_s) == 299
+    assert [n.code for n in stream.notices] == ["truncated_line"]
+
+
+def test_words_in_the_table_count_as_missing() -> None:
+    lines = table().split("\n")
+    lines[5] = "ERR" + lines[5][lines[5].index(",") :]
+    lines[6] = "inf" + lines[6][lines[6].index(",") :]
+    stream = read("\n".join(lines)).streams["shank_l"]
+    assert np.isnan(stream.acc).sum() == 2
+    assert [n.code for n in stream.notices] == ["bad_cells"]
