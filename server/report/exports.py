@@ -26,9 +26,10 @@ from core.angles import JointAngles
 from core.body.poses import Poses
 from core.calibration.result import Calibration
 from core.events.result import GaitEvents, Strides
-from core.frames import Floats
+from core.frames import Floats, Side
+from core.fusion.orientations import Orientations
+from core.parameters import cycle_curves, foot_pitch, per_stride, per_stride_figures, stride_figures
 from core.parameters.result import Parameter
-from core.parameters.temporal import NAMES, per_stride
 
 if TYPE_CHECKING:
     from core.pipeline import Analysis
@@ -46,7 +47,7 @@ def analysis_files(analysis: Analysis) -> dict[str, bytes]:
     if analysis.events is not None:
         files["events.csv"] = events_csv(analysis.events)
     if analysis.strides is not None:
-        files["strides.csv"] = strides_csv(analysis.strides)
+        files["strides.csv"] = strides_csv(analysis.strides, analysis.angles, analysis.orientations)
     if analysis.angles is not None:
         files["angles.parquet"] = angles_parquet(analysis.angles)
     if analysis.poses is not None:
@@ -108,9 +109,16 @@ def events_csv(events: GaitEvents) -> bytes:
     )
 
 
-def strides_csv(strides: Strides) -> bytes:
+def strides_csv(
+    strides: Strides, angles: JointAngles | None = None, orientations: Orientations | None = None
+) -> bytes:
     """Every stride, used or not, with its own parameters (spec/field.md §4b)."""
-    values = per_stride(strides)
+    figures: dict[str, Mapping[Side, Floats]] = {}
+    if angles is not None:
+        figures |= stride_figures(cycle_curves(angles, strides))
+    if orientations is not None:
+        figures |= foot_pitch(orientations, strides)
+    values = per_stride(strides) | per_stride_figures(strides, figures)
     rows = (
         (
             s.side,
@@ -120,12 +128,12 @@ def strides_csv(strides: Strides) -> bytes:
             s.opposite_tc_s,
             s.opposite_ic_s,
             None if s.turn_rad is None else math.degrees(s.turn_rad),
-            *(values[name][i] for name in NAMES),
+            *(column[i] for column in values.values()),
             s.excluded_reason,
         )
         for i, s in enumerate(strides.strides)
     )
-    return write_csv((*STRIDE_COLUMNS, *NAMES, "excluded_reason"), rows)
+    return write_csv((*STRIDE_COLUMNS, *values, "excluded_reason"), rows)
 
 
 def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:

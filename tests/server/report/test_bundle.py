@@ -128,6 +128,7 @@ def test_strides_csv_carries_the_parameters_of_each_stride(files: Mapping[str, b
     assert columns[:4] == ["side", "start_s", "tc_s", "end_s"]
     assert columns[-1] == "excluded_reason"
     assert set(NAMES) <= set(columns)
+    assert "knee_flexion_rom_deg" in columns
     assert "nan" not in first.lower()
 
 
