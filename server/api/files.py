@@ -34,7 +34,7 @@ _FORM = {
         "multipart/form-data": {
             "schema": {
                 "type": "object",
-                "properties": {"files": {"type": "array", "items": BINARY}},
+                "properties": {"files": {"type": "array", "items": BINARY, "minItems": 1}},
                 "required": ["files"],
             }
         }

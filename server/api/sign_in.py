@@ -137,8 +137,8 @@ def change_password(
     who: Annotated[Identity, require(Action.USE_ACCOUNT)],
 ) -> None:
     """Change one's own password; all other sign-ins of this person end."""
-    # 422, not 401: the person is signed in and must not be sent to the sign-in page
-    accounts.check_password(db, failures, who.name, body.current, address_of(request), status=422)
+    # 403, not 401: the person is signed in and must not be sent to the sign-in page
+    accounts.check_password(db, failures, who.name, body.current, address_of(request), status=403)
     hashed = hash_password(body.password)
     with db.write() as c:
         accounts.change(c, who.user_id, {"password_hash": hashed})

@@ -232,7 +232,7 @@ async def test_changing_the_password_needs_the_present_one_and_ends_other_sign_i
     async with clinic.client(headers={"Cookie": f"sid={mine}"}) as client:
         path = "/api/v1/account/password"
         wrong = await client.post(path, json={"current": "not my password", "password": "another good one"})
-        assert (wrong.status_code, wrong.json()["code"]) == (422, "wrong_password")
+        assert (wrong.status_code, wrong.json()["code"]) == (403, "wrong_password")
         right = await client.post(path, json={"current": PASSWORD, "password": "another good one"})
         assert right.status_code == 204
         assert (await client.get("/api/v1/account")).status_code == 200
