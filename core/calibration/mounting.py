@@ -20,7 +20,7 @@ WAYS = {"forward": 0.0, "front": 0.0, "left": 90.0, "back": 180.0, "rear": 180.0
 """Horizontal way → angle in degrees from anterior, counter-clockwise seen from above."""
 
 _PHRASE = re.compile(
-    r"\b(?:(?P<sign>[+-])?(?P<axis>[xyz])(?:[- ]axis)?|face|facing|faces)\s+(?:to\s+the\s+)?"
+    r"(?<![\w+-])(?:(?P<sign>[+-])?(?P<axis>[xyz])(?:[- ]axis)?|face|facing|faces)\s+(?:to\s+the\s+)?"
     r"(?P<way>forward|front|left|back|rear|right)(?:s|wards?)?\b",
     re.IGNORECASE,
 )

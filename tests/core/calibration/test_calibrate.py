@@ -1,0 +1,197 @@
+"""The calibration stage on simulated walks: truth, invariances, subsets, and every failure by its code."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.calibration import CalibrationParams, calibrate
+from core.calibration.anterior import Method
+from core.calibration.result import Calibration
+from core.errors import CalibrationError, SignalError
+from core.frames import SEGMENTS, Floats, Segment
+from core.recording import UniformRecording
+from core.rotation import exp, from_matrix, log, normalise, rotate, to_matrix
+from core.simulate import Pivot, Stand, Straight, Truth
+from tests.walks import cut, only, scripted, simulated, turned
+
+LEGS: tuple[Segment, ...] = ("thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r")
+
+
+def axial_error_deg(calibration: Calibration, truth: Truth, segment: Segment) -> float:
+    """Error of the anterior axis about the segment's long axis."""
+    R = to_matrix(truth.mounts[segment].q_segment_sensor)
+    E = calibration.segments[segment].R_segment_sensor @ R.T
+    return float(np.degrees(log(from_matrix(E))[1]))
+
+
+def codes(calibration: Calibration) -> set[str]:
+    return {n.code for n in calibration.notices}
+
+
+@pytest.mark.parametrize("name", ["comfortable", "slow", "fast_with_turns", "five_minutes"])
+def test_forward_is_found_on_every_segment(name: str) -> None:
+    """Against the truth's axes, which at standing are turned out: feet by 10°, legs by a little."""
+    recording, truth = simulated(name)
+    found = calibrate(recording).calibration
+    assert abs(axial_error_deg(found, truth, "pelvis")) <= 6.0
+    for segment in LEGS:
+        out = {"foot": 10.0, "shank": 5.0, "thigh": 4.0}[segment.split("_")[0]]
+        outward = axial_error_deg(found, truth, segment) * (1 if segment.endswith("_l") else -1)
+        assert abs(outward - out) <= 8.0, f"{segment}: {outward:.1f}"
+        assert found.segments[segment].score > 0.8
+
+
+def test_gyro_bias_is_the_drawn_one() -> None:
+    recording, truth = simulated("comfortable")
+    for segment, mounted in calibrate(recording).calibration.segments.items():
+        off = np.degrees(np.linalg.norm(mounted.gyro_bias - truth.errors[segment].gyr_bias))
+        assert off < 0.1, segment
+
+
+@pytest.mark.parametrize("method", ["walking_direction", "gyro_pca"])
+def test_any_mounting_gives_the_same_segment_frames(method: Method) -> None:
+    """The same signals in turned sensors: R_segment_sensor takes the turn up (spec/fusion.md §10.1–2)."""
+    recording, _ = simulated("comfortable")
+    rng = np.random.default_rng(7)
+    by: dict[Segment, Floats] = {s: normalise(rng.standard_normal(4)) for s in recording.sensors}
+    params = replace(CalibrationParams(), method=method)
+    one, other = calibrate(recording, params), calibrate(turned(recording, by), params)
+    for s in recording.sensors:
+        R = other.calibration.segments[s].R_segment_sensor @ to_matrix(by[s])
+        off = log(from_matrix(R @ one.calibration.segments[s].R_segment_sensor.T))
+        assert np.degrees(np.linalg.norm(off)) < 0.1, s
+
+
+def test_half_a_turn_about_the_vertical_is_recognised() -> None:
+    recording, _ = simulated("comfortable")
+    up = recording.sensors["shank_l"].acc[100:400].mean(axis=0)
+    by: dict[Segment, Floats] = {"shank_l": exp(np.pi * up / np.linalg.norm(up))}
+    one = calibrate(recording).calibration.segments["shank_l"].R_segment_sensor
+    other = calibrate(turned(recording, by)).calibration.segments["shank_l"].R_segment_sensor
+    np.testing.assert_allclose(other @ to_matrix(by["shank_l"]), one, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "segments",
+    [("foot_l", "foot_r"), ("foot_l",), ("pelvis",), ("pelvis", "foot_l", "foot_r"), ("thigh_r", "shank_r")],
+)
+def test_any_subset_of_segments_works(segments: tuple[Segment, ...]) -> None:
+    recording, truth = simulated("comfortable")
+    found = calibrate(only(recording, *segments)).calibration
+    assert set(found.segments) == set(segments)
+    for s in segments:
+        assert abs(axial_error_deg(found, truth, s)) < 20.0
+    assert len(found.walking) >= 1
+
+
+def test_rest_only_at_the_end_works() -> None:
+    """As on gaitmap_foot: the take starts in the middle of the walk."""
+    recording, truth = simulated("slow")
+    late = cut(recording, truth.stands[-1][0] - 12.0, recording.t_s[-1])
+    found = calibrate(late).calibration
+    assert len(found.rest) == 1
+    assert found.zero[0] > 11.0
+    for s in ("pelvis", *LEGS):
+        assert abs(axial_error_deg(found, truth, s)) < 20.0, s
+
+
+def test_turning_before_walking_does_not_turn_the_segments() -> None:
+    """Standing across the walkway: forward is where the person faces, not where the walk goes."""
+    recording, truth = scripted(
+        (Stand(5.0), Pivot(np.pi / 2, np.pi / 4, 0.55), Straight(12.0, 0.64, 0.54), Stand(4.0))
+    )
+    found = calibrate(recording).calibration
+    assert "facing_not_walking" in codes(found)
+    for s in ("pelvis", "thigh_l", "thigh_r", "shank_l", "shank_r"):
+        assert abs(axial_error_deg(found, truth, s)) < 20.0, s
+
+
+def test_turns_are_not_straight_walking() -> None:
+    recording, _ = simulated("fast_with_turns")
+    found = calibrate(recording).calibration
+    assert len(found.walking) >= 4
+    assert 0.05 < found.turning.mean() < 0.5
+    for a, b in found.walking:
+        assert not found.turning[round(a * 100) : round(b * 100)].any()
+
+
+def standing_only() -> UniformRecording:
+    return cut(simulated("comfortable")[0], 0.0, 5.0)
+
+
+def test_no_walking_is_an_error_that_says_what_to_do() -> None:
+    with pytest.raises(CalibrationError) as caught:
+        calibrate(standing_only())
+    assert caught.value.code == "no_walking"
+    assert "8 steps" in caught.value.message
+
+
+def test_without_walking_a_declared_mounting_is_enough() -> None:
+    _, truth = simulated("comfortable")
+    alone = only(standing_only(), "pelvis")
+    face = rotate(truth.mounts["pelvis"].q_segment_sensor, np.array([0.0, 0.0, 1.0]))
+    along = {"forward": face[0], "back": -face[0], "right": face[2], "left": -face[2]}
+    way = max(along, key=lambda w: along[w])
+    found = calibrate(replace(alone, mounting={"pelvis": f"sacrum, face {way}"})).calibration
+    assert found.segments["pelvis"].method == "declared"
+    assert abs(axial_error_deg(found, truth, "pelvis")) < 50.0
+
+
+def test_a_mounting_declared_the_wrong_way_round_is_a_conflict() -> None:
+    recording, truth = simulated("comfortable")
+    face = rotate(truth.mounts["pelvis"].q_segment_sensor, np.array([0.0, 0.0, 1.0]))
+    along = {"forward": face[0], "back": -face[0], "right": face[2], "left": -face[2]}
+    wrong = min(along, key=lambda w: along[w])
+    with pytest.raises(CalibrationError) as caught:
+        calibrate(replace(recording, mounting={"pelvis": f"face {wrong}"}))
+    assert caught.value.code == "calibration_sign_conflict"
+    assert caught.value.sensor == "pelvis"
+
+
+def test_a_pelvis_without_a_rest_near_the_walk_is_left_out_and_the_legs_stay() -> None:
+    """Rest, then 3 s of fidgeting on the spot, then the walk: nothing tells which way the pelvis faces."""
+    recording, _ = simulated("slow")
+    start = round(5.6 * 100)
+    sensors = {}
+    for s, x in recording.sensors.items():
+        acc, gyr = x.acc.copy(), x.gyr.copy()
+        fidget = np.sin(np.arange(300) * 0.5)[:, None] * np.array([0.3, 0.3, 0.3])
+        acc[start - 300 : start + 100] = x.acc[100:500]
+        gyr[start - 300 : start] = x.gyr[100:400] + fidget
+        gyr[-1500:] += 0.3 * np.sin(np.arange(1500) * 0.5)[:, None]
+        sensors[s] = replace(x, acc=acc, gyr=gyr, mag=None)
+    cut_short = cut(replace(recording, sensors=sensors), 0.0, 20.0)
+    found = calibrate(cut_short).calibration
+    assert "pelvis_heading_unknown" in codes(found)
+    assert set(found.segments) == set(recording.sensors) - {"pelvis"}
+
+
+def test_no_rest_and_no_sensor_are_errors() -> None:
+    recording, _ = simulated("comfortable")
+    walking = cut(recording, 9.0, 15.0)
+    with pytest.raises(SignalError) as caught:
+        calibrate(walking)
+    assert caught.value.code == "no_rest"
+    with pytest.raises(CalibrationError) as empty:
+        calibrate(replace(recording, sensors={}))
+    assert empty.value.code == "no_segment"
+
+
+def test_few_steps_are_told_with_their_number() -> None:
+    recording, _ = scripted((Stand(5.0), Straight(3.2, 0.64, 0.54), Stand(4.0)))
+    few = [n for n in calibrate(recording).calibration.notices if n.code == "few_steps"]
+    assert len(few) == 1
+    assert "8 or more" in few[0].message
+
+
+def test_all_segments_have_a_calibration_that_is_a_rotation() -> None:
+    found = calibrate(simulated("comfortable")[0]).calibration
+    assert set(found.segments) <= set(SEGMENTS)
+    for mounted in found.segments.values():
+        np.testing.assert_allclose(
+            mounted.R_segment_sensor @ mounted.R_segment_sensor.T, np.eye(3), atol=1e-9
+        )
+        assert 0.0 <= mounted.score <= 1.0
