@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 import socket
 import sys
 import threading
@@ -70,9 +71,15 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
             ws_per_message_deflate=False,
         )
     )
+    # uvicorn raises the signal again when it has ended; the workers are still to be stopped then
+    signal.signal(signal.SIGTERM, lambda *_: setattr(server, "should_exit", True))
     host = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{host}:{listener.getsockname()[1]}"
     threading.Thread(target=_when_started, args=(server, lambda: announce(address)), daemon=True).start()
+    # uvicorn stops gracefully and then raises the signal again: without a handler that would end us here,
+    # before the workers have given their jobs back
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: None)
     try:
         workers.start()
         server.run(sockets=[listener])

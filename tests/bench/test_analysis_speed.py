@@ -1,0 +1,51 @@
+"""The whole chain on ten minutes of seven sensors at 100 Hz: speed as times real time, and peak memory."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.data import ROOT
+
+SCRIPT = """
+import json, resource, sys, time
+from math import pi
+from core.pipeline import analyse
+from core.simulate import Arc, Stand, Straight, simulate
+
+half = (Straight(20.0, 0.64, 0.54), Arc(1.5, pi, 0.52, 0.56))
+lap = half * 2
+take = simulate((Stand(8.0), *lap * 14, Stand(5.0)), seed=3)
+short = simulate((Stand(8.0), *lap, Stand(5.0)), seed=4)
+analyse(short.recording)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+began = time.process_time()
+done = analyse(take.recording)
+took = time.process_time() - began
+print(json.dumps({
+    "recording_s": float(take.truth.t_s[-1]), "cpu_s": took, "problem": done.problem and done.problem.code,
+    "strides": sum(s.excluded_reason is None for s in done.strides.strides),
+    "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, "before_mb": before / 1024,
+}))
+"""
+
+
+@pytest.mark.bench
+def test_ten_minutes_are_analysed_100_times_faster_than_walked_within_700_mb() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT],
+        cwd=ROOT, capture_output=True, text=True, check=True, timeout=600,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    found = json.loads(done.stdout)
+    sys.stdout.write(f"{found}\n")
+    assert found["problem"] is None
+    assert found["recording_s"] >= 600
+    assert found["strides"] > 500
+    # 6 s for 10 min is 100 times real time
+    assert found["recording_s"] / found["cpu_s"] >= 100
+    assert found["peak_mb"] <= 700
