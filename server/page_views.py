@@ -19,6 +19,7 @@ from server.storage.tables import ACTIVE_STATES, job, patient
 from web.words import number, seconds
 
 JOBS_SHOWN: Final = 100
+FOLLOWED: Final = 3
 
 PROTOCOLS: Final = (
     ("walk", "Walk", "Over ground, there and back, with a few seconds of quiet standing before or after."),
@@ -98,6 +99,7 @@ def patient_rows(c: Connection, found: Sequence[Patient]) -> list[dict[str, Any]
         rows.append(
             patient_view(p) | {"visits": p.sessions, "last": p.last_visit, "job": running, "status": last}
         )
+    follow_few([row["job"] for row in rows])
     return rows
 
 
@@ -129,6 +131,7 @@ def visits(c: Connection, blobs: BlobStore, patient_id: str, *, results: bool) -
                 "status": status(s.state),
             }
         )
+    follow_few([row["job"] for row in rows])
     return rows
 
 
@@ -165,15 +168,21 @@ def job_rows(c: Connection) -> list[dict[str, Any]]:
                 "session": visit if listed.session_id else None,
             }
         )
+    follow_few(rows)
     return rows
 
 
 def job_dict(view: JobView) -> dict[str, Any]:
-    """A job for the templates: `active` = will still change; `live` = running, so worth following.
+    """A job for the templates: `active` = will still change; `live` = the page follows it."""
+    return {**vars(view), "active": not view.finished, "live": not view.finished}
 
-    One worker runs one job at a time, and a browser has few connections: waiting jobs are not followed.
-    """
-    return {**vars(view), "active": not view.finished, "live": view.state == "running"}
+
+def follow_few(found: Sequence[dict[str, Any] | None]) -> None:
+    """Follow the first jobs of a list only: a browser has six connections to a server, events take one each."""
+    active = [j for j in found if j is not None and j["active"]]
+    active.sort(key=lambda j: j["state"] != "running")
+    for j in active[FOLLOWED:]:
+        j["live"] = False
 
 
 def newest_job(c: Connection, session_id: str) -> JobView | None:

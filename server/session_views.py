@@ -11,7 +11,7 @@ from sqlalchemy import Connection
 from server.page_views import PROTOCOL_NAMES, SEGMENT_NAMES, job_dict, newest_job, who_words
 from server.report.bundle import load_bundle
 from server.report.curves import cycle_svg, strip_svg
-from server.report.model import report_model
+from server.report.model import ReportModel, report_model
 from server.report.panels import CurvePanel
 from server.services import analyses, patients, recordings, sessions
 from server.storage.blobs import BlobStore
@@ -25,13 +25,14 @@ PAPER_HEIGHTS: Final = {False: 152, True: 166}
 KEY_HEIGHT: Final = 186
 """Chart heights in px; the last row also carries the unit of the x axis."""
 
+SEVERITIES: Final = ("bad", "warn", "info")
+
 NOT_ON_PAPER: Final = "Support in seconds"
 """This group says in seconds what another says in percent; the sheet has no room for both."""
 
 SHOWN: Final = (
     "problem",
     "quality",
-    "warnings",
     "kpis",
     "strides",
     "duration_s",
@@ -136,6 +137,7 @@ def report(
     return {
         **{name: getattr(model, name) for name in SHOWN},
         "groups": [(name, rows) for name, rows in model.groups if not (paper and name == NOT_ON_PAPER)],
+        "warnings": _notices(model),
         "curves": curves,
         "key_curve": _chart(model.key_curve, KEY_HEIGHT, x_unit=True),
         "strip": strip_svg(bundle.strides, model.duration_s) if model.strides else "",
@@ -146,6 +148,19 @@ def report(
         f"input {found.input_sha256[:8]} · {day(found.created_at)}",
         "has_poses": "poses.parquet" in found.files,
     }
+
+
+def _notices(model: ReportModel) -> list[dict[str, Any]]:
+    """Notices by severity; those of one kind share a box, what stopped the analysis has its own place."""
+    boxes: dict[tuple[str, str], dict[str, Any]] = {}
+    for w in sorted(model.warnings, key=lambda w: SEVERITIES.index(w.kind)):
+        if w.message == model.problem:
+            continue
+        box = boxes.setdefault((w.kind, w.code), {"kind": w.kind, "title": w.title, "messages": []})
+        if box["messages"]:
+            box["title"] = w.code.replace("_", " ").capitalize()
+        box["messages"].append(w.message)
+    return list(boxes.values())
 
 
 def _chart(panel: CurvePanel, height: int, *, x_unit: bool) -> dict[str, Any]:

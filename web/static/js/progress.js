@@ -34,7 +34,7 @@ class JobProgress extends HTMLElement {
       this.source.close();
       clearInterval(this.clock);
       this.dispatchEvent(new CustomEvent("job-end", { bubbles: true, detail: job }));
-      const target = this.getAttribute(job.state === "done" ? "done" : "failed") || this.getAttribute("done");
+      const target = this.getAttribute(job.state === "done" ? "done" : "failed") ?? this.getAttribute("done");
       if (target === "reload" || target === location.pathname) location.reload();
       else if (target) location.assign(target);
       return;
@@ -44,15 +44,15 @@ class JobProgress extends HTMLElement {
     if (bar) bar.value = fraction;
     const percent = this.querySelector("[data-percent]");
     if (percent) percent.textContent = `${Math.round(100 * fraction)} %`;
-    this.say(job.state === "queued" ? "Waiting for the worker" : job.message || job.stage || "Working");
-    this.markStages(job);
+    const step = this.markStages(job);
+    this.say(job.state === "queued" ? "Waiting for the worker" : step || job.message || "Working");
   }
 
-  // Stages before the current one are done, it runs, the rest wait; unknown names change nothing.
+  // Stages before the current one are done, it runs, the rest wait; returns the step in words.
   markStages(job) {
     const items = [...this.querySelectorAll("[data-stage]")];
     const at = items.findIndex((li) => li.dataset.stage === job.stage);
-    if (at < 0) return;
+    if (at < 0) return "";
     items.forEach((li, i) => {
       const now = i < at ? "ok" : i === at ? "run" : "none";
       if (li.dataset.now === now) return;
@@ -60,6 +60,7 @@ class JobProgress extends HTMLElement {
       li.querySelector(".state").className = `state ${now}`;
       li.querySelectorAll("[data-shape]").forEach((s) => (s.hidden = s.dataset.shape !== now));
     });
+    return `Step ${at + 1} of ${items.length}: ${items[at].textContent.trim()}`;
   }
 
   async cancel() {

@@ -1,0 +1,140 @@
+"""A real recording goes in through the browser, a clinical session comes out (issue: acceptance on real input)."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.conftest import NAME, PASSWORD, RunningServer
+from tests.data import data_folder
+
+SEGMENTS = {
+    "00B40B91": "pelvis",
+    "00B40C45": "thigh_l",
+    "00B40C3C": "thigh_r",
+    "00B40BA5": "shank_l",
+    "00B40C35": "shank_r",
+    "00B40C55": "foot_l",
+    "00B40C48": "foot_r",
+}
+"""Where each sensor was worn (README of the recording)."""
+
+
+def test_eleven_files_become_a_session_page(solid: Browser, running: RunningServer) -> None:
+    files = sorted(data_folder("neura_walk", "rawimu").glob("*.txt"))
+    assert len(files) == 11
+    context = solid.new_context(base_url=running.url, viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    _sign_in(page)
+    _new_session(page)
+    page.locator("[data-files]").set_input_files([str(f) for f in files])
+
+    # what was found: nine sensors, two byte copies said
+    found = page.locator("sensor-map")
+    expect(found).to_be_visible(timeout=60_000)
+    facts = page.locator("dl.dl").inner_text()
+    assert "9 and 2 copies" in facts
+    assert "100 Hz" in facts
+    copies = page.locator(".note", has_text="copies of others")
+    expect(copies).to_contain_text("00B40C49 of 00B40C44")
+    expect(copies).to_contain_text("00B40C4A of 00B40C47")
+
+    _map_sensors(page)
+    page.locator("[data-analyse]").click()
+    page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), wait_until="commit")
+    expect(page.locator("h2", has_text="Parameters")).to_be_visible(timeout=120_000)
+
+    _has_figures(page)
+    _replays(page, page.url)
+    page.goto(f"{page.url}/kinematics")
+    expect(page.locator(".kin .chart.cycle")).not_to_have_count(0)
+    assert page.locator(".kin path.ml").count() >= 8, "left mean curves"
+    assert page.locator(".kin path.mr").count() >= 8, "right mean curves"
+    context.close()
+
+
+def _sign_in(page: Page) -> None:
+    page.goto("/")
+    page.get_by_label("User name").fill(NAME)
+    page.get_by_label("Password").fill(PASSWORD)
+    page.get_by_role("button", name="Sign in").click()
+    page.wait_for_url("**/patients")
+
+
+def _new_session(page: Page) -> None:
+    page.get_by_role("button", name="New patient").first.click()
+    dialog = page.locator("dialog[open]")
+    dialog.get_by_label("Code").fill("NEURA-S02")
+    dialog.get_by_label("Body height in metres").fill("1.75")
+    dialog.get_by_role("button", name="Add patient").click()
+    page.wait_for_url(re.compile(r"/patients/[0-9a-f]{32}$"))
+    page.get_by_role("link", name="New session").first.click()
+    page.get_by_role("button", name="Upload the recording").click()
+    page.wait_for_url("**/upload")
+
+
+def _map_sensors(page: Page) -> None:
+    """The movement gives the parts; which leg is the left one is asked, and here the guess is wrong."""
+    analyse = page.locator("[data-analyse]")
+    expect(analyse).to_be_disabled()
+    question = page.locator("[data-ask]")
+    left_foot = question.locator("[data-ask-id]").inner_text()
+    answer = "keep" if SEGMENTS[left_foot] == "foot_l" else "swap"
+    page.locator(f"[data-sides={answer}]").click()
+    expect(question).to_have_count(0)
+    for row in page.locator("tr[data-device]").all():
+        device = row.get_attribute("data-device") or ""
+        assert row.locator("select").input_value() == SEGMENTS.get(device, ""), device
+    expect(analyse).to_be_enabled()
+
+
+def _has_figures(page: Page) -> None:
+    quality = page.locator(".quality").inner_text()
+    assert "Strides used" in quality
+    rows = page.locator(".params tbody tr:not(.group)")
+    assert rows.count() >= 15
+    stride_time = page.locator(".params tr", has_text="Stride time").first.inner_text()
+    figures = [float(f) for f in re.findall(r"\d\.\d\d", stride_time)[:2]]
+    # README of the recording: strides of about 1.4 s
+    assert all(1.2 < f < 1.6 for f in figures), stride_time
+
+
+def _replays(page: Page, url: str) -> None:
+    view = page.locator("gait-view[data-state=open]")
+    expect(view).to_be_visible(timeout=30_000)
+    canvas = page.frame_locator("gait-view iframe").locator("canvas[data-engine]")
+    expect(canvas).to_be_visible(timeout=30_000)
+    # the charts, the time bar and the figure follow one clock
+    shown = view.get_attribute("data-shown")
+    page.keyboard.press("j")
+    expect(view).not_to_have_attribute("data-shown", shown or "", timeout=10_000)
+    at = float(page.locator("time-bar input").input_value())
+    expect(page.locator("[data-chart] .cursor").first).not_to_have_attribute("hidden", "hidden")
+    page.wait_for_function(
+        "at => Math.abs(Number(document.querySelector('gait-view').dataset.shown) - at) < 0.05", arg=at
+    )
+    assert url == page.url
+
+
+def test_a_file_that_is_no_recording_is_said_in_a_sentence(
+    solid: Browser, running: RunningServer, tmp_path: Path
+) -> None:
+    picture = tmp_path / "walk 🚶.jpg"
+    picture.write_bytes(b"\xff\xd8\xff\xe0 no recording")
+    context = solid.new_context(base_url=running.url)
+    page = context.new_page()
+    _sign_in(page)
+    with running.client() as client:
+        patient = client.post("/api/v1/patients", json={"code": "PICTURE"}).json()["id"]
+        session = client.post(
+            f"/api/v1/patients/{patient}/sessions", json={"title": "Walk", "performed_on": "2026-11-18"}
+        ).json()["id"]
+    page.goto(f"/sessions/{session}/upload")
+    page.locator("[data-files]").set_input_files(str(picture))
+    note = page.locator(".note.bad:visible")
+    expect(note).to_contain_text("These files could not be read", timeout=30_000)
+    assert len(note.inner_text()) > 60
+    expect(page.locator(".files")).to_contain_text("walk 🚶.jpg")
+    context.close()
