@@ -69,7 +69,7 @@ def joint_angles(orientations: Orientations, zero: Window) -> JointAngles:
     Returns
     -------
     JointAngles; a joint with a missing segment has no entry and a notice `joint_missing`, a joint whose |b|
-    passes 80° a notice `gimbal`.
+    passes 80° a notice `gimbal`, one without signal while standing is left out with `no_standing_zero`.
     """
     raw: dict[str, Floats] = {}
     notices: list[Notice] = []
@@ -94,8 +94,16 @@ def joint_angles(orientations: Orientations, zero: Window) -> JointAngles:
                 sign = right if side == "right" else left
                 raw[f"{name}_{SUFFIX[side]}"] = np.where(ok, sign * value, np.nan)
     part = samples(zero, orientations.rate_hz)
-    offset = {name: _circular_mean(value[part]) for name, value in raw.items()}
-    angles = {name: _wrap(value - offset[name]) for name, value in raw.items()}
+    standing = {name for name, value in raw.items() if np.isfinite(value[part]).any()}
+    for name in sorted(raw.keys() - standing):
+        message = (
+            f"{name}: no angle, its sensors have no signal while standing ({zero[0]:.1f} to {zero[1]:.1f} "
+            "s), so "
+            "there is no zero."
+        )
+        notices.append(Notice("no_standing_zero", message, t_s=zero[0]))
+    offset = {name: _circular_mean(raw[name][part]) for name in raw if name in standing}
+    angles = {name: _wrap(raw[name] - zero_angle) for name, zero_angle in offset.items()}
     return JointAngles(orientations.t_s, angles, offset, notices=tuple(notices))
 
 
@@ -138,9 +146,9 @@ def _gimbal(b: Floats, ok: Bools, side: Side, joint: str, t_s: Floats) -> list[N
 
 
 def _circular_mean(x: Floats) -> float:
-    """Mean angle in rad over the finite samples, 0 when there are none."""
+    """Mean angle in rad over the finite samples."""
     x = x[np.isfinite(x)]
-    return float(np.arctan2(np.sin(x).mean(), np.cos(x).mean())) if len(x) else 0.0
+    return float(np.arctan2(np.sin(x).mean(), np.cos(x).mean()))
 
 
 def _wrap(x: Floats) -> Floats:
