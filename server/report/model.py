@@ -274,7 +274,7 @@ def _curve_notes(bundle: Bundle, panels: tuple[CurvePanel, ...]) -> tuple[str, .
     )
     notes = [
         about_zero,
-        *dict.fromkeys(p.norm_note for p in panels if p.norm_note and p.reason is None),
+        *_norm_notes(panels),
     ]
     drawn = max((len(c.strides) for p in panels for c in p.sides.values()), default=0)
     most = max((c.n for p in panels for c in p.sides.values()), default=0)
@@ -283,6 +283,17 @@ def _curve_notes(bundle: Bundle, panels: tuple[CurvePanel, ...]) -> tuple[str, .
             f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the take; means are of all."
         )
     return tuple(notes)
+
+
+def _norm_notes(panels: tuple[CurvePanel, ...]) -> list[str]:
+    """What must be said about the norm, once for all variables it concerns."""
+    concerned: dict[str, list[str]] = {}
+    for p in panels:
+        if p.norm_note and p.reason is None:
+            concerned.setdefault(p.norm_note, []).append(p.variable.label)
+    return [
+        f"{', '.join(labels).capitalize()}: {note[0].lower()}{note[1:]}" for note, labels in concerned.items()
+    ]
 
 
 def _panel_json(p: CurvePanel) -> dict[str, object]:

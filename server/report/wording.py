@@ -51,7 +51,7 @@ VARIABLES: Final[tuple[Variable, ...]] = (
         "Ankle dorsiflexion",
         "sagittal",
         (-40, 30),
-        10,
+        20,
         "Dorsiflexion",
         "Plantarflexion",
     ),

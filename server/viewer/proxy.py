@@ -25,6 +25,7 @@ import viser
 from fastapi import APIRouter, FastAPI, Query, Request, WebSocket
 from fastapi.responses import HTMLResponse
 from starlette.websockets import WebSocketDisconnect
+from websockets.exceptions import WebSocketException
 
 from core.errors import SagittalError
 from server.auth.access import require
@@ -42,7 +43,11 @@ CONTENT_POLICY = (
     "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; connect-src 'self' data: blob:; "
     "frame-ancestors 'self'"
 )
-"""What viser's single-file client needs, and nothing from elsewhere."""
+"""What viser's single-file client needs, and nothing from elsewhere.
+
+Its WebAssembly for point clouds would also evaluate strings; we show none, so that stays refused and the
+browser's console says so once.
+"""
 
 _HIDE_PANEL = "<style>.mantine-Paper-root,.mantine-Notifications-root{display:none!important}</style>"
 _GONE = 4404
@@ -86,13 +91,23 @@ async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
     """Carry viser's messages."""
     view = _views(ws).find(view_id, who.login_id)
     if view is None:
-        await ws.accept(subprotocol=next(iter(subprotocols_of(ws)), None))
-        await ws.close(_GONE, "view_not_found")
+        await _say_gone(ws)
         return
     with view.watched():
-        async with upstream(view.port, subprotocols_of(ws)) as up:
+        try:
+            up = await upstream(view.port, subprotocols_of(ws))
+        except (OSError, WebSocketException):
+            await _say_gone(ws)
+            return
+        async with up:
             await ws.accept(subprotocol=up.subprotocol)
             await carry(ws, up, functools.partial(ws.app.state.logins.is_open, who.login_id))
+
+
+async def _say_gone(ws: WebSocket) -> None:
+    """Close with a code of our own, which needs an accepted connection."""
+    await ws.accept(subprotocol=next(iter(subprotocols_of(ws)), None))
+    await ws.close(_GONE, "view_not_found")
 
 
 @router.websocket("/sessions/{sid}/replay")

@@ -137,6 +137,16 @@ async def test_a_view_of_somebody_else_is_not_there(ward: Ward) -> None:
         assert closed.value.rcvd.code == 4404
 
 
+async def test_a_view_whose_viser_has_died_is_gone_too(ward: Ward) -> None:
+    headers = ward.cookie()
+    async with replaying(ward, headers, tab="dying") as (_, opened):
+        view = views_of(ward).find(str(opened["view"]), _login_of(ward, headers))
+        assert view is not None
+        await asyncio.to_thread(view.server.stop)
+        async with piped(ward, headers, opened["view"]) as ws:
+            assert await asyncio.wait_for(_close_code(ws), 5) == 4404
+
+
 async def test_close_code_of_viser_reaches_the_browser(ward: Ward) -> None:
     headers = ward.cookie()
     async with replaying(ward, headers) as (_, opened):
