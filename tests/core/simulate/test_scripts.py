@@ -3,21 +3,26 @@ from __future__ import annotations
 import pytest
 
 from core.errors import ParameterError
-from core.frames import SIDES
+from core.frames import GRAVITY, SIDES
 from core.simulate import SCRIPTS, simulate_scenario
+
+FULL_SCALE = 16.0 * GRAVITY
+"""Range of a real accelerometer, m/s²."""
 
 SHORT = [name for name in SCRIPTS if name != "five_minutes"]
 
 
 @pytest.mark.parametrize("name", SHORT)
 def test_named_scripts_are_long_enough_for_an_analysis(name: str) -> None:
-    truth = simulate_scenario(name, seed=2).truth
+    simulation = simulate_scenario(name, seed=2)
+    truth = simulation.truth
     assert 40.0 <= truth.t_s[-1] <= 65.0
     assert truth.stands[0][1] - truth.stands[0][0] >= 5.0
     assert truth.stands[-1][1] - truth.stands[-1][0] >= 3.0
     for side in SIDES:
         assert sum(s.side == side for s in truth.strides) >= 20
     assert truth.guard_m < 0.03
+    assert max(force for force, _ in simulation.peaks().values()) < FULL_SCALE
 
 
 def test_the_lost_sensor_is_lost_and_comes_back() -> None:
