@@ -89,7 +89,7 @@ def test_relative_heading_drift_is_taken_out_over_a_long_walk() -> None:
     n = min(len(recording.t_s), len(truth.t_s))
 
     def worst(q: Mapping[Segment, Floats]) -> float:
-        """Largest error in degrees of a relative heading in the last minute, against that of the first walk."""
+        """Largest error in degrees of a relative heading in the last minute, against the first walk's."""
         out = 0.0
         pairs: tuple[tuple[Segment, Segment], ...] = (
             ("pelvis", "thigh_r"), ("thigh_l", "shank_l"), ("shank_r", "foot_r"),
