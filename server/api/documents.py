@@ -20,6 +20,7 @@ _WORDS = {
     "413": "Larger than a limit of the settings",
     "422": "A field or the data is not as expected",
     "429": "Too many failed attempts",
+    "503": "Too busy with other sign-ins; try again in some seconds",
     "507": "Not enough free disk space",
 }
 _PROBLEM = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/ProblemDetails"}}}

@@ -21,7 +21,6 @@ from server.auth.passwords import hash_password
 from server.auth.roles import POLICY, Action, Role
 from server.auth.sessions import Logins
 from server.auth.tokens import token_hash
-from server.problems import Problem
 
 router = APIRouter(tags=["account"])
 address_router = APIRouter(include_in_schema=False)
@@ -47,7 +46,7 @@ async def _credentials(request: Request) -> schemas.SignIn:
     "/sign-in",
     dependencies=[require(Action.SIGN_IN)],
     response_model=schemas.User,
-    responses=refusals(401, 429),
+    responses=refusals(401, 429, 503),
     openapi_extra=PUBLIC
     | {"requestBody": {"required": True, "content": {"application/json": _BODY, _FORM: _BODY}}},
 )
@@ -89,27 +88,20 @@ def sign_out(
     status_code=201,
     dependencies=[require(Action.SET_UP)],
     response_model=schemas.User,
-    responses=refusals(404, 409, 429),
+    responses=refusals(404, 409, 503),
     openapi_extra=PUBLIC,
 )
-def set_up(
-    token: str, body: schemas.SetUp, request: Request, db: Db, logins: OpenLogins, failures: Failures
-) -> Any:
+def set_up(token: str, body: schemas.SetUp, request: Request, db: Db, logins: OpenLogins) -> Any:
     """Make the first administrator with the token of the printed address, and sign in."""
-    failures.check("set-up", address_of(request))
     with db.read() as c:
         valid = one_time.is_valid(c, token, "set_up")
     # the hash takes long: outside of the transaction, and not for everybody who guesses
     hashed = hash_password(body.password) if valid else ""
-    try:
-        with db.write() as c:
-            one_time.use(c, token, "set_up")
-            row = accounts.create(c, body.name, body.display_name, Role.ADMIN, hashed)
-            audit.record(c, None, "user.set_up", "user", row.id)
-            session = _open(c, logins, row, request, "sign_in")
-    except Problem:
-        failures.fail("set-up", address_of(request))
-        raise
+    with db.write() as c:
+        one_time.use(c, token, "set_up")
+        row = accounts.create(c, body.name, body.display_name, Role.ADMIN, hashed)
+        audit.record(c, None, "user.set_up", "user", row.id)
+        session = _open(c, logins, row, request, "sign_in")
     response = JSONResponse(schemas.User.model_validate(row).model_dump(mode="json"), 201)
     set_token(response, request, session)
     return response
@@ -127,7 +119,7 @@ def read_account(who: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> schem
     )
 
 
-@router.post("/account/password", status_code=204, responses=refusals(429))
+@router.post("/account/password", status_code=204, responses=refusals(429, 503))
 def change_password(
     body: schemas.PasswordChange,
     request: Request,
@@ -147,17 +139,12 @@ def change_password(
 
 
 @address_router.get("/sign-in/{token}", dependencies=[require(Action.SIGN_IN)])
-def sign_in_once(token: str, request: Request, db: Db, logins: OpenLogins, failures: Failures) -> Response:
+def sign_in_once(token: str, request: Request, db: Db, logins: OpenLogins) -> Response:
     """Sign in with a printed one-time address and go to the patients."""
-    failures.check("one-time", address_of(request))
-    try:
-        with db.write() as c:
-            user_id = one_time.use(c, token, "sign_in")
-            row = accounts.get(c, user_id or "")
-            session = _open(c, logins, row, request, "sign_in.one_time")
-    except Problem:
-        failures.fail("one-time", address_of(request))
-        raise
+    with db.write() as c:
+        user_id = one_time.use(c, token, "sign_in")
+        row = accounts.get(c, user_id or "")
+        session = _open(c, logins, row, request, "sign_in.one_time")
     response = RedirectResponse("/patients", status_code=303)
     set_token(response, request, session)
     return response

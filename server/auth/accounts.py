@@ -80,5 +80,5 @@ def check_password(
     if not verify_password(password, stored) or row is None:
         throttle.fail(name, address)
         raise Problem(status, "wrong_password", "Name or password is wrong. Check both and try again.")
-    throttle.succeed(name)
+    throttle.succeed(name, address)
     return row

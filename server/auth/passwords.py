@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
+from collections.abc import Iterator
 
 from pwdlib import PasswordHash
 from pwdlib.exceptions import PwdlibError
@@ -17,6 +19,8 @@ MAX_LENGTH = 128  # OWASP ASVS 4.0.3, 2.1.2
 _HASHER = PasswordHash((Argon2Hasher(),))
 # each hash takes 64 MiB: without a bound a burst of sign-ins would take the machine's memory
 _SLOTS = threading.BoundedSemaphore(2)
+# and without an end to the waiting it would take every thread that answers requests
+PATIENCE_S = 5.0
 _UNKNOWN = _HASHER.hash("no account has this hash")
 
 
@@ -29,7 +33,7 @@ def hash_password(password: str) -> str:
             f"A password needs {MIN_LENGTH} to {MAX_LENGTH} characters; this one has {len(password)}. "
             "A few unrelated words make a good one.",
         )
-    with _SLOTS:
+    with _slot():
         return _HASHER.hash(password)
 
 
@@ -37,9 +41,24 @@ def verify_password(password: str, stored: str | None) -> bool:
     """Tell whether the password is right; None (no such account) takes as long as a wrong password."""
     if len(password) > MAX_LENGTH:
         password = ""
-    with _SLOTS:
+    with _slot():
         try:
             right = _HASHER.verify(password, stored or _UNKNOWN)
         except PwdlibError:
             return False
     return right and stored is not None
+
+
+@contextlib.contextmanager
+def _slot() -> Iterator[None]:
+    if not _SLOTS.acquire(timeout=PATIENCE_S):
+        raise Problem(
+            503,
+            "busy",
+            "Too many people are signing in at this moment. Try again in some seconds.",
+            headers={"Retry-After": "5"},
+        )
+    try:
+        yield
+    finally:
+        _SLOTS.release()

@@ -1,4 +1,4 @@
-"""Counts failed sign-ins per account and per address, so that guessing passwords takes years."""
+"""Counts failed sign-ins per account and per address, so that guessing a password takes years."""
 
 from __future__ import annotations
 
@@ -10,10 +10,16 @@ from collections.abc import Callable
 from server.problems import Problem
 
 WINDOW_S = 15 * 60.0
-MAX_PER_ACCOUNT = 10
+MAX_PER_PAIR = 10
+"""Failures on one account from one address."""
+MAX_PER_ACCOUNT = 50
+"""From all addresses; higher, so that a stranger cannot lock a colleague out with ten wrong guesses."""
 MAX_PER_ADDRESS = 30
-# NIST SP 800-63B §5.2.2 allows at most 100 failures in a row; a clinic shares one address, hence two limits
+"""On all accounts; a clinic may share one address. NIST SP 800-63B §5.2.2 allows 100 failures in a row."""
 _MAX_KEYS = 10_000
+
+
+Key = tuple[str | None, str | None]
 
 
 class Throttle:
@@ -22,16 +28,13 @@ class Throttle:
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._lock = threading.Lock()
-        self._failures: defaultdict[tuple[str, str], deque[float]] = defaultdict(deque)
+        self._failures: defaultdict[Key, deque[float]] = defaultdict(deque)
 
     def check(self, account: str, address: str) -> None:
         """Raise Problem 429 with Retry-After while one of the two has failed too often."""
         now = self._clock()
         with self._lock:
-            wait = max(
-                self._wait(("account", account), MAX_PER_ACCOUNT, now),
-                self._wait(("address", address), MAX_PER_ADDRESS, now),
-            )
+            wait = max(self._wait(key, limit, now) for key, limit in _keys(account, address).items())
         if wait > 0:
             seconds = int(wait) + 1
             minutes = -(-seconds // 60)
@@ -48,15 +51,15 @@ class Throttle:
         with self._lock:
             if len(self._failures) > _MAX_KEYS:
                 self._forget(now)
-            self._failures["account", account].append(now)
-            self._failures["address", address].append(now)
+            for key in _keys(account, address):
+                self._failures[key].append(now)
 
-    def succeed(self, account: str) -> None:
-        """Forget the failures of an account whose owner has just signed in."""
+    def succeed(self, account: str, address: str) -> None:
+        """Forget the failures of somebody who mistyped a few times and has now signed in."""
         with self._lock:
-            self._failures.pop(("account", account), None)
+            self._failures.pop((account, address), None)
 
-    def _wait(self, key: tuple[str, str], limit: int, now: float) -> float:
+    def _wait(self, key: Key, limit: int, now: float) -> float:
         failures = self._failures.get(key)
         if failures is None:
             return 0.0
@@ -70,3 +73,11 @@ class Throttle:
     def _forget(self, now: float) -> None:
         for key in [k for k, times in self._failures.items() if times[-1] <= now - WINDOW_S]:
             del self._failures[key]
+
+
+def _keys(account: str, address: str) -> dict[Key, int]:
+    return {
+        (account, address): MAX_PER_PAIR,
+        (account, None): MAX_PER_ACCOUNT,
+        (None, address): MAX_PER_ADDRESS,
+    }

@@ -206,6 +206,19 @@ async def _until(condition: object) -> None:
     raise AssertionError("it did not happen within 10 s")
 
 
+async def test_a_file_is_reached_only_through_its_own_session(clinic: Clinic) -> None:
+    mine, other = await new_session(clinic, "mine"), await new_session(clinic, "other")
+    async with clinic.client("clinician") as client:
+        for session in (mine, other):
+            await client.put(f"{API}/sessions/{session}/files/shared.txt", content=session.encode())
+        await client.put(f"{API}/sessions/{mine}/files/only.txt", content=b"mine")
+        assert (await client.get(f"{API}/sessions/{other}/files/shared.txt")).text == other
+        for method in ("GET", "DELETE"):
+            answer = await client.request(method, f"{API}/sessions/{other}/files/only.txt")
+            assert (answer.status_code, answer.json()["code"]) == (404, "not_found")
+    assert await stored_names(clinic, mine) == ["only.txt", "shared.txt"]
+
+
 @pytest.mark.bench
 async def test_the_memory_of_an_upload_does_not_grow_with_its_size(clinic: Clinic) -> None:
     session = await new_session(clinic, "memory")

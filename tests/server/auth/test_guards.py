@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import httpx
@@ -10,6 +11,7 @@ from starlette.types import Receive, Scope, Send
 from server.auth.csrf import CrossSiteGuard
 from server.auth.headers import SecurityHeaders
 from server.auth.hosts import HostGuard
+from server.auth.routes import declared_actions
 from tests.server.clinic import Clinic
 from tests.server.serving import serve
 
@@ -145,3 +147,22 @@ async def test_over_a_real_socket_a_foreign_origin_gets_403_before_accept(clinic
             ):
                 pass
     assert refused.value.response.status_code == 403
+
+
+async def test_the_websockets_of_the_application_refuse_foreign_pages_and_strangers(clinic: Clinic) -> None:
+    token = clinic.token("viewer")
+    paths = [p.partition(" ")[2] for p in declared_actions(clinic.app.routes) if p.startswith("WEBSOCKET")]
+    assert paths
+    async with serve(clinic.app) as port:
+        for path in paths:
+            url = f"ws://127.0.0.1:{port}" + re.sub(r"\{\w+\}", "0" * 32, path)
+            for origin, cookie, status in (
+                ("http://evil.example", f"sid={token}", 403),
+                (f"http://127.0.0.1:{port}", "sid=wrong", 401),
+            ):
+                with pytest.raises(websockets.exceptions.InvalidStatus) as refused:
+                    async with websockets.connect(
+                        url, origin=websockets.Origin(origin), additional_headers={"Cookie": cookie}
+                    ):
+                        pass
+                assert refused.value.response.status_code == status

@@ -4,8 +4,9 @@ import time
 
 import pytest
 
+from server.auth import passwords
 from server.auth.passwords import MAX_LENGTH, hash_password, verify_password
-from server.auth.throttle import MAX_PER_ACCOUNT, MAX_PER_ADDRESS, WINDOW_S, Throttle
+from server.auth.throttle import MAX_PER_ACCOUNT, MAX_PER_ADDRESS, MAX_PER_PAIR, WINDOW_S, Throttle
 from server.problems import Problem
 from tests.server.clinic import PASSWORD, password_hash
 
@@ -47,20 +48,31 @@ class Clock:
         return self.now
 
 
-def test_an_account_is_closed_for_a_while_after_too_many_failures_from_anywhere() -> None:
+def test_a_person_is_stopped_after_ten_failures_and_may_try_again_later() -> None:
     clock = Clock()
     throttle = Throttle(clock)
-    for i in range(MAX_PER_ACCOUNT):
-        throttle.check("anna", f"10.0.0.{i}")
-        throttle.fail("anna", f"10.0.0.{i}")
+    for _ in range(MAX_PER_PAIR):
+        throttle.check("anna", "10.0.0.1")
+        throttle.fail("anna", "10.0.0.1")
     with pytest.raises(Problem) as refused:
-        throttle.check("anna", "10.0.0.99")
+        throttle.check("anna", "10.0.0.1")
     assert refused.value.status == 429
     assert refused.value.headers is not None
     assert 0 < int(refused.value.headers["Retry-After"]) <= WINDOW_S + 1
-    throttle.check("berta", "10.0.0.99")
+    throttle.check("anna", "10.0.0.2")
+    throttle.check("berta", "10.0.0.1")
     clock.now = WINDOW_S + 1
-    throttle.check("anna", "10.0.0.99")
+    throttle.check("anna", "10.0.0.1")
+
+
+def test_an_account_is_closed_after_failures_from_many_addresses() -> None:
+    throttle = Throttle(Clock())
+    for i in range(MAX_PER_ACCOUNT):
+        throttle.check("anna", f"10.0.0.{i}")
+        throttle.fail("anna", f"10.0.0.{i}")
+    with pytest.raises(Problem):
+        throttle.check("anna", "10.0.0.99")
+    throttle.check("berta", "10.0.0.99")
 
 
 def test_an_address_is_closed_after_failures_on_many_accounts() -> None:
@@ -73,10 +85,20 @@ def test_an_address_is_closed_after_failures_on_many_accounts() -> None:
     throttle.check("somebody", "10.0.0.2")
 
 
-def test_success_forgets_the_failures_of_the_account() -> None:
+def test_success_forgets_a_few_mistypes() -> None:
     throttle = Throttle(Clock())
-    for _ in range(MAX_PER_ACCOUNT - 1):
+    for _ in range(MAX_PER_PAIR - 1):
         throttle.fail("anna", "10.0.0.1")
-    throttle.succeed("anna")
+    throttle.succeed("anna", "10.0.0.1")
     throttle.fail("anna", "10.0.0.1")
     throttle.check("anna", "10.0.0.1")
+
+
+def test_a_burst_of_sign_ins_neither_takes_the_memory_nor_waits_for_ever(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(passwords, "PATIENCE_S", 0.05)
+    with passwords._slot(), passwords._slot(), pytest.raises(Problem) as refused:
+        verify_password(PASSWORD, password_hash())
+    assert (refused.value.status, refused.value.code) == (503, "busy")
+    assert verify_password(PASSWORD, password_hash())

@@ -9,7 +9,7 @@ from sqlalchemy import func, select
 from server.auth import accounts, one_time
 from server.auth.roles import Role
 from server.auth.sessions import Logins
-from server.auth.throttle import MAX_PER_ACCOUNT, Throttle
+from server.auth.throttle import MAX_PER_PAIR, Throttle
 from server.storage.db import Database
 from server.storage.tables import login_session, one_time_token
 from tests.server.clinic import PASSWORD, Clinic, open_clinic
@@ -148,10 +148,10 @@ async def test_guessing_a_password_is_stopped_and_says_when_to_try_again(clinic:
     async with clinic.client() as client:
         answers = [
             await client.post("/api/v1/sign-in", json={"name": "dora", "password": f"guess number {i}"})
-            for i in range(MAX_PER_ACCOUNT + 1)
+            for i in range(MAX_PER_PAIR + 1)
         ]
         right = await client.post("/api/v1/sign-in", json={"name": "dora", "password": PASSWORD})
-    assert [a.status_code for a in answers] == [401] * MAX_PER_ACCOUNT + [429]
+    assert [a.status_code for a in answers] == [401] * MAX_PER_PAIR + [429]
     assert right.status_code == 429
     assert int(right.headers["retry-after"]) > 0
     clinic.app.state.throttle = Throttle()
