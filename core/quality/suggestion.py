@@ -2,8 +2,7 @@
 
 In walking the two legs swing in turn, so on one leg the rates and the shaking of neighbouring sensors rise
 and fall together, those of the other leg in between; the foot turns fastest, then the shank, then the thigh,
-and the pelvis least of all. Which leg is the left one cannot be read from this, and the phase of the pelvis
-rotation, which could tell it, shifts with speed and with illness: a leg is numbered, its side is not guessed.
+and the pelvis least of all. Legs are numbered; core/quality/sides.py says which is the left one, if it can.
 Looked at on neura_walk (rates 3.3, 2.7, 1.9, 1.1 rad/s), qmt_fullbody and five simulated walks: the shaking
 of a thigh agrees with its own shank with r ≥ 0.62, with the other one with r ≤ 0.05.
 """
@@ -15,8 +14,9 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.formats.aliases import segment_in
+from core.formats.aliases import segment_in, segment_named
 from core.frames import Floats, Segment
+from core.quality.sides import left_leg, smooth
 from core.recording import ImuStream, Recording
 
 Part = Literal["foot", "shank", "thigh", "pelvis"]
@@ -88,62 +88,63 @@ def _by_movement(streams: list[ImuStream]) -> dict[str, Suggestion]:
     distinct = list({s.digest: s for s in reversed(streams) if s.gyr is not None}.values())[::-1]
     if len(distinct) < 7 or len({s.clock for s in distinct}) > 1:
         return {}
-    moved = _walking(distinct)
-    if moved is None:
+    motion = _on_grid(distinct)
+    if motion is None:
         return {}
-    rates, shaking = moved
-    energy = np.sqrt((rates**2).mean(axis=1))
-    alike: Floats = np.asarray(np.corrcoef(rates), np.float64)
-    bond = alike + np.asarray(np.corrcoef(shaking), np.float64)
+    acc, gyr = motion
+    speed = np.linalg.norm(gyr - np.median(gyr, axis=1, keepdims=True), axis=2)
+    rates = np.stack([smooth(x, SMOOTH_S, GRID_HZ) for x in speed])
+    walking = smooth(rates.mean(axis=0), 1.0, GRID_HZ) > WALKING_RATE
+    if np.count_nonzero(walking) < SHORTEST_WALK_S * GRID_HZ:
+        return {}
+    force = np.linalg.norm(acc, axis=2)
+    shaking = np.stack([smooth(np.abs(np.diff(f, prepend=f[0])), SMOOTH_S, GRID_HZ) for f in force])
+    energy = np.sqrt((rates[:, walking] ** 2).mean(axis=1))
+    alike: Floats = np.asarray(np.corrcoef(rates[:, walking]), np.float64)
+    bond = alike + np.asarray(np.corrcoef(shaking[:, walking]), np.float64)
     central = [i for i in range(len(distinct)) if energy[i] < CENTRAL * energy.max()]
     legs = _legs(energy, alike, bond, [i for i in range(len(distinct)) if i not in central])
     if legs is None:
         return {}
-    shaken = [float(np.nanstd(np.linalg.norm(s.acc, axis=1))) for s in distinct]
+    pelvis = central[0] if len(central) == 1 else None
+    left = None
+    if pelvis is not None:
+        feet = [max(leg, key=lambda i: energy[i]) for leg in legs]
+        left = left_leg(acc[pelvis], gyr[pelvis], speed[feet[0]], speed[feet[1]], GRID_HZ)
     out = {s.device_id: Suggestion() for s in distinct}
     for number, leg in enumerate(legs, start=1):
         bodies = _bodies(leg, alike)
         if len(bodies) != len(LEG_PARTS):
             return {}
         bodies.sort(key=lambda body: -max(energy[i] for i in body))
+        side = None if left is None else "l" if number == left else "r"
         for part, body in zip(LEG_PARTS, bodies, strict=True):
-            nearest = min(body, key=lambda i: shaken[i])
-            out[distinct[nearest].device_id] = Suggestion(None, "movement", part, number)
-    if len(central) == 1:
-        out[distinct[central[0]].device_id] = Suggestion("pelvis", "movement", "pelvis")
+            nearest = min(body, key=lambda i: float(force[i].std()))
+            segment = None if side is None else segment_named(f"{part}_{side}")
+            out[distinct[nearest].device_id] = Suggestion(segment, "movement", part, number)
+    if pelvis is not None:
+        out[distinct[pelvis].device_id] = Suggestion("pelvis", "movement", "pelvis")
     return out
 
 
-def _walking(streams: list[ImuStream]) -> tuple[Floats, Floats] | None:
-    """Smoothed |ω| and |d|f|/dt| (sensor, sample) while walking, on one grid; None when nobody walks."""
+def _on_grid(streams: list[ImuStream]) -> tuple[Floats, Floats] | None:
+    """Acceleration and rate (sensor, sample, 3) of the common range at `GRID_HZ`; None when too short."""
     start = max(float(s.t_s[0]) for s in streams)
     end = min(float(s.t_s[-1]) for s in streams)
     n = int((end - start) * GRID_HZ)
     if n < SHORTEST_WALK_S * GRID_HZ:
         return None
     grid = start + np.arange(n) / GRID_HZ
-    rows = []
-    shaken = []
+    acc: list[Floats] = []
+    gyr: list[Floats] = []
     for s in streams:
         assert s.gyr is not None  # noqa: S101 - the caller chose streams with a gyroscope
-        good = np.isfinite(s.gyr).all(axis=1)
-        if not good.any():
-            return None
-        speed = np.linalg.norm(s.gyr[good] - np.median(s.gyr[good], axis=0), axis=1)
-        rows.append(_smooth(np.interp(grid, s.t_s[good], speed), SMOOTH_S))
-        known = np.isfinite(s.acc).all(axis=1)
-        force = np.interp(grid, s.t_s[known], np.linalg.norm(s.acc[known], axis=1))
-        shaken.append(_smooth(np.abs(np.diff(force, prepend=force[0])), SMOOTH_S))
-    rates = np.stack(rows)
-    walking = _smooth(rates.mean(axis=0), 1.0) > WALKING_RATE
-    if np.count_nonzero(walking) < SHORTEST_WALK_S * GRID_HZ:
-        return None
-    return rates[:, walking], np.stack(shaken)[:, walking]
-
-
-def _smooth(x: Floats, seconds: float) -> Floats:
-    width = round(seconds * GRID_HZ)
-    return np.convolve(x, np.full(width, 1.0 / width), mode="same")
+        for signal, out in ((s.acc, acc), (s.gyr, gyr)):
+            good = np.isfinite(signal).all(axis=1)
+            if not good.any():
+                return None
+            out.append(np.stack([np.interp(grid, s.t_s[good], axis[good]) for axis in signal.T], axis=1))
+    return np.stack(acc), np.stack(gyr)
 
 
 def _legs(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from core.quality import QualityReport, assess, describe, suggest, suggest_segme
 from core.quality.signals import facts, magnetic_share, saturation
 from core.recording import ImuStream, Recording
 from core.rotation import about
+from core.simulate import simulate_scenario
 from core.timeline import synchronise
 from tests.core.formats.making import signals, stream, take
 from tests.core.formats.test_samples import gaitmap
@@ -207,21 +208,43 @@ def test_the_upload_page_learns_what_the_real_files_hold(neura: Recording) -> No
     assert found.duration_s == pytest.approx(25.02)
 
 
-def parts_agree(found: Mapping[str, tuple[str | None, int | None]], truth: Mapping[str, Segment]) -> bool:
-    """Right parts, and both legs kept apart, whichever of them is number 1."""
-    if any(found[d][0] != s.split("_")[0] for d, s in truth.items()):
-        return False
-    sides = {(found[d][1], s[-1]) for d, s in truth.items() if "_" in s}
-    return len(sides) == 2
+def nameless(recording: Recording) -> tuple[Recording, dict[str, Segment]]:
+    """The same sensors without any name or mapping, and what they truly are."""
+    ids = {d: f"id{i}" for i, d in enumerate(recording.streams)}
+    streams = {ids[d]: replace(s, device_id=ids[d], source="x") for d, s in recording.streams.items()}
+    return Recording(streams, {}), {ids[d]: s for d, s in recording.segments.items() if s}
 
 
 def test_movement_sorts_nine_real_sensors_and_sets_ankles_and_copies_aside(neura: Recording) -> None:
-    found = {d: (s.part, s.leg) for d, s in suggest(Recording(neura.streams, {})).items()}
-    assert parts_agree(found, {d: s for d, s in NEURA.items() if s})
-    assert all(found[d] == (None, None) for d in ("00B40C44", "00B40C47", "00B40C49", "00B40C4A"))
     segments = suggest_segments(Recording(neura.streams, {}))
-    assert segments["00B40B91"] == "pelvis"
-    assert [s for s in segments.values() if s] == ["pelvis"]
+    assert segments == {d: NEURA.get(d) for d in neura.streams}
+
+
+@pytest.mark.parametrize("script", ["comfortable", "fast_with_turns", "slow"])
+def test_movement_tells_segments_and_sides_of_simulated_walks(script: str) -> None:
+    recording, truth = nameless(simulate_scenario(script, seed=1).recording)
+    assert suggest_segments(recording) == truth
+
+
+def test_a_walk_without_rest_before_it_has_legs_but_no_sides(neura: Recording) -> None:
+    walk = slice(1250, 2150)
+    cut = {
+        d: replace(
+            s,
+            t_s=s.t_s[walk],
+            acc=s.acc[walk],
+            gyr=None if s.gyr is None else s.gyr[walk],
+            mag=None,
+            quat=None,
+        )
+        for d, s in neura.streams.items()
+    }
+    found = suggest(Recording(cut, {}))
+    assert {s.segment for s in found.values()} == {None, "pelvis"}
+    parts = {d: (s.part, s.leg) for d, s in found.items()}
+    assert {parts[d][0] for d in ("00B40C55", "00B40C48")} == {"foot"}
+    legs = {(parts[d][1], segment[-1]) for d, segment in NEURA.items() if segment and "_" in segment}
+    assert len(legs) == 2
 
 
 def test_movement_says_nothing_about_people_who_stand(neura: Recording) -> None:
