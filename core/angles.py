@@ -11,15 +11,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import radians
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from core.errors import Notice
 from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
-from core.fusion.orientations import Orientations
 from core.rest import Window, samples
 from core.rotation import conjugate, from_matrix, multiply, to_matrix
+
+if TYPE_CHECKING:
+    # the package brings numba, which readers of results do without
+    from core.fusion.orientations import Orientations
 
 GIMBAL_LIMIT: Final = radians(80.0)
 """|b| beyond which a and c cannot be told apart (spec/fusion.md §7)."""

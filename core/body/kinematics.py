@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,8 +20,11 @@ from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.poses import Poses
 from core.errors import Notice
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
-from core.fusion.orientations import Orientations
 from core.rotation import rotate
+
+if TYPE_CHECKING:
+    # the package brings numba, which readers of results do without
+    from core.fusion.orientations import Orientations
 
 HEEL, BALL = -0.21, 0.53
 """Heel and ball contact points in front of the ankle as fractions of foot length: the −.055 and .14 m of the

@@ -6,7 +6,7 @@ Source: spec/fusion.md §5.2–5.4 and §9 (codes).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -14,8 +14,11 @@ from core.errors import Notice, SignalError
 from core.events.foot_pitch import FootPitchParams, FootPitchState, pitch_signal, push
 from core.events.result import EventKind, GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES, Bools, Floats, Side
-from core.fusion.orientations import Orientations
 from core.rotation import angle_between
+
+if TYPE_CHECKING:
+    # the package brings numba, which readers of results do without
+    from core.fusion.orientations import Orientations
 
 SOURCE: Final = "foot_pitch"
 KINDS: Final[tuple[EventKind, EventKind]] = ("tc", "ic")

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import remainder, tau
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,11 @@ from numpy.typing import NDArray
 from core.errors import Notice
 from core.events.result import GaitEvents, Stride, Strides
 from core.frames import FOOT, SIDES, Bools, Side
-from core.fusion.orientations import Orientations
 from core.rotation import yaw
+
+if TYPE_CHECKING:
+    # the package brings numba, which readers of results do without
+    from core.fusion.orientations import Orientations
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from core.angles import JointAngles
 from core.events.result import Strides
-from core.fusion.orientations import Orientations
 from core.parameters.kinematic import (
     cycle_curves,
     foot_pitch,
@@ -15,6 +16,10 @@ from core.parameters.kinematic import (
 )
 from core.parameters.result import Parameter
 from core.parameters.temporal import per_stride, stride_values, temporal
+
+if TYPE_CHECKING:
+    # the package brings numba, which readers of results do without
+    from core.fusion.orientations import Orientations
 
 __all__ = [
     "cycle_curves",

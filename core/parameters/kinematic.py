@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
@@ -16,9 +16,12 @@ from core.angles import JointAngles
 from core.events.foot_pitch import pitch_signal
 from core.events.result import Strides
 from core.frames import FOOT, SIDES, SUFFIX, Floats, Side
-from core.fusion.orientations import Orientations
 from core.parameters.result import CycleCurves, Parameter
 from core.parameters.temporal import Column, summary
+
+if TYPE_CHECKING:
+    # the package brings numba, which readers of results do without
+    from core.fusion.orientations import Orientations
 
 POINTS: Final = 101
 """Points of a curve: 0, 1, … 100 % of the cycle."""

@@ -24,14 +24,15 @@ import pyarrow.parquet as pq
 
 from core.angles import JointAngles
 from core.body.poses import Poses
-from core.calibration.result import Calibration
 from core.events.result import GaitEvents, Strides
 from core.frames import Floats, Side
-from core.fusion.orientations import Orientations
 from core.parameters import cycle_curves, foot_pitch, per_stride, per_stride_figures, stride_figures
 from core.parameters.result import Parameter
 
 if TYPE_CHECKING:
+    # these packages bring numba, which the web process does without
+    from core.calibration.result import Calibration
+    from core.fusion.orientations import Orientations
     from core.pipeline import Analysis
 
 SCHEMA = 1

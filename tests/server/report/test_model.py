@@ -3,6 +3,8 @@ from __future__ import annotations
 import csv
 import io
 import json
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 
@@ -194,3 +196,8 @@ def test_ten_minutes_are_reported_within_50_ms(make_bundle: MakeBundle) -> None:
         report_model(long, age=40, sex="male")
         best = min(best, time.thread_time() - start)
     assert best < 0.05
+
+
+def test_reading_a_result_does_not_load_the_compiler() -> None:
+    code = "import sys, server.report.model, server.report.tables; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
