@@ -71,8 +71,6 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
             ws_per_message_deflate=False,
         )
     )
-    # uvicorn raises the signal again when it has ended; the workers are still to be stopped then
-    signal.signal(signal.SIGTERM, lambda *_: setattr(server, "should_exit", True))
     host = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{host}:{listener.getsockname()[1]}"
     threading.Thread(target=_when_started, args=(server, lambda: announce(address)), daemon=True).start()

@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import os
 import resource
+import signal
 import sys
 from multiprocessing.connection import Connection
 
@@ -26,6 +27,7 @@ def main() -> None:
     """Answer orders until the worker closes the socket."""
     line = Connection(int(sys.argv[1]))
     die_with(int(sys.argv[2]))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the worker ends us
     when_parent_ends(lambda: os._exit(1))
     logging.basicConfig(level=logging.INFO)
     settings = load_settings()

@@ -104,7 +104,10 @@ def set_manifest(
         manifest_of(manifest)
     this = require_current(c, session_id)
     if this.manifest != manifest:
-        c.execute(update(recording).where(recording.c.id == this.id).values(manifest=manifest))
+        values: dict[str, Any] = {"manifest": manifest}
+        if _sources(this.manifest) != _sources(manifest):
+            values["inspection"] = None  # the files will be read in another way
+        c.execute(update(recording).where(recording.c.id == this.id).values(values))
         audit.record(c, actor, "recording.mapped", "recording", this.id, {"session_id": session_id})
     return get(c, this.id)
 
@@ -123,15 +126,19 @@ def remove_file(c: Connection, actor: audit.Actor | None, session_id: str, name:
 
 
 def inspect(c: Connection, queue: JobQueue, actor: audit.Actor | None, session_id: str) -> JobView:
-    """Ask for "what we found"; the same files are looked at once; raises Conflict no_files."""
+    """Ask for "what we found"; unchanged files are looked at once; raises Conflict no_files."""
     this = require_current(c, session_id)
-    params = {**job_inputs(this), "manifest": this.manifest}
+    if this.inspection is not None and this.job is not None and this.job.state == "done":
+        return this.job
+    # a set that was changed and changed back has been looked at, but what was found has been dropped
+    earlier = select(func.count()).select_from(job).where(job.c.recording_id == this.id)
+    times = c.execute(earlier.where(job.c.kind == INSPECT, job.c.state == "done")).scalar_one()
     declared = hashlib.sha256(repr(_sources(this.manifest)).encode()).hexdigest()[:16]
     view = queue.submit(
         c,
-        key=f"{this.id}:{INSPECT}:{this.input_sha256}:{declared}:{CODE_VERSION}",
+        key=f"{this.id}:{INSPECT}:{this.input_sha256}:{declared}:{times}:{CODE_VERSION}",
         kind=INSPECT,
-        params=params,
+        params={**job_inputs(this), "manifest": this.manifest},
         recording_id=this.id,
         requested_by=actor.user_id if actor else None,
         priority=-1,  # somebody waits in front of the screen

@@ -12,6 +12,7 @@ FULL costs one fsync per commit; a clinic writes rarely.
 from __future__ import annotations
 
 import sqlite3
+import threading
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -20,6 +21,8 @@ from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.pool import ConnectionPoolEntry
 
+MAX_READERS = 45
+"""Connections beyond the five that are kept open: more than a web process has threads."""
 BUSY_TIMEOUT_MS = 5000
 """How long a writer waits for another one before SQLITE_BUSY."""
 
@@ -34,13 +37,15 @@ class Database:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        # threads of one process queue here in turn; SQLite's own waiting is a lottery that somebody may lose
+        self._turn = threading.RLock()
         self._writer = _engine(path, begin="BEGIN IMMEDIATE", query_only=False)
         self._reader = _engine(path, begin="BEGIN", query_only=True)
 
     @contextmanager
     def write(self) -> Iterator[Connection]:
         """One transaction that holds the write lock from its first statement; commits at the block's end."""
-        with self._writer.begin() as connection:
+        with self._turn, self._writer.begin() as connection:
             yield connection
 
     @contextmanager
@@ -112,7 +117,10 @@ def foreign_key_violations(connection: Connection) -> list[str]:
 def _engine(path: Path, *, begin: str, query_only: bool, foreign_keys: bool = True) -> Engine:
     # hide_parameters: an error's text goes to the log, and its parameters may be a patient's
     engine = create_engine(
-        f"sqlite:///{path}", connect_args={"timeout": BUSY_TIMEOUT_MS / 1000}, hide_parameters=True
+        f"sqlite:///{path}",
+        max_overflow=MAX_READERS,
+        connect_args={"timeout": BUSY_TIMEOUT_MS / 1000},
+        hide_parameters=True,
     )
 
     @event.listens_for(engine, "connect")

@@ -31,6 +31,17 @@ def test_a_job_is_done_with_its_result_stored(clinic: Clinic, workers: Workers) 
     assert clinic.blobs.read(clinic.patient.id, result.files["result.txt"].sha256) == b"signals"
 
 
+def test_the_warm_child_is_kept_from_job_to_job(clinic: Clinic, workers: Workers) -> None:
+    def child_at(stage: str) -> str:
+        view, reached, gate = clinic.hold(stage)
+        pid = until(lambda: reached.exists() and reached.read_text())
+        gate.touch()
+        clinic.ended(view)
+        return str(pid)
+
+    assert child_at("first") == child_at("second")
+
+
 @pytest.mark.parametrize("stage", [*STAGES, "publish"])
 def test_a_killed_worker_is_replaced_and_the_job_has_one_result(
     clinic: Clinic, workers: Workers, stage: str

@@ -37,7 +37,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progre
         case "bug":
             raise ZeroDivisionError
         case "memory":
-            bytearray(1 << 46)
+            bytearray(5 << 30)  # untouched, so only the limit of the address space refuses it
     while params.get("spin"):
         pass
     return {"result.txt": b"".join(f.read() for f in files) or b"nothing"}

@@ -260,7 +260,7 @@ class QueueModel(RuleBasedStateMachine):
     @rule(data=st.data())
     def cancel(self, data: st.DataObject) -> None:
         with self.bench.db.read() as c:
-            ids = list(c.execute(job.select().with_only_columns(job.c.id)).scalars())
+            ids = list(c.execute(job.select().with_only_columns(job.c.id).order_by(job.c.seq)).scalars())
         if ids:
             self.bench.cancel(data.draw(st.sampled_from(ids)))
 

@@ -259,6 +259,41 @@ def test_an_inspection_of_files_that_have_changed_is_not_kept(clinic: Clinic) ->
         recordings.publish_inspection(c, before.id, before.input_sha256, {"devices": []})
 
 
+def test_files_are_looked_at_once_until_they_or_the_way_to_read_them_change(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    clinic.upload(session_id, "a", b"1")
+
+    def look() -> str:
+        with clinic.db.write() as c:
+            view = recordings.inspect(c, clinic.queue, None, session_id)
+            assert recordings.inspect(c, clinic.queue, None, session_id).id == view.id
+        claim = clinic.queue.claim("w", (recordings.INSPECT,))
+        if claim is not None:
+            digest = claim.params["input_sha256"]
+            found: dict[str, object] = {"devices": []}
+            assert clinic.queue.finish(
+                claim, lambda c: recordings.publish_inspection(c, str(claim.recording_id), digest, found)
+            )
+        assert clinic.recording(session_id).state == "ready"
+        return view.id
+
+    first = look()
+    assert look() == first
+    clinic.upload(session_id, "b", b"2")
+    with clinic.db.write() as c:
+        recordings.remove_file(c, None, session_id, "b")
+    assert clinic.recording(session_id).state == "draft"
+    second = look()
+    assert second != first
+    with clinic.db.write() as c:
+        recordings.set_manifest(c, None, session_id, {"sensors": {"x": "pelvis"}})
+    assert look() == second
+    source = {"file": "a", "rate_hz": 100.0, "columns": {"pelvis": {"acc": ["x", "y", "z"]}}}
+    with clinic.db.write() as c:
+        recordings.set_manifest(c, None, session_id, {"sources": [source]})
+    assert look() != second
+
+
 def test_erasing_a_patient_needs_the_code_and_leaves_only_the_trail(clinic: Clinic) -> None:
     patient_id, other_id = clinic.patient("P-1"), clinic.patient("P-2")
     session_id, other_session = clinic.session(patient_id), clinic.session(other_id)

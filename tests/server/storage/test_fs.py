@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import errno
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -11,42 +10,10 @@ import pytest
 from server.storage import fs
 from server.storage.blobs import BlobStore, IntegrityError
 from tests.data import ROOT
+from tests.faults.failing import FailingSystem
 
 SPACE = "a" * 32
 CONTENT = b"seven sensors"
-
-
-class FailingSystem(fs.System):
-    """The operating system, but its n-th call fails."""
-
-    def __init__(self, fail_at: int, number: int) -> None:
-        self.calls = 0
-        self._fail_at, self._number = fail_at, number
-
-    def _count(self) -> None:
-        self.calls += 1
-        if self.calls == self._fail_at:
-            raise OSError(self._number, os.strerror(self._number))
-
-    def open(self, path: Path, flags: int) -> int:
-        self._count()
-        return super().open(path, flags)
-
-    def write(self, fd: int, data: bytes | memoryview) -> int:
-        self._count()
-        return super().write(fd, data)
-
-    def fsync(self, fd: int) -> None:
-        self._count()
-        super().fsync(fd)
-
-    def replace(self, source: Path, target: Path) -> None:
-        self._count()
-        super().replace(source, target)
-
-    def mkdir(self, path: Path) -> None:
-        self._count()
-        super().mkdir(path)
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EMFILE])

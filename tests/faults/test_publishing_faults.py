@@ -1,0 +1,119 @@
+"""The disk refuses in the middle of an upload or a publication: no row without its file, a retry works."""
+
+from __future__ import annotations
+
+import errno
+import threading
+from collections.abc import Callable
+
+import pytest
+
+from core.errors import SagittalError
+from server.jobs.task import load
+from server.jobs.worker import Worker
+from server.services import checks, recordings
+from server.services.sweep import sweep
+from server.storage import fs
+from tests.faults.clinic import Clinic
+from tests.faults.failing import FailingSystem
+
+
+def fail_at_every_call(
+    monkeypatch: pytest.MonkeyPatch, act: Callable[[], bool], after: Callable[[bool], None]
+) -> int:
+    """Repeat `act` with the first, second … call failing until it passes; returns the number of failures."""
+    failures = 0
+    while True:
+        monkeypatch.setattr(fs, "system", FailingSystem(failures + 1, errno.ENOSPC))
+        passed = act()
+        monkeypatch.setattr(fs, "system", fs.System())
+        after(passed)
+        if passed:
+            return failures
+        failures += 1
+
+
+def test_an_upload_that_fails_anywhere_leaves_no_row_and_can_be_sent_again(
+    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def upload() -> bool:
+        try:
+            with recordings.receive(
+                clinic.db, clinic.blobs, clinic.settings, None, clinic.session.id, "b.txt"
+            ) as incoming:
+                incoming.write(b"first half, ")
+                incoming.write(b"second half")
+                incoming.keep()
+        except OSError:
+            return False
+        return True
+
+    def after(passed: bool) -> None:
+        assert checks.check(clinic.db, clinic.blobs) == []
+        with clinic.db.read() as c:
+            names = [f.name for f in recordings.require_current(c, clinic.session.id).files]
+        assert ("b.txt" in names) is passed
+
+    assert fail_at_every_call(monkeypatch, upload, after) >= 5
+    assert sweep(clinic.db, clinic.blobs, grace_s=0.0) == 0
+
+
+def test_a_result_that_cannot_be_stored_fails_its_job_with_a_reason(
+    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    load(clinic.settings.task_modules)
+    stop = threading.Event()
+    worker = Worker(clinic.settings, clinic.db, clinic.blobs, clinic.queue, stop)
+    thread = threading.Thread(target=worker.run)
+    thread.start()
+
+    def work() -> bool:
+        view = clinic.ended(clinic.submit())
+        assert view.state == "done" or view.error_code == "not_stored"
+        return view.state == "done"
+
+    def after(passed: bool) -> None:
+        assert len(clinic.results()) == int(passed)
+        assert checks.check(clinic.db, clinic.blobs) == []
+
+    try:
+        assert fail_at_every_call(monkeypatch, work, after) >= 4
+    finally:
+        stop.set()
+        thread.join()
+
+
+def test_a_file_swept_before_its_row_was_written_is_noticed(clinic: Clinic) -> None:
+    with recordings.receive(
+        clinic.db, clinic.blobs, clinic.settings, None, clinic.session.id, "b.txt"
+    ) as upload:
+        upload.write(b"content")
+        kept = upload._receiver.keep
+
+        def keep_and_lose() -> object:
+            blob = kept()
+            clinic.blobs.path(clinic.patient.id, blob.sha256).unlink()
+            return blob
+
+        upload._receiver.keep = keep_and_lose  # type: ignore[method-assign, assignment]
+        with pytest.raises(SagittalError, match="is not there"):
+            upload.keep()
+    assert checks.check(clinic.db, clinic.blobs) == []
+
+
+def write_notes(clinic: Clinic, times: int) -> None:
+    for i in range(times):
+        with clinic.db.write() as c:
+            c.exec_driver_sql("UPDATE patient SET note = ?", (f"{i:08}" * 8000,))
+
+
+def test_a_reader_that_holds_its_snapshot_stops_nobody_and_the_log_shrinks_after(clinic: Clinic) -> None:
+    log = clinic.settings.database.with_name("sagittal.db-wal")
+    with clinic.db.read() as reader:
+        reader.exec_driver_sql("SELECT count(*) FROM patient").scalar_one()
+        write_notes(clinic, 100)
+        grown = log.stat().st_size
+    write_notes(clinic, 100)
+    assert log.stat().st_size < 1.2 * grown  # the log was started anew
+    clinic.db.close()
+    assert not log.exists()
