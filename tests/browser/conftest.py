@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import socket
@@ -21,6 +22,7 @@ from server.auth.passwords import hash_password
 from server.auth.roles import Role
 from server.storage.db import Database
 from server.storage.migrate import upgrade
+from tests.browser import filling
 from tests.data import ROOT
 
 NAME, PASSWORD = "anna", "correct horse battery"
@@ -39,11 +41,12 @@ class RunningServer:
     url: str
     folder: Path
 
-    def client(self) -> httpx.Client:
+    @contextlib.contextmanager
+    def client(self) -> Iterator[httpx.Client]:
         """A signed-in API client."""
-        client = httpx.Client(base_url=self.url, timeout=60)
-        client.post("/api/v1/sign-in", json={"name": NAME, "password": PASSWORD}).raise_for_status()
-        return client
+        with httpx.Client(base_url=self.url, timeout=60) as client:
+            client.post("/api/v1/sign-in", json={"name": NAME, "password": PASSWORD}).raise_for_status()
+            yield client
 
 
 @pytest.fixture(scope="session")
@@ -168,3 +171,53 @@ def _matters(kind: str, text: str) -> bool:
 def _ours(text: str) -> bool:
     # viser's client tries `new Function` once; its own document's policy refuses that, and it goes on without
     return "unsafe-eval" not in text
+
+
+@dataclass(frozen=True)
+class Filled:
+    """A clinic with something on every page.
+
+    Parameters
+    ----------
+    patient : with three visits. done : analysed. unread : the files are no recording. unmapped : uploaded,
+        not analysed. unusable : analysed with one sensor, so without strides. empty : nothing uploaded.
+    """
+
+    patient: str
+    done: str
+    unread: str
+    unmapped: str
+    unusable: str
+    empty: str
+
+
+@pytest.fixture(scope="session")
+def filled(running: RunningServer) -> Filled:
+    files, sensors = filling.simulated_files()
+    with running.client() as client:
+        patient = filling.add(
+            client,
+            "/patients",
+            code="P-0042",
+            sex="male",
+            birth_year=1968,
+            height_m=1.76,
+            note="Stroke, left side affected",
+        )["id"]
+        filling.add(client, "/patients", code="P-0043", sex="female", birth_year=1951)
+        other = filling.add(client, "/patients", code="P-0047", note="Knee, after ligament repair")["id"]
+        done = filling.add_session(client, patient, "Walk, own pace", note="Barefoot, no aid")
+        earlier = filling.add_session(client, patient, "Walk, first visit", performed_on="2026-10-21")
+        for session in (done, earlier):
+            filling.upload(client, session, files)
+            assert filling.analyse(client, session, sensors)["state"] == "done"
+        unmapped = filling.add_session(client, patient, "Walk, with stick", performed_on="2026-11-20")
+        filling.upload(client, unmapped, files)
+        unread = filling.add_session(client, other, "Walk")
+        filling.upload(client, unread, {"notes.txt": b"no recording at all\n"})
+        unusable = filling.add_session(client, other, "Walk, one sensor", performed_on="2026-11-19")
+        name, content = next(iter(files.items()))
+        filling.upload(client, unusable, {name: content})
+        filling.analyse(client, unusable, {next(iter(sensors)): "shank_l"})
+        empty = filling.add_session(client, other, "Walk, later", performed_on="2026-11-21")
+    return Filled(patient, done, unread, unmapped, unusable, empty)

@@ -31,9 +31,9 @@ def add(client: httpx.Client, path: str, **body: Any) -> dict[str, Any]:
 def add_session(client: httpx.Client, patient_id: str, title: str, **more: Any) -> str:
     """A visit; returns its id."""
     day = more.pop("performed_on", "2026-11-18")
-    session_id: str = add(
-        client, f"/patients/{patient_id}/sessions", title=title, performed_on=day, **more
-    )["id"]
+    session_id: str = add(client, f"/patients/{patient_id}/sessions", title=title, performed_on=day, **more)[
+        "id"
+    ]
     return session_id
 
 

@@ -136,5 +136,5 @@ def test_a_file_that_is_no_recording_is_said_in_a_sentence(
     note = page.locator(".note.bad:visible")
     expect(note).to_contain_text("These files could not be read", timeout=30_000)
     assert len(note.inner_text()) > 60
-    expect(page.locator(".files")).to_contain_text("walk 🚶.jpg")
+    expect(page.locator("details .files")).to_contain_text("walk 🚶.jpg")
     context.close()

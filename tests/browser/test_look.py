@@ -1,0 +1,135 @@
+"""Every page obeys the design system: light and dark, desk, laptop, tablet and phone."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page
+
+from tests.browser.conftest import Filled, Opener, RunningServer
+from tests.browser.design import layout_faults, text_faults
+from tests.data import ROOT
+
+DESK, LAPTOP, TABLET, PHONE = (1280, 800), (1024, 768), (810, 1080), (360, 740)
+SIZES = (DESK, LAPTOP, TABLET, PHONE)
+
+Address = Callable[[Filled], str]
+PAGES: dict[str, Address] = {
+    "sign-in": lambda f: "/sign-in",
+    "set-up": lambda f: "/set-up/no-such-token",
+    "patients": lambda f: "/patients",
+    "patient": lambda f: f"/patients/{f.patient}",
+    "new-session": lambda f: f"/patients/{f.patient}/sessions/new",
+    "upload": lambda f: f"/sessions/{f.empty}/upload",
+    "found": lambda f: f"/sessions/{f.unmapped}/upload",
+    "unread": lambda f: f"/sessions/{f.unread}/upload",
+    "session": lambda f: f"/sessions/{f.done}",
+    "session-empty": lambda f: f"/sessions/{f.empty}",
+    "session-failed": lambda f: f"/sessions/{f.unusable}",
+    "kinematics": lambda f: f"/sessions/{f.done}/kinematics",
+    "data": lambda f: f"/sessions/{f.done}/data",
+    "print": lambda f: f"/sessions/{f.done}/print",
+    "jobs": lambda f: "/jobs",
+    "users": lambda f: "/users",
+    "audit": lambda f: "/audit",
+    "account": lambda f: "/account",
+    "error": lambda f: "/patients/00000000000000000000000000000000",
+}
+"""Name of a screenshot → address."""
+
+PAPER = {"print"}
+"""A sheet of A4 has its own width; it scrolls inside the page on small screens."""
+
+OUT = {"sign-in", "set-up"}
+FIGURE = {"session", "kinematics"}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_page_obeys_the_design_system(name: str, opened: Opener, filled: Filled) -> None:
+    faults = []
+    page = opened(PAGES[name](filled), signed_in=name not in OUT)
+    page.wait_for_load_state()
+    for width, height in SIZES:
+        page.set_viewport_size({"width": width, "height": height})
+        for scheme in ("light", "dark"):
+            # without motion: colours must not be read in the middle of a transition
+            page.emulate_media(color_scheme=scheme, reduced_motion="reduce")  # type: ignore[arg-type]
+            page.wait_for_timeout(30)
+            found = layout_faults(page) | text_faults(page)
+            faults += [f"{width} {scheme}: {found}"] if found else []
+    assert not faults, "\n".join(faults)
+
+
+def test_the_checks_can_fail(opened: Opener) -> None:
+    page = opened("/patients")
+    page.evaluate(
+        "() => { document.querySelector('main').insertAdjacentHTML('beforeend', "
+        "`<button id='tiny'>x</button><p id='faint'>faint</p><div id='wide'>wide</div>`);"
+        "const s = (id, css) => Object.assign(document.getElementById(id).style, css);"
+        "s('tiny', {width: '20px', height: '20px'}); s('faint', {color: '#bbb', fontSize: '9px'});"
+        "s('wide', {width: '3000px'}); }"
+    )
+    assert set(layout_faults(page)) == {"sideways", "small", "over"}
+    assert any("contrast" in k for k in text_faults(page))
+    assert any("size 9" in k for k in text_faults(page))
+
+
+def test_dialogs_obey_the_design_system(opened: Opener, filled: Filled) -> None:
+    for path, button in (
+        ("/patients", "new-patient"),
+        (f"/patients/{filled.patient}", "edit-patient"),
+        (f"/patients/{filled.patient}", "delete-patient"),
+        ("/users", "new-user"),
+    ):
+        for width, height in (DESK, PHONE):
+            page = opened(path, width=width, height=height)
+            page.locator(f"[data-open={button}]").click()
+            found = layout_faults(page) | text_faults(page)
+            assert not found, f"{button} {width}: {found}"
+            box = page.locator("dialog[open]").bounding_box()
+            assert box is not None
+            assert box["x"] >= 0
+            assert box["x"] + box["width"] <= width
+            page.close()
+
+
+def test_the_print_view_is_two_sheets_of_paper(opened: Opener, filled: Filled) -> None:
+    page = opened(PAGES["print"](filled))
+    pdf = page.pdf(prefer_css_page_size=True)
+    assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ") == 2
+
+
+def test_screenshots_of_every_page(
+    opened: Opener, solid: Browser, running: RunningServer, filled: Filled, tmp_path: Path
+) -> None:
+    """Written to docs/screens when SAGITTAL_SCREENS=1, else thrown away; the figure must be on them."""
+    folder = ROOT / "docs" / "screens" if os.environ.get("SAGITTAL_SCREENS") == "1" else tmp_path
+    for name, address in PAGES.items():
+        browser = {"browser": solid} if name in FIGURE else {}
+        page = opened(address(filled), signed_in=name not in OUT, **browser)
+        if name in FIGURE:
+            _wait_for_figure(page)
+        page.screenshot(path=folder / f"{name}.png")
+        if name in {"session", "found", "kinematics"}:
+            page.set_viewport_size({"width": TABLET[0], "height": TABLET[1]})
+            page.wait_for_timeout(300)
+            page.screenshot(path=folder / f"{name}-tablet.png")
+        page.close()
+        if name in {"session", "kinematics", "patients"}:
+            page = opened(address(filled), scheme="dark", **browser)
+            if name in FIGURE:
+                _wait_for_figure(page)
+            page.screenshot(path=folder / f"{name}-dark.png")
+            page.close()
+    sizes = [p.stat().st_size for p in folder.glob("*.png")]
+    assert len(sizes) == len(PAGES) + 6
+    assert sum(sizes) < 6_000_000
+
+
+def _wait_for_figure(page: Page) -> None:
+    page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
+    page.frame_locator("gait-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
+    page.wait_for_timeout(2500)
