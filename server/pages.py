@@ -95,6 +95,7 @@ def new_session(
     """Ask for protocol, date, height and aids of a new visit."""
     with db.read() as c:
         patient = patients.get(c, pid)
+    _opened(db, who, "patient", pid)
     today = dt.datetime.now(dt.UTC).date().isoformat()
     return _page(
         request, db, who, "session-new.html", "patients",
@@ -111,6 +112,7 @@ def upload(
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
         view = upload_views.upload_view(recordings.current(c, sid), session, patient)
+    _opened(db, who, "session", sid)
     return _page(request, db, who, "upload.html", "patients", session=session, patient=patient, **view)
 
 
@@ -146,6 +148,7 @@ def data(
     with db.read() as c:
         context = session_views.base(c, sid)
         context |= session_views.downloads(c, sid, results=who.may(Action.READ_RESULT))
+    _opened(db, who, "session", sid)
     return _page(request, db, who, "data.html", "patients", **context)
 
 
@@ -206,11 +209,11 @@ def _session_page(
     with db.read() as c:
         context = session_views.base(c, sid)
         latest = analyses.latest(c, sid) if who.may(Action.READ_RESULT) else None
+    if latest is None and paper:
+        return RedirectResponse(f"/sessions/{sid}", status_code=303)
     if latest is not None:
         context["report"] = session_views.report(blobs, latest, context, paper=paper)
-        _opened(db, who, "session", sid)
-    elif paper:
-        return RedirectResponse(f"/sessions/{sid}", status_code=303)
+    _opened(db, who, "session", sid)
     return _page(request, db, who, template, "patients", **context)
 
 

@@ -12,6 +12,7 @@ from urllib.parse import quote
 from fastapi import FastAPI
 from fastapi.exceptions import HTTPException, RequestValidationError
 from jinja2 import TemplateNotFound
+from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException as AnyHttpException
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
@@ -26,6 +27,10 @@ from server.auth.headers import add_security_headers
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
 TEMPLATES = Jinja2Templates(Path(web.__file__).parent / "templates")
+
+
+# all other exceptions go on to the server, which logs them
+LOGGED_HERE = (SagittalError, OperationalError)
 
 
 class Problem(HTTPException):
@@ -86,6 +91,8 @@ def as_problem(error: Exception) -> Problem:
         return Problem(
             error.status_code, code, SENTENCES.get(code, said) if is_bare else said, headers=error.headers
         )
+    if isinstance(error, OperationalError) and "locked" in str(error.orig):
+        return Problem(503, "database_busy", SENTENCES["database_busy"], headers={"Retry-After": "5"})
     return Problem(500, "internal_error", SENTENCES["internal_error"])
 
 
@@ -132,6 +139,8 @@ def install(app: FastAPI) -> None:
 
     async def handle(connection: HTTPConnection, error: Exception) -> Response | None:
         problem = as_problem(error)
+        if problem.status == HTTPStatus.INTERNAL_SERVER_ERROR and isinstance(error, LOGGED_HERE):
+            log.error("%s %s", connection.scope["type"], problem.code, exc_info=error)
         if isinstance(connection, WebSocket):
             await refuse_websocket(connection, problem)
             return None
@@ -140,7 +149,7 @@ def install(app: FastAPI) -> None:
         add_security_headers(response.headers)
         return response
 
-    for kind in (AnyHttpException, SagittalError, RequestValidationError, Exception):
+    for kind in (AnyHttpException, SagittalError, RequestValidationError, OperationalError, Exception):
         app.add_exception_handler(kind, handle)  # type: ignore[arg-type]
 
 
@@ -177,5 +186,6 @@ SENTENCES = {
     "forbidden": "Your role does not allow this. Ask an administrator if you need it.",
     "not_found": "There is nothing at this address, or it has been deleted.",
     "method_not_allowed": "This address does not offer that method; see /api/v1/openapi.json.",
+    "database_busy": "Another change takes unusually long. Try again in some seconds.",
     "internal_error": "Something went wrong on the server. The server's log has the details; try again.",
 }

@@ -46,7 +46,7 @@ async def _credentials(request: Request) -> schemas.SignIn:
     "/sign-in",
     dependencies=[require(Action.SIGN_IN)],
     response_model=schemas.User,
-    responses=refusals(401, 429, 503),
+    responses=refusals(401, 429),
     openapi_extra=PUBLIC
     | {"requestBody": {"required": True, "content": {"application/json": _BODY, _FORM: _BODY}}},
 )
@@ -88,7 +88,7 @@ def sign_out(
     status_code=201,
     dependencies=[require(Action.SET_UP)],
     response_model=schemas.User,
-    responses=refusals(404, 409, 503),
+    responses=refusals(404, 409),
     openapi_extra=PUBLIC,
 )
 def set_up(token: str, body: schemas.SetUp, request: Request, db: Db, logins: OpenLogins) -> Any:
@@ -119,7 +119,7 @@ def read_account(who: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> schem
     )
 
 
-@router.post("/account/password", status_code=204, responses=refusals(429, 503))
+@router.post("/account/password", status_code=204, responses=refusals(429))
 def change_password(
     body: schemas.PasswordChange,
     request: Request,

@@ -27,7 +27,7 @@ def list_users(db: Db, who: Admin) -> list[Row[Any]]:
         return accounts.everyone(c)
 
 
-@router.post("", status_code=201, response_model=schemas.User, responses=refusals(409, 503))
+@router.post("", status_code=201, response_model=schemas.User, responses=refusals(409))
 def add_user(body: schemas.UserNew, db: Db, who: Admin) -> Row[Any]:
     """Add an account with its first password."""
     hashed = hash_password(body.password)
@@ -37,7 +37,7 @@ def add_user(body: schemas.UserNew, db: Db, who: Admin) -> Row[Any]:
     return row
 
 
-@router.patch("/{user_id}", response_model=schemas.User, responses=refusals(409, 503))
+@router.patch("/{user_id}", response_model=schemas.User, responses=refusals(409))
 def change_user(user_id: Id, body: schemas.UserChange, db: Db, logins: OpenLogins, who: Admin) -> Row[Any]:
     """Change role, shown name, password, or close the account; sign-ins end with a new role."""
     values = body.model_dump(exclude_unset=True, mode="json")

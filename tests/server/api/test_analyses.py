@@ -158,6 +158,21 @@ async def test_opening_a_report_is_audited_once(visit: Visit) -> None:
         assert await count() == before + 1
 
 
+async def test_every_page_about_a_person_leaves_one_audit_row(visit: Visit) -> None:
+    clinic = visit.clinic
+    async with clinic.client("admin", headers={"Accept": "text/html"}) as client:
+        patient = (await client.get(f"{API}/sessions/{visit.session}")).json()["patient_id"]
+        pages = {f"/patients/{patient}": patient, f"/patients/{patient}/sessions/new": patient}
+        for tab in ("", "/upload", "/kinematics", "/data", "/print"):
+            pages[f"/sessions/{visit.session}{tab}"] = visit.session
+        for page, resource in pages.items():
+            before = (await client.get(f"{API}/audit", params={"limit": 1})).json()[0]["seq"]
+            assert (await client.get(page)).status_code == 200
+            rows = (await client.get(f"{API}/audit", params={"limit": 5})).json()
+            new = [r for r in rows if r["seq"] > before]
+            assert [(r["resource_id"], r["user_name"]) for r in new] == [(resource, "admin")], page
+
+
 async def test_a_damaged_result_is_never_sent(visit: Visit) -> None:
     async with visit.clinic.client("viewer") as client:
         analysis = (await client.get(f"{visit.path}/analyses")).json()[0]

@@ -1,6 +1,9 @@
 from __future__ import annotations
 
+import contextlib
 import logging
+import sqlite3
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,7 +14,8 @@ from server.auth.access import require
 from server.auth.roles import Action
 from server.problems import Problem, as_problem
 from server.services.errors import NotFound
-from tests.server.clinic import Clinic
+from server.storage import db
+from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
 
@@ -99,6 +103,20 @@ async def test_an_unforeseen_error_tells_neither_client_nor_log_whose_data_it_wa
             await client.get(f"{API}/broken/database")
     assert CANARY not in str(raised.value)
     assert CANARY not in caplog.text
+
+
+async def test_a_busy_database_is_said_and_not_an_internal_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(db, "BUSY_TIMEOUT_MS", 100)
+    async with open_clinic(tmp_path) as clinic, clinic.client("clinician") as client:
+        with contextlib.closing(sqlite3.connect(clinic.settings.database, isolation_level=None)) as other:
+            other.execute("BEGIN IMMEDIATE")
+            answer = await client.post(f"{API}/patients", json={"code": "waits"})
+            other.execute("ROLLBACK")
+        assert (answer.status_code, answer.json()["code"]) == (503, "database_busy")
+        assert answer.headers["retry-after"]
+        assert (await client.post(f"{API}/patients", json={"code": "waits"})).status_code == 201
 
 
 async def test_no_log_line_and_no_error_body_holds_what_was_entered_about_a_patient(
