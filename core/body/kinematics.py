@@ -53,7 +53,7 @@ def nominal_body(height_m: float | None) -> tuple[BodyModel, tuple[Notice, ...]]
         f"Body height is not given; the figure is drawn with {NOMINAL_HEIGHT_M:.2f} m. Enter the height "
         "to see true proportions and distances; joint angles do not depend on it."
     )
-    return BodyModel.from_height(NOMINAL_HEIGHT_M), (Notice("height_assumed", message),)
+    return BodyModel.from_height(NOMINAL_HEIGHT_M), (Notice("height_assumed", message, severity="info"),)
 
 
 def forward_kinematics(

@@ -87,7 +87,7 @@ def remove_relative_drift(
             "and was brought back to its mean over straight walking. Slow changes of rotation posture during "
             "the take are taken out with it: read transverse angles as changes within a stride."
         )
-        notices.append(Notice("heading_rereferenced", message, sensor=worst))
+        notices.append(Notice("heading_rereferenced", message, sensor=worst, severity="info"))
     return corrected, largest, notices
 
 
