@@ -33,6 +33,7 @@ def erase_patient(
         c.execute(delete(patient).where(patient.c.id == patient_id))
         audit.record(c, actor, "patient.erased", "patient", patient_id, {"sessions": found.sessions})
     blobs.erase(patient_id)
+    db.fold()
 
 
 def erase_session(db: Database, blobs: BlobStore, actor: audit.Actor | None, session_id: str) -> None:

@@ -77,6 +77,11 @@ class Database:
         timeout = BUSY_TIMEOUT_MS / 1000
         return sqlite3.connect(self.path, timeout=timeout, isolation_level=None, check_same_thread=False)
 
+    def fold(self) -> None:
+        """Move the write-ahead log into the file and empty it, what was deleted is gone then."""
+        with closing(self._plain()) as connection:
+            connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+
     def close(self) -> None:
         """Close all connections; the last one to leave folds the write-ahead log into the file."""
         self._reader.dispose()
@@ -137,7 +142,7 @@ def _engine(path: Path, *, begin: str, query_only: bool, foreign_keys: bool = Tr
 
 
 def _set_pragmas(connection: DBAPIConnection, query_only: bool, foreign_keys: bool) -> None:
-    """Set what SQLite keeps per connection: WAL, durable commits, enforced keys, a schema not trusted."""
+    """Set what SQLite keeps per connection: WAL, durable commits, enforced keys, zeroed deletions."""
     cursor = connection.cursor()
     for pragma in (
         f"busy_timeout={BUSY_TIMEOUT_MS}",
@@ -145,6 +150,7 @@ def _set_pragmas(connection: DBAPIConnection, query_only: bool, foreign_keys: bo
         "synchronous=FULL",
         f"foreign_keys={'ON' if foreign_keys else 'OFF'}",
         "trusted_schema=OFF",
+        "secure_delete=ON",
         f"query_only={'ON' if query_only else 'OFF'}",
     ):
         cursor.execute(f"PRAGMA {pragma}")

@@ -322,6 +322,23 @@ def test_erasing_a_patient_needs_the_code_and_leaves_only_the_trail(clinic: Clin
     assert checks.check(clinic.db, clinic.blobs) == []
 
 
+def test_no_byte_of_an_erased_patient_is_left_in_the_data_folder(clinic: Clinic) -> None:
+    patient_id = clinic.patient("CANARY-CODE")
+    with clinic.db.write() as c:
+        patients.change(c, clinic.who, patient_id, {"note": "CANARY-NOTE " * 500})
+        session_id = sessions.create(c, clinic.who, patient_id, title="CANARY-TITLE").id
+    clinic.upload(session_id, "CANARY-FILE", b"CANARY-BYTES")
+    clinic.analyse(session_id, b"CANARY-RESULT")
+
+    def found() -> set[str]:
+        files = [p for p in clinic.settings.data_dir.rglob("*") if p.is_file()]
+        return {str(p.name) for p in files if b"CANARY" in p.read_bytes()}
+
+    assert found()
+    erasure.erase_patient(clinic.db, clinic.blobs, clinic.who, patient_id, confirm="CANARY-CODE")
+    assert found() == set()
+
+
 def test_erasing_a_session_keeps_the_files_another_one_shares(clinic: Clinic) -> None:
     patient_id = clinic.patient()
     one, two = clinic.session(patient_id), clinic.session(patient_id)
