@@ -49,16 +49,15 @@ class Problem(HTTPException):
         super().__init__(status, detail, dict(headers or {}))
         self.status = status
         self.code = code
-        self.sentence = detail
         self.errors = errors
 
     def to_json(self) -> dict[str, Any]:
         """Return the members of RFC 9457 §3.1 plus `code` and, for bad fields, `errors`."""
         body: dict[str, Any] = {
-            "type": "about:blank",
-            "title": HTTPStatus(self.status).phrase,
+            "type": f"urn:sagittal:problem:{self.code}",
+            "title": self.code.replace("_", " ").capitalize(),
             "status": self.status,
-            "detail": self.sentence,
+            "detail": self.detail,
             "code": self.code,
         }
         if self.errors is not None:

@@ -41,7 +41,7 @@ def user(data_dir: Path | None, name: str, role: str) -> int:
                 accounts.change(c, known, {"password_hash": hashed})
                 audit.record(c, None, "user.password_changed", "user", known, {"by": "console"})
     except Problem as error:
-        sys.stderr.write(f"{error.sentence}\n")
+        sys.stderr.write(f"{error.detail}\n")
         return 1
     sys.stdout.write(f"{name} can sign in.\n")
     sys.stdout.flush()

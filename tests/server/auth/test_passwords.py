@@ -38,7 +38,7 @@ def test_too_short_and_too_long_passwords_are_refused(password: str) -> None:
     with pytest.raises(Problem) as refused:
         hash_password(password)
     assert refused.value.code == "weak_password"
-    assert not password or password not in refused.value.sentence
+    assert not password or password not in refused.value.detail
 
 
 class Clock:
