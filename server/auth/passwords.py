@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import threading
 from collections.abc import Iterator
 
@@ -21,7 +22,6 @@ _HASHER = PasswordHash((Argon2Hasher(),))
 _SLOTS = threading.BoundedSemaphore(2)
 # and without an end to the waiting it would take every thread that answers requests
 PATIENCE_S = 5.0
-_UNKNOWN = _HASHER.hash("no account has this hash")
 
 
 def hash_password(password: str) -> str:
@@ -41,12 +41,20 @@ def verify_password(password: str, stored: str | None) -> bool:
     """Tell whether the password is right; None (no such account) takes as long as a wrong password."""
     if len(password) > MAX_LENGTH:
         password = ""
+    nobody = _nobody()
     with _slot():
         try:
-            right = _HASHER.verify(password, stored or _UNKNOWN)
+            right = _HASHER.verify(password, stored or nobody)
         except PwdlibError:
             return False
     return right and stored is not None
+
+
+@functools.cache
+def _nobody() -> str:
+    """Return the hash that unknown names are checked against; made at the first sign-in, not at import."""
+    with _slot():
+        return _HASHER.hash("no account has this password")
 
 
 @contextlib.contextmanager
