@@ -118,11 +118,12 @@ def test_a_renewed_lease_is_not_taken_an_expired_one_is(bench: Bench) -> None:
     assert (second.job_id, second.attempt) == (first.job_id, 2)
 
 
-def test_every_write_of_a_lost_claim_is_refused(bench: Bench) -> None:
+@pytest.mark.parametrize("taker", ["one", "two"])
+def test_every_write_of_a_lost_claim_is_refused(bench: Bench, taker: str) -> None:
     bench.submit("a")
     lost = bench.claim("one")
     bench.clock.advance(LEASE_S * 1.1)
-    bench.claim("two")
+    bench.claim(taker)
     before = bench.queue.get(lost.job_id)
     assert bench.queue.heartbeat(lost) is Hold.LOST
     assert not bench.queue.progress(lost, "angles", 0.5)
