@@ -28,6 +28,7 @@ class TimelineParams:
     min_duration_s : shorter takes cannot hold 1 s of rest and two strides [our choice].
     min_share : a sensor that lasts less than this share of the median duration does not cut the take for the
         others; it is invalid where it has no samples [our choice].
+    max_stretch : samples of the axis per recorded sample; beyond, the clock must have jumped [our choice].
     on_grid : largest distance from the axis, in samples, at which a sample counts as lying on it.
     """
 
@@ -35,6 +36,7 @@ class TimelineParams:
     min_rate_hz: float = 40.0
     min_duration_s: float = 5.0
     min_share: float = 0.9
+    max_stretch: float = 20.0
     on_grid: float = 0.01
 
 
@@ -48,7 +50,7 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
     ------
     SignalError
         no_mapping, missing_gyro (no usable sensor), duplicate_stream, no_common_clock, sample_rate_too_low,
-        no_overlap, too_short.
+        no_overlap, too_short, clock_jump.
     """
     params = params or TimelineParams()
     worn = {
@@ -76,6 +78,14 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
     rate, rate_notices = _common_rate(usable, params)
     start, end, length_notices = _common_range(usable, params)
     n = int(np.floor((end - start) * rate + params.on_grid)) + 1
+    most = max(len(s.t_s) for s in usable.values())
+    if n > params.max_stretch * most:
+        raise SignalError(
+            "clock_jump",
+            f"The sensors' clock spans {end - start:.0f} s, {n} samples at {rate:g} Hz, but at most "
+            f"{most} were recorded: "
+            "the counter or time column jumps. Export the recording again.",
+        )
     axis = start + np.arange(n) / rate
     sensors = {segment: _on_axis(s, axis, rate, params) for segment, s in usable.items()}
     return UniformRecording(

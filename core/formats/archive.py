@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import stat
+import struct
 import zipfile
 import zlib
 from collections.abc import Iterable
@@ -21,6 +22,17 @@ from core.formats.source import SourceFile
 ZIP_MAGIC = (b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")
 GZIP_MAGIC = b"\x1f\x8b"
 _CHUNK = 1 << 20
+_DAMAGE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    EOFError,
+    OSError,
+    RuntimeError,
+    ValueError,
+    OverflowError,
+)
+"""What zipfile and zlib raise on damaged bytes (NotImplementedError is a RuntimeError)."""
 _RATIO_FLOOR = 1 << 20
 """Below 1 MB no ratio is alarming: a file of a few blank lines packs 200 to 1."""
 
@@ -88,7 +100,7 @@ def _looks_packed(file: SourceFile) -> bool:
 def _members(name: str, data: bytes, limits: ArchiveLimits) -> list[SourceFile]:
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
-    except (zipfile.BadZipFile, ValueError, NotImplementedError, OverflowError) as e:
+    except _DAMAGE as e:
         raise ArchiveError("zip_bad", f"{name} is damaged and cannot be opened ({e}); zip it again.") from e
     infos = archive.infolist()
     if len(infos) > limits.entries:
@@ -157,7 +169,7 @@ class _MemberReader:
                         raise ArchiveError(
                             "zip_bomb", f"{where}: more bytes than declared; zip the files again."
                         )
-        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as e:
+        except _DAMAGE as e:
             raise ArchiveError("zip_bad", f"{where} is damaged ({e}); zip the files again.") from e
         if len(out) != self.info.file_size:
             raise ArchiveError("zip_bad", f"{where} ends early; zip the files again.")

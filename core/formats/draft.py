@@ -148,6 +148,12 @@ def _in_order(d: Draft) -> Draft:
             t_s=t,
         )
     keep = np.flatnonzero(good)[rising]
+    if not np.isfinite(d.acc[keep]).all(axis=1).any():
+        raise FormatError(
+            "empty",
+            f"{d.source} has no row with both a valid counter and a complete acceleration; export it again.",
+            sensor=d.device_id,
+        )
     notices = d.notices
     if back or lost:
         notices = (

@@ -1,8 +1,8 @@
 """Sagittal's own recording file: Parquet with one column per channel (spec/kernels.md §6).
 
-int64 time in µs, float32 signals, zstd with byte-stream split and no dictionary; what is not a signal
-(units, sensor → segment, subject, protocol, hashes of the originals) is JSON in the schema metadata. Rows are
-the union of the times of all streams; a row that a stream does not have is null, a missing sample is NaN.
+int64 time in µs, float32 signals, zstd with byte-stream split, page checksums and no dictionary; what is not
+a signal (units, sensor → segment, subject, protocol, hashes of the originals) is JSON in the schema metadata.
+Rows are the union of the times of all streams; a row that a stream does not have is null, a missing sample NaN.
 """
 
 from __future__ import annotations
@@ -63,6 +63,7 @@ def write_recording(recording: Recording) -> bytes:
         use_dictionary=False,
         use_byte_stream_split=cast("bool", signals),  # the stubs know only True and False
         row_group_size=1 << 20,
+        write_page_checksum=True,
     )
     return bytes(sink.getvalue().to_pybytes())
 
@@ -117,7 +118,7 @@ def read_recording(data: bytes, source: str) -> Recording:
         bad_parquet (damaged or too large), foreign_parquet (not written by Sagittal), newer_schema.
     """
     try:
-        file = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=False)
+        file = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=True)
         meta = file.metadata
         unpacked = sum(meta.row_group(i).total_byte_size for i in range(meta.num_row_groups))
         if meta.num_rows > _MAX_ROWS or unpacked > _MAX_BYTES:
@@ -190,7 +191,8 @@ def _signal(
 ) -> Floats | None:
     if f"{device}.{names[0]}" not in table.column_names:
         return None
-    return np.stack([table[f"{device}.{n}"].to_numpy()[rows] for n in names], axis=-1).astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        return np.stack([table[f"{device}.{n}"].to_numpy()[rows] for n in names], axis=-1).astype(np.float64)
 
 
 def _list(value: object) -> list[dict[str, object]]:

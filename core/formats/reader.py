@@ -88,7 +88,7 @@ def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload
 def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> None:
     """Read one file; a file that cannot be read is remembered, it does not stop the others."""
     raw = member.read()
-    data = text.to_utf8(raw)
+    data = raw if parquet.looks_like(raw) else text.to_utf8(raw)
     spec = manifest.source_of(member.name) if manifest else None
     kind, what = _sniff.sniff(data)
     if any(member.name == name for name, _ in upload.manifests):
@@ -101,7 +101,7 @@ def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> Non
             upload.stored.append(parquet.read_recording(data, member.name))
         elif kind == "mapping":
             upload.mapping |= mapping_xml.read(data, member.name)
-        elif spec and spec.columns and kind != "empty":
+        elif spec and spec.columns and kind != "empty" and text.is_text(data):
             upload.drafts += table.read(data, member.name, spec)
         elif kind == "empty":
             raise FormatError("empty", f"{member.name} is empty; copy or export it again.")

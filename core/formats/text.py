@@ -16,6 +16,8 @@ from core.frames import Floats
 
 SEPARATORS: Final = (b"\t", b";", b",", b"|", b" ")
 MISSING: Final = ["", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "-", "None"]
+LARGEST: Final = 1e30
+"""Larger numbers are damage; they would not fit float32."""
 _LONGEST_LINE: Final = 1_000_000
 _HEAD: Final = 1 << 16
 
@@ -29,11 +31,17 @@ class Columns:
 
 
 def to_utf8(data: bytes) -> bytes:
-    """Strip a byte order mark and turn UTF-16 (Excel's "Unicode text") into UTF-8; other bytes pass."""
+    """Strip a byte order mark; turn UTF-16 (Excel's "Unicode text") and Latin-1 into UTF-8; binary passes."""
     if data[:3] == b"\xef\xbb\xbf":
-        return data[3:]
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return data.decode("utf-16", errors="replace").encode()
+        data = data[3:]
+    elif data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return data.decode("utf-16", errors="replace").encode("utf-8", errors="replace")
+    if data.isascii() or not is_text(data):
+        return data
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return data.decode("latin-1").encode()
     return data
 
 
@@ -153,10 +161,13 @@ def read_columns(
 
 
 def _as_floats(column: pa.ChunkedArray[Any]) -> Floats:
-    """Arrow column to float64 with NaN for null and for infinities."""
-    out = np.array(column.to_numpy(), np.float64)
-    out[~np.isfinite(out)] = np.nan
-    return out
+    """Arrow column to float64 with NaN for null and for what no sensor or clock gives."""
+    return _plausible(np.array(column.to_numpy(), np.float64))
+
+
+def _plausible(x: Floats) -> Floats:
+    x[~(np.abs(x) < LARGEST)] = np.nan
+    return x
 
 
 def _cell_by_cell(
@@ -174,8 +185,7 @@ def _cell_by_cell(
                 out[i] = float(cell.replace(",", ".") if decimal_comma else cell)
             except ValueError:
                 bad += 1
-        out[~np.isfinite(out)] = np.nan
-        values[name] = out
+        values[name] = _plausible(out)
     return values, bad
 
 

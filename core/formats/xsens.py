@@ -29,7 +29,7 @@ _EULER: Final = ("Roll", "Pitch", "Yaw")
 _GROUPS: Final = (_ACC, _GYR, _MAG, _QUAT, _MAT, _EULER)
 _TIME: Final = re.compile(r"SampleTimeFine|Year|Month|Day|Second|UTC_\w+$")
 """Columns that MT Manager leaves blank, so that a space-separated file may have lost them."""
-_RATE: Final = re.compile(rb"Update Rate:\s*([\d.]+)\s*Hz")
+_RATE: Final = re.compile(rb"Update Rate:\s*(\d{1,5}(?:\.\d+)?)\s*Hz")
 _DEVICE: Final = re.compile(rb"DeviceId:\s*([0-9A-Fa-f]{8})")
 _ID_IN_NAME: Final = re.compile(r"(?<![0-9A-Fa-f])([0-9A-Fa-f]{8})(?![0-9A-Fa-f])")
 _TICK_S: Final = 1e-4
@@ -230,8 +230,8 @@ def _rate(layout: _Layout, table: text.Columns, spec: SourceSpec | None) -> floa
     if spec is not None and spec.rate_hz is not None:
         return spec.rate_hz
     for line in layout.comments:
-        if m := _RATE.search(line):
-            return float(m.group(1))
+        if (m := _RATE.search(line)) and (rate := float(m.group(1))) >= 1.0:
+            return rate
     fine = table.values.get("SampleTimeFine")
     if fine is None or np.count_nonzero(np.isfinite(fine)) < 10:
         return None

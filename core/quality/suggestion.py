@@ -22,6 +22,8 @@ from core.recording import ImuStream, Recording
 Part = Literal["foot", "shank", "thigh", "pelvis"]
 LEG_PARTS: Final[tuple[Part, ...]] = ("foot", "shank", "thigh")
 GRID_HZ: Final = 50.0
+MOST_STRETCHED: Final = 20
+"""Grid points per recorded sample; beyond, a clock has jumped and nothing is suggested [our choice]."""
 SMOOTH_S: Final = 0.2
 WALKING_RATE: Final = 0.5
 """Mean smoothed rate over all sensors, rad/s, above which the body walks [our choice]."""
@@ -132,7 +134,7 @@ def _on_grid(streams: list[ImuStream]) -> tuple[Floats, Floats] | None:
     start = max(float(s.t_s[0]) for s in streams)
     end = min(float(s.t_s[-1]) for s in streams)
     n = int((end - start) * GRID_HZ)
-    if n < SHORTEST_WALK_S * GRID_HZ:
+    if not SHORTEST_WALK_S * GRID_HZ <= n <= MOST_STRETCHED * max(len(s.t_s) for s in streams):
         return None
     grid = start + np.arange(n) / GRID_HZ
     acc: list[Floats] = []
