@@ -60,6 +60,8 @@ STATES: Final[Mapping[str, tuple[str, str]]] = {
 }
 """State of a session → shape and word."""
 
+NO_STRIDES: Final = {"kind": "bad", "text": "No strides"}
+
 JOB_WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "queued": ("none", "Waiting"),
     "running": ("run", "Running"),
@@ -128,7 +130,7 @@ def visits(c: Connection, blobs: BlobStore, patient_id: str, *, results: bool) -
                 "cells": cells,
                 "strides": strides,
                 "job": _running(c, [s.id]) if s.state == "running" else None,
-                "status": status(s.state),
+                "status": NO_STRIDES if latest and not any((strides or {}).values()) else status(s.state),
             }
         )
     follow_few([row["job"] for row in rows])
@@ -178,7 +180,7 @@ def job_dict(view: JobView) -> dict[str, Any]:
 
 
 def follow_few(found: Sequence[dict[str, Any] | None]) -> None:
-    """Follow the first jobs of a list only: a browser has six connections to a server, events take one each."""
+    """Follow the first jobs of a list only: each takes one of the six connections a browser has."""
     active = [j for j in found if j is not None and j["active"]]
     active.sort(key=lambda j: j["state"] != "running")
     for j in active[FOLLOWED:]:

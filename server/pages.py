@@ -111,7 +111,7 @@ def upload(
     with db.read() as c:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
-        view = upload_views.upload_view(recordings.current(c, sid), session, patient)
+        view = upload_views.upload_view(c, recordings.current(c, sid), session, patient)
     _opened(db, who, "session", sid)
     return _page(request, db, who, "upload.html", "patients", session=session, patient=patient, **view)
 

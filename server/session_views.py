@@ -13,9 +13,11 @@ from server.report.bundle import load_bundle
 from server.report.curves import cycle_svg, strip_svg
 from server.report.model import ReportModel, report_model
 from server.report.panels import CurvePanel
+from server.report.table import Row
+from server.report.wording import ZERO_WORDS
 from server.services import analyses, patients, recordings, sessions
 from server.storage.blobs import BlobStore
-from web.words import day
+from web.words import day, seconds
 
 COLUMNS: Final = 3
 """Charts per row: sagittal, frontal, transverse."""
@@ -136,18 +138,35 @@ def report(
     used, total = sum(model.used.values()), len(model.strides)
     return {
         **{name: getattr(model, name) for name in SHOWN},
-        "groups": [(name, rows) for name, rows in model.groups if not (paper and name == NOT_ON_PAPER)],
+        "groups": _groups(model, paper=paper),
         "warnings": _notices(model),
         "curves": curves,
         "key_curve": _chart(model.key_curve, KEY_HEIGHT, x_unit=True),
+        "zero_words": ZERO_WORDS.get(model.angle_zero or "", model.angle_zero),
         "strip": strip_svg(bundle.strides, model.duration_s) if model.strides else "",
         "stride_words": f"{used} of {total} used",
-        "empty_reason": model.problem or "No complete stride was found in the recording.",
+        "empty_reason": _why_empty(model),
         "identity": _identity(patient, session),
         "provenance_line": f"Sagittal {found.code_version} · settings {found.config_sha256[:8]} · "
         f"input {found.input_sha256[:8]} · {day(found.created_at)}",
         "has_poses": "poses.parquet" in found.files,
     }
+
+
+def _groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[Row, ...]]]:
+    """The parameter table; empty when not one number was found, because then one sentence says more."""
+    if all(row.reason for _, rows in model.groups for row in rows):
+        return []
+    return [(name, rows) for name, rows in model.groups if not (paper and name == NOT_ON_PAPER)]
+
+
+def _why_empty(model: ReportModel) -> str:
+    said = sorted(model.warnings, key=lambda w: SEVERITIES.index(w.kind))
+    grave = next((w.message for w in said if w.kind != "info"), None)
+    found = f"{seconds(model.duration_s)} of data were read, but no complete stride was seen in them. "
+    return (
+        model.problem or grave or f"{found}Is a sensor on each foot, and are the feet where the mapping says?"
+    )
 
 
 def _notices(model: ReportModel) -> list[dict[str, Any]]:

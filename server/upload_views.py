@@ -6,8 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 from urllib.parse import quote
 
+from sqlalchemy import Connection
+
 from core.frames import SEGMENTS
 from server.page_views import SEGMENT_NAMES, job_dict
+from server.services import analyses, sessions
 from server.services.patients import Patient
 from server.services.recordings import Recording
 from server.services.sessions import Session
@@ -22,6 +25,7 @@ CLOCK_WORDS: Final = {
 }
 BASIS_WORDS: Final = {
     "manifest": "As set before. Change what is not right.",
+    "remembered": "As at this patient's last visit with these sensors. Check it.",
     "declared": "As the files say. Change what is not right.",
     "label": "Guessed from the names. Change what is not right.",
     "movement": "Guessed from how each sensor moves.",
@@ -32,7 +36,7 @@ KINDS: Final = {"error": "bad", "warning": "warn", "info": ""}
 DUPLICATE: Final = "duplicate_stream"
 
 
-def upload_view(this: Recording | None, s: Session, p: Patient) -> dict[str, Any]:
+def upload_view(c: Connection, this: Recording | None, s: Session, p: Patient) -> dict[str, Any]:
     """Files of the session, the waiting inspection, what was found."""
     files = [
         {"name": f.name, "size": f.size, "href": f"/api/v1/sessions/{s.id}/files/{quote(f.name)}"}
@@ -48,18 +52,55 @@ def upload_view(this: Recording | None, s: Session, p: Patient) -> dict[str, Any
         "files": files,
         "inspect_job": job_dict(look) if look is not None and waiting else None,
         "problem": problem,
-        "found": None if this is None or this.inspection is None or waiting else found_view(this),
+        "found": None
+        if this is None or this.inspection is None or waiting
+        else found_view(this, remembered(c, s)),
         "segments": SEGMENT_CHOICES,
         "height_m": said.get("height_m") or s.height_m or p.height_m,
     }
 
 
-def found_view(this: Recording) -> dict[str, Any]:
-    """What the inspection found: facts, sensors with their most likely segment, notices."""
+def remembered(c: Connection, s: Session) -> Mapping[str, str | None]:
+    """Which sensor sat where at this patient's other visits, the newest analysed one that says so."""
+    for other in sessions.of_patient(c, s.patient_id):
+        found = analyses.latest(c, other.id) if other.id != s.id else None
+        sensors: Mapping[str, str | None] = ((found.manifest if found else None) or {}).get("sensors") or {}
+        if any(sensors.values()):
+            return sensors
+    return {}
+
+
+def agrees(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, str | None]) -> bool:
+    """Whether a remembered mapping covers these sensors and does not contradict how they move now."""
+    own = {d["device_id"] for d in devices}
+    worn = {device for device, segment in sensors.items() if segment}
+    if not worn or not worn <= own:
+        return False
+    sides: dict[int, set[str]] = {1: set(), 2: set()}
+    for d in devices:
+        segment = sensors.get(d["device_id"])
+        if not segment or not d["suggested_part"]:
+            continue
+        part, _, side = segment.partition("_")
+        if part != d["suggested_part"]:
+            return False
+        if d["suggested_leg"]:
+            sides[d["suggested_leg"]].add(side)
+    return all(len(found) <= 1 for found in sides.values()) and not sides[1] & sides[2]
+
+
+def found_view(this: Recording, earlier: Mapping[str, str | None]) -> dict[str, Any]:
+    """What the inspection found: facts, sensors with their most likely segment, notices.
+
+    Parameters
+    ----------
+    earlier : mapping of an earlier visit; used when it covers these sensors and fits how they move.
+    """
     found: Mapping[str, Any] = this.inspection or {}
     devices: Sequence[Mapping[str, Any]] = found["devices"]
     said: Mapping[str, str | None] = (this.manifest or {}).get("sensors") or {}
-    chosen = {d["device_id"]: _segment(d, said) for d in devices}
+    past = earlier if not said and agrees(devices, earlier) else {}
+    chosen = {d["device_id"]: _segment(d, said, past) for d in devices}
     guessed = any(basis == "movement" for _, basis in chosen.values())
     known = {basis for segment, basis in chosen.values() if segment and basis}
     hint = next(
@@ -75,12 +116,16 @@ def found_view(this: Recording) -> dict[str, Any]:
     }
 
 
-def _segment(device: Mapping[str, Any], said: Mapping[str, str | None]) -> tuple[str | None, str | None]:
+def _segment(
+    device: Mapping[str, Any], said: Mapping[str, str | None], past: Mapping[str, str | None]
+) -> tuple[str | None, str | None]:
     """Segment to preselect and what that rests on; of a leg whose side is unknown, leg 1 is tried as left."""
     if device["device_id"] in said:
         return said[device["device_id"]], "manifest"
     if device["declared"]:
         return device["segment"], "declared"
+    if past:
+        return past.get(device["device_id"]), "remembered"
     if device["duplicate_of"]:
         return None, None
     if device["suggested"]:

@@ -56,7 +56,7 @@ def test_page_obeys_the_design_system(name: str, opened: Opener, filled: Filled)
         page.set_viewport_size({"width": width, "height": height})
         for scheme in ("light", "dark"):
             # without motion: colours must not be read in the middle of a transition
-            page.emulate_media(color_scheme=scheme, reduced_motion="reduce")  # type: ignore[arg-type]
+            page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
             page.wait_for_timeout(30)
             found = layout_faults(page) | text_faults(page)
             faults += [f"{width} {scheme}: {found}"] if found else []

@@ -1,4 +1,4 @@
-"""A real recording goes in through the browser, a clinical session comes out (issue: acceptance on real input)."""
+"""A real recording goes in through the browser, a clinical session comes out."""
 
 from __future__ import annotations
 

@@ -1,0 +1,107 @@
+"""Which segment the upload page preselects, and what it rests on."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from server.services.recordings import Recording
+from server.upload_views import agrees, found_view
+
+NOW = dt.datetime(2026, 11, 18, tzinfo=dt.UTC)
+
+
+def device(name: str, part: str | None = None, leg: int | None = None, **more: Any) -> dict[str, Any]:
+    return {
+        "device_id": name,
+        "rate_hz": 100.0,
+        "clock": "counter",
+        "duration_s": 25.0,
+        "lost_pct": 0.0,
+        "longest_gap_s": 0.0,
+        "has_gyro": True,
+        "has_mag": True,
+        "has_orientation": False,
+        "still_norm_mps2": 9.8,
+        "declared": False,
+        "segment": None,
+        "suggested": "pelvis" if part == "pelvis" else None,
+        "suggested_part": part,
+        "suggested_leg": leg,
+        "basis": "movement" if part else None,
+        "duplicate_of": None,
+        "notices": [],
+    } | more
+
+
+WALKER = [device("P", "pelvis"), device("A", "foot", 1), device("B", "foot", 2), device("C", "shank", 1)]
+RIGHT_WAY = {"P": "pelvis", "A": "foot_r", "B": "foot_l", "C": "shank_r"}
+
+
+def recording(devices: list[dict[str, Any]], manifest: Mapping[str, Any] | None = None) -> Recording:
+    found = {"devices": devices, "duration_s": 25.0, "height_m": None, "protocol": "walk", "notices": []}
+    return Recording("r", "s", "p", "ready", (), manifest, found, None, NOW)
+
+
+def chosen(view: Mapping[str, Any]) -> dict[str, str | None]:
+    return {s["id"]: s["segment"] for s in view["sensors"]}
+
+
+def test_a_leg_without_a_known_side_is_tried_and_asked_for() -> None:
+    view = found_view(recording(WALKER), {})
+    assert chosen(view) == {"P": "pelvis", "A": "foot_l", "B": "foot_r", "C": "shank_l"}
+    assert view["ask_sides"]
+
+
+def test_an_earlier_visit_that_fits_the_movement_is_taken_over_without_a_question() -> None:
+    view = found_view(recording(WALKER), RIGHT_WAY)
+    assert chosen(view) == RIGHT_WAY
+    assert not view["ask_sides"]
+
+
+@pytest.mark.parametrize(
+    "earlier",
+    [
+        {**RIGHT_WAY, "A": "shank_r", "C": "foot_r"},  # foot and shank exchanged since
+        {**RIGHT_WAY, "C": "shank_l"},  # one leg on two sides
+        {"P": "pelvis", "A": "foot_r", "B": "foot_r"},  # two legs on one side
+        {**RIGHT_WAY, "Z": "thigh_l"},  # a sensor that is not in this upload
+        {},
+    ],
+)
+def test_an_earlier_visit_that_contradicts_the_movement_is_not(earlier: dict[str, str | None]) -> None:
+    assert not agrees(WALKER, earlier)
+    assert found_view(recording(WALKER), earlier)["ask_sides"]
+
+
+def test_what_a_person_has_set_goes_before_everything() -> None:
+    manifest = {"sensors": {"A": "foot_l", "B": None}}
+    view = found_view(recording(WALKER, manifest), RIGHT_WAY)
+    assert chosen(view)["A"] == "foot_l"
+    assert chosen(view)["B"] is None
+
+
+def test_copies_are_said_in_one_sentence_and_not_used() -> None:
+    devices = [*WALKER, device("A2", duplicate_of="A"), device("B2", duplicate_of="B")]
+    view = found_view(recording(devices), {})
+    assert chosen(view)["A2"] is None
+    (notice,) = view["notices"]
+    assert notice["title"] == "2 sensors are copies of others"
+    assert "A2 of A, B2 of B" in notice["message"]
+    assert ("Sensors", "4", "and 2 copies") in view["facts"]
+
+
+def test_grave_notices_come_first_and_only_once() -> None:
+    def notice(code: str, severity: str) -> dict[str, Any]:
+        return {"code": code, "message": code, "sensor": None, "t_s": None, "severity": severity}
+
+    noisy = [
+        device("A", notices=[notice("some_info", "info"), notice("units", "warning")]),
+        device("B", has_gyro=False, notices=[notice("units", "warning"), notice("no_gyro", "error")]),
+    ]
+    view = found_view(recording(noisy), {})
+    assert [n["kind"] for n in view["notices"]] == ["bad", "warn", ""]
+    assert [s["state"]["kind"] for s in view["sensors"]] == ["warn", "bad"]
