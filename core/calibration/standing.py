@@ -21,6 +21,9 @@ MARGIN_S = 0.25
 GOOD_S = 2.0
 """A rest of this length is taken before a longer one further from the walk, s (our choice)."""
 
+LONG_WALK_S = 10.0
+"""A walk this long, or half as long as the longest, is not the putting on of sensors (our choice)."""
+
 NORM_RANGE = (7.0, 13.0)
 """|f| at rest that can be gravity in m/s²; real sensors are within 6.6 % of 9.81 (spec/estimators.md §1)."""
 
@@ -117,7 +120,9 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
 
 
 def choose_rest(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> Window:
-    """The rest to calibrate on: the last one before the first walk, else the one nearest to a walk.
+    """The rest to calibrate on: the last good one before the first long walk, else the first good one after.
+
+    A long walk, not the first movement: a take may begin with sensors that lie on a table and are put on.
 
     Parameters
     ----------
@@ -127,23 +132,19 @@ def choose_rest(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> Win
     -------
     At most 8 s of the chosen rest, at the side of the walk.
     """
-    walks = runs(moving)
-    starts = [a / rate_hz for a, _ in walks]
-    before = [r for r in rests if starts and r[1] <= starts[0] + 0.5]
-    good = [r for r in before if r[1] - r[0] >= GOOD_S]
-    if good or not walks:
-        chosen = (good or list(rests))[-1] if good else max(rests, key=lambda r: r[1] - r[0])
-    else:
-        good = [r for r in rests if r[1] - r[0] >= GOOD_S]
-        chosen = good[0] if good else max(rests, key=lambda r: r[1] - r[0])
-    start, end = chosen
-    margin = MARGIN_S if end - start > 1.0 + 2 * MARGIN_S else 0.0
-    leads = any(abs(s - end) < 2.0 or s > end for s in starts) or not starts
-    if leads:
-        end -= margin
-        return max(start, end - LONGEST_S), end
-    start += margin
-    return start, min(end, start + LONGEST_S)
+    walks = [(a / rate_hz, b / rate_hz) for a, b in runs(moving)]
+    long = min(LONG_WALK_S, 0.5 * max((b - a for a, b in walks), default=0.0))
+    start, end = next(((a, b) for a, b in walks if b - a >= long), (np.inf, np.inf))
+    before = [r for r in rests if r[1] <= start + 0.5 * GOOD_S]
+    after = [r for r in rests if r[0] >= end - 0.5 * GOOD_S]
+    near = [r for r in (*reversed(before), *after) if r[1] - r[0] >= GOOD_S]
+    first, last = near[0] if near else max(rests, key=lambda r: r[1] - r[0])
+    margin = MARGIN_S if last - first > 1.0 + 2 * MARGIN_S else 0.0
+    if not walks or any(a > last - 0.5 * GOOD_S for a, _ in walks):
+        last -= margin
+        return max(first, last - LONGEST_S), last
+    first += margin
+    return first, min(last, first + LONGEST_S)
 
 
 def stand_all(recording: UniformRecording, window: Window) -> Mapping[Segment, Standing]:
