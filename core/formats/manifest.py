@@ -6,7 +6,6 @@ exact place ("sources[0].columns.foot_l.acc") and what would be right there.
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from typing import Final
 
 from core.errors import ManifestError
 from core.formats.aliases import segment_named
+from core.formats.json_tree import Node, no_constant, unique
 from core.frames import GRAVITY, PROTOCOLS, SEGMENTS, Protocol, Segment
 from core.recording import Subject
 
@@ -131,7 +131,7 @@ def parse_manifest(data: bytes) -> Manifest:
             "manifest_bad_json", f"The manifest has {len(data)} bytes, at most {MAX_BYTES} make sense."
         )
     try:
-        root = json.loads(data.decode("utf-8-sig"), parse_constant=_no_constant, object_pairs_hook=_unique)
+        root = json.loads(data.decode("utf-8-sig"), parse_constant=no_constant, object_pairs_hook=unique)
     except (ValueError, RecursionError) as e:
         raise ManifestError("manifest_bad_json", f"The manifest is not valid JSON: {e}.") from e
     return manifest_of(root)
@@ -139,7 +139,7 @@ def parse_manifest(data: bytes) -> Manifest:
 
 def manifest_of(root: object) -> Manifest:
     """Build a manifest from decoded JSON; errors as in `parse_manifest`."""
-    top = _Node(root, "")
+    top = Node(root, "")
     top.only("subject", "protocol", "mounting", "sensors", "sources")
     subject = top.child("subject")
     subject.only("height_m")
@@ -165,7 +165,7 @@ def manifest_of(root: object) -> Manifest:
     )
 
 
-def _sensors(node: _Node) -> dict[str, Segment | None]:
+def _sensors(node: Node) -> dict[str, Segment | None]:
     out: dict[str, Segment | None] = {}
     worn: dict[str, str] = {}
     for device in node.keys:
@@ -202,7 +202,7 @@ _SOURCE_KEYS: Final = (
 )  # fmt: skip
 
 
-def _source(node: _Node) -> SourceSpec:
+def _source(node: Node) -> SourceSpec:
     node.only(*_SOURCE_KEYS)
     if node.text("file") is None:
         raise ManifestError(
@@ -235,7 +235,7 @@ def _source(node: _Node) -> SourceSpec:
     )
 
 
-def _channels(node: _Node) -> Channels:
+def _channels(node: Node) -> Channels:
     node.only("acc", "gyr", "mag", "quat")
     acc = node.names("acc", 3)
     if acc is None:
@@ -243,110 +243,3 @@ def _channels(node: _Node) -> Channels:
             "manifest_bad_value", f"{node.path}.acc is missing; name three columns (x, y, z)."
         )
     return Channels(acc, node.names("gyr", 3), node.names("mag", 3), node.names("quat", 4))
-
-
-class _Node:
-    """One place in the JSON tree that knows its own path."""
-
-    def __init__(self, value: object, path: str) -> None:
-        if value is not None and not isinstance(value, dict):
-            raise ManifestError(
-                "manifest_bad_value", f"{path or 'The manifest'} is {_kind(value)}; expected an object."
-            )
-        self.value: dict[str, object] = value or {}
-        self.path = path
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        return tuple(self.value)
-
-    def at(self, key: str) -> str:
-        return f"{self.path}.{key}" if self.path else key
-
-    def only(self, *allowed: str) -> None:
-        for key in self.value:
-            if key not in allowed:
-                near = difflib.get_close_matches(key, allowed, 1)
-                hint = f"did you mean '{near[0]}'?" if near else f"known here: {', '.join(allowed)}."
-                raise ManifestError("manifest_unknown_key", f"{self.at(key)} is not known; {hint}")
-
-    def child(self, key: str) -> _Node:
-        return _Node(self.value.get(key), self.at(key))
-
-    def children(self, key: str) -> list[_Node]:
-        value = self.value.get(key)
-        if value is not None and not isinstance(value, list):
-            raise ManifestError("manifest_bad_value", f"{self.at(key)} is {_kind(value)}; expected a list.")
-        return [_Node(v, f"{self.at(key)}[{i}]") for i, v in enumerate(value or [])]
-
-    def text(self, key: str) -> str | None:
-        value = self.value.get(key)
-        if value is not None and (not isinstance(value, str) or not value.strip()):
-            raise self._wrong(key, "a text")
-        return value
-
-    def string(self, key: str) -> str:
-        value = self.text(key)
-        if value is None:
-            raise self._wrong(key, "a text")
-        return value
-
-    def number(self, key: str) -> float | None:
-        value = self.value.get(key)
-        if value is None:
-            return None
-        if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > 1e12:
-            raise self._wrong(key, "a number")
-        return float(value)
-
-    def count(self, key: str, default: int, most: int) -> int:
-        value = self.value.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
-            raise self._wrong(key, f"a whole number from 0 to {most}")
-        return value
-
-    def flag(self, key: str) -> bool | None:
-        value = self.value.get(key)
-        if value is not None and not isinstance(value, bool):
-            raise self._wrong(key, "true or false")
-        return value
-
-    def choice(self, key: str, allowed: tuple[str, ...], code: str) -> str | None:
-        value = self.text(key)
-        if value is not None and value not in allowed:
-            options = ", ".join(repr(a) for a in allowed)
-            raise ManifestError(code, f"{self.at(key)} is '{value}'; expected one of {options}.")
-        return value
-
-    def names(self, key: str, n: int) -> tuple[str, ...] | None:
-        value = self.value.get(key)
-        if value is None:
-            return None
-        if not isinstance(value, list) or len(value) != n or not all(isinstance(v, str) and v for v in value):
-            raise self._wrong(key, f"a list of {n} column names")
-        if len(set(value)) != n:
-            raise self._wrong(key, f"a list of {n} different column names")
-        return tuple(value)
-
-    def _wrong(self, key: str, expected: str) -> ManifestError:
-        return ManifestError(
-            "manifest_bad_value", f"{self.at(key)} is {_kind(self.value.get(key))}; expected {expected}."
-        )
-
-
-def _kind(value: object) -> str:
-    text = json.dumps(value, ensure_ascii=False, default=str)
-    return text if len(text) <= 40 else text[:37] + "..."
-
-
-def _no_constant(name: str) -> object:
-    raise ValueError(f"{name} is not a number in JSON; use null")
-
-
-def _unique(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    out: dict[str, object] = {}
-    for key, value in pairs:
-        if key in out:
-            raise ValueError(f"the key '{key}' is given twice")
-        out[key] = value
-    return out

@@ -2,7 +2,7 @@
 
 int64 time in µs, float32 signals, zstd with byte-stream split, page checksums and no dictionary; what is not
 a signal (units, sensor → segment, subject, protocol, hashes of the originals) is JSON in the schema metadata.
-Rows are the union of the times of all streams; a row that a stream does not have is null, a missing sample NaN.
+Rows are the union of the times of all streams; a row that a stream does not have is null, a missing one NaN.
 """
 
 from __future__ import annotations
