@@ -48,10 +48,8 @@ def seconds(value: float | None) -> str:
 
 
 def pattern(text: str) -> str:
-    """Escape text for the pattern attribute of an input, which is a regular expression of the `v` kind."""
-    return re.sub(
-        r"[^A-Za-z0-9 _]", lambda m: f"\\{m[0]}" if m[0] in r"-()[]{}|/\^$*+?.&!#%,:;<=>@`~" else m[0], text
-    )
+    """Escape text for the pattern attribute of an input; its `v` syntax refuses every needless escape."""
+    return re.sub(r"[\^$\\.*+?()\[\]{}|/]", r"\\\g<0>", text)
 
 
 FILTERS: dict[str, Callable[..., str]] = {
