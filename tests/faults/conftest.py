@@ -13,8 +13,9 @@ from tests.faults.clinic import Clinic, alive
 
 
 @pytest.fixture
-def clinic(tmp_path: Path) -> Iterator[Clinic]:
-    made = Clinic(tmp_path, lease_s=1.5)
+def clinic(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Clinic]:
+    """A lease of 1.5 s, so that deaths are seen soon; a test may ask for another."""
+    made = Clinic(tmp_path, lease_s=getattr(request, "param", 1.5))
     yield made
     made.db.close()
 

@@ -14,6 +14,7 @@ import pytest
 
 from server.jobs.runner import environment
 from server.jobs.supervisor import Workers
+from server.settings import Settings
 from tests.faults.clinic import Clinic, alive, until
 from tests.faults.tiny_tasks import STAGES
 
@@ -55,6 +56,21 @@ def test_a_killed_worker_is_replaced_and_the_job_has_one_result(
     assert (done.state, done.attempt) == ("done", 2)
     assert [r.job_id for r in clinic.results()] == [view.id]
     assert workers.pids != [worker]
+
+
+@pytest.mark.parametrize("clinic", [Settings().lease_s], indirect=True)
+@pytest.mark.parametrize("busy", [False, True])
+def test_a_child_does_not_outlive_its_worker(clinic: Clinic, workers: Workers, busy: bool) -> None:
+    if busy:
+        view = clinic.submit(spin=True)
+        until(lambda: clinic.row(view).stage == STAGES[-1])
+    else:
+        _, reached, _ = clinic.hold("second")
+        until(reached.exists)
+    [worker] = workers.pids
+    [child] = children_of(worker)
+    os.kill(worker, signal.SIGKILL)
+    until(lambda: not alive(child))
 
 
 def test_a_killed_child_is_replaced_by_the_same_worker(clinic: Clinic, workers: Workers) -> None:
@@ -100,6 +116,7 @@ def test_a_frozen_worker_is_fenced_when_it_wakes(clinic: Clinic, workers: Worker
     assert [r.job_id for r in clinic.results()].count(view.id) == 1
 
 
+@pytest.mark.parametrize("clinic", [Settings().lease_s], indirect=True)
 @pytest.mark.parametrize("stage", STAGES)
 def test_cancel_stops_the_child_within_two_seconds(clinic: Clinic, workers: Workers, stage: str) -> None:
     view, reached, _ = clinic.hold(stage)
@@ -116,6 +133,7 @@ def test_cancel_stops_the_child_within_two_seconds(clinic: Clinic, workers: Work
     assert clinic.results() == []
 
 
+@pytest.mark.parametrize("clinic", [Settings().lease_s], indirect=True)
 def test_cancel_stops_a_child_that_never_speaks(clinic: Clinic, workers: Workers) -> None:
     view = clinic.submit(spin=True)
     until(lambda: clinic.row(view).stage == STAGES[-1])
@@ -165,6 +183,7 @@ def test_a_killed_server_takes_worker_and_child_along_and_the_next_one_goes_on(c
     script = textwrap.dedent("""
         import sys, time
         from server.jobs.supervisor import Workers
+from server.settings import Settings
         from server.settings import load_settings
         workers = Workers(load_settings())
         workers.start()
