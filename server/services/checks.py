@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from sqlalchemy.exc import DatabaseError
+
 from core.errors import SagittalError
 from server import audit
 from server.services.sweep import referenced
@@ -27,10 +29,13 @@ class Finding:
 
 def check(db: Database, blobs: BlobStore) -> list[Finding]:
     """Check the database's structure and keys, every referenced file by its hash, and the audit chain."""
-    found = [Finding("database", text) for text in db.problems()]
-    with db.read() as c:
-        used = sorted(referenced(c))
-        found += [Finding("audit", text) for text in audit.problems(c)]
+    try:
+        found = [Finding("database", text) for text in db.problems()]
+        with db.read() as c:
+            used = sorted(referenced(c))
+            found += [Finding("audit", text) for text in audit.problems(c)]
+    except DatabaseError as error:
+        return [Finding("database", f"cannot be read ({error.orig}); restore it from a backup")]
     for space, sha256 in used:
         try:
             blobs.read(space, sha256)

@@ -6,7 +6,6 @@ require_current(settings.database)  # in a worker: refuses instead of migrating
 
 from __future__ import annotations
 
-import contextlib
 import io
 import time
 from contextlib import closing
@@ -16,6 +15,7 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
+from sqlalchemy.exc import DatabaseError
 
 import server
 from server.storage import fs
@@ -40,13 +40,18 @@ def configuration(database: Path, scripts: Path | None = None) -> Config:
 
 
 def current(database: Path) -> str | None:
-    """The database's revision; None when there is no database yet or it is empty."""
+    """The database's revision; None when there is none yet or it is empty; raises MigrationError."""
     if not database.exists():
         return None
     engine = migration_engine(database)
     try:
         with engine.connect() as connection:
             return MigrationContext.configure(connection).get_current_revision()
+    except DatabaseError as error:
+        raise MigrationError(
+            f"{database} cannot be read as a database ({error.orig}). Restore it from a backup "
+            f"({database.parent / 'backups'} holds those made before upgrades)."
+        ) from error
     finally:
         engine.dispose()
 
@@ -66,8 +71,7 @@ def upgrade(database: Path, *, target: str = "head", scripts: Path | None = None
     if at == wanted:
         return None
     backup = _backup(database, at) if at else None
-    with contextlib.redirect_stdout(io.StringIO()):
-        command.upgrade(config, target)
+    command.upgrade(config, target)
     return backup
 
 

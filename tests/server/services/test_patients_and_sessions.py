@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -376,6 +377,19 @@ def test_the_check_finds_what_is_wrong(clinic: Clinic) -> None:
         c.exec_driver_sql("DELETE FROM audit WHERE seq = 3")
     findings = checks.check(clinic.db, clinic.blobs)
     assert sorted(f.area for f in findings) == ["audit", "audit", "files", "files"]
+
+
+def test_the_check_speaks_of_a_damaged_database_instead_of_failing(clinic: Clinic) -> None:
+    for i in range(50):
+        clinic.patient(f"P-{i}")
+    clinic.db.close()
+    path = clinic.settings.database
+    content = bytearray(path.read_bytes())
+    content[4096 : len(content) // 2] = bytes(len(content) // 2 - 4096)
+    path.write_bytes(content)
+    with closing(Database(path)) as damaged:
+        findings = checks.check(damaged, clinic.blobs)
+    assert {f.area for f in findings} == {"database"}
 
 
 def test_audit_rows_cannot_be_changed_or_removed(clinic: Clinic) -> None:

@@ -169,6 +169,13 @@ def test_an_unknown_revision_is_refused(tmp_path: Path) -> None:
             start(path)
 
 
+def test_a_file_that_is_no_database_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.db"
+    path.write_bytes(b"not a database" * 1000)
+    with pytest.raises(migrate.MigrationError, match="Restore it from a backup"):
+        migrate.upgrade(path)
+
+
 def test_a_worker_refuses_a_database_that_is_behind(tmp_path: Path) -> None:
     with pytest.raises(migrate.MigrationError, match="sagittal migrate"):
         migrate.require_current(tmp_path / "none.db")
