@@ -41,6 +41,9 @@ from core.rotation import conjugate, rotate
 DISAGREEMENT = radians(15.0)
 """Difference of two measures of the walking direction that is told (spec/real-data.md §3, heading)."""
 
+COARSE = radians(30.0)
+"""The same where velocity comes from one rest only: a tilt of 1° and 3 s make 0.5 m/s across (our choice)."""
+
 CONFLICT = radians(120.0)
 """Difference from the declared mounting that is a contradiction: within 60° of the opposite way."""
 
@@ -157,6 +160,7 @@ def _by_walking(
         ]
         velocity = velocity_direction(v, first, [p for p, _ in inside], [b for _, b in inside], params)
     facts: dict[str, object] = {"axis_share": axis.score}
+    allowed = DISAGREEMENT
     if velocity is not None:
         off = difference(nearest_sign(axis.angle, velocity.angle), velocity.angle)
         facts |= {"source": "velocity", "disagreement_rad": off}
@@ -167,8 +171,9 @@ def _by_walking(
         else:
             chosen = velocity
     else:
+        gap_s = params.trunk_gap_s if segment in TRUNK else params.leg_gap_s
         start = start_direction(
-            a, walk.rest, walk.parts[0], walk.bearing[0], walk.leads, walk.rate_hz, params
+            a, walk.rest, walk.parts[0], walk.bearing[0], walk.leads, walk.rate_hz, gap_s, params
         )
         if start is None:
             angle, notices = _signed(segment, axis.angle, written, R_vertical, q, walk)
@@ -177,14 +182,15 @@ def _by_walking(
         off = difference(nearest_sign(axis.angle, start.angle), start.angle)
         facts |= {"source": "acceleration", "sign": "velocity", "disagreement_rad": off}
         chosen = Direction(nearest_sign(axis.angle, start.angle), axis.score)
-        if abs(off) > DISAGREEMENT and axis.score <= STRONG_AXIS:
+        allowed = COARSE
+        if abs(off) > allowed and axis.score <= STRONG_AXIS:
             facts["source"] = "velocity"
             chosen = Direction(start.angle, 0.5)
     notices = _sign_notices(segment, chosen.angle, R_vertical, q, walk)
-    if abs(off) > DISAGREEMENT:
+    if abs(off) > allowed:
         message = (
             f"{segment}: velocity and acceleration show walking directions {abs(degrees(off)):.0f}° apart, "
-            f"{degrees(DISAGREEMENT):.0f}° are expected at most; {facts['source']} was used. Frontal and "
+            f"{degrees(allowed):.0f}° are expected at most; {facts['source']} was used. Frontal and "
             "transverse angles of this segment are doubtful; look at the mounting."
         )
         notices += (Notice("heading_disagreement", message, sensor=segment),)

@@ -105,6 +105,7 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
                 "facing_not_walking",
                 f"The person turned by {abs(degrees(facing)):.0f}° between standing and walking; forward is "
                 "where they stood facing. Start straight ahead from standing where possible.",
+                severity="info",
             )
         )
     calibration = Calibration(

@@ -34,8 +34,9 @@ class HeadingParams:
     cutoff_hz : low-pass of the acceleration before its principal axis (spec/real-data.md §0, mount methods).
     longest_velocity_s : longest time between two rests over which velocity is integrated, s. An accelerometer
         bias of 0.05 m/s² that the linear de-drift leaves over to 10 % bends a 1 m/s walk by 7° after 25 s.
-    start_s : time after (before) a rest over which velocity gives the sign, s. longest_gap_s : time between
-        that rest and the straight part beyond which it does not.
+    start_s : part of the walk next to a rest over which its velocity is averaged for a sign, s. leg_gap_s,
+        trunk_gap_s : time between rest and straight part up to which that works. Legs have the gait rule
+        besides; a trunk has nothing else, and a bias of 0.05 m/s² leaves the sign of 1 m/s right for 8 s.
     speed : plausible walking speed, m/s.
     coherence : least agreement of the parts' velocities, 0 to 1.
     reach_s : parts that start further from the rest are left out: heading drifts.
@@ -43,8 +44,9 @@ class HeadingParams:
 
     cutoff_hz: float = 4.0
     longest_velocity_s: float = 40.0
-    start_s: float = 5.0
-    longest_gap_s: float = 1.5
+    start_s: float = 3.5
+    leg_gap_s: float = 1.5
+    trunk_gap_s: float = 5.0
     speed: tuple[float, float] = (0.15, 3.0)
     coherence: float = 0.8
     reach_s: float = 60.0
@@ -105,24 +107,31 @@ def velocity_direction(
 
 
 def start_direction(
-    a: Complexes, rest: Window, part: Part, turn: float, leads: bool, rate_hz: float, params: HeadingParams
+    a: Complexes,
+    rest: Window,
+    part: Part,
+    turn: float,
+    leads: bool,
+    rate_hz: float,
+    longest_gap_s: float,
+    params: HeadingParams,
 ) -> Direction | None:
     """Direction from the velocity gained since a rest (lost until it), good enough for a sign.
 
     Parameters
     ----------
     part : the straight part next to the rest, turned by `turn` rad since standing. leads : the rest is before
-        it.
+        it. longest_gap_s : time between them up to which the sign is worth something.
 
     Returns
     -------
-    None when rest and part are further apart than `longest_gap_s`, or the speed is implausible.
+    None when rest and part are further apart than that, or the speed is implausible.
     """
     edge = round(rest[1] * rate_hz) if leads else round(rest[0] * rate_hz)
     gap = (part[0] - edge) if leads else (edge - part[1])
-    if gap > params.longest_gap_s * rate_hz:
+    if gap > longest_gap_s * rate_hz:
         return None
-    reach = round(params.start_s * rate_hz)
+    reach = max(0, gap) + round(params.start_s * rate_hz)
     if leads:
         first, used = edge, (max(part[0], edge), min(part[1], edge + reach))
         v = rest_to_rest_velocity(a[edge : edge + reach], False, rate_hz)

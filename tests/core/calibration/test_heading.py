@@ -47,13 +47,13 @@ def test_velocity_that_disagrees_with_itself_gives_no_direction() -> None:
 def test_velocity_next_to_a_rest_tells_the_sign(leads: bool) -> None:
     a = out_and_back(0.7)
     rest, part, turn = ((0.0, 1.0), (110, 700), 0.0) if leads else ((15.0, 16.0), (900, 1490), np.pi)
-    found = start_direction(a, rest, part, turn, leads, RATE, PARAMS)
+    found = start_direction(a, rest, part, turn, leads, RATE, 1.5, PARAMS)
     assert found is not None
     assert abs(difference(found.angle, 0.7)) < np.radians(2.0)
 
 
 def test_a_rest_far_from_the_walk_tells_no_sign() -> None:
-    assert start_direction(out_and_back(0.7), (0.0, 1.0), (400, 700), 0.0, True, RATE, PARAMS) is None
+    assert start_direction(out_and_back(0.7), (0.0, 1.0), (400, 700), 0.0, True, RATE, 1.5, PARAMS) is None
 
 
 @pytest.mark.parametrize("direction", [-1.2, 0.0, 0.4, 1.5])
