@@ -6,7 +6,6 @@ import contextlib
 import datetime as dt
 import os
 from collections.abc import AsyncIterator
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -43,6 +42,7 @@ from server.auth.sessions import Logins
 from server.auth.throttle import Throttle
 from server.jobs.feed import JobFeed
 from server.jobs.table import TableQueue
+from server.services.provenance import CODE_VERSION
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -81,7 +81,7 @@ def create_app(settings: Settings) -> FastAPI:
     app = FastAPI(
         title="Sagittal",
         summary="Gait analysis from body-worn IMUs; research software, not a medical device.",
-        version=_version(),
+        version=CODE_VERSION,
         # the interactive pages load scripts from elsewhere; the document itself is served below
         openapi_url=None,
         docs_url=None,
@@ -131,10 +131,3 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     finally:
         app.state.feed.close()
         db.close()
-
-
-def _version() -> str:
-    try:
-        return version("sagittal")
-    except PackageNotFoundError:
-        return "0"
