@@ -1,5 +1,5 @@
 # Sagittal: one image for web and worker. Build: docker build -t sagittal .
-# Run: docker run -p 127.0.0.1:8000:8000 -v sagittal:/data sagittal   (put a TLS proxy in front for other hosts)
+# Run: docker run -p 127.0.0.1:8000:8000 -v sagittal:/data -e SAGITTAL_BEHIND_TLS=1 sagittal  (behind a TLS proxy)
 FROM python:3.13-slim AS build
 WORKDIR /src
 COPY pyproject.toml README.md LICENSE ./
