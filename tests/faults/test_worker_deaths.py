@@ -183,7 +183,6 @@ def test_a_killed_server_takes_worker_and_child_along_and_the_next_one_goes_on(c
     script = textwrap.dedent("""
         import sys, time
         from server.jobs.supervisor import Workers
-from server.settings import Settings
         from server.settings import load_settings
         workers = Workers(load_settings())
         workers.start()
