@@ -34,6 +34,7 @@ NAVIGATION = (
 )
 """Rail entries: page, icon, word, address, and what one must be allowed to do to see it."""
 
+PATIENTS_SHOWN = 200
 AUDIT_ROWS = 100
 
 
@@ -68,7 +69,7 @@ def patient_list(
 ) -> Response:
     """All patients, the latest visit first."""
     with db.read() as c:
-        rows = page_views.patient_rows(c, patients.listing(c, search=q, limit=1000))
+        rows = page_views.patient_rows(c, patients.listing(c, search=q, limit=PATIENTS_SHOWN))
         total = page_views.patient_count(c)
     return _page(request, db, who, "patients.html", "patients", patients=rows, query=q, total=total)
 

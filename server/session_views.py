@@ -23,7 +23,7 @@ COLUMNS: Final = 3
 """Charts per row: sagittal, frontal, transverse."""
 
 PAGE_HEIGHTS: Final = {False: 144, True: 158}
-PAPER_HEIGHTS: Final = {False: 152, True: 166}
+PAPER_HEIGHTS: Final = {False: 142, True: 156}
 KEY_HEIGHT: Final = 186
 """Chart heights in px; the last row also carries the unit of the x axis."""
 

@@ -138,3 +138,29 @@ def test_a_file_that_is_no_recording_is_said_in_a_sentence(
     assert len(note.inner_text()) > 60
     expect(page.locator("details .files")).to_contain_text("walk 🚶.jpg")
     context.close()
+
+
+def test_a_file_that_breaks_off_can_be_tried_again(
+    solid: Browser, running: RunningServer, tmp_path: Path
+) -> None:
+    files = {"one.txt": b"first", "two.txt": b"second"}
+    for name, content in files.items():
+        (tmp_path / name).write_bytes(content)
+    context = solid.new_context(base_url=running.url)
+    page = context.new_page()
+    _sign_in(page)
+    with running.client() as client:
+        patient = client.post("/api/v1/patients", json={"code": "BROKEN"}).json()["id"]
+        session = client.post(
+            f"/api/v1/patients/{patient}/sessions", json={"title": "Walk", "performed_on": "2026-11-18"}
+        ).json()["id"]
+    page.goto(f"/sessions/{session}/upload")
+    page.route("**/files/two.txt", lambda route: route.abort(), times=1)
+    page.locator("[data-files]").set_input_files([str(tmp_path / name) for name in files])
+    broken = page.locator("[data-sending] li.bad")
+    expect(broken).to_contain_text("The connection broke")
+    expect(page.get_by_role("button", name="Go on without them")).to_be_visible()
+    page.get_by_role("button", name="Try two.txt again").click()
+    # both are there: the server looks into them and the page shows what it thinks of them
+    expect(page.locator("details .files li")).to_have_count(2, timeout=30_000)
+    context.close()

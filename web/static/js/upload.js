@@ -52,6 +52,7 @@ class UploadArea extends HTMLElement {
       this.add(entries.length ? entries : plain);
     });
     window.addEventListener("beforeunload", (e) => { if (this.active) e.preventDefault(); });
+    this.querySelector("[data-anyway]").addEventListener("click", () => this.inspect());
     document.querySelector("[data-inspect]")?.addEventListener("click", () => this.inspect());
     for (const b of document.querySelectorAll("[data-remove]")) b.addEventListener("click", () => this.remove(b));
   }
@@ -77,7 +78,8 @@ class UploadArea extends HTMLElement {
     const total = this.querySelector("[data-total]");
     const left = this.waiting.length + this.active;
     total.hidden = !(left || this.sent || this.failed);
-    total.textContent = left ? `${this.sent} of ${this.sent + left + this.failed} files uploaded` : `${this.sent} files uploaded`;
+    this.querySelector("[data-anyway]").hidden = left > 0 || !this.failed || !this.sent;
+    total.textContent = left ? `${this.sent} of ${this.sent + left + this.failed} files uploaded` : `${this.sent} files uploaded${this.failed ? `, ${this.failed} not` : ""}`;
     if (!left && this.sent && !this.failed) this.inspect();
   }
 
@@ -92,6 +94,8 @@ class UploadArea extends HTMLElement {
       if (ok) { this.sent += 1; bar.value = 1; button.remove(); } else { this.failed += 1; }
       say(text);
       item.row.classList.toggle("bad", !ok);
+      item.row.classList.toggle("done", ok);
+      if (ok) item.row.querySelector("use").setAttribute("href", "#i-check");
       this.pump();
     };
     xhr.upload.onprogress = (e) => { bar.value = e.loaded / e.total; say(`${mb(e.loaded)} of ${mb(e.total)}`); };
