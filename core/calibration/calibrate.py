@@ -20,6 +20,7 @@ from core.calibration.walking import (
     mean_turn,
     moving_mask,
     straight_parts,
+    turn_sensors,
     turning_mask,
 )
 from core.errors import CalibrationError, Notice
@@ -151,8 +152,7 @@ def _walk(
     leads = bool(after)
     near = after or [p for p in reversed(parts) if p[1] <= first + rate and p[1] >= first - reach]
     mid = round(0.5 * (zero[0] + zero[1]) * rate)
-    # the trunk shows the turn best: legs rotate with every step
-    show = [s for s in q if s in TRUNK] or list(q)
+    show = turn_sensors(recording)
     turns = [
         float(np.angle(np.mean([np.exp(1j * mean_turn(q[s], q[s][mid], p)) for s in show]))) for p in near
     ]

@@ -71,12 +71,11 @@ def turning_mask(
     """
     from scipy.signal import butter, sosfiltfilt
 
-    group = next(g for g in DOWN if any(s in recording.sensors for s in g))
-    worn = [s for s in group if s in recording.sensors]
+    worn = turn_sensors(recording)
     rate = np.zeros(len(recording.t_s))
     for s in worn:
         rate += rotate(q[s], recording.sensors[s].gyr - biases[s])[:, 2] / len(worn)
-    cutoff = params.turn_cutoff_hz if group is TRUNK else 0.5 * params.turn_cutoff_hz
+    cutoff = params.turn_cutoff_hz if worn[0] in TRUNK else 0.5 * params.turn_cutoff_hz
     sos = butter(2, cutoff / (0.5 * recording.rate_hz), output="sos")
     turning = (
         np.abs(sosfiltfilt(sos, rate, padlen=min(len(rate) - 1, round(2 * recording.rate_hz))))
@@ -86,6 +85,18 @@ def turning_mask(
     for a, b in runs(turning):
         turning[max(0, a - reach) : b + reach] = True
     return np.asarray(turning)
+
+
+def turn_sensors(recording: UniformRecording) -> list[Segment]:
+    """The steadiest sensors that show a turn, those that never were lost if there are any."""
+    groups = [[s for s in group if s in recording.sensors] for group in DOWN]
+    whole = [[s for s in g if not _gaps(recording, s)] for g in groups]
+    return next((g for g in (*whole, *groups) if g), [])
+
+
+def _gaps(recording: UniformRecording, segment: Segment) -> bool:
+    """Was the sensor lost for longer than the 0.1 s that are interpolated (spec/fusion.md §3)?"""
+    return any(b - a > 0.1 * recording.rate_hz for a, b in runs(~recording.sensors[segment].valid))
 
 
 def straight_parts(

@@ -53,7 +53,8 @@ def remove_relative_drift(
 
     Parameters
     ----------
-    q : segment → (n, 4) in W. The reference is the pelvis, without it the mean of all segments.
+    q : segment → (n, 4) in W. The reference is the pelvis; without it, or where it was lost in between,
+        the mean of the segments that never were.
 
     Returns
     -------
@@ -68,10 +69,12 @@ def remove_relative_drift(
     if len(q) < 2 or (np.count_nonzero(straight) <= params.reference_s * rate_hz and not gaps):
         return corrected, {}, []
     heading = {s: np.exp(1j * yaw(x)) for s, x in q.items()}
-    reference = heading["pelvis"] if "pelvis" in q else np.asarray(np.sum(list(heading.values()), axis=0))
+    whole = [s for s in q if not _gaps(valid[s], rate_hz)] or list(q)
+    steady: list[Segment] = ["pelvis"] if "pelvis" in whole else whole
+    reference = np.asarray(np.sum([heading[s] for s in steady], axis=0))
     largest: dict[str, float] = {}
     for segment, x in q.items():
-        if segment == "pelvis":
+        if steady == [segment]:
             continue
         relative = heading[segment] * np.conj(reference)
         turn = _drift(
@@ -101,28 +104,29 @@ def _drift(
 ) -> Floats:
     """Drift (n,) in rad of one segment's relative heading (n,) complex, zero around standing."""
     zero = samples(calibration.zero, rate_hz)
-    index = np.flatnonzero(straight)
+    middle = (zero.start + zero.stop) // 2
     turn = np.zeros(len(straight))
+    edges = [0, *(b for _, b in _gaps(valid, rate_hz)), len(straight)]
+    stretches = [(a, b) for a, b in pairwise(edges) if b > a]
+    home = next((r for r in stretches if r[0] <= middle < r[1]), stretches[-1])
+    index = home[0] + np.flatnonzero(straight[home[0] : home[1]])
     if not len(index):
         return turn
-    middle = 0.5 * (zero.start + zero.stop)
     near = index[np.argsort(np.abs(index - middle), kind="stable")[: round(params.reference_s * rate_hz)]]
     mean = relative[near].mean()
-    lost = [r for r in runs(~valid) if r[1] - r[0] > 0.1 * rate_hz]
-    edges = [0, *(b for _, b in lost), len(straight)]
-    for start, end in pairwise(edges):
-        if end <= start:
-            continue
-        home = start <= middle < end
+    for start, end in stretches:
         used = straight[start:end]
-        if np.count_nonzero(used) <= (params.reference_s if home else params.least_s) * rate_hz:
-            continue
-        turn[start:end] = _smooth(relative[start:end] * np.conj(mean), used, rate_hz, params)
-        if home:
-            # inside the reference the mean is the reference: its scatter over strides is not drift
-            quiet = slice(min(near.min(), zero.start), max(near.max() + 1, zero.stop))
-            turn[quiet] = 0.0
+        least = params.reference_s if (start, end) == home else params.least_s
+        if np.count_nonzero(used) > least * rate_hz:
+            turn[start:end] = _smooth(relative[start:end] * np.conj(mean), used, rate_hz, params)
+    # inside the reference the mean is the reference: its scatter over strides is not drift
+    turn[min(near.min(), zero.start) : max(near.max() + 1, zero.stop)] = 0.0
     return turn
+
+
+def _gaps(valid: Bools, rate_hz: float) -> list[tuple[int, int]]:
+    """Gaps that interrupt the heading: longer than the 0.1 s that are interpolated (spec/fusion.md §3)."""
+    return [r for r in runs(~valid) if r[1] - r[0] > 0.1 * rate_hz]
 
 
 def _smooth(relative: Floats, used: Bools, rate_hz: float, params: DriftParams) -> Floats:

@@ -140,6 +140,21 @@ def test_a_lost_sensor_is_masked_told_and_comes_back() -> None:
     assert rms_deg(error[2100:]) < 5.0
 
 
+def test_a_lost_pelvis_finds_its_heading_again_and_leaves_the_legs_alone() -> None:
+    """The gap covers a turn, so that a held heading would be far off."""
+    recording, truth = simulated("fast_with_turns")
+    whole = estimate(calibrate(recording))
+    turning = np.flatnonzero(calibrate(recording).calibration.turning) / 100.0
+    take = calibrate(lost(recording, "pelvis", float(turning[0]) - 0.2, float(turning[0]) + 3.0))
+    found = estimate(take)
+    late = slice(round(100 * turning[0]) + 600, round(100 * truth.stands[-1][0]))
+    thighs: tuple[Segment, ...] = ("thigh_l", "thigh_r")
+    for thigh in thighs:
+        ours, true = (np.exp(1j * (yaw(x.q[thigh]) - yaw(x.q["pelvis"])))[late] for x in (found, whole))
+        assert abs(np.degrees(np.angle((ours * np.conj(true)).mean()))) < 8.0
+    assert np.degrees(angle_between(found.q["shank_l"], whole.q["shank_l"]).max()) < 5.0
+
+
 def test_feet_alone_are_estimated_as_in_the_full_set() -> None:
     recording, _ = simulated("slow")
     alone = estimate(calibrate(only(recording, "foot_l", "foot_r")))
