@@ -29,6 +29,9 @@ KEY_HEIGHT: Final = 186
 
 SEVERITIES: Final = ("bad", "warn", "info")
 
+NO_STRIDE_CODES: Final = ("foot_missing", "no_strides", "few_steps")
+"""Notices that explain a take without strides."""
+
 NOT_ON_PAPER: Final = "Support in seconds"
 """This group says in seconds what another says in percent; the sheet has no room for both."""
 
@@ -161,12 +164,10 @@ def _groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[Row, ..
 
 
 def _why_empty(model: ReportModel) -> str:
-    said = sorted(model.warnings, key=lambda w: SEVERITIES.index(w.kind))
-    grave = next((w.message for w in said if w.kind != "info"), None)
-    found = f"{seconds(model.duration_s)} of data were read, but no complete stride was seen in them. "
-    return (
-        model.problem or grave or f"{found}Is a sensor on each foot, and are the feet where the mapping says?"
-    )
+    causes = [w.message for code in NO_STRIDE_CODES for w in model.warnings if w.code == code]
+    read = f"{seconds(model.duration_s)} of data were read, but no complete stride was seen in them."
+    asked = "Is a sensor on each foot, and is it the one the mapping says?"
+    return model.problem or " ".join([read, *(causes or [asked])])
 
 
 def _notices(model: ReportModel) -> list[dict[str, Any]]:
