@@ -1,7 +1,7 @@
 """What was recorded: frozen objects, checked once at construction, SI units.
 
 `Recording` is what the files say (each sensor on its own clock); `UniformRecording` is the same take on
-one time axis with a validity mask per sensor (made by core/timeline.py). Everything after works on the latter.
+one time axis with a validity mask per sensor (made by core/timeline.py). All later stages work on the latter.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ class Recording:
             if segment not in SEGMENTS:
                 raise ParameterError(
                     "unknown_segment",
-                    f"Sensor {device} is mapped to '{segment}'; expected one of {', '.join(SEGMENTS)} or null.",
+                    f"Sensor {device} is mapped to '{segment}'; expected {', '.join(SEGMENTS)} or null.",
                     sensor=device,
                 )
             if segment in worn:

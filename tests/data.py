@@ -1,4 +1,4 @@
-"""Where the real recordings are: the environment variable SAGITTAL_DATA, else ../shared/data beside the project."""
+"""Where the real recordings are: the variable SAGITTAL_DATA, else ../shared/data beside the project."""
 
 from __future__ import annotations
 

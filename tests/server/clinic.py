@@ -63,7 +63,9 @@ class Clinic:
         """A client that is signed in with this role, or not at all."""
         cookies = {"sid": self.token(role)} if role else {}
         transport = httpx.ASGITransport(self.app, raise_app_exceptions=options.pop("raises", True))
-        return httpx.AsyncClient(transport=transport, base_url=ORIGIN, cookies=cookies, headers=headers, **options)
+        return httpx.AsyncClient(
+            transport=transport, base_url=ORIGIN, cookies=cookies, headers=headers, **options
+        )
 
 
 @contextlib.asynccontextmanager

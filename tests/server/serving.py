@@ -13,7 +13,7 @@ import uvicorn
 
 @contextlib.asynccontextmanager
 async def serve(app: Any) -> AsyncIterator[int]:
-    """Serve on a free port of this event loop, without the lifespan (a clinic has already started its own)."""
+    """Serve on a free port of this event loop, without the lifespan (a clinic has started its own)."""
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         config = uvicorn.Config(
