@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -40,6 +41,19 @@ class RunningServer:
 
     url: str
     folder: Path
+    pid: int
+
+    @contextlib.contextmanager
+    def without_workers(self) -> Iterator[None]:
+        """Hold the workers still for a moment, so that a job waits as in a busy clinic."""
+        workers = [pid for pid, parent in _parents().items() if parent == self.pid]
+        for pid in workers:
+            os.kill(pid, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            for pid in workers:
+                os.kill(pid, signal.SIGCONT)
 
     @contextlib.contextmanager
     def client(self) -> Iterator[httpx.Client]:
@@ -69,7 +83,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]
     url = f"http://127.0.0.1:{port}"
     try:
         _wait_until_ready(url, process, folder / "server.log")
-        yield RunningServer(url, folder)
+        yield RunningServer(url, folder, process.pid)
     finally:
         process.terminate()
         try:
@@ -92,6 +106,15 @@ def _wait_until_ready(url: str, process: subprocess.Popen[bytes], log: Path) -> 
             break
         time.sleep(0.1)
     pytest.fail(f"the server did not start:\n{log.read_text(errors='replace')[-3000:]}")
+
+
+def _parents() -> dict[int, int]:
+    """Process id → its parent's, from /proc."""
+    found = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            found[int(stat.parent.name)] = int(stat.read_text().rpartition(")")[2].split()[1])
+    return found
 
 
 @pytest.fixture(scope="session")

@@ -95,6 +95,31 @@ def test_another_mapping_runs_the_analysis_again(
     assert shown[left_foot] == "Left foot"
 
 
+def test_a_waiting_job_is_shown_live_and_can_be_cancelled(
+    opened: Opener, filled: Filled, running: RunningServer
+) -> None:
+    files, _ = filling.simulated_files()
+    with running.client() as client:
+        patient = filling.add(client, "/patients", code="WAITING")["id"]
+        session = filling.add_session(client, patient, "Walk")
+        filling.upload(client, session, files)
+    with running.without_workers():
+        page = opened(f"/sessions/{session}/upload")
+        page.locator("[data-sides=keep]").click()
+        page.get_by_role("button", name="Analyse").click()
+        card = page.locator("job-progress.card")
+        expect(card).to_contain_text("Waiting for the worker")
+        expect(card).to_contain_text("Find contacts and strides")
+        expect(card).to_contain_text("You can close this page")
+        expect(page.locator(".rail .count")).to_have_text("1")
+        card.get_by_role("button", name="Cancel").click()
+        # no reload by us: the page hears of the end by itself
+        expect(page.locator("h3")).to_have_text("The analysis was cancelled", timeout=5_000)
+    page.get_by_role("link", name="Check sensors").click()
+    page.get_by_role("button", name="Analyse").click()
+    expect(page.locator("gait-view")).to_be_visible(timeout=60_000)
+
+
 def test_a_take_without_strides_says_why_and_offers_the_mapping(opened: Opener, filled: Filled) -> None:
     page = opened(f"/sessions/{filled.unusable}")
     expect(page.locator(".quality")).to_contain_text("No strides")
