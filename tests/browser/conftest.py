@@ -63,19 +63,14 @@ class RunningServer:
             yield client
 
 
-@pytest.fixture(scope="session")
-def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
-    folder = tmp_path_factory.mktemp("clinic")
-    upgrade(folder / "sagittal.db")
-    db = Database(folder / "sagittal.db")
-    with db.write() as c:
-        accounts.create(c, NAME, "Anna", Role.ADMIN, hash_password(PASSWORD))
-    db.close()
+@contextlib.contextmanager
+def serve(folder: Path) -> Iterator[RunningServer]:
+    """Run `sagittal serve` on a data folder; what it says is in server.log there."""
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
         port = s.getsockname()[1]
     log = (folder / "server.log").open("wb")
-    # an own process group, so that workers go with their server
+    # an own process group, so that a Ctrl-C in the terminal does not reach it twice
     process = subprocess.Popen(
         [sys.executable, "-m", "server.main", "serve", "--data", str(folder), "--port", str(port)],
         cwd=ROOT, stdout=log, stderr=subprocess.STDOUT, start_new_session=True,
@@ -92,6 +87,19 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]
             process.kill()
             process.wait()
         log.close()
+
+
+@pytest.fixture(scope="session")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
+    """One server for all tests, with one administrator."""
+    folder = tmp_path_factory.mktemp("clinic")
+    upgrade(folder / "sagittal.db")
+    db = Database(folder / "sagittal.db")
+    with db.write() as c:
+        accounts.create(c, NAME, "Anna", Role.ADMIN, hash_password(PASSWORD))
+    db.close()
+    with serve(folder) as server:
+        yield server
 
 
 def _wait_until_ready(url: str, process: subprocess.Popen[bytes], log: Path) -> None:
