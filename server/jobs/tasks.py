@@ -38,7 +38,8 @@ def _analyse(files: Sequence[SourceFile], params: Mapping[str, Any], progress: P
 def _publish_analysis(
     c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
 ) -> None:
-    analyses.publish(c, claim, blobs)
+    provenance = json.loads(files["analysis.json"])["provenance"]
+    analyses.publish(c, claim, blobs, provenance["parameters_sha256"])
 
 
 def _warm() -> None:

@@ -160,8 +160,13 @@ def submit(
     return view
 
 
-def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob]) -> None:
-    """Write the rows of a result, in the transaction that marks its job done."""
+def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob], config_sha256: str) -> None:
+    """Write the rows of a result, in the transaction that marks its job done.
+
+    Parameters
+    ----------
+    config_sha256 : digest of all parameters that were used, defaults included, from the result itself.
+    """
     params = claim.params
     analysis_id = new_id()
     row = {
@@ -169,7 +174,7 @@ def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob]) -> None:
         "recording_id": claim.recording_id,
         "job_id": claim.job_id,
         "input_sha256": params["input_sha256"],
-        "config_sha256": _digest(params["config"]),
+        "config_sha256": config_sha256,
         "code_version": CODE_VERSION,
         "manifest": params["manifest"],
         "config": params["config"],

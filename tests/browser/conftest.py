@@ -125,15 +125,16 @@ def _parents() -> dict[int, int]:
     return found
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def playwright_() -> Iterator[Playwright]:
+    # while it lives it keeps an event loop running in this thread, which other tests must not find
     if not Path(CHROMIUM).exists():
         pytest.skip(f"no Chromium at {CHROMIUM}; set CHROMIUM to one")
     with sync_playwright() as p:
         yield p
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def flat(playwright_: Playwright) -> Iterator[Browser]:
     """Chromium without 3D."""
     browser = playwright_.chromium.launch(executable_path=CHROMIUM, args=FLAT)
@@ -141,7 +142,7 @@ def flat(playwright_: Playwright) -> Iterator[Browser]:
     browser.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def solid(playwright_: Playwright) -> Iterator[Browser]:
     """Chromium with software WebGL."""
     browser = playwright_.chromium.launch(executable_path=CHROMIUM, args=SOLID)

@@ -66,7 +66,7 @@ class Clinic:
             claim = self.queue.claim("w", (recordings.ANALYSE,))
             assert claim is not None
             stored = {"analysis.json": self.blobs.put(claim.params["space"], content)}
-            assert self.queue.finish(claim, lambda c: analyses.publish(c, claim, stored))
+            assert self.queue.finish(claim, lambda c: analyses.publish(c, claim, stored, "0" * 64))
         with self.db.read() as c:
             found = analyses.latest(c, session_id)
         assert found is not None

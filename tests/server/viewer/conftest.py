@@ -70,4 +70,4 @@ def _finish_analysis(clinic: Clinic, patient_id: str, session_id: str) -> None:
         analyses.submit(c, state.queue, None, session_id)
     claim = state.queue.claim("test", [recordings.ANALYSE])
     stored = {"poses.parquet": state.blobs.put(patient_id, poses_parquet(walk.poses()))}
-    assert state.queue.finish(claim, lambda c: analyses.publish(c, claim, stored))
+    assert state.queue.finish(claim, lambda c: analyses.publish(c, claim, stored, "0" * 64))
