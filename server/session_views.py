@@ -9,13 +9,12 @@ from urllib.parse import quote
 from sqlalchemy import Connection
 
 from server.page_views import PROTOCOL_NAMES, SEGMENT_NAMES, job_dict, newest_job, who_words
-from server.report.bundle import load_bundle
 from server.report.curves import cycle_svg, strip_svg
-from server.report.model import ReportModel, report_model
+from server.report.model import ReportModel
 from server.report.panels import CurvePanel
 from server.report.table import Row
 from server.report.wording import ZERO_WORDS
-from server.services import analyses, patients, recordings, sessions
+from server.services import analyses, patients, recordings, reports, sessions
 from server.storage.blobs import BlobStore
 from web.words import day, seconds
 
@@ -131,10 +130,7 @@ def report(
 ) -> dict[str, Any]:
     """The report of an analysis with its charts drawn, for the page or for paper."""
     patient, session = context["patient"], context["session"]
-    files = {name: analyses.file_bytes(blobs, found, name) for name in found.files if name != "poses.parquet"}
-    bundle = load_bundle(files)
-    age = session.performed_on.year - patient.birth_year if patient.birth_year else None
-    model = report_model(bundle, age=age, sex=patient.sex)
+    bundle, model = reports.read(blobs, found, patient, session)
     last_row = len(model.panels) - COLUMNS
     heights = PAPER_HEIGHTS if paper else PAGE_HEIGHTS
     curves = [_chart(p, heights[i >= last_row], x_unit=i >= last_row) for i, p in enumerate(model.panels)]

@@ -13,10 +13,9 @@ from server.api.downloads import BINARY, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.report.bundle import load_bundle
-from server.report.model import ReportModel, report_model
+from server.report.model import ReportModel
 from server.report.tables import curves_csv, parameters_csv
-from server.services import analyses, patients, sessions
+from server.services import analyses, patients, reports, sessions
 from server.services.errors import NotFound
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -55,6 +54,4 @@ def _opened(db: Database, blobs: BlobStore, who: Identity, session_id: str) -> R
         if found is None:
             raise NotFound("analysis of session", session_id)
         audit.record(c, who, "report.opened", "session", session_id, {"analysis_id": found.id})
-    files = {name: analyses.file_bytes(blobs, found, name) for name in found.files if name != "poses.parquet"}
-    age = session.performed_on.year - patient.birth_year if patient.birth_year else None
-    return report_model(load_bundle(files), age=age, sex=patient.sex)  # type: ignore[arg-type]
+    return reports.read(blobs, found, patient, session)[1]

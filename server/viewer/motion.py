@@ -101,7 +101,9 @@ def prepare(poses: Poses) -> Motion:
         `no_figure` when no segment has a pose.
     """
     if not poses.q or len(poses.t_s) == 0:
-        raise ParameterError("no_figure", "No segment has a pose; the replay needs at least one sensor.")
+        raise ParameterError(
+            "no_figure", "No figure: it needs the pelvis and one whole leg (thigh, shank, foot)."
+        )
     keep = slice(None, None, max(1, round(poses.rate_hz / FRAME_RATE)))
     q = {s: np.asarray(a[keep], np.float64) for s, a in poses.q.items()}
     p = {s: np.asarray(a[keep], np.float64) for s, a in poses.p.items()}
