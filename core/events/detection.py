@@ -92,7 +92,7 @@ def _events(
     side: Side, s: Floats, valid: Bools, orientations: Orientations, params: FootPitchParams
 ) -> list[GaitEvent]:
     """Run the rule over the whole take of one foot."""
-    kind, index, offset = push(FootPitchState.start(orientations.rate_hz, params), s, valid)
+    kind, index, known, offset = push(FootPitchState.start(orientations.rate_hz, params), s, valid)
     step = 1.0 / orientations.rate_hz
     return [
         GaitEvent(
@@ -100,9 +100,9 @@ def _events(
             side=side,
             kind=KINDS[k],
             source=SOURCE,
-            detected_s=float(orientations.t_s[j + 1]),
+            detected_s=float(orientations.t_s[at]),
         )
-        for k, j, o in zip(kind, index, offset, strict=True)
+        for k, j, at, o in zip(kind, index, known, offset, strict=True)
     ]
 
 

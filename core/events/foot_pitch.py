@@ -32,6 +32,10 @@ class FootPitchParams:
     monotone_share : share of the window's steps that must lead towards the extremum (thesis Alg 1: 0.8).
     threshold : level of s between stance and push-off (thesis Alg 1: −0.2 = 11.5° toes down). Do not raise
         it: at −0.1 a drop foot loses most of its contacts (spec/patients.md §0.5).
+    fall : an initial contact with the toes up counts once s has fallen this far below its maximum, or by half
+        of it; what rises again before was a plateau of the swing, and the later maximum is taken. Our choice:
+        the additive noise on s that the rule stands (spec/fusion.md §5.4). A foot landing on its heel falls so
+        far within a few samples: the real recordings give the same contacts with and without.
     min_rate_hz : below it the window holds too few samples (spec/fusion.md §5.3).
     suspect_max : a foot that never pitches up beyond this was not level at rest (spec/fusion.md §5.3).
     suspect_quiet : largest mean |s| of quiet standing (spec/fusion.md §5.3).
@@ -41,6 +45,7 @@ class FootPitchParams:
     window_s: float = 0.150
     monotone_share: float = 0.8
     threshold: float = -0.2
+    fall: float = 0.01
     min_rate_hz: float = 40.0
     suspect_max: float = 0.1
     suspect_quiet: float = 0.1
@@ -53,15 +58,19 @@ class FootPitchState:
 
     Parameters
     ----------
-    ring : (window + 3,) the last values of s. counters : (5,) samples seen, valid samples in a row,
-        0 = stance or 1 = swing, sample of the last detection of TC and of IC.
+    ring : (window + 3,) the last values of s. counters : (6,) samples seen, valid samples in a row,
+        0 = stance or 1 = swing, sample of the last detection of TC and of IC, sample of the held maximum
+        or −1.
+    held : (3,) the held maximum, the value before it, its sub-sample offset (2 = not known yet).
     """
 
     ring: Floats
     counters: NDArray[np.int64]
+    held: Floats
     window: int
     need: int
     threshold: float
+    fall: float
 
     @classmethod
     def start(cls, rate_hz: float, params: FootPitchParams) -> FootPitchState:
@@ -70,16 +79,18 @@ class FootPitchState:
         never = -(1 << 40)
         return cls(
             ring=np.zeros(window + 3),
-            counters=np.array([0, 0, 0, never, never], np.int64),
+            counters=np.array([0, 0, 0, never, never, -1], np.int64),
+            held=np.zeros(3),
             window=window,
             need=int(np.ceil(params.monotone_share * window - 1e-9)),
             threshold=params.threshold,
+            fall=params.fall,
         )
 
 
 def push(
     state: FootPitchState, s: Floats, valid: Bools
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Floats]:
     """Advance one foot by a block of samples, in place.
 
     Parameters
@@ -88,20 +99,21 @@ def push(
 
     Returns
     -------
-    (m,) kind 0 = TC, 1 = IC; (m,) sample of the extremum since the start, detected one sample later;
-    (m,) offset of the parabola through the three samples around it, within ±0.5 samples.
+    (m,) kind 0 = TC, 1 = IC; (m,) sample of the extremum since the start; (m,) sample at which it is
+    known; (m,) offset of the parabola through the three samples around it, within ±0.5 samples.
     """
     room = 2 * (len(s) // (state.window + 1) + 1)
-    kind, index, offset = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)
+    kind, index, known = (np.empty(room, np.int64) for _ in range(3))
+    offset = np.empty(room)
     # numba is slow to import and only needed here
     from core.events.foot_pitch_kernel import foot_pitch_kernel
 
     # copies: the kernel is compiled once, for writable contiguous arrays of these types
     m = foot_pitch_kernel(
-        np.array(s, np.float64), np.array(valid, np.bool_), state.ring, state.counters, state.window,
-        state.need, state.threshold, kind, index, offset,
+        np.array(s, np.float64), np.array(valid, np.bool_), state.ring, state.counters, state.held,
+        state.window, state.need, state.threshold, state.fall, kind, index, known, offset,
     )  # fmt: skip
-    return kind[:m], index[:m], offset[:m]
+    return kind[:m], index[:m], known[:m], offset[:m]
 
 
 def pitch_signal(q_foot: Floats) -> Floats:

@@ -23,7 +23,7 @@ def run(s: Floats, rate_hz: float, cuts: list[int] | None = None) -> tuple[Float
     """Times of TC and IC; `cuts` splits the run into blocks."""
     state = FootPitchState.start(rate_hz, FootPitchParams())
     parts = [push(state, b, np.ones(len(b), np.bool_)) for b in np.split(s, cuts or [])]
-    kind, index, offset = (np.concatenate([p[i] for p in parts]) for i in range(3))
+    kind, index, offset = (np.concatenate([p[i] for p in parts]) for i in (0, 1, 3))
     times = (index + offset) / rate_hz
     return times[kind == 0], times[kind == 1]
 
@@ -59,10 +59,11 @@ def test_any_split_into_blocks_gives_the_same_bits(cuts: list[int], seed: int) -
     one = push(whole, s, valid)
     places = sorted(cuts)
     parts = [push(split, a, b) for a, b in zip(np.split(s, places), np.split(valid, places), strict=True)]
-    for i in range(3):
+    for i in range(4):
         assert np.array_equal(one[i], np.concatenate([p[i] for p in parts]))
     assert np.array_equal(whole.ring, split.ring)
     assert np.array_equal(whole.counters, split.counters)
+    assert np.array_equal(whole.held, split.held)
 
 
 @given(seed=st.integers(0, 1000), roughness=st.floats(0.0, 0.3))
@@ -71,21 +72,41 @@ def test_contacts_alternate_and_start_with_the_foot_leaving(seed: int, roughness
     rng = np.random.default_rng(seed)
     s = signal(RATE, rng.uniform(0.5, 2.0), 8) * rng.uniform(0.3, 1.0)
     s = s + np.cumsum(rng.normal(0.0, roughness / 20, len(s)))
-    kind, index, offset = push(FootPitchState.start(RATE, FootPitchParams()), s, np.ones(len(s), np.bool_))
+    kind, index, known, offset = push(
+        FootPitchState.start(RATE, FootPitchParams()), s, np.ones(len(s), np.bool_)
+    )
     assert np.array_equal(kind, np.arange(len(kind)) % 2)
     assert np.all(np.diff(index) > 0)
+    assert np.all(known > index)
     assert np.all(np.abs(offset) <= 0.5)
 
 
-def test_the_event_is_known_one_sample_after_its_extreme() -> None:
+def test_a_stream_knows_the_event_when_it_says_so_and_soon() -> None:
     s = signal(RATE)
-    _, index, _ = push(FootPitchState.start(RATE, FootPitchParams()), s, np.ones(len(s), np.bool_))
-    for j in index[:6]:
+    kind, index, known, _ = push(FootPitchState.start(RATE, FootPitchParams()), s, np.ones(len(s), np.bool_))
+    assert np.all(known[kind == 0] == index[kind == 0] + 1)
+    assert np.all(known[kind == 1] <= index[kind == 1] + 4)
+    for j, at in zip(index[:6], known[:6], strict=True):
         state = FootPitchState.start(RATE, FootPitchParams())
-        before = push(state, s[: j + 1], np.ones(j + 1, np.bool_))[1]
-        after = push(state, s[j + 1 : j + 2], np.ones(1, np.bool_))[1]
+        before = push(state, s[:at], np.ones(at, np.bool_))[1]
+        after = push(state, s[at : at + 1], np.ones(1, np.bool_))[1]
         assert j not in before
         assert after.tolist() == [j]
+
+
+@pytest.mark.parametrize("dip", [0.0005, 0.004, 0.009])
+def test_a_plateau_of_the_swing_is_not_a_landing(dip: float) -> None:
+    s = signal(RATE)
+    true_ic = extremes(2.0, 15, 1.1)[1]
+    t = np.arange(len(s)) / RATE
+    for contact in true_ic:
+        # the toes are up, rest for 30 ms before the heel lands, and rise again
+        early = (t > contact - 0.06) & (t <= contact - 0.03)
+        assert s[early][0] > 0.1
+        s[early] = s[early][0] - dip * (t[early] - t[early][0]) / 0.02
+    tc, ic = run(s, RATE)
+    assert len(tc) == len(ic) == 15
+    assert np.abs(ic - true_ic).max() < 0.01
 
 
 def test_nothing_is_concluded_across_lost_samples() -> None:
@@ -96,7 +117,7 @@ def test_nothing_is_concluded_across_lost_samples() -> None:
     valid[lost] = False
     garbage = s.copy()
     garbage[lost] = np.nan
-    kind, index, _ = push(FootPitchState.start(RATE, FootPitchParams()), garbage, valid)
+    kind, index, _, _ = push(FootPitchState.start(RATE, FootPitchParams()), garbage, valid)
     ic = index[kind == 1] / RATE
     assert not np.any(np.abs(ic - true_ic[5]) < 0.1), "the phase of the foot is unknown after a gap"
     assert len(ic) == 14
