@@ -34,8 +34,8 @@ class FootPitchParams:
         it: at −0.1 a drop foot loses most of its contacts (spec/patients.md §0.5).
     fall : an initial contact with the toes up counts once s has fallen this far below its maximum, or by half
         of it; what rises again before was a plateau of the swing, and the later maximum is taken. Our choice:
-        the additive noise on s that the rule stands (spec/fusion.md §5.4). A foot landing on its heel falls so
-        far within a few samples: the real recordings give the same contacts with and without.
+        the additive noise on s that the rule stands (spec/fusion.md §5.4). A foot that lands on its heel
+        falls so far within a few samples: real recordings give the same contacts with and without.
     min_rate_hz : below it the window holds too few samples (spec/fusion.md §5.3).
     suspect_max : a foot that never pitches up beyond this was not level at rest (spec/fusion.md §5.3).
     suspect_quiet : largest mean |s| of quiet standing (spec/fusion.md §5.3).
