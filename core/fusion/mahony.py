@@ -9,16 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from core.attitude import AttitudeParams, orientation
 from core.calibration.result import CalibratedRecording, SegmentCalibration
-from core.errors import EstimationError, Notice
+from core.errors import EstimationError
 from core.frames import R_NEUTRAL, Bools, Floats, Segment
 from core.fusion.drift import DriftParams, remove_relative_drift
 from core.fusion.orientations import Orientations
 from core.recording import SensorSignals
-from core.rest import Window, runs
+from core.rest import Window
 from core.rotation import conjugate, from_matrix, multiply
 
 
@@ -39,8 +37,8 @@ def estimate(calibrated: CalibratedRecording, params: MahonyParams | None = None
 
     Returns
     -------
-    Orientations with `valid` False where a sensor was lost; a notice `gap` tells when and for how long, and
-    `heading_rereferenced` how much relative heading drift was taken out.
+    Orientations with `valid` False where a sensor was lost; a notice `heading_rereferenced` tells how
+    much relative heading drift was taken out.
 
     Raises
     ------
@@ -52,14 +50,12 @@ def estimate(calibrated: CalibratedRecording, params: MahonyParams | None = None
         raise EstimationError("no_segment", "No segment is calibrated; calibrate at least one foot.")
     q: dict[Segment, Floats] = {}
     valid: dict[Segment, Bools] = {}
-    notices: list[Notice] = []
     for segment, mounted in calibration.segments.items():
         signals = recording.sensors[segment]
         q[segment] = segment_orientation(
             signals, mounted, calibration.zero, recording.rate_hz, params.attitude
         )
         valid[segment] = signals.valid
-        notices += _gaps(signals.valid, segment, recording.rate_hz)
     q, drift, told = remove_relative_drift(q, valid, calibration, recording.rate_hz, params.drift)
     return Orientations(
         t_s=recording.t_s,
@@ -67,7 +63,7 @@ def estimate(calibrated: CalibratedRecording, params: MahonyParams | None = None
         q=q,
         valid=valid,
         engine="mahony",
-        notices=(*notices, *told),
+        notices=tuple(told),
         diagnostics={"kp": params.attitude.kp, "largest_drift_rad": drift},
     )
 
@@ -81,17 +77,3 @@ def segment_orientation(
     gyr = signals.gyr - mounted.gyro_bias
     sensor = orientation(start, at, gyr, signals.acc, signals.valid, rate_hz, mounted.rest_norm, params)
     return multiply(sensor, conjugate(from_matrix(mounted.R_segment_sensor)))
-
-
-def _gaps(valid: Bools, segment: Segment, rate_hz: float) -> list[Notice]:
-    lost = runs(~valid)
-    if not lost:
-        return []
-    a, b = max(lost, key=lambda r: r[1] - r[0])
-    total = float(np.count_nonzero(~valid)) / rate_hz
-    message = (
-        f"{segment}: no signal for {total:.2f} s in {len(lost)} gaps, the longest {(b - a) / rate_hz:.2f} s. "
-        "There "
-        "are no angles there, and the heading after a gap is relearnt from straight walking."
-    )
-    return [Notice("gap", message, sensor=segment, t_s=a / rate_hz)]

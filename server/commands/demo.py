@@ -60,6 +60,7 @@ def demo(port: int | None) -> int:
 def _report(database: Path) -> None:
     """Say on the console what is being waited for, until every session is analysed."""
     from server.services.demo_clinic import VISITS
+    from server.services.recordings import ANALYSE
     from server.storage.tables import job
 
     began, told = time.monotonic(), ""
@@ -69,7 +70,9 @@ def _report(database: Path) -> None:
         while True:
             with db.read() as c:
                 ended = c.execute(
-                    select(func.count()).select_from(job).where(job.c.finished_at.is_not(None))
+                    select(func.count())
+                    .select_from(job)
+                    .where(job.c.kind == ANALYSE, job.c.finished_at.is_not(None))
                 ).scalar_one()
             text = f"{ended} of {len(VISITS)} sessions analysed ({time.monotonic() - began:.0f} s)"
             if ended and text.split(" (")[0] != told:

@@ -93,8 +93,10 @@ def _add(
             upload.write(content)
             upload.keep()
     with db.write() as c:
+        queue = TableQueue(db, settings.lease_s)
         recordings.set_manifest(c, None, session.id, {"sensors": dict(recording.segments)})
-        analyses.submit(c, TableQueue(db, settings.lease_s), None, session.id)
+        recordings.inspect(c, queue, None, session.id)
+        analyses.submit(c, queue, None, session.id)
 
 
 if __name__ == "__main__":

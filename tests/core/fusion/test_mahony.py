@@ -120,17 +120,13 @@ def test_drift_correction_does_not_change_flexion() -> None:
         assert rms_deg(held[name] - free[name]) < 1.0
 
 
-def test_a_lost_sensor_is_masked_told_and_comes_back() -> None:
+def test_a_lost_sensor_is_masked_and_comes_back() -> None:
     recording, truth = simulated("comfortable")
     broken = lost(recording, "shank_l", 15.0, 20.0)
     take = calibrate(broken)
     found = estimate(take)
     assert not found.valid["shank_l"][1500:2000].any()
     assert found.valid["shank_l"][2000:].all()
-    gap = [x for x in found.notices if x.code == "gap"]
-    assert len(gap) == 1
-    assert gap[0].sensor == "shank_l"
-    assert gap[0].t_s == pytest.approx(15.0)
     angles = joint_angles(found, take.calibration.zero)
     knee = angles.angles["knee_flexion_l"]
     assert np.isnan(knee[1500:2000]).all()
