@@ -240,8 +240,8 @@ def _gap_notice(
         Notice(
             "gap",
             f"{segment} has no data in {len(holes)} stretch(es) longer than 0.1 s, {100 * invalid:.1f} % "
-            f"of the take; the longest is {(end - start) / uniform.rate_hz:.2f} s. There are no angles there and "
-            "strides that touch them are left out; the heading after one is relearnt from straight walking.",
+            f"of the take; the longest is {(end - start) / uniform.rate_hz:.2f} s. Angles there are missing "
+            "and strides that touch them are left out; heading is relearnt from the straight walking after.",
             segment,
             start / uniform.rate_hz,
             severity="warning" if invalid > params.invalid_usable else "info",
