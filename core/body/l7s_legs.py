@@ -1,8 +1,8 @@
-"""Sy's body model: its lengths, its segment frames against ours, and the legs from hip, ankle and hinge axis.
+"""Sy's body model: its lengths, its frames against ours, and the legs from hip, ankle and hinge axis.
 
-Sy's frames (spec/estimators.md §1): pelvis, thigh and shank x forward, y left, z up; foot z from ankle to toe,
-y left, x down. We keep the inclination of the line from ankle to toe under the sole's forward axis, so that
-nothing of it is left in our foot frame; with it 0 the conversion is the M_foot of §1.
+Sy's frames (spec/estimators.md §1): pelvis, thigh and shank x forward, y left, z up; foot z from ankle to
+toe, y left, x down. We keep the inclination of the line from ankle to toe under the sole's forward axis, so
+that nothing of it is left in our foot frame; with it 0 the conversion is the M_foot of §1.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ BODIES: Final[tuple[Segment, ...]] = ("pelvis", "foot_l", "foot_r")
 LEGS: Final[tuple[Side, ...]] = ("left", "right")
 """Order of the legs in the state."""
 
-HINGE_SIDE: Final[dict[Side, float]] = {"left": 1.0, "right": -1.0}
+HIP_SIDE: Final[dict[Side, float]] = {"left": 1.0, "right": -1.0}
 """Sign of the hip centre on the pelvis's y axis, which points left (paper eq 32)."""
 
 M_LEG: Final[Floats] = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -97,8 +97,8 @@ class Legs:
     Parameters
     ----------
     q : segment → (n, 4). p : segment → (n, 3) hip for thighs, knee for shanks, ankle for feet, m.
-    reach : side → (n,) distance of ankle and hip, m. hinge : side → (n,) distance of the hip from the plane of
-    the foot, m, zero when the hinge constraint holds.
+    reach : side → (n,) distance of ankle and hip, m. hinge : side → (n,) distance of the hip from the plane
+    of the foot, m, zero when the hinge constraint holds.
     """
 
     q: Mapping[Segment, Floats]
@@ -124,7 +124,7 @@ def solve_legs(R: Floats, p: Floats, model: LegModel) -> Legs:
     hinge: dict[Side, Floats] = {}
     for leg, side in enumerate(LEGS):
         R_foot, p_foot = R[:, 1 + leg], p[:, 1 + leg]
-        hip = p[:, 0] + 0.5 * HINGE_SIDE[side] * model.hip_width * R[:, 0, :, 1]
+        hip = p[:, 0] + 0.5 * HIP_SIDE[side] * model.hip_width * R[:, 0, :, 1]
         ankle = p_foot - 0.5 * model.foot * R_foot[:, :, 2]
         y = R_foot[:, :, 1]
         tau = hip - ankle
