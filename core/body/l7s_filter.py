@@ -2,7 +2,7 @@
 
 Sy, Lovell, Redmond 2021, IEEE TBME (spec/estimators.md §4): a constrained Kalman filter on SE(3)³ × R⁹. The
 state is the pose and velocity of pelvis and feet; thighs and shanks follow from hinged knees and ankles.
-What we do otherwise than the paper prints, each checked against finite differences or simulation:
+What we do otherwise than the paper prints (evidence in spec/estimators.md §4 and §5):
 
 - eq 18: the feet's blocks of the mid-pelvis row carry −½, the minus is lost in print.
 - eq 32: the ankle lies at −d/2 on the foot's z axis, which points to the toe; print has +.
