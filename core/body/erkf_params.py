@@ -34,13 +34,15 @@ class ErkfParams:
     ----------
     states : per IMU, 9 (position, velocity, orientation) or 15 (with both biases).
     acc_sd : m/s². gyr_sd : rad/s. gyr_sd_of : IMU → its own. impact : share c of the change of specific force
-        from sample to sample that is added as uncertainty, σ_a² + (c |f_k − f_k−1|)² (spec/real-data.md §0.1).
+        from sample to sample that is added as uncertainty, σ_a² + (c |f_k − f_k−1|)² (spec/real-data.md
+        §0.1).
     gyr_walk, acc_walk : random walk of the biases, rad/s/√s and m/s²/√s (15 states).
     zero_velocity_sd : m/s. gate : largest χ² of a zero velocity. reaccept_s : contact refused for so long is
         accepted after all; then `reaccept_m` is added to the foot's uncertainty (spec/estimators.md §3.3).
     tilt_sd : of the direction of f. joint_centre_sd : m. joint_axis_sd, heading_sd : rad. zaru_sd : rad/s.
     gap_acc_sd, gap_gyr_sd : in place of acc_sd and gyr_sd while an IMU is lost.
-    start_* : of the first sample; `start_heading_sd` about the vertical, must cover the first headings' errors.
+    start_* : of the first sample; `start_heading_sd` about the vertical, must cover the first headings'
+        errors.
     moving_* : the same where a recording starts mid-walk.
     """
 

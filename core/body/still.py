@@ -1,9 +1,9 @@
 """Where a foot stands still, for zero-velocity updates, and where any sensor rests, for tilt.
 
-Both are rules on the magnitude of angular rate and of specific force, so they need no orientation. A foot's rule
-is the wide one: .7 rad/s and 1.2 m/s² find 14 of 14 stances of the real walk with none too many (spec/real-data.md
-§4); what it lets through wrongly is the χ² gate's matter. Events (core/events) say where contact begins and ends;
-the foot is flat and still only in a part of that time.
+Both are rules on the magnitude of angular rate and of specific force, so they need no orientation. A foot's
+rule is the wide one: .7 rad/s and 1.2 m/s² find 14 of 14 stances of the real walk with none too many
+(spec/real-data.md §4); what it lets through wrongly is the χ² gate's matter. Events (core/events) say where
+contact begins and ends; the foot is flat and still only in a part of that time.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from core.frames import GRAVITY, Bools, Floats
 
 @dataclass(frozen=True)
 class StillRule:
-    """Still where |ω| and ||f| − g| stay below limits over a centred window, in runs of at least `shortest_s`."""
+    """Still: |ω| and ||f| − g| below limits over a centred window, in runs of at least `shortest_s`."""
 
     gyr_limit: float
     acc_limit: float
@@ -39,7 +39,7 @@ def still_samples(acc: Floats, gyr: Floats, valid: Bools, rate_hz: float, rule: 
         & (np.linalg.norm(gyr, axis=1) < rule.gyr_limit)
         & (np.abs(np.linalg.norm(acc, axis=1) - GRAVITY) < rule.acc_limit)
     )
-    reach = int(round(rule.window_s * rate_hz)) // 2
+    reach = round(rule.window_s * rate_hz) // 2
     loud = np.concatenate(([0], np.cumsum(~quiet)))
     index = np.arange(len(quiet))
     low, high = np.maximum(index - reach, 0), np.minimum(index + reach + 1, len(quiet))

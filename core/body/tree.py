@@ -1,8 +1,9 @@
 """The kinematic tree the pose filters run on: IMUs, and the joints that hold them together.
 
 Nothing in a filter knows about legs: it sees sensors, joint centres in sensor axes, hinge axes and which
-sensors come to rest on the floor. Trees of people are made from a body model, how the sensors sit (calibration)
-and where (places.py). Where no joint links two sensors, as with two feet alone, they are filtered side by side.
+sensors come to rest on the floor. Trees of people are made from a body model, how the sensors sit
+(calibration) and where (places.py). Where no joint links two sensors, as with two feet alone, they are
+filtered side by side.
 """
 
 from __future__ import annotations
@@ -109,17 +110,21 @@ class ImuTree:
                         f"{joint.name} lies at {np.round(r, 3).tolist()} m from its sensor, expected within "
                         f"{LONGEST_M:g} m; check the body model's units.",
                     )
-            a, b = group[joint.proximal], group[joint.distal]
-            if a == b:
+            part, other = group[joint.proximal], group[joint.distal]
+            if part == other:
                 raise EstimationError(
                     "joint_loop", f"{joint.name} closes a loop; a tree has one way to each IMU."
                 )
-            group = [a if g == b else g for g in group]
+            group = [part if g == other else g for g in group]
 
     def roots(self) -> list[int]:
         """The first sensor of each connected part."""
         below = {j.distal for j in self.joints}
         return [i for i in range(len(self.imus)) if i not in below]
+
+    def forward(self) -> Floats:
+        """The segments' anterior axes (n, 3) in sensor axes."""
+        return rotate(conjugate(self.q_mount), np.array([1.0, 0.0, 0.0]))
 
     def segment_q(self, q: Floats) -> Floats:
         """Segment orientations (..., n, 4) from sensor orientations (..., n, 4)."""

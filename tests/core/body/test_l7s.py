@@ -134,7 +134,7 @@ FLEXION = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 
 @pytest.mark.parametrize("worn", ["3I", "2I"])
 def test_angles_and_strides_of_a_simulated_walk_are_within_the_limits(worn: Worn) -> None:
-    calibrated, orientations, _, truth = walk()
+    calibrated, _, _, truth = walk()
     found = poses_of(worn)
     posed = Orientations(found.t_s, found.rate_hz, found.q, dict.fromkeys(found.q, found.valid), found.method)
     angles = joint_angles(posed, calibrated.calibration.zero).angles
