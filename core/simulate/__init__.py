@@ -1,28 +1,33 @@
 """Simulated walkers and sensors with exact truth, for tests, demo and CLI (docs/simulation.md)."""
 
 from core.simulate.mt_text import mt_files, mt_text
+from core.simulate.patients import PATIENTS, Patient
 from core.simulate.recorder import Dropout, Setup, Simulation, simulate
-from core.simulate.script import Arc, Pivot, Script, Stand, Straight
+from core.simulate.script import Arc, Pivot, Script, Stand, Steps, Straight
 from core.simulate.scripts import SCRIPTS, Scenario, simulate_scenario
 from core.simulate.sensors import SensorNoise
 from core.simulate.soft_tissue import SoftTissue
 from core.simulate.tables import angle_table, event_table, stride_table
 from core.simulate.truth import Truth
-from core.simulate.walker import STEADY, Variability, Walker
+from core.simulate.walker import STEADY, SideGait, Variability, Walker
 
 __all__ = [
+    "PATIENTS",
     "SCRIPTS",
     "STEADY",
     "Arc",
     "Dropout",
+    "Patient",
     "Pivot",
     "Scenario",
     "Script",
     "SensorNoise",
     "Setup",
+    "SideGait",
     "Simulation",
     "SoftTissue",
     "Stand",
+    "Steps",
     "Straight",
     "Truth",
     "Variability",

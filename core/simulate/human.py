@@ -13,13 +13,13 @@ import numpy as np
 
 from core.errors import ParameterError
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
-from core.rotation import from_matrix, rotate
+from core.rotation import about, from_matrix, multiply, rotate
 from core.simulate import pelvis
 from core.simulate.script import Plan
 from core.simulate.stance import Sole, StanceFoot, foot_orientation
 from core.simulate.swing import FootMotion, foot_motion
 from core.simulate.timing import FootTiming, amplitude, body_phase, foot_timing, gait_phase
-from core.simulate.walker import Walker
+from core.simulate.walker import SIGN, Walker
 
 HINGE_FROM_PELVIS = 0.65
 """Share of the pelvis in the direction of the knee hinge; the rest follows the foot's heading."""
@@ -65,7 +65,7 @@ def move(plan: Plan, walker: Walker, rate_hz: float) -> Motion:
     paths = {s: stances[s].path(t) for s in SIDES}
     ankles = {s: paths[s][0] for s in SIDES}
     xy, heading = pelvis.floor_path(t, plan, walker, phase, scale, rate_hz)
-    q_pelvis = pelvis.orientation(heading, phase, scale)
+    q_pelvis = pelvis.orientation(walker, heading, phase, phases, scale)
 
     shares = {s: pelvis.load_share(t, plan, timings, s) for s in SIDES}
     z = pelvis.height(plan, walker, phases, scale, shares, xy, q_pelvis, ankles, rate_hz)
@@ -136,8 +136,18 @@ def _leg(
         up = _unit(top - bottom)
         q[segment] = from_matrix(np.stack((np.cross(up, hinge), up, hinge), axis=-1))
         p[segment] = top
+    if walker.tibial_rotation_rad:
+        # about the shank's own axis: joint centres stay where they are
+        bent = np.sin(_knee_angle(thigh, shank, length[:, 0]))
+        inward = SIGN[side] * walker.tibial_rotation_rad * bent
+        q[SHANK[side]] = multiply(q[SHANK[side]], about(1, inward))
     q[FOOT[side]] = foot_orientation(foot.heading, foot.pitch, foot.roll)
     p[FOOT[side]] = foot.ankle
+
+
+def _knee_angle(thigh: float, shank: float, length: Floats) -> Floats:
+    """Knee flexion (n,) in rad of a leg that is `length` (n,) from hip to ankle: the inverse of leg_reach."""
+    return np.asarray(np.arccos((length**2 - thigh**2 - shank**2) / (2.0 * thigh * shank)))
 
 
 def _unit(v: Floats) -> Floats:

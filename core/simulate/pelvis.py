@@ -13,14 +13,13 @@ from scipy.ndimage import maximum_filter1d
 
 from core.frames import SIDES, Bools, Floats, Side
 from core.rotation import about, multiply, rotate
-from core.simulate.curves import KNEE_FLEXION, PELVIS_OBLIQUITY, PELVIS_ROTATION, PELVIS_TILT
+from core.simulate.curves import PELVIS_OBLIQUITY, PELVIS_ROTATION, PELVIS_TILT
 from core.simulate.script import Plan
-from core.simulate.shapes import smooth, smooth_max, smoothstep
+from core.simulate.shapes import phase_bump, smooth, smooth_max, smoothstep
 from core.simulate.stance import Q_NEUTRAL
+from core.simulate.targets import DEGREE, knee_flexion
 from core.simulate.timing import FootTiming, window
 from core.simulate.walker import SIGN, Walker, leg_reach
-
-DEGREE = float(np.radians(1.0))
 
 FULL_FORWARD = 0.94
 """From this share of the reference step on the pelvis is fully ahead of the feet at contact."""
@@ -73,11 +72,22 @@ def floor_path(
     return xy + wave[:, None] * np.stack((np.cos(heading), np.sin(heading)), axis=-1), heading
 
 
-def orientation(heading: Floats, phase: Floats, amplitude: Floats) -> Floats:
-    """Pelvis quaternions (n, 4): rotation, then obliquity, then tilt (Baker 2001)."""
-    yaw = heading + amplitude * PELVIS_ROTATION(phase)
-    obliquity = -amplitude * PELVIS_OBLIQUITY(phase)
-    tilt = PELVIS_TILT.mean + amplitude * (PELVIS_TILT(phase) - PELVIS_TILT.mean)
+def orientation(
+    walker: Walker, heading: Floats, phase: Floats, phases: Mapping[Side, Floats], amplitude: Floats
+) -> Floats:
+    """Pelvis quaternions (n, 4): rotation, then obliquity, then tilt (Baker 2001).
+
+    Parameters
+    ----------
+    phase : (n,) of the body. phases : side → (n,) of that leg, for a hiked pelvis.
+    """
+    yaw = heading + amplitude * (walker.rotation_factor * PELVIS_ROTATION(phase))
+    right_up = walker.obliquity_factor * PELVIS_OBLIQUITY(phase)
+    for side, gait in walker.sides.items():
+        if gait.hike_rad:
+            right_up = right_up + SIGN[side] * gait.hike_rad * phase_bump(phases[side], 0.80, 0.26)
+    obliquity = -amplitude * right_up
+    tilt = PELVIS_TILT.mean + walker.tilt_rad + amplitude * (PELVIS_TILT(phase) - PELVIS_TILT.mean)
     turned = multiply(about(2, yaw), Q_NEUTRAL)
     return multiply(multiply(turned, about(0, obliquity)), about(2, -tilt))
 
@@ -116,9 +126,9 @@ def height(
     """Mid-hip height (n,) in m that gives the loaded leg its target knee flexion."""
     total = np.zeros(len(q))
     for side in SIDES:
-        rest = walker.standing_knee_rad
-        least = walker.sides[side].knee_min_rad
-        knee = smooth_max(rest + amplitude * (KNEE_FLEXION(phases[side]) - rest), least, DEGREE)
+        rest, gait = walker.standing_knee_rad, walker.sides[side]
+        target = rest + amplitude * (knee_flexion(gait, phases[side]) - rest)
+        knee = smooth_max(target, gait.knee_min_rad, DEGREE)
         reach = leg_reach(walker.anatomy, smooth(knee, window(plan, rate_hz, 0.02)))
         total += shares[side] * _hip_height(walker, side, xy, q, ankles[side], reach)
     return smooth(total, window(plan, rate_hz, 0.01))

@@ -83,14 +83,27 @@ class Pivot:
         return [Move(0.0, self.angle_rad / n, self.step_s)] * n
 
 
-Item = Stand | Straight | Arc | Pivot
+@dataclass(frozen=True)
+class Steps:
+    """Single steps, each (forward length in m, turn in rad to the left, duration in s): e.g. festination."""
+
+    steps: tuple[tuple[float, float, float], ...]
+
+    def moves(self) -> list[Move]:
+        """The steps as given."""
+        return [Move(*step) for step in self.steps]
+
+
+Item = Stand | Straight | Arc | Pivot | Steps
 Script = tuple[Item, ...]
 
 
 def scaled(script: Script, k: float) -> Script:
     """The same script with all lengths k times as long, for a person k times as tall."""
     return tuple(
-        replace(item, **{name: k * value for name, value in vars(item).items() if name.endswith("_m")})
+        Steps(tuple((k * length, turn, duration) for length, turn, duration in item.steps))
+        if isinstance(item, Steps)
+        else replace(item, **{name: k * value for name, value in vars(item).items() if name.endswith("_m")})
         for item in script
     )
 
@@ -189,9 +202,10 @@ def plan(script: Script, walker: Walker, rng: np.random.Generator) -> Plan:
             moves = [*moves, Move(CLOSING * moves[-1].length_m, 0.0, moves[-1].duration_s)]
         for i, move in enumerate(moves):
             g = np.clip(rng.standard_normal(6), -CLIP, CLIP)
-            length = move.length_m * (1.0 + spread.step_length * g[0])
+            gait = walker.sides[side]
+            length = move.length_m * gait.length_factor * (1.0 + spread.step_length * g[0])
             # two steps make a stride: √2 keeps the stride's variation at the asked value
-            duration = move.duration_s * (1.0 + sqrt(2.0) * spread.step_time * g[1])
+            duration = move.duration_s * gait.time_factor * (1.0 + sqrt(2.0) * spread.step_time * g[1])
             heading += move.turn_rad / 2.0
             x += length * cos(heading)
             y += length * sin(heading)
@@ -227,9 +241,24 @@ def _check(script: Script) -> None:
             "script_standing", "A script starts and ends with standing; add Stand(5) at both ends."
         )
     for i, item in enumerate(script):
+        if isinstance(item, Steps):
+            _check_steps(i, item)
+            continue
         for name, value in vars(item).items():
             if not (np.isfinite(value) and (value > 0.0 or name == "angle_rad")):
                 raise ParameterError(
                     "script_item",
                     f"Item {i} of the script ({type(item).__name__}): {name} is {value:g}, expected above 0.",
                 )
+
+
+def _check_steps(i: int, item: Steps) -> None:
+    for j, (length, turn, duration) in enumerate(item.steps):
+        if not (np.isfinite((length, turn, duration)).all() and length >= 0.0 and duration > 0.0):
+            raise ParameterError(
+                "script_item",
+                f"Item {i} of the script (Steps): step {j} is ({length:g} m, {turn:g} rad, {duration:g} s);"
+                " expected a length of 0 or more and a duration above 0.",
+            )
+    if not item.steps:
+        raise ParameterError("script_item", f"Item {i} of the script (Steps) has no steps.")

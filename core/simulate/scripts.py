@@ -9,8 +9,9 @@ from types import MappingProxyType
 from typing import Final
 
 from core.errors import ParameterError
+from core.simulate.patients import PATIENTS, Patient
 from core.simulate.recorder import Dropout, Setup, Simulation, simulate
-from core.simulate.script import Arc, Pivot, Script, Stand, Straight, scaled
+from core.simulate.script import Arc, Pivot, Script, Stand, Steps, Straight, scaled
 from core.simulate.sensors import MEMS
 from core.simulate.soft_tissue import SoftTissue
 from core.simulate.walker import Walker
@@ -19,13 +20,17 @@ ON_SKIN: Final = Setup(tissue=SoftTissue())
 """Named scripts are recorded with sensors on skin: fixed to the bone they would flatter every analysis."""
 
 
+REFERENCE_PERSON: Final = Walker()
+
+
 @dataclass(frozen=True)
 class Scenario:
-    """A script, written for the reference person, and how it is recorded."""
+    """A script, written for a walker of the reference height, who walks it, and how it is recorded."""
 
     title: str
     script: Script
     setup: Setup = ON_SKIN
+    walker: Walker = REFERENCE_PERSON
 
 
 _COMFORTABLE: Script = (
@@ -47,6 +52,22 @@ _LAP: Script = (
     Straight(22.0, 0.64, 0.54),
     Pivot(pi, radians(30.0), 0.55),
 )
+
+
+def _bouts(patient: Patient, bout_m: float = 12.0) -> Scenario:
+    """Two straight bouts with a stop, the take the signatures of spec/patients.md §3 were measured on."""
+    bout = Straight(bout_m, patient.step_m, patient.step_s)
+    return Scenario(patient.title, (Stand(6.0), bout, Stand(2.0), bout, Stand(4.0)), walker=patient.walker)
+
+
+def _festination(start: Patient, steps: int = 14) -> Scenario:
+    """Steps that grow shorter and quicker, a freeze of 4 s, and the same again (spec/patients.md §3)."""
+    hurry = Steps(
+        tuple((start.step_m * (1 - 0.035 * i), 0.0, start.step_s * (1 - 0.02 * i)) for i in range(steps))
+    )
+    script = (Stand(6.0), hurry, Stand(4.0), hurry, Stand(4.0))
+    return Scenario("Festination and freezing", script, walker=start.walker)
+
 
 SCRIPTS: Mapping[str, Scenario] = MappingProxyType(
     {
@@ -82,6 +103,8 @@ SCRIPTS: Mapping[str, Scenario] = MappingProxyType(
         "five_minutes": Scenario(
             "Five minutes with turns and changes of speed", (Stand(8.0), *_LAP * 3, Stand(5.0))
         ),
+        **{name: _bouts(patient) for name, patient in PATIENTS.items()},
+        "festination": _festination(PATIENTS["parkinson"]),
     }
 )
 
@@ -95,6 +118,7 @@ def simulate_scenario(name: str, seed: int = 0, height_m: float = 1.75, rate_hz:
     """
     if name not in SCRIPTS:
         raise ParameterError("unknown_script", f"No script '{name}'; expected one of {', '.join(SCRIPTS)}.")
-    scenario, walker = SCRIPTS[name], Walker.of_height(height_m)
+    scenario = SCRIPTS[name]
+    walker = scenario.walker.scaled_to(height_m)
     setup = replace(scenario.setup, rate_hz=rate_hz)
     return simulate(scaled(scenario.script, walker.scale), walker, seed, setup)

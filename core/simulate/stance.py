@@ -90,7 +90,8 @@ class StanceFoot:
         power = np.log((0.5 - phase_0) / (RELEASE_PHASE - phase_0)) / np.log(share)
         phase = phase_0 + (RELEASE_PHASE - phase_0) * np.clip(u, 1e-9, 3.0) ** power
         # long steps push off more: with the factor held at 1 the knee lands bent 14° at steps of 0.72 m
-        push = self.walker.amplitude(self.prints[i + 1].step_m)
+        gait = self.walker.sides[self.side]
+        push = gait.push * self.walker.amplitude(self.prints[i + 1].step_m)
         rise = FOOT_PITCH(phase) - FOOT_PITCH(np.asarray(phase_0))
         return np.where(u > 0.0, push * rise * smoothstep(u / 0.45), 0.0)
 
@@ -111,6 +112,10 @@ class StanceFoot:
         )
         ankle = self._floor_point(i, self.sole.forefoot) + centre - rotate(q, self.sole.rocker_centre)
         return np.asarray(ankle)
+
+    def on_landing(self, i: int, q: Floats, pitch: Floats) -> Floats:
+        """Ankle (n, 3) in m landing on footprint i: over the heel, or the forefoot if it lands first."""
+        return self.on_heel(i, q) if self.landing_pitch(i) >= 0.0 else self.on_forefoot(i, q, pitch)
 
     def path(self, t: Floats) -> tuple[Floats, Floats, Floats]:
         """Ankle (n, 3), pitch (n,) and heading (n,) over the whole take; only contact times are meant.
@@ -134,7 +139,8 @@ class StanceFoot:
             if i < len(timing.release):
                 angle += self.push_off_pitch(i, at)
             q = foot_orientation(foot.foot_rad, angle)
-            ankle[part] = np.where(landing[:, None], self.on_heel(i, q), self.on_forefoot(i, q, angle))
+            early = self.on_landing(i, q, angle) if i else np.empty((len(at), 3))
+            ankle[part] = np.where(landing[:, None], early, self.on_forefoot(i, q, angle))
             pitch[part] = angle
             heading[part] = foot.foot_rad
         return ankle, pitch, heading

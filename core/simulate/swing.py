@@ -11,10 +11,10 @@ import numpy as np
 
 from core.frames import Floats
 from core.rotation import about, multiply, rotate
-from core.simulate.curves import ANKLE_DORSIFLEXION, HIP_ADDUCTION, HIP_FLEXION, KNEE_FLEXION
-from core.simulate.pelvis import DEGREE, hip_offset
+from core.simulate.pelvis import hip_offset
 from core.simulate.shapes import bump, join, phase_bump, smooth_max, smoothstep
 from core.simulate.stance import StanceFoot, foot_orientation
+from core.simulate.targets import DEGREE, ankle_dorsiflexion, hip_adduction, hip_flexion, knee_flexion
 from core.simulate.timing import RELEASE_PHASE
 from core.simulate.walker import SIGN, leg_reach
 
@@ -77,18 +77,20 @@ def _swing(
     phase = RELEASE_PHASE + (1.0 - RELEASE_PHASE) * u
 
     free, lean = _free_leg(stance, i, phase, scale, hip, q_pelvis)
-    dorsiflexion = ANKLE_DORSIFLEXION(phase) * (1.0 if scale > 0.5 else scale)
+    dorsiflexion = ankle_dorsiflexion(walker.sides[side], phase) * (1.0 if scale > 0.5 else scale)
     heading = before.foot_rad + (landing.path_rad - before.path_rad) * smoothstep(u)
     free_pitch = dorsiflexion - np.arctan2(
         np.cos(heading) * lean[:, 0] + np.sin(heading) * lean[:, 1], lean[:, 2]
     )
 
     leaving_pitch = stance.push_off_pitch(i, t)
-    approach = LANDING_RISE * walker.landing_amplitude(landing.step_m) * (1.0 - smoothstep((u - 0.7) / 0.3))
+    rise = LANDING_RISE * walker.landing_amplitude(landing.step_m) if walker.lands_rising else 0.0
+    approach = rise * (1.0 - smoothstep((u - 0.7) / 0.3))
     landing_pitch = stance.landing_pitch(i + 1) - approach
     air_pitch = free_pitch + join(u, leaving_pitch - free_pitch, landing_pitch - free_pitch)
-    above = smooth_max(air_pitch - landing_pitch, 0.0, 1.5 * DEGREE)
-    air_pitch = air_pitch - smoothstep((u - 0.28) / 0.22) * above
+    if walker.lands_rising:
+        above = smooth_max(air_pitch - landing_pitch, 0.0, 1.5 * DEGREE)
+        air_pitch = air_pitch - smoothstep((u - 0.28) / 0.22) * above
 
     leaving = 1.0 - smoothstep(u / LEAVE)
     arriving = smoothstep((u - 1.0 + LAND) / LAND)
@@ -97,7 +99,7 @@ def _swing(
     roll = SIGN[side] * ROLL * scale * bump(u)
     q = foot_orientation(heading, pitch, roll)
     off_path = stance.on_forefoot(i, q, pitch)
-    on_path = stance.on_heel(i + 1, q)
+    on_path = stance.on_landing(i + 1, q, pitch)
     air = free + join(u, off_path - free, on_path - free)
     ankle = leaving[:, None] * off_path + arriving[:, None] * on_path + flying[:, None] * air
 
@@ -113,14 +115,14 @@ def _free_leg(
 ) -> tuple[Floats, Floats]:
     """Ankle (n, 3) and shank axis (n, 3) in the world if the leg followed the target angles exactly."""
     walker, side = stance.walker, stance.side
-    landing, least = stance.prints[i + 1], walker.sides[stance.side].knee_min_rad
+    landing, gait = stance.prints[i + 1], walker.sides[side]
     rest_knee = walker.standing_knee_rad
-    rest_hip = 0.5 * rest_knee + HIP_STANDING
-    knee = KNEE_FLEXION(phase) + landing.knee_rad * phase_bump(phase, 0.72, 0.20)
-    flexion = HIP_FLEXION(phase) + landing.hip_rad * phase_bump(phase, 0.85, 0.30)
-    knee = smooth_max(rest_knee + scale * (knee - rest_knee), least + 1.5 * DEGREE, 1.5 * DEGREE)
+    rest_hip = 0.5 * rest_knee + HIP_STANDING + walker.tilt_rad
+    knee = knee_flexion(gait, phase) + landing.knee_rad * phase_bump(phase, 0.72, 0.20)
+    flexion = hip_flexion(gait, phase) + landing.hip_rad * phase_bump(phase, 0.85, 0.30)
+    knee = smooth_max(rest_knee + scale * (knee - rest_knee), gait.knee_min_rad + 1.5 * DEGREE, 1.5 * DEGREE)
     flexion = rest_hip + scale * (flexion - rest_hip)
-    q_hip = multiply(about(2, flexion), about(0, SIGN[side] * HIP_ADDUCTION(phase)))
+    q_hip = multiply(about(2, flexion), about(0, SIGN[side] * hip_adduction(gait, phase)))
     q_thigh = multiply(q_pelvis, q_hip)
     shank = rotate(multiply(q_thigh, about(2, -knee)), UP)
     return hip - walker.anatomy.thigh * rotate(q_thigh, UP) - walker.anatomy.shank * shank, shank

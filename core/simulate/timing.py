@@ -18,9 +18,6 @@ RELEASE_PHASE = 0.59
 STANDING_PHASE = 0.3
 """The phase is held here while standing: mid-stance, both knees nearly straight."""
 
-PAUSE = 2.4
-"""A stride longer than so many step times had standing in it."""
-
 
 @dataclass(frozen=True, eq=False)
 class FootTiming:
@@ -49,7 +46,7 @@ def foot_timing(plan: Plan, walker: Walker, side: Side) -> FootTiming:
     for before, landing in pairwise(prints):
         step = landing.step_s
         stride = landing.time_s - before.time_s
-        paused = stride > PAUSE * step
+        paused = any(before.time_s <= start < landing.time_s for start, _ in plan.stands)
         cycle = 2.0 * step if paused else stride
         opposite = landing.start_s
         release = min(opposite + gait.double_support * cycle, landing.time_s - 0.5 * step)

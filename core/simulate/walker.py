@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import radians
@@ -64,8 +63,16 @@ class SideGait:
     ----------
     double_support : opposite contact to own release. flat_from : foot flat after own contact.
     heel_off : phase at which the heel rises. toe_out_rad : foot heading outward of the path.
-    contact_pitch_rad : toes up at contact. knee_min_rad : least knee flexion.
+    contact_pitch_rad : toes up at contact; below 0 the forefoot lands first. push : factor on the foot's
+        pitch at push-off. knee_min_rad : least knee flexion.
     clearance_m : height of the sole at mid-swing.
+    length_factor, time_factor : of this leg's steps.
+    knee_stance_rad, knee_swing_rad : added flexion outside swing; commanded peak in swing, None = healthy.
+    knee_wave : share of the flexion wave at loading. hip_factor, ankle_factor : on the target curves.
+    hip_swing_rad, ankle_swing_rad : added flexion and dorsiflexion in swing.
+    circumduction_rad, hike_rad : added hip abduction, and rise of this side of the pelvis, in swing.
+
+    Commands are not results: lifts for clearance and the paths of both contacts bend them.
     """
 
     double_support: float = 0.0928
@@ -75,6 +82,18 @@ class SideGait:
     contact_pitch_rad: float = radians(16.12)
     knee_min_rad: float = radians(3.5)
     clearance_m: float = 0.008
+    length_factor: float = 1.0
+    time_factor: float = 1.0
+    push: float = 1.0
+    knee_stance_rad: float = 0.0
+    knee_wave: float = 1.0
+    knee_swing_rad: float | None = None
+    hip_swing_rad: float = 0.0
+    hip_factor: float = 1.0
+    ankle_swing_rad: float = 0.0
+    ankle_factor: float = 1.0
+    circumduction_rad: float = 0.0
+    hike_rad: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -102,7 +121,12 @@ class Walker:
     width_m : between the two lines of footprints (ankle centres).
     forward_m, forward_wave_m : pelvis ahead of the middle of the feet at contact; cos and sin of its double
         step wave. lateral : share of the stance foot's lateral offset the pelvis moves over it.
-    standing_knee_rad : knee flexion at rest. reference_step_m : step with amplitude 1.
+    standing_knee_rad : knee flexion at rest. tilt_rad : added anterior pelvic tilt.
+    reference_step_m : step with amplitude 1; amplitude grows with the step to `amplitude_power`.
+    rotation_factor, obliquity_factor : on the pelvis curves.
+    tibial_rotation_rad : internal rotation of the shank that comes with a right angle at the knee.
+    lands_rising : the foot pitches up until it touches the floor. People differ in this, and event rules
+        that look for the largest pitch are early by up to 0.1 s without it (spec/patients.md §3).
     """
 
     height_m: float = REFERENCE_HEIGHT_M
@@ -113,12 +137,23 @@ class Walker:
     forward_wave_m: tuple[float, float] = (0.0026, -0.0019)
     lateral: float = 0.45
     standing_knee_rad: float = radians(5.0)
+    tilt_rad: float = 0.0
     reference_step_m: float = 0.641
+    amplitude_power: float = 0.5
+    rotation_factor: float = 1.0
+    obliquity_factor: float = 1.0
+    tibial_rotation_rad: float = 0.0
+    lands_rising: bool = True
     variability: Variability = Variability()
 
     @classmethod
     def of_height(cls, height_m: float, variability: Variability | None = None) -> Walker:
-        """A geometrically similar healthy person of another height; all lengths grow alike.
+        """A healthy person of this height, see `scaled_to`."""
+        base = cls()
+        return replace(base, variability=variability or base.variability).scaled_to(height_m)
+
+    def scaled_to(self, height_m: float) -> Walker:
+        """The geometrically similar person of another height; all lengths grow alike.
 
         Raises
         ------
@@ -129,19 +164,17 @@ class Walker:
                 "height_implausible",
                 f"Height {height_m:g} m is outside the 1.0 to 2.3 m this walker can have.",
             )
-        k = height_m / REFERENCE_HEIGHT_M
-        base = cls()
-        spread = variability or base.variability
+        k = height_m / self.height_m
         return replace(
-            base,
+            self,
             height_m=height_m,
-            anatomy=base.anatomy.scaled(k),
-            sides={s: replace(g, clearance_m=k * g.clearance_m) for s, g in base.sides.items()},
-            width_m=k * base.width_m,
-            forward_m=k * base.forward_m,
-            forward_wave_m=(k * base.forward_wave_m[0], k * base.forward_wave_m[1]),
-            reference_step_m=k * base.reference_step_m,
-            variability=replace(spread, width_m=k * spread.width_m),
+            anatomy=self.anatomy.scaled(k),
+            sides={s: replace(g, clearance_m=k * g.clearance_m) for s, g in self.sides.items()},
+            width_m=k * self.width_m,
+            forward_m=k * self.forward_m,
+            forward_wave_m=(k * self.forward_wave_m[0], k * self.forward_wave_m[1]),
+            reference_step_m=k * self.reference_step_m,
+            variability=replace(self.variability, width_m=k * self.variability.width_m),
         )
 
     @property
@@ -153,13 +186,13 @@ class Walker:
         """Factor on the angle curves for a step of this length; steps on the spot keep a lifted knee."""
         if step_m <= 0.05 * self.scale:
             return 0.35
-        return min(1.15, math.sqrt(step_m / self.reference_step_m))
+        return min(1.15, float((step_m / self.reference_step_m) ** self.amplitude_power))
 
     def landing_amplitude(self, step_m: float) -> float:
         """Factor on the pitch at contact; short and closing steps land flat."""
         if step_m <= 0.3 * self.reference_step_m:
             return 0.15
-        return min(1.0, math.sqrt(step_m / self.reference_step_m))
+        return min(1.0, float((step_m / self.reference_step_m) ** self.amplitude_power))
 
 
 def leg_reach(anatomy: Anatomy, knee_rad: Floats | float) -> Floats:

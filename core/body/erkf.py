@@ -1,0 +1,291 @@
+"""The error-state Kalman filter of Potter et al. 2021 for any tree of IMUs.
+
+Every IMU is a free body with position, velocity and orientation of its accelerometer; what holds them
+together are measurements: joint centres coincide (eq 21–23), hinge axes agree (eq 24–26), a foot on the floor
+does not move (eq 15–17), gravity is where the accelerometer sees it (eq 18–20). Errors are local (right),
+Hamilton.
+
+Where we differ from the paper: trapezoidal steps; the exact derivative of the step (the paper leaves out
+δp/δθ); biases as states; process noise that follows impacts; a χ² gate on zero velocity; the blocks of one
+step are taken one after the other, which with diagonal noise is the same as their stacked update; the reset
+Jacobian (eq 27) is carried in the next step's transition. Source: spec/estimators.md §3, spec/kernels.md §3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.body.erkf_kernel import CONTACT, INVALID, STILL, Links, Noise, Record, forward
+from core.body.erkf_params import ErkfParams as ErkfParams
+from core.body.still import AT_REST, FOOT_STILL, still_samples
+from core.body.tree import ImuTree
+from core.errors import EstimationError, Notice, ParameterError, SignalError
+from core.frames import Bools, Floats
+
+
+@dataclass(frozen=True, eq=False)
+class ErkfInputs:
+    """A block of samples of n IMUs in the tree's order.
+
+    Parameters
+    ----------
+    step_s : (T,) time since the sample before; 0 for the very first.
+    acc, gyr : (T, n, 3) m/s², rad/s, at rest |acc| = g. valid : (T, n) measured; elsewhere the last value
+        is held.
+    contact : (T, n) the sensor's foot rests on the floor. still : (T, n) the sensor has been at rest for
+        0.3 s.
+    heading : (T, n) measured heading of the segment's forward axis in W, rad, NaN where none; None for none.
+    """
+
+    step_s: Floats
+    acc: Floats
+    gyr: Floats
+    valid: Bools
+    contact: Bools
+    still: Bools
+    heading: Floats | None = None
+
+    def part(self, start: int, stop: int) -> ErkfInputs:
+        """Samples start … stop − 1."""
+        k = slice(start, stop)
+        return ErkfInputs(
+            self.step_s[k], self.acc[k], self.gyr[k], self.valid[k], self.contact[k], self.still[k],
+            None if self.heading is None else self.heading[k],
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class ErkfState:
+    """All that passes from one sample to the next.
+
+    Parameters
+    ----------
+    nominal : (n, 16) per IMU p (3), v (3), q (4), gyro bias (3), accelerometer bias (3).
+    P : (n·m, n·m) covariance of the errors (δp, δv, δθ[, δb_g, δb_a]) of each IMU.
+    before : (n, 6) last sample's acc and gyr. injected : (n·m,) last correction, its reset still to be
+        applied.
+    refused : (n,) consecutive refused zero velocities.
+    """
+
+    nominal: Floats
+    P: Floats
+    before: Floats
+    injected: Floats
+    refused: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class ErkfTrack:
+    """What the filter or the smoother says at every sample.
+
+    Parameters
+    ----------
+    nominal : (T, n, 16) as in `ErkfState`. heading_sd : (T, n) rad, of the filter, about the vertical.
+    joint_residual : (T, joints) distance of the two ends of each joint, m.
+    refused : (T, n) zero velocities that the gate refused.
+    """
+
+    nominal: Floats
+    heading_sd: Floats
+    joint_residual: Floats
+    refused: Bools
+
+    @property
+    def p(self) -> Floats:
+        """Sensor positions (T, n, 3) in W, m."""
+        return self.nominal[..., 0:3]
+
+    @property
+    def v(self) -> Floats:
+        """Sensor velocities (T, n, 3) in W, m/s."""
+        return self.nominal[..., 3:6]
+
+    @property
+    def q(self) -> Floats:
+        """Sensor orientations (T, n, 4)."""
+        return self.nominal[..., 6:10]
+
+
+@dataclass(frozen=True, eq=False)
+class ErkfResult:
+    """A whole recording.
+
+    Parameters
+    ----------
+    diagnostics : the figures of spec/estimators.md §7 (see erkf_health.py), plain values.
+    """
+
+    track: ErkfTrack
+    final: ErkfState
+    notices: tuple[Notice, ...]
+    diagnostics: dict[str, object]
+
+
+def erkf_inputs(
+    tree: ImuTree, acc: Floats, gyr: Floats, valid: Bools, rate_hz: float, heading: Floats | None = None
+) -> ErkfInputs:
+    """Inputs of a recording on a uniform axis: holds lost samples, finds contacts and rest (still.py).
+
+    Parameters
+    ----------
+    acc, gyr : (T, n, 3), gyro bias at rest removed, excess of |acc| at rest removed along gravity
+        (spec/real-data.md §0.8); samples that are not finite count as lost.
+
+    Raises
+    ------
+    SignalError `bad_signal` when an IMU has no valid sample.
+    """
+    acc, gyr = np.array(acc, np.float64), np.array(gyr, np.float64)
+    valid = np.asarray(valid & np.isfinite(acc).all(axis=2) & np.isfinite(gyr).all(axis=2))
+    contact, still = np.zeros(valid.shape, bool), np.zeros(valid.shape, bool)
+    for i, name in enumerate(tree.imus):
+        if not valid[:, i].any():
+            raise SignalError("bad_signal", f"{name}: no valid sample; leave this sensor out.", sensor=name)
+        last = np.maximum.accumulate(np.where(valid[:, i], np.arange(len(valid)), -1))
+        last[last < 0] = int(np.argmax(valid[:, i]))
+        acc[:, i], gyr[:, i] = acc[last, i], gyr[last, i]
+        still[:, i] = still_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz, AT_REST)
+        if i in tree.feet:
+            contact[:, i] = still_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz, FOOT_STILL)
+    step = np.full(len(acc), 1.0 / rate_hz)
+    step[:1] = 0.0
+    return ErkfInputs(step, acc, gyr, valid, contact, still, heading)
+
+
+def filter_block(
+    state: ErkfState, inputs: ErkfInputs, tree: ImuTree, params: ErkfParams
+) -> tuple[ErkfTrack, ErkfState]:
+    """Advance over a block of samples; any division into blocks gives the same bits.
+
+    Raises
+    ------
+    EstimationError `filter_diverged` when the covariance is or becomes not positive definite.
+    """
+    return run_block(state, inputs, tree, params, new_record(tree, params, 1))
+
+
+def run_block(
+    state: ErkfState, inputs: ErkfInputs, tree: ImuTree, params: ErkfParams, record: Record
+) -> tuple[ErkfTrack, ErkfState]:
+    """`filter_block` that leaves in `record` what the smoother needs, if that has room for the block."""
+    T, n = inputs.valid.shape
+    _check(state, inputs, tree, params)
+    rate = 1.0 / np.median(inputs.step_s[inputs.step_s > 0.0]) if np.any(inputs.step_s > 0.0) else 1.0
+    x, P, before = state.nominal.copy(), state.P.copy(), state.before.copy()
+    dx, refused = state.injected.copy(), state.refused.copy()
+    flags = (INVALID * ~inputs.valid + CONTACT * inputs.contact + STILL * inputs.still).astype(np.int64)
+    heading = np.empty((0, n)) if inputs.heading is None else np.ascontiguousarray(inputs.heading)
+    out, sd = np.empty((T, n, 16)), np.empty((T, n))
+    residual, hit = np.empty((T, len(tree.joints))), np.empty((T, n), bool)
+    broke = forward(
+        x, P, before, dx, refused,
+        np.ascontiguousarray(inputs.step_s), np.ascontiguousarray(inputs.acc),
+        np.ascontiguousarray(inputs.gyr), flags, heading, _links(tree, params), _noise(params, rate), record,
+        out, sd, residual, hit,
+    )  # fmt: skip
+    if broke >= 0 or not _positive(P):
+        at = broke if broke >= 0 else T - 1
+        raise EstimationError(
+            "filter_diverged",
+            f"The covariance is no longer positive definite {inputs.step_s[: at + 1].sum():.2f} s into "
+            "this block; check units, sensor positions and which sensor is on which segment.",
+        )
+    return ErkfTrack(out, sd, residual, hit), ErkfState(x, P, before, dx, refused)
+
+
+def new_record(tree: ImuTree, params: ErkfParams, samples: int) -> Record:
+    """Room for so many samples of what the smoother needs; with 1 nothing is kept."""
+    n, J = len(tree.imus), len(tree.joints)
+    N = n * params.states
+    # per sample at most: centre and axis of each joint; zero velocity, tilt, ZARU and heading of each IMU
+    B = 2 * J + 4 * n + 1
+    used = J * (params.joint_centre_sd is not None) + n * (params.tilt_sd is not None) + len(tree.feet) + 1
+    used += sum(j.e_distal is not None for j in tree.joints) * (params.joint_axis_sd is not None)
+    used += n * (params.zaru_sd is not None) + n
+    K, B = samples, min(B, used)
+    return Record(
+        F=np.empty((K, n, 5, 3, 3)),
+        V=np.empty((K, B, 3, N)),
+        E=np.empty((K, B, 9)),
+        H=np.empty((K, B, 2, 3, 3)),
+        place=np.empty((K, B, 4), np.int64),
+        blocks=np.empty(K, np.int64),
+        P=np.empty((K, N, N)),
+        dx=np.empty((K, N)),
+    )
+
+
+def _noise(params: ErkfParams, rate_hz: float) -> Noise:
+    def on(value: float | None) -> float:
+        return -1.0 if value is None else float(value)
+
+    return Noise(
+        m=params.states,
+        first=1.0 if params.integration == "euler" else 0.5,
+        impact=float(params.impact),
+        gyr_walk=float(params.gyr_walk),
+        acc_walk=float(params.acc_walk),
+        zero_velocity=on(params.zero_velocity_sd),
+        gate=on(params.gate),
+        reaccept=max(1, round(params.reaccept_s * rate_hz)),
+        reaccept_m=float(params.reaccept_m),
+        tilt=on(params.tilt_sd),
+        centre=on(params.joint_centre_sd),
+        axis=on(params.joint_axis_sd),
+        zaru=on(params.zaru_sd),
+        heading=float(params.heading_sd),
+        gap_acc=float(params.gap_acc_sd),
+        gap_gyr=float(params.gap_gyr_sd),
+    )
+
+
+def _links(tree: ImuTree, params: ErkfParams) -> Links:
+    J = len(tree.joints)
+    lever, axis = np.zeros((J, 2, 3)), np.zeros((J, 2, 3))
+    for k, j in enumerate(tree.joints):
+        lever[k] = j.r_proximal, j.r_distal
+        if j.e_proximal is not None and j.e_distal is not None:
+            axis[k] = j.e_proximal, j.e_distal
+    return Links(
+        ends=np.array([(j.proximal, j.distal) for j in tree.joints], np.int64).reshape(J, 2),
+        lever=lever,
+        axis=axis,
+        hinged=np.array([j.e_proximal is not None for j in tree.joints], bool),
+        forward=tree.forward(),
+        sd=np.array([(params.acc_sd, params.gyr_sd_of.get(s, params.gyr_sd)) for s in tree.imus], np.float64),
+    )
+
+
+def _positive(P: Floats) -> bool:
+    try:
+        np.linalg.cholesky(P)
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def _check(state: ErkfState, inputs: ErkfInputs, tree: ImuTree, params: ErkfParams) -> None:
+    T, N = len(inputs.valid), len(tree.imus) * params.states
+    for name, a, shape in (
+        ("acc", inputs.acc, (T, len(tree.imus), 3)),
+        ("gyr", inputs.gyr, (T, len(tree.imus), 3)),
+        ("contact", inputs.contact, (T, len(tree.imus))),
+        ("still", inputs.still, (T, len(tree.imus))),
+        ("step_s", inputs.step_s, (T,)),
+        ("nominal", state.nominal, (len(tree.imus), 16)),
+        ("P", state.P, (N, N)),
+    ):
+        if a.shape != shape:
+            raise ParameterError("bad_shape", f"ErKF: {name} has shape {a.shape}, expected {shape}.")
+    if not (np.isfinite(inputs.acc).all() and np.isfinite(inputs.gyr).all()):
+        raise SignalError(
+            "bad_signal", "ErKF: non-finite samples; hold the last one and mark it not valid (erkf_inputs)."
+        )
+    if not (np.isfinite(inputs.step_s).all() and (inputs.step_s >= 0.0).all()):
+        raise ParameterError("bad_step", "ErKF: a time step is negative or not finite.")
+    if not (np.isfinite(state.P).all() and np.isfinite(state.nominal).all() and _positive(state.P)):
+        raise EstimationError(
+            "filter_diverged", "The covariance at the start of the block is not positive definite."
+        )

@@ -1,0 +1,115 @@
+"""What the ErKF assumes: noise, measurement uncertainty and the start; three sourced sets.
+
+All are standard deviations. σ_a and σ_ω are per sample at the recording's rate (density · √rate, Potter 2021
+Table 1), inflated for what the model leaves out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import radians
+from typing import Final, Literal
+
+import numpy as np
+
+from core.errors import ParameterError
+
+Integration = Literal["trapezoid", "euler"]
+"""euler: Potter 2021 eq 8, the sample at the start of the step; it costs 0.6 to 0.9° at 100 Hz
+(spec/estimators.md §0.3). trapezoid: the mean of both ends."""
+
+GATE: Final = 16.27
+"""χ² of 3 degrees of freedom at 0.999."""
+
+SOFT_TISSUE: Final[Mapping[str, float]] = {"thigh_l": 0.2, "thigh_r": 0.2}
+"""σ_ω in rad/s of the sensors that move most on the bone (spec/real-data.md §2.9)."""
+
+
+@dataclass(frozen=True)
+class ErkfParams:
+    """Parameters of `filter_block` and `smooth`; None switches a correction off.
+
+    Parameters
+    ----------
+    states : per IMU, 9 (position, velocity, orientation) or 15 (with both biases).
+    acc_sd : m/s². gyr_sd : rad/s. gyr_sd_of : IMU → its own. impact : share c of the change of specific force
+        from sample to sample that is added as uncertainty, σ_a² + (c |f_k − f_k−1|)² (spec/real-data.md
+        §0.1).
+    gyr_walk, acc_walk : random walk of the biases, rad/s/√s and m/s²/√s (15 states).
+    zero_velocity_sd : m/s. gate : largest χ² of a zero velocity. reaccept_s : contact refused for so long is
+        accepted after all; then `reaccept_m` is added to the foot's uncertainty (spec/estimators.md §3.3).
+    tilt_sd : of the direction of f. joint_centre_sd : m. joint_axis_sd, heading_sd : rad. zaru_sd : rad/s.
+    gap_acc_sd, gap_gyr_sd : in place of acc_sd and gyr_sd while an IMU is lost.
+    start_* : of the first sample; `start_heading_sd` about the vertical, must cover the first headings'
+        errors.
+    moving_* : the same where a recording starts mid-walk.
+    """
+
+    states: Literal[9, 15] = 15
+    integration: Integration = "trapezoid"
+    acc_sd: float = 0.1
+    gyr_sd: float = 0.005
+    gyr_sd_of: Mapping[str, float] = field(default_factory=lambda: SOFT_TISSUE)
+    impact: float = 0.3
+    gyr_walk: float = 5e-5
+    acc_walk: float = 2e-4
+    zero_velocity_sd: float = 0.01
+    gate: float | None = GATE
+    reaccept_s: float = 0.08
+    reaccept_m: float = 0.1
+    tilt_sd: float | None = 0.1
+    joint_centre_sd: float | None = 0.01
+    joint_axis_sd: float | None = None
+    zaru_sd: float | None = None
+    heading_sd: float = radians(10.0)
+    gap_acc_sd: float = 20.0
+    gap_gyr_sd: float = 5.0
+    start_position_sd: float = 0.02
+    start_velocity_sd: float = 0.01
+    start_tilt_sd: float = radians(1.0)
+    start_heading_sd: float = radians(30.0)
+    start_gyr_bias_sd: float = radians(0.05)
+    start_acc_bias_sd: float = 0.03
+    moving_velocity_sd: float = 2.0
+    moving_tilt_sd: float = radians(15.0)
+    moving_gyr_bias_sd: float = radians(0.5)
+
+    def __post_init__(self) -> None:
+        if self.states not in (9, 15):
+            raise ParameterError("states_unknown", f"{self.states} states per IMU, expected 9 or 15.")
+        if self.integration not in ("trapezoid", "euler"):
+            raise ParameterError(
+                "integration_unknown", f"integration is '{self.integration}', expected trapezoid or euler."
+            )
+        for name, value in (*vars(self).items(), *self.gyr_sd_of.items()):
+            if isinstance(value, float) and not (np.isfinite(value) and value >= 0.0):
+                raise ParameterError("deviation_range", f"{name} = {value:g} is not 0 or above.")
+        for name in ("zero_velocity_sd", "tilt_sd", "joint_centre_sd", "joint_axis_sd", "zaru_sd"):
+            if getattr(self, name) == 0.0:
+                raise ParameterError("deviation_range", f"{name} is 0; the filter needs it above 0.")
+
+    @classmethod
+    def offline(cls) -> ErkfParams:
+        """For stored recordings, with the smoother: 15 states (spec/real-data.md §2.9)."""
+        return cls()
+
+    @classmethod
+    def live(cls) -> ErkfParams:
+        """For samples as they come: 9 states, the gyroscopes' biases frozen from rest (same section)."""
+        return cls(states=9, gyr_sd=0.02)
+
+    @classmethod
+    def paper(cls) -> ErkfParams:
+        """Potter 2021 Table 1 at 512 Hz, σ_JA = 0.02 rad as its Table 2 demands (spec/estimators.md §0.1)."""
+        return cls(
+            states=9,
+            integration="euler",
+            acc_sd=0.027,
+            gyr_sd=radians(5.66),
+            gyr_sd_of={},
+            impact=0.0,
+            gate=None,
+            joint_axis_sd=0.02,
+            start_heading_sd=radians(1.0),
+        )

@@ -1,0 +1,157 @@
+"""One step of time of the ErKF: Potter 2021 eq 8–14 with both ends of the step, and P ← F P Fᵀ + Q.
+
+F couples nothing between IMUs, so P is passed through by blocks: rows, then columns, of the lower block
+triangle only, then mirrored. (A full row and column pass is not symmetric in floating point, and the
+asymmetry grows without bound: spec/kernels.md §3.2.)
+"""
+
+from __future__ import annotations
+
+from math import sin, sqrt
+
+import numba
+import numpy as np
+
+from core.body.so3 import FAST, exponential, matrix, product, times_cross, turn
+from core.frames import GRAVITY
+
+A, S, D, GAMMA, C = range(5)
+"""Blocks of F per IMU, δv'=δv+A δθ+D δb_g+C δb_a, δp'=δp+Δt δv+½Δt(δv'−δv), δθ'=S δθ+Γ δb_g."""
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-untyped-def]
+    """Advance one IMU's nominal state x (16,) and write its blocks F (5, 3, 3) and new matrix R (3, 3).
+
+    `first` is the weight of the sample at the start of the step: 1 Euler (eq 8), ½ trapezoid. F is the exact
+    derivative: with φ = ω̄Δt, S = Exp(−φ), Γ = −J_r(φ)Δt, and f̄ at both ends turned with its own
+    orientation.
+    """
+    phi, f0, f1, accelerated = scratch[0], scratch[1], scratch[2], scratch[3]
+    start, turned = scratch[4:7], scratch[7:10]
+    last = 1.0 - first
+    for i in range(3):
+        phi[i] = (first * before[3 + i] + last * gyr[i] - x[10 + i]) * dt
+        f0[i] = first * (before[i] - x[13 + i])
+        f1[i] = last * (acc[i] - x[13 + i])
+    matrix(x[6:10], start)
+    turn(x[6:10], phi[0], phi[1], phi[2])
+    matrix(x[6:10], R)
+    for i in range(3):
+        accelerated[i] = start[i, 0] * f0[0] + start[i, 1] * f0[1] + start[i, 2] * f0[2]
+        accelerated[i] += R[i, 0] * f1[0] + R[i, 1] * f1[1] + R[i, 2] * f1[2]
+    accelerated[2] -= GRAVITY
+    for i in range(3):
+        x[i] += dt * x[3 + i] + 0.5 * dt * dt * accelerated[i]
+        x[3 + i] += dt * accelerated[i]
+
+    angle2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2]
+    angle = sqrt(angle2)
+    if angle < 1e-4:
+        s1, s2, s3 = 1.0 - angle2 / 6.0, 0.5 - angle2 / 24.0, 1.0 / 6.0 - angle2 / 120.0
+    else:
+        s1 = sin(angle) / angle
+        s2 = 2.0 * sin(0.5 * angle) ** 2 / angle2
+        s3 = (1.0 - s1) / angle2
+    exponential(phi, 1.0, -s1, s2, F[S])
+    exponential(phi, -dt, dt * s2, -dt * s3, F[GAMMA])
+    times_cross(R, f1, -dt, turned)
+    product(turned, F[S], 1.0, F[A])
+    product(turned, F[GAMMA], 1.0, F[D])
+    times_cross(start, f0, -dt, F[C])
+    for i in range(3):
+        for j in range(3):
+            F[A, i, j] += F[C, i, j]
+            F[C, i, j] = -dt * (first * start[i, j] + last * R[i, j])
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+def reset_before(F, d):  # type: ignore[no-untyped-def]
+    """Fold the reset Jacobian G = 1 − ½[δθ̂]× of the last correction (eq 27) into A and S: F ← F G."""
+    a, b, c = 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]
+    for k in range(2):
+        for i in range(3):
+            x, y, z = F[k, i, 0], F[k, i, 1], F[k, i, 2]
+            F[k, i, 0] = x - (y * c - z * b)
+            F[k, i, 1] = y - (z * a - x * c)
+            F[k, i, 2] = z - (x * b - y * a)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
+    """P ← F P Fᵀ for the blocks F (n, 5, 3, 3) of n IMUs with m errors each."""
+    N = P.shape[0]
+    half = 0.5 * dt
+    biased = m == 15
+    for j in range(N // m):
+        b, end = j * m, (j + 1) * m
+        f = F[j]
+        for i in range(3):
+            a0, a1, a2 = f[A, i, 0], f[A, i, 1], f[A, i, 2]
+            if biased:
+                d0, d1, d2 = f[D, i, 0], f[D, i, 1], f[D, i, 2]
+                c0, c1, c2 = f[C, i, 0], f[C, i, 1], f[C, i, 2]
+                for c in range(end):
+                    dv = a0 * P[b + 6, c] + a1 * P[b + 7, c] + a2 * P[b + 8, c]
+                    dv += d0 * P[b + 9, c] + d1 * P[b + 10, c] + d2 * P[b + 11, c]
+                    dv += c0 * P[b + 12, c] + c1 * P[b + 13, c] + c2 * P[b + 14, c]
+                    P[b + i, c] += dt * P[b + 3 + i, c] + half * dv
+                    P[b + 3 + i, c] += dv
+            else:
+                for c in range(end):
+                    dv = a0 * P[b + 6, c] + a1 * P[b + 7, c] + a2 * P[b + 8, c]
+                    P[b + i, c] += dt * P[b + 3 + i, c] + half * dv
+                    P[b + 3 + i, c] += dv
+        s = f[S]
+        for c in range(end):
+            t0, t1, t2 = P[b + 6, c], P[b + 7, c], P[b + 8, c]
+            P[b + 6, c] = s[0, 0] * t0 + s[0, 1] * t1 + s[0, 2] * t2
+            P[b + 7, c] = s[1, 0] * t0 + s[1, 1] * t1 + s[1, 2] * t2
+            P[b + 8, c] = s[2, 0] * t0 + s[2, 1] * t1 + s[2, 2] * t2
+        if biased:
+            for i in range(3):
+                g0, g1, g2 = f[GAMMA, i, 0], f[GAMMA, i, 1], f[GAMMA, i, 2]
+                for c in range(end):
+                    P[b + 6 + i, c] += g0 * P[b + 9, c] + g1 * P[b + 10, c] + g2 * P[b + 11, c]
+    change = np.empty(3)
+    for r in range(N):
+        for j in range(r // m + 1):
+            b = j * m
+            f = F[j]
+            row = P[r, b : b + m]
+            t0, t1, t2 = row[6], row[7], row[8]
+            for i in range(3):
+                change[i] = f[A, i, 0] * t0 + f[A, i, 1] * t1 + f[A, i, 2] * t2
+                row[6 + i] = f[S, i, 0] * t0 + f[S, i, 1] * t1 + f[S, i, 2] * t2
+            if biased:
+                for i in range(3):
+                    change[i] += f[D, i, 0] * row[9] + f[D, i, 1] * row[10] + f[D, i, 2] * row[11]
+                    change[i] += f[C, i, 0] * row[12] + f[C, i, 1] * row[13] + f[C, i, 2] * row[14]
+                    row[6 + i] += f[GAMMA, i, 0] * row[9] + f[GAMMA, i, 1] * row[10]
+                    row[6 + i] += f[GAMMA, i, 2] * row[11]
+            for i in range(3):
+                row[i] += dt * row[3 + i] + half * change[i]
+                row[3 + i] += change[i]
+    for r in range(N):
+        for c in range(r):
+            P[c, r] = P[r, c]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+def back(lam, F, m, dt):  # type: ignore[no-untyped-def]
+    """λ ← Fᵀ λ, the same step for the smoother."""
+    for j in range(len(lam) // m):
+        x = lam[j * m : (j + 1) * m]
+        f = F[j]
+        # dv enters δv with weight 1 and δp with ½Δt
+        u0, u1, u2 = x[3] + 0.5 * dt * x[0], x[4] + 0.5 * dt * x[1], x[5] + 0.5 * dt * x[2]
+        t0, t1, t2 = x[6], x[7], x[8]
+        for i in range(3):
+            x[3 + i] += dt * x[i]
+            x[6 + i] = f[A, 0, i] * u0 + f[A, 1, i] * u1 + f[A, 2, i] * u2
+            x[6 + i] += f[S, 0, i] * t0 + f[S, 1, i] * t1 + f[S, 2, i] * t2
+        if m == 15:
+            for i in range(3):
+                x[9 + i] += f[D, 0, i] * u0 + f[D, 1, i] * u1 + f[D, 2, i] * u2
+                x[9 + i] += f[GAMMA, 0, i] * t0 + f[GAMMA, 1, i] * t1 + f[GAMMA, 2, i] * t2
+                x[12 + i] += f[C, 0, i] * u0 + f[C, 1, i] * u1 + f[C, 2, i] * u2

@@ -1,0 +1,162 @@
+"""Seven poses from three IMUs or two by Sy's L7S; the filter is in core/body/l7s_filter.py.
+
+A sparse mode of visibly lower accuracy: never take stride lengths from it where anything better is worn
+(spec/real-data.md §0.7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from core.body.l7s_filter import L7sInputs, L7sParams, L7sState, L7sTrack, Worn, filter_block, start, warm
+from core.body.l7s_legs import BODIES, LEGS, LegModel, solve_legs
+from core.body.model import BodyModel
+from core.body.poses import Poses
+from core.calibration.result import CalibratedRecording
+from core.errors import EstimationError, Notice
+from core.frames import FOOT, GRAVITY, Bools, Floats, Segment, Side
+from core.fusion.orientations import Orientations
+from core.rotation import angle_between, from_matrix, rotate, to_matrix
+
+__all__ = [
+    "L7sInputs", "L7sParams", "L7sState", "L7sTrack", "LegModel", "Worn", "filter_block", "free_acceleration",
+    "inputs_of", "l7s_poses", "start", "warm",
+]  # fmt: skip
+
+
+def l7s_poses(
+    orientations: Orientations,
+    acceleration: Mapping[Segment, Floats],
+    steps: Mapping[Side, Bools],
+    body: BodyModel,
+    params: L7sParams | None = None,
+    worn: Worn | None = None,
+) -> Poses:
+    """Poses of the seven segments from pelvis and feet, or from the feet alone.
+
+    Parameters
+    ----------
+    orientations : of the worn segments; others are not read.
+    acceleration : segment → (n, 3) in W without gravity, m/s² (`free_acceleration`).
+    steps : side → (n,) foot still on the floor: zero velocity, not contact.
+    worn : None = 3I with a pelvis, else 2I.
+
+    Returns
+    -------
+    Poses in ISB frames, method "l7s_3i" or "l7s_2i", `contact` = steps. The feet's orientation is that of the
+    constrained state and differs from the measured one by some degrees (spec/estimators.md §4.4).
+    Diagnostics by side: `clip_share`, samples with a foot in motion at which the leg is stretched and its
+    knee straight; `hinge_m`, `excess_m`, largest residuals of the constraints; `step_share`;
+    `foot_turned_rad`, mean angle from measured to reported.
+    At the end: `position_sd_m` by body, `min_eigenvalue` of P.
+    A notice `foot_never_still` when a foot has no step.
+
+    Raises
+    ------
+    EstimationError `sensor_missing`, `segment_length`, `headings_apart`, `bad_signal`, `l7s_diverged`.
+    """
+    params = params or L7sParams()
+    worn = worn or ("3I" if "pelvis" in orientations.q else "2I")
+    model = LegModel.of(body)
+    inputs = inputs_of(orientations, acceleration, steps, model, worn)
+    track, state = filter_block(start(inputs, model, params), inputs, model, orientations.rate_hz, params)
+    legs = solve_legs(track.R, track.p, model)
+    length = model.thigh + model.shank
+    moving = ~inputs.step.all(axis=1) | inputs.step.all()
+    turned = angle_between(
+        from_matrix(track.R[:, 1:].reshape(-1, 3, 3)), from_matrix(inputs.R[:, 1:].reshape(-1, 3, 3))
+    ).reshape(-1, 2)
+    variances = np.diag(state.P)[:18].reshape(3, 6)[:, :3]
+    measured = BODIES if worn == "3I" else BODIES[1:]
+    return Poses(
+        t_s=orientations.t_s,
+        rate_hz=orientations.rate_hz,
+        q={"pelvis": from_matrix(track.R[:, 0] @ model.to_isb("pelvis")), **legs.q},
+        p={"pelvis": track.p[:, 0], **legs.p},
+        valid=np.logical_and.reduce([orientations.valid[s] for s in measured]),
+        contact={FOOT[s]: np.asarray(steps[s], bool) for s in LEGS},
+        body=body,
+        method=f"l7s_{worn.lower()}",
+        notices=_never_still(steps),
+        diagnostics={
+            "adjoint": params.adjoint,
+            "clip_share": {s: float(np.mean((legs.reach[s] > length)[moving])) for s in LEGS},
+            "hinge_m": {s: float(np.abs(legs.hinge[s]).max()) for s in LEGS},
+            "excess_m": {s: float(np.maximum(legs.reach[s] - length, 0.0).max()) for s in LEGS},
+            "step_share": {s: float(np.mean(steps[s])) for s in LEGS},
+            "foot_turned_rad": {s: float(turned[:, i].mean()) for i, s in enumerate(LEGS)},
+            "position_sd_m": {s: float(np.sqrt(x.max())) for s, x in zip(BODIES, variances, strict=True)},
+            "min_eigenvalue": float(np.linalg.eigvalsh(state.P)[0]),
+        },
+    )
+
+
+def free_acceleration(calibrated: CalibratedRecording, orientations: Orientations) -> dict[Segment, Floats]:
+    """Accelerations (n, 3) of the sensors in W without gravity, m/s²; zero while a sensor is lost.
+
+    What the accelerometer's norm at rest differs from G is taken off as a bias along the segment's axis that
+    is vertical at rest, not as a scale (spec/real-data.md §0.8).
+    """
+    found: dict[Segment, Floats] = {}
+    for segment, mounted in calibrated.calibration.segments.items():
+        signals = calibrated.recording.sensors[segment]
+        force = signals.acc @ mounted.R_segment_sensor.T
+        force[:, 1] -= mounted.rest_norm - GRAVITY
+        world = rotate(orientations.q[segment], force)
+        world[:, 2] -= GRAVITY
+        found[segment] = np.where(signals.valid[:, None], world, 0.0)
+    return found
+
+
+def inputs_of(
+    orientations: Orientations,
+    acceleration: Mapping[Segment, Floats],
+    steps: Mapping[Side, Bools],
+    model: LegModel,
+    worn: Worn,
+) -> L7sInputs:
+    """Bring orientations, accelerations and steps into the filter's order and frames.
+
+    Raises
+    ------
+    EstimationError `sensor_missing` when a worn body has no orientation, acceleration or steps.
+    """
+    needed = BODIES if worn == "3I" else BODIES[1:]
+    for segment in needed:
+        if segment not in orientations.q or segment not in acceleration:
+            raise EstimationError(
+                "sensor_missing",
+                f"L7S-{worn} needs {', '.join(needed)}; nothing of {segment}. Wear or map a sensor there.",
+                sensor=segment,
+            )
+    for side in LEGS:
+        if side not in steps:
+            raise EstimationError(
+                "sensor_missing",
+                f"L7S needs to know when the {side} foot is still; give its step flags.",
+                sensor=FOOT[side],
+            )
+    n = len(orientations.t_s)
+    R, acc = np.tile(np.eye(3), (n, 3, 1, 1)), np.zeros((n, 3, 3))
+    for b, segment in enumerate(BODIES):
+        if segment in needed:
+            R[:, b] = to_matrix(orientations.q[segment]) @ model.to_isb(segment).T
+            acc[:, b] = acceleration[segment]
+    if worn == "2I":
+        acc[:, 0] = 0.5 * (acc[:, 1] + acc[:, 2])
+    return L7sInputs(R, acc, np.stack([steps[side] for side in LEGS], axis=1), worn)
+
+
+def _never_still(steps: Mapping[Side, Bools]) -> tuple[Notice, ...]:
+    return tuple(
+        Notice(
+            "foot_never_still",
+            f"The {side} foot is never still in this take, so nothing bounds its speed; positions and step "
+            "lengths mean nothing. A treadmill or a sensor on another segment looks like this.",
+            sensor=FOOT[side],
+        )
+        for side in LEGS
+        if not np.any(steps[side])
+    )

@@ -1,0 +1,225 @@
+"""L7S: seven bodies from three IMUs (pelvis and feet) or from two (feet), Sy et al. 2021.
+
+Sy, Lovell, Redmond 2021, IEEE TBME (spec/estimators.md §4): a constrained Kalman filter on SE(3)³ × R⁹. The
+state is the pose and velocity of pelvis and feet; thighs and shanks follow from hinged knees and ankles.
+What we do otherwise than the paper prints (evidence in spec/estimators.md §4 and §5):
+
+- eq 18: the feet's blocks of the mid-pelvis row carry −½, the minus is lost in print.
+- eq 32: the ankle lies at −d/2 on the foot's z axis, which points to the toe; print has +.
+- eq 20: σ there is a variance; it jumps to 10 m² at toe-off and decays from the last flagged sample on, not
+  below 1e-4 m², which is also its value while a step is flagged (missing in print).
+- eq 6: `adjoint="printed"` keeps the paper's Ad(+Ω) with the C of the authors' program; the derivation gives
+  Ad(−Ω) and with the full C no term at all: `"exact"`. The printed form is measurably better and is default.
+- eq 7: 𝒢 puts acceleration noise into the position as if that were in world axes; with this local
+  error it is in body axes, so its covariance with velocity is turned by Rᵀ. Otherwise the result would depend
+  on which way the person walks in the world.
+- two projections onto the constraints instead of one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal, get_args
+
+import numpy as np
+
+from core.body.l7s_legs import HIP_SIDE, LEGS, LegModel
+from core.body.model import NOMINAL_HEIGHT_M, BodyModel
+from core.errors import EstimationError, ParameterError
+from core.frames import FOOT, R_NEUTRAL, Bools, Floats
+from core.rotation import about, to_matrix
+
+Worn = Literal["3I", "2I"]
+"""3I: pelvis and both feet carry an IMU; 2I: the feet only."""
+
+Adjoint = Literal["printed", "exact"]
+
+SIZE: Final = 27
+"""Length of the error vector (ρ φ of pelvis, left foot, right foot; ν of the three)."""
+
+HEADING_LIMIT: Final = np.pi / 2
+"""Headings of the worn sensors that are further apart at the start are refused (spec/estimators.md §3.5)."""
+
+
+@dataclass(frozen=True)
+class L7sParams:
+    """Variances of Sy 2021, table III; all are variances, not standard deviations.
+
+    Parameters
+    ----------
+    adjoint : see the module. projections : onto the constraints per step (paper: 1).
+    acceleration : m²/s⁴. orientation_step : rad² added per step, σ_ω²Δt² = 1e7 · 1e-4 at any rate, so that
+        the orientation is taken anew from the orientation filter each step. orientation : rad².
+    mid_pelvis, pelvis_height : m². yaw : rad² (2I only). zero_velocity : m²/s².
+    foot_swing : m² at toe-off; foot_floor : m² while a step is flagged and at least; decay_s : λ of eq 20.
+    start : every diagonal entry of P at the first sample.
+    """
+
+    adjoint: Adjoint = "printed"
+    projections: int = 2
+    acceleration: float = 100.0
+    orientation_step: float = 1e3
+    orientation: float = 10.0
+    mid_pelvis: float = 1.0
+    pelvis_height: float = 1.0
+    yaw: float = 0.1
+    zero_velocity: float = 1e-2
+    foot_swing: float = 10.0
+    foot_floor: float = 1e-4
+    decay_s: float = 1.0
+    start: float = 0.5
+
+    def __post_init__(self) -> None:
+        if self.adjoint not in ("printed", "exact"):
+            raise ParameterError(
+                "adjoint_unknown", f"adjoint is '{self.adjoint}', expected printed or exact."
+            )
+        if not 0 <= self.projections <= 10:
+            raise ParameterError("projections_range", f"{self.projections} projections are outside 0 to 10.")
+        for name, value in vars(self).items():
+            if isinstance(value, float) and not (np.isfinite(value) and value > 0.0):
+                raise ParameterError("variance_range", f"{name} = {value:g} is not above 0.")
+
+
+@dataclass(frozen=True, eq=False)
+class L7sState:
+    """What the filter carries from one sample to the next.
+
+    Parameters
+    ----------
+    R : (3, 3, 3) of BODIES in Sy's frames. p, v : (3, 3) m, m/s, in W. P : (27, 27).
+    since : (2,) samples since the last flagged step, left and right.
+    """
+
+    R: Floats
+    p: Floats
+    v: Floats
+    P: Floats
+    since: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class L7sInputs:
+    """A block of samples.
+
+    Parameters
+    ----------
+    R : (n, 3, 3, 3) measured orientations of BODIES in Sy's frames (2I: the pelvis's are not read).
+    acc : (n, 3, 3) accelerations in W without gravity, m/s². step : (n, 2) foot still, left and right.
+    """
+
+    R: Floats
+    acc: Floats
+    step: Bools
+    worn: Worn
+
+    def part(self, which: slice) -> L7sInputs:
+        """Some of the samples."""
+        return L7sInputs(self.R[which], self.acc[which], self.step[which], self.worn)
+
+
+@dataclass(frozen=True, eq=False)
+class L7sTrack:
+    """The constrained state after every sample; variance (n, 27) is the diagonal of P."""
+
+    R: Floats
+    p: Floats
+    v: Floats
+    variance: Floats
+
+
+def filter_block(
+    state: L7sState, inputs: L7sInputs, model: LegModel, rate_hz: float, params: L7sParams | None = None
+) -> tuple[L7sTrack, L7sState]:
+    """Advance the filter over a block: predict, one stacked update, projections (Sy 2021 eq 3–39).
+
+    One run over n samples equals any split of it into blocks, bit for bit.
+
+    Raises
+    ------
+    EstimationError `bad_signal` when an input is not finite, `l7s_diverged` when a constraint cannot be met.
+    """
+    from core.body import l7s_kernel
+
+    params = params or L7sParams()
+    R = np.ascontiguousarray(inputs.R, np.float64)
+    acc = np.ascontiguousarray(inputs.acc, np.float64)
+    step = np.ascontiguousarray(inputs.step, np.bool_)
+    n = len(step)
+    if R.shape != (n, 3, 3, 3) or acc.shape != (n, 3, 3) or step.shape != (n, 2):
+        raise ParameterError(
+            "bad_shape",
+            f"L7S inputs have shapes {R.shape}, {acc.shape}, {step.shape}; expected "
+            "(n, 3, 3, 3), (n, 3, 3), (n, 2).",
+        )
+    bad = ~(np.isfinite(R).all(axis=(1, 2, 3)) & np.isfinite(acc).all(axis=(1, 2)))
+    if bad.any():
+        raise EstimationError(
+            "bad_signal",
+            f"Sample {int(np.argmax(bad))} of the block is not a number; mark it invalid or interpolate it.",
+        )
+    now = L7sState(*(np.array(x, np.float64, order="C") for x in vars(state).values()))
+    track = L7sTrack(np.empty((n, 3, 3, 3)), np.empty((n, 3, 3)), np.empty((n, 3, 3)), np.empty((n, SIZE)))
+    failed = l7s_kernel.run(
+        now.R, now.p, now.v, now.P, now.since, R, acc, step, inputs.worn == "3I", 1.0 / rate_hz,
+        np.array([0.5 * model.hip_width, 0.5 * model.foot, model.thigh + model.shank]),
+        np.array([model.hip_height, model.foot_height]),
+        np.array([
+            params.orientation, params.mid_pelvis, params.pelvis_height, params.yaw, params.zero_velocity,
+        ]),
+        np.array([params.foot_swing, params.foot_floor, params.decay_s]),
+        np.array([params.acceleration, params.orientation_step]),
+        params.adjoint == "printed", params.projections, track.R, track.p, track.v, track.variance,
+    )  # fmt: skip
+    if failed >= 0 or not all(np.isfinite(x).all() for x in vars(now).values()):
+        raise EstimationError(
+            "l7s_diverged",
+            f"The leg constraints cannot be met at sample {max(int(failed), 0)} of the block; check which "
+            "foot each sensor is on and the body height.",
+        )
+    return track, now
+
+
+def start(inputs: L7sInputs, model: LegModel, params: L7sParams | None = None) -> L7sState:
+    """The state at the first sample: standing straight, ankles under the hips, pelvis over the origin of W.
+
+    Sy 2021 §III-A takes the start from Vicon; here it is the body model at the measured headings.
+
+    Raises
+    ------
+    EstimationError `headings_apart` when the worn sensors face more than 90° apart.
+    """
+    R = np.array(inputs.R[0], np.float64)
+    forward = R[1:, :2, 2].sum(axis=0)
+    facing = float(np.arctan2(forward[1], forward[0]))
+    if inputs.worn == "3I":
+        facing = float(np.arctan2(R[0, 1, 0], R[0, 0, 0]))
+    else:
+        R[0] = to_matrix(about(2, facing))
+    for leg, side in enumerate(LEGS):
+        apart = (np.arctan2(R[1 + leg, 1, 2], R[1 + leg, 0, 2]) - facing + np.pi) % (2.0 * np.pi) - np.pi
+        if abs(apart) > HEADING_LIMIT:
+            raise EstimationError(
+                "headings_apart",
+                f"The {side} foot faces {abs(np.degrees(apart)):.0f}° away from the body at the start, at "
+                "most 90° can be a person; check that no sensor is worn backwards and calibrate again.",
+                sensor=FOOT[side],
+            )
+    p = np.zeros((3, 3))
+    p[0, 2] = model.hip_height
+    for leg, side in enumerate(LEGS):
+        lateral = 0.5 * HIP_SIDE[side] * model.hip_width
+        hip = np.array([-lateral * np.sin(facing), lateral * np.cos(facing), model.ankle_height])
+        p[1 + leg] = hip + 0.5 * model.foot * R[1 + leg, :, 2]
+    P = (params or L7sParams()).start * np.eye(SIZE)
+    return L7sState(R, p, np.zeros((3, 3)), P, np.zeros(2))
+
+
+def warm() -> None:
+    """Compile or load the kernel, so that the first take does not wait for it."""
+    model = LegModel.of(BodyModel.from_height(NOMINAL_HEIGHT_M))
+    foot = model.to_isb("foot_l").T
+    R = np.tile(np.stack((np.eye(3), R_NEUTRAL @ foot, R_NEUTRAL @ foot)), (2, 1, 1, 1))
+    for worn in get_args(Worn):
+        inputs = L7sInputs(R, np.zeros((2, 3, 3)), np.ones((2, 2), bool), worn)
+        filter_block(start(inputs, model), inputs, model, 100.0)

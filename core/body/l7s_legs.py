@@ -1,0 +1,152 @@
+"""Sy's body model: its lengths, its frames against ours, and the legs from hip, ankle and hinge axis.
+
+Sy's frames (spec/estimators.md §1): pelvis, thigh and shank x forward, y left, z up; foot z from ankle to
+toe, y left, x down. We keep the inclination of the line from ankle to toe under the sole's forward axis, so
+that nothing of it is left in our foot frame; with it 0 the conversion is the M_foot of §1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import atan2, hypot
+from typing import Final
+
+import numpy as np
+
+from core.body.kinematics import sole_points
+from core.body.model import BodyModel
+from core.errors import EstimationError
+from core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
+from core.rotation import about, from_matrix, to_matrix
+
+BODIES: Final[tuple[Segment, ...]] = ("pelvis", "foot_l", "foot_r")
+"""Order of the three bodies of the state (paper: p, lf, rf)."""
+
+LEGS: Final[tuple[Side, ...]] = ("left", "right")
+"""Order of the legs in the state."""
+
+HIP_SIDE: Final[dict[Side, float]] = {"left": 1.0, "right": -1.0}
+"""Sign of the hip centre on the pelvis's y axis, which points left (paper eq 32)."""
+
+M_LEG: Final[Floats] = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+M_FOOT: Final[Floats] = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+"""R_ISB = R_Sy M (spec/estimators.md §1)."""
+M_LEG.setflags(write=False)
+M_FOOT.setflags(write=False)
+
+
+@dataclass(frozen=True)
+class LegModel:
+    """Lengths in m of the model: three bodies and two hinged legs.
+
+    Parameters
+    ----------
+    foot : from the ankle to the toe point on the floor, the ball. incline : of that line under the sole's
+    forward axis, rad. hip_height : mid-hip over the floor in standing. foot_height : of the foot's middle.
+    """
+
+    hip_width: float
+    thigh: float
+    shank: float
+    foot: float
+    incline: float
+    ankle_height: float
+    hip_height: float
+    foot_height: float
+
+    @classmethod
+    def of(cls, body: BodyModel) -> LegModel:
+        """The model of a person standing straight on a flat foot.
+
+        Raises
+        ------
+        EstimationError `segment_length` when a length is not positive and finite.
+        """
+        for name in ("hip_width", "thigh", "shank", "ankle_height", "foot"):
+            length = getattr(body, name)
+            if not (np.isfinite(length) and length > 0.0):
+                raise EstimationError(
+                    "segment_length",
+                    f"The body model's {name} is {length:g} m, expected above 0; enter the body height or "
+                    "measure the segment.",
+                )
+        forward, drop, _ = sole_points(body)[1]
+        return cls(
+            hip_width=body.hip_width,
+            thigh=body.thigh,
+            shank=body.shank,
+            foot=hypot(forward, drop),
+            incline=atan2(-drop, forward),
+            ankle_height=body.ankle_height,
+            hip_height=body.ankle_height + body.shank + body.thigh,
+            foot_height=0.5 * body.ankle_height,
+        )
+
+    def to_isb(self, segment: Segment) -> Floats:
+        """Matrix M (3, 3) of R_ISB = R_Sy M."""
+        if segment.startswith("foot"):
+            return np.asarray(M_FOOT @ to_matrix(about(2, self.incline)))
+        return M_LEG
+
+
+@dataclass(frozen=True, eq=False)
+class Legs:
+    """Both legs, poses in our ISB frames.
+
+    Parameters
+    ----------
+    q : segment → (n, 4). p : segment → (n, 3) hip for thighs, knee for shanks, ankle for feet, m.
+    reach : side → (n,) distance of ankle and hip, m. hinge : side → (n,) distance of the hip from the plane
+    of the foot, m, zero when the hinge constraint holds.
+    """
+
+    q: Mapping[Segment, Floats]
+    p: Mapping[Segment, Floats]
+    reach: Mapping[Side, Floats]
+    hinge: Mapping[Side, Floats]
+
+
+def solve_legs(R: Floats, p: Floats, model: LegModel) -> Legs:
+    """Thighs, shanks and feet from pelvis and feet: the knee by the law of cosines.
+
+    Parameters
+    ----------
+    R : (n, 3, 3, 3), p : (n, 3, 3) of BODIES in Sy's frames, foot position in its middle.
+
+    References
+    ----------
+    Sy 2021 eq 40–44. Where the leg is longer than thigh and shank (the cosine passes 1) the knee is straight.
+    """
+    q: dict[Segment, Floats] = {}
+    places: dict[Segment, Floats] = {}
+    reach: dict[Side, Floats] = {}
+    hinge: dict[Side, Floats] = {}
+    for leg, side in enumerate(LEGS):
+        R_foot, p_foot = R[:, 1 + leg], p[:, 1 + leg]
+        hip = p[:, 0] + 0.5 * HIP_SIDE[side] * model.hip_width * R[:, 0, :, 1]
+        ankle = p_foot - 0.5 * model.foot * R_foot[:, :, 2]
+        y = R_foot[:, :, 1]
+        tau = hip - ankle
+        distance = np.linalg.norm(tau, axis=1)
+        cosine = (model.shank**2 + distance**2 - model.thigh**2) / (2.0 * model.shank * distance)
+        angle = np.arccos(np.clip(cosine, -1.0, 1.0))[:, None]
+        along = tau / distance[:, None]
+        # Exp(θ y) of a vector across y; the small part along y, left by the last projection, stays
+        z_shank = np.cos(angle) * along + np.sin(angle) * np.cross(y, along)
+        knee = ankle + model.shank * z_shank
+        z_thigh = _unit(hip - knee)
+        for segment, z, origin in ((SHANK[side], z_shank, knee), (THIGH[side], z_thigh, hip)):
+            x = _unit(np.cross(y, z))
+            R_leg = np.stack((x, np.cross(z, x), z), axis=-1)
+            q[segment] = from_matrix(R_leg @ model.to_isb(segment))
+            places[segment] = origin
+        q[FOOT[side]] = from_matrix(R_foot @ model.to_isb(FOOT[side]))
+        places[FOOT[side]] = ankle
+        reach[side] = distance
+        hinge[side] = np.sum(y * tau, axis=1)
+    return Legs(q, places, reach, hinge)
+
+
+def _unit(v: Floats) -> Floats:
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))

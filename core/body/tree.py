@@ -1,0 +1,229 @@
+"""The kinematic tree the pose filters run on: IMUs, and the joints that hold them together.
+
+Nothing in a filter knows about legs: it sees sensors, joint centres in sensor axes, hinge axes and which
+sensors come to rest on the floor. Trees of people are made from a body model, how the sensors sit
+(calibration) and where (places.py). Where no joint links two sensors, as with two feet alone, they are
+filtered side by side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from core.body.model import BodyModel
+from core.body.places import joint_places, sensor_place, standing_origin
+from core.errors import EstimationError, ParameterError
+from core.frames import R_NEUTRAL, Floats, Segment
+from core.rotation import conjugate, from_matrix, multiply, rotate, to_matrix
+
+Preset = Literal["lower_body7", "feet_pelvis3", "feet2", "single_foot_r", "single_foot_l"]
+
+PRESETS: Final[Mapping[Preset, tuple[Segment, ...]]] = {
+    "lower_body7": ("pelvis", "thigh_r", "shank_r", "foot_r", "thigh_l", "shank_l", "foot_l"),
+    "feet_pelvis3": ("pelvis", "foot_r", "foot_l"),
+    "feet2": ("foot_r", "foot_l"),
+    "single_foot_r": ("foot_r",),
+    "single_foot_l": ("foot_l",),
+}
+"""Sensors of each set-up, in the order of spec/estimators.md §1."""
+
+HINGED: Final = "shank"
+"""The knee is the joint with a hinge axis, z of thigh and shank; its distal segment begins so."""
+
+LONGEST_M: Final = 2.0
+"""A joint further from its sensor than this is a unit error."""
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """Two sensors that share a point, and an axis if the joint is a hinge.
+
+    Parameters
+    ----------
+    proximal, distal : indices of the sensors. r_proximal, r_distal : (3,) the centre in their axes, m.
+    e_proximal, e_distal : (3,) unit hinge axis in their axes, or None.
+    """
+
+    name: str
+    proximal: int
+    distal: int
+    r_proximal: Floats
+    r_distal: Floats
+    e_proximal: Floats | None = None
+    e_distal: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ImuTree:
+    """What the filters know about the set-up.
+
+    Parameters
+    ----------
+    imus : unique names, segments for a person. feet : indices of the sensors that rest on the floor.
+    q_mount : (n, 4) sensor to segment axes. place : (n, 3) sensor in segment axes, m.
+    origin : (n, 3) segment origins in W in neutral standing, m.
+
+    Raises
+    ------
+    EstimationError `duplicate_segment`, `no_imu`, `segment_length`, `joint_unknown`, `joint_loop`.
+    """
+
+    imus: tuple[str, ...]
+    joints: tuple[Joint, ...]
+    feet: tuple[int, ...]
+    q_mount: Floats
+    place: Floats
+    origin: Floats
+
+    def __post_init__(self) -> None:
+        n = len(self.imus)
+        if n == 0:
+            raise EstimationError("no_imu", "The tree has no IMU; give at least one foot.")
+        if len(set(self.imus)) != n:
+            twice = next(s for s in self.imus if self.imus.count(s) > 1)
+            raise EstimationError(
+                "duplicate_segment", f"{twice} carries two sensors; set one of them aside.", sensor=twice
+            )
+        for name, a, width in (
+            ("q_mount", self.q_mount, 4),
+            ("place", self.place, 3),
+            ("origin", self.origin, 3),
+        ):
+            if a.shape != (n, width):
+                raise ParameterError(
+                    "bad_shape", f"ImuTree: {name} has shape {a.shape}, expected {(n, width)}."
+                )
+        group = list(range(n))
+        for joint in self.joints:
+            if not (
+                0 <= joint.proximal < n and 0 <= joint.distal < n and all(0 <= foot < n for foot in self.feet)
+            ):
+                raise EstimationError("joint_unknown", f"{joint.name} or a foot names a sensor out of 0…{n}.")
+            for r in (joint.r_proximal, joint.r_distal):
+                if not (np.isfinite(r).all() and np.linalg.norm(r) < LONGEST_M):
+                    raise EstimationError(
+                        "segment_length",
+                        f"{joint.name} lies at {np.round(r, 3).tolist()} m from its sensor, expected within "
+                        f"{LONGEST_M:g} m; check the body model's units.",
+                    )
+            part, other = group[joint.proximal], group[joint.distal]
+            if part == other:
+                raise EstimationError(
+                    "joint_loop", f"{joint.name} closes a loop; a tree has one way to each IMU."
+                )
+            group = [part if g == other else g for g in group]
+
+    def roots(self) -> list[int]:
+        """The first sensor of each connected part."""
+        below = {j.distal for j in self.joints}
+        return [i for i in range(len(self.imus)) if i not in below]
+
+    def forward(self) -> Floats:
+        """The segments' anterior axes (n, 3) in sensor axes."""
+        return rotate(conjugate(self.q_mount), np.array([1.0, 0.0, 0.0]))
+
+    def segment_q(self, q: Floats) -> Floats:
+        """Segment orientations (..., n, 4) from sensor orientations (..., n, 4)."""
+        return multiply(q, conjugate(self.q_mount))
+
+    def segment_origin(self, p: Floats, q: Floats) -> Floats:
+        """Segment origins (..., n, 3) in W from sensor positions (..., n, 3) and orientations (..., n, 4)."""
+        return np.asarray(p - rotate(self.segment_q(q), self.place))
+
+
+def person_tree(
+    body: BodyModel,
+    mounts: Mapping[Segment, Floats],
+    segments: Sequence[Segment],
+    places: Mapping[Segment, Floats] | None = None,
+) -> ImuTree:
+    """The tree of the worn sensors; neighbours on the body are joined, knees are hinges.
+
+    Parameters
+    ----------
+    mounts : segment → (3, 3) R_segment_sensor (`SegmentCalibration.R_segment_sensor`).
+    segments : in this order, a `PRESETS` entry or any other set.
+    places : segment → (3,) sensor in segment axes, m; nominal where not given.
+
+    Raises
+    ------
+    EstimationError `segments_missing` when one of `segments` has no mount, `segment_length` when a length of
+    the body model is not positive; and those of `ImuTree`.
+    """
+    missing = [s for s in segments if s not in mounts]
+    if missing:
+        raise EstimationError(
+            "segments_missing",
+            f"{len(segments) - len(missing)} of {len(segments)} sensors are there, missing: "
+            f"{', '.join(missing)}; choose an estimator for the sensors worn.",
+            sensor=missing[0],
+        )
+    _check_lengths(body)
+    q_mount = from_matrix(np.stack([mounts[s] for s in segments]))
+    place = np.stack([(places or {}).get(s, sensor_place(s, body)) for s in segments])
+    index = {s: i for i, s in enumerate(segments)}
+    joints = []
+    for (proximal, distal), (above, below) in joint_places(body).items():
+        if proximal not in index or distal not in index:
+            continue
+        i, j = index[proximal], index[distal]
+        to_i, to_j = to_matrix(conjugate(q_mount[i])), to_matrix(conjugate(q_mount[j]))
+        hinge = distal.startswith(HINGED)
+        joints.append(
+            Joint(
+                name=f"{proximal}-{distal}",
+                proximal=i,
+                distal=j,
+                r_proximal=to_i @ (above - place[i]),
+                r_distal=to_j @ (below - place[j]),
+                e_proximal=to_i[:, 2].copy() if hinge else None,
+                e_distal=to_j[:, 2].copy() if hinge else None,
+            )
+        )
+    return ImuTree(
+        imus=tuple(segments),
+        joints=tuple(joints),
+        feet=tuple(i for s, i in index.items() if s.startswith("foot")),
+        q_mount=q_mount,
+        place=place,
+        origin=np.stack([standing_origin(s, body) for s in segments]),
+    )
+
+
+def walker3(leg_m: float = 0.92, hip_width_m: float = 0.39, pelvis_sensor_m: float = 0.08) -> ImuTree:
+    """The three bodies of Potter et al. 2021: a pelvis and two straight legs on hip hinges, sensors unturned.
+
+    Sensors sit above the middle of the hips and at the ends of the legs (fig 1, data set 1).
+    """
+    lateral, up, axis = 0.5 * hip_width_m, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    joints = tuple(
+        Joint(f"hip_{s}", 0, i, out * axis * lateral - pelvis_sensor_m * up, leg_m * up, axis, axis)
+        for s, i, out in (("r", 1, 1.0), ("l", 2, -1.0))
+    )
+    return ImuTree(
+        imus=("pelvis", "leg_r", "leg_l"),
+        joints=joints,
+        feet=(1, 2),
+        q_mount=np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)),
+        place=np.array([pelvis_sensor_m * up, -leg_m * up, -leg_m * up]),
+        origin=np.array([[0.0, 0.0, leg_m], [0.0, -lateral, leg_m], [0.0, lateral, leg_m]]),
+    )
+
+
+def _check_lengths(body: BodyModel) -> None:
+    for name in ("hip_width", "thigh", "shank", "ankle_height", "foot"):
+        length = getattr(body, name)
+        if not (np.isfinite(length) and 0.0 < length < LONGEST_M):
+            raise EstimationError(
+                "segment_length",
+                f"The body model's {name} is {length:g} m, expected between 0 and {LONGEST_M:g}; enter the "
+                "body height or measure the segment.",
+            )
+
+
+NEUTRAL_Q: Final[Floats] = from_matrix(R_NEUTRAL)
+"""Orientation (4,) of every segment in neutral standing."""

@@ -1,0 +1,186 @@
+"""Measurements of the ErKF: their rows in closed form, and the update by one block of three rows.
+
+A block is 0 = h(x) + noise with at most two IMUs. Its H is ±1 on three errors (position, velocity or bias)
+and a 3 × 3 matrix on δθ, so H P costs a few rows of P. Blocks are taken one after the other against the
+accumulated correction dx, which is injected once per step: with diagonal noise that equals the paper's
+stacked update. Rows: spec/estimators.md §3.3, Potter 2021 eq 15–26; V = L⁻¹ H P, P ← P − VᵀV: spec/kernels.md
+§3.2.
+"""
+
+from __future__ import annotations
+
+from math import atan2, pi, sqrt
+
+import numba
+
+from core.body.so3 import FAST, times_cross
+
+FIRST, SECOND, UNIT, TURNS = range(4)
+"""A block's place: first error of its IMUs (SECOND is −1 for one IMU), offset of the ±1 (−1: none), whether
+it has a part on δθ."""
+
+POSITION, VELOCITY, ANGLE, GYRO_BIAS = 0, 3, 6, 9
+"""Offsets in an IMU's errors."""
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-untyped-def]
+    """Joint centre p_i + R_i r_i = p_j + R_j r_j, or with centre False joint axis R_i e_i = R_j e_j."""
+    place[FIRST], place[SECOND] = i * m, j * m
+    place[UNIT], place[TURNS] = (POSITION if centre else -1), 1
+    times_cross(R[i], ri, -1.0, H[0])
+    times_cross(R[j], rj, 1.0, H[1])
+    for k in range(3):
+        y[k] = R[j, k, 0] * rj[0] + R[j, k, 1] * rj[1] + R[j, k, 2] * rj[2]
+        y[k] -= R[i, k, 0] * ri[0] + R[i, k, 1] * ri[1] + R[i, k, 2] * ri[2]
+        if centre:
+            y[k] += x[j, k] - x[i, k]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+def known_rows(place, m, i, offset, value, measured, y):  # type: ignore[no-untyped-def]
+    """Zero velocity (measured 0) or the gyroscope at rest showing its bias: an error itself is observed."""
+    place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, offset, 0
+    for k in range(3):
+        y[k] = measured[k] - value[k]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+def tilt_rows(R, f, m, i, place, H, y):  # type: ignore[no-untyped-def]
+    """Tilt: Rᵀẑ is the direction of the specific force at rest; δθ: [Rᵀẑ]×."""
+    place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, -1, 1
+    norm = 1.0 / sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
+    a, b, c = R[2, 0], R[2, 1], R[2, 2]
+    G = H[0]
+    G[0, 0], G[0, 1], G[0, 2] = 0.0, -c, b
+    G[1, 0], G[1, 1], G[1, 2] = c, 0.0, -a
+    G[2, 0], G[2, 1], G[2, 2] = -b, a, 0.0
+    for k in range(3):
+        y[k] = f[k] * norm - R[2, k]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-untyped-def]
+    """Heading of the axis t = R f; two empty rows make it a block of three. False when t is near vertical."""
+    tx = R[0, 0] * forward[0] + R[0, 1] * forward[1] + R[0, 2] * forward[2]
+    ty = R[1, 0] * forward[0] + R[1, 1] * forward[1] + R[1, 2] * forward[2]
+    level = tx * tx + ty * ty
+    if level < 0.01:
+        return False
+    place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, -1, 1
+    times_cross(R, forward, -1.0, H[1])
+    for k in range(3):
+        H[0, 0, k] = (tx * H[1, 1, k] - ty * H[1, 0, k]) / level
+        H[0, 1, k] = 0.0
+        H[0, 2, k] = 0.0
+    y[0], y[1], y[2] = measured - atan2(ty, tx), 0.0, 0.0
+    y[0] -= 2.0 * pi * round(y[0] / (2.0 * pi))
+    return True
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+def correct(P, dx, place, H, y, sd, V, E, U):  # type: ignore[no-untyped-def]
+    """Take one block; V (3, N) and E (9,) = (e, L) are kept for the smoother. False if S is not positive."""
+    N = P.shape[0]
+    b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
+    both, turns = b2 >= 0, place[TURNS] == 1
+    for r in range(3):
+        if turns:
+            h0, h1, h2 = H[0, r, 0], H[0, r, 1], H[0, r, 2]
+            if both:
+                g0, g1, g2 = H[1, r, 0], H[1, r, 1], H[1, r, 2]
+                for c in range(N):
+                    V[r, c] = (
+                        h0 * P[b + 6, c] + h1 * P[b + 7, c] + h2 * P[b + 8, c]
+                        + g0 * P[b2 + 6, c] + g1 * P[b2 + 7, c] + g2 * P[b2 + 8, c]
+                    )  # fmt: skip
+                if unit >= 0:
+                    for c in range(N):
+                        V[r, c] += P[b + unit + r, c] - P[b2 + unit + r, c]
+            else:
+                for c in range(N):
+                    V[r, c] = h0 * P[b + 6, c] + h1 * P[b + 7, c] + h2 * P[b + 8, c]
+        else:
+            for c in range(N):
+                V[r, c] = P[b + unit + r, c]
+    for r in range(3):
+        U[3, r] = y[r]
+        for k in range(3):
+            U[r, k] = 0.0
+            if turns:
+                for i in range(3):
+                    U[r, k] += H[0, k, i] * V[r, b + 6 + i]
+                    if both:
+                        U[r, k] += H[1, k, i] * V[r, b2 + 6 + i]
+            if unit >= 0:
+                U[r, k] += V[r, b + unit + k]
+                if both:
+                    U[r, k] -= V[r, b2 + unit + k]
+        if turns:
+            for i in range(3):
+                U[3, r] -= H[0, r, i] * dx[b + 6 + i]
+                if both:
+                    U[3, r] -= H[1, r, i] * dx[b2 + 6 + i]
+        if unit >= 0:
+            U[3, r] -= dx[b + unit + r]
+            if both:
+                U[3, r] += dx[b2 + unit + r]
+        U[r, r] += sd * sd
+    if not (U[0, 0] > 0.0):
+        return False
+    i0 = 1.0 / sqrt(U[0, 0])
+    l10, l20 = U[1, 0] * i0, U[2, 0] * i0
+    pivot = U[1, 1] - l10 * l10
+    if not (pivot > 0.0):
+        return False
+    i1 = 1.0 / sqrt(pivot)
+    l21 = (U[2, 1] - l20 * l10) * i1
+    pivot = U[2, 2] - l20 * l20 - l21 * l21
+    if not (pivot > 0.0):
+        return False
+    i2 = 1.0 / sqrt(pivot)
+    e0 = U[3, 0] * i0
+    e1 = (U[3, 1] - l10 * e0) * i1
+    e2 = (U[3, 2] - l20 * e0 - l21 * e1) * i2
+    for c in range(N):
+        v0 = V[0, c] * i0
+        v1 = (V[1, c] - l10 * v0) * i1
+        v2 = (V[2, c] - l20 * v0 - l21 * v1) * i2
+        V[0, c] = v0
+        V[1, c] = v1
+        V[2, c] = v2
+        dx[c] += v0 * e0 + v1 * e1 + v2 * e2
+    E[0], E[1], E[2] = e0, e1, e2
+    E[3], E[4], E[5], E[6], E[7], E[8] = i0, l10, l20, i1, l21, i2
+    for r in range(N):
+        v0, v1, v2 = V[0, r], V[1, r], V[2, r]
+        for c in range(N):
+            P[r, c] -= v0 * V[0, c] + v1 * V[1, c] + v2 * V[2, c]
+    return True
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+def back_correct(lam, place, H, V, E):  # type: ignore[no-untyped-def]
+    """λ ← λ − Hᵀ L⁻ᵀ (V λ + e): one block of the modified Bryson–Frazier smoother (spec/kernels.md §3.2)."""
+    z0, z1, z2 = E[0], E[1], E[2]
+    for c in range(len(lam)):
+        z0 += V[0, c] * lam[c]
+        z1 += V[1, c] * lam[c]
+        z2 += V[2, c] * lam[c]
+    w2 = z2 * E[8]
+    w1 = (z1 - E[7] * w2) * E[6]
+    w0 = (z0 - E[4] * w1 - E[5] * w2) * E[3]
+    b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
+    if unit >= 0:
+        lam[b + unit] -= w0
+        lam[b + unit + 1] -= w1
+        lam[b + unit + 2] -= w2
+        if b2 >= 0:
+            lam[b2 + unit] += w0
+            lam[b2 + unit + 1] += w1
+            lam[b2 + unit + 2] += w2
+    if place[TURNS] == 1:
+        for i in range(3):
+            lam[b + 6 + i] -= H[0, 0, i] * w0 + H[0, 1, i] * w1 + H[0, 2, i] * w2
+            if b2 >= 0:
+                lam[b2 + 6 + i] -= H[1, 0, i] * w0 + H[1, 1, i] * w1 + H[1, 2, i] * w2

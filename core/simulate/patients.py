@@ -1,0 +1,221 @@
+"""Twelve virtual people: how each walks differently from the healthy reference (spec/patients.md §3).
+
+One body, plausible in scale, no clinical data: they show that the analysis finds and names a deviation, never
+how well it does on patients. Where one side is affected it is the left. Parameters are commands; what comes
+out is written down and tested as signatures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import radians as deg
+from types import MappingProxyType
+from typing import Final
+
+from core.frames import Side
+from core.simulate.walker import SideGait, Variability, Walker
+
+
+@dataclass(frozen=True)
+class Patient:
+    """A person and the steps this person takes: length in m at the reference height, duration in s."""
+
+    title: str
+    step_m: float
+    step_s: float
+    walker: Walker
+
+
+UNEVEN: Final = Variability(
+    step_time=0.02,
+    step_length=0.03,
+    width_m=0.010,
+    knee_rad=deg(2.5),
+    pitch_rad=deg(1.5),
+    hip_rad=deg(1.2),
+)
+"""Step-to-step variation after a stroke."""
+
+PARKINSON_SPREAD: Final = replace(Variability(), step_time=0.03, step_length=0.06, width_m=0.006)
+
+ELDERLY_SPREAD: Final = Variability(
+    step_time=0.025,
+    step_length=0.04,
+    width_m=0.015,
+    knee_rad=deg(2.5),
+    pitch_rad=deg(2.0),
+    hip_rad=deg(1.5),
+)
+
+HEALTHY: Final = SideGait()
+
+
+def _both(gait: SideGait) -> dict[Side, SideGait]:
+    return {"left": gait, "right": gait}
+
+
+def _sides(left: SideGait, right: SideGait = HEALTHY) -> dict[Side, SideGait]:
+    return {"left": left, "right": right}
+
+
+HEMIPARETIC: Final = Walker(
+    variability=UNEVEN,
+    width_m=0.15,
+    rotation_factor=0.9,
+    sides=_sides(
+        left=SideGait(
+            length_factor=1.12,
+            time_factor=1.16,
+            double_support=0.17,
+            contact_pitch_rad=deg(-3.0),
+            push=0.6,
+            knee_swing_rad=deg(26.0),
+            circumduction_rad=deg(3.0),
+            hike_rad=deg(7.0),
+            ankle_swing_rad=deg(-2.0),
+            hip_factor=0.8,
+            knee_stance_rad=deg(2.0),
+            clearance_m=-0.004,
+            toe_out_rad=deg(14.0),
+        ),
+        right=SideGait(length_factor=0.88, time_factor=0.84, double_support=0.15),
+    ),
+)
+
+HEMI_MILD: Final = Walker(
+    variability=UNEVEN,
+    width_m=0.13,
+    sides=_sides(
+        left=SideGait(
+            length_factor=1.05,
+            time_factor=1.07,
+            double_support=0.135,
+            contact_pitch_rad=deg(5.0),
+            push=0.8,
+            knee_swing_rad=deg(50.0),
+            circumduction_rad=deg(3.0),
+            hike_rad=deg(2.5),
+            ankle_swing_rad=deg(-3.0),
+        ),
+        right=SideGait(length_factor=0.95, time_factor=0.93, double_support=0.125),
+    ),
+)
+
+STIFF_KNEE: Final = Walker(
+    sides=_sides(SideGait(knee_swing_rad=deg(20.0), circumduction_rad=deg(2.5), hike_rad=deg(4.0), push=0.65))
+)
+
+DROP_FOOT: Final = Walker(
+    sides=_sides(
+        SideGait(
+            ankle_swing_rad=deg(-18.0),
+            contact_pitch_rad=deg(-8.0),
+            hip_swing_rad=deg(12.0),
+            knee_swing_rad=deg(72.0),
+            flat_from=0.09,
+            clearance_m=0.012,
+        )
+    )
+)
+
+CROUCH: Final = Walker(
+    standing_knee_rad=deg(24.0),
+    tilt_rad=deg(4.0),
+    sides=_both(
+        SideGait(
+            knee_stance_rad=deg(24.0),
+            knee_wave=0.4,
+            knee_swing_rad=deg(68.0),
+            contact_pitch_rad=deg(4.0),
+            ankle_swing_rad=deg(3.0),
+            push=0.8,
+        )
+    ),
+)
+
+ANTALGIC: Final = Walker(
+    sides=_sides(
+        left=SideGait(
+            length_factor=1.10,
+            time_factor=1.15,
+            double_support=0.14,
+            push=0.75,
+            contact_pitch_rad=deg(10.0),
+        ),
+        right=SideGait(length_factor=0.90, time_factor=0.85, double_support=0.11),
+    ),
+)
+
+_PARKINSON_LEG: Final = SideGait(
+    contact_pitch_rad=deg(3.0),
+    push=0.55,
+    knee_stance_rad=deg(10.0),
+    knee_swing_rad=deg(44.0),
+    hip_factor=0.8,
+    clearance_m=0.003,
+    double_support=0.14,
+    flat_from=0.08,
+    heel_off=0.36,
+    toe_out_rad=deg(6.0),
+)
+
+PARKINSON: Final = Walker(
+    variability=PARKINSON_SPREAD,
+    amplitude_power=0.55,
+    width_m=0.09,
+    rotation_factor=0.4,
+    obliquity_factor=0.5,
+    tilt_rad=deg(-4.0),
+    standing_knee_rad=deg(15.0),
+    sides=_both(_PARKINSON_LEG),
+)
+
+SEVERE_SHUFFLE: Final = replace(
+    PARKINSON,
+    sides=_both(
+        replace(
+            _PARKINSON_LEG,
+            contact_pitch_rad=0.0,
+            push=0.22,
+            knee_swing_rad=deg(30.0),
+            clearance_m=0.002,
+        )
+    ),
+)
+
+STEP_ASYMMETRY: Final = Walker(sides=_sides(SideGait(length_factor=0.85), SideGait(length_factor=1.15)))
+
+ELDERLY: Final = Walker(
+    variability=ELDERLY_SPREAD,
+    width_m=0.14,
+    rotation_factor=0.8,
+    sides=_both(
+        SideGait(
+            double_support=0.15,
+            contact_pitch_rad=deg(11.0),
+            push=0.75,
+            knee_swing_rad=deg(52.0),
+            knee_stance_rad=deg(3.0),
+            hip_factor=0.85,
+            clearance_m=0.010,
+        )
+    ),
+)
+
+PATIENTS: Mapping[str, Patient] = MappingProxyType(
+    {
+        "healthy": Patient("Healthy person", 0.64, 0.54, Walker()),
+        "healthy_slow": Patient("Healthy person walking slowly", 0.45, 0.68, Walker()),
+        "hemiparetic": Patient("Left hemiparesis", 0.40, 0.72, HEMIPARETIC),
+        "hemi_mild": Patient("Mild left hemiparesis", 0.52, 0.60, HEMI_MILD),
+        "stiff_knee": Patient("Stiff left knee", 0.55, 0.60, STIFF_KNEE),
+        "drop_foot": Patient("Left drop foot", 0.55, 0.57, DROP_FOOT),
+        "crouch": Patient("Crouch gait", 0.48, 0.56, CROUCH),
+        "antalgic": Patient("Pain in the left leg", 0.52, 0.58, ANTALGIC),
+        "parkinson": Patient("Short quick steps", 0.27, 0.43, PARKINSON),
+        "severe_shuffle": Patient("Severe shuffling", 0.18, 0.45, SEVERE_SHUFFLE),
+        "step_asym": Patient("Steps of unequal length", 0.56, 0.56, STEP_ASYMMETRY),
+        "elderly": Patient("Cautious elderly person", 0.42, 0.66, ELDERLY),
+    }
+)

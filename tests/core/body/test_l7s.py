@@ -1,0 +1,215 @@
+"""L7S against exact truth, finite differences, and the laws every filter obeys."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from core.angles import joint_angles
+from core.body.l7s import free_acceleration, inputs_of, l7s_poses
+from core.body.l7s_constraints import constraint_rows
+from core.body.l7s_filter import L7sInputs, L7sParams, Worn, filter_block, start
+from core.body.l7s_legs import LegModel
+from core.body.l7s_updates import inject, reset
+from core.body.model import BodyModel
+from core.body.poses import Poses
+from core.body.se3 import right_jacobian
+from core.body.still import FOOT_STILL, still_samples
+from core.calibration import calibrate
+from core.calibration.result import CalibratedRecording
+from core.errors import EstimationError, ParameterError
+from core.frames import FOOT, SIDES, Bools, Floats, Side
+from core.fusion import estimate
+from core.fusion.orientations import Orientations
+from core.rotation import about, exp, multiply, to_matrix
+from core.simulate import Truth
+from tests.walks import simulated
+
+BODY = BodyModel.from_height(1.75)
+MODEL = LegModel.of(BODY)
+
+
+def still_feet(calibrated: CalibratedRecording) -> dict[Side, Bools]:
+    """Where each foot rests, by the rule on its own signals."""
+    found: dict[Side, Bools] = {}
+    for side in SIDES:
+        signals = calibrated.recording.sensors[FOOT[side]]
+        bias = calibrated.calibration.segments[FOOT[side]].gyro_bias
+        found[side] = still_samples(
+            signals.acc, signals.gyr - bias, signals.valid, calibrated.recording.rate_hz, FOOT_STILL
+        )
+    return found
+
+
+@cache
+def walk() -> tuple[CalibratedRecording, Orientations, dict[Side, Bools], Truth]:
+    recording, truth = simulated("comfortable", 2)
+    calibrated = calibrate(recording)
+    return calibrated, estimate(calibrated), still_feet(calibrated), truth
+
+
+def poses_of(worn: Worn, params: L7sParams | None = None) -> Poses:
+    calibrated, orientations, steps, truth = walk()
+    acceleration = free_acceleration(calibrated, orientations)
+    return l7s_poses(orientations, acceleration, steps, truth.body, params, worn)
+
+
+def random_state(seed: int) -> tuple[Floats, Floats, Floats]:
+    rng = np.random.default_rng(seed)
+    R = to_matrix(exp(rng.normal(0.0, 0.8, (3, 3))))
+    return R, rng.normal(0.0, 0.5, (3, 3)), rng.normal(0.0, 0.5, (3, 3))
+
+
+@pytest.mark.parametrize("leg", [0, 1])
+@pytest.mark.parametrize("reach", [0.3, 3.0])
+def test_constraint_rows_are_the_derivatives_of_what_they_hold(leg: int, reach: float) -> None:
+    R, p, v = random_state(3 + leg)
+    p[1 + leg] = p[0] + reach * np.array([0.1, 0.2, -1.0])
+    C, d = np.zeros((2, 27)), np.zeros(2)
+    count = constraint_rows(R, p, leg, 0.09, 0.1, 0.9, C, d)
+    assert count == (2 if reach > 1 else 1)
+    step, work = 1e-6, np.empty((7, 3, 3))
+    for k in range(27):
+        ends = []
+        for sign in (1.0, -1.0):
+            dx = np.zeros(27)
+            dx[k] = sign * step
+            Rk, pk, vk = R.copy(), p.copy(), v.copy()
+            inject(Rk, pk, vk, dx, work)
+            there = np.zeros(2)
+            constraint_rows(Rk, pk, leg, 0.09, 0.1, 0.9, np.zeros((2, 27)), there)
+            ends.append(there)
+        # d is what is missing: minus the constraint
+        slope = -(ends[0] - ends[1]) / (2.0 * step)
+        np.testing.assert_allclose(C[:count, k], slope[:count], atol=1e-7)
+
+
+def test_the_reset_turns_the_covariance_by_the_right_jacobian_of_the_correction() -> None:
+    rng = np.random.default_rng(5)
+    for scale in (1e-6, 0.1, 1.5):
+        rho, phi = rng.normal(0.0, 1.0, 3), scale * rng.normal(0.0, 1.0, 3)
+        same, cross = np.empty((3, 3)), np.empty((3, 3))
+        right_jacobian(rho, phi, same, cross, np.empty((5, 3, 3)))
+        J = np.block([[same, cross], [np.zeros((3, 3)), same]])
+        for k in range(6):
+            ends = []
+            for sign in (1.0, -1.0):
+                small = np.zeros(6)
+                small[k] = sign * 1e-6
+                # Exp(ξ)⁻¹ Exp(ξ + δ) = Exp(J_r δ + …)
+                R, p = np.tile(np.eye(3), (3, 1, 1)), np.zeros((3, 3))
+                dx = np.zeros(27)
+                dx[:3], dx[3:6] = rho + small[:3], phi + small[3:]
+                inject(R, p, np.zeros((3, 3)), dx, np.empty((7, 3, 3)))
+                R0, p0 = np.tile(np.eye(3), (3, 1, 1)), np.zeros((3, 3))
+                dx[:3], dx[3:6] = rho, phi
+                inject(R0, p0, np.zeros((3, 3)), dx, np.empty((7, 3, 3)))
+                turn = R0[0].T @ R[0]
+                vector = 0.5 * np.array(
+                    [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+                )
+                ends.append(np.concatenate((R0[0].T @ (p[0] - p0[0]), vector)))
+            np.testing.assert_allclose(J[:, k], (ends[0] - ends[1]) / 2e-6, atol=1e-6)
+
+
+def test_the_reset_keeps_the_covariance_symmetric_and_positive() -> None:
+    rng = np.random.default_rng(6)
+    A = rng.normal(0.0, 1.0, (27, 27))
+    P = A @ A.T + np.eye(27)
+    reset(P, rng.normal(0.0, 0.3, 27), np.empty((7, 3, 3)))
+    assert np.array_equal(P, P.T)
+    assert np.linalg.eigvalsh(P)[0] > 0.0
+
+
+# spec/estimators.md §6.4: limits of RMSE (offset removed) and correlation of hip, knee and ankle flexion
+LIMITS = {
+    "3I": ((8.0, 12.0, 9.0), (0.85, 0.70, 0.75)),
+    "2I": ((12.0, 16.0, 11.0), (0.75, 0.60, 0.65)),
+}
+FLEXION = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
+
+
+@pytest.mark.parametrize("worn", ["3I", "2I"])
+def test_angles_and_strides_of_a_simulated_walk_are_within_the_limits(worn: Worn) -> None:
+    calibrated, _, _, truth = walk()
+    found = poses_of(worn)
+    posed = Orientations(found.t_s, found.rate_hz, found.q, dict.fromkeys(found.q, found.valid), found.method)
+    angles = joint_angles(posed, calibrated.calibration.zero).angles
+    true, n = truth.zeroed(), len(found.t_s)
+    moving = (found.t_s > truth.stands[0][1]) & (found.t_s < truth.stands[-1][0])
+    for name, rmse, r in zip(FLEXION, *LIMITS[worn], strict=True):
+        both = [(angles[f"{name}_{e}"][moving], true[f"{name}_{e}"][:n][moving]) for e in "lr"]
+        assert np.mean([np.degrees((a - b).std()) for a, b in both]) < rmse, name
+        assert np.mean([np.corrcoef(a, b)[0, 1] for a, b in both]) > r, name
+    errors = []
+    for stride in truth.strides:
+        k = [min(round((t + 0.25) * found.rate_hz), n - 1) for t in (stride.start_s, stride.end_s)]
+        foot = found.p[FOOT[stride.side]]
+        errors.append(np.linalg.norm((foot[k[1]] - foot[k[0]])[:2]) - stride.length_m)
+    assert np.sqrt(np.mean(np.square(errors))) < 0.08
+    assert found.diagnostics["min_eigenvalue"] > 0.0  # type: ignore[operator]
+    assert max(found.diagnostics["hinge_m"].values()) < 1e-3  # type: ignore[attr-defined]
+
+
+def test_any_split_into_blocks_gives_the_same_bits() -> None:
+    calibrated, orientations, steps, _ = walk()
+    acceleration = free_acceleration(calibrated, orientations)
+    for worn in ("3I", "2I"):
+        inputs = inputs_of(orientations, acceleration, steps, MODEL, worn).part(slice(500, 1400))
+        first = start(inputs, MODEL)
+        whole, end = filter_block(first, inputs, MODEL, 100.0)
+        state, parts = first, []
+        for a, b in ((0, 1), (1, 2), (2, 300), (300, 301), (301, 900)):
+            part, state = filter_block(state, inputs.part(slice(a, b)), MODEL, 100.0)
+            parts.append(part)
+        for name in ("R", "p", "v", "variance"):
+            assert np.array_equal(getattr(whole, name), np.concatenate([getattr(x, name) for x in parts]))
+        assert np.array_equal(end.P, state.P)
+
+
+def test_a_common_turn_of_the_world_turns_the_result() -> None:
+    calibrated, orientations, steps, _ = walk()
+    acceleration = free_acceleration(calibrated, orientations)
+    turn = about(2, 1.1)
+    turned = replace(orientations, q={s: multiply(turn, q) for s, q in orientations.q.items()})
+    moved = {s: a @ to_matrix(turn).T for s, a in acceleration.items()}
+    for worn in ("3I", "2I"):
+        one = l7s_poses(orientations, acceleration, steps, BODY, worn=worn)
+        other = l7s_poses(turned, moved, steps, BODY, worn=worn)
+        for segment in one.p:
+            np.testing.assert_allclose(other.p[segment], one.p[segment] @ to_matrix(turn).T, atol=1e-6)
+
+
+def test_what_cannot_be_estimated_is_refused_with_its_name() -> None:
+    calibrated, orientations, steps, truth = walk()
+    acceleration = free_acceleration(calibrated, orientations)
+    without = replace(orientations, q={s: q for s, q in orientations.q.items() if s != "foot_l"})
+    with pytest.raises(EstimationError) as missing:
+        l7s_poses(without, acceleration, steps, truth.body)
+    assert (missing.value.code, missing.value.sensor) == ("sensor_missing", "foot_l")
+    with pytest.raises(EstimationError) as short:
+        LegModel.of(replace(BODY, shank=0.0))
+    assert short.value.code == "segment_length"
+    backwards = {**orientations.q, "foot_r": multiply(about(2, np.pi), orientations.q["foot_r"])}
+    with pytest.raises(EstimationError) as apart:
+        l7s_poses(replace(orientations, q=backwards), acceleration, steps, truth.body)
+    assert apart.value.code == "headings_apart"
+    inputs = inputs_of(orientations, acceleration, steps, MODEL, "3I").part(slice(0, 50))
+    broken = L7sInputs(inputs.R, np.full_like(inputs.acc, np.nan), inputs.step, "3I")
+    with pytest.raises(EstimationError) as bad:
+        filter_block(start(inputs, MODEL), broken, MODEL, 100.0)
+    assert bad.value.code == "bad_signal"
+    with pytest.raises(ParameterError):
+        L7sParams(acceleration=0.0)
+    with pytest.raises(ParameterError):
+        L7sParams(adjoint="wrong")  # type: ignore[arg-type]
+
+
+def test_a_foot_that_never_rests_is_told() -> None:
+    calibrated, orientations, steps, truth = walk()
+    never = {**steps, "left": np.zeros_like(steps["left"])}
+    found = l7s_poses(orientations, free_acceleration(calibrated, orientations), never, truth.body)
+    assert [n.code for n in found.notices] == ["foot_never_still"]
