@@ -85,7 +85,8 @@ def test_tables_2_and_3_are_reproduced() -> None:
         "Potter's walker with the ErKF",
         ["run", "hip FE RMS °", "IE °", "AA °", "slope °/h"],
         rows,
-        f"{STRIDES} strides at 512 Hz; mean slope of FE over three noise seeds {slopes['FE']:+.3f} °/h. Stride length error {length.mean():+.1f} ± {length.std():.1f} mm "
+        f"{STRIDES} strides at 512 Hz; mean slope of FE over three noise seeds {slopes['FE']:+.3f} °/h. "
+        f"Stride length error {length.mean():+.1f} ± {length.std():.1f} mm "
         f"(paper 10 ± 10), width {width.mean():+.1f} ± {width.std():.1f} mm (paper 0 ± 10). The unit of σ_JA "
         "in the paper's Table 1 is a misprint: with 1.15 rad rotation and adduction miss its Table 2.",
     )
