@@ -21,7 +21,7 @@ from core.body.erkf_kernel import CONTACT, INVALID, STILL, Links, Noise, Record,
 from core.body.erkf_params import ErkfParams as ErkfParams
 from core.body.still import AT_REST, FOOT_STILL, still_samples
 from core.body.tree import ImuTree
-from core.errors import EstimationError, Notice, ParameterError, SignalError
+from core.errors import EstimationError, ParameterError, SignalError
 from core.frames import Bools, Floats
 
 
@@ -106,21 +106,6 @@ class ErkfTrack:
     def q(self) -> Floats:
         """Sensor orientations (T, n, 4)."""
         return self.nominal[..., 6:10]
-
-
-@dataclass(frozen=True, eq=False)
-class ErkfResult:
-    """A whole recording.
-
-    Parameters
-    ----------
-    diagnostics : the figures of spec/estimators.md §7 (see erkf_health.py), plain values.
-    """
-
-    track: ErkfTrack
-    final: ErkfState
-    notices: tuple[Notice, ...]
-    diagnostics: dict[str, object]
 
 
 def erkf_inputs(

@@ -65,12 +65,13 @@ def take_of(made: Simulation) -> Take:
     return Take(tree, inputs, truth, recording.rate_hz)
 
 
-def angles_of(take: Take, track: ErkfTrack) -> dict[str, Floats]:
-    """Joint angles (n,) in rad by name, zeroed on the first standing."""
+def angles_of(take: Take, track: ErkfTrack, *, zeroed: bool = True) -> dict[str, Floats]:
+    """Joint angles (n,) in rad by name, zeroed on the first standing or as they are."""
     q = {s: take.tree.segment_q(track.q)[:, i] for i, s in enumerate(SEGMENTS)}
     n = len(track.q)
     posed = Orientations(take.truth.t_s[:n], take.rate_hz, q, {s: np.ones(n, bool) for s in q}, "erkf")
-    return dict(joint_angles(posed, take.truth.zero).angles)
+    found = joint_angles(posed, take.truth.zero)
+    return {n: x + (0.0 if zeroed else found.zero_offset[n]) for n, x in found.angles.items()}
 
 
 def angle_errors_deg(take: Take, track: ErkfTrack) -> dict[str, float]:
