@@ -17,7 +17,7 @@ import numpy as np
 from core.body.model import BodyModel
 from core.body.places import joint_places, sensor_place, standing_origin
 from core.errors import EstimationError, ParameterError
-from core.frames import R_NEUTRAL, Floats, Segment
+from core.frames import Floats, Segment
 from core.rotation import conjugate, from_matrix, multiply, rotate, to_matrix
 
 Preset = Literal["lower_body7", "feet_pelvis3", "feet2", "single_foot_r", "single_foot_l"]
@@ -223,7 +223,3 @@ def _check_lengths(body: BodyModel) -> None:
                 f"The body model's {name} is {length:g} m, expected between 0 and {LONGEST_M:g}; enter the "
                 "body height or measure the segment.",
             )
-
-
-NEUTRAL_Q: Final[Floats] = from_matrix(R_NEUTRAL)
-"""Orientation (4,) of every segment in neutral standing."""
