@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from core.body.health import Finding
 from core.body.model import BodyModel
 from core.errors import Notice
 from core.frames import Bools, Floats, Segment
@@ -21,6 +22,10 @@ class Poses:
         mid-hip, thigh hip centre, shank knee centre, foot ankle centre (spec/estimators.md §1).
     valid : (n,) all segments of the figure measured.
     contact : segment (feet) → (n,) True while the foot is taken to be on the floor.
+    method : "erkf_smoothed", "l7s_3i", "l7s_2i", "stance_foot_anchor", or "none" when there is no figure.
+    reduced : a stable code when a better estimator was not possible or not asked for, e.g. "sensor_failed";
+        None for the best one of the worn sensors.
+    health : the estimator's own findings.
     """
 
     t_s: Floats
@@ -31,5 +36,7 @@ class Poses:
     contact: Mapping[Segment, Bools]
     body: BodyModel
     method: str
+    reduced: str | None = None
+    health: tuple[Finding, ...] = ()
     notices: tuple[Notice, ...] = ()
     diagnostics: Mapping[str, object] = field(default_factory=dict)

@@ -1,0 +1,34 @@
+"""Where the feet go: what strides, steps, width and clearance are measured on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from core.body.model import BodyModel
+from core.frames import Bools, Floats, Side
+
+
+@dataclass(frozen=True, eq=False)
+class FootTracks:
+    """Paths of the feet on the uniform axis.
+
+    Parameters
+    ----------
+    p : side → (n, 3) ankle centre in W, m. q : side → (n, 4) foot axes to W, scalar first.
+    still : side → (n,) the foot rests on the floor (zero velocity; shorter than contact).
+    valid : side → (n,) the sensor was there.
+    linked : both feet hang on one chain of sensors, so that their places relative to each other are known;
+        False: each foot has its own origin and heading.
+    source : the estimator, "erkf_smoothed" or "erkf_feet".
+    """
+
+    t_s: Floats
+    rate_hz: float
+    p: Mapping[Side, Floats]
+    q: Mapping[Side, Floats]
+    still: Mapping[Side, Bools]
+    valid: Mapping[Side, Bools]
+    linked: bool
+    source: str
+    body: BodyModel

@@ -1,0 +1,40 @@
+"""What an estimator says about its own result: measured quantities against limits with a source."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+Verdict = Literal["good", "warn", "bad"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One measured quantity of a run.
+
+    Parameters
+    ----------
+    name : with its unit at the end, e.g. "joint_residual_mm", "zero_velocity_refused_pct".
+    of : the joint, segment or side it belongs to, None for the whole take.
+    warn, bad : limits; a value beyond is judged so. None = shown, not judged.
+    """
+
+    name: str
+    of: str | None
+    value: float
+    warn: float | None = None
+    bad: float | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """good, warn or bad."""
+        if self.bad is not None and not self.value <= self.bad:
+            return "bad"
+        return "warn" if self.warn is not None and not self.value <= self.warn else "good"
+
+
+def worst(findings: Sequence[Finding]) -> Verdict:
+    """The least favourable verdict of all."""
+    verdicts = {f.verdict for f in findings}
+    return "bad" if "bad" in verdicts else "warn" if "warn" in verdicts else "good"
