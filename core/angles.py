@@ -21,7 +21,8 @@ from core.rest import Window, samples
 from core.rotation import conjugate, from_matrix, multiply, to_matrix
 
 if TYPE_CHECKING:
-    # the package brings numba, which readers of results do without
+    # these packages bring numba, which readers of results do without
+    from core.body.poses import Poses
     from core.fusion.orientations import Orientations
 
 GIMBAL_LIMIT: Final = radians(80.0)
@@ -61,13 +62,15 @@ class JointAngles:
     diagnostics: Mapping[str, object] = field(default_factory=dict)
 
 
-def joint_angles(orientations: Orientations, zero: Window) -> JointAngles:
+def joint_angles(orientations: Orientations, zero: Window, poses: Poses | None = None) -> JointAngles:
     """Angles of every joint whose two segments are there, zeroed on the mean over the standing window.
 
     Parameters
     ----------
     orientations : segment orientations in W.
     zero : window whose mean angles are subtracted, seconds.
+    poses : of an estimator that knows more segments than have a sensor. A joint that has not both its sensors
+        takes its angles from there; `diagnostics["estimated"]` names them.
 
     Returns
     -------
@@ -75,27 +78,31 @@ def joint_angles(orientations: Orientations, zero: Window) -> JointAngles:
     passes 80° a notice `gimbal`, one without signal while standing is left out with `no_standing_zero`.
     """
     raw: dict[str, Floats] = {}
+    estimated: list[str] = []
     notices: list[Notice] = []
-    if "pelvis" in orientations.q:
-        tilt, obliquity = pelvis_angles(orientations.q["pelvis"])
-        lost = ~orientations.valid["pelvis"]
-        for name, value in (("pelvis_tilt", tilt), ("pelvis_obliquity", obliquity)):
-            raw[name] = np.where(lost, np.nan, value)
+    pelvis = _source(orientations, poses, "pelvis")
+    if pelvis is not None:
+        q, ok = pelvis
+        for name, value in zip(("pelvis_tilt", "pelvis_obliquity"), pelvis_angles(q["pelvis"]), strict=True):
+            raw[name] = np.where(ok, value, np.nan)
+            estimated += [name] if q is not orientations.q else []
     for side in SIDES:
         for joint, proximal, distal in joints(side):
-            missing = [s for s in (proximal, distal) if s not in orientations.q]
-            if missing:
+            source = _source(orientations, poses, proximal, distal)
+            if source is None:
+                missing = [s for s in (proximal, distal) if s not in orientations.q]
                 message = (
                     f"{side} {joint}: no angles, no sensor on {' and '.join(missing)}; wear or map one there."
                 )
                 notices.append(Notice("joint_missing", message, sensor=missing[0]))
                 continue
-            ok = orientations.valid[proximal] & orientations.valid[distal]
-            abc = cardan_zxy(multiply(conjugate(orientations.q[proximal]), orientations.q[distal]))
+            q, ok = source
+            abc = cardan_zxy(multiply(conjugate(q[proximal]), q[distal]))
             notices += _gimbal(abc[:, 1], ok, side, joint, orientations.t_s)
-            for (name, right, left), value in zip(SIGNS[joint], abc.T, strict=True):
-                sign = right if side == "right" else left
-                raw[f"{name}_{SUFFIX[side]}"] = np.where(ok, sign * value, np.nan)
+            for (base, right, left), value in zip(SIGNS[joint], abc.T, strict=True):
+                name = f"{base}_{SUFFIX[side]}"
+                raw[name] = np.where(ok, (right if side == "right" else left) * value, np.nan)
+                estimated += [name] if q is not orientations.q else []
     part = samples(zero, orientations.rate_hz)
     standing = {name for name, value in raw.items() if np.isfinite(value[part]).any()}
     for name in sorted(raw.keys() - standing):
@@ -107,7 +114,24 @@ def joint_angles(orientations: Orientations, zero: Window) -> JointAngles:
         notices.append(Notice("no_standing_zero", message, t_s=zero[0]))
     offset = {name: _circular_mean(raw[name][part]) for name in raw if name in standing}
     angles = {name: _wrap(raw[name] - zero_angle) for name, zero_angle in offset.items()}
-    return JointAngles(orientations.t_s, angles, offset, notices=tuple(notices))
+    return JointAngles(
+        orientations.t_s,
+        angles,
+        offset,
+        notices=tuple(notices),
+        diagnostics={"estimated": tuple(name for name in estimated if name in angles)},
+    )
+
+
+def _source(
+    orientations: Orientations, poses: Poses | None, *segments: Segment
+) -> tuple[Mapping[Segment, Floats], Bools] | None:
+    """Where these segments are known together, sensors first: their orientations, and when valid."""
+    if all(s in orientations.q for s in segments):
+        return orientations.q, np.logical_and.reduce([orientations.valid[s] for s in segments])
+    if poses is not None and all(s in poses.q for s in segments):
+        return poses.q, poses.valid
+    return None
 
 
 def joints(side: Side) -> tuple[tuple[str, Segment, Segment], ...]:

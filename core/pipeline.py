@@ -15,6 +15,8 @@ from typing import Final
 
 from core import angles, body, calibration, events, fusion, parameters, quality, timeline
 from core.angles import JointAngles
+from core.body.estimate import PoseParams, estimate_poses
+from core.body.feet import FootTracks
 from core.body.poses import Poses
 from core.calibration import CalibrationParams
 from core.calibration.result import Calibration
@@ -37,13 +39,13 @@ Progress = Callable[[str, float], None]
 
 STAGES: Final[tuple[tuple[str, float], ...]] = (
     ("timeline", 0.0),
-    ("quality", 0.15),
-    ("calibration", 0.25),
-    ("orientation", 0.5),
-    ("events", 0.65),
-    ("poses", 0.7),
-    ("angles", 0.8),
-    ("parameters", 0.9),
+    ("quality", 0.03),
+    ("calibration", 0.05),
+    ("orientation", 0.1),
+    ("events", 0.14),
+    ("poses", 0.15),
+    ("angles", 0.95),
+    ("parameters", 0.98),
 )
 """Stage names in order and the share of a typical run that lies before each."""
 
@@ -57,6 +59,7 @@ class PipelineConfig:
     fusion: MahonyParams = field(default_factory=MahonyParams)
     events: FootPitchParams = field(default_factory=FootPitchParams)
     strides: StrideParams = field(default_factory=StrideParams)
+    poses: PoseParams = field(default_factory=PoseParams)
 
     @property
     def digest(self) -> str:
@@ -72,6 +75,8 @@ class Analysis:
     Parameters
     ----------
     problem : the error that stopped the chain, None when every stage ran.
+    orientations : as the angles take them: refined where the pose estimator does so.
+    feet : paths of the feet that distances are measured on; None without a foot sensor.
     notices : all notices of all stages in order of the chain.
     provenance : input sha256 by file, digest of the parameters, version of the code.
     """
@@ -83,6 +88,7 @@ class Analysis:
     events: GaitEvents | None
     strides: Strides | None
     poses: Poses | None
+    feet: FootTracks | None
     angles: JointAngles | None
     parameters: tuple[Parameter, ...]
     problem: Notice | None
@@ -157,12 +163,13 @@ def _run_stages(
         for side in SIDES
     }
     reached["body"] = assumed
-    reached["poses"] = body.forward_kinematics(orientations, lengths, contacts)
+    posed = estimate_poses(calibrated, orientations, contacts, lengths, config.poses)
+    reached |= {"poses": posed.poses, "orientations": posed.orientations, "feet": posed.feet}
     start("angles")
-    joint = angles.joint_angles(orientations, calibrated.calibration.zero)
+    joint = angles.joint_angles(posed.orientations, calibrated.calibration.zero, posed.poses)
     reached["angles"] = joint
     start("parameters")
-    reached["parameters"] = parameters.gait_parameters(strides, joint, orientations)
+    reached["parameters"] = parameters.gait_parameters(strides, joint, posed.orientations)
 
 
 def _bundle(
@@ -185,7 +192,7 @@ def _bundle(
         quality=report,
         **{
             name: reached.get(name)  # type: ignore[arg-type]
-            for name in ("calibration", "orientations", "events", "strides", "poses", "angles")
+            for name in ("calibration", "orientations", "events", "strides", "poses", "feet", "angles")
         },
         parameters=reached.get("parameters", ()),  # type: ignore[arg-type]
         problem=problem,

@@ -77,7 +77,7 @@ def forward_kinematics(
     params = params or AnchorParams()
     n = len(orientations.t_s)
     legs = [s for s in SIDES if all(x in orientations.q for x in (THIGH[s], SHANK[s], FOOT[s]))]
-    notices = _incomplete(orientations, legs)
+    notices = incomplete_legs(orientations, legs)
     if "pelvis" not in orientations.q or not legs:
         return Poses(
             orientations.t_s,
@@ -166,7 +166,8 @@ def _somebody_carries(carrying: Mapping[Side, Bools]) -> dict[Side, Bools]:
     return {s: c | nobody for s, c in carrying.items()}
 
 
-def _incomplete(orientations: Orientations, legs: list[Side]) -> tuple[Notice, ...]:
+def incomplete_legs(orientations: Orientations, legs: list[Side]) -> tuple[Notice, ...]:
+    """Notices `figure_incomplete` for what a figure of these legs leaves out of the worn sensors."""
     notices = []
     if "pelvis" not in orientations.q:
         message = "No figure: without a pelvis sensor the legs have nothing to hang on; wear one there."

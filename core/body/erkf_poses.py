@@ -1,0 +1,151 @@
+"""A calibrated take through the ErKF and its smoother: orientations, figure and paths of the feet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+
+from core.body.corrected import corrected_signals
+from core.body.erkf import ErkfInputs, ErkfParams, ErkfState, ErkfTrack, erkf_inputs
+from core.body.erkf_start import start_state
+from core.body.feet import FootTracks
+from core.body.kinematics import incomplete_legs
+from core.body.model import BodyModel
+from core.body.poses import Poses
+from core.body.smoother import smooth
+from core.body.tree import ImuTree, person_tree
+from core.calibration.result import CalibratedRecording
+from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from core.fusion.orientations import Orientations
+from core.rotation import from_matrix, multiply
+
+NEAR_START_S = 1.0
+"""Rest that begins so early is a standing start."""
+
+
+@dataclass(frozen=True, eq=False)
+class ErkfRun:
+    """One smoothed run. rest : samples of the standing start, None = the take starts mid-walk."""
+
+    tree: ImuTree
+    inputs: ErkfInputs
+    start: ErkfState
+    rest: tuple[int, int] | None
+    track: ErkfTrack
+    final: ErkfState
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """Segments in the tree's order."""
+        return cast("tuple[Segment, ...]", self.tree.imus)
+
+
+def run_erkf(
+    calibrated: CalibratedRecording,
+    orientations: Orientations,
+    body: BodyModel,
+    segments: Sequence[Segment],
+    params: ErkfParams,
+) -> ErkfRun:
+    """Filter and smooth a take with the sensors of some segments; neighbours are joined, others run beside.
+
+    Raises
+    ------
+    EstimationError of `person_tree` and `smooth`.
+    """
+    mounts = {s: calibrated.calibration.segments[s].R_segment_sensor for s in segments}
+    tree = person_tree(body, mounts, segments)
+    acc, gyr, valid = corrected_signals(calibrated, segments)
+    rate = calibrated.recording.rate_hz
+    inputs = erkf_inputs(tree, acc, gyr, valid, rate)
+    first = np.stack([multiply(orientations.q[s][0], from_matrix(mounts[s])) for s in segments])
+    rest = next(
+        (
+            (round(a * rate), round(b * rate))
+            for a, b in calibrated.calibration.rest
+            if a <= NEAR_START_S and b - a >= NEAR_START_S
+        ),
+        None,
+    )
+    start = start_state(tree, inputs, params, rest, q=first)
+    track, final = smooth(start, inputs, tree, params)
+    return ErkfRun(tree, inputs, start, rest, track, final)
+
+
+def refined(run: ErkfRun, orientations: Orientations) -> Orientations:
+    """The given orientations with those of the run's segments in their place."""
+    q = run.tree.segment_q(run.track.q)
+    found = {s: np.ascontiguousarray(q[:, i]) for i, s in enumerate(run.segments)}
+    return replace(orientations, q={**orientations.q, **found}, engine="erkf_smoothed")
+
+
+def figure(
+    run: ErkfRun, orientations: Orientations, contacts: Mapping[Side, Bools], body: BodyModel
+) -> Poses:
+    """The pelvis and every whole leg where they are in the room.
+
+    Heights are levelled: between the times at which a foot rests, what its ankle is above or below its height
+    over the floor is taken off, so that a flat floor stays at z = 0; of stairs this figure knows nothing.
+
+    Parameters
+    ----------
+    orientations : refined by this run.
+    """
+    legs = [s for s in SIDES if {THIGH[s], SHANK[s], FOOT[s]} <= set(run.segments)]
+    shown: list[Segment] = ["pelvis", *(x for s in legs for x in (THIGH[s], SHANK[s], FOOT[s]))]
+    origin = run.tree.segment_origin(run.track.p, run.track.q)
+    place = {s: origin[:, run.segments.index(s)] for s in shown}
+    still = {s: run.inputs.contact[:, run.segments.index(FOOT[s])] for s in legs}
+    floor = _floor({s: place[FOOT[s]][:, 2] - body.ankle_height for s in legs}, still)
+    lift = np.stack((np.zeros_like(floor), np.zeros_like(floor), floor), axis=1)
+    return Poses(
+        t_s=orientations.t_s,
+        rate_hz=orientations.rate_hz,
+        q={s: orientations.q[s] for s in shown},
+        p={s: place[s] - lift for s in shown},
+        valid=np.logical_and.reduce([orientations.valid[s] for s in shown]),
+        contact={FOOT[s]: contacts.get(s, still[s]) for s in legs},
+        body=body,
+        method="erkf_smoothed",
+        notices=incomplete_legs(orientations, legs),
+    )
+
+
+def foot_tracks(run: ErkfRun, orientations: Orientations, body: BodyModel) -> FootTracks:
+    """Paths of the run's feet; linked when both hang on the same pelvis.
+
+    Parameters
+    ----------
+    orientations : refined by this run.
+    """
+    origin = run.tree.segment_origin(run.track.p, run.track.q)
+    at: dict[Side, int] = {s: run.segments.index(FOOT[s]) for s in SIDES if FOOT[s] in run.segments}
+    linked = len(at) == 2 and not ({FOOT[s] for s in at} & {run.segments[i] for i in run.tree.roots()})
+    return FootTracks(
+        t_s=orientations.t_s,
+        rate_hz=orientations.rate_hz,
+        p={s: np.ascontiguousarray(origin[:, i]) for s, i in at.items()},
+        q={s: orientations.q[FOOT[s]] for s in at},
+        still={s: run.inputs.contact[:, i] for s, i in at.items()},
+        valid={s: orientations.valid[FOOT[s]] for s in at},
+        linked=linked,
+        source="erkf_smoothed" if linked else "erkf_feet",
+        body=body,
+    )
+
+
+def _floor(above: Mapping[Side, Floats], still: Mapping[Side, Bools]) -> Floats:
+    """Height (n,) of the floor as the run sees it: the feet's where they rest, linear between."""
+    n = len(next(iter(above.values())))
+    seen = np.zeros(n)
+    count = np.zeros(n)
+    for side, height in above.items():
+        seen += np.where(still[side], height, 0.0)
+        count += still[side]
+    index = np.flatnonzero(count)
+    if not len(index):
+        return np.zeros(n)
+    return np.interp(np.arange(n), index, seen[index] / count[index])

@@ -1,0 +1,179 @@
+"""Orientations → Poses by the best estimator that the worn sensors allow, and the paths of the feet.
+
+Seven sensors: ErKF with smoother (Potter 2021). Pelvis and feet, or feet alone: L7S (Sy 2021) for the figure,
+and an unlinked ErKF for each foot, because stride lengths are never taken from L7S (spec/real-data.md §0.7).
+What is asked of a take with a failed sensor is in choice.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from core.body.choice import Estimator, Requested, choose
+from core.body.corrected import corrected_signals
+from core.body.erkf import ErkfParams, erkf_inputs
+from core.body.erkf_poses import figure, foot_tracks, refined, run_erkf
+from core.body.erkf_start import start_state
+from core.body.feet import FootTracks
+from core.body.kinematics import forward_kinematics
+from core.body.l7s import free_acceleration, l7s_poses
+from core.body.l7s_filter import L7sParams
+from core.body.model import NOMINAL_HEIGHT_M, BodyModel
+from core.body.poses import Poses
+from core.body.smoother import smooth
+from core.body.still import FOOT_STILL, still_samples
+from core.body.tree import person_tree
+from core.calibration.result import CalibratedRecording
+from core.errors import EstimationError, Notice
+from core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
+from core.fusion.orientations import Orientations
+
+
+@dataclass(frozen=True)
+class PoseParams:
+    """Parameters of `estimate_poses`.
+
+    Parameters
+    ----------
+    estimator : "auto" picks by what is worn.
+    least_valid : share of the take a sensor must be there for (our choice).
+    """
+
+    estimator: Requested = "auto"
+    erkf: ErkfParams = field(default_factory=ErkfParams.offline)
+    l7s: L7sParams = field(default_factory=L7sParams)
+    least_valid: float = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class PoseEstimate:
+    """What the stage gives.
+
+    Parameters
+    ----------
+    orientations : of the segments with a working sensor, refined where the ErKF ran: what angles are of.
+    poses : the figure. feet : None when no foot sensor works.
+    """
+
+    orientations: Orientations
+    poses: Poses
+    feet: FootTracks | None
+
+
+def estimate_poses(
+    calibrated: CalibratedRecording,
+    orientations: Orientations,
+    contacts: Mapping[Side, Bools],
+    body: BodyModel,
+    params: PoseParams | None = None,
+) -> PoseEstimate:
+    """Estimate the poses of a take.
+
+    Parameters
+    ----------
+    contacts : side → (n,) foot on the floor, from the events.
+
+    Raises
+    ------
+    EstimationError `estimator_impossible` when the one asked for cannot run on these sensors; its own errors
+    when it was asked for by name. Unasked, an estimator that fails gives way to the next possible one, with a
+    notice `estimator_failed`.
+    """
+    params = params or PoseParams()
+    choice = choose(calibrated, orientations, params.estimator, params.least_valid)
+    take = _Take(calibrated, _without(orientations, choice.failed), contacts, body, params)
+    order = choice.possible if params.estimator == "auto" else (params.estimator,)
+    notices, reduced = list(choice.notices), choice.reduced
+    made = None
+    for estimator in order:
+        try:
+            made = take.run(estimator, choice.segments)
+            break
+        except EstimationError as error:
+            if estimator == order[-1]:
+                raise
+            message = f"{estimator} cannot estimate this take, the next one is used. {error.message}"
+            notices.append(Notice("estimator_failed", message, error.sensor, error.t_s))
+            reduced = "estimator_failed"
+    if made is None:
+        poses = forward_kinematics(take.orientations, body, contacts)
+        made = PoseEstimate(take.orientations, poses, take.lone_feet(choice.segments))
+    poses = replace(
+        made.poses,
+        reduced=reduced,
+        notices=(*notices, *made.poses.notices),
+        diagnostics={
+            **made.poses.diagnostics,
+            "requested": params.estimator,
+            "sensors": choice.segments,
+            "possible": choice.possible,
+        },
+    )
+    return replace(made, poses=poses)
+
+
+@dataclass(frozen=True, eq=False)
+class _Take:
+    """The arguments of `estimate_poses`, the failed sensors taken out of the orientations."""
+
+    calibrated: CalibratedRecording
+    orientations: Orientations
+    contacts: Mapping[Side, Bools]
+    body: BodyModel
+    params: PoseParams
+
+    def run(self, estimator: Estimator, segments: tuple[Segment, ...]) -> PoseEstimate:
+        if estimator == "erkf":
+            run = run_erkf(self.calibrated, self.orientations, self.body, segments, self.params.erkf)
+            orientations = refined(run, self.orientations)
+            poses = figure(run, orientations, self.contacts, self.body)
+            return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body))
+        if estimator == "stance_foot_anchor":
+            poses = forward_kinematics(self.orientations, self.body, self.contacts)
+        else:
+            poses = l7s_poses(
+                self.orientations,
+                free_acceleration(self.calibrated, self.orientations),
+                self.steps(),
+                self.body,
+                self.params.l7s,
+                "3I" if estimator == "l7s_3i" else "2I",
+            )
+        return PoseEstimate(self.orientations, poses, self.lone_feet(segments))
+
+    def steps(self) -> dict[Side, Bools]:
+        """When each foot is still."""
+        found: dict[Side, Bools] = {}
+        for side in SIDES:
+            acc, gyr, valid = corrected_signals(self.calibrated, (FOOT[side],))
+            rate = self.calibrated.recording.rate_hz
+            found[side] = still_samples(acc[:, 0], gyr[:, 0], valid[:, 0], rate, FOOT_STILL)
+        return found
+
+    def lone_feet(self, segments: tuple[Segment, ...]) -> FootTracks | None:
+        """Each foot by an ErKF of its own; None without a foot."""
+        feet = tuple(FOOT[s] for s in SIDES if FOOT[s] in segments)
+        if not feet:
+            return None
+        run = run_erkf(self.calibrated, self.orientations, self.body, feet, self.params.erkf)
+        return foot_tracks(run, refined(run, self.orientations), self.body)
+
+
+def _without(orientations: Orientations, failed: Collection[Segment]) -> Orientations:
+    kept = [s for s in orientations.q if s not in failed]
+    return replace(
+        orientations,
+        q={s: orientations.q[s] for s in kept},
+        valid={s: orientations.valid[s] for s in kept},
+    )
+
+
+def warm() -> None:
+    """Compile the filter's kernels or load them, so that the first take does not wait for it."""
+    tree = person_tree(BodyModel.from_height(NOMINAL_HEIGHT_M), {"foot_r": np.eye(3)}, ("foot_r",))
+    acc, gyr = np.tile([0.0, GRAVITY, 0.0], (2, 1, 1)), np.zeros((2, 1, 3))
+    inputs = erkf_inputs(tree, acc, gyr, np.ones((2, 1), bool), 100.0)
+    smooth(start_state(tree, inputs, ErkfParams()), inputs, tree, ErkfParams())
