@@ -99,8 +99,14 @@ def estimate_poses(
             notices.append(Notice("estimator_failed", message, error.sensor, error.t_s))
             reduced = "estimator_failed"
     if made is None:
-        poses = forward_kinematics(take.orientations, body, contacts)
-        made = PoseEstimate(take.orientations, poses, take.lone_feet(choice.segments))
+        # no figure; the notices of what is missing are still wanted
+        made = take.anchored()
+    if made.feet is None:
+        try:
+            made = replace(made, feet=take.lone_feet(choice.segments))
+        except EstimationError as error:
+            message = f"The paths of the feet cannot be estimated, so there are no distances. {error.message}"
+            notices.append(Notice("foot_paths_failed", message, error.sensor, error.t_s))
     poses = replace(
         made.poses,
         reduced=reduced,
@@ -132,17 +138,22 @@ class _Take:
             poses = figure(run, orientations, self.contacts, self.body)
             return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body))
         if estimator == "stance_foot_anchor":
-            poses = forward_kinematics(self.orientations, self.body, self.contacts)
-        else:
-            poses = l7s_poses(
-                self.orientations,
-                free_acceleration(self.calibrated, self.orientations),
-                self.steps(),
-                self.body,
-                self.params.l7s,
-                "3I" if estimator == "l7s_3i" else "2I",
-            )
-        return PoseEstimate(self.orientations, poses, self.lone_feet(segments))
+            return self.anchored()
+        poses = l7s_poses(
+            self.orientations,
+            free_acceleration(self.calibrated, self.orientations),
+            self.steps(),
+            self.body,
+            self.params.l7s,
+            "3I" if estimator == "l7s_3i" else "2I",
+        )
+        return PoseEstimate(self.orientations, poses, None)
+
+    def anchored(self) -> PoseEstimate:
+        """Orientations as they are, a figure by forward kinematics."""
+        return PoseEstimate(
+            self.orientations, forward_kinematics(self.orientations, self.body, self.contacts), None
+        )
 
     def steps(self) -> dict[Side, Bools]:
         """When each foot is still."""

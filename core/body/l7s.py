@@ -94,17 +94,18 @@ def l7s_poses(
 
 
 def free_acceleration(calibrated: CalibratedRecording, orientations: Orientations) -> dict[Segment, Floats]:
-    """Accelerations (n, 3) of the sensors in W without gravity, m/s²; zero while a sensor is lost.
+    """Accelerations (n, 3) of the sensors with an orientation, in W without gravity, m/s²; zero while lost.
 
     What the accelerometer's norm at rest differs from G is taken off as a bias along the segment's axis that
     is vertical at rest, not as a scale (spec/real-data.md §0.8).
     """
     found: dict[Segment, Floats] = {}
-    for segment, mounted in calibrated.calibration.segments.items():
+    for segment, q in orientations.q.items():
+        mounted = calibrated.calibration.segments[segment]
         signals = calibrated.recording.sensors[segment]
         force = signals.acc @ mounted.R_segment_sensor.T
         force[:, 1] -= mounted.rest_norm - GRAVITY
-        world = rotate(orientations.q[segment], force)
+        world = rotate(q, force)
         world[:, 2] -= GRAVITY
         found[segment] = np.where(signals.valid[:, None], world, 0.0)
     return found

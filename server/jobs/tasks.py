@@ -46,10 +46,12 @@ def _warm() -> None:
     """Import readers and pipeline, compile the kernels or load them from the cache."""
     import server.report.exports  # noqa: F401
     from core import attitude
+    from core.body import estimate
     from core.events import foot_pitch
 
     attitude.warm()
     foot_pitch.warm()
+    estimate.warm()
 
 
 register(Task(recordings.INSPECT, _inspect, _publish_inspection, keeps_files=False))

@@ -1,0 +1,198 @@
+"""Which estimator a take gets, what is done when a sensor failed, and what comes out of each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from core import calibration, events, fusion
+from core.angles import joint_angles
+from core.body import contact_mask, nominal_body
+from core.body.choice import possible
+from core.body.estimate import PoseEstimate, PoseParams, estimate_poses
+from core.body.tree import PRESETS
+from core.errors import EstimationError
+from core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
+from core.recording import UniformRecording
+from core.simulate import Truth
+from tests.walks import only, simulated
+
+WHOLE = PRESETS["lower_body7"]
+PELVIS_FEET = PRESETS["feet_pelvis3"]
+FEET = PRESETS["feet2"]
+
+
+def estimated(take: UniformRecording, params: PoseParams | None = None) -> PoseEstimate:
+    calibrated = calibration.calibrate(take)
+    orientations = fusion.estimate(calibrated)
+    found = events.detect(orientations)
+    contacts = {s: contact_mask(take.t_s, found.times(s, "ic"), found.times(s, "tc")) for s in SIDES}
+    body, _ = nominal_body(take.subject.height_m)
+    return estimate_poses(calibrated, orientations, contacts, body, params)
+
+
+@cache
+def walk(*worn: Segment) -> PoseEstimate:
+    return estimated(only(simulated("fast_with_turns", 3)[0], *(worn or WHOLE)))
+
+
+def truth() -> Truth:
+    return simulated("fast_with_turns", 3)[1]
+
+
+def failing(take: UniformRecording, segment: Segment, from_s: float) -> UniformRecording:
+    """The take with one sensor that stops at a time."""
+    was = take.sensors[segment]
+    valid = was.valid & (take.t_s < from_s)
+    return replace(take, sensors={**take.sensors, segment: replace(was, valid=valid)})
+
+
+@pytest.mark.parametrize(
+    ("worn", "first"),
+    [
+        (WHOLE, "erkf"),
+        (PELVIS_FEET, "l7s_3i"),
+        (FEET, "l7s_2i"),
+        (set(WHOLE) - {"thigh_l"}, "l7s_3i"),
+        (set(WHOLE) - {"pelvis"}, "l7s_2i"),
+        (set(WHOLE) - {"foot_l"}, "erkf"),
+        (("pelvis", "thigh_r", "shank_r", "foot_r"), "erkf"),
+        (("foot_l",), None),
+        ((), None),
+    ],
+)
+def test_what_is_worn_decides(worn: set[Segment], first: str | None) -> None:
+    assert (possible(worn) or (None,))[0] == first
+
+
+def test_seven_sensors_walk_through_the_room_as_the_person_did() -> None:
+    made = walk()
+    assert made.poses.method == "erkf_smoothed"
+    assert made.poses.reduced is None
+    assert made.orientations.engine == "erkf_smoothed"
+    n = min(len(made.poses.t_s), len(truth().t_s))
+    path, true = made.poses.p["pelvis"][:n, :2], truth().p["pelvis"][:n, :2]
+    # a common heading is free: the two paths are laid on each other before they are compared
+    apart = _after_turning(path - path[0], true - true[0])
+    assert np.abs(apart).max() < 0.6
+    assert np.linalg.norm(np.diff(path, axis=0), axis=1).sum() == pytest.approx(
+        np.linalg.norm(np.diff(true, axis=0), axis=1).sum(), rel=0.02
+    )
+
+
+def test_the_floor_stays_at_zero_and_segments_hang_together() -> None:
+    poses = walk().poses
+    for side in SIDES:
+        still = walk().feet.still[side]  # type: ignore[union-attr]
+        height = poses.p[FOOT[side]][still, 2] - poses.body.ankle_height
+        assert np.abs(height).max() < 0.03
+    knee = poses.p["thigh_r"] + _down(poses.q["thigh_r"], poses.body.thigh)
+    assert np.sqrt(np.mean(np.sum((knee - poses.p["shank_r"]) ** 2, axis=1))) < 0.01
+
+
+def test_feet_are_linked_only_by_a_whole_chain() -> None:
+    assert walk().feet is not None
+    assert walk().feet.linked  # type: ignore[union-attr]
+    for worn in (PELVIS_FEET, FEET):
+        feet = walk(*worn).feet
+        assert feet is not None
+        assert not feet.linked
+        assert feet.source == "erkf_feet"
+    one = walk("foot_l").feet
+    assert one is not None
+    assert set(one.p) == {"left"}
+    assert walk("pelvis", "thigh_r", "shank_r").feet is None
+
+
+@pytest.mark.parametrize(("worn", "method"), [(PELVIS_FEET, "l7s_3i"), (FEET, "l7s_2i")])
+def test_few_sensors_give_a_figure_and_all_angles_named_as_estimated(
+    worn: tuple[Segment, ...], method: str
+) -> None:
+    made = walk(*worn)
+    assert made.poses.method == method
+    assert set(made.poses.q) == set(WHOLE)
+    zero = calibration.calibrate(only(simulated("fast_with_turns", 3)[0], *worn)).calibration.zero
+    angles = joint_angles(made.orientations, zero, made.poses)
+    assert len(angles.angles) == 20
+    estimated_names = set(angles.diagnostics["estimated"])  # type: ignore[call-overload]
+    assert {n for n in angles.angles if not n.startswith("pelvis")} <= estimated_names
+    assert ("pelvis_tilt" in estimated_names) == (method == "l7s_2i")
+
+
+def test_a_failed_thigh_leaves_the_other_leg_as_measured_and_estimates_the_rest() -> None:
+    take = failing(simulated("fast_with_turns", 3)[0], "thigh_l", 15.0)
+    made = estimated(take)
+    assert made.poses.method == "l7s_3i"
+    assert made.poses.reduced == "sensor_failed"
+    (told,) = [n for n in made.poses.notices if n.code == "sensor_failed"]
+    assert told.sensor == "thigh_l"
+    assert "50%" in told.message
+    zero = calibration.calibrate(take).calibration.zero
+    angles = joint_angles(made.orientations, zero, made.poses)
+    names = {n.rpartition("_") for n in angles.diagnostics["estimated"]}  # type: ignore[attr-defined]
+    assert {(base.split("_")[0], side) for base, _, side in names} == {("hip", "l"), ("knee", "l")}
+
+
+def test_a_failed_foot_leaves_one_leg_with_the_pelvis() -> None:
+    made = estimated(failing(simulated("fast_with_turns", 3)[0], "foot_l", 15.0))
+    assert made.poses.method == "erkf_smoothed"
+    assert set(made.poses.q) == {"pelvis", "thigh_r", "shank_r", "foot_r"}
+    assert made.feet is not None
+    assert set(made.feet.p) == {"right"}
+    assert {n.code for n in made.poses.notices} >= {"sensor_failed", "figure_incomplete"}
+
+
+def test_a_short_loss_is_no_failure() -> None:
+    take = simulated("lost_sensor", 41)[0]
+    made = estimated(take)
+    assert made.poses.method == "erkf_smoothed"
+    assert made.poses.reduced is None
+
+
+def test_another_estimator_runs_on_the_same_take() -> None:
+    take = simulated("fast_with_turns", 3)[0]
+    for name, method in (("l7s_3i", "l7s_3i"), ("stance_foot_anchor", "stance_foot_anchor")):
+        made = estimated(take, PoseParams(estimator=name))  # type: ignore[arg-type]
+        assert made.poses.method == method
+        assert made.poses.diagnostics["requested"] == name
+        assert made.feet is not None
+
+
+def test_an_estimator_that_lacks_its_sensors_says_which_it_needs() -> None:
+    with pytest.raises(EstimationError, match="needs sensors on the pelvis and both feet") as caught:
+        estimated(only(simulated("fast_with_turns", 3)[0], *FEET), PoseParams(estimator="l7s_3i"))
+    assert caught.value.code == "estimator_impossible"
+
+
+def test_an_unasked_estimator_that_fails_gives_way_to_the_next() -> None:
+    take = simulated("fast_with_turns", 3)[0]
+    body, _ = nominal_body(None)
+    calibrated = calibration.calibrate(take)
+    orientations = fusion.estimate(calibrated)
+    broken = replace(body, thigh=-0.4)
+    made = estimate_poses(calibrated, orientations, {}, broken)
+    assert made.poses.reduced == "estimator_failed"
+    assert [n.code for n in made.poses.notices].count("estimator_failed") >= 1
+    assert "thigh" in made.poses.notices[0].message
+    assert made.feet is None
+    assert "foot_paths_failed" in {n.code for n in made.poses.notices}
+
+
+def test_segment_names_are_known() -> None:
+    assert set(WHOLE) <= set(SEGMENTS)
+
+
+def _down(q: Floats, length: float) -> Floats:
+    from core.rotation import rotate
+
+    return rotate(q, np.array([0.0, -length, 0.0]))
+
+
+def _after_turning(path: Floats, true: Floats) -> Floats:
+    """Difference of two paths in the plane (n, 2) after the best common turn."""
+    a, b = path[:, 0] + 1j * path[:, 1], true[:, 0] + 1j * true[:, 1]
+    turn = np.vdot(a, b)
+    return np.asarray(np.abs(a * turn / abs(turn) - b))
