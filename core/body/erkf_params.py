@@ -43,7 +43,7 @@ class ErkfParams:
     gap_acc_sd, gap_gyr_sd : in place of acc_sd and gyr_sd while an IMU is lost.
     start_* : of the first sample; `start_heading_sd` about the vertical, must cover the first headings'
         errors.
-    moving_* : the same where a recording starts mid-walk.
+    moving_* : the same where a recording starts mid-walk; the bias where it has no rest at all.
     """
 
     states: Literal[9, 15] = 15

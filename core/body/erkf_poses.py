@@ -70,7 +70,8 @@ def run_erkf(
         ),
         None,
     )
-    start = start_state(tree, inputs, params, rest, q=first)
+    # without a standing start the biases still come from the calibration's rest, wherever that is
+    start = start_state(tree, inputs, params, rest, q=first, bias_age_s=calibrated.calibration.zero[0])
     track, final = smooth(start, inputs, tree, params)
     return ErkfRun(tree, inputs, start, rest, track, final)
 

@@ -1,4 +1,4 @@
-"""The first state of the ErKF: from standing, or mid-walk with wide uncertainty.
+"""The first state of the ErKF: from standing, or mid-walk with wide uncertainty of tilt and velocity.
 
 Tilt comes from the mean specific force; heading from the convention that all segments face +x at the start
 (a common heading, free gauge); positions from the tree with the ankles at their height over the floor, so
@@ -24,16 +24,20 @@ def start_state(
     params: ErkfParams,
     rest: tuple[int, int] | None = None,
     q: Floats | None = None,
+    bias_age_s: float | None = None,
 ) -> ErkfState:
     """State at the first sample, before any correction.
 
     Parameters
     ----------
     rest : samples start … stop − 1 at which everybody stands still, beginning close to the first sample; None
-        for a recording that starts mid-walk: tilt, velocity and gyroscope biases are then taken as widely
-        unknown.
+        for a recording that starts mid-walk: tilt and velocity are then taken as widely unknown.
     q : (n, 4) sensor orientations at the first sample from elsewhere (an orientation filter); else from
         gravity.
+    bias_age_s : for a start mid-walk, time to the rest, elsewhere in the take, whose mean rate was taken off
+        as gyroscope bias: the bias has walked since, no more. None when there was no rest at all: biases are
+        widely unknown, and one foot alone then takes errors of scale and impact for them (30 mm per stride on
+        a real walk whose only rest is at its end).
     """
     n, m = len(tree.imus), params.states
     standing = rest is not None
@@ -47,7 +51,10 @@ def start_state(
     nominal[:, 6:10] = q
     tilt = params.start_tilt_sd if standing else params.moving_tilt_sd
     velocity = params.start_velocity_sd if standing else params.moving_velocity_sd
-    bias = params.start_gyr_bias_sd if standing else params.moving_gyr_bias_sd
+    age_s = 0.0 if standing else bias_age_s
+    bias = params.moving_gyr_bias_sd
+    if age_s is not None:
+        bias = float(np.hypot(params.start_gyr_bias_sd, params.gyr_walk * np.sqrt(age_s)))
     P = np.zeros((n * m, n * m))
     up = to_matrix(q)[:, 2, :]
     for i in range(n):
