@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import degrees
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from core.body.erkf import ErkfInputs, ErkfParams
 from core.body.erkf_start import chain_positions, start_state
 from core.body.smoother import smooth
-from core.body.tree import ImuTree
+from core.body.tree import PRESETS, ImuTree
 from core.frames import Floats
 from core.rotation import multiply, rotate
 from tests.core.body.erkf_walks import SEGMENTS, Take, mixed_walk
@@ -44,7 +45,7 @@ def test_a_standing_start_knows_tilt_velocity_and_bias() -> None:
 
 
 def test_a_bias_seen_at_a_later_rest_has_only_walked_since() -> None:
-    """hypot(0.05 °/s, 5e-5 rad/s/√s √t): 0.053 °/s after 38 s, 0.09 after 10 min, never the 0.5 of no rest."""
+    """hypot(0.05 °/s, 5e-5 rad/s/√s √t): 0.053 °/s after 38 s, 0.09 after 10 min, not the 0.5 of no rest."""
     take = mixed_walk()
     after_s = {s: start_state(take.tree, take.inputs, OFFLINE, bias_age_s=s) for s in (0.0, 38.0, 600.0)}
     assert np.allclose([bias_sd_deg(x.P) for x in after_s.values()], [0.05, 0.0530, 0.0861], atol=2e-4)
@@ -71,7 +72,7 @@ def test_joint_centres_coincide_and_the_lower_foot_is_at_ankle_height() -> None:
             p[i] + rotate(q[i], r)
             for i, r in ((joint.proximal, joint.r_proximal), (joint.distal, joint.r_distal))
         ]
-        np.testing.assert_allclose(*ends, atol=1e-12)
+        np.testing.assert_allclose(ends[0], ends[1], atol=1e-12)
     ankles = take.tree.segment_origin(p, q)[FEET, 2]
     assert np.isclose(ankles.min(), take.tree.origin[FEET[0], 2])
 
@@ -83,12 +84,12 @@ def test_two_feet_from_mid_walk_to_a_standing_end_keep_their_strides() -> None:
     track, _ = smooth(start_state(tree, inputs, OFFLINE, bias_age_s=50.0), inputs, tree, OFFLINE)
     ankle = tree.segment_origin(track.p, track.q)
     first = round(MID_WALK_S * take.rate_hz)
-    for i, segment in enumerate(("foot_r", "foot_l")):
+    for i, segment in enumerate(PRESETS["feet2"]):
         still = np.flatnonzero(np.diff(inputs.contact[:, i].astype(int)) > 0) + 5
         true = take.truth.p[segment][first:]
         error = [
             np.linalg.norm((ankle[b, i] - ankle[a, i])[:2]) - np.linalg.norm((true[b] - true[a])[:2])
-            for a, b in zip(still[:-1], still[1:], strict=True)
+            for a, b in pairwise(still)
         ]
         assert len(error) > 10
         assert abs(np.mean(error)) < 0.005
