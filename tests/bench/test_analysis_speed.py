@@ -1,7 +1,7 @@
 """The whole chain on ten minutes of seven sensors at 100 Hz: speed as times real time, and peak memory.
 
-Once with orientations alone and once with the ErKF and its smoother, which may take 200 µs a sample and 150 MB
-more.
+Once with orientations alone and once with the ErKF and its smoother, which may take 200 µs a sample and
+150 MB more.
 """
 
 from __future__ import annotations

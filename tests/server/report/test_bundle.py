@@ -49,6 +49,7 @@ def analysis(*, reached: bool = True) -> Analysis:
         events=walk.events() if reached else None,
         strides=strides if reached else None,
         poses=walk.poses() if reached else None,
+        feet=None,
         angles=angles if reached else None,
         parameters=gait_parameters(strides, angles) if reached else (),
         problem=problem,
