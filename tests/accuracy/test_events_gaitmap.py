@@ -7,65 +7,25 @@ middle counts as an extra here, the contact at its end as missed.
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 from functools import cache
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt
 
 from core import calibration, events, fusion, timeline
 from core.events.result import EventKind, GaitEvents, Strides
-from core.formats import SourceFile, parse_manifest, read_recording
-from core.frames import SIDES, Floats, Side
+from core.frames import SIDES, Side
 from tests.accuracy.event_scoring import Score, match
+from tests.accuracy.gaitmap import COPIES, RATE, recording_of, reference_strides, resampled
 from tests.accuracy.report import record
-from tests.data import data_folder
 
-RATE = 204.8
 RATES = (204.8, 60.0, 100.0, 128.0)
-COPIES = ("imu_sample.csv", "imu_sample_not_rotated.csv")
-COLUMNS = [f"{side}_sensor/{kind}_{axis}" for side in SIDES for kind in ("acc", "gyr") for axis in "xyz"]
-
-
-@cache
-def signals(name: str) -> Floats:
-    """Columns of one copy of the recording, (n, 12)."""
-    rows = list(csv.reader(io.StringIO((data_folder("gaitmap_foot") / name).read_text())))
-    header = [f"{a}/{b}" for a, b in zip(rows[0], rows[1], strict=True)]
-    table = np.array(rows[2:], np.float64)
-    return np.asarray(table[:, [header.index(c) for c in COLUMNS]])
-
-
-def resampled(name: str, rate_hz: float) -> bytes:
-    """The recording as a table at another rate: low-pass at 0.45 of the new rate, linear interpolation."""
-    x = signals(name)
-    t = np.arange(len(x)) / RATE
-    if rate_hz != RATE:
-        x = sosfiltfilt(butter(4, 0.45 * rate_hz / (RATE / 2), output="sos"), x, axis=0)
-        new = np.arange(0.0, t[-1], 1.0 / rate_hz)
-        x = np.stack([np.interp(new, t, c) for c in x.T], axis=1)
-    lines = [",".join(COLUMNS), *(",".join(f"{v:.9g}" for v in row) for row in x)]
-    return "\n".join(lines).encode()
 
 
 @cache
 def found(name: str, rate_hz: float) -> tuple[GaitEvents, Strides]:
     """Events and strides by the product's chain; only the manifest tells it about the file."""
-    columns = {
-        f"foot_{side[0]}": {k: [f"{side}_sensor/{k}_{a}" for a in "xyz"] for k in ("acc", "gyr")}
-        | {"mag": None}
-        for side in SIDES
-    }
-    source = {
-        "file": name, "header_rows": 1, "index_column": False, "rate_hz": rate_hz, "acc_unit": "m/s2",
-        "gyr_unit": "deg/s", "gravity_included": True, "columns": columns,
-    }  # fmt: skip
-    data = resampled(name, rate_hz)
-    manifest = parse_manifest(json.dumps({"protocol": "walk", "sources": [source]}).encode())
-    recording = read_recording([SourceFile(name, len(data), lambda: data)], manifest)
+    recording = recording_of(resampled(name, rate_hz), rate_hz)
     calibrated = calibration.calibrate(timeline.synchronise(recording))
     orientations = fusion.estimate(calibrated)
     contacts = events.detect(orientations)
@@ -77,12 +37,6 @@ def reference(side: Side, kind: EventKind) -> tuple[float, ...]:
     """Motion-capture events of one foot, s."""
     columns = ("ic", "pre_ic") if kind == "ic" else ("tc",)
     return tuple(sorted({float(r[c]) / RATE for r in reference_strides(side) for c in columns}))
-
-
-@cache
-def reference_strides(side: Side) -> tuple[dict[str, str], ...]:
-    with (data_folder("gaitmap_foot") / "stride_events_sample.csv").open(newline="") as file:
-        return tuple(r for r in csv.DictReader(file) if r["foot"] == side)
 
 
 def score(contacts: GaitEvents, side: Side, kind: EventKind) -> tuple[Score, int]:
