@@ -214,8 +214,8 @@ def test_write_down_the_figures() -> None:
         rows,
         "Found − motion capture (mean of three markers), straight strides of about 1375 mm, one healthy "
         "person, 2 × 20 m at 204.8 Hz. The take begins in motion and rests at its end, from where the "
-        "gyroscope biases are. Limits: |mean| ≤ 8, SD ≤ 18, none over 60 mm, refused < 2 %, end height ≤ 0.3 m; "
-        "SD ≤ 30 mm at 102.4 Hz, ≤ 45 mm for the filter alone. The impact rule was found on this recording, "
-        "nothing else was. Turning strides, way of the sensor against the mean marker (the lever between them "
-        f"counts, no limit), mm: {'; '.join(turns)}; the left one holds two steps round the turn.",
+        "gyroscope biases are. Limits: |mean| ≤ 8, SD ≤ 18, none over 60 mm, refused < 2 %, end height ≤ "
+        "0.3 m; SD ≤ 30 mm at 102.4 Hz, ≤ 45 mm for the filter alone. The impact rule was found on this "
+        "recording, nothing else was. Turning strides, way of the sensor against the mean marker (the lever "
+        f"between them counts, no limit), mm: {'; '.join(turns)}; the left one holds two steps round the turn.",
     )
