@@ -217,5 +217,5 @@ def test_write_down_the_figures() -> None:
         "gyroscope biases are. Limits: |mean| ≤ 8, SD ≤ 18, none over 60 mm, refused < 2 %, end height ≤ "
         "0.3 m; SD ≤ 30 mm at 102.4 Hz, ≤ 45 mm for the filter alone. The impact rule was found on this "
         "recording, nothing else was. Turning strides, way of the sensor against the mean marker (the lever "
-        f"between them counts, no limit), mm: {'; '.join(turns)}; the left one holds two steps round the turn.",
+        f"between them counts, no limit), mm: {'; '.join(turns)}; the left one holds two steps.",
     )
