@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from math import degrees, radians
+from typing import Final
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from core.body.erkf import ErkfParams, erkf_inputs
 from core.body.erkf_poses import figure, foot_tracks, refined, run_erkf
 from core.body.erkf_start import start_state
 from core.body.feet import FootTracks
+from core.body.headings import heading_errors, turned
 from core.body.kinematics import forward_kinematics
 from core.body.l7s import free_acceleration, l7s_poses
 from core.body.l7s_filter import L7sParams
@@ -30,6 +33,9 @@ from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError, Notice
 from core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
 from core.fusion.orientations import Orientations
+
+TELL_HEADING: Final = radians(10.0)
+"""A forward axis off by more is told: beyond what soft tissue does to the joints' own view of it."""
 
 
 @dataclass(frozen=True)
@@ -133,10 +139,7 @@ class _Take:
 
     def run(self, estimator: Estimator, segments: tuple[Segment, ...]) -> PoseEstimate:
         if estimator == "erkf":
-            run = run_erkf(self.calibrated, self.orientations, self.body, segments, self.params.erkf)
-            orientations = refined(run, self.orientations)
-            poses = figure(run, orientations, self.contacts, self.body)
-            return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body))
+            return self.chain(segments)
         if estimator == "stance_foot_anchor":
             return self.anchored()
         poses = l7s_poses(
@@ -148,6 +151,18 @@ class _Take:
             "3I" if estimator == "l7s_3i" else "2I",
         )
         return PoseEstimate(self.orientations, poses, None)
+
+    def chain(self, segments: tuple[Segment, ...]) -> PoseEstimate:
+        """ErKF and smoother, once the forward axes agree."""
+        errors = heading_errors(self.calibrated, self.orientations, self.body, segments, self.params.erkf)
+        calibrated, orientations = turned(self.calibrated, self.orientations, errors)
+        run = run_erkf(calibrated, orientations, self.body, segments, self.params.erkf)
+        orientations = refined(run, orientations)
+        poses = figure(run, orientations, self.contacts, self.body)
+        poses = replace(
+            poses, notices=(*poses.notices, *_corrected(errors)), diagnostics={"heading_error_rad": errors}
+        )
+        return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body))
 
     def anchored(self) -> PoseEstimate:
         """Orientations as they are, a figure by forward kinematics."""
@@ -171,6 +186,19 @@ class _Take:
             return None
         run = run_erkf(self.calibrated, self.orientations, self.body, feet, self.params.erkf)
         return foot_tracks(run, refined(run, self.orientations), self.body)
+
+
+def _corrected(errors: Mapping[Segment, float]) -> tuple[Notice, ...]:
+    off = [s for s in errors if abs(errors[s]) > TELL_HEADING]
+    if not off:
+        return ()
+    worst = max(off, key=lambda s: abs(errors[s]))
+    message = (
+        f"The joints show that calibration took the wrong way for forward at {', '.join(off)}, by up to "
+        f"{degrees(abs(errors[worst])):.0f}° ({worst}); it was turned. Frontal and transverse angles there "
+        "are less certain."
+    )
+    return (Notice("heading_corrected", message, sensor=worst, severity="info"),)
 
 
 def _without(orientations: Orientations, failed: Collection[Segment]) -> Orientations:

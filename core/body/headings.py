@@ -1,0 +1,89 @@
+"""How the sensors sit about the vertical, as the chain of joints sees it.
+
+Calibration finds each segment's forward axis on its own, from the direction of walking. Joint centres tell the
+ErKF the sensors' headings relative to each other, so a segment whose heading they change has a wrong
+forward axis. Its mounting is turned by the mean change while walking (spec/real-data.md §2.8). Which way is
+ahead no joint can tell: it is the median of the segments, so that no single calibration decides for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import pi
+from typing import Final
+
+import numpy as np
+
+from core.body.corrected import corrected_signals
+from core.body.erkf import ErkfParams, erkf_inputs
+from core.body.erkf_start import start_state
+from core.body.model import BodyModel
+from core.body.smoother import smooth
+from core.body.tree import person_tree
+from core.calibration.result import CalibratedRecording
+from core.frames import Segment
+from core.fusion.orientations import Orientations
+from core.rest import samples
+from core.rotation import about, from_matrix, multiply, to_matrix, yaw
+
+LOOKED_AT_S: Final = 120.0
+"""Part of the take that is filtered for this, from the standing zero on: some fifty strides."""
+
+
+def heading_errors(
+    calibrated: CalibratedRecording,
+    orientations: Orientations,
+    body: BodyModel,
+    segments: Sequence[Segment],
+    params: ErkfParams,
+) -> dict[Segment, float]:
+    """How far each segment's forward axis is off the median of all, rad, left positive.
+
+    Nine states and the smoother, two minutes from the standing zero on, or the last two; empty when nobody
+    walks in them.
+
+    Raises
+    ------
+    EstimationError of `person_tree` and `smooth`.
+    """
+    rate = calibrated.recording.rate_hz
+    zero = samples(calibrated.calibration.zero, rate)
+    n = len(calibrated.recording.t_s)
+    length = round(LOOKED_AT_S * rate)
+    first = max(0, min(zero.start, n - length))
+    part = slice(first, min(n, first + length))
+    mounts = {s: calibrated.calibration.segments[s].R_segment_sensor for s in segments}
+    tree = person_tree(body, mounts, segments)
+    acc, gyr, valid = corrected_signals(calibrated, segments)
+    inputs = erkf_inputs(tree, acc[part], gyr[part], valid[part], rate)
+    q = np.stack([multiply(orientations.q[s][first], from_matrix(mounts[s])) for s in segments])
+    rest = (0, zero.stop - first) if zero.start == first else None
+    coarse = replace(params, states=9)
+    track, _ = smooth(start_state(tree, inputs, coarse, rest, q=q), inputs, tree, coarse)
+    walking = np.zeros(n, bool)
+    for window in calibrated.calibration.walking:
+        walking[samples(window, rate)] = True
+    change = []
+    for i, segment in enumerate(segments):
+        was, now = orientations.q[segment][part], tree.segment_q(track.q)[:, i]
+        seen = walking[part] & orientations.valid[segment][part]
+        if not seen.any():
+            return {}
+        change.append(np.angle(np.mean(np.exp(1j * (yaw(now) - yaw(was)))[seen])))
+    apart = (np.array(change) - change[0] + pi) % (2 * pi) - pi
+    return dict(zip(segments, (apart - np.median(apart)).tolist(), strict=True))
+
+
+def turned(
+    calibrated: CalibratedRecording, orientations: Orientations, errors: Mapping[Segment, float]
+) -> tuple[CalibratedRecording, Orientations]:
+    """The calibration with its forward axes turned by `heading_errors`, the orientations to match."""
+    mounted, q = dict(calibrated.calibration.segments), dict(orientations.q)
+    for segment, error in errors.items():
+        was = mounted[segment]
+        mount = to_matrix(about(1, error)) @ was.R_segment_sensor
+        mounted[segment] = replace(was, R_segment_sensor=mount)
+        q[segment] = multiply(multiply(about(2, error), q[segment]), about(1, -error))
+    calibration = replace(calibrated.calibration, segments=mounted)
+    return replace(calibrated, calibration=calibration), replace(orientations, q=q)

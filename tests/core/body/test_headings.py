@@ -1,0 +1,77 @@
+"""Forward axes that calibration took wrongly are found by the joints, and turned."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import degrees, radians
+
+import numpy as np
+import pytest
+
+from core import calibration, fusion
+from core.body import nominal_body
+from core.body.erkf import ErkfParams
+from core.body.headings import heading_errors, turned
+from core.body.tree import PRESETS
+from core.calibration.result import CalibratedRecording
+from core.frames import R_NEUTRAL, Segment
+from core.fusion.orientations import Orientations
+from core.rest import samples
+from core.rotation import about, angle_between, from_matrix, to_matrix
+from tests.walks import simulated
+
+WHOLE = PRESETS["lower_body7"]
+
+
+def take(
+    seed: int, wrong: dict[Segment, float]
+) -> tuple[CalibratedRecording, Orientations, dict[Segment, float]]:
+    """A walk calibrated as it is but for some forward axes, and what is found wrong, in degrees."""
+    recording, _ = simulated("fast_with_turns", seed)
+    calibrated = calibration.calibrate(recording)
+    segments = dict(calibrated.calibration.segments)
+    for segment, angle in wrong.items():
+        was = segments[segment]
+        mount = to_matrix(about(1, radians(angle))) @ was.R_segment_sensor
+        segments[segment] = replace(was, R_segment_sensor=mount)
+    calibrated = replace(calibrated, calibration=replace(calibrated.calibration, segments=segments))
+    orientations = fusion.estimate(calibrated)
+    body, _ = nominal_body(recording.subject.height_m)
+    found = heading_errors(calibrated, orientations, body, WHOLE, ErkfParams.offline())
+    return calibrated, orientations, {s: degrees(x) for s, x in found.items()}
+
+
+@pytest.mark.parametrize("wrong", [{"thigh_l": 25.0}, {"shank_r": -20.0, "foot_l": 15.0}, {"pelvis": 20.0}])
+def test_a_wrong_forward_axis_is_found_by_its_size_and_sign(wrong: dict[Segment, float]) -> None:
+    _, _, without = take(3, {})
+    _, _, found = take(3, wrong)
+    change = {s: found[s] - without[s] for s in WHOLE}
+    for segment, angle in wrong.items():
+        assert change[segment] == pytest.approx(-angle, abs=4.0)
+    for segment in set(WHOLE) - set(wrong):
+        assert abs(change[segment]) < 4.0
+
+
+def test_a_good_calibration_is_left_nearly_as_it_is() -> None:
+    for seed in (2, 3, 4):
+        _, _, found = take(seed, {})
+        assert max(abs(x) for x in found.values()) < 8.0
+        assert np.median(list(found.values())) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_after_turning_everybody_still_faces_ahead_at_rest() -> None:
+    calibrated, orientations, found = take(3, {"thigh_l": 25.0})
+    calibrated, orientations = turned(calibrated, orientations, {s: radians(x) for s, x in found.items()})
+    zero = samples(calibrated.calibration.zero, orientations.rate_hz)
+    middle = (zero.start + zero.stop) // 2
+    for segment in WHOLE:
+        apart = angle_between(orientations.q[segment][middle : middle + 1], from_matrix(R_NEUTRAL)[None])
+        assert degrees(float(apart[0])) < 1.0
+
+
+def test_nobody_walking_means_nothing_is_found() -> None:
+    recording, _ = simulated("fast_with_turns", 3)
+    calibrated = calibration.calibrate(recording)
+    still = replace(calibrated, calibration=replace(calibrated.calibration, walking=()))
+    body, _ = nominal_body(recording.subject.height_m)
+    assert heading_errors(still, fusion.estimate(calibrated), body, WHOLE, ErkfParams.offline()) == {}
