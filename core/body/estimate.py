@@ -38,6 +38,12 @@ TELL_HEADING: Final = radians(10.0)
 """A forward axis off by more is told: beyond what soft tissue does to the joints' own view of it."""
 
 
+ON_A_BELT: Final = (
+    "On a treadmill a foot on the belt does not rest in the room, as the estimator takes it to. Positions are "
+    "those on a belt of constant speed; distances are given only where the belt's speed was entered."
+)
+
+
 @dataclass(frozen=True)
 class PoseParams:
     """Parameters of `estimate_poses`.
@@ -93,6 +99,8 @@ def estimate_poses(
     take = _Take(calibrated, _without(orientations, choice.failed), contacts, body, params)
     order = choice.possible if params.estimator == "auto" else (params.estimator,)
     notices, reduced = list(choice.notices), choice.reduced
+    if calibrated.recording.protocol == "treadmill":
+        notices.append(Notice("treadmill_belt", ON_A_BELT, severity="info"))
     made = None
     for estimator in order:
         try:

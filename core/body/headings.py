@@ -1,7 +1,7 @@
 """How the sensors sit about the vertical, as the chain of joints sees it.
 
-Calibration finds each segment's forward axis on its own, from the direction of walking. Joint centres tell the
-ErKF the sensors' headings relative to each other, so a segment whose heading they change has a wrong
+Calibration finds each segment's forward axis on its own, from the direction of walking. Joint centres tell
+the ErKF the sensors' headings relative to each other, so a segment whose heading they change has a wrong
 forward axis. Its mounting is turned by the mean change while walking (spec/real-data.md §2.8). Which way is
 ahead no joint can tell: it is the median of the segments, so that no single calibration decides for all.
 """
