@@ -37,10 +37,9 @@ from core.fusion.orientations import Orientations
 TELL_HEADING: Final = radians(10.0)
 """A forward axis off by more is told: beyond what soft tissue does to the joints' own view of it."""
 
-
 ON_A_BELT: Final = (
-    "On a treadmill a foot on the belt does not rest in the room, as the estimator takes it to. Positions are "
-    "those on a belt of constant speed; distances are given only where the belt's speed was entered."
+    "On a treadmill a foot on the belt does not rest in the room, as the estimator takes it to. Positions "
+    "are those on a belt of constant speed; distances are given only where the belt's speed was entered."
 )
 
 
