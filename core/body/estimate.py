@@ -20,7 +20,7 @@ from core.body.erkf import ErkfParams, erkf_inputs
 from core.body.erkf_poses import figure, foot_tracks, refined, run_erkf
 from core.body.erkf_start import start_state
 from core.body.feet import FootTracks
-from core.body.headings import heading_errors, turned
+from core.body.headings import agreed
 from core.body.kinematics import forward_kinematics
 from core.body.l7s import free_acceleration, l7s_poses
 from core.body.l7s_filter import L7sParams
@@ -161,8 +161,9 @@ class _Take:
 
     def chain(self, segments: tuple[Segment, ...]) -> PoseEstimate:
         """ErKF and smoother, once the forward axes agree."""
-        errors = heading_errors(self.calibrated, self.orientations, self.body, segments, self.params.erkf)
-        calibrated, orientations = turned(self.calibrated, self.orientations, errors)
+        calibrated, orientations, errors = agreed(
+            self.calibrated, self.orientations, self.body, segments, self.params.erkf
+        )
         run = run_erkf(calibrated, orientations, self.body, segments, self.params.erkf)
         orientations = refined(run, orientations)
         poses = figure(run, orientations, self.contacts, self.body)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import pi
+from math import pi, radians
 from typing import Final
 
 import numpy as np
@@ -29,6 +29,36 @@ from core.rotation import about, from_matrix, multiply, to_matrix, yaw
 
 LOOKED_AT_S: Final = 120.0
 """Part of the take that is filtered for this, from the standing zero on: some fifty strides."""
+
+ROUNDS: Final = 3
+"""Most passes. One leaves up to 7 % of an error, as the joints were placed with the wrong axis; two leave
+0.2° of 30° and 0.4° of 60° (neura_walk, each sensor alone)."""
+
+SETTLED: Final = radians(5.0)
+"""A pass that turns nothing further is the last: what remains is below half a degree."""
+
+
+def agreed(
+    calibrated: CalibratedRecording,
+    orientations: Orientations,
+    body: BodyModel,
+    segments: Sequence[Segment],
+    params: ErkfParams,
+) -> tuple[CalibratedRecording, Orientations, dict[Segment, float]]:
+    """Turn forward axes until they agree with the joints; what each was turned by in all, rad.
+
+    Raises
+    ------
+    EstimationError as `heading_errors`.
+    """
+    total: dict[Segment, float] = {}
+    for _ in range(ROUNDS):
+        errors = heading_errors(calibrated, orientations, body, segments, params)
+        calibrated, orientations = turned(calibrated, orientations, errors)
+        total = {s: total.get(s, 0.0) + error for s, error in errors.items()}
+        if all(abs(error) <= SETTLED for error in errors.values()):
+            break
+    return calibrated, orientations, total
 
 
 def heading_errors(

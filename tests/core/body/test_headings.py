@@ -11,7 +11,7 @@ import pytest
 from core import calibration, fusion
 from core.body import nominal_body
 from core.body.erkf import ErkfParams
-from core.body.headings import heading_errors, turned
+from core.body.headings import agreed, heading_errors, turned
 from core.body.tree import PRESETS
 from core.calibration.result import CalibratedRecording
 from core.frames import R_NEUTRAL, Segment
@@ -75,3 +75,17 @@ def test_nobody_walking_means_nothing_is_found() -> None:
     still = replace(calibrated, calibration=replace(calibrated.calibration, walking=()))
     body, _ = nominal_body(recording.subject.height_m)
     assert heading_errors(still, fusion.estimate(calibrated), body, WHOLE, ErkfParams.offline()) == {}
+
+
+def test_passes_are_repeated_until_a_large_error_is_gone() -> None:
+    calibrated, orientations, without = take(3, {})
+    body, _ = nominal_body(calibrated.recording.subject.height_m)
+    wrong, turned_wrong, _ = take(3, {"shank_r": -30.0})
+    right, _, small = agreed(calibrated, orientations, body, WHOLE, ErkfParams.offline())
+    again, _, large = agreed(wrong, turned_wrong, body, WHOLE, ErkfParams.offline())
+    assert degrees(small["shank_r"]) == pytest.approx(without["shank_r"], abs=0.5)
+    assert degrees(large["shank_r"] - small["shank_r"]) == pytest.approx(30.0, abs=0.5)
+    for segment in WHOLE:
+        mounts = (c.calibration.segments[segment].R_segment_sensor for c in (right, again))
+        q, p = (from_matrix(m)[None] for m in mounts)
+        assert degrees(float(angle_between(q, p)[0])) < 1.0, segment
