@@ -10,7 +10,7 @@ import numpy as np
 
 from core.formats import SourceFile, parse_manifest, read_recording
 from core.frames import Bools, Floats, Segment
-from core.recording import SensorSignals, UniformRecording
+from core.recording import Recording, SensorSignals, UniformRecording
 from core.rotation import rotate
 from core.simulate import SCRIPTS, Truth, simulate, simulate_scenario
 from core.simulate.script import Script
@@ -40,14 +40,20 @@ def scripted(script: Script, seed: int = 0) -> tuple[UniformRecording, Truth]:
 
 
 @cache
-def neura_walk() -> UniformRecording:
-    """The real walk of seven sensors, or skip."""
+def neura_recording() -> Recording:
+    """The real walk of seven sensors as its files say it, or skip."""
     files = [
         SourceFile(p.name, p.stat().st_size, p.read_bytes)
         for p in sorted((data_folder("neura_walk") / "rawimu").glob("*.txt"))
     ]
     manifest = parse_manifest(json.dumps({"sensors": NEURA, "subject": {"height_m": 1.7}}).encode())
-    return synchronise(read_recording(files, manifest))
+    return read_recording(files, manifest)
+
+
+@cache
+def neura_walk() -> UniformRecording:
+    """The same on the uniform axis."""
+    return synchronise(neura_recording())
 
 
 def only(recording: UniformRecording, *segments: Segment) -> UniformRecording:
