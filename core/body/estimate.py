@@ -20,7 +20,7 @@ from core.body.erkf import ErkfParams, erkf_inputs
 from core.body.erkf_poses import figure, foot_tracks, refined, run_erkf
 from core.body.erkf_start import start_state
 from core.body.feet import FootTracks
-from core.body.headings import agreed
+from core.body.headings import agreed, findings
 from core.body.kinematics import forward_kinematics
 from core.body.l7s import free_acceleration, l7s_poses
 from core.body.l7s_filter import L7sParams
@@ -54,7 +54,7 @@ class PoseParams:
     """
 
     estimator: Requested = "auto"
-    erkf: ErkfParams = field(default_factory=ErkfParams.offline)
+    erkf: ErkfParams = field(default_factory=ErkfParams.people)
     l7s: L7sParams = field(default_factory=L7sParams)
     least_valid: float = 0.5
 
@@ -168,7 +168,10 @@ class _Take:
         orientations = refined(run, orientations)
         poses = figure(run, orientations, self.contacts, self.body)
         poses = replace(
-            poses, notices=(*poses.notices, *_corrected(errors)), diagnostics={"heading_error_rad": errors}
+            poses,
+            health=(*poses.health, *findings(errors)),
+            notices=(*poses.notices, *_corrected(errors)),
+            diagnostics={"heading_error_rad": errors},
         )
         return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body))
 

@@ -11,7 +11,7 @@ import pytest
 from core import calibration, fusion
 from core.body import nominal_body
 from core.body.erkf import ErkfParams
-from core.body.headings import agreed, heading_errors, turned
+from core.body.headings import agreed, findings, heading_errors, turned
 from core.body.tree import PRESETS
 from core.calibration.result import CalibratedRecording
 from core.frames import R_NEUTRAL, Segment
@@ -89,3 +89,16 @@ def test_passes_are_repeated_until_a_large_error_is_gone() -> None:
         mounts = (c.calibration.segments[segment].R_segment_sensor for c in (right, again))
         q, p = (from_matrix(m)[None] for m in mounts)
         assert degrees(float(angle_between(q, p)[0])) < 1.0, segment
+
+
+def test_what_was_turned_is_told_as_health() -> None:
+    told = {f.of: f for f in findings({"pelvis": 0.0, "thigh_r": radians(-20.0), "foot_l": radians(170.0)})}
+    assert [told[s].verdict for s in ("pelvis", "thigh_r", "foot_l")] == ["good", "warn", "bad"]
+    assert told["thigh_r"].value == pytest.approx(20.0)
+
+
+def test_an_axis_turned_right_round_is_not_told_as_more_than_half_a_turn() -> None:
+    wrong, orientations, _ = take(3, {"shank_r": 180.0})
+    body, _ = nominal_body(wrong.recording.subject.height_m)
+    _, _, total = agreed(wrong, orientations, body, WHOLE, ErkfParams.offline())
+    assert 170.0 < abs(degrees(total["shank_r"])) <= 180.0
