@@ -95,6 +95,15 @@ class ErkfParams:
         return cls()
 
     @classmethod
+    def people(cls) -> ErkfParams:
+        """`offline` for sensors on skin at nominal places: joint centres known to some centimetres.
+
+        spec/estimators.md §3.6, last row. On simulated people with soft tissue and sensors 2 cm off their
+        nominal places it takes the bias of stride lengths from 2 cm to below 1 cm.
+        """
+        return cls(joint_centre_sd=0.03)
+
+    @classmethod
     def live(cls) -> ErkfParams:
         """For samples as they come: 9 states, the gyroscopes' biases frozen from rest (same section)."""
         return cls(states=9, gyr_sd=0.02)
