@@ -169,7 +169,9 @@ def _run_stages(
     joint = angles.joint_angles(posed.orientations, calibrated.calibration.zero, posed.poses)
     reached["angles"] = joint
     start("parameters")
-    reached["parameters"] = parameters.gait_parameters(strides, joint, posed.orientations)
+    reached["parameters"] = parameters.gait_parameters(
+        strides, joint, posed.orientations, posed.feet, parameters.surface_of(uniform)
+    )
 
 
 def _bundle(

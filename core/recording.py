@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 
@@ -25,6 +26,33 @@ def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], 
     ):
         raise ParameterError("bad_shape", f"{where}: {name} has shape {a.shape}, expected {shape}.")
     a.setflags(write=False)
+
+
+BELT_MPS: Final = (0.05, 5.0)
+"""Speeds a treadmill can have."""
+
+
+def check_belt(belt_speed_mps: float | None, protocol: Protocol) -> None:
+    """Refuse a belt speed that no treadmill has, or one without a treadmill.
+
+    Raises
+    ------
+    ParameterError `belt_speed_implausible`, `belt_speed_without_treadmill`.
+    """
+    if belt_speed_mps is None:
+        return
+    if not BELT_MPS[0] <= belt_speed_mps <= BELT_MPS[1]:
+        raise ParameterError(
+            "belt_speed_implausible",
+            f"Belt speed {belt_speed_mps:g} m/s is outside {BELT_MPS[0]:g} to {BELT_MPS[1]:g} m/s; give it "
+            "in metres per second (3.6 km/h is 1 m/s).",
+        )
+    if protocol != "treadmill":
+        raise ParameterError(
+            "belt_speed_without_treadmill",
+            f"A belt speed is given, but the protocol is '{protocol}'; set it to treadmill or leave the "
+            "speed out.",
+        )
 
 
 @dataclass(frozen=True)
@@ -104,6 +132,7 @@ class Recording:
     segments : device id → segment, None = not used. Ids without an entry are unassigned (see `unassigned`).
     mounting : segment → declared mounting, free text ("sacrum, face backwards").
     sha256 : file name → sha256 of the source bytes.
+    belt_speed_mps : of a treadmill, None = not entered.
     """
 
     streams: Mapping[str, ImuStream]
@@ -113,8 +142,10 @@ class Recording:
     mounting: Mapping[str, str] = field(default_factory=dict)
     sha256: Mapping[str, str] = field(default_factory=dict)
     notices: tuple[Notice, ...] = ()
+    belt_speed_mps: float | None = None
 
     def __post_init__(self) -> None:
+        check_belt(self.belt_speed_mps, self.protocol)
         if self.protocol not in PROTOCOLS:
             raise ParameterError(
                 "unknown_protocol", f"Protocol '{self.protocol}' is not one of {', '.join(PROTOCOLS)}."
@@ -186,7 +217,7 @@ class UniformRecording:
     Parameters
     ----------
     t_s : (n,) seconds from recording start, step 1 / rate_hz.
-    sensors : segment → signals, all of length n.
+    sensors : segment → signals, all of length n. belt_speed_mps : of a treadmill, None = not entered.
     """
 
     t_s: Floats
@@ -196,6 +227,7 @@ class UniformRecording:
     protocol: Protocol
     mounting: Mapping[str, str]
     notices: tuple[Notice, ...] = ()
+    belt_speed_mps: float | None = None
 
     def __post_init__(self) -> None:
         _frozen(self.t_s, "t_s", (None,), "UniformRecording")

@@ -96,6 +96,7 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
         protocol=recording.protocol,
         mounting=recording.mounting,
         notices=(*notices, *rate_notices, *length_notices),
+        belt_speed_mps=recording.belt_speed_mps,
     )
 
 

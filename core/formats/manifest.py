@@ -13,11 +13,11 @@ from fnmatch import fnmatchcase
 from types import MappingProxyType
 from typing import Final
 
-from core.errors import ManifestError
+from core.errors import ManifestError, ParameterError
 from core.formats.aliases import segment_named
 from core.formats.json_tree import Node, no_constant, unique
 from core.frames import GRAVITY, PROTOCOLS, SEGMENTS, Protocol, Segment
-from core.recording import Subject
+from core.recording import Subject, check_belt
 
 ACC_UNITS: Final[dict[str, float]] = {
     "m/s2": 1.0,
@@ -96,7 +96,7 @@ class Manifest:
     Parameters
     ----------
     sensors : device id → segment, None = ignore this sensor.
-    protocol : None = not said (walk).
+    protocol : None = not said (walk). belt_speed_mps : of a treadmill.
     """
 
     subject: Subject = field(default_factory=Subject)
@@ -104,6 +104,7 @@ class Manifest:
     mounting: Mapping[str, str] = field(default_factory=dict)
     sensors: Mapping[str, Segment | None] = field(default_factory=dict)
     sources: tuple[SourceSpec, ...] = ()
+    belt_speed_mps: float | None = None
 
     def source_of(self, name: str) -> SourceSpec | None:
         """First entry of `sources` that covers a file."""
@@ -113,7 +114,7 @@ class Manifest:
 def is_manifest(value: object) -> bool:
     """Tell whether a JSON value means to be a manifest."""
     return isinstance(value, dict) and bool(
-        value.keys() & {"sensors", "sources", "subject", "protocol", "mounting"}
+        value.keys() & {"sensors", "sources", "subject", "protocol", "mounting", "belt_speed_mps"}
     )
 
 
@@ -124,7 +125,8 @@ def parse_manifest(data: bytes) -> Manifest:
     ------
     ManifestError
         manifest_bad_json, manifest_unknown_key, manifest_bad_value, unknown_segment, duplicate_segment,
-        unknown_protocol, height_implausible, unknown_unit; the message names the path inside the manifest.
+        unknown_protocol, height_implausible, unknown_unit, belt_speed_implausible,
+        belt_speed_without_treadmill; the message names the path inside the manifest.
     """
     if len(data) > MAX_BYTES:
         raise ManifestError(
@@ -140,7 +142,7 @@ def parse_manifest(data: bytes) -> Manifest:
 def manifest_of(root: object) -> Manifest:
     """Build a manifest from decoded JSON; errors as in `parse_manifest`."""
     top = Node(root, "")
-    top.only("subject", "protocol", "mounting", "sensors", "sources")
+    top.only("subject", "protocol", "mounting", "sensors", "sources", "belt_speed_mps")
     subject = top.child("subject")
     subject.only("height_m")
     height = subject.number("height_m")
@@ -154,6 +156,11 @@ def manifest_of(root: object) -> Manifest:
         raise ManifestError(
             "unknown_protocol", f"protocol is '{protocol}'; expected one of {', '.join(PROTOCOLS)}."
         )
+    belt = top.number("belt_speed_mps")
+    try:
+        check_belt(belt, protocol or "treadmill")
+    except ParameterError as error:
+        raise ManifestError(error.code, f"belt_speed_mps: {error.message}") from error
     mounting = top.child("mounting")
     sensors = top.child("sensors")
     return Manifest(
@@ -162,6 +169,7 @@ def manifest_of(root: object) -> Manifest:
         mounting=MappingProxyType({_segment(k, f"mounting.{k}"): mounting.string(k) for k in mounting.keys}),
         sensors=MappingProxyType(_sensors(sensors)),
         sources=tuple(_source(n) for n in top.children("sources")),
+        belt_speed_mps=belt,
     )
 
 

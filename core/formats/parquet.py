@@ -78,6 +78,7 @@ def _metadata(r: Recording) -> dict[str, object]:
         "units": {"t": "us", "acc": "m/s2", "gyr": "rad/s", "quat": "wxyz, sensor to world"},
         "subject": {"height_m": r.subject.height_m},
         "protocol": r.protocol,
+        "belt_speed_mps": r.belt_speed_mps,
         "mounting": dict(r.mounting),
         "sha256": dict(r.sha256),
         "notices": [_notice(n) for n in r.notices],
@@ -183,6 +184,7 @@ def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Reco
         mounting=mounting,
         sha256=sha,
         notices=tuple(_read_notice(n) for n in _list(info["notices"])),
+        belt_speed_mps=None if (belt := info.get("belt_speed_mps")) is None else float(str(belt)),
     )
 
 

@@ -184,6 +184,7 @@ def _declared(recording: Recording, manifest: Manifest | None, upload: _Upload) 
         segments=segments,
         subject=manifest.subject if manifest and manifest.subject.height_m is not None else recording.subject,
         protocol=(manifest.protocol if manifest else None) or recording.protocol,
+        belt_speed_mps=(manifest.belt_speed_mps if manifest else None) or recording.belt_speed_mps,
         mounting={**recording.mounting, **(manifest.mounting if manifest else {})},
         sha256={**recording.sha256, **upload.sha256},
         notices=tuple(notices),

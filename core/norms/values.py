@@ -50,7 +50,17 @@ _FOOT_OFF = (
 )
 """Simulated truth: 72 ± 5 ms after the last touch; gaitmap's healthy walker has a stance of 68.6 % by it."""
 
-_NEEDS_FOOT_OFF = ("stance_pct", "swing_pct", "double_support_pct", "single_support_pct")
+_WIDTH = "Not comparable: our width takes the feet to have stood under the hips."
+"""Calibration takes legs to be vertical in standing; simulated people stand closer, 4 to 9 cm too wide."""
+
+_NOT_COMPARABLE: Final[Mapping[str, str]] = {
+    "step_width_m": _WIDTH,
+    "stance_pct": _FOOT_OFF,
+    "swing_pct": _FOOT_OFF,
+    "double_support_pct": _FOOT_OFF,
+    "single_support_pct": _FOOT_OFF,
+}
+"""Parameter → why a walkway's reference says nothing about ours."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +145,7 @@ def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -
         if key not in table:
             continue
         row = table[key]
-        note = _BAND if row["kind"] != "mean_sd" else _FOOT_OFF if name in _NEEDS_FOOT_OFF else ""
+        note = _BAND if row["kind"] != "mean_sd" else _NOT_COMPARABLE.get(name, "")
         ages = f"{row['age_min']} to {row['age_max']} years"
         values[name] = NormValue(
             name=name,

@@ -15,13 +15,16 @@ from core.parameters.kinematic import (
     stride_figures,
 )
 from core.parameters.result import Parameter
+from core.parameters.spatial import GROUND, Surface, per_stride_spatial, spatial, spatial_rows, surface_of
 from core.parameters.temporal import per_stride, stride_values, temporal
 
 if TYPE_CHECKING:
-    # the package brings numba, which readers of results do without
+    # these packages bring numba, which readers of results do without
+    from core.body.feet import FootTracks
     from core.fusion.orientations import Orientations
 
 __all__ = [
+    "Surface",
     "cycle_curves",
     "foot_pitch",
     "gait_parameters",
@@ -29,20 +32,32 @@ __all__ = [
     "mean_curve",
     "per_stride",
     "per_stride_figures",
+    "per_stride_spatial",
+    "spatial_rows",
     "stride_figures",
     "stride_values",
+    "surface_of",
     "temporal",
 ]
 
 
 def gait_parameters(
-    strides: Strides, angles: JointAngles, orientations: Orientations | None = None
+    strides: Strides,
+    angles: JointAngles,
+    orientations: Orientations | None = None,
+    feet: FootTracks | None = None,
+    surface: Surface = GROUND,
 ) -> tuple[Parameter, ...]:
-    """All parameters of a take: temporal, then angles over the cycle, then foot pitch at the contacts.
+    """All parameters of a take: temporal, spatial, angles over the cycle, foot pitch at the contacts.
 
     Parameters
     ----------
-    orientations : of the feet, for their pitch; None leaves it out.
+    orientations : of the feet, for their pitch; None leaves it out. feet : None = there are no distances.
     """
     pitch = None if orientations is None else foot_pitch(orientations, strides)
-    return temporal(strides) + kinematic(cycle_curves(angles, strides), pitch)
+    rows = spatial_rows(strides, feet, surface)
+    return (
+        temporal(strides)
+        + spatial(strides, feet, rows, surface)
+        + kinematic(cycle_curves(angles, strides), pitch)
+    )

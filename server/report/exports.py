@@ -26,8 +26,18 @@ from core.angles import JointAngles
 from core.body.poses import Poses
 from core.events.result import GaitEvents, Strides
 from core.frames import Floats, Side
-from core.parameters import cycle_curves, foot_pitch, per_stride, per_stride_figures, stride_figures
+from core.parameters import (
+    cycle_curves,
+    foot_pitch,
+    per_stride,
+    per_stride_figures,
+    per_stride_spatial,
+    spatial_rows,
+    stride_figures,
+    surface_of,
+)
 from core.parameters.result import Parameter
+from core.parameters.spatial import Row
 
 if TYPE_CHECKING:
     # these packages bring numba, which the web process does without
@@ -48,7 +58,8 @@ def analysis_files(analysis: Analysis) -> dict[str, bytes]:
     if analysis.events is not None:
         files["events.csv"] = events_csv(analysis.events)
     if analysis.strides is not None:
-        files["strides.csv"] = strides_csv(analysis.strides, analysis.angles, analysis.orientations)
+        rows = spatial_rows(analysis.strides, analysis.feet, surface_of(analysis.recording))
+        files["strides.csv"] = strides_csv(analysis.strides, rows, analysis.angles, analysis.orientations)
     if analysis.angles is not None:
         files["angles.parquet"] = angles_parquet(analysis.angles)
     if analysis.poses is not None:
@@ -111,16 +122,24 @@ def events_csv(events: GaitEvents) -> bytes:
 
 
 def strides_csv(
-    strides: Strides, angles: JointAngles | None = None, orientations: Orientations | None = None
+    strides: Strides,
+    rows: Sequence[Row],
+    angles: JointAngles | None = None,
+    orientations: Orientations | None = None,
 ) -> bytes:
-    """Every stride, used or not, with its own parameters (spec/field.md §4b)."""
+    """Every stride, used or not, with its own parameters (spec/field.md §4b).
+
+    Parameters
+    ----------
+    rows : of `spatial_rows`.
+    """
     figures: dict[str, Mapping[Side, Floats]] = {}
     if angles is not None:
         figures |= stride_figures(cycle_curves(angles, strides))
     if orientations is not None:
         figures |= foot_pitch(orientations, strides)
-    values = per_stride(strides) | per_stride_figures(strides, figures)
-    rows = (
+    values = per_stride(strides) | per_stride_spatial(rows) | per_stride_figures(strides, figures)
+    lines = (
         (
             s.side,
             s.start_s,
@@ -134,7 +153,7 @@ def strides_csv(
         )
         for i, s in enumerate(strides.strides)
     )
-    return write_csv((*STRIDE_COLUMNS, *values, "excluded_reason"), rows)
+    return write_csv((*STRIDE_COLUMNS, *values, "excluded_reason"), lines)
 
 
 def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:

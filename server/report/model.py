@@ -23,8 +23,18 @@ from server.report.wording import NO_NORM, VARIABLES, ZERO_WORDS, excluded_words
 
 Sex = Literal["female", "male"]
 
-KEY_NUMBERS: Final = ("cadence_spm", "stride_time_s", "stance_pct", "knee_flexion_rom_deg")
-"""Parameters shown large on the overview."""
+KEY_NUMBERS: Final = (
+    "gait_speed_mps",
+    "cadence_spm",
+    "step_length_m",
+    "knee_flexion_rom_deg",
+    "stride_time_s",
+    "stance_pct",
+)
+"""Parameters for the overview, in this order of preference."""
+
+SHOWN_LARGE: Final = 4
+"""So many of them are shown, those that were measured."""
 
 KEY_CURVE: Final = "knee_flexion"
 
@@ -155,8 +165,10 @@ def report_model(
     Parameters
     ----------
     age : years at the visit; without it curves are compared with all adults, timing with nobody.
-    speed_mps : walking speed if measured; below 0.8 m/s no reference applies.
+    speed_mps : walking speed, None = the take's own; below 0.8 m/s no reference applies.
     """
+    if speed_mps is None:
+        speed_mps = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
     bands = adult_kinematics(age, speed_mps)
     angle_norms, time_norms = angle_values(age), temporal_values(age, sex)
     values = {} if bands.reason else {**time_norms.values, **angle_norms.values}
@@ -170,7 +182,7 @@ def report_model(
         warnings=tuple(_warning(n) for n in bundle.warnings),
         kpis=tuple(
             _key_number(r) for name in KEY_NUMBERS for r in rows if r.name == name and r.reason is None
-        ),
+        )[:SHOWN_LARGE],
         groups=grouped(rows),
         panels=panels,
         strides=tuple(

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from core.norms import NormValue
 from core.parameters.result import Parameter
 from server.report.curves import range_svg
 from server.report.wording import TERMS, Term, difference_words, number, reason_words
+
+COUNTED: Final[Mapping[str, str]] = {"cadence_spm": "steps", "total_distance_m": "feet"}
+"""What a number is the mean of, where not of strides."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +123,7 @@ def _cell(p: Parameter | None, term: Term) -> Cell | None:
     if p is None or p.mean is None:
         return None
     spread = "" if p.sd is None else f" ± {number(p.sd, _sd_digits(term))}"
-    what = "steps" if p.side is None else "strides"
+    what = COUNTED.get(p.name, "strides")
     full = f"{number(p.mean, max(term.digits, 1))}{spread}\u202f{term.unit}, mean ± SD of {p.n} {what}"
     return Cell(p.mean, p.sd, p.n, number(p.mean, term.digits), full)
 

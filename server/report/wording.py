@@ -92,10 +92,22 @@ class Term:
     comparison: Comparison
 
 
-_TIMING, _PHASES, _SUPPORT = "Timing", "Phases of the stride", "Support in seconds"
+_WAY, _TIMING, _PHASES = "Speed and distance", "Timing", "Phases of the stride"
+_SUPPORT = "Support in seconds"
 _HIP_KNEE, _ANKLE_FOOT = "Hip and knee angles", "Ankle and foot angles"
 
+_WIDTH: Final[Comparison] = ("wider", "narrower")
+_HEIGHT: Final[Comparison] = ("higher", "lower")
+
 TERMS: Final[Mapping[str, Term]] = {
+    "gait_speed_mps": Term("Gait speed", "m/s", _WAY, 2, (0, 2), _SIZE),
+    "stride_length_m": Term("Stride length", "m", _WAY, 2, (0.2, 1.8), _TIME),
+    "step_length_m": Term("Step length", "m", _WAY, 2, (0, 1), _TIME),
+    "step_width_m": Term("Step width", "m", _WAY, 2, (-0.05, 0.35), _WIDTH),
+    "circumduction_m": Term("Circumduction", "m", _WAY, 3, (0, 0.2), _SIZE),
+    "max_heel_clearance_m": Term("Heel clearance, most", "m", _WAY, 2, (0, 0.5), _HEIGHT),
+    "min_toe_clearance_m": Term("Toe clearance, least in swing", "m", _WAY, 3, (-0.02, 0.12), _HEIGHT),
+    "total_distance_m": Term("Distance walked", "m", _WAY, 1, (0, 100), _SIZE),
     "cadence_spm": Term("Cadence", "steps/min", _TIMING, 0, (40, 150), _SIZE),
     "stride_time_s": Term("Stride time", "s", _TIMING, 2, (0.7, 2.1), _TIME),
     "step_time_s": Term("Step time", "s", _TIMING, 2, (0.3, 1.1), _TIME),
@@ -143,6 +155,11 @@ REASONS: Final[Mapping[str, str]] = {
     "no_double_support": "not measured: the feet were never on the floor together",
     "joint_missing": "not measured: a segment of this joint carries no sensor",
     "gap": "not measured: the sensor was lost in every stride",
+    "treadmill": "not measured: on a treadmill the belt's speed is needed, and gives speed and stride length",
+    "no_foot_track": "not measured: no sensor on this foot",
+    "no_foot_flat": "not measured: the foot never rested on the floor",
+    "feet_not_linked": "not measured: needs sensors on both legs and the pelvis to place the feet",
+    "no_shoe_geometry": "not measured: needs the shape of the shoe",
     "no_heading": "not measured: needs a heading reference shared by the sensors",
     "not_reached": "not measured: the analysis stopped before this",
 }

@@ -99,8 +99,8 @@ def test_temporal_references_by_age_and_sex() -> None:
     assert woman["double_support_pct"].mean == pytest.approx(27.1)
     assert woman["gait_speed_mps"].comparable
     assert {n for n, v in woman.items() if not v.comparable} == {
-        "stance_pct", "swing_pct", "double_support_pct", "single_support_pct",
-    }, "our foot-off is not a walkway's"  # fmt: skip
+        "stance_pct", "swing_pct", "double_support_pct", "single_support_pct", "step_width_m",
+    }, "our foot-off is not a walkway's, our width not a ruler's"  # fmt: skip
     man = temporal_values(25.5, "male").values
     assert man["stride_time_s"].mean == pytest.approx(1.135)
     assert not man["gait_speed_mps"].comparable, "the band of a pace class is not a spread"
