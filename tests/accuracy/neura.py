@@ -16,6 +16,7 @@ from core.body import BodyModel
 from core.body.corrected import corrected_signals
 from core.body.erkf import ErkfParams
 from core.body.erkf_poses import ErkfRun, refined, run_erkf
+from core.body.estimate import PoseParams
 from core.body.headings import agreed
 from core.body.tree import PRESETS
 from core.calibration import calibrate
@@ -32,6 +33,9 @@ BODY = BodyModel.from_height(HEIGHT_M)
 SEGMENTS = PRESETS["lower_body7"]
 RATE = 100.0
 WALK = slice(1110, 2080)
+
+SHIPPED = PoseParams().erkf
+"""The set the pipeline uses."""
 
 TURNING = np.radians(20.0)
 """Turn of the foot from one stance to the next beyond which a stride is a turning one."""
@@ -84,7 +88,7 @@ def chain(
     agree: bool = True,
 ) -> Chain:
     """The product's chain on a calibrated take; `agree`: turn forward axes that the joints contradict."""
-    params = params or ErkfParams.offline()
+    params = params or SHIPPED
     turned: dict[Segment, float] = {}
     if agree:
         calibrated, orientations, turned = agreed(calibrated, orientations, BODY, SEGMENTS, params)

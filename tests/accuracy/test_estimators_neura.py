@@ -10,7 +10,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from core.body import BodyModel
-from core.body.erkf import ErkfParams
 from core.body.erkf_poses import run_erkf
 from core.body.l7s import free_acceleration, l7s_poses
 from core.body.l7s_filter import Worn
@@ -18,7 +17,7 @@ from core.body.still import FOOT_STILL, still_samples
 from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.pipeline import analyse
-from tests.accuracy.neura import BODY, HEIGHT_M, angles_deg, healthy, stride_errors_m, take
+from tests.accuracy.neura import BODY, HEIGHT_M, SHIPPED, angles_deg, healthy, stride_errors_m, take
 from tests.accuracy.report import record
 from tests.accuracy.test_neura_walk import scores
 from tests.walks import neura_recording
@@ -51,7 +50,7 @@ def raw_degrees(q: dict[Segment, Floats]) -> dict[str, Floats]:
 
 def lone_strides_cm(side: Side) -> Floats:
     """Errors of one foot's straight strides from its own sensor alone."""
-    run = run_erkf(*take(), BODY, (FOOT[side],), ErkfParams.offline())
+    run = run_erkf(*take(), BODY, (FOOT[side],), SHIPPED)
     return 100 * stride_errors_m(side, run.tree.segment_origin(run.track.p, run.track.q)[:, 0])
 
 
