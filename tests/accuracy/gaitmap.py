@@ -84,12 +84,17 @@ def reference_strides(side: Side) -> tuple[dict[str, str], ...]:
 
 @dataclass(frozen=True)
 class TrueStride:
-    """A stride between two stances: times in s, horizontal way of the mean marker in m; turning or not."""
+    """A stride between two stances: times in s, horizontal way of the mean marker in m; turning or not.
+
+    first_ic_s, last_ic_s : the initial contacts that begin these stances.
+    """
 
     start_s: float
     end_s: float
     length_m: float
     turning: bool
+    first_ic_s: float
+    last_ic_s: float
 
 
 @cache
@@ -106,5 +111,6 @@ def true_strides(side: Side) -> tuple[TrueStride, ...]:
         times = float(row["start"]) / RATE, float(row["end"]) / RATE
         a, b = (np.array([np.interp(s, t, c) for c in (*mean.T, heading)]) for s in times)
         length = float(np.linalg.norm(b[:2] - a[:2]))
-        found.append(TrueStride(*times, length, bool(abs(b[2] - a[2]) > TURNING)))
+        contacts = float(row["pre_ic"]) / RATE, float(row["ic"]) / RATE
+        found.append(TrueStride(*times, length, bool(abs(b[2] - a[2]) > TURNING), *contacts))
     return tuple(found)

@@ -26,6 +26,7 @@ from core.body.tree import person_tree
 from core.calibration.result import CalibratedRecording
 from core.frames import FOOT, GRAVITY, SIDES, Floats, Side
 from core.fusion.orientations import Orientations
+from core.parameters import spatial_rows
 from core.pipeline import Analysis, analyse
 from core.rotation import rotate
 from core.timeline import synchronise
@@ -172,6 +173,33 @@ def test_the_product_measures_the_same_feet(side: Side) -> None:
     assert np.abs(e).max() <= 60.0
 
 
+def reported(side: Side) -> tuple[Floats, Floats]:
+    """Errors of the strides that the report counts: lengths in mm, speeds in mm/s."""
+    analysis = product()
+    assert analysis.strides is not None
+    rows = spatial_rows(analysis.strides, analysis.feet)
+    found = []
+    for stride, row in zip(analysis.strides.strides, rows, strict=True):
+        length, speed = row["stride_length_m"], row["gait_speed_mps"]
+        for true in true_strides(side):
+            same = abs(stride.start_s - true.first_ic_s) < 0.05 and abs(stride.end_s - true.last_ic_s) < 0.05
+            if stride.side == side and stride.excluded_reason is None and same:
+                assert isinstance(length, float)
+                assert isinstance(speed, float)
+                true_speed = true.length_m / (true.last_ic_s - true.first_ic_s)
+                found.append((1000 * (length - true.length_m), 1000 * (speed - true_speed)))
+    return np.array(found).T[0], np.array(found).T[1]
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_report_counts_these_lengths_and_speeds(side: Side) -> None:
+    lengths, speeds = reported(side)
+    assert len(lengths) >= 22
+    assert abs(lengths.mean()) <= 8.0
+    assert lengths.std() <= 18.0
+    assert abs(speeds.mean()) <= 10.0
+
+
 def test_the_filter_beats_plain_integration_on_both_feet() -> None:
     for side in SIDES:
         ours = errors(run(side).track.p[:, 0], side, RATE).straight
@@ -181,7 +209,7 @@ def test_the_filter_beats_plain_integration_on_both_feet() -> None:
 
 
 def test_write_down_the_figures() -> None:
-    rows, turns = [], []
+    rows, turns, speed = [], [], []
     for side in SIDES:
         made, half, constant = run(side), run(side, half_rate=True), run(side, impact=0.0)
         feet = product().feet
@@ -206,6 +234,14 @@ def test_write_down_the_figures() -> None:
                 height = of.track.p[-1, 0, 2] - of.track.p[0, 0, 2]
                 told = [f"{100 * refused_share(of):.1f}", f"{height:+.2f}"]
             rows.append([side, name, *found.row, *told])
+        lengths, speeds = reported(side)
+        told = [
+            str(len(lengths)),
+            f"{lengths.mean():+.1f} ± {lengths.std():.1f}",
+            f"{np.abs(lengths).max():.0f}",
+        ]
+        rows.append([side, "the report's counted strides", *told, "", ""])
+        speed.append(f"{side} {speeds.mean():+.0f} ± {speeds.std():.0f}")
         path = errors(made.track.p[:, 0], side, RATE).turning
         turns.append(f"{side} " + ", ".join(f"{x:+.0f}" for x in path))
     record(
@@ -217,5 +253,6 @@ def test_write_down_the_figures() -> None:
         "gyroscope biases are. Limits: |mean| ≤ 8, SD ≤ 18, none over 60 mm, refused < 2 %, end height ≤ "
         "0.3 m; SD ≤ 30 mm at 102.4 Hz, ≤ 45 mm for the filter alone. The impact rule was found on this "
         "recording, nothing else was. Turning strides, way of the sensor against the mean marker (the lever "
-        f"between them counts, no limit), mm: {'; '.join(turns)}; the left one holds two steps.",
+        f"between them counts, no limit), mm: {'; '.join(turns)}; the left one holds two steps. "
+        f"Walking speed of the counted strides, found − motion capture in mm/s: {', '.join(speed)}.",
     )
