@@ -17,6 +17,7 @@ import numpy as np
 from core.body.choice import Estimator, Requested, choose
 from core.body.corrected import corrected_signals
 from core.body.erkf import ErkfParams, erkf_inputs
+from core.body.erkf_health import erkf_health, erkf_notices
 from core.body.erkf_poses import figure, foot_tracks, refined, run_erkf
 from core.body.erkf_start import start_state
 from core.body.feet import FootTracks
@@ -24,6 +25,7 @@ from core.body.headings import agreed, findings
 from core.body.kinematics import forward_kinematics
 from core.body.l7s import free_acceleration, l7s_poses
 from core.body.l7s_filter import L7sParams
+from core.body.l7s_health import l7s_health, l7s_notices
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.poses import Poses
 from core.body.smoother import smooth
@@ -116,7 +118,7 @@ def estimate_poses(
         made = take.anchored()
     if made.feet is None:
         try:
-            made = replace(made, feet=take.lone_feet(choice.segments))
+            made = take.with_feet(made, choice.segments)
         except EstimationError as error:
             message = f"The paths of the feet cannot be estimated, so there are no distances. {error.message}"
             notices.append(Notice("foot_paths_failed", message, error.sensor, error.t_s))
@@ -157,7 +159,10 @@ class _Take:
             self.params.l7s,
             "3I" if estimator == "l7s_3i" else "2I",
         )
-        return PoseEstimate(self.orientations, poses, None)
+        notices = (*poses.notices, *l7s_notices(self.calibrated.recording.protocol))
+        return PoseEstimate(
+            self.orientations, replace(poses, health=l7s_health(poses), notices=notices), None
+        )
 
     def chain(self, segments: tuple[Segment, ...]) -> PoseEstimate:
         """ErKF and smoother, once the forward axes agree."""
@@ -167,10 +172,11 @@ class _Take:
         run = run_erkf(calibrated, orientations, self.body, segments, self.params.erkf)
         orientations = refined(run, orientations)
         poses = figure(run, orientations, self.contacts, self.body)
+        health = erkf_health(run)
         poses = replace(
             poses,
-            health=(*poses.health, *findings(errors)),
-            notices=(*poses.notices, *_corrected(errors)),
+            health=(*health, *findings(errors)),
+            notices=(*poses.notices, *erkf_notices(run, health), *_corrected(errors)),
             diagnostics={"heading_error_rad": errors},
         )
         return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body))
@@ -190,13 +196,25 @@ class _Take:
             found[side] = still_samples(acc[:, 0], gyr[:, 0], valid[:, 0], rate, FOOT_STILL)
         return found
 
-    def lone_feet(self, segments: tuple[Segment, ...]) -> FootTracks | None:
-        """Each foot by an ErKF of its own; None without a foot."""
+    def with_feet(self, made: PoseEstimate, segments: tuple[Segment, ...]) -> PoseEstimate:
+        """The same with each foot by an ErKF of its own; as it was without a foot.
+
+        Raises
+        ------
+        EstimationError of `run_erkf`.
+        """
         feet = tuple(FOOT[s] for s in SIDES if FOOT[s] in segments)
         if not feet:
-            return None
+            return made
         run = run_erkf(self.calibrated, self.orientations, self.body, feet, self.params.erkf)
-        return foot_tracks(run, refined(run, self.orientations), self.body)
+        health = tuple(f for f in erkf_health(run) if f.of in feet)
+        known = {(f.name, f.of) for f in made.poses.health}
+        poses = replace(
+            made.poses,
+            health=(*made.poses.health, *(f for f in health if (f.name, f.of) not in known)),
+            notices=(*made.poses.notices, *erkf_notices(run, health)),
+        )
+        return replace(made, poses=poses, feet=foot_tracks(run, refined(run, self.orientations), self.body))
 
 
 def _corrected(errors: Mapping[Segment, float]) -> tuple[Notice, ...]:

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
+
+import numpy as np
+
+from core.frames import Bools
 
 Verdict = Literal["good", "warn", "bad"]
 
@@ -38,3 +42,14 @@ def worst(findings: Sequence[Finding]) -> Verdict:
     """The least favourable verdict of all."""
     verdicts = {f.verdict for f in findings}
     return "bad" if "bad" in verdicts else "warn" if "warn" in verdicts else "good"
+
+
+LONGEST_MOVING_S: Final = (5.0, 20.0)
+"""Time without a rest of a foot (our choice): a stride takes 1 to 2 s, an error of position grows with t² and
+more from the last rest on."""
+
+
+def longest_run_s(flags: Bools, rate_hz: float) -> float:
+    """Duration of the longest stretch of True in s, 0 without any."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False]))))
+    return float(np.max(edges[1::2] - edges[::2], initial=0)) / rate_hz

@@ -1,0 +1,125 @@
+"""What an ErKF run says about itself (spec/estimators.md §7)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from core.body.erkf_poses import ErkfRun
+from core.body.health import LONGEST_MOVING_S, Finding, longest_run_s
+from core.errors import Notice, Severity
+from core.frames import Floats
+
+RESIDUAL_MM: Final = (25.0, 80.0)
+"""RMS distance of the two ends of a joint while moving. A right set-up has 3 to 19 (simulation, neura_walk),
+a thigh 100 ms late or exchanged legs 30, exchanged sensors 57 to 186 (spec/real-data.md §3)."""
+
+REFUSED_PCT: Final = 2.0
+"""Zero velocities refused, of all; a real shoe stays below (spec/real-data.md §7)."""
+
+GAP_S: Final = 0.5
+"""Loss of a sensor in one piece; 0.3 s cost a degree and pass (spec/estimators.md §3.3)."""
+
+CLIMB_PCT: Final = 3.0
+"""The floor's height at the end against the start, of the way walked: level walks have up to 1.4 (simulation,
+neura_walk, gaitmap), a ramp for wheelchairs 5."""
+
+CLIMB_WAY_M: Final = 5.0
+"""A shorter way than this is taken as this long: a level take of 10 s may end 0.1 m up."""
+
+
+def erkf_health(run: ErkfRun) -> tuple[Finding, ...]:
+    """Judge a run by its own quantities: joints, zero velocities, losses, height, covariance."""
+    rate = 1.0 / float(np.median(run.inputs.step_s[run.inputs.step_s > 0.0]))
+    valid, found = run.inputs.valid, []
+    moving = ~run.inputs.still.all(axis=1)
+    for k, joint in enumerate(run.tree.joints):
+        both = valid[:, joint.proximal] & valid[:, joint.distal] & moving
+        residual = run.track.joint_residual[both, k]
+        value = 1e3 * float(np.sqrt(np.mean(residual**2))) if len(residual) else float("nan")
+        found.append(Finding("joint_residual_mm", joint.name, value, *RESIDUAL_MM))
+    for i in run.tree.feet:
+        name, contact = run.tree.imus[i], run.inputs.contact[:, i]
+        refused = 100.0 * run.track.refused[contact, i].mean() if contact.any() else 0.0
+        found.append(Finding("zero_velocity_refused_pct", name, float(refused), warn=REFUSED_PCT))
+        found.append(Finding("longest_moving_s", name, longest_run_s(~contact, rate), *LONGEST_MOVING_S))
+        if contact.any():
+            found.append(Finding("climb_pct", name, _climb_pct(run, i), warn=CLIMB_PCT))
+    for i, name in enumerate(run.tree.imus):
+        lost = longest_run_s(~valid[:, i], rate)
+        if lost > 0.0:
+            found.append(Finding("gap_s", name, lost, warn=GAP_S))
+    found.append(Finding("heading_sd_deg", None, float(np.degrees(run.track.heading_sd[-1].max()))))
+    found.append(Finding("min_eigenvalue", None, float(np.linalg.eigvalsh(run.final.P)[0])))
+    return tuple(found)
+
+
+TOLD: Final[Mapping[str, tuple[str, Severity, str]]] = {
+    "joint_residual_mm": (
+        "sensors_do_not_hang_together",
+        "warning",
+        (
+            "The two sensors at {of} do not hang together: their joint is {value:.0f} mm apart on average, "
+            "up to {warn:.0f} mm are expected. Check left and right, which sensor is on which segment and how "
+            "it is mounted, the body height, and that all clocks agree."
+        ),
+    ),
+    "zero_velocity_refused_pct": (
+        "zero_velocity_refused",
+        "warning",
+        (
+            "{value:.0f} % of the rests of {of} do not fit its path, up to {warn:.0f} % are expected, so "
+            "distances of this foot are doubtful. A loose sensor, a slipping shoe or unnoticed lost samples "
+            "look like this."
+        ),
+    ),
+    "longest_moving_s": (
+        "foot_never_still",
+        "warning",
+        (
+            "{of} does not rest on the floor for {value:.0f} s, at most {warn:.0f} s are expected: its path "
+            "is not bounded there. Toe walking, a treadmill or a sensor on another segment look like this."
+        ),
+    ),
+    "climb_pct": (
+        "not_level",
+        "warning",
+        (
+            "The floor under {of} rises or falls by {value:.0f} % of the way walked, up to {warn:.0f} % are "
+            "expected on level ground: stairs, a slope, a sensor on the wrong foot or one that drifts."
+        ),
+    ),
+    "gap_s": (
+        "gap_bridged",
+        "info",
+        "{of} was lost for {value:.1f} s in one piece; its pose there is bridged by its neighbours.",
+    ),
+}
+"""Finding → code, severity and words of the notice when it is not good."""
+
+STARTED_MOVING: Final = (
+    "The take starts without standing: the estimator began mid-walk and needs some strides to settle. Stand "
+    "still for 3 to 5 s first where possible."
+)
+
+
+def erkf_notices(run: ErkfRun, findings: tuple[Finding, ...]) -> tuple[Notice, ...]:
+    """What of it a person must be told."""
+    told = []
+    for f in findings:
+        if f.verdict != "good" and f.name in TOLD:
+            code, severity, words = TOLD[f.name]
+            message = words.format(of=f.of, value=f.value, warn=f.warn)
+            told.append(Notice(code, message, sensor=(f.of or "").split("-")[-1] or None, severity=severity))
+    if run.rest is None:
+        told.append(Notice("started_moving", STARTED_MOVING, t_s=0.0))
+    return tuple(told)
+
+
+def _climb_pct(run: ErkfRun, foot: int) -> float:
+    """How far the foot's last rest lies above or below its first, of the way between, %."""
+    p: Floats = run.tree.segment_origin(run.track.p, run.track.q)[run.inputs.contact[:, foot], foot]
+    way = float(np.linalg.norm(np.diff(p[:, :2], axis=0), axis=1).sum())
+    return 100.0 * float(abs(p[-1, 2] - p[0, 2])) / max(way, CLIMB_WAY_M)

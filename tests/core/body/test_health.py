@@ -1,0 +1,161 @@
+"""What is wrong with a set-up shows in a measured quantity; what is right is not accused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.body.estimate import PoseEstimate
+from core.body.health import Finding, longest_run_s, worst
+from core.frames import FOOT, Segment
+from core.pipeline import Analysis, analyse
+from core.recording import Recording, UniformRecording
+from core.rotation import about, rotate
+from core.simulate import simulate_scenario
+from tests.core.body.test_estimate import estimated
+from tests.walks import simulated
+
+
+def take(seed: int = 3, name: str = "fast_with_turns") -> UniformRecording:
+    return simulated(name, seed)[0]
+
+
+def swapped(recording: UniformRecording, a: Segment, b: Segment) -> UniformRecording:
+    s = recording.sensors
+    return replace(recording, sensors={**s, a: s[b], b: s[a]})
+
+
+def changed(recording: UniformRecording, segment: Segment, **signals: object) -> UniformRecording:
+    was = recording.sensors[segment]
+    return replace(recording, sensors={**recording.sensors, segment: replace(was, **signals)})  # type: ignore[arg-type]
+
+
+def codes(made: PoseEstimate) -> set[str]:
+    return {n.code for n in made.poses.notices}
+
+
+def residuals(made: PoseEstimate) -> dict[str | None, float]:
+    return {f.of: f.value for f in made.poses.health if f.name == "joint_residual_mm"}
+
+
+def test_a_verdict_follows_the_limits() -> None:
+    assert [Finding("x", None, v, 1.0, 2.0).verdict for v in (1.0, 1.5, 2.5)] == ["good", "warn", "bad"]
+    assert Finding("x", None, float("nan"), 1.0, 2.0).verdict == "bad"
+    assert Finding("x", None, 9.0).verdict == "good"
+    assert worst([Finding("x", None, 0.0, 1.0), Finding("y", None, 3.0, 1.0)]) == "warn"
+    assert worst([]) == "good"
+
+
+def test_the_longest_run_is_found_wherever_it_lies() -> None:
+    assert longest_run_s(np.array([1, 1, 0, 1, 1, 1], bool), 10.0) == pytest.approx(0.3)
+    assert longest_run_s(np.zeros(5, bool), 10.0) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "seed"), [("fast_with_turns", 2), ("comfortable", 3), ("hemiparetic", 4), ("drop_foot", 5)]
+)
+def test_a_right_set_up_is_not_accused(name: str, seed: int) -> None:
+    made = estimated(take(seed, name))
+    accused = {"sensors_do_not_hang_together", "zero_velocity_refused", "foot_never_still", "started_moving"}
+    assert not codes(made) & accused
+    assert max(residuals(made).values()) < 10.0
+    assert worst([f for f in made.poses.health if f.name != "forward_axis_turned_deg"]) == "good"
+
+
+@pytest.mark.parametrize(("a", "b"), [("thigh_l", "thigh_r"), ("shank_l", "shank_r"), ("foot_l", "foot_r")])
+def test_exchanged_sides_do_not_hang_together(a: Segment, b: Segment) -> None:
+    made = estimated(swapped(take(), a, b))
+    assert "sensors_do_not_hang_together" in codes(made)
+    assert max(residuals(made).values()) > 30.0
+
+
+def test_exchanged_segments_of_one_leg_are_told() -> None:
+    made = estimated(swapped(take(), "thigh_l", "shank_l"))
+    assert worst(made.poses.health) != "good"
+    assert codes(made) & {"sensors_do_not_hang_together", "heading_corrected"}
+
+
+def test_a_late_sensor_shows_in_its_joints() -> None:
+    was = take().sensors["thigh_r"]
+    late = 30
+    made = estimated(
+        changed(
+            take(), "thigh_r", acc=np.roll(was.acc, late, axis=0).copy(), gyr=np.roll(was.gyr, late, axis=0).copy()
+        )
+    )  # fmt: skip
+    right, left = residuals(made)["pelvis-thigh_r"], residuals(made)["pelvis-thigh_l"]
+    assert right > 2.0 * left
+
+
+def test_a_foot_that_never_rests_is_told() -> None:
+    was = take().sensors["foot_l"]
+    shaken = was.gyr + 1.5 * np.sin(2 * np.pi * 7.0 * take().t_s)[:, None] * (take().t_s > 8.0)[:, None]
+    made = estimated(changed(take(), "foot_l", gyr=shaken))
+    assert "foot_never_still" in codes(made)
+    (told,) = [f for f in made.poses.health if (f.name, f.of) == ("longest_moving_s", "foot_l")]
+    assert told.verdict == "bad"
+
+
+@pytest.mark.parametrize("lost_s", [0.5, 8.0])
+def test_a_known_gap_is_bridged_told_and_recovered(lost_s: float) -> None:
+    was = take().sensors["shank_r"]
+    gap = (take().t_s >= 20.0) & (take().t_s < 20.0 + lost_s)
+    held = {
+        "acc": np.where(gap[:, None], was.acc[2000], was.acc),
+        "gyr": np.where(gap[:, None], was.gyr[2000], was.gyr),
+        "valid": was.valid & ~gap,
+    }
+    made = estimated(changed(take(), "shank_r", **held))
+    assert ("gap_bridged" in codes(made)) == (lost_s > 0.5)
+    assert max(residuals(made).values()) < 30.0
+    whole = estimated(take())
+    after = take().t_s > 32.0
+    for segment in ("thigh_r", "shank_r", "foot_r"):
+        apart = made.poses.q[segment][after] - whole.poses.q[segment][after]
+        assert np.abs(apart).max() < 0.1
+
+
+def test_an_unnoticed_gap_never_gives_numbers_that_are_none() -> None:
+    was = take().sensors["foot_r"]
+    gap = (take().t_s >= 20.0) & (take().t_s < 20.3)
+    held = {
+        "acc": np.where(gap[:, None], was.acc[2000], was.acc),
+        "gyr": np.where(gap[:, None], was.gyr[2000], was.gyr),
+    }
+    made = estimated(changed(take(), "foot_r", **held))
+    for p in made.poses.p.values():
+        assert np.isfinite(p).all()
+    end = made.poses.p["pelvis"][-1] - estimated(take()).poses.p["pelvis"][-1]
+    assert np.linalg.norm(end) < 10.0
+
+
+def test_a_burst_of_no_numbers_is_a_gap() -> None:
+    made = simulate_scenario("fast_with_turns", 3)
+    device = next(d for d, s in made.recording.segments.items() if s == "shank_l")
+    stream = made.recording.streams[device]
+    acc, gyr = stream.acc.copy(), stream.gyr.copy() if stream.gyr is not None else None
+    assert gyr is not None
+    acc[2000:2040], gyr[2000:2040] = np.nan, np.nan
+    broken: Recording = replace(
+        made.recording,
+        streams={**made.recording.streams, device: replace(stream, acc=acc, gyr=gyr)},
+    )
+    done: Analysis = analyse(broken)
+    assert done.problem is None
+    assert done.poses is not None
+    assert done.poses.method == "erkf_smoothed"
+    assert np.isfinite(done.poses.p["shank_l"]).all()
+    assert done.angles is not None
+    assert np.isnan(done.angles.angles["knee_flexion_l"]).any()
+
+
+def test_a_foot_sensor_put_on_backwards_walks_all_the_same_or_is_told() -> None:
+    was = take().sensors["foot_l"]
+    half = about(2, np.pi)
+    made = estimated(changed(take(), "foot_l", acc=rotate(half, was.acc), gyr=rotate(half, was.gyr)))
+    whole = estimated(take())
+    if not codes(made) & {"sensors_do_not_hang_together", "heading_corrected"}:
+        apart = made.poses.q[FOOT["left"]] - whole.poses.q[FOOT["left"]]
+        assert np.abs(apart).max() < 0.1
