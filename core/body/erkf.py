@@ -14,6 +14,7 @@ Jacobian (eq 27) is carried in the next step's transition. Source: spec/estimato
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from core.body.erkf_params import ErkfParams as ErkfParams
 from core.body.still import AT_REST, FOOT_STILL, still_samples
 from core.body.tree import ImuTree
 from core.errors import EstimationError, ParameterError, SignalError
-from core.frames import Bools, Floats
+from core.frames import GRAVITY, Bools, Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +33,7 @@ class ErkfInputs:
     Parameters
     ----------
     step_s : (T,) time since the sample before; 0 for the very first.
-    acc, gyr : (T, n, 3) m/s², rad/s, at rest |acc| = g. valid : (T, n) measured; elsewhere the last value
-        is held.
+    acc, gyr : (T, n, 3) m/s², rad/s, at rest |acc| = g. valid : (T, n) measured; elsewhere see `erkf_inputs`.
     contact : (T, n) the sensor's foot rests on the floor. still : (T, n) the sensor has been at rest for
         0.3 s.
     heading : (T, n) measured heading of the segment's forward axis in W, rad, NaN where none; None for none.
@@ -131,12 +131,35 @@ def erkf_inputs(
         last = np.maximum.accumulate(np.where(valid[:, i], np.arange(len(valid)), -1))
         last[last < 0] = int(np.argmax(valid[:, i]))
         acc[:, i], gyr[:, i] = acc[last, i], gyr[last, i]
+        _rest_in_gaps(acc[:, i], gyr[:, i], valid[:, i], rate_hz)
         still[:, i] = still_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz, AT_REST)
         if i in tree.feet:
             contact[:, i] = still_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz, FOOT_STILL)
     step = np.full(len(acc), 1.0 / rate_hz)
     step[:1] = 0.0
     return ErkfInputs(step, acc, gyr, valid, contact, still, heading)
+
+
+HOLD_S: Final = 0.3
+"""A lost sensor is taken to go on as it last did for so long; then to travel on upright at an even speed."""
+
+POSTURE_S: Final = 1.0
+"""About a stride: the mean specific force over it is gravity in the mean posture."""
+
+
+def _rest_in_gaps(acc: Floats, gyr: Floats, valid: Bools, rate_hz: float) -> None:
+    """After `HOLD_S` of a gap: no rotation, gravity as in the mean posture before it; causal, in place.
+
+    Holding the last rate on would turn the sensor round and round, and the joints its neighbours with it.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], ~valid, [False]))))
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        begin = start + round(HOLD_S * rate_hz)
+        if begin >= stop or start == 0:
+            continue
+        posture = acc[max(0, start - round(POSTURE_S * rate_hz)) : start].mean(axis=0)
+        acc[begin:stop] = GRAVITY * posture / np.linalg.norm(posture)
+        gyr[begin:stop] = 0.0
 
 
 def filter_block(
