@@ -55,6 +55,7 @@ class Setup:
     rate_hz : 20 to 1000. sampling : see `Sampling`. mount_spread_rad : sensors are turned by up to this.
     noise : None for ideal sensors. tissue : None for sensors fixed to the bone.
     packet_loss : share of lost samples, in short runs, 0 to 0.5.
+    worn : the sensors that are recorded.
     """
 
     rate_hz: float = 100.0
@@ -64,6 +65,7 @@ class Setup:
     tissue: SoftTissue | None = None
     packet_loss: float = 0.0
     dropouts: tuple[Dropout, ...] = ()
+    worn: tuple[Segment, ...] = tuple(PLACES)
 
     def __post_init__(self) -> None:
         if not 20.0 <= self.rate_hz <= 1000.0:
@@ -141,8 +143,9 @@ def simulate(
         if setup.noise is not None:
             measured, errors[segment] = with_errors(measured, setup.noise, setup.rate_hz, of_errors)
         arrived = _arrived(t, segment, setup, of_losses)
-        streams[device] = _stream(device, t, measured, arrived, setup.rate_hz)
-        worn[device] = segment
+        if segment in setup.worn:
+            streams[device] = _stream(device, t, measured, arrived, setup.rate_hz)
+            worn[device] = segment
     recording = Recording(streams=streams, segments=worn, subject=Subject(height_m=walker.height_m))
     return Simulation(recording, truth_of(motion, every, mounts, errors, seed), ideal, first_counter)
 

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Final
 
 from core.errors import ParameterError
+from core.frames import Segment
 from core.simulate.patients import PATIENTS, Patient
 from core.simulate.recorder import Dropout, Setup, Simulation, simulate
 from core.simulate.script import Arc, Pivot, Script, Stand, Steps, Straight, scaled
@@ -109,8 +110,19 @@ SCRIPTS: Mapping[str, Scenario] = MappingProxyType(
 )
 
 
-def simulate_scenario(name: str, seed: int = 0, height_m: float = 1.75, rate_hz: float = 100.0) -> Simulation:
+def simulate_scenario(
+    name: str,
+    seed: int = 0,
+    height_m: float = 1.75,
+    rate_hz: float = 100.0,
+    worn: tuple[Segment, ...] | None = None,
+    dropouts: tuple[Dropout, ...] | None = None,
+) -> Simulation:
     """Simulate a named script for a person of a height; its lengths grow with the person.
+
+    Parameters
+    ----------
+    worn, dropouts : other sensors than all seven, other failures than the script's own.
 
     Raises
     ------
@@ -120,5 +132,10 @@ def simulate_scenario(name: str, seed: int = 0, height_m: float = 1.75, rate_hz:
         raise ParameterError("unknown_script", f"No script '{name}'; expected one of {', '.join(SCRIPTS)}.")
     scenario = SCRIPTS[name]
     walker = scenario.walker.scaled_to(height_m)
-    setup = replace(scenario.setup, rate_hz=rate_hz)
+    setup = replace(
+        scenario.setup,
+        rate_hz=rate_hz,
+        worn=scenario.setup.worn if worn is None else worn,
+        dropouts=scenario.setup.dropouts if dropouts is None else dropouts,
+    )
     return simulate(scaled(scenario.script, walker.scale), walker, seed, setup)

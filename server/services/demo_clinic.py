@@ -1,4 +1,4 @@
-"""The simulated clinic of `sagittal demo`: four patients, two visits each, uploaded like any recording.
+"""The simulated clinic of `sagittal demo`: virtual patients whose visits are uploaded like any recording.
 
 Run as a module it fills the data folder of its environment; simulating takes seconds of computing, so this is
 a process of its own.
@@ -10,7 +10,10 @@ import datetime as dt
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
+from math import inf
+from typing import TYPE_CHECKING
 
+from core.frames import Segment
 from core.recording import Recording
 from server.jobs.table import TableQueue
 from server.services import analyses, patients, recordings, sessions
@@ -18,6 +21,11 @@ from server.settings import Settings, load_settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.tables import now
+
+if TYPE_CHECKING:
+    from core.simulate import Simulation
+
+FEET: tuple[Segment, ...] = ("foot_l", "foot_r")
 
 
 @dataclass(frozen=True)
@@ -33,35 +41,67 @@ class Person:
 
 @dataclass(frozen=True)
 class Visit:
-    """One visit: who, which script of core/simulate, how many days ago, seed."""
+    """One visit.
+
+    Parameters
+    ----------
+    script, seed : of core.simulate. days_ago : when. worn : sensors, None = all seven.
+    fails : a sensor and the second of the take from which on it is silent.
+    """
 
     person: Person
     title: str
     script: str
     days_ago: int
     seed: int
+    note: str = ""
+    worn: tuple[Segment, ...] | None = None
+    fails: tuple[Segment, float] | None = None
 
 
-ADA = Person("DEMO-1", "female", 1958, 1.64, "Simulated, healthy gait at comfortable speed.")
-BEN = Person("DEMO-2", "male", 1949, 1.78, "Simulated, healthy gait, slow.")
-CLEO = Person("DEMO-3", "female", 1991, 1.71, "Simulated, healthy gait, fast with turns.")
-DAN = Person("DEMO-4", "male", 1972, 1.83, "Simulated, one sensor lost for ten seconds and noisy sensors.")
+VOLUNTEER = Person("REF-004", "female", 1989, 1.70, "Simulated. Healthy volunteer, no complaints.")
+STROKE = Person("NR-2107", "male", 1961, 1.76, "Simulated. Left hemiparesis, walks without an aid.")
+KNEE = Person("OR-1188", "female", 1974, 1.66, "Simulated. Left knee replaced, little flexion in swing.")
+NERVE = Person("NR-2133", "male", 1983, 1.81, "Simulated. Left peroneal palsy, drop foot.")
+PARKINSON = Person("NR-2090", "male", 1953, 1.72, "Simulated. Parkinson's disease, short quick steps.")
+CROUCH = Person("PD-0412", "female", 2009, 1.58, "Simulated. Bilateral cerebral palsy, crouch gait.")
+HIP = Person("OR-1203", "male", 1966, 1.79, "Simulated. Pain in the left hip, waiting for surgery.")
+FALLS = Person("GE-0317", "female", 1943, 1.62, "Simulated. Two falls in the last year.")
 
 VISITS = (
-    Visit(ADA, "Walk, comfortable", "comfortable", 3, 11),
-    Visit(BEN, "Walk, slow", "slow", 5, 21),
-    Visit(CLEO, "Walk, fast with turns", "fast_with_turns", 2, 31),
-    Visit(DAN, "Walk, one sensor lost", "lost_sensor", 8, 41),
-    Visit(ADA, "Walk, slow", "slow", 38, 12),
-    Visit(BEN, "Walk, slow", "slow", 47, 22),
-    Visit(CLEO, "Walk, comfortable", "comfortable", 30, 32),
-    Visit(DAN, "Walk, comfortable", "comfortable", 36, 42),
+    Visit(VOLUNTEER, "Reference walk, comfortable speed", "healthy", 3, 11),
+    Visit(STROKE, "Discharge from rehabilitation", "hemi_mild", 2, 22, "After six weeks of gait training."),
+    Visit(NERVE, "Barefoot, without orthosis", "drop_foot", 5, 41),
+    Visit(FALLS, "Falls clinic, corridor walk", "elderly", 6, 61, "Two sensors, feet only.", FEET),
+    Visit(HIP, "Before surgery, short set-up", "antalgic", 8, 71, "Pelvis and feet.", ("pelvis", *FEET)),
+    Visit(PARKINSON, "Medication review, on", "parkinson", 9, 51),
+    Visit(KNEE, "Twelve weeks after surgery", "stiff_knee", 12, 31),
+    Visit(
+        CROUCH,
+        "Annual review",
+        "crouch",
+        15,
+        81,
+        "The sensor on the left shank stopped in the second walk.",
+        fails=("shank_l", 18.0),
+    ),
+    Visit(STROKE, "Admission to rehabilitation", "hemiparetic", 44, 21),
+    Visit(VOLUNTEER, "Course with turns, fast", "fast_with_turns", 31, 12),
 )
+"""In the order of their analyses: the newest visit of each patient first."""
+
+
+def record(visit: Visit) -> Simulation:
+    """Simulate the take of a visit."""
+    from core.simulate import Dropout, simulate_scenario
+
+    fails = visit.fails and (Dropout(*visit.fails, end_s=inf),)
+    return simulate_scenario(visit.script, visit.seed, visit.person.height_m, worn=visit.worn, dropouts=fails)
 
 
 def fill(settings: Settings) -> None:
-    """Add all patients and visits and ask for their analyses, the newest visit of each patient first."""
-    from core.simulate import mt_files, simulate_scenario
+    """Add all patients and visits and ask for their analyses."""
+    from core.simulate import mt_files
 
     with closing(Database(settings.database)) as db:
         blobs = BlobStore(settings.blobs)
@@ -71,7 +111,7 @@ def fill(settings: Settings) -> None:
                 fields = {k: v for k, v in vars(person).items() if k != "code"}
                 known[person.code] = patients.create(c, None, code=person.code, **fields).id
         for visit in VISITS:
-            made = simulate_scenario(visit.script, visit.seed, visit.person.height_m)
+            made = record(visit)
             files = mt_files(made.recording, visit.script, made.first_counter)
             _add(db, blobs, settings, visit, known[visit.person.code], made.recording, files)
 
@@ -87,7 +127,7 @@ def _add(
 ) -> None:
     day = now().date() - dt.timedelta(days=visit.days_ago)
     with db.write() as c:
-        session = sessions.create(c, None, patient_id, title=visit.title, performed_on=day)
+        session = sessions.create(c, None, patient_id, title=visit.title, performed_on=day, note=visit.note)
     for name, content in files.items():
         with recordings.receive(db, blobs, settings, None, session.id, name) as upload:
             upload.write(content)

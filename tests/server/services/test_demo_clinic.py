@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from core.pipeline import analyse
+from server.services import patients, sessions
+from server.services.demo_clinic import VISITS, fill, record
+from server.settings import Settings
+from server.storage.db import Database
+from server.storage.migrate import upgrade
+
+
+def test_the_clinic_is_full_of_people_who_say_they_are_simulated(tmp_path: Path) -> None:
+    settings = Settings(data_dir=tmp_path, min_free_bytes=0)
+    upgrade(settings.database)
+    fill(settings)
+    with closing(Database(settings.database)) as db, db.read() as c:
+        listed = patients.listing(c)
+        visits = [v for p in listed for v in sessions.of_patient(c, p.id)]
+    assert sorted(v.title for v in visits) == sorted(v.title for v in VISITS)
+    assert all(v.state == "running" for v in visits)
+    assert all(p.note.startswith("Simulated.") for p in listed)
+    assert any(p.sessions == 2 for p in listed)
+
+
+@pytest.mark.parametrize(
+    ("script", "method", "reduced"),
+    [
+        ("hemiparetic", "erkf_smoothed", None),
+        ("antalgic", "l7s_3i", None),
+        ("elderly", "l7s_2i", None),
+        ("crouch", "l7s_3i", "sensor_failed"),
+    ],
+)
+def test_every_estimator_has_its_visit(script: str, method: str, reduced: str | None) -> None:
+    visit = next(v for v in VISITS if v.script == script)
+    made = analyse(record(visit).recording)
+    assert made.problem is None
+    assert made.poses is not None
+    assert (made.poses.method, made.poses.reduced) == (method, reduced)
