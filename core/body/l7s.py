@@ -7,6 +7,7 @@ A sparse mode of visibly lower accuracy: never take stride lengths from it where
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
@@ -24,6 +25,11 @@ __all__ = [
     "L7sInputs", "L7sParams", "L7sState", "L7sTrack", "LegModel", "Worn", "filter_block", "free_acceleration",
     "inputs_of", "l7s_poses", "start", "warm",
 ]  # fmt: skip
+
+STRETCHED_M: Final = 1e-6
+"""A leg this close to its full length is at the bound: the knee is within .2° of straight. The projection
+leaves 1e-4 m too much with one pass, 1e-8 with two (spec/estimators.md §4.5 counts that as "clip"); with this
+margin the count is the same for any number of passes."""
 
 
 def l7s_poses(
@@ -47,9 +53,9 @@ def l7s_poses(
     -------
     Poses in ISB frames, method "l7s_3i" or "l7s_2i", `contact` = steps. The feet's orientation is that of the
     constrained state and differs from the measured one by some degrees (spec/estimators.md §4.4).
-    Diagnostics by side: `clip_share`, samples with a foot in motion at which the leg is stretched and its
-    knee straight; `hinge_m`, `excess_m`, largest residuals of the constraints; `step_share`;
-    `foot_turned_rad`, mean angle from measured to reported.
+    Diagnostics by side: `knee_straight_share`, samples with a foot in motion at which the leg is at its full
+    length, so that the knee is a bound and no measurement; `hinge_m`, `excess_m`, largest residuals of the
+    constraints; `step_share`; `foot_turned_rad`, mean angle from measured to reported.
     At the end: `position_sd_m` by body, `min_eigenvalue` of P.
     A notice `foot_never_still` when a foot has no step.
 
@@ -82,7 +88,9 @@ def l7s_poses(
         notices=_never_still(steps),
         diagnostics={
             "adjoint": params.adjoint,
-            "clip_share": {s: float(np.mean((legs.reach[s] > length)[moving])) for s in LEGS},
+            "knee_straight_share": {
+                s: float(np.mean((legs.reach[s] > length - STRETCHED_M)[moving])) for s in LEGS
+            },
             "hinge_m": {s: float(np.abs(legs.hinge[s]).max()) for s in LEGS},
             "excess_m": {s: float(np.maximum(legs.reach[s] - length, 0.0).max()) for s in LEGS},
             "step_share": {s: float(np.mean(steps[s])) for s in LEGS},

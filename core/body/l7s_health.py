@@ -31,8 +31,8 @@ def l7s_health(poses: Poses) -> tuple[Finding, ...]:
             Finding("longest_moving_s", foot, moving, *LONGEST_MOVING_S),
             Finding("leg_excess_mm", leg, 1e3 * d["excess_m"][side], *CONSTRAINT_MM),
             Finding("hinge_mm", leg, 1e3 * d["hinge_m"][side], *CONSTRAINT_MM),
-            # the leg's length is only bounded from above: at the bound the knee is straight
-            Finding("knee_straight_pct", leg, 100.0 * d["clip_share"][side]),
+            # the leg's length is only bounded from above: at the bound the knee is straight, whatever it did
+            Finding("knee_straight_pct", leg, 100.0 * d["knee_straight_share"][side]),
             Finding("foot_turned_deg", foot, float(np.degrees(d["foot_turned_rad"][side]))),
         ]
     found.append(Finding("min_eigenvalue", None, float(d["min_eigenvalue"])))
