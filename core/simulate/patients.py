@@ -135,6 +135,7 @@ CROUCH: Final = Walker(
 )
 
 ANTALGIC: Final = Walker(
+    impact=0.7,
     sides=_sides(
         left=SideGait(
             length_factor=1.10,
@@ -168,6 +169,7 @@ PARKINSON: Final = Walker(
     obliquity_factor=0.5,
     tilt_rad=deg(-4.0),
     standing_knee_rad=deg(15.0),
+    impact=0.7,
     sides=_both(_PARKINSON_LEG),
 )
 
@@ -190,6 +192,7 @@ ELDERLY: Final = Walker(
     variability=ELDERLY_SPREAD,
     width_m=0.14,
     rotation_factor=0.8,
+    impact=0.7,
     sides=_both(
         SideGait(
             double_support=0.15,

@@ -1,4 +1,4 @@
-"""From a script to a recording with its truth: the one door of the simulator."""
+"""From the paths of sensors to a recording: errors, ranges, lagging clocks, lost packets."""
 
 from __future__ import annotations
 
@@ -9,26 +9,12 @@ from typing import Final
 
 import numpy as np
 
-from core.errors import ParameterError
 from core.formats.draft import signal_digest
-from core.frames import Bools, Floats, Segment
+from core.frames import Bools, Floats, Protocol, Segment
 from core.recording import ImuStream, Recording, Subject
-from core.simulate.human import move
-from core.simulate.script import Script, plan
-from core.simulate.sensors import (
-    MEMS,
-    PLACES,
-    DrawnErrors,
-    Sampling,
-    SensorNoise,
-    Signals,
-    draw_mounts,
-    ideal_signals,
-    with_errors,
-)
-from core.simulate.soft_tissue import SoftTissue
-from core.simulate.truth import Truth, truth_of
-from core.simulate.walker import Walker
+from core.simulate.mems import DrawnErrors, clipped, with_errors
+from core.simulate.sensors import Path, Signals, ideal_signals
+from core.simulate.setup import Setup
 
 FINE_RATE_HZ: Final = 400.0
 """The motion is worked out at least this fine, and at least four times as fine as the recording."""
@@ -37,117 +23,83 @@ BURST: Final = 3.0
 """Mean length of a run of lost packets, samples."""
 
 
-@dataclass(frozen=True)
-class Dropout:
-    """One sensor lost from `start_s` to `end_s`."""
+class Draws:
+    """Random numbers of one seed, a stream for each kind: another noise level leaves the steps alone."""
 
-    segment: Segment
-    start_s: float
-    end_s: float
-
-
-@dataclass(frozen=True)
-class Setup:
-    """How it is recorded.
-
-    Parameters
-    ----------
-    rate_hz : 20 to 1000. sampling : see `Sampling`. mount_spread_rad : sensors are turned by up to this.
-    noise : None for ideal sensors. tissue : None for sensors fixed to the bone.
-    packet_loss : share of lost samples, in short runs, 0 to 0.5.
-    worn : the sensors that are recorded.
-    """
-
-    rate_hz: float = 100.0
-    sampling: Sampling = "instant"
-    mount_spread_rad: float = pi
-    noise: SensorNoise | None = MEMS
-    tissue: SoftTissue | None = None
-    packet_loss: float = 0.0
-    dropouts: tuple[Dropout, ...] = ()
-    worn: tuple[Segment, ...] = tuple(PLACES)
-
-    def __post_init__(self) -> None:
-        if not 20.0 <= self.rate_hz <= 1000.0:
-            raise ParameterError(
-                "rate_range", f"Rate {self.rate_hz:g} Hz is outside the 20 to 1000 Hz we simulate."
-            )
-        if not 0.0 <= self.packet_loss <= 0.5:
-            raise ParameterError("loss_range", f"Packet loss {self.packet_loss:g} is outside 0 to 0.5.")
+    def __init__(self, seed: int) -> None:
+        streams = np.random.SeedSequence(seed).spawn(6)
+        self.steps, self.mounts, self.errors, self.losses, self.impacts, self.iron = (
+            np.random.default_rng(s) for s in streams
+        )
 
 
 @dataclass(frozen=True, eq=False)
-class Simulation:
-    """A recording, what really happened, and what ideal sensors would have measured.
+class Recorded:
+    """What the sensors made of a motion.
 
     Parameters
     ----------
-    ideal : segment → signals at every sample of `truth.t_s`, without errors or losses.
+    ideal : segment → signals at every sample of the common axis, without errors, lags or losses.
+    errors : segment → constant errors it was given. clipped : segment → (n,) samples beyond its range.
     first_counter : packet counter at t = 0, for rendering device files.
     """
 
     recording: Recording
-    truth: Truth
     ideal: Mapping[Segment, Signals]
+    errors: Mapping[Segment, DrawnErrors]
+    clipped: Mapping[Segment, Bools]
     first_counter: int
 
-    def peaks(self) -> dict[Segment, tuple[float, float]]:
-        """Segment → largest |specific force| in m/s² and |angular rate| in rad/s of the ideal signals."""
-        return {
-            segment: (
-                float(np.linalg.norm(s.acc, axis=1).max()),
-                float(np.linalg.norm(s.gyr, axis=1).max()),
-            )
-            for segment, s in self.ideal.items()
-        }
+
+def oversampling(rate_hz: float) -> int:
+    """Steps of the fine grid per sample."""
+    return max(4, ceil(FINE_RATE_HZ / rate_hz))
 
 
-def simulate(
-    script: Script, walker: Walker | None = None, seed: int = 0, setup: Setup | None = None
-) -> Simulation:
-    """Let a walker do a script with seven sensors on; the same arguments give the same bits.
+def record(
+    paths: Mapping[Segment, Path],
+    setup: Setup,
+    draws: Draws,
+    height_m: float | None = None,
+    protocol: Protocol = "walk",
+) -> Recorded:
+    """Record sensors on their ways.
 
     Parameters
     ----------
-    script : starts and ends with standing. walker : default is the healthy reference person.
-    seed : of everything drawn. Steps, mounts, errors and losses have their own streams of random numbers, so
-        another noise level does not change the steps.
-
-    Raises
-    ------
-    ParameterError : "script_standing", "script_item", "step_too_long".
+    paths : segment → path on the common grid, `oversampling` times as fine as the recording.
     """
-    walker, setup = walker or Walker(), setup or Setup()
-    of_steps, of_mounts, of_errors, of_losses = (
-        np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(4)
-    )
-    every = max(4, ceil(FINE_RATE_HZ / setup.rate_hz))
-    motion = move(plan(script, walker, of_steps), walker, every * setup.rate_hz)
-    mounts = draw_mounts(walker, setup.mount_spread_rad, of_mounts)
-    north = float(of_mounts.uniform(-pi, pi))
-    first_counter = int(of_mounts.integers(0, 1 << 16))
-    first_id = int(of_mounts.integers(0x00B40000, 0x00B4F000))
-    ids = of_mounts.permutation(np.arange(first_id, first_id + len(PLACES)))
+    every = oversampling(setup.rate_hz)
+    north = float(draws.mounts.uniform(-pi, pi))
+    first_counter = int(draws.mounts.integers(0, 1 << 16))
+    first_id = int(draws.mounts.integers(0x00B40000, 0x00B4F000))
+    ids = draws.mounts.permutation(np.arange(first_id, first_id + len(paths)))
 
-    t = motion.t_s[::every]
     ideal: dict[Segment, Signals] = {}
     errors: dict[Segment, DrawnErrors] = {}
+    beyond: dict[Segment, Bools] = {}
     streams: dict[str, ImuStream] = {}
-    worn: dict[str, Segment | None] = {}
-    for segment, number in zip(PLACES, ids, strict=True):
-        device = f"{number:08X}"
-        ideal[segment] = ideal_signals(
-            motion, segment, mounts[segment], setup.tissue, every, setup.sampling, north
-        )
-        measured = ideal[segment]
+    segments: dict[str, Segment | None] = {}
+    for (segment, path), number in zip(paths.items(), ids, strict=True):
+        t = path.t_s[::every]
+        ideal[segment] = measured = ideal_signals(path, every, setup.sampling, north, setup.dipoles)
+        if late := setup.late_s.get(segment, 0.0):
+            measured = ideal_signals(path.later(late), every, setup.sampling, north, setup.dipoles)
+        beyond[segment] = np.zeros(len(t), bool)
         if setup.noise is not None:
-            measured, errors[segment] = with_errors(measured, setup.noise, setup.rate_hz, of_errors)
-        arrived = _arrived(t, segment, setup, of_losses)
+            measured, errors[segment] = with_errors(
+                measured, setup.noise, setup.rate_hz, draws.errors, draws.iron
+            )
+            measured, beyond[segment] = clipped(measured, setup.acc_range, setup.gyr_range)
+        arrived = _arrived(t, segment, setup, draws.losses)
         if segment in setup.worn:
+            device = f"{number:08X}"
             streams[device] = _stream(device, t, measured, arrived, setup.rate_hz)
-            worn[device] = segment
-    recording = Recording(streams=streams, segments=worn, subject=Subject(height_m=walker.height_m))
-    return Simulation(recording, truth_of(motion, every, mounts, errors, seed), ideal, first_counter)
+            segments[device] = segment
+    recording = Recording(
+        streams=streams, segments=segments, subject=Subject(height_m=height_m), protocol=protocol
+    )
+    return Recorded(recording, ideal, errors, beyond, first_counter)
 
 
 def _arrived(t: Floats, segment: Segment, setup: Setup, rng: np.random.Generator) -> Bools:

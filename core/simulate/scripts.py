@@ -10,10 +10,11 @@ from typing import Final
 
 from core.errors import ParameterError
 from core.frames import Segment
+from core.simulate.mems import MEMS
 from core.simulate.patients import PATIENTS, Patient
-from core.simulate.recorder import Dropout, Setup, Simulation, simulate
 from core.simulate.script import Arc, Pivot, Script, Stand, Steps, Straight, scaled
-from core.simulate.sensors import MEMS
+from core.simulate.setup import Dropout, Setup
+from core.simulate.simulation import Simulation, simulate
 from core.simulate.soft_tissue import SoftTissue
 from core.simulate.walker import Walker
 

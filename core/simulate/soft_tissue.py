@@ -6,6 +6,7 @@ size is a judgement, real artefacts differ between people and places).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import radians
 from typing import Final
@@ -14,7 +15,6 @@ import numpy as np
 
 from core.frames import SHANK, SIDES, THIGH, Floats, Segment, Side
 from core.rotation import conjugate, exp, multiply, to_matrix
-from core.simulate.human import Motion
 from core.simulate.walker import SIGN
 
 SHANK_SHARE: Final = 0.6
@@ -34,12 +34,19 @@ class SoftTissue:
     shift_m: float = 0.010
 
 
-def skin_motion(motion: Motion, segment: Segment, tissue: SoftTissue) -> tuple[Floats, Floats] | None:
-    """Rotation (n, 4) and shift (n, 3) in m of the skin in segment axes; None on a stiff segment."""
+def skin_motion(
+    bones: Mapping[Segment, Floats], segment: Segment, tissue: SoftTissue
+) -> tuple[Floats, Floats] | None:
+    """Rotation (n, 4) and shift (n, 3) in m of the skin in segment axes; None on a stiff segment.
+
+    Parameters
+    ----------
+    bones : segment → (n, 4) orientations of the pelvis and the leg, standing at first.
+    """
     side = next((s for s in SIDES if segment in (THIGH[s], SHANK[s])), None)
     if side is None:
         return None
-    knee, hip = _flexions(motion, side)
+    knee, hip = _flexions(bones, side)
     bend = np.sin(knee)
     turn = np.stack((0.4 * bend, bend - 0.3 * hip, 0.5 * bend), axis=-1)
     shift = np.stack((bend, 0.7 * bend, 0.3 * hip), axis=-1)
@@ -51,10 +58,10 @@ def skin_motion(motion: Motion, segment: Segment, tissue: SoftTissue) -> tuple[F
     return exp(share * tissue.turn_rad * (turn - turn[0])), tissue.shift_m * (shift - shift[0])
 
 
-def _flexions(motion: Motion, side: Side) -> tuple[Floats, Floats]:
+def _flexions(bones: Mapping[Segment, Floats], side: Side) -> tuple[Floats, Floats]:
     """Knee and hip flexion (n,) in rad."""
-    thigh = motion.q[THIGH[side]]
-    knee = multiply(conjugate(thigh), motion.q[SHANK[side]])
-    hip = to_matrix(multiply(conjugate(motion.q["pelvis"]), thigh))
+    thigh = bones[THIGH[side]]
+    knee = multiply(conjugate(thigh), bones[SHANK[side]])
+    hip = to_matrix(multiply(conjugate(bones["pelvis"]), thigh))
     # the knee is a hinge about z, turned backwards in flexion
     return 2.0 * np.arctan2(-knee[:, 3], knee[:, 0]), np.arctan2(-hip[:, 0, 1], hip[:, 1, 1])

@@ -36,3 +36,9 @@ def sign_continuous(q: Floats) -> Floats:
     """The same rotations (n, 4) without sign flips from sample to sample."""
     flips = np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0)
     return q * np.concatenate(([1.0], np.cumprod(flips)))[:, None]
+
+
+def resampled(t: Floats, p: Floats, q: Floats, at: Floats) -> tuple[Floats, Floats]:
+    """The pose between its samples: p (m, 3) and unit q (m, 4) at times `at` (m,) within those of t."""
+    pose = make_interp_spline(t, np.column_stack((p, q)), k=5)(at)
+    return np.ascontiguousarray(pose[:, :3]), normalise(pose[:, 3:])

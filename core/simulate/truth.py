@@ -15,8 +15,9 @@ from core.body.model import BodyModel
 from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
 from core.rotation import to_matrix
 from core.simulate.human import Motion
+from core.simulate.mems import DrawnErrors
 from core.simulate.script import Footprint
-from core.simulate.sensors import DrawnErrors, Mount
+from core.simulate.sensors import Mount
 from core.simulate.timing import FootTiming
 from core.simulate.walker import SIGN
 

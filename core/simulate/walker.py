@@ -127,6 +127,7 @@ class Walker:
     tibial_rotation_rad : internal rotation of the shank that comes with a right angle at the knee.
     lands_rising : the foot pitches up until it touches the floor. People differ in this, and event rules
         that look for the largest pitch are early by up to 0.1 s without it (spec/patients.md §3).
+    impact : how hard the feet land, 1 = as most people at 1.2 m/s.
     """
 
     height_m: float = REFERENCE_HEIGHT_M
@@ -144,6 +145,7 @@ class Walker:
     obliquity_factor: float = 1.0
     tibial_rotation_rad: float = 0.0
     lands_rising: bool = True
+    impact: float = 1.0
     variability: Variability = Variability()
 
     @classmethod

@@ -9,13 +9,18 @@ from core.errors import ParameterError
 from core.frames import FOOT, GRAVITY, SIDES, Floats, Segment
 from core.rotation import angle_between, conjugate, exp, multiply, rotate
 from core.simulate import Dropout, Script, SensorNoise, Setup, Simulation, Stand, Straight, Walker, simulate
-from core.simulate.sensors import Signals, with_errors
+from core.simulate.mems import with_errors
+from core.simulate.sensors import Signals
 
 SHORT: Script = (Stand(3.0), Straight(5.0, 0.6, 0.54), Stand(2.0))
 
 
 def _sensor_orientation(simulation: Simulation, segment: Segment) -> Floats:
     return multiply(simulation.truth.q[segment], simulation.truth.mounts[segment].q_segment_sensor)
+
+
+def _streams(seed: int) -> tuple[np.random.Generator, np.random.Generator]:
+    return np.random.default_rng(seed), np.random.default_rng(seed + 1000)
 
 
 def _fingerprint(simulation: Simulation) -> str:
@@ -99,11 +104,11 @@ def test_the_field_is_constant_in_the_world(mixed: Simulation) -> None:
 def test_errors_are_of_the_declared_size() -> None:
     still = Signals(*(np.zeros((20_000, 3)) for _ in range(3)))
     noise = SensorNoise(gyr_walk=0.0, acc_walk=0.0)
-    measured, drawn = with_errors(still, noise, 100.0, np.random.default_rng(1))
+    measured, drawn = with_errors(still, noise, 100.0, *_streams(1))
     assert measured.gyr.mean(axis=0) == pytest.approx(drawn.gyr_bias, abs=1e-4)
     assert (measured.gyr - drawn.gyr_bias).std() == pytest.approx(10.0 * noise.gyr_density, rel=0.02)
     assert (measured.acc - drawn.acc_bias).std() == pytest.approx(10.0 * noise.acc_density, rel=0.02)
-    biases = [with_errors(still, noise, 100.0, np.random.default_rng(s))[1].gyr_bias for s in range(60)]
+    biases = [with_errors(still, noise, 100.0, *_streams(s))[1].gyr_bias for s in range(60)]
     assert np.std(biases) == pytest.approx(noise.gyr_bias, rel=0.2)
 
 

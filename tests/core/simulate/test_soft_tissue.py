@@ -16,14 +16,14 @@ STIFF = np.array([1.0, 0.0, 0.0, 0.0])
 
 @pytest.mark.parametrize("segment", ["pelvis", "foot_l", "foot_r"])
 def test_pelvis_and_feet_are_stiff(steady_motion: Motion, segment: Segment) -> None:
-    assert skin_motion(steady_motion, segment, SoftTissue()) is None
+    assert skin_motion(steady_motion.q, segment, SoftTissue()) is None
 
 
 @pytest.mark.parametrize(("segment", "least", "most"), [("thigh_r", 1.5, 4.0), ("shank_l", 0.9, 2.4)])
 def test_skin_is_at_rest_in_standing_and_moves_in_walking(
     steady_motion: Motion, segment: Segment, least: float, most: float
 ) -> None:
-    moved = skin_motion(steady_motion, segment, SoftTissue())
+    moved = skin_motion(steady_motion.q, segment, SoftTissue())
     assert moved is not None
     turn, shift = np.degrees(angle_between(moved[0], STIFF)), np.linalg.norm(moved[1], axis=1)
     standing = steady_motion.t_s < 3.0
@@ -34,7 +34,7 @@ def test_skin_is_at_rest_in_standing_and_moves_in_walking(
 
 
 def test_left_and_right_are_mirror_images(steady_motion: Motion) -> None:
-    left, right = (skin_motion(steady_motion, s, SoftTissue()) for s in ("thigh_l", "thigh_r"))
+    left, right = (skin_motion(steady_motion.q, s, SoftTissue()) for s in ("thigh_l", "thigh_r"))
     assert left is not None
     assert right is not None
     # half a stride apart: compare what each goes through in the middle of the walk

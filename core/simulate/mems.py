@@ -1,0 +1,97 @@
+"""What a MEMS device makes of a signal: noise, biases that wander, scale errors, hard iron and its range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from math import radians
+from typing import Final
+
+import numpy as np
+
+from core.frames import GRAVITY, Bools, Floats
+from core.simulate.sensors import Signals
+
+ACC_RANGE: Final = 16.0 * GRAVITY
+GYR_RANGE: Final = radians(2000.0)
+"""Full scales of today's wearables, m/s² and rad/s."""
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Errors of one sensor; densities are per √Hz, walks per √s (spec/estimators.md §2.2 "MEMS").
+
+    Parameters
+    ----------
+    gyr_bias, acc_bias, gyr_scale, acc_scale, hard_iron : standard deviations of constants drawn once per
+        axis.
+    mag_density, hard_iron : of a field with strength 1 (iron: our choice; sensors leave the maker with little
+        of it, what they are fixed to may bring more).
+    """
+
+    gyr_density: float = radians(0.01)
+    gyr_bias: float = radians(0.3)
+    gyr_walk: float = radians(0.003)
+    gyr_scale: float = 0.002
+    acc_density: float = 150e-6 * GRAVITY
+    acc_bias: float = 0.02
+    acc_walk: float = 2e-4
+    acc_scale: float = 0.002
+    mag_density: float = 2e-4
+    hard_iron: float = 0.02
+
+    def times(self, k: float) -> SensorNoise:
+        """All errors k times as large."""
+        return SensorNoise(**{f.name: k * getattr(self, f.name) for f in fields(self)})
+
+
+MEMS: Final = SensorNoise()
+"""A body-worn MEMS device of today."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnErrors:
+    """Constant errors a sensor was given, all (3,): true = (measured − bias) / scale; hard iron is added."""
+
+    gyr_bias: Floats
+    gyr_scale: Floats
+    acc_bias: Floats
+    acc_scale: Floats
+    hard_iron: Floats
+
+
+def with_errors(
+    ideal: Signals, noise: SensorNoise, rate_hz: float, rng: np.random.Generator, of_iron: np.random.Generator
+) -> tuple[Signals, DrawnErrors]:
+    """Add scale errors, constant and wandering biases, white noise and hard iron.
+
+    Parameters
+    ----------
+    of_iron : a stream of its own, so that magnets leave accelerometer and gyroscope as they are.
+    """
+    shape = ideal.acc.shape
+    drawn = DrawnErrors(
+        gyr_bias=rng.normal(0.0, noise.gyr_bias, 3),
+        gyr_scale=1.0 + rng.normal(0.0, noise.gyr_scale, 3),
+        acc_bias=rng.normal(0.0, noise.acc_bias, 3),
+        acc_scale=1.0 + rng.normal(0.0, noise.acc_scale, 3),
+        hard_iron=of_iron.normal(0.0, noise.hard_iron, 3),
+    )
+    root = np.sqrt(rate_hz)
+
+    def wander(walk: float, density: float) -> Floats:
+        return np.cumsum(rng.normal(0.0, walk / root, shape), axis=0) + rng.normal(0.0, density * root, shape)
+
+    gyr = ideal.gyr * drawn.gyr_scale + drawn.gyr_bias + wander(noise.gyr_walk, noise.gyr_density)
+    acc = ideal.acc * drawn.acc_scale + drawn.acc_bias + wander(noise.acc_walk, noise.acc_density)
+    mag = ideal.mag + drawn.hard_iron + rng.normal(0.0, noise.mag_density * root, shape)
+    return Signals(acc, gyr, mag), drawn
+
+
+def clipped(signals: Signals, acc_range: float, gyr_range: float) -> tuple[Signals, Bools]:
+    """The signals held within the ranges (m/s², rad/s per axis), and where (n,) any axis was beyond."""
+    too_much = (np.abs(signals.acc) > acc_range) | (np.abs(signals.gyr) > gyr_range)
+    beyond: Bools = np.any(too_much, axis=1)
+    if not beyond.any():
+        return signals, beyond
+    acc, gyr = np.clip(signals.acc, -acc_range, acc_range), np.clip(signals.gyr, -gyr_range, gyr_range)
+    return Signals(acc, gyr, signals.mag), beyond

@@ -1,0 +1,73 @@
+"""How a simulated take is recorded: rate, sensors, their errors, and what goes wrong on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import pi
+from types import MappingProxyType
+
+from core.errors import ParameterError
+from core.frames import SEGMENTS, Segment
+from core.simulate.magnetics import Dipole
+from core.simulate.mems import ACC_RANGE, GYR_RANGE, MEMS, SensorNoise
+from core.simulate.sensors import Sampling
+from core.simulate.soft_tissue import SoftTissue
+
+
+@dataclass(frozen=True)
+class Dropout:
+    """One sensor lost from `start_s` to `end_s`."""
+
+    segment: Segment
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class Setup:
+    """How it is recorded.
+
+    Parameters
+    ----------
+    rate_hz : 20 to 1000. sampling : see `Sampling`. mount_spread_rad : sensors are turned by up to this.
+    noise : None for ideal sensors. tissue : None for sensors fixed to the bone.
+    impacts : contacts of the feet shake the sensors.
+    acc_range, gyr_range : full scale per axis, m/s² and rad/s; real sensors cut off what is beyond.
+    dipoles : iron in the room. packet_loss : share of lost samples, in short runs, 0 to 0.5.
+    late_s : segment → by how much the clock of its sensor lags, so that its samples come that much later on
+        the common axis than what they show happened; at most 1 s.
+    worn : the sensors that are recorded.
+    """
+
+    rate_hz: float = 100.0
+    sampling: Sampling = "instant"
+    mount_spread_rad: float = pi
+    noise: SensorNoise | None = MEMS
+    tissue: SoftTissue | None = None
+    impacts: bool = False
+    acc_range: float = ACC_RANGE
+    gyr_range: float = GYR_RANGE
+    dipoles: tuple[Dipole, ...] = ()
+    packet_loss: float = 0.0
+    dropouts: tuple[Dropout, ...] = ()
+    late_s: Mapping[Segment, float] = field(default_factory=lambda: MappingProxyType({}))
+    worn: tuple[Segment, ...] = SEGMENTS
+
+    def __post_init__(self) -> None:
+        if not 20.0 <= self.rate_hz <= 1000.0:
+            raise ParameterError(
+                "rate_range", f"Rate {self.rate_hz:g} Hz is outside the 20 to 1000 Hz we simulate."
+            )
+        if not 0.0 <= self.packet_loss <= 0.5:
+            raise ParameterError("loss_range", f"Packet loss {self.packet_loss:g} is outside 0 to 0.5.")
+        if not (self.acc_range > 0.0 and self.gyr_range > 0.0):
+            raise ParameterError(
+                "range_not_positive",
+                f"Ranges {self.acc_range:g} m/s² and {self.gyr_range:g} rad/s; expected above 0.",
+            )
+        for segment, late in self.late_s.items():
+            if not abs(late) <= 1.0:
+                raise ParameterError(
+                    "clock_offset_range", f"The clock at {segment} lags {late:g} s; expected −1 to 1 s."
+                )

@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core.errors import ParameterError
+from core.frames import Floats, Segment
+from core.rotation import multiply, rotate
+from core.simulate import Dipole, SensorNoise, Setup, Simulation, Stand, Straight, simulate
+from core.simulate.magnetics import FIELD_DIP, IRON_SIZE_M, earth_field, field_at
+
+SCRIPT = (Stand(3.0), Straight(6.4, 0.64, 0.54), Stand(2.0))
+BESIDE = Dipole((3.0, 0.6, 0.4), (0.0, 0.05, 0.0))
+"""Something like a steel cabinet beside the walkway: 0.2 to 0.5 of the Earth's field at the nearest leg."""
+
+
+def _world_field(made: Simulation, segment: Segment) -> Floats:
+    q = multiply(made.truth.q[segment], made.truth.mounts[segment].q_segment_sensor)
+    return rotate(q, made.ideal[segment].mag)
+
+
+def test_the_earth_field_points_down_in_the_north() -> None:
+    field = earth_field(0.5)
+    assert np.linalg.norm(field) == pytest.approx(1.0)
+    assert np.arctan2(field[1], field[0]) == pytest.approx(0.5)
+    assert np.arcsin(-field[2]) == pytest.approx(FIELD_DIP)
+
+
+def test_a_dipole_has_the_field_of_a_dipole() -> None:
+    """Twice the moment on the axis at 1 m, minus the moment beside it, an eighth at double the distance."""
+    thing = (Dipole((1.0, 2.0, 0.5), (0.0, 0.0, 0.03)),)
+    places = np.array([[1.0, 2.0, 1.5], [2.0, 2.0, 0.5], [1.0, 2.0, 2.5]])
+    extra = field_at(places, 0.0, thing) - earth_field(0.0)
+    expected = np.array([[0.0, 0.0, 0.06], [0.0, 0.0, -0.03], [0.0, 0.0, 0.06 / 8.0]])
+    assert extra == pytest.approx(expected, abs=1e-12)
+
+
+def test_its_field_has_no_sources_and_no_currents() -> None:
+    """Divergence and curl by central differences vanish outside the thing."""
+    thing, here, h = (BESIDE,), np.array([2.2, 0.1, 0.9]), 1e-4
+    jacobian = np.empty((3, 3))
+    for k in range(3):
+        step = h * np.eye(3)[k]
+        ahead, behind = field_at(np.array([here + step, here - step]), 0.0, thing)
+        jacobian[:, k] = (ahead - behind) / (2.0 * h)
+    assert np.trace(jacobian) == pytest.approx(0.0, abs=1e-6)
+    assert jacobian == pytest.approx(jacobian.T, abs=1e-6)
+
+
+def test_the_field_stays_finite_in_the_thing_itself() -> None:
+    places = np.array([BESIDE.position_m, np.add(BESIDE.position_m, [0.0, 0.3 * IRON_SIZE_M, 0.0])])
+    assert np.isfinite(field_at(places, 0.0, (BESIDE,))).all()
+
+
+def test_the_field_bends_where_the_iron_is_and_nowhere_else() -> None:
+    made = simulate(SCRIPT, seed=5, setup=Setup(noise=None, dipoles=(BESIDE,)))
+    field = _world_field(made, "shank_l")
+    away = np.linalg.norm(made.truth.p["shank_l"] - BESIDE.position_m, axis=1)
+    strength = np.abs(np.linalg.norm(field, axis=1) - 1.0)
+    assert strength[away < 0.9].max() > 0.1
+    assert strength[away > 2.5].max() < 0.01
+    assert np.corrcoef(away[away < 2.0], strength[away < 2.0])[0, 1] < -0.5
+
+
+def test_iron_in_the_room_leaves_the_other_signals_alone() -> None:
+    plain, disturbed = (simulate(SCRIPT, seed=5, setup=Setup(dipoles=d)) for d in ((), (BESIDE,)))
+    for device, stream in plain.recording.streams.items():
+        other = disturbed.recording.streams[device]
+        assert np.array_equal(stream.acc, other.acc)
+        assert stream.gyr is not None
+        assert other.gyr is not None
+        assert np.array_equal(stream.gyr, other.gyr)
+        assert stream.mag is not None
+        assert other.mag is not None
+        assert not np.array_equal(stream.mag, other.mag)
+
+
+def test_hard_iron_is_a_constant_in_the_sensor() -> None:
+    noise = SensorNoise(mag_density=0.0, hard_iron=0.1)
+    made = simulate(SCRIPT, seed=6, setup=Setup(noise=noise))
+    for device, segment in made.recording.segments.items():
+        assert segment is not None
+        mag = made.recording.streams[device].mag
+        assert mag is not None
+        drawn = made.truth.errors[segment].hard_iron
+        assert mag - made.ideal[segment].mag == pytest.approx(np.tile(drawn, (len(mag), 1)), abs=1e-12)
+        assert np.abs(drawn).max() > 0.0
+
+
+def test_a_dipole_that_is_not_a_number_is_refused() -> None:
+    with pytest.raises(ParameterError) as caught:
+        Dipole((float("nan"), 0.0, 0.0), (0.0, 0.0, 1.0))
+    assert caught.value.code == "dipole_not_finite"
