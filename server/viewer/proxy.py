@@ -1,8 +1,10 @@
 """The routes of the 3D replay: the viewer page, the pipe to its viser server, and the time cursor.
 
     WS  /sessions/{sid}/replay?tab=…&dark=…   the time cursor; the page around owns the clock
-            sends {"t": seconds} or {"dark": true|false}
-            first answer {"view": id, "src": "/views/<id>/", "start_s", "duration_s"},
+            sends {"t": seconds}, or true|false for one of "dark", "follow" (the person, else the whole walk
+            is in the picture) and "ground" (footprints and trails)
+            first answer {"view": id, "src": "/views/<id>/", "start_s", "duration_s",
+            "placed": positions are where the person was, "measured": sensors support all of the figure},
             then {"t": shown, "valid": bool} for every {"t"}
     GET /views/{view}/   viser's own client page, for an iframe
     WS  /views/{view}    the pipe; the client finds it from its own address
@@ -17,7 +19,7 @@ import contextlib
 import functools
 import json
 import math
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -34,6 +36,7 @@ from server.auth.roles import Action
 from server.problems import Problem, as_problem
 from server.report.bundle import read_poses
 from server.services import analyses
+from server.viewer.figure import Figure
 from server.viewer.motion import Motion, prepare
 from server.viewer.pipe import POLICY_VIOLATION, Activity, carry, subprotocols_of, until_over, upstream
 from server.viewer.views import View, Views
@@ -52,6 +55,12 @@ browser's console says so once.
 _HIDE_PANEL = "<style>.mantine-Paper-root,.mantine-Notifications-root{display:none!important}</style>"
 _GONE = 4404
 """Close code: the view is not there (any more); the page around should connect again."""
+
+_SWITCHES: Mapping[str, Callable[[Figure, bool], None]] = {
+    "dark": Figure.set_dark,
+    "follow": Figure.set_follow,
+    "ground": Figure.set_ground,
+}
 
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
 
@@ -132,6 +141,8 @@ async def replay(
                 "src": f"/views/{view.id}/",
                 "start_s": float(motion.t_s[0]),
                 "duration_s": motion.duration_s,
+                "placed": motion.placed,
+                "measured": motion.measured,
             }
         )
         cursor = asyncio.create_task(_follow(ws, view, Activity(lambda: logins.touch(who.login_id))))
@@ -179,15 +190,16 @@ def _act(view: View, text: str) -> dict[str, Any]:
         message = json.loads(text)
     except ValueError:
         message = None
-    if isinstance(message, dict):
-        t, dark = message.get("t"), message.get("dark")
-        if isinstance(t, (int, float)) and not isinstance(t, bool) and math.isfinite(t):
-            shown = view.figure.pose(float(t))
+    if isinstance(message, dict) and len(message) == 1:
+        ((name, value),) = message.items()
+        if name == "t" and type(value) in (int, float) and math.isfinite(value):
+            shown = view.figure.pose(float(value))
             return {"t": shown, "valid": view.figure.is_valid(shown)}
-        if isinstance(dark, bool):
-            view.figure.set_dark(dark)
-            return {"dark": dark}
-    detail = 'Expected {"t": seconds} or {"dark": true or false}.'
+        switch = _SWITCHES.get(name)
+        if switch and isinstance(value, bool):
+            switch(view.figure, value)
+            return {name: value}
+    detail = f'Expected {{"t": seconds}}, or true or false for one of {", ".join(_SWITCHES)}.'
     return {"error": {"code": "bad_message", "detail": detail}}
 
 

@@ -1,4 +1,4 @@
-"""The few meshes the figure is made of, each drawn many times: bone, ball, shoe, disc.
+"""The few meshes the figure is made of, each drawn many times: bone, ball, shoe, footprint.
 
 All are (vertices (n, 3) float32, faces (m, 3) uint32), outward facing, made once at import of the viewer.
 """
@@ -9,6 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+
+from core.frames import Side
 
 Mesh = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
@@ -27,9 +29,24 @@ def ball(rings: int = 14, sides: int = 28) -> Mesh:
     return _turned([(np.cos(a), np.sin(a)) for a in u], sides)
 
 
-def disc(sides: int = 36) -> Mesh:
-    """Flat disc of radius 1 facing +z."""
-    return _turned([(1.0, 0.0), (0.0, 0.0)], sides)
+def footprint(length: float, side: Side, points: int = 48) -> Mesh:
+    """Outline of a sole lying flat, facing +z: x to the toes, z = 0, origin in the middle of its length.
+
+    Narrow at the arch on the inner side, the toes drawn inwards; proportions are for the eye only.
+    """
+    s = -np.cos(np.linspace(0.0, np.pi, points))
+    half = (0.155 + 0.025 * s) * np.sqrt(1.0 - s**4)
+    arch = np.exp(-(((s + 0.1) / 0.32) ** 2))
+    inwards = 0.02 * s + 0.02 * s**2
+    outer, inner = half * (1.0 - 0.12 * arch) - inwards, half * (1.0 - 0.5 * arch) + inwards
+    left, right = (inner, outer) if side == "right" else (outer, inner)
+    edges = [np.stack((0.5 * s, y, 0.0 * s), axis=1) for y in (left, -right)]
+    vertices = length * np.concatenate(edges)
+    i = np.arange(points - 1)
+    faces = np.concatenate(
+        (np.stack((i, points + i, points + i + 1), axis=1), np.stack((i, points + i + 1, i + 1), axis=1))
+    )
+    return vertices.astype(np.float32), faces.astype(np.uint32)
 
 
 def shoe(length: float, ankle_height: float, sides: int = 24) -> Mesh:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from server.viewer.figure import TINTS
+from server.viewer.colours import TINTS
 from tests.server.viewer.conftest import Ward
 
 CHROMIUM = Path("/usr/bin/chromium")

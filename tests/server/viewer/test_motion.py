@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,21 +9,17 @@ from core import rotation
 from core.body.poses import Poses
 from core.errors import ParameterError
 from core.frames import FOOT, SIDES, Segment
-from server.viewer.figure import TINTS, linear
+from server.viewer.colours import TINTS, linear
 from server.viewer.motion import Motion, prepare
 from tests.server import walk
 
 
 def subset(poses: Poses, *segments: Segment) -> Poses:
-    return Poses(
-        poses.t_s,
-        poses.rate_hz,
-        {s: poses.q[s] for s in segments},
-        {s: poses.p[s] for s in segments},
-        poses.valid,
-        {s: c for s, c in poses.contact.items() if s in segments},
-        poses.body,
-        poses.method,
+    return replace(
+        poses,
+        q={s: poses.q[s] for s in segments},
+        p={s: poses.p[s] for s in segments},
+        contact={s: c for s, c in poses.contact.items() if s in segments},
     )
 
 
@@ -80,12 +78,29 @@ def test_the_figure_stays_in_view_while_its_sway_is_kept(motion: Motion) -> None
     assert 0.01 < np.abs(offset[:, 1]).max() < 0.04
 
 
-def test_a_print_lies_under_each_contact(motion: Motion) -> None:
-    for side in SIDES:
-        start, place = motion.prints[side]
-        assert len(start) == len(place) >= 10
-        steps = np.diff(place[1:-1, 0])
-        np.testing.assert_allclose(steps, 1.2 * walk.STRIDE_S, atol=0.1)
+def test_positions_that_are_for_the_eye_only_leave_no_trail() -> None:
+    poses = walk.poses(3.0)
+    seen = prepare(replace(poses, method="stance_foot_anchor"))
+    assert not seen.placed
+    assert seen.trails == {}
+    assert set(seen.prints) == {"left", "right"}
+    assert set(prepare(replace(poses, method="erkf_smoothed")).trails) == {"left", "right"}
+
+
+@pytest.mark.parametrize(
+    ("method", "measured"),
+    [
+        ("erkf_smoothed", {"pelvis", "thigh", "shank", "foot"}),
+        ("l7s_3i", {"pelvis", "foot"}),
+        ("l7s_2i", {"foot"}),
+    ],
+)
+def test_what_no_sensor_supports_is_marked(method: str, measured: set[str]) -> None:
+    seen = prepare(replace(walk.poses(3.0), method=method))
+    thigh, shank, foot, pelvis = (x in measured for x in ("thigh", "shank", "foot", "pelvis"))
+    assert seen.batches["bones"].measured == (thigh, shank, thigh, shank, pelvis, pelvis)
+    assert seen.batches["shoes"].measured == (foot, foot)
+    assert seen.measured == (thigh and pelvis)
 
 
 def test_lost_samples_are_marked_and_never_nan() -> None:

@@ -49,10 +49,15 @@ async def test_replay_poses_the_figure_at_the_time_of_the_page(ward: Ward) -> No
         assert opened["duration_s"] == pytest.approx(11.98)
         assert await ask(ws, {"t": 3.001}) == {"t": pytest.approx(3.0), "valid": True}
         assert (await ask(ws, {"t": 1e9}))["t"] == pytest.approx(11.98)
-        assert await ask(ws, {"dark": True}) == {"dark": True}
+        assert opened["placed"] is opened["measured"] is True
+        for switch in ("dark", "follow", "ground"):
+            assert await ask(ws, {switch: True}) == {switch: True}
+            assert await ask(ws, {switch: False}) == {switch: False}
 
 
-@pytest.mark.parametrize("message", ["", "[]", '{"t": NaN}', '{"t": "1"}', '{"t": true}', '{"x": 1}', "{"])
+@pytest.mark.parametrize(
+    "message", ["", "[]", '{"t": NaN}', '{"t": "1"}', '{"t": true}', '{"x": 1}', '{"follow": 1}', "{"]
+)
 async def test_a_message_that_makes_no_sense_is_answered_not_fatal(ward: Ward, message: str) -> None:
     async with replaying(ward, ward.cookie(), tab="odd") as (ws, _):
         answer = await ask(ws, message)

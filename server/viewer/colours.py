@@ -1,0 +1,40 @@
+"""Colours of the scene, sRGB."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final, Literal
+
+import numpy as np
+
+Rgb = tuple[int, int, int]
+Tint = Literal["left", "right", "body", "joint"]
+
+TINTS: Final[Mapping[Tint, Rgb]] = {
+    "left": (0xD5, 0x5E, 0x00),
+    "right": (0x00, 0x72, 0xB2),
+    "body": (0x6B, 0x76, 0x82),
+    "joint": (0xEC, 0xEE, 0xF1),
+}
+"""The leg pair is that of the charts (experience.md)."""
+
+BACKGROUND: Final[Mapping[bool, Rgb]] = {False: (0xF9, 0xFA, 0xFB), True: (0x16, 0x1C, 0x22)}
+"""Dark → colour behind the figure."""
+
+FLOOR: Final[Mapping[bool, tuple[Rgb, Rgb]]] = {
+    False: ((0xE2, 0xE6, 0xEA), (0xC2, 0xCA, 0xD2)),
+    True: ((0x2A, 0x32, 0x3B), (0x45, 0x50, 0x5C)),
+}
+"""Dark → lines of the floor's cells and sections."""
+
+
+def linear(colour: Rgb) -> Rgb:
+    """Turn sRGB into the linear RGB that viser expects per instance of a batch (0 to 255).
+
+    A colour per mesh is taken as sRGB, a colour per instance is not: unconverted it looks washed out.
+    Formula: IEC 61966-2-1.
+    """
+    c = np.asarray(colour) / 255.0
+    out = np.where(c > 0.04045, ((c + 0.055) / 1.055) ** 2.4, c / 12.92)
+    r, g, b = (round(float(v) * 255) for v in out)
+    return r, g, b

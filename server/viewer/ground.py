@@ -1,0 +1,117 @@
+"""What the walk leaves on the floor of a scene: footprints and the trails of the feet, up to a moment.
+
+A trail is cut into chunks that are sent once and only switched on; at a moment only the unfinished chunk is
+sent, so that a frame costs the same at the end of a long take as at its start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import viser
+
+from core.frames import Side
+from server.viewer import shapes
+from server.viewer.colours import TINTS, linear
+from server.viewer.motion import Motion
+from server.viewer.steps import Prints, Single, Trail
+
+CHUNK = 128
+"""Pieces of a trail per scene node, about four strides."""
+
+PLAIN_PRINTS = 3
+"""Footprints kept per side where positions are for the eye only, latest first."""
+
+_PIXELS = 1.6
+_OPACITY = 0.5
+
+
+class Ground:
+    """Prints and trails of a motion in one scene.
+
+    Parameters
+    ----------
+    parent : name of the scene node that carries the room.
+    """
+
+    def __init__(self, scene: viser.SceneApi, parent: str, motion: Motion) -> None:
+        self._all = scene.add_frame(f"{parent}/ground", show_axes=False)
+        length = motion.body.foot
+        keep = None if motion.placed else PLAIN_PRINTS
+        self._parts: list[_Prints | _Trail] = [
+            *(
+                _Prints(scene, self._all.name, s, x, length, keep)
+                for s, x in motion.prints.items()
+                if len(x.t_s)
+            ),
+            *(_Trail(scene, self._all.name, s, x) for s, x in motion.trails.items() if len(x.t_s)),
+        ]
+
+    def show(self, t_s: float) -> None:
+        """Show what has been left until a time."""
+        for part in self._parts:
+            part.show(t_s)
+
+    def set_visible(self, visible: bool) -> None:
+        """Show or hide everything."""
+        self._all.visible = visible
+
+
+class _Prints:
+    def __init__(
+        self, scene: viser.SceneApi, parent: str, side: Side, prints: Prints, length: float, keep: int | None
+    ) -> None:
+        self._t_s, self._keep = prints.t_s, keep
+        self._node = scene.add_batched_meshes_simple(
+            f"{parent}/prints_{side}",
+            *shapes.footprint(length, side),
+            prints.wxyz,
+            prints.position,
+            batched_scales=np.zeros(len(prints.t_s), np.float32),
+            batched_colors=linear(TINTS[side]),
+            opacity=_OPACITY,
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+    def show(self, t_s: float) -> None:
+        seen = int(np.searchsorted(self._t_s, t_s, side="right"))
+        scales = np.zeros(len(self._t_s), np.float32)
+        scales[0 if self._keep is None else max(0, seen - self._keep) : seen] = 1.0
+        self._node.batched_scales = scales
+
+
+class _Trail:
+    def __init__(self, scene: viser.SceneApi, parent: str, side: Side, trail: Trail) -> None:
+        self._trail = trail
+        self._done = 0
+
+        def node(name: str, pieces: Single) -> viser.LineSegmentsHandle:
+            return scene.add_line_segments(
+                f"{parent}/trail_{side}_{name}",
+                pieces,
+                TINTS[side],
+                thickness=_PIXELS,
+                thickness_units="screen",
+                visible=False,
+            )
+
+        whole = range(0, len(trail.t_s) - CHUNK + 1, CHUNK)
+        self._chunks = [node(str(k), trail.pieces[k : k + CHUNK]) for k in whole]
+        self._rest = node("rest", trail.pieces[:1])
+
+    def show(self, t_s: float) -> None:
+        seen = int(np.searchsorted(self._trail.t_s, t_s, side="right"))
+        done = seen // CHUNK
+        for k in _between(self._done, done):
+            self._chunks[k].visible = k < done
+        self._done = done
+        self._rest.visible = seen > done * CHUNK
+        if self._rest.visible:
+            self._rest.points = self._trail.pieces[done * CHUNK : seen]
+
+
+def _between(a: int, b: int) -> Iterable[int]:
+    return range(min(a, b), max(a, b))

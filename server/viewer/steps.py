@@ -1,0 +1,94 @@
+"""Where the feet went and where they rested, laid out once so that a moment of the replay is only a count."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core import rotation
+from core.body.model import BodyModel
+from core.frames import Bools, Floats
+
+PIECE_M = 0.05
+"""A trail is drawn in pieces of about this length: some 30 per stride, none while the foot stands."""
+
+CLEAR_M = 0.003
+"""How far prints and trails keep above the floor, so that neither hides in it."""
+
+SAME_M = 0.02
+"""A foot that rests again so near to where it rested last has only been restless: one print, not two."""
+
+_REST_WINDOW_S = 0.1
+
+Single = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Trail:
+    """The way of one foot over the whole take.
+
+    Parameters
+    ----------
+    t_s : (k,) s, increasing, when the foot had gone a piece. pieces : (k, 2, 3) m, from and to, world.
+    """
+
+    t_s: Floats
+    pieces: Single
+
+
+@dataclass(frozen=True, eq=False)
+class Prints:
+    """The footprints of one foot.
+
+    Parameters
+    ----------
+    t_s : (c,) s, increasing, when the foot rested. position : (c, 3) m, middle of the sole on the floor,
+    world. wxyz : (c, 4) turned about the vertical only, x to the toes.
+    """
+
+    t_s: Floats
+    position: Single
+    wxyz: Single
+
+
+def sole(p: Floats, q: Floats, body: BodyModel) -> Floats:
+    """Middle (n, 3) of the sole, m, from the ankle (n, 3) and the foot's orientation (n, 4)."""
+    return p + rotation.rotate(q, np.array([0.25 * body.foot, -body.ankle_height, 0.0]))
+
+
+def trail(t_s: Floats, valid: Bools, path: Floats) -> Trail:
+    """Lay a path (n, 3) out in pieces; where samples are not valid there is a gap."""
+    stride = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    gone = np.concatenate(([0.0], np.cumsum(np.where(valid[1:] & valid[:-1], stride, 0.0))))
+    # the first and last sample of every valid run are kept, so that a piece never reaches over a gap
+    edge = valid & ~(np.append(valid[1:], False) & np.append(False, valid[:-1]))
+    kept = np.flatnonzero(valid & (edge | (np.diff(gone // PIECE_M, prepend=-1.0) > 0)))
+    lost = np.cumsum(~valid)
+    whole = lost[kept[1:]] == lost[kept[:-1]]
+    points = path[kept].astype(np.float32)
+    points[:, 2] = np.maximum(points[:, 2], CLEAR_M)
+    return Trail(t_s[kept[1:]][whole], np.stack((points[:-1], points[1:]), axis=1)[whole])
+
+
+def prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats, q: Floats) -> Prints:
+    """One print per floor contact, where and when the foot was slowest in it.
+
+    Parameters
+    ----------
+    contact : (n,) foot on the floor. path : (n, 3) of the sole, m. q : (n, 4) of the foot.
+    """
+    n = len(t_s)
+    half = max(1, round(_REST_WINDOW_S / 2 * n / max(t_s[-1] - t_s[0], _REST_WINDOW_S)))
+    before, after = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half, n - 1)
+    speed = np.linalg.norm(path[after] - path[before], axis=1) / np.maximum(after - before, 1)
+    edge = np.diff(np.concatenate(([0], (contact & valid).astype(np.int8), [0])))
+    rest: list[int] = []
+    for start, end in zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True):
+        at = int(start + np.argmin(speed[start:end]))
+        if not rest or np.hypot(*(path[at] - path[rest[-1]])[:2]) > SAME_M:
+            rest.append(at)
+    position = path[rest].astype(np.float32)
+    position[:, 2] = CLEAR_M
+    return Prints(t_s[rest], position, rotation.about(2, rotation.yaw(q[rest])).astype(np.float32))

@@ -1,0 +1,132 @@
+"""Footprints and trails: where the feet rested and went, with gaps, without contacts, of one foot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from core import rotation
+from core.body.poses import Poses
+from core.frames import FOOT, SIDES, Floats
+from server.viewer.motion import Motion, prepare
+from server.viewer.steps import PIECE_M, prints, trail
+from tests.server import walk
+
+T_S = np.arange(500) / 50.0
+FLAT = np.tile([1.0, 0.0, 0.0, 0.0], (500, 1))
+
+
+def straight(speed: float = 1.0) -> Floats:
+    """A path along x."""
+    return np.stack((speed * T_S, 0 * T_S, 0 * T_S), axis=1)
+
+
+def stepping(stride_m: float = 1.2) -> tuple[Floats, np.ndarray]:
+    """A foot that rests for a second and swings for a second, five times, and when it is on the floor."""
+    phase, count = np.modf(T_S / 2.0)
+    swing = np.clip(2 * phase - 1, 0, 1)
+    x = stride_m * (count + swing**2 * (3 - 2 * swing))
+    return np.stack((x, 0 * x, 0.1 * np.sin(np.pi * swing)), axis=1), phase < 0.5
+
+
+def without_contact(poses: Poses) -> Poses:
+    return replace(poses, contact={})
+
+
+def test_one_print_lies_under_each_contact_and_appears_during_it() -> None:
+    path, contact = stepping()
+    found = prints(T_S, np.ones(500, bool), contact, path, FLAT)
+    np.testing.assert_allclose(found.position[:, 0], 1.2 * np.arange(5), atol=1e-5)
+    assert np.all((found.t_s % 2.0) < 1.0)
+
+
+def test_prints_are_a_stride_apart_on_a_walk(motion: Motion) -> None:
+    for side in SIDES:
+        steps = np.diff(motion.prints[side].position[1:-1, 0])
+        assert len(steps) >= 8
+        np.testing.assert_allclose(steps, 1.2 * walk.STRIDE_S, atol=0.02)
+
+
+def test_a_print_lies_flat_and_points_where_the_toes_point() -> None:
+    path, contact = stepping()
+    turned = rotation.multiply(rotation.about(2, np.radians(30)), rotation.about(1, np.radians(-12)))
+    found = prints(T_S, np.ones(500, bool), contact, path, np.tile(turned, (500, 1)))
+    np.testing.assert_allclose(np.degrees(rotation.yaw(found.wxyz.astype(float))), 30, atol=1e-4)
+    up = rotation.rotate(found.wxyz.astype(float), np.array([0.0, 0.0, 1.0]))
+    np.testing.assert_allclose(up, [[0, 0, 1]] * 5, atol=1e-6)
+    assert np.ptp(found.position[:, 2]) == 0
+
+
+def test_a_restless_standing_foot_leaves_one_print() -> None:
+    wobble = np.stack((0.004 * np.sin(9 * T_S), 0 * T_S, 0 * T_S), axis=1)
+    found = prints(T_S, np.ones(500, bool), np.sin(20 * T_S) > 0, wobble, FLAT)
+    assert len(found.t_s) == 1
+
+
+def test_a_foot_that_never_rests_leaves_no_print() -> None:
+    found = prints(T_S, np.ones(500, bool), np.zeros(500, bool), straight(), FLAT)
+    assert found.position.shape == (0, 3)
+    assert found.wxyz.shape == (0, 4)
+
+
+def test_no_print_comes_from_samples_that_were_lost() -> None:
+    path, contact = stepping()
+    found = prints(T_S, (T_S < 3.9) | (T_S > 5.2), contact, path, FLAT)
+    np.testing.assert_allclose(found.position[:, 0], 1.2 * np.array([0, 1, 3, 4]), atol=1e-5)
+
+
+def test_a_trail_is_one_line_in_short_pieces() -> None:
+    found = trail(T_S, np.ones(500, bool), straight())
+    length = np.linalg.norm(found.pieces[:, 1] - found.pieces[:, 0], axis=1)
+    assert length.max() < PIECE_M + 0.021  # a sample's way more at most
+    np.testing.assert_allclose(length.sum(), straight()[-1, 0], rtol=1e-5)
+    np.testing.assert_array_equal(found.pieces[1:, 0], found.pieces[:-1, 1])
+    assert np.all(np.diff(found.t_s) > 0)
+
+
+def test_a_trail_ends_where_the_foot_is(motion: Motion) -> None:
+    for side in SIDES:
+        found = motion.trails[side]
+        for t_s in (2.0, 5.5, 9.0):
+            last = found.pieces[np.searchsorted(found.t_s, t_s, side="right") - 1, 1]
+            shoe = motion.batches["shoes"].position[motion.index(t_s), 0 if side == "left" else 1]
+            assert np.hypot(*(last - shoe)[:2]) < 0.25 * walk.BODY.foot + PIECE_M + 0.1
+
+
+def test_a_standing_foot_adds_nothing_to_its_trail() -> None:
+    assert len(trail(T_S, np.ones(500, bool), straight(0.0)).t_s) <= 1
+
+
+def test_a_trail_has_a_gap_where_samples_were_lost() -> None:
+    valid = (T_S < 4.0) | (T_S >= 6.0)
+    path = straight()
+    path[~valid] = path[199]
+    found = trail(T_S, valid, path)
+    assert found.pieces[..., 0].max() > 9.9
+    inside = (found.pieces[..., 0] > 3.99) & (found.pieces[..., 0] < 5.99)
+    assert not inside.any()
+    assert np.all(np.linalg.norm(found.pieces[:, 1] - found.pieces[:, 0], axis=1) < 0.1)
+
+
+def test_a_trail_of_nothing_valid_is_empty() -> None:
+    assert trail(T_S, np.zeros(500, bool), straight()).pieces.shape == (0, 2, 3)
+
+
+def test_a_take_without_contacts_has_trails_and_no_prints() -> None:
+    found = prepare(without_contact(walk.poses(3.0)))
+    assert found.prints == {}
+    assert set(found.trails) == {"left", "right"}
+
+
+def test_one_foot_leaves_its_own_prints_and_trail_only() -> None:
+    poses = walk.poses(5.0)
+    one = replace(
+        poses,
+        q={"foot_r": poses.q["foot_r"]},
+        p={"foot_r": poses.p["foot_r"]},
+        contact={"foot_r": poses.contact[FOOT["right"]]},
+    )
+    found = prepare(one)
+    assert set(found.prints) == set(found.trails) == {"right"}
+    assert len(found.prints["right"].t_s) >= 4
