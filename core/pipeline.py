@@ -157,7 +157,7 @@ def _run_stages(
     strides = events.stride_list(found, orientations, calibrated.calibration.turning, config.strides)
     reached["strides"] = strides
     start("poses")
-    lengths, assumed = body.nominal_body(uniform.subject.height_m)
+    lengths, assumed = body.nominal_body(uniform.subject.height_m, uniform.subject.standing_width_m)
     contacts = {
         side: body.contact_mask(uniform.t_s, found.times(side, "ic"), found.times(side, "tc"))
         for side in SIDES

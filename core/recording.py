@@ -62,15 +62,23 @@ class Subject:
     Parameters
     ----------
     height_m : body height, 0.5 to 2.5 m.
+    standing_width_m : between the middles of the ankles while standing at the beginning, 0 to 0.8 m.
     """
 
     height_m: float | None = None
+    standing_width_m: float | None = None
 
     def __post_init__(self) -> None:
         if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:
             raise ParameterError(
                 "height_implausible",
                 f"Body height {self.height_m:g} m is outside 0.5 to 2.5 m; give it in metres.",
+            )
+        if self.standing_width_m is not None and not 0.0 <= self.standing_width_m <= 0.8:
+            raise ParameterError(
+                "standing_width_implausible",
+                f"Ankles {self.standing_width_m:g} m apart while standing is outside 0 to 0.8 m; give the "
+                "distance of their middles in metres.",
             )
 
 

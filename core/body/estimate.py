@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from core.body.apart import legs_apart
 from core.body.choice import Estimator, Requested, choose
 from core.body.corrected import corrected_signals
 from core.body.erkf import ErkfParams, erkf_inputs
@@ -21,7 +22,7 @@ from core.body.erkf_health import erkf_health, erkf_notices
 from core.body.erkf_poses import figure, foot_tracks, refined, run_erkf
 from core.body.erkf_start import start_state
 from core.body.feet import FootTracks
-from core.body.headings import agreed, findings
+from core.body.headings import WARN, agreed, findings
 from core.body.kinematics import forward_kinematics
 from core.body.l7s import free_acceleration, l7s_poses
 from core.body.l7s_filter import L7sParams
@@ -32,7 +33,7 @@ from core.body.smoother import smooth
 from core.body.still import FOOT_STILL, still_samples
 from core.body.tree import person_tree
 from core.calibration.result import CalibratedRecording
-from core.errors import EstimationError, Notice
+from core.errors import EstimationError, Notice, Severity
 from core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
 from core.fusion.orientations import Orientations
 
@@ -96,6 +97,7 @@ def estimate_poses(
     notice `estimator_failed`.
     """
     params = params or PoseParams()
+    calibrated, orientations = legs_apart(calibrated, orientations, body)
     choice = choose(calibrated, orientations, params.estimator, params.least_valid)
     take = _Take(calibrated, _without(orientations, choice.failed), contacts, body, params)
     order = choice.possible if params.estimator == "auto" else (params.estimator,)
@@ -116,6 +118,7 @@ def estimate_poses(
     if made is None:
         # no figure; the notices of what is missing are still wanted
         made = take.anchored()
+        made = replace(made, poses=replace(made.poses, method="none"))
     if made.feet is None:
         try:
             made = take.with_feet(made, choice.segments)
@@ -227,7 +230,8 @@ def _corrected(errors: Mapping[Segment, float]) -> tuple[Notice, ...]:
         f"{degrees(abs(errors[worst])):.0f}° ({worst}); it was turned. Frontal and transverse angles there "
         "are less certain."
     )
-    return (Notice("heading_corrected", message, sensor=worst, severity="info"),)
+    severity: Severity = "warning" if abs(errors[worst]) > WARN else "info"
+    return (Notice("heading_corrected", message, sensor=worst, severity=severity),)
 
 
 def _without(orientations: Orientations, failed: Collection[Segment]) -> Orientations:

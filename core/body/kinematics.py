@@ -11,7 +11,7 @@ relative chain only and is not corrected: positions are for looking at, stride l
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,15 +45,18 @@ class AnchorParams:
     soft_m: float = 0.01
 
 
-def nominal_body(height_m: float | None) -> tuple[BodyModel, tuple[Notice, ...]]:
+def nominal_body(
+    height_m: float | None, standing_width_m: float | None = None
+) -> tuple[BodyModel, tuple[Notice, ...]]:
     """Body model from height in m, or from 1.70 m with a notice `height_assumed` when nobody gave one."""
     if height_m is not None:
-        return BodyModel.from_height(height_m), ()
+        return replace(BodyModel.from_height(height_m), standing_width=standing_width_m), ()
     message = (
         f"Body height is not given; the figure is drawn with {NOMINAL_HEIGHT_M:.2f} m. Enter the height "
         "to see true proportions and distances; joint angles do not depend on it."
     )
-    return BodyModel.from_height(NOMINAL_HEIGHT_M), (Notice("height_assumed", message, severity="info"),)
+    body = replace(BodyModel.from_height(NOMINAL_HEIGHT_M), standing_width=standing_width_m)
+    return body, (Notice("height_assumed", message, severity="info"),)
 
 
 def forward_kinematics(

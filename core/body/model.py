@@ -23,6 +23,7 @@ class BodyModel:
     hip_width : between hip centres. thigh : hip to knee centre. shank : knee to ankle centre.
     ankle_height : ankle centre above the sole. foot : heel to toe.
     estimated : True when taken from body height by Winter's fractions, False when measured.
+    standing_width : between the ankle centres while standing for calibration, None = not measured.
     """
 
     hip_width: float
@@ -31,6 +32,7 @@ class BodyModel:
     ankle_height: float
     foot: float
     estimated: bool
+    standing_width: float | None = None
 
     @classmethod
     def from_height(cls, height_m: float) -> BodyModel:

@@ -125,8 +125,8 @@ def parse_manifest(data: bytes) -> Manifest:
     ------
     ManifestError
         manifest_bad_json, manifest_unknown_key, manifest_bad_value, unknown_segment, duplicate_segment,
-        unknown_protocol, height_implausible, unknown_unit, belt_speed_implausible,
-        belt_speed_without_treadmill; the message names the path inside the manifest.
+        unknown_protocol, height_implausible, standing_width_implausible, unknown_unit,
+        belt_speed_implausible, belt_speed_without_treadmill; the message names the path inside the manifest.
     """
     if len(data) > MAX_BYTES:
         raise ManifestError(
@@ -144,13 +144,12 @@ def manifest_of(root: object) -> Manifest:
     top = Node(root, "")
     top.only("subject", "protocol", "mounting", "sensors", "sources", "belt_speed_mps")
     subject = top.child("subject")
-    subject.only("height_m")
-    height = subject.number("height_m")
-    if height is not None and not 0.5 <= height <= 2.5:
-        raise ManifestError(
-            "height_implausible",
-            f"subject.height_m is {height:g}; expected 0.5 to 2.5, in metres (1.75, not 175).",
-        )
+    subject.only("height_m", "standing_width_m")
+    try:
+        who = Subject(subject.number("height_m"), subject.number("standing_width_m"))
+    except ParameterError as error:
+        key = error.code.removesuffix("_implausible")
+        raise ManifestError(error.code, f"subject.{key}_m: {error.message}") from error
     protocol = top.text("protocol")
     if protocol is not None and protocol not in PROTOCOLS:
         raise ManifestError(
@@ -164,7 +163,7 @@ def manifest_of(root: object) -> Manifest:
     mounting = top.child("mounting")
     sensors = top.child("sensors")
     return Manifest(
-        subject=Subject(height),
+        subject=who,
         protocol=protocol,
         mounting=MappingProxyType({_segment(k, f"mounting.{k}"): mounting.string(k) for k in mounting.keys}),
         sensors=MappingProxyType(_sensors(sensors)),

@@ -76,7 +76,7 @@ def _metadata(r: Recording) -> dict[str, object]:
     return {
         "schema": SCHEMA,
         "units": {"t": "us", "acc": "m/s2", "gyr": "rad/s", "quat": "wxyz, sensor to world"},
-        "subject": {"height_m": r.subject.height_m},
+        "subject": {"height_m": r.subject.height_m, "standing_width_m": r.subject.standing_width_m},
         "protocol": r.protocol,
         "belt_speed_mps": r.belt_speed_mps,
         "mounting": dict(r.mounting),
@@ -179,7 +179,7 @@ def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Reco
     return Recording(
         streams=streams,
         segments=cast("dict[str, Segment | None]", segments),  # Recording checks them
-        subject=Subject(subject["height_m"]),
+        subject=Subject(subject["height_m"], subject.get("standing_width_m")),
         protocol=cast("Protocol", info["protocol"]),
         mounting=mounting,
         sha256=sha,

@@ -13,7 +13,7 @@ from core.formats.draft import Draft, finish
 from core.formats.manifest import Manifest, parse_manifest
 from core.formats.source import SourceFile, sha256
 from core.frames import Segment
-from core.recording import Recording
+from core.recording import Recording, Subject
 
 FORMATS = "Xsens MT Manager text, CSV or TSV with a manifest, Sagittal Parquet"
 _SHOWN = 5
@@ -182,12 +182,20 @@ def _declared(recording: Recording, manifest: Manifest | None, upload: _Upload) 
     return replace(
         recording,
         segments=segments,
-        subject=manifest.subject if manifest and manifest.subject.height_m is not None else recording.subject,
+        subject=_said(manifest.subject, recording.subject) if manifest else recording.subject,
         protocol=(manifest.protocol if manifest else None) or recording.protocol,
         belt_speed_mps=(manifest.belt_speed_mps if manifest else None) or recording.belt_speed_mps,
         mounting={**recording.mounting, **(manifest.mounting if manifest else {})},
         sha256={**recording.sha256, **upload.sha256},
         notices=tuple(notices),
+    )
+
+
+def _said(declared: Subject, read: Subject) -> Subject:
+    """What was declared, completed by what the file says."""
+    height, width = declared.height_m, declared.standing_width_m
+    return Subject(
+        read.height_m if height is None else height, read.standing_width_m if width is None else width
     )
 
 

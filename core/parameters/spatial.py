@@ -47,7 +47,7 @@ STEP_M: Final = 0.05
 
 Reason = Literal[
     "treadmill", "no_foot_track", "no_foot_flat", "gap", "feet_not_linked", "opposite_foot_missing",
-    "no_shoe_geometry",
+    "no_shoe_geometry", "standing_width_unknown",
 ]  # fmt: skip
 Value = float | Reason
 """A figure of one stride, or why it has none."""
@@ -86,8 +86,8 @@ def spatial_rows(strides: Strides, feet: FootTracks | None, surface: Surface = G
     Returns
     -------
     values in m and m/s: circumduction outward positive, width positive with the feet on their own sides. On
-    a treadmill only length and speed, from the belt's speed. Width holds as far as the feet stood under the
-    hips in the standing part: there calibration takes the legs to be vertical.
+    a treadmill only length and speed, from the belt's speed. Width needs to know how far apart the feet
+    stood: without, calibration takes the legs to be vertical, which is wrong by up to a decimetre.
     """
     if surface.protocol == "treadmill":
         return tuple(_on_belt(s, surface.belt_speed_mps) for s in strides.strides)
@@ -169,7 +169,9 @@ def _places(strides: Strides, feet: FootTracks) -> dict[tuple[Side, float], int 
         if s.opposite_ic_s is not None:
             until.setdefault((_other(s.side), s.opposite_ic_s), s.opposite_ic_s + stance)
     for s in strides.strides:
-        until[s.side, s.start_s] = s.start_s + STANCE_SHARE * s.duration_s if s.tc_s is None else s.tc_s
+        off = s.start_s + STANCE_SHARE * s.duration_s if s.tc_s is None else s.tc_s
+        # the stride before tells how long a stance is, where a small step in a turn was not found
+        until[s.side, s.start_s] = min(off, until.get((s.side, s.start_s), off))
     return {key: _flat(feet, key[0], key[1], stop) for key, stop in until.items()}
 
 
@@ -229,7 +231,11 @@ def _step(
     if opposite is None:
         return {"step_length_m": reason or "no_foot_flat", "step_width_m": reason or "no_foot_flat"}
     apart = landed - feet.p[_other(s.side)][opposite, :2]
-    return {"step_length_m": float(apart @ along), "step_width_m": float(apart @ outward)}
+    known = feet.body.standing_width is not None
+    return {
+        "step_length_m": float(apart @ along),
+        "step_width_m": float(apart @ outward) if known else "standing_width_unknown",
+    }
 
 
 def _heel_clearance(s: Stride, feet: FootTracks, first: int, last: int) -> float:

@@ -30,7 +30,7 @@ def estimated(take: UniformRecording, params: PoseParams | None = None) -> PoseE
     orientations = fusion.estimate(calibrated)
     found = events.detect(orientations)
     contacts = {s: contact_mask(take.t_s, found.times(s, "ic"), found.times(s, "tc")) for s in SIDES}
-    body, _ = nominal_body(take.subject.height_m)
+    body, _ = nominal_body(take.subject.height_m, take.subject.standing_width_m)
     return estimate_poses(calibrated, orientations, contacts, body, params)
 
 

@@ -79,12 +79,8 @@ def test_exchanged_segments_of_one_leg_are_told() -> None:
 
 def test_a_late_sensor_shows_in_its_joints() -> None:
     was = take().sensors["thigh_r"]
-    late = 30
-    made = estimated(
-        changed(
-            take(), "thigh_r", acc=np.roll(was.acc, late, axis=0).copy(), gyr=np.roll(was.gyr, late, axis=0).copy()
-        )
-    )  # fmt: skip
+    acc, gyr = (np.roll(x, 30, axis=0).copy() for x in (was.acc, was.gyr))
+    made = estimated(changed(take(), "thigh_r", acc=acc, gyr=gyr))
     right, left = residuals(made)["pelvis-thigh_r"], residuals(made)["pelvis-thigh_l"]
     assert right > 2.0 * left
 

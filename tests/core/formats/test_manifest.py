@@ -52,6 +52,11 @@ def test_an_empty_manifest_says_nothing() -> None:
         ({"sensor": {}}, "manifest_unknown_key", "did you mean 'sensors'"),
         ({"subject": {"height": 1.7}}, "manifest_unknown_key", "subject.height"),
         ({"subject": {"height_m": 175}}, "height_implausible", "subject.height_m"),
+        (
+            {"subject": {"standing_width_m": 20}},
+            "standing_width_implausible",
+            "subject.standing_width_m",
+        ),
         ({"subject": {"height_m": "175"}}, "manifest_bad_value", "subject.height_m"),
         ({"subject": {"height_m": True}}, "manifest_bad_value", "subject.height_m"),
         ({"subject": []}, "manifest_bad_value", "subject"),

@@ -20,7 +20,9 @@ from core.simulate import Truth
 from tests.walks import simulated
 
 RATE = 100.0
-BODY = BodyModel(hip_width=0.18, thigh=0.42, shank=0.42, ankle_height=0.08, foot=0.26, estimated=True)
+BODY = BodyModel(
+    hip_width=0.18, thigh=0.42, shank=0.42, ankle_height=0.08, foot=0.26, estimated=True, standing_width=0.2
+)
 TURN = 1.0  # s of one stride
 
 
@@ -99,6 +101,30 @@ def test_known_paths_give_their_lengths_whatever_the_heading(heading: float) -> 
 
 def test_feet_that_cross_have_a_negative_width() -> None:
     assert parameters(feet(width=-0.06))["step_width_m", "left"].mean == pytest.approx(-0.06)
+
+
+def test_without_the_standing_width_there_is_no_width() -> None:
+    found = parameters(replace(feet(), body=replace(BODY, standing_width=None)))
+    assert found["step_width_m", "left"].reason == "standing_width_unknown"
+    assert found["step_length_m", "left"].mean is not None
+
+
+def test_a_small_step_within_a_stance_does_not_move_the_flat_before_it() -> None:
+    """In a turn the foot is set down a second time, longer; the stride that came before ends at the first."""
+    tracks = feet()
+    p, still = tracks.p["left"].copy(), tracks.still["left"].copy()
+    p[round(5.5 * RATE) : round(6.05 * RATE), 0] = p[round(5.5 * RATE), 0]
+    moved = slice(round(6.05 * RATE), None)
+    p[moved, 0] = p[round(6.0 * RATE), 0] + 0.1
+    still[round(5.5 * RATE) : round(6.0 * RATE)] = True
+    still[round(6.0 * RATE) : round(6.1 * RATE)] = False
+    still[round(6.1 * RATE) :] = True
+    turned = replace(tracks, p={**tracks.p, "left": p}, still={**tracks.still, "left": still})
+    long = Stride("left", 5.5, 7.5, 8.0)
+    known = Strides((*(s for s in strides().strides if s.end_s <= 5.5), long))
+    rows = spatial_rows(known, turned)
+    before = next(r for s, r in zip(known.strides, rows, strict=True) if s.side == "left" and s.end_s == 5.5)
+    assert before["stride_length_m"] == pytest.approx(1.3, abs=0.02)
 
 
 def test_drift_in_height_leaves_clearance_as_it_is() -> None:
