@@ -143,12 +143,12 @@ def print_view(
 
 @router.get("/sessions/{sid}/data")
 def data(
-    request: Request, db: Db, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> Response:
-    """Downloads, provenance, running again."""
+    """Downloads, the estimator's health, provenance, running again."""
     with db.read() as c:
         context = session_views.base(c, sid)
-        context |= session_views.downloads(c, sid, results=who.may(Action.READ_RESULT))
+        context |= session_views.downloads(c, blobs, sid, results=who.may(Action.READ_RESULT))
     _opened(db, who, "session", sid)
     return _page(request, db, who, "data.html", "patients", **context)
 

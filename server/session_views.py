@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any, Final
 from urllib.parse import quote
@@ -10,6 +11,7 @@ from sqlalchemy import Connection
 
 from server.page_views import PROTOCOL_NAMES, SEGMENT_NAMES, job_dict, newest_job, who_words
 from server.report.curves import cycle_svg, strip_svg
+from server.report.estimator import CHOICES, EstimatorView, estimator_view
 from server.report.model import ReportModel
 from server.report.panels import CurvePanel
 from server.report.table import Row
@@ -84,15 +86,18 @@ def base(c: Connection, session_id: str) -> dict[str, Any]:
     }
 
 
-def downloads(c: Connection, session_id: str, *, results: bool) -> dict[str, Any]:
-    """Files to download, provenance and the mapping behind the shown analysis."""
+def downloads(c: Connection, blobs: BlobStore, session_id: str, *, results: bool) -> dict[str, Any]:
+    """Files to download, estimator, provenance and the mapping behind the shown analysis."""
     this = recordings.current(c, session_id)
     found = analyses.of_session(c, session_id) if results else []
     shown = found[0] if found else None
     files = [] if shown is None else [(shown.id, name, blob.size) for name, blob in shown.files.items()]
     return {
         "analysis": shown,
-        "earlier": found[1:],
+        "estimator": None if shown is None else _estimator(blobs, shown),
+        "earlier": [
+            {"id": a.id, "created_at": a.created_at, "estimator": _asked_for(a.config)} for a in found[1:]
+        ],
         "results": [
             {
                 "name": name,
@@ -109,6 +114,16 @@ def downloads(c: Connection, session_id: str, *, results: bool) -> dict[str, Any
         "provenance": _provenance(shown) if shown else [],
         "mapping": _mapping(shown.manifest if shown else None),
     }
+
+
+def _estimator(blobs: BlobStore, shown: analyses.Analysis) -> EstimatorView | None:
+    return estimator_view(json.loads(analyses.file_bytes(blobs, shown, "analysis.json")).get("estimator"))
+
+
+def _asked_for(config: Mapping[str, Any]) -> str | None:
+    """The estimator somebody chose by name."""
+    asked = (config.get("poses") or {}).get("estimator")
+    return None if asked is None else CHOICES.get(asked, asked)
 
 
 def _provenance(shown: analyses.Analysis) -> list[tuple[str, str]]:

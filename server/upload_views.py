@@ -42,7 +42,8 @@ def upload_view(c: Connection, this: Recording | None, s: Session, p: Patient) -
         {"name": f.name, "size": f.size, "href": f"/api/v1/sessions/{s.id}/files/{quote(f.name)}"}
         for f in (this.files if this else ())
     ]
-    said = ((this.manifest if this else None) or {}).get("subject") or {}
+    manifest = (this.manifest if this else None) or {}
+    subject = manifest.get("subject") or {}
     look = this.job if this else None
     waiting = look is not None and not look.finished
     problem = None
@@ -56,7 +57,11 @@ def upload_view(c: Connection, this: Recording | None, s: Session, p: Patient) -
         if this is None or this.inspection is None or waiting
         else found_view(this, remembered(c, s)),
         "segments": SEGMENT_CHOICES,
-        "height_m": said.get("height_m") or s.height_m or p.height_m,
+        "said": {
+            "height_m": subject.get("height_m") or s.height_m or p.height_m,
+            "standing_width_m": subject.get("standing_width_m"),
+            "belt_speed_mps": manifest.get("belt_speed_mps"),
+        },
     }
 
 

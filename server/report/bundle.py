@@ -30,7 +30,7 @@ class Bundle:
 
     Parameters
     ----------
-    quality, calibration, provenance : the JSON of analysis.json.
+    quality, calibration, estimator, provenance : the JSON of analysis.json.
     """
 
     quality: Mapping[str, Any]
@@ -38,6 +38,7 @@ class Bundle:
     parameters: tuple[Parameter, ...]
     warnings: tuple[Notice, ...]
     provenance: Mapping[str, Any]
+    estimator: Mapping[str, Any] | None = None
     angles: JointAngles | None = None
     events: GaitEvents = field(default_factory=lambda: GaitEvents(()))
     strides: Strides = field(default_factory=lambda: Strides(()))
@@ -65,6 +66,7 @@ def load_bundle(files: Mapping[str, bytes]) -> Bundle:
         parameters=tuple(Parameter(**row) for row in data["parameters"]),
         warnings=tuple(Notice(**row) for row in data["warnings"]),
         provenance=data["provenance"],
+        estimator=data.get("estimator"),
         angles=read_angles(files["angles.parquet"]) if "angles.parquet" in files else None,
         events=read_events(files["events.csv"]) if "events.csv" in files else GaitEvents(()),
         strides=read_strides(files["strides.csv"]) if "strides.csv" in files else Strides(()),

@@ -23,6 +23,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from core.angles import JointAngles
+from core.body.health import worst
 from core.body.poses import Poses
 from core.events.result import GaitEvents, Strides
 from core.frames import Floats, Side
@@ -73,6 +74,7 @@ def summary(analysis: Analysis) -> dict[str, object]:
         "schema": SCHEMA,
         "quality": plain(analysis.quality.to_json()),
         "calibration": _calibration(analysis.calibration, analysis.angles),
+        "estimator": _estimator(analysis),
         "parameters": [parameter_row(p) for p in analysis.parameters],
         "warnings": [n.to_json() for n in analysis.notices],
         "provenance": plain(analysis.provenance),
@@ -210,6 +212,38 @@ def _calibration(calibration: Calibration | None, angles: JointAngles | None) ->
     )
     assert isinstance(result, dict)  # noqa: S101 (narrows the type; `plain` keeps mappings)
     return result
+
+
+def _estimator(analysis: Analysis) -> dict[str, object] | None:
+    """Which pose estimator ran on what, and its health (spec/estimators.md §7)."""
+    poses = analysis.poses
+    if poses is None:
+        return None
+    facts = dict(poses.diagnostics)
+    feet = analysis.feet
+    angles = {} if analysis.angles is None else analysis.angles.diagnostics
+    return {
+        "name": poses.method,
+        "requested": facts.pop("requested", None),
+        "reduced": poses.reduced,
+        "sensors": plain(facts.pop("sensors", ())),
+        "possible": plain(facts.pop("possible", ())),
+        "verdict": worst(poses.health),
+        "health": [
+            {
+                "name": f.name,
+                "of": f.of,
+                "value": plain(f.value),
+                "warn": f.warn,
+                "bad": f.bad,
+                "verdict": f.verdict,
+            }
+            for f in poses.health
+        ],
+        "feet": None if feet is None else {"source": feet.source, "linked": feet.linked},
+        "estimated_angles": plain(angles.get("estimated", ())),
+        "diagnostics": plain(facts),
+    }
 
 
 def _parquet(t_s: Floats, columns: Mapping[str, np.ndarray], meta: Mapping[str, object]) -> bytes:

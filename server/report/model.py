@@ -15,6 +15,7 @@ from core.errors import Notice
 from core.frames import SIDES, Floats, Side
 from core.norms import NormBands, NormValues, adult_kinematics, angle_values, temporal_values
 from server.report.bundle import Bundle
+from server.report.estimator import EstimatorView, estimator_view
 from server.report.exports import plain
 from server.report.panels import DRAWN_STRIDES, CurvePanel, SideCurve, curve_panels
 from server.report.quality_box import QualityBox, quality_box
@@ -91,6 +92,7 @@ class ReportModel:
     Parameters
     ----------
     problem : what stopped the analysis, None when it ran to its end.
+    estimator : which pose estimator ran and its health, None when it was not reached.
     groups : parameter rows under their headings. key_curve : the panel shown on the overview.
     norm_note : source, number and speed of the reference people, or why there is none.
     curve_notes : how to read the curves, in sentences: zero, offsets, confidence, what is drawn.
@@ -110,6 +112,7 @@ class ReportModel:
     angle_zero: str | None
     zero_offset_deg: Mapping[str, float]
     provenance: Mapping[str, object]
+    estimator: EstimatorView | None = None
 
     @property
     def key_curve(self) -> CurvePanel:
@@ -151,6 +154,7 @@ class ReportModel:
                 "curve_notes": self.curve_notes,
                 "angle_zero": self.angle_zero,
                 "zero_offset_deg": self.zero_offset_deg,
+                "estimator": None if self.estimator is None else asdict(self.estimator),
                 "provenance": self.provenance,
             }
         )
@@ -205,6 +209,7 @@ def report_model(
         if angles is None
         else {k: float(np.degrees(v)) for k, v in angles.zero_offset.items()},
         provenance=bundle.provenance,
+        estimator=estimator_view(bundle.estimator),
     )
 
 
@@ -284,8 +289,10 @@ def _curve_notes(bundle: Bundle, panels: tuple[CurvePanel, ...]) -> tuple[str, .
         f"Angles are measured {zero}: the posture of the standing part is 0°. "
         f"Subtracted: {', '.join(offsets)}. A person who stands bent gets curves shifted by that much."
     )
+    view = estimator_view(bundle.estimator)
     notes = [
         about_zero,
+        *([view.estimated] if view is not None and view.estimated else []),
         *_norm_notes(panels),
     ]
     drawn = max((len(c.strides) for p in panels for c in p.sides.values()), default=0)

@@ -13,6 +13,7 @@ from core.norms import NormBand, NormBands
 from core.parameters import cycle_curves, mean_curve
 from core.parameters.result import CycleCurves
 from server.report.bundle import Bundle
+from server.report.estimator import estimated_angles
 from server.report.wording import VARIABLES, ZERO_WORDS, Variable, reason_words
 
 DRAWN_STRIDES: Final = 40
@@ -45,7 +46,8 @@ class CurvePanel:
     Parameters
     ----------
     title : with the zero in words, "Knee flexion, from standing".
-    low_confidence : frontal and transverse planes. reason : why there is no curve, None if there is one.
+    low_confidence : frontal and transverse planes, and joints without a sensor on both of their segments.
+    reason : why there is no curve, None if there is one.
     norm : band to draw, None where it is not comparable. norm_note : what must be said about it.
     """
 
@@ -62,11 +64,14 @@ def curve_panels(bundle: Bundle, norms: NormBands) -> tuple[CurvePanel, ...]:
     """All panels in reading order; a variable without a curve keeps its place and says why."""
     curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
     zero = None if bundle.angles is None else bundle.angles.zero
-    return tuple(_panel(v, curves, zero, norms.bands.get(v.name)) for v in VARIABLES)
+    estimated = {a.removesuffix("_l").removesuffix("_r") for a in estimated_angles(bundle.estimator)}
+    return tuple(
+        _panel(v, curves, zero, norms.bands.get(v.name), sure=v.name not in estimated) for v in VARIABLES
+    )
 
 
 def _panel(
-    variable: Variable, curves: CycleCurves | None, zero: str | None, band: NormBand | None
+    variable: Variable, curves: CycleCurves | None, zero: str | None, band: NormBand | None, *, sure: bool
 ) -> CurvePanel:
     sides = {} if curves is None else {s: _side(curves, variable.name, s) for s in SIDES}
     sides = {s: c for s, c in sides.items() if c.mean_deg is not None}
@@ -75,7 +80,7 @@ def _panel(
     return CurvePanel(
         variable=variable,
         title=f"{variable.label}, {words}" if words else variable.label,
-        low_confidence=variable.plane != "sagittal",
+        low_confidence=variable.plane != "sagittal" or not sure,
         reason=reason,
         norm=band if band is not None and band.comparable and reason is None else None,
         norm_note="" if band is None else band.note,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from server.report.bundle import Bundle
+from server.report.estimator import estimator_view
 from server.report.wording import number, place_words
 
 _METHODS: Final[Mapping[str, str]] = {
@@ -19,12 +20,18 @@ _METHODS: Final[Mapping[str, str]] = {
 
 @dataclass(frozen=True)
 class QualityItem:
-    """One fact: a text, or a count of strides per side; `kind` ok, warn or bad where it is a judgement."""
+    """One fact: a text, or a count of strides per side.
+
+    Parameters
+    ----------
+    kind : ok, warn or bad where it is a judgement. page : of the session, where more about it stands.
+    """
 
     label: str
     value: str = ""
     extra: str = ""
     kind: str | None = None
+    page: str | None = None
     sides: bool = False
     left: int = 0
     left_of: int = 0
@@ -59,7 +66,12 @@ def quality_box(bundle: Bundle) -> QualityBox:
         kind, word = "warn", "Usable, see notices"
     else:
         kind, word = "ok", "Good data"
-    items = [_strides(bundle), *_signals(bundle.quality), *_calibration(bundle.calibration)]
+    items = [
+        _strides(bundle),
+        *_signals(bundle.quality),
+        *_calibration(bundle.calibration),
+        *_estimator(bundle.estimator),
+    ]
     return QualityBox(kind, word, tuple(items))
 
 
@@ -106,6 +118,15 @@ def _calibration(calibration: Mapping[str, Any] | None) -> list[QualityItem]:
     if calibration.get("angle_zero") is not None:
         items.append(QualityItem("Angle zero", str(calibration["angle_zero"])))
     return items
+
+
+def _estimator(section: Mapping[str, Any] | None) -> list[QualityItem]:
+    view = estimator_view(section)
+    if view is None:
+        return []
+    extra = view.reduced or view.verdict
+    kind = None if view.kind == "ok" and view.reduced is None else view.kind
+    return [QualityItem("Poses by", view.name, extra, kind="warn" if kind == "ok" else kind, page="data")]
 
 
 def _sensor_name(sensor: Mapping[str, Any]) -> str:

@@ -158,6 +158,7 @@ REASONS: Final[Mapping[str, str]] = {
     "treadmill": "not measured: on a treadmill the belt's speed is needed, and gives speed and stride length",
     "no_foot_track": "not measured: no sensor on this foot",
     "no_foot_flat": "not measured: the foot never rested on the floor",
+    "standing_width_unknown": "not measured: enter how far apart the ankles are while standing",
     "feet_not_linked": "not measured: needs sensors on both legs and the pelvis to place the feet",
     "no_shoe_geometry": "not measured: needs the shape of the shoe",
     "no_heading": "not measured: needs a heading reference shared by the sensors",

@@ -73,7 +73,15 @@ def test_analysis_json_is_strict_json_of_schema_1(files: Mapping[str, bytes]) ->
 
     data = json.loads(files["analysis.json"], parse_constant=refuse)
     assert data["schema"] == 1
-    assert set(data) == {"schema", "quality", "calibration", "parameters", "warnings", "provenance"}
+    assert set(data) == {
+        "schema",
+        "quality",
+        "calibration",
+        "estimator",
+        "parameters",
+        "warnings",
+        "provenance",
+    }
     assert data["calibration"]["segments"]["pelvis"]["gyro_bias_dps"][2] is None
     assert data["warnings"][0] | {"code": "gap", "sensor": "pelvis", "t_s": 1.0} == data["warnings"][0]
     row = next(p for p in data["parameters"] if p["name"] == "stride_time_s" and p["side"] == "left")

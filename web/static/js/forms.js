@@ -8,10 +8,17 @@ function values(form) {
   for (const el of form.elements) {
     if (!el.name || el.disabled || "skip" in el.dataset) continue;
     if (el.type === "checkbox") body[el.name] = el.checked;
+    else if (el.value === "" && el.name.includes(".")) continue;
     else if (el.value === "" && !el.required) body[el.name] = "keepEmpty" in el.dataset ? "" : null;
-    else body[el.name] = (TYPES[el.dataset.type] || String)(el.value);
+    else put(body, el.name.split("."), (TYPES[el.dataset.type] || String)(el.value));
   }
   return body;
+}
+
+// "config.poses.estimator" goes three levels deep.
+function put(body, [first, ...rest], value) {
+  if (rest.length) put((body[first] ??= {}), rest, value);
+  else body[first] = value;
 }
 
 function same(form) {

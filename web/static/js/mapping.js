@@ -25,6 +25,7 @@ class SensorMap extends HTMLElement {
       row.addEventListener("click", () => this.select(row));
       row.addEventListener("focusin", () => this.select(row));
     }
+    this.measures = [...this.querySelectorAll("[data-measure]")];
     this.ask = this.querySelector("[data-ask]");
     this.querySelector("[data-swap]").addEventListener("click", () => this.swap());
     for (const b of this.querySelectorAll("[data-sides]")) {
@@ -139,14 +140,19 @@ class SensorMap extends HTMLElement {
   manifest() {
     const manifest = JSON.parse(this.getAttribute("manifest") || "{}") || {};
     manifest.sensors = Object.fromEntries(this.rows.map((r) => [r.dataset.device, this.segment(r) || null]));
-    const height = parseFloat(this.querySelector("#height").value.replace(",", "."));
-    if (Number.isFinite(height)) manifest.subject = { ...manifest.subject, height_m: height };
+    for (const input of this.measures) {
+      const [name, of] = input.name.split(".").reverse();
+      const into = of ? (manifest[of] ??= {}) : manifest;
+      const value = parseFloat(input.value.replace(",", "."));
+      if (Number.isFinite(value)) into[name] = value;
+      else delete into[name];
+    }
     return manifest;
   }
 
   async analyse(button) {
     const session = this.getAttribute("session");
-    if (!this.querySelector("#height").reportValidity()) return;
+    if (!this.measures.every((input) => input.reportValidity())) return;
     button.disabled = true;
     try {
       await request("POST", `/api/v1/sessions/${session}/analyses`, { manifest: this.manifest() });

@@ -1,0 +1,179 @@
+"""Which pose estimator ran, on what, and what it measured about itself, in words (clinic.md §7)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from server.report.wording import number, place_words
+
+KINDS: Final[Mapping[str, str]] = {"good": "ok", "warn": "warn", "bad": "bad"}
+VERDICTS: Final[Mapping[str, str]] = {"good": "consistent", "warn": "doubtful in part", "bad": "inconsistent"}
+
+METHODS: Final[Mapping[str, str]] = {
+    "erkf_smoothed": "ErKF, smoothed",
+    "l7s_3i": "L7S-3I",
+    "l7s_2i": "L7S-2I",
+    "stance_foot_anchor": "Orientations only",
+    "none": "No figure",
+}
+"""`Poses.method` → its name."""
+
+MEANING: Final[Mapping[str, str]] = {
+    "erkf_smoothed": (
+        "An error-state Kalman filter ties all sensors together at the joints, holds each foot in place "
+        "while it rests, and goes through the take forwards and backwards (Potter). Angles are measured by two "
+        "sensors each; on a healthy walk flexion was within 2 to 4° of optical motion capture, hip and knee "
+        "adduction within 2 to 4°, strides within 2 cm."
+    ),
+    "l7s_3i": (
+        "Thighs and shanks carry no sensor: they follow from the pelvis, the feet and the leg's length, with "
+        "knees and ankles as hinges (Sy). On a healthy walk estimated flexion was 7 to 11° from optical "
+        "motion capture, so curves show the pattern, not small changes."
+    ),
+    "l7s_2i": (
+        "Only the feet carry sensors: pelvis, thighs and shanks are estimated from them and the leg's length "
+        "(Sy). On a healthy walk estimated flexion was 8 to 11° from optical motion capture; the pelvis is "
+        "taken to keep its height and to face between the feet."
+    ),
+    "stance_foot_anchor": (
+        "Each sensor's orientation on its own, without the joints; the figure hangs on the foot that stands. "
+        "Flexion angles are measured all the same; frontal and transverse angles drift with each sensor's "
+        "heading."
+    ),
+    "none": "These sensors do not allow a figure; what they measure themselves is shown.",
+}
+
+CHOICES: Final[Mapping[str, str]] = {
+    "erkf": "ErKF with smoother",
+    "l7s_3i": "L7S-3I: pelvis and feet",
+    "l7s_2i": "L7S-2I: feet only",
+    "stance_foot_anchor": "Orientations only",
+}
+"""Estimator that can be asked for → what the choice says."""
+
+REDUCED: Final[Mapping[str, str]] = {
+    "sensor_failed": "reduced: a sensor failed in this take",
+    "estimator_failed": "reduced: the better estimator could not finish",
+}
+
+QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
+    "joint_residual_mm": ("Joint ends apart", 0, "mm"),
+    "zero_velocity_refused_pct": ("Rests refused", 1, "%"),
+    "longest_moving_s": ("Longest without rest", 1, "s"),
+    "climb_pct": ("Floor rises or falls, of the way", 1, "%"),
+    "gap_s": ("Longest loss", 1, "s"),
+    "heading_sd_deg": ("Heading uncertain by", 1, "°"),
+    "min_eigenvalue": ("Smallest eigenvalue of P", 0, ""),
+    "forward_axis_turned_deg": ("Forward axis turned", 0, "°"),
+    "leg_excess_mm": ("Leg longer than it is", 1, "mm"),
+    "hinge_mm": ("Joint off its hinge", 1, "mm"),
+    "knee_straight_pct": ("Knee straight", 0, "%"),
+    "foot_turned_deg": ("Foot sensor turned", 0, "°"),
+}
+"""Name of a finding → label, decimals, unit."""
+
+HIDDEN: Final = ("min_eigenvalue",)
+"""For those who check numbers: in analysis.json, not on the page."""
+
+
+@dataclass(frozen=True)
+class HealthRow:
+    """One measured quantity: the worst of its kind and where, its limit, and the verdict."""
+
+    label: str
+    where: str
+    text: str
+    limit: str
+    kind: str
+
+
+@dataclass(frozen=True)
+class EstimatorView:
+    """The estimator of an analysis.
+
+    Parameters
+    ----------
+    kind, verdict : ok, warn or bad and its word. reduced : words, None when the take allowed what is worn.
+    choices : (value, words, shown now) of what can be asked for on these sensors.
+    estimated : sentence about angles that no two sensors measure, empty when there are none.
+    """
+
+    name: str
+    meaning: str
+    sensors: int
+    kind: str
+    verdict: str
+    reduced: str | None
+    health: tuple[HealthRow, ...]
+    choices: tuple[tuple[str, str, bool], ...]
+    estimated: str
+
+
+def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
+    """View of `estimator` in analysis.json; None when the analysis stopped before the poses."""
+    if e is None:
+        return None
+    name, verdict, asked = str(e["name"]), str(e["verdict"]), str(e["requested"])
+    ran = name.removesuffix("_smoothed")
+    reduced = e["reduced"]
+    return EstimatorView(
+        name=METHODS.get(name, name),
+        meaning=MEANING.get(name, ""),
+        sensors=len(e["sensors"]),
+        kind=KINDS[verdict],
+        verdict=VERDICTS[verdict],
+        reduced=None if reduced is None else REDUCED.get(reduced, str(reduced)),
+        health=_rows(e["health"]),
+        choices=(
+            ("auto", "Automatic: the best for what is worn", asked == "auto"),
+            *((x, CHOICES.get(x, x), asked == x or (asked == "auto" and x == ran)) for x in e["possible"]),
+        ),
+        estimated=_estimated(estimated_angles(e)),
+    )
+
+
+def estimated_angles(e: Mapping[str, Any] | None) -> frozenset[str]:
+    """Angles with their side that the estimator's model gives rather than two sensors."""
+    return frozenset() if e is None else frozenset(e["estimated_angles"])
+
+
+def _estimated(angles: frozenset[str]) -> str:
+    if not angles:
+        return ""
+    joints = sorted({a.split("_")[0] for a in angles})
+    sides = {"l": "left", "r": "right"}
+    on = sorted({sides[a[-1]] for a in angles if a[-2:] in ("_l", "_r")})
+    who = "both sides" if len(on) > 1 else f"the {on[0]} side" if on else "the pelvis"
+    return (
+        f"{', '.join(joints).capitalize()} angles of {who} are estimated by the leg model, not measured by "
+        "two sensors: low confidence."
+    )
+
+
+def _rows(health: list[Mapping[str, Any]]) -> tuple[HealthRow, ...]:
+    """The worst finding of each name, judged ones first."""
+    worst: dict[str, Mapping[str, Any]] = {}
+    for f in health:
+        was = worst.get(f["name"])
+        if was is None or f["value"] is None or (was["value"] is not None and f["value"] > was["value"]):
+            worst[f["name"]] = f
+    shown = [f for name, f in worst.items() if name not in HIDDEN]
+    shown.sort(key=lambda f: f["warn"] is None and f["bad"] is None)
+    return tuple(_row(f) for f in shown)
+
+
+def _row(f: Mapping[str, Any]) -> HealthRow:
+    name = str(f["name"])
+    label, digits, unit = QUANTITIES.get(name, (name.replace("_", " ").capitalize(), 2, ""))
+    gap = "" if unit == "°" else "\u202f"
+    limit = f["bad"] if f["warn"] is None else f["warn"]
+    where = " and ".join(place_words(part) for part in str(f["of"] or "").split("-") if part)
+    return HealthRow(
+        label=label,
+        where=where,
+        text="not measured" if f["value"] is None else f"{number(float(f['value']), digits)}{gap}{unit}",
+        limit="" if limit is None else f"≤ {number(float(limit), 0)}{gap}{unit}",
+        kind=KINDS[str(f["verdict"])],
+    )
