@@ -57,6 +57,12 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of one take")
     p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")
     p.add_argument("--out", type=Path, required=True, help="folder for the results")
+    p.add_argument(
+        "--estimator",
+        default="auto",
+        help="auto, erkf, l7s_3i, l7s_2i, stance_foot_anchor (docs/estimators.md)",
+    )
+    p.add_argument("--config", type=Path, help='JSON: parameters by stage, {"poses": {"estimator": "erkf"}}')
     p = add("simulate", "Write a simulated recording and its exact truth.")
     p.add_argument("--out", type=Path, required=True, help="folder for recording and truth")
     p.add_argument(

@@ -62,8 +62,8 @@ TOLD: Final[Mapping[str, tuple[str, Severity, str]]] = {
         "warning",
         (
             "The two sensors at {of} do not hang together: their joint is {value:.0f} mm apart on average, "
-            "up to {warn:.0f} mm are expected. Check left and right, which sensor is on which segment, how it "
-            "is mounted, the body height, and that all clocks agree."
+            "up to {warn:.0f} mm are expected. Check left and right, which sensor is on which segment, how "
+            "it is mounted, the body height, and that all clocks agree."
         ),
     ),
     "zero_velocity_refused_pct": (

@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from math import degrees, radians
-from typing import Final
+from typing import Final, get_args
 
 import numpy as np
 
 from core.body.apart import legs_apart
-from core.body.choice import Estimator, Requested, choose
+from core.body.choice import WHOLE, Estimator, Requested, choose
 from core.body.corrected import corrected_signals
 from core.body.erkf import ErkfParams, erkf_inputs
 from core.body.erkf_health import erkf_health, erkf_notices
@@ -31,9 +31,9 @@ from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.poses import Poses
 from core.body.smoother import smooth
 from core.body.still import FOOT_STILL, still_samples
-from core.body.tree import person_tree
+from core.body.tree import PRESETS, person_tree
 from core.calibration.result import CalibratedRecording
-from core.errors import EstimationError, Notice, Severity
+from core.errors import EstimationError, Notice, ParameterError, Severity
 from core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
 from core.fusion.orientations import Orientations
 
@@ -46,6 +46,13 @@ ON_A_BELT: Final = (
 )
 
 
+SENSORS: Final[Mapping[str, tuple[Segment, ...]]] = {
+    "l7s_3i": PRESETS["feet_pelvis3"],
+    "l7s_2i": PRESETS["feet2"],
+}
+"""What these see when they are asked for by name: the point is what so few sensors tell."""
+
+
 @dataclass(frozen=True)
 class PoseParams:
     """Parameters of `estimate_poses`.
@@ -54,12 +61,24 @@ class PoseParams:
     ----------
     estimator : "auto" picks by what is worn.
     least_valid : share of the take a sensor must be there for (our choice).
+
+    Raises
+    ------
+    ParameterError `unknown_estimator`.
     """
 
     estimator: Requested = "auto"
     erkf: ErkfParams = field(default_factory=ErkfParams.people)
     l7s: L7sParams = field(default_factory=L7sParams)
     least_valid: float = 0.5
+
+    def __post_init__(self) -> None:
+        known = get_args(Requested)
+        if self.estimator not in known:
+            raise ParameterError(
+                "unknown_estimator",
+                f"'{self.estimator}' is no estimator; expected one of {', '.join(known)}.",
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +118,8 @@ def estimate_poses(
     params = params or PoseParams()
     calibrated, orientations = legs_apart(calibrated, orientations, body)
     choice = choose(calibrated, orientations, params.estimator, params.least_valid)
-    take = _Take(calibrated, _without(orientations, choice.failed), contacts, body, params)
+    used = tuple(s for s in choice.segments if s in SENSORS.get(params.estimator, choice.segments))
+    take = _Take(calibrated, _without(orientations, set(WHOLE) - set(used)), contacts, body, params)
     order = choice.possible if params.estimator == "auto" else (params.estimator,)
     notices, reduced = list(choice.notices), choice.reduced
     if calibrated.recording.protocol == "treadmill":
@@ -107,7 +127,7 @@ def estimate_poses(
     made = None
     for estimator in order:
         try:
-            made = take.run(estimator, choice.segments)
+            made = take.run(estimator, used)
             break
         except EstimationError as error:
             if estimator == order[-1]:
@@ -121,7 +141,7 @@ def estimate_poses(
         made = replace(made, poses=replace(made.poses, method="none"))
     if made.feet is None:
         try:
-            made = take.with_feet(made, choice.segments)
+            made = take.with_feet(made, used)
         except EstimationError as error:
             message = f"The paths of the feet cannot be estimated, so there are no distances. {error.message}"
             notices.append(Notice("foot_paths_failed", message, error.sensor, error.t_s))
@@ -132,7 +152,7 @@ def estimate_poses(
         diagnostics={
             **made.poses.diagnostics,
             "requested": params.estimator,
-            "sensors": choice.segments,
+            "sensors": used,
             "possible": choice.possible,
         },
     )

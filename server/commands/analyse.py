@@ -6,17 +6,29 @@ import json
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from core.errors import InputError, SagittalError
+from server.report.estimator import estimator_view
 from server.storage import fs
 
 if TYPE_CHECKING:
     from core.formats.source import SourceFile
 
 
-def analyse(paths: Sequence[Path], manifest: Path | None, out: Path) -> int:
+def analyse(
+    paths: Sequence[Path],
+    manifest: Path | None,
+    out: Path,
+    estimator: str = "auto",
+    config: Path | None = None,
+) -> int:
     """Analyse files, folders or zips as one recording and write the results into `out`.
+
+    Parameters
+    ----------
+    estimator : of the poses, "auto" for the best that the sensors allow. config : JSON file with overrides of
+        parameters by stage, as the API takes them.
 
     Returns
     -------
@@ -28,7 +40,7 @@ def analyse(paths: Sequence[Path], manifest: Path | None, out: Path) -> int:
         sources = list(source_files(paths))
         declared = manifest.read_bytes() if manifest else None
         with _ProgressBar() as bar:
-            files = analyses.run(sources, declared, None, bar.stage)
+            files = analyses.run(sources, declared, _overrides(config, estimator), bar.stage)
     except SagittalError as error:
         sys.stderr.write(f"Nothing analysable ({error.code}): {error.message}\n")
         return 1
@@ -38,6 +50,24 @@ def analyse(paths: Sequence[Path], manifest: Path | None, out: Path) -> int:
     result = json.loads(files["analysis.json"])
     print_summary(result, out)
     return 0 if any(p["mean"] is not None for p in result["parameters"]) else 1
+
+
+def _overrides(path: Path | None, estimator: str) -> dict[str, Any]:
+    """What the file says, the estimator of the command line put into it.
+
+    Raises
+    ------
+    InputError `config_unreadable`.
+    """
+    try:
+        chosen = json.loads(path.read_bytes()) if path else {}
+    except (OSError, ValueError) as error:
+        raise InputError("config_unreadable", f"{path} cannot be read as JSON: {error}.") from error
+    if not isinstance(chosen, dict) or not isinstance(chosen.get("poses", {}), dict):
+        raise InputError("config_unreadable", f'{path} is not of the form {{"stage": {{"name": value}}}}.')
+    if estimator != "auto":
+        chosen["poses"] = {**chosen.get("poses", {}), "estimator": estimator}
+    return chosen
 
 
 def source_files(paths: Sequence[Path]) -> Iterator[SourceFile]:
@@ -52,8 +82,8 @@ def source_files(paths: Sequence[Path]) -> Iterator[SourceFile]:
             yield SourceFile.of_path(file, name)
 
 
-def print_summary(result: dict[str, list[dict[str, object]]], out: Path) -> None:
-    """Parameters as a table, warnings as sentences, on stdout."""
+def print_summary(result: dict[str, Any], out: Path) -> None:
+    """Parameters as a table, the estimator and its verdict, warnings as sentences, on stdout."""
     lines = [f"{'parameter':<36}{'side':<8}{'n':>4}{'mean':>10}{'sd':>9}  unit"]
     for p in result["parameters"]:
         if p["mean"] is None:
@@ -63,6 +93,9 @@ def print_summary(result: dict[str, list[dict[str, object]]], out: Path) -> None
             lines.append(
                 f"{p['name']:<36}{p['side'] or '':<8}{p['n']:>4}{p['mean']:>10.3f}{sd:>9}  {p['unit']}"
             )
+    view = estimator_view(result["estimator"])
+    if view is not None:
+        lines.append(f"Poses by {view.name}, {view.sensors} sensors: {view.reduced or view.verdict}.")
     lines += [f"{w['code']}: {w['message']}" for w in result["warnings"]]
     lines.append(f"Results in {out}")
     sys.stdout.write("\n".join(lines) + "\n")

@@ -23,8 +23,8 @@ METHODS: Final[Mapping[str, str]] = {
 MEANING: Final[Mapping[str, str]] = {
     "erkf_smoothed": (
         "An error-state Kalman filter ties all sensors together at the joints, holds each foot in place "
-        "while it rests, and goes through the take forwards and backwards (Potter). Angles are measured by two "
-        "sensors each; on a healthy walk flexion was within 2 to 4° of optical motion capture, hip and knee "
+        "while it rests, and goes through the take forwards and backwards (Potter). Angles are measured by "
+        "two sensors each; on a healthy walk flexion was within 2 to 4° of optical motion capture, hip and knee "
         "adduction within 2 to 4°, strides within 2 cm."
     ),
     "l7s_3i": (

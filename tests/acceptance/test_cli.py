@@ -53,6 +53,26 @@ def rows(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(path.read_text("utf-8"))))
 
 
+def test_another_estimator_and_a_config_file(tmp_path: Path) -> None:
+    take = tmp_path / "take"
+    assert sagittal("simulate", "--out", take, "--script", "comfortable").returncode == 0
+    files = next(p for p in take.iterdir() if p.suffix == ".parquet")
+    done = sagittal("analyse", files, "--out", tmp_path / "a", "--estimator", "l7s_2i")
+    assert done.returncode == 0, done.stderr
+    assert "Poses by L7S-2I" in done.stdout
+    assert result(tmp_path / "a")["estimator"]["requested"] == "l7s_2i"
+    config = tmp_path / "config.json"
+    config.write_text('{"poses": {"estimator": "stance_foot_anchor"}}')
+    done = sagittal("analyse", files, "--out", tmp_path / "b", "--config", config)
+    assert "Poses by Orientations only" in done.stdout
+    wrong = sagittal("analyse", files, "--out", tmp_path / "c", "--estimator", "guess")
+    assert wrong.returncode == 1
+    assert "unknown_estimator" in wrong.stderr
+    config.write_text("[1]")
+    wrong = sagittal("analyse", files, "--out", tmp_path / "c", "--config", config)
+    assert "config_unreadable" in wrong.stderr
+
+
 def result(folder: Path) -> dict[str, Any]:
     content: dict[str, Any] = json.loads((folder / "analysis.json").read_text("utf-8"))
     return content

@@ -189,3 +189,25 @@ async def test_a_damaged_result_is_never_sent(visit: Visit) -> None:
 def _replace(path: Path, content: bytes) -> None:
     path.chmod(0o600)
     path.write_bytes(content)
+
+
+async def test_another_estimator_runs_on_the_same_take_and_the_first_can_be_shown_again(visit: Visit) -> None:
+    async with visit.clinic.client("clinician", timeout=300) as client:
+        first = (await client.get(f"{visit.path}/report")).json()["estimator"]
+        assert first["name"] == "ErKF, smoothed"
+
+        async def run(config: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+            job = (await client.post(f"{visit.path}/analyses", json={"config": config})).json()
+            last = events(await client.get(f"{API}/jobs/{job['id']}/events"))[-1]
+            return last["state"], (await client.get(f"{visit.path}/report")).json()["estimator"]
+
+        state, other = await run({"poses": {"estimator": "l7s_3i"}})
+        assert (state, other["name"]) == ("done", "L7S-3I")
+        assert "estimated by the leg model" in other["estimated"]
+        state, again = await run({})
+        assert (state, again) == ("done", first)
+        state, _ = await run({"poses": {"estimator": "guess"}})
+        assert state == "failed"
+        jobs = (await client.get(f"{API}/jobs")).json()
+        assert any(j["error_code"] == "unknown_estimator" for j in jobs)
+        await run({})
