@@ -24,8 +24,8 @@ MEANING: Final[Mapping[str, str]] = {
     "erkf_smoothed": (
         "An error-state Kalman filter ties all sensors together at the joints, holds each foot in place "
         "while it rests, and goes through the take forwards and backwards (Potter). Angles are measured by "
-        "two sensors each; on a healthy walk flexion was within 2 to 4° of optical motion capture, hip and knee "
-        "adduction within 2 to 4°, strides within 2 cm."
+        "two sensors each; on a healthy walk flexion, hip and knee adduction were within 2 to 4° of optical "
+        "motion capture, strides within 2 cm."
     ),
     "l7s_3i": (
         "Thighs and shanks carry no sensor: they follow from the pelvis, the feet and the leg's length, with "
@@ -96,7 +96,7 @@ class EstimatorView:
     Parameters
     ----------
     kind, verdict : ok, warn or bad and its word. reduced : words, None when the take allowed what is worn.
-    choices : (value, words, shown now) of what can be asked for on these sensors.
+    choices : (value, words, asked for now) of what can be asked for on these sensors.
     estimated : sentence about angles that no two sensors measure, empty when there are none.
     """
 
@@ -116,7 +116,6 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
     if e is None:
         return None
     name, verdict, asked = str(e["name"]), str(e["verdict"]), str(e["requested"])
-    ran = name.removesuffix("_smoothed")
     reduced = e["reduced"]
     return EstimatorView(
         name=METHODS.get(name, name),
@@ -128,7 +127,7 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
         health=_rows(e["health"]),
         choices=(
             ("auto", "Automatic: the best for what is worn", asked == "auto"),
-            *((x, CHOICES.get(x, x), asked == x or (asked == "auto" and x == ran)) for x in e["possible"]),
+            *((x, CHOICES.get(x, x), asked == x) for x in e["possible"]),
         ),
         estimated=_estimated(estimated_angles(e)),
     )
@@ -137,6 +136,11 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
 def estimated_angles(e: Mapping[str, Any] | None) -> frozenset[str]:
     """Angles with their side that the estimator's model gives rather than two sensors."""
     return frozenset() if e is None else frozenset(e["estimated_angles"])
+
+
+def estimated_variables(e: Mapping[str, Any] | None) -> frozenset[str]:
+    """The same without the side."""
+    return frozenset(a.removesuffix("_l").removesuffix("_r") for a in estimated_angles(e))
 
 
 def _estimated(angles: frozenset[str]) -> str:

@@ -15,7 +15,7 @@ from core.errors import Notice
 from core.frames import SIDES, Floats, Side
 from core.norms import NormBands, NormValues, adult_kinematics, angle_values, temporal_values
 from server.report.bundle import Bundle
-from server.report.estimator import EstimatorView, estimator_view
+from server.report.estimator import EstimatorView, estimated_variables, estimator_view
 from server.report.exports import plain
 from server.report.panels import DRAWN_STRIDES, CurvePanel, SideCurve, curve_panels
 from server.report.quality_box import QualityBox, quality_box
@@ -176,7 +176,7 @@ def report_model(
     bands = adult_kinematics(age, speed_mps)
     angle_norms, time_norms = angle_values(age), temporal_values(age, sex)
     values = {} if bands.reason else {**time_norms.values, **angle_norms.values}
-    rows = parameter_rows(bundle.parameters, values)
+    rows = parameter_rows(bundle.parameters, values, estimated_variables(bundle.estimator))
     panels = curve_panels(bundle, bands)
     stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
     angles = bundle.angles
@@ -185,7 +185,10 @@ def report_model(
         quality=quality_box(bundle),
         warnings=tuple(_warning(n) for n in bundle.warnings),
         kpis=tuple(
-            _key_number(r) for name in KEY_NUMBERS for r in rows if r.name == name and r.reason is None
+            _key_number(r)
+            for name in KEY_NUMBERS
+            for r in rows
+            if r.name == name and r.reason is None and not r.low_confidence
         )[:SHOWN_LARGE],
         groups=grouped(rows),
         panels=panels,

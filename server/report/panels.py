@@ -13,7 +13,7 @@ from core.norms import NormBand, NormBands
 from core.parameters import cycle_curves, mean_curve
 from core.parameters.result import CycleCurves
 from server.report.bundle import Bundle
-from server.report.estimator import estimated_angles
+from server.report.estimator import estimated_variables
 from server.report.wording import VARIABLES, ZERO_WORDS, Variable, reason_words
 
 DRAWN_STRIDES: Final = 40
@@ -64,7 +64,7 @@ def curve_panels(bundle: Bundle, norms: NormBands) -> tuple[CurvePanel, ...]:
     """All panels in reading order; a variable without a curve keeps its place and says why."""
     curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
     zero = None if bundle.angles is None else bundle.angles.zero
-    estimated = {a.removesuffix("_l").removesuffix("_r") for a in estimated_angles(bundle.estimator)}
+    estimated = estimated_variables(bundle.estimator)
     return tuple(
         _panel(v, curves, zero, norms.bands.get(v.name), sure=v.name not in estimated) for v in VARIABLES
     )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 from core.norms import NormValue
@@ -36,6 +36,7 @@ class Row:
     difference : left against right in words. norm : "62.6 ± 2.0". norm_mean, norm_sd, norm_n, norm_source :
         behind it; None where no comparable norm exists, `norm_note` then says why if there is a reason.
     reason : words in place of all numbers, None if there is any.
+    low_confidence : of an angle that the estimator's model gives; it has no norm.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Row:
     norm_n: int | None = None
     norm_source: str | None = None
     norm_note: str = ""
+    low_confidence: bool = False
 
     @property
     def plot(self) -> str:
@@ -65,14 +67,24 @@ class Row:
         return range_svg(marks, (self.norm_mean, self.norm_sd), self.scale)
 
 
-def parameter_rows(parameters: Sequence[Parameter], norms: Mapping[str, NormValue]) -> tuple[Row, ...]:
-    """Rows in the order of the table; parameters without wording come last under their own name."""
+def parameter_rows(
+    parameters: Sequence[Parameter],
+    norms: Mapping[str, NormValue],
+    estimated: Collection[str] = (),
+) -> tuple[Row, ...]:
+    """Rows in the order of the table; parameters without wording come last under their own name.
+
+    Parameters
+    ----------
+    estimated : variables that no two sensors measure; what is derived from them has low confidence.
+    """
     found: dict[str, dict[str | None, Parameter]] = {}
     for p in parameters:
         found.setdefault(p.name, {})[p.side] = p
     known = [name for name in TERMS if name in found]
     other = [name for name in found if name not in TERMS]
-    return tuple(_row(name, found[name], norms.get(name)) for name in (*known, *other))
+    rows = (_row(name, found[name], norms.get(name)) for name in (*known, *other))
+    return tuple(_unsure(r) if any(r.name.startswith(f"{v}_") for v in estimated) else r for r in rows)
 
 
 def grouped(rows: Sequence[Row]) -> tuple[tuple[str, tuple[Row, ...]], ...]:
@@ -105,6 +117,12 @@ def _row(name: str, sides: Mapping[str | None, Parameter], norm: NormValue | Non
         norm_n=None if shown is None else shown.n,
         norm_source=None if shown is None else shown.source,
         norm_note="" if norm is None else norm.note,
+    )
+
+
+def _unsure(row: Row) -> Row:
+    return replace(
+        row, norm=None, norm_mean=None, norm_sd=None, norm_n=None, norm_source=None, low_confidence=True
     )
 
 

@@ -62,7 +62,7 @@ def test_the_choice_offers_what_the_sensors_allow_and_marks_what_ran() -> None:
     view = estimator_view(section())
     assert view is not None
     assert [v for v, _, _ in view.choices] == ["auto", "erkf", "l7s_2i", "stance_foot_anchor"]
-    assert [v for v, _, on in view.choices if on] == ["auto", "erkf"]
+    assert [v for v, _, on in view.choices if on] == ["auto"]
     asked = estimator_view(section(name="l7s_2i", requested="l7s_2i"))
     assert asked is not None
     assert [v for v, _, on in asked.choices if on] == ["l7s_2i"]
@@ -85,6 +85,23 @@ def test_angles_of_the_model_are_marked_on_their_curves(make_bundle: MakeBundle)
     assert low["knee_flexion"]
     assert not low["hip_flexion"]
     assert any("estimated by the leg model" in note for note in model.curve_notes)
+    rows = {r.name: r for _, group in model.groups for r in group}
+    assert rows["knee_flexion_rom_deg"].low_confidence
+    assert not rows["hip_flexion_rom_deg"].low_confidence
+    assert "knee_flexion_rom_deg" not in {k.name for k in model.kpis}
+
+
+def test_an_angle_of_the_model_has_no_norm(make_bundle: MakeBundle) -> None:
+    measured = report_model(make_bundle(estimator=section()), age=40, speed_mps=1.2)
+    guessed = report_model(
+        make_bundle(estimator=section(estimated_angles=["knee_flexion_r"])), age=40, speed_mps=1.2
+    )
+    norms = [
+        {r.name: r.norm for _, group in m.groups for r in group}["knee_flexion_rom_deg"]
+        for m in (measured, guessed)
+    ]
+    assert norms[0] is not None
+    assert norms[1] is None
 
 
 def test_a_reduced_take_is_said_in_the_quality_box(make_bundle: MakeBundle) -> None:
