@@ -18,6 +18,7 @@ from core.body.updates import (
     GYRO_BIAS,
     VELOCITY,
     back_correct,
+    bent,
     correct,
     heading_rows,
     joint_rows,
@@ -105,7 +106,7 @@ def forward(  # type: ignore[no-untyped-def]
     stride = 1 if record.V.shape[0] > 1 else 0
     R, U, y = np.empty((n, 3, 3)), np.empty((4, 3)), np.empty(3)
     scratch, zero = np.empty((10, 3)), np.zeros(3)
-    take = np.zeros(n, np.bool_)
+    take, slack = np.zeros(n, np.bool_), np.empty(J)
     for k in range(T):
         slot, dt = stride * k, step[k]
         F, V, E, H = record.F[slot], record.V[slot], record.E[slot], record.H[slot]
@@ -148,15 +149,21 @@ def forward(  # type: ignore[no-untyped-def]
                 for c in range(3):
                     P[b + c, b + c] += noise.reaccept_m**2
                     P[b + 3 + c, b + 3 + c] += speed2
+        # all from the predicted covariance too
+        for j in range(J):
+            a, c = links.ends[j, 0], links.ends[j, 1]
+            slack[j] = np.sqrt(
+                max(noise.centre, 0.0) ** 2 + bent(P, R, m, a, c, links.lever[j, 0], links.lever[j, 1])
+            )
         dx[:] = 0.0
         B = 0
         good = True
         for j in range(J):
             a, c = links.ends[j, 0], links.ends[j, 1]
             for axis in range(2):
-                s = noise.axis if axis else noise.centre
-                if s < 0.0 or (axis and not links.hinged[j]):
+                if (noise.axis if axis else noise.centre) < 0.0 or (axis and not links.hinged[j]):
                     continue
+                s = noise.axis if axis else slack[j]
                 on = links.axis[j] if axis else links.lever[j]
                 joint_rows(x, R, m, a, c, on[0], on[1], axis == 0, place[B], H[B], y)
                 good &= correct(P, dx, place[B], H[B], y, s, V[B], E[B], U)

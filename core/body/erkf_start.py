@@ -3,14 +3,22 @@
 Tilt comes from the mean specific force; heading from the convention that all segments face +x at the start
 (a common heading, free gauge); positions from the tree with the ankles at their height over the floor, so
 that joint centres coincide. Source: spec/estimators.md §3.5.
+
+Positions laid out with wrong orientations are wrong by them, so the first covariance joins both: taken as
+independent, the joint centres of a person who stands, which say nothing of headings, would seem to measure
+them. And no measurement tells the heading that all have in common, nor does its uncertainty: left in, the
+linearised filter believes to learn it in every turn and moves the whole path, strides with it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
+from numpy.typing import NDArray
 
 from core.body.erkf import ErkfInputs, ErkfParams, ErkfState
-from core.body.tree import ImuTree
+from core.body.tree import ImuTree, Joint
 from core.frames import Floats
 from core.rotation import from_matrix, rotate, to_matrix
 
@@ -55,21 +63,21 @@ def start_state(
     bias = params.moving_gyr_bias_sd
     if age_s is not None:
         bias = float(np.hypot(params.start_gyr_bias_sd, params.gyr_walk * np.sqrt(age_s)))
-    P = np.zeros((n * m, n * m))
-    up = to_matrix(q)[:, 2, :]
-    for i in range(n):
-        sd = np.concatenate(
-            [
-                np.full(3, s)
-                for s in (params.start_position_sd, velocity, tilt, bias, params.start_acc_bias_sd)
-            ]
-        )[:m]
-        block = np.diag(sd**2)
-        block[6:9, 6:9] += params.start_heading_sd**2 * np.outer(up[i], up[i])
-        P[i * m : (i + 1) * m, i * m : (i + 1) * m] = block
+    sd = np.repeat((params.start_position_sd, velocity, tilt, bias, params.start_acc_bias_sd), 3)[:m]
+    P = np.diag(np.tile(sd**2, n))
+    up, part, heading = to_matrix(q)[:, 2, :], _parts(tree), np.eye(n)
+    if inputs.heading is None:
+        # nothing tells a common heading: as none of its errors it stays what it is
+        same = part[:, None] == part
+        heading -= same / same.sum(axis=0)
+    for i, j in zip(*np.nonzero(heading), strict=True):
+        shared = params.start_heading_sd**2 * heading[i, j] * np.outer(up[i], up[j])
+        P[i * m + 6 : i * m + 9, j * m + 6 : j * m + 9] += shared
+    spread = _spread(tree, q, m)
+    P = spread @ P @ spread.T
     return ErkfState(
         nominal=nominal,
-        P=P,
+        P=0.5 * (P + P.T),
         before=np.concatenate((inputs.acc[0], inputs.gyr[0]), axis=1),
         injected=np.zeros(n * m),
         refused=np.zeros(n, np.int64),
@@ -78,27 +86,51 @@ def start_state(
 
 def chain_positions(tree: ImuTree, q: Floats) -> Floats:
     """Sensor positions (n, 3) in W that make the joint centres coincide, given orientations (n, 4)."""
-    p = np.full((len(tree.imus), 3), np.nan)
-    parts = []
+    p, part = np.full((len(tree.imus), 3), np.nan), _parts(tree)
     for root in tree.roots():
         p[root] = tree.origin[root] + rotate(tree.segment_q(q)[root], tree.place[root])
-        part, joints = [root], list(tree.joints)
-        while joints:
-            joint = next((j for j in joints if not np.isnan(p[j.proximal, 0])), None)
-            if joint is None:
-                break
-            joints.remove(joint)
-            centre = p[joint.proximal] + rotate(q[joint.proximal], joint.r_proximal)
-            if np.isnan(p[joint.distal, 0]):
-                p[joint.distal] = centre - rotate(q[joint.distal], joint.r_distal)
-                part.append(joint.distal)
-        parts.append(part)
-    for part in parts:
-        feet = [i for i in part if i in tree.feet]
+    for joint in _outward(tree):
+        centre = p[joint.proximal] + rotate(q[joint.proximal], joint.r_proximal)
+        p[joint.distal] = centre - rotate(q[joint.distal], joint.r_distal)
+    for one in set(part.tolist()):
+        feet = [i for i in tree.feet if part[i] == one]
         if feet:
             height = tree.segment_origin(p, q)[feet, 2] - tree.origin[feet, 2]
-            p[part, 2] -= height.min()
+            p[part == one, 2] -= height.min()
     return p
+
+
+def _parts(tree: ImuTree) -> NDArray[np.int64]:
+    """Root (n,) of the part of the tree that each sensor belongs to."""
+    part = np.arange(len(tree.imus))
+    for joint in _outward(tree):
+        part[joint.distal] = part[joint.proximal]
+    return part
+
+
+def _outward(tree: ImuTree) -> Iterator[Joint]:
+    """Joints from the roots on, those that reach a sensor first."""
+    reached, joints = set(tree.roots()), list(tree.joints)
+    while joint := next((j for j in joints if j.proximal in reached), None):
+        joints.remove(joint)
+        if joint.distal not in reached:
+            reached.add(joint.distal)
+            yield joint
+
+
+def _spread(tree: ImuTree, q: Floats, m: int) -> Floats:
+    """Derivative (n·m, n·m) of the errors at the start by independent ones: the position of a sensor in the
+    chain carries those of its neighbour's position and, by the levers, of both orientations.
+    """
+    R = to_matrix(q)
+    # np.cross(1, r) = [r]×
+    J = np.eye(len(R) * m)
+    for joint in _outward(tree):
+        a, b = joint.proximal * m, joint.distal * m
+        J[b : b + 3] += J[a : a + 3]
+        J[b : b + 3, a + 6 : a + 9] -= R[joint.proximal] @ np.cross(np.eye(3), joint.r_proximal)
+        J[b : b + 3, b + 6 : b + 9] += R[joint.distal] @ np.cross(np.eye(3), joint.r_distal)
+    return J
 
 
 def _level(f: Floats, forward: Floats) -> Floats:
