@@ -16,7 +16,6 @@ from server.viewer.colours import BACKGROUND, FLOOR, TINTS, linear
 from server.viewer.ground import Ground
 from server.viewer.motion import Batch, Motion
 
-_SECTION_M = 1.0
 _FOV_RAD = np.deg2rad(31.0)
 _FAINT = 0.35
 """Opacity of a part that no sensor supports."""
@@ -26,11 +25,12 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Shot:
-    """A place to look from. at, eye : m, in the scene. fade : m, where the floor ends."""
+    """A place to look from, in m: at, eye in the scene; fade, section are end and lines of the floor."""
 
     at: Vector
     eye: Vector
     fade: float
+    section: float
 
 
 class Figure:
@@ -50,9 +50,7 @@ class Figure:
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
         scene.configure_default_lights(True, cast_shadow=True)
-        self._grid = scene.add_grid(
-            "/floor", infinite_grid=True, cell_size=0.25, section_size=_SECTION_M, shadow_opacity=0.2
-        )
+        self._grid = scene.add_grid("/floor", infinite_grid=True, shadow_opacity=0.2)
         self._room = scene.add_frame("/room", show_axes=False)
         self._batches = [
             (b, _add_batch(scene, f"/room/{name}", b)) for name, b in motion.batches.items() if b.tint
@@ -91,11 +89,12 @@ class Figure:
                     handle.batched_positions = batch.position[i]
                     handle.batched_wxyzs = batch.wxyz[i]
             for side, letter in self._letters.items():
-                letter.visible = valid
+                letter.visible = valid and self._follow
                 letter.position = m.toes[side][i]
             self._room.position = (x, y, 0.0)
             # the grid has no end only as long as it stays below the camera
-            self._grid.position = (x % _SECTION_M, y % _SECTION_M, 0.0)
+            section = self._grid.section_size
+            self._grid.position = (x % section, y % section, 0.0)
             self._ground.show(self._t_s)
         self._server.flush()
         return self._t_s
@@ -112,6 +111,7 @@ class Figure:
         self._follow = follow
         shot = _near(self._motion) if follow else _whole(self._motion)
         self._grid.fade_distance = shot.fade
+        self._grid.section_size, self._grid.cell_size = shot.section, shot.section / 5
         initial = self._server.initial_camera
         initial.position, initial.look_at = shot.eye, shot.at
         for client in self._server.get_clients().values():
@@ -126,8 +126,8 @@ class Figure:
 
 def _near(motion: Motion) -> Shot:
     """From the right and slightly from ahead, the whole person in the picture."""
-    x, y, z = motion.size * (_turned(motion.facing) @ np.array([1.9, -3.4, 1.35]))
-    return Shot((0.0, 0.0, 0.86 * motion.size), (float(x), float(y), float(z)), fade=12.0)
+    x, y, z = motion.size * (_turned(motion.facing) @ np.array([1.9, -3.4, 1.75]))
+    return Shot((0.0, 0.0, 0.86 * motion.size), (float(x), float(y), float(z)), fade=12.0, section=1.0)
 
 
 def _whole(motion: Motion) -> Shot:
@@ -135,14 +135,14 @@ def _whole(motion: Motion) -> Shot:
     sight = _turned(motion.facing) @ np.array([0.62, 0.62, -0.48])
     right = np.cross(sight, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
-    half = np.ptp(motion.root, axis=0) / 2 + 0.5 * motion.size
-    corners = np.array([(x, y, z) for x in (-half[0], half[0]) for y in (-half[1], half[1]) for z in (0, 2)])
+    half = np.append(np.ptp(motion.root, axis=0) / 2, motion.size) + 0.2
+    corners = half * np.stack(np.meshgrid(*[(-1, 1)] * 3), axis=-1).reshape(-1, 3)
     across, up, ahead = (corners @ np.stack((right, np.cross(right, sight), sight)).T).T
     # how far back the eye must be for a corner to be inside a square picture of this angle
     back = np.maximum(abs(across), abs(up)) / np.tan(_FOV_RAD / 2) - ahead
-    distance = float(back.max())
-    x, y, z = -distance * sight
-    return Shot((0.0, 0.0, 0.0), (float(x), float(y), float(z)), fade=2.5 * distance)
+    at = np.array([0.0, 0.0, motion.size])
+    x, y, z = at - back.max() * sight
+    return Shot((0.0, 0.0, at[2]), (float(x), float(y), float(z)), fade=2.5 * float(back.max()), section=5.0)
 
 
 def _turned(heading: float) -> Floats:

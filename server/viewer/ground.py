@@ -6,8 +6,6 @@ sent, so that a frame costs the same at the end of a long take as at its start.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 import viser
 
@@ -17,14 +15,14 @@ from server.viewer.colours import TINTS, linear
 from server.viewer.motion import Motion
 from server.viewer.steps import Prints, Single, Trail
 
-CHUNK = 128
-"""Pieces of a trail per scene node, about four strides."""
+CHUNK = 256
+"""Pieces of a trail per scene node, about eight strides."""
 
 PLAIN_PRINTS = 3
 """Footprints kept per side where positions are for the eye only, latest first."""
 
 _PIXELS = 1.6
-_OPACITY = 0.5
+_OPACITY = 0.6
 
 
 class Ground:
@@ -39,7 +37,7 @@ class Ground:
         self._all = scene.add_frame(f"{parent}/ground", show_axes=False)
         length = motion.body.foot
         keep = None if motion.placed else PLAIN_PRINTS
-        self._parts: list[_Prints | _Trail] = [
+        parts: list[_Prints | _Trail] = [
             *(
                 _Prints(scene, self._all.name, s, x, length, keep)
                 for s, x in motion.prints.items()
@@ -47,11 +45,15 @@ class Ground:
             ),
             *(_Trail(scene, self._all.name, s, x) for s, x in motion.trails.items() if len(x.t_s)),
         ]
+        self._shown = dict.fromkeys(parts, 0)
 
     def show(self, t_s: float) -> None:
         """Show what has been left until a time."""
-        for part in self._parts:
-            part.show(t_s)
+        for part, shown in self._shown.items():
+            count = int(np.searchsorted(part.t_s, t_s, side="right"))
+            if count != shown:
+                part.show(count)
+                self._shown[part] = count
 
     def set_visible(self, visible: bool) -> None:
         """Show or hide everything."""
@@ -62,7 +64,7 @@ class _Prints:
     def __init__(
         self, scene: viser.SceneApi, parent: str, side: Side, prints: Prints, length: float, keep: int | None
     ) -> None:
-        self._t_s, self._keep = prints.t_s, keep
+        self.t_s, self._keep = prints.t_s, keep
         self._node = scene.add_batched_meshes_simple(
             f"{parent}/prints_{side}",
             *shapes.footprint(length, side),
@@ -76,16 +78,15 @@ class _Prints:
             receive_shadow=False,
         )
 
-    def show(self, t_s: float) -> None:
-        seen = int(np.searchsorted(self._t_s, t_s, side="right"))
-        scales = np.zeros(len(self._t_s), np.float32)
-        scales[0 if self._keep is None else max(0, seen - self._keep) : seen] = 1.0
+    def show(self, count: int) -> None:
+        scales = np.zeros(len(self.t_s), np.float32)
+        scales[0 if self._keep is None else max(0, count - self._keep) : count] = 1.0
         self._node.batched_scales = scales
 
 
 class _Trail:
     def __init__(self, scene: viser.SceneApi, parent: str, side: Side, trail: Trail) -> None:
-        self._trail = trail
+        self.t_s, self._pieces = trail.t_s, trail.pieces
         self._done = 0
 
         def node(name: str, pieces: Single) -> viser.LineSegmentsHandle:
@@ -98,20 +99,15 @@ class _Trail:
                 visible=False,
             )
 
-        whole = range(0, len(trail.t_s) - CHUNK + 1, CHUNK)
-        self._chunks = [node(str(k), trail.pieces[k : k + CHUNK]) for k in whole]
-        self._rest = node("rest", trail.pieces[:1])
+        whole = range(0, len(self.t_s) - CHUNK + 1, CHUNK)
+        self._chunks = [node(str(k), self._pieces[k : k + CHUNK]) for k in whole]
+        self._rest = node("rest", self._pieces[:1])
 
-    def show(self, t_s: float) -> None:
-        seen = int(np.searchsorted(self._trail.t_s, t_s, side="right"))
-        done = seen // CHUNK
-        for k in _between(self._done, done):
+    def show(self, count: int) -> None:
+        done = count // CHUNK
+        for k in range(min(self._done, done), max(self._done, done)):
             self._chunks[k].visible = k < done
         self._done = done
-        self._rest.visible = seen > done * CHUNK
+        self._rest.visible = count > done * CHUNK
         if self._rest.visible:
-            self._rest.points = self._trail.pieces[done * CHUNK : seen]
-
-
-def _between(a: int, b: int) -> Iterable[int]:
-    return range(min(a, b), max(a, b))
+            self._rest.points = self._pieces[done * CHUNK : count]

@@ -16,15 +16,25 @@ function tabId() {
   }
 }
 
+const setting = (button) => ({ [button.dataset.switch]: button.ariaPressed === "true" });
+
 class GaitView extends HTMLElement {
   connectedCallback() {
     this.frame = this.querySelector("iframe");
     this.tries = 0;
     this.onTick = () => this.request();
     clock.addEventListener("tick", this.onTick);
-    const recolour = () => this.socket?.readyState === WebSocket.OPEN && this.socket.send(JSON.stringify({ dark: isDark() }));
+    const recolour = () => this.tell({ dark: isDark() });
     new MutationObserver(recolour).observe(document.documentElement, { attributeFilter: ["data-theme"] });
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
+    this.options = this.parentElement.querySelector("[data-options]");
+    this.switches = [...this.options.querySelectorAll("[data-switch]")];
+    for (const b of this.switches) {
+      b.addEventListener("click", () => {
+        b.ariaPressed = b.ariaPressed !== "true";
+        this.tell(setting(b));
+      });
+    }
     this.connect();
   }
 
@@ -60,6 +70,10 @@ class GaitView extends HTMLElement {
       this.frame.hidden = false;
       this.dataset.state = "open";
       this.say("");
+      this.options.hidden = false;
+      this.options.querySelector("[data-switch=follow]").hidden = !message.placed;
+      this.options.querySelector("[data-estimated]").hidden = message.measured;
+      for (const b of this.switches) this.tell(setting(b));
       this.send();
     } else if (message.t !== undefined) {
       this.waiting = false;
@@ -67,6 +81,10 @@ class GaitView extends HTMLElement {
       this.say(message.valid === false ? "No data at this moment" : "");
       if (this.sent !== clock.t) this.request();
     }
+  }
+
+  tell(message) {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
   }
 
   say(text) {
@@ -83,7 +101,7 @@ class GaitView extends HTMLElement {
     if (this.socket?.readyState !== WebSocket.OPEN) return;
     this.sent = clock.t;
     this.waiting = true;
-    this.socket.send(JSON.stringify({ t: clock.t }));
+    this.tell({ t: clock.t });
   }
 }
 

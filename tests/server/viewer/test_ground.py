@@ -1,0 +1,133 @@
+"""What is on the floor of a real viser scene at a moment, and that the moment costs little."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import viser
+
+from server.viewer.figure import Figure
+from server.viewer.ground import CHUNK, PLAIN_PRINTS
+from server.viewer.motion import Motion, prepare
+from tests.server import walk
+
+LONG_S = 120.0
+
+
+class Scene:
+    """A figure in a viser server, and the scene nodes it has made."""
+
+    def __init__(self, server: viser.ViserServer, motion: Motion) -> None:
+        self.figure = Figure(server, motion)
+        self.nodes = dict(server.scene._handle_from_node_name)
+
+    def __getitem__(self, name: str) -> viser.SceneNodeHandle:
+        return self.nodes[name]
+
+    def drawn(self, side: str) -> np.ndarray:
+        """Pieces (k, 2, 3) of the trail of a side that are to be seen, in order of time."""
+        chunks = [n for name, n in self.nodes.items() if name.startswith(f"/room/ground/trail_{side}")]
+        seen = [np.asarray(n.points) for n in chunks if n.visible]
+        return np.concatenate(seen) if seen else np.zeros((0, 2, 3))
+
+    def prints(self, side: str) -> np.ndarray:
+        """Which prints of a side are to be seen."""
+        return np.flatnonzero(np.asarray(self[f"/room/ground/prints_{side}"].batched_scales))
+
+
+@pytest.fixture(scope="module")
+def long_walk() -> Motion:
+    return prepare(replace(walk.poses(LONG_S), method="erkf_smoothed"))
+
+
+@pytest.fixture
+def server() -> Iterator[viser.ViserServer]:
+    started = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield started
+    started.stop()
+
+
+@pytest.mark.parametrize("way", [(5.0,), (110.0, 5.0), (1.0, 60.0, 119.0, 30.0), (119.9, 0.0)])
+def test_a_moment_looks_the_same_whatever_was_shown_before(
+    server: viser.ViserServer, long_walk: Motion, way: tuple[float, ...]
+) -> None:
+    scene = Scene(server, long_walk)
+    for t_s in way:
+        scene.figure.pose(t_s)
+    for side, trail in long_walk.trails.items():
+        past = trail.t_s <= way[-1] + 0.01
+        np.testing.assert_array_equal(scene.drawn(side), trail.pieces[past])
+        np.testing.assert_array_equal(
+            scene.prints(side), np.flatnonzero(long_walk.prints[side].t_s <= way[-1] + 0.01)
+        )
+
+
+def test_a_frame_sends_at_most_one_chunk_of_a_trail(server: viser.ViserServer, long_walk: Motion) -> None:
+    scene = Scene(server, long_walk)
+    lengths = []
+    for t_s in np.linspace(0, LONG_S, 60):
+        scene.figure.pose(t_s)
+        lengths += [len(scene[f"/room/ground/trail_{s}_rest"].points) for s in ("left", "right")]
+    assert max(lengths) < CHUNK
+
+
+def test_where_positions_are_for_the_eye_only_the_last_prints_stay(server: viser.ViserServer) -> None:
+    scene = Scene(server, prepare(replace(walk.poses(12.0), method="stance_foot_anchor")))
+    scene.figure.pose(11.0)
+    assert len(scene.prints("left")) == PLAIN_PRINTS
+    assert len(scene.drawn("left")) == 0
+
+
+def test_prints_and_trails_can_be_hidden_together(server: viser.ViserServer, long_walk: Motion) -> None:
+    scene = Scene(server, long_walk)
+    scene.figure.set_ground(False)
+    assert not scene["/room/ground"].visible
+    scene.figure.set_ground(True)
+    assert scene["/room/ground"].visible
+
+
+def test_following_keeps_the_person_in_the_middle_and_letting_go_keeps_the_room_still(
+    server: viser.ViserServer, long_walk: Motion
+) -> None:
+    scene = Scene(server, long_walk)
+
+    def places() -> tuple[np.ndarray, np.ndarray]:
+        room = np.asarray(scene["/room"].position)
+        shoe = np.asarray(scene["/room/shoes"].batched_positions)[0]
+        return room, room + shoe
+
+    for t_s in (10.0, 60.0, 110.0):
+        scene.figure.pose(t_s)
+        assert np.hypot(*places()[1][:2]) < 1.0
+    scene.figure.set_follow(False)
+    still, here = places()
+    assert here[0] > 40
+    scene.figure.pose(10.0)
+    np.testing.assert_array_equal(places()[0], still)
+    assert places()[1][0] < -40
+    scene.figure.set_follow(True)
+    assert np.hypot(*places()[1][:2]) < 1.0
+
+
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+def test_the_whole_walk_is_in_a_square_picture(
+    server: viser.ViserServer, long_walk: Motion, heading: float
+) -> None:
+    figure = Figure(server, replace(long_walk, facing=heading))
+    figure.set_follow(False)
+    camera = server.initial_camera
+    eye = np.asarray(camera.position)
+    sight = np.asarray(camera.look_at) - eye
+    sight /= np.linalg.norm(sight)
+    right = np.cross(sight, [0, 0, 1])
+    right /= np.linalg.norm(right)
+    ground = long_walk.root - (long_walk.root.min(axis=0) + long_walk.root.max(axis=0)) / 2
+    for height in (0.0, 1.8):
+        rays = np.column_stack((ground, np.full(len(ground), height))) - eye
+        ahead = rays @ sight
+        assert np.all(ahead > 0)
+        for axis in (right, np.cross(right, sight)):
+            assert np.all(np.abs(rays @ axis) <= np.tan(camera.fov / 2) * ahead)
