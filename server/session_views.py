@@ -24,7 +24,7 @@ COLUMNS: Final = 3
 """Charts per row: sagittal, frontal, transverse."""
 
 PAGE_HEIGHTS: Final = {False: 144, True: 158}
-PAPER_HEIGHTS: Final = {False: 142, True: 156}
+PAPER_HEIGHTS: Final = {False: 124, True: 138}
 KEY_HEIGHT: Final = 186
 """Chart heights in px; the last row also carries the unit of the x axis."""
 
@@ -153,6 +153,12 @@ def report(
     return {
         **{name: getattr(model, name) for name in SHOWN},
         "groups": _groups(model, paper=paper),
+        "missing": [
+            (r.title, r.reason.removeprefix("not measured: "))
+            for _, rows in model.groups
+            for r in rows
+            if r.reason
+        ],
         "warnings": _notices(model),
         "curves": curves,
         "key_curve": _chart(model.key_curve, KEY_HEIGHT, x_unit=True),
@@ -168,10 +174,16 @@ def report(
 
 
 def _groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[Row, ...]]]:
-    """The parameter table; empty when not one number was found, because then one sentence says more."""
+    """The parameter table; empty when not one number was found, because then one sentence says more.
+
+    On paper only what was measured has a row; `missing` says the rest in one line.
+    """
     if all(row.reason for _, rows in model.groups for row in rows):
         return []
-    return [(name, rows) for name, rows in model.groups if not (paper and name == NOT_ON_PAPER)]
+    if not paper:
+        return list(model.groups)
+    measured = ((name, tuple(r for r in rows if r.reason is None)) for name, rows in model.groups)
+    return [(name, rows) for name, rows in measured if rows and name != NOT_ON_PAPER]
 
 
 def _why_empty(model: ReportModel) -> str:
