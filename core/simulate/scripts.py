@@ -18,8 +18,9 @@ from core.simulate.simulation import Simulation, simulate
 from core.simulate.soft_tissue import SoftTissue
 from core.simulate.walker import Walker
 
-ON_SKIN: Final = Setup(tissue=SoftTissue())
-"""Named scripts are recorded with sensors on skin: fixed to the bone they would flatter every analysis."""
+ON_SKIN: Final = Setup(tissue=SoftTissue(), impacts=True)
+"""Named scripts are recorded with sensors on skin and the shock of contact: fixed to the bone, without
+shocks, they would flatter every analysis."""
 
 
 REFERENCE_PERSON: Final = Walker()

@@ -25,14 +25,14 @@ LEAVE, LAND = 0.22, 0.25
 HIP_STANDING = 10.0 * DEGREE
 """Hip flexion that comes with the pelvic tilt at rest, on top of half the knee's."""
 
-LANDING_RISE = 6.0 * DEGREE
+LANDING_RISE = 14.0 * DEGREE
 """Rise of the pitch over the second half of swing, so that its maximum is at contact; without it the pitch
-peaks up to 0.1 s early (spec/patients.md §1)."""
+peaks up to 0.1 s early (spec/patients.md §1). The specification's 6° over the last 30 % leave the pitch of
+those who land nearly flat level for 0.1 s, and half a degree of error in an orientation then moves its
+maximum by 150 ms."""
 
 TIP_FROM, TIP_TO = 0.50, 0.85
-"""Shares of the swing between which the pitch takes on its landing path. Done later, or with a rise that only
-starts at 0.7, the pitch of those who land nearly flat rests on a level for 0.1 s, and half a degree of error
-in an orientation moves its maximum by 150 ms."""
+"""Shares of the swing between which the pitch takes on its landing path."""
 
 ROLL = 5.0 * DEGREE
 """Supination of the free foot."""
@@ -89,7 +89,9 @@ def _swing(
     )
 
     leaving_pitch = stance.push_off_pitch(i, t)
-    rise = LANDING_RISE * walker.landing_amplitude(landing.step_m) if walker.lands_rising else 0.0
+    # a foot that hardly pushes off hardly tips in the air
+    tips = walker.sides[side].push * walker.landing_amplitude(landing.step_m)
+    rise = LANDING_RISE * tips if walker.lands_rising else 0.0
     approach = rise * (1.0 - smoothstep((u - TIP_FROM) / (1.0 - TIP_FROM)))
     landing_pitch = stance.landing_pitch(i + 1) - approach
     air_pitch = free_pitch + join(u, leaving_pitch - free_pitch, landing_pitch - free_pitch)

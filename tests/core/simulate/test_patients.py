@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import events
+from core import calibration, events, fusion
 from core.events import FootPitchParams
 from core.events.foot_pitch import pitch_signal
 from core.events.result import GaitEvents
@@ -21,6 +21,7 @@ from core.simulate.human import move
 from core.simulate.script import Script, plan
 from core.simulate.truth import truth_of
 from core.simulate.walker import REFERENCE_HEIGHT_M
+from core.timeline import synchronise
 from tests.accuracy.event_scoring import match
 from tests.gait_features import Features, features
 
@@ -168,6 +169,17 @@ def test_the_rule_invents_nothing_and_finds_all_heel_contacts(name: str, rising:
         missed, total = missed + ic.missed, total + len(true)
     if name != "severe_shuffle" and name not in FOREFOOT_FIRST:
         assert missed <= 0.02 * total
+
+
+@pytest.mark.parametrize("name", [n for n in SIGNATURES if n != "severe_shuffle"])
+def test_contacts_stay_in_place_on_estimated_orientations_with_shocks(name: str) -> None:
+    """What an analysis sees: half a degree of error must not move the maximum of the pitch by 0.1 s."""
+    made = simulate_scenario(name, seed=5)
+    found = events.detect(fusion.estimate(calibration.calibrate(synchronise(made.recording))))
+    for side in SIDES:
+        ic = match(found.times(side, "ic"), made.truth.contacts[side].contact.tolist())
+        assert len(ic.extra) + ic.missed <= 1
+        assert abs(float(np.median(ic.errors))) < 0.040
 
 
 @pytest.mark.parametrize("seed", SEEDS)
