@@ -1,0 +1,90 @@
+"""What estimated the poses is named, its health shown, another one can be run; what a tape measure adds."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser import filling
+from tests.browser.conftest import Filled, Opener, RunningServer
+
+
+@pytest.fixture(scope="module")
+def walk(running: RunningServer, filled: Filled) -> str:
+    """An analysed session of its own."""
+    files, sensors = filling.simulated_files()
+    with running.client() as client:
+        patient = filling.add(client, "/patients", code="ESTIMATED", height_m=1.75)["id"]
+        session = filling.add_session(client, patient, "Walk")
+        filling.upload(client, session, files)
+        filling.analyse(client, session, sensors)
+    return session
+
+
+def test_the_overview_names_the_estimator_and_leads_to_its_health(opened: Opener, walk: str) -> None:
+    page = opened(f"/sessions/{walk}")
+    quality = page.locator(".quality")
+    expect(quality).to_contain_text("ErKF, smoothed")
+    quality.get_by_role("link", name="ErKF, smoothed").click()
+    page.wait_for_url(re.compile(r"/data$"))
+    health = page.locator("table.health")
+    expect(health).to_contain_text("Joint ends apart")
+    expect(health.locator("tbody tr")).not_to_have_count(0)
+
+
+def test_another_estimator_runs_and_its_angles_are_marked(opened: Opener, walk: str) -> None:
+    page = opened(f"/sessions/{walk}/data")
+    page.get_by_label("Another estimator on this take").select_option("l7s_3i")
+    page.get_by_role("button", name="Run it").click()
+    page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")
+    expect(page.locator(".quality")).to_contain_text("L7S-3I", timeout=60_000)
+    knee = page.locator(".params tr", has_text="Knee flexion range")
+    expect(knee).to_contain_text("low confidence")
+    page.goto(f"/sessions/{walk}/data")
+    expect(page.get_by_role("heading", name="Earlier analyses")).to_be_visible()
+    page.get_by_label("Another estimator on this take").select_option(
+        label="Automatic: the best for what is worn"
+    )
+    page.get_by_role("button", name="Run it").click()
+    page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")
+    expect(page.locator(".quality")).to_contain_text("ErKF, smoothed", timeout=60_000)
+
+
+def test_the_ankles_distance_gives_step_width(opened: Opener, walk: str, running: RunningServer) -> None:
+    page = opened(f"/sessions/{walk}")
+    width = page.locator(".params tr", has_text="Step width")
+    expect(width).to_contain_text("enter how far apart the ankles are")
+    page.goto(f"/sessions/{walk}/upload")
+    ankles = page.get_by_label("Ankles apart while standing")
+    ankles.fill("3")
+    page.get_by_role("button", name="Analyse").click()
+    assert page.locator("input:invalid").count() == 1, "three metres must not pass"
+    ankles.fill("0.2")
+    page.get_by_role("button", name="Analyse").click()
+    page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")
+    expect(page.locator("job-progress")).to_have_count(0, timeout=60_000)
+    page.reload()
+    expect(width.locator("td.n .num").first).to_have_text(re.compile(r"^0\.\d\d$"))
+    page.goto(f"/sessions/{walk}/upload")
+    expect(ankles).to_have_value("0.2")
+
+
+def test_the_belts_speed_is_asked_for_on_a_treadmill_only(
+    opened: Opener, walk: str, running: RunningServer
+) -> None:
+    page = opened(f"/sessions/{walk}/upload")
+    expect(page.get_by_label("Speed of the belt")).to_have_count(0)
+    files, _ = filling.simulated_files()
+    with running.client() as client:
+        patient = filling.add(client, "/patients", code="BELT")["id"]
+        session = filling.add_session(client, patient, "On the belt", protocol="treadmill")
+        filling.upload(client, session, files)
+    page.goto(f"/sessions/{session}/upload")
+    page.locator("[data-sides=keep]").click()
+    page.get_by_label("Speed of the belt").fill("1.1")
+    page.get_by_role("button", name="Analyse").click()
+    page.wait_for_url(re.compile(rf"/sessions/{session}$"), wait_until="commit")
+    expect(page.locator(".kpis")).to_contain_text("1.10", timeout=60_000)
+    expect(page.locator(".params tr", has_text="Step length")).to_contain_text("on a treadmill")
