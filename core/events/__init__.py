@@ -1,7 +1,8 @@
 """Orientations → gait events and the stride list."""
 
 from core.events.detection import detect
+from core.events.flags import StrideParams
 from core.events.foot_pitch import FootPitchParams, warm
-from core.events.strides import StrideParams, stride_list
+from core.events.strides import stride_list
 
 __all__ = ["FootPitchParams", "StrideParams", "detect", "stride_list", "warm"]

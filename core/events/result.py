@@ -4,13 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Final, Literal
 
 from core.errors import Notice
 from core.frames import Side
 
 EventKind = Literal["ic", "tc"]
 """ic = initial contact (foot strike), tc = terminal contact (foot off)."""
+
+StrideFlag = Literal[
+    "gap",
+    "incomplete",
+    "implausible_time",
+    "turn",
+    "outlier",
+    "first",
+    "last",
+    "near_turn",
+    "non_periodic",
+]
+"""What a rule found about a cycle (core/events/flags.py), in the order in which it names the reason."""
+
+MANUAL: Final = "manual"
+"""Begins the exclusion reason that a person gave: "manual:<text>"."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +37,8 @@ class GaitEvent:
     ----------
     time_s : when it happened, seconds from recording start.
     detected_s : when a real-time detector would have known it.
-    source : name of the detector ("foot_pitch") or "manual".
+    source : name of the detector ("foot_pitch"), "consensus" or "manual".
+    confidence : 0 to 1, share of the detectors that found it (core/events/consensus.py); None = one detector.
     """
 
     time_s: float
@@ -29,6 +46,7 @@ class GaitEvent:
     kind: EventKind
     source: str
     detected_s: float
+    confidence: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +72,9 @@ class Stride:
     tc_s : terminal contact between them, None if not found.
     opposite_tc_s, opposite_ic_s : the other foot's events inside the cycle, None if not found.
     turn_rad : heading change of the foot over the stride, left positive; None if not known.
-    excluded_reason : None = counted; else a stable code: "incomplete", "turn", "first", "last", "gap",
-        "implausible_time", "outlier", "manual:<text>".
+    excluded_reason : None = counted; else one of `flags` or "manual:<text>".
+    flags : all that the rules found, also where the cycle counts: a short walk keeps its edges, a person may
+        take a cycle in again.
     """
 
     side: Side
@@ -66,6 +85,14 @@ class Stride:
     opposite_ic_s: float | None = None
     turn_rad: float | None = None
     excluded_reason: str | None = None
+    flags: tuple[StrideFlag, ...] = ()
+
+    @property
+    def excluded_by(self) -> Literal["rule", "person"] | None:
+        """Who set the cycle aside, None if it counts."""
+        if self.excluded_reason is None:
+            return None
+        return "person" if self.excluded_reason.startswith(MANUAL) else "rule"
 
     @property
     def duration_s(self) -> float:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import remainder, tau
 from typing import TYPE_CHECKING
@@ -17,41 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import Notice
-from core.events.result import GaitEvents, Stride, Strides
+from core.events.flags import StrideParams, decided, flagged
+from core.events.result import GaitEvents, Stride, StrideFlag, Strides
 from core.frames import FOOT, SIDES, Bools, Side
 from core.rotation import yaw
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
     from core.fusion.orientations import Orientations
-
-
-@dataclass(frozen=True)
-class StrideParams:
-    """When a cycle counts.
-
-    Parameters
-    ----------
-    min_s : shorter is two events of one step; the detector itself cannot follow shorter cycles
-        (spec/fusion.md §5.4: stride < 0.4 s).
-    max_s : longer is a stop, not a stride (mobgap's stride rule: at most 3 s; spec/field.md §4a).
-    bout_break_s : a walking bout ends where a foot makes no contact for longer (mobgap: 3 s; same place).
-    turn_rad : heading change of the foot over a stride that counts as turning. Our choice: straight strides
-        of gaitmap_foot and neura_walk stay within 15°, turning ones exceed 30°.
-    turn_share : share of a stride inside the pelvis turning mask that counts as turning. Our choice.
-    edge_strides : strides set aside at each end of a bout: gait starts and stops within them
-        (spec/clinic.md §3, CV).
-    min_kept : the edge strides of a take stay in when fewer would be left on a foot. Our choice: three
-        strides are the least with a spread worth printing; the notice `short_walk` says so.
-    """
-
-    min_s: float = 0.4
-    max_s: float = 3.0
-    bout_break_s: float = 3.0
-    turn_rad: float = float(np.radians(20.0))
-    turn_share: float = 0.25
-    edge_strides: int = 1
-    min_kept: int = 3
 
 
 def stride_list(
@@ -70,34 +42,21 @@ def stride_list(
 
     Returns
     -------
-    excluded_reason, the first that holds: "gap" (the foot's sensor was lost inside), "incomplete" (no
-    terminal contact, or the other foot landed twice: a contact was missed), "implausible_time", "turn",
-    "first" / "last" of a bout.
+    flags: "gap" (the foot's sensor was lost inside), "incomplete" (not exactly one terminal contact, or the
+    other foot landed twice: a contact was missed), "implausible_time", "turn", "outlier" of the foot's stride
+    times, "first" / "last" of a bout, "near_turn", "non_periodic" (alone); excluded_reason the first of them.
     """
     params = params or StrideParams()
     plain = [
-        stride for side in SIDES for stride in _side_strides(side, events, orientations, turning, params)
+        stride
+        for side in SIDES
+        for stride in flagged(_side_strides(side, events, orientations, turning, params), params)
     ]
-    edges = _edge_reasons(plain, params)
-    kept = {
-        side: sum(s.side == side and s.excluded_reason is None and s not in edges for s in plain)
-        for side in {s.side for s in edges}
-    }
-    notices: list[Notice] = []
-    if edges and any(n < params.min_kept for n in kept.values()):
-        notices.append(
-            Notice(
-                "short_walk",
-                f"The walk is so short that fewer than {params.min_kept} strides of a foot would be left:"
-                " the first and last strides, where gait starts and stops, are counted too."
-                " Record a longer walk for steady figures.",
-            )
-        )
-    else:
-        plain = [replace(s, excluded_reason=edges[s]) if s in edges else s for s in plain]
     plain.sort(key=lambda s: (s.start_s, s.side))
-    notices.extend(_unused(plain))
-    return Strides(tuple(plain), tuple(notices))
+    listed, yielding = decided(plain, params)
+    notices = [_short_walk(yielding, params)] if yielding else []
+    notices.extend(_unused(listed))
+    return Strides(tuple(listed), tuple(notices))
 
 
 def _side_strides(
@@ -119,7 +78,7 @@ def _side_strides(
     heading = yaw(orientations.q[foot][np.minimum(places, n - 1)]) if foot in orientations.q else None
     strides = []
     for i, (start, end) in enumerate(pairwise(contacts)):
-        tc = _first(leavings, start, end)
+        left = _between(leavings, start, end)
         landings = _between(other_contacts, start, end)
         opposite_ic = landings[0] if len(landings) == 1 else None
         opposite_tc = _first(other_leavings, start, end if opposite_ic is None else opposite_ic)
@@ -128,18 +87,19 @@ def _side_strides(
         turn = None
         if heading is not None and not gap:
             turn = remainder(heading[i + 1] - heading[i], tau)
-        reason = None
+        flags: list[StrideFlag] = []
         if gap:
-            reason = "gap"
-        elif tc is None or len(landings) > 1:
-            reason = "incomplete"
-        elif not params.min_s <= end - start <= params.max_s:
-            reason = "implausible_time"
-        elif (turn is not None and abs(turn) > params.turn_rad) or (
+            flags.append("gap")
+        if len(left) != 1 or len(landings) > 1:
+            flags.append("incomplete")
+        if not params.min_s <= end - start <= params.max_s:
+            flags.append("implausible_time")
+        if (turn is not None and abs(turn) > params.turn_rad) or (
             turned[past] - turned[first] > params.turn_share * (past - first)
         ):
-            reason = "turn"
-        strides.append(Stride(side, start, tc, end, opposite_tc, opposite_ic, turn, reason))
+            flags.append("turn")
+        tc = left[0] if left else None
+        strides.append(Stride(side, start, tc, end, opposite_tc, opposite_ic, turn, flags=tuple(flags)))
     return strides
 
 
@@ -159,20 +119,16 @@ def _first(times: Sequence[float], after: float, before: float) -> float | None:
     return inside[0] if inside else None
 
 
-def _edge_reasons(strides: Sequence[Stride], params: StrideParams) -> dict[Stride, str]:
-    """Counted strides that stand first or last in a walking bout of their foot."""
-    reasons: dict[Stride, str] = {}
-    for side in SIDES:
-        bout: list[Stride] = []
-        own = [s for s in strides if s.side == side]
-        for i, stride in enumerate(own):
-            if stride.duration_s <= params.bout_break_s:
-                bout.append(stride)
-            if bout and (stride.duration_s > params.bout_break_s or i == len(own) - 1):
-                first, last = bout[: params.edge_strides], bout[len(bout) - params.edge_strides :]
-                reasons |= dict.fromkeys(last, "last") | dict.fromkeys(first, "first")
-                bout = []
-    return {s: reason for s, reason in reasons.items() if s.excluded_reason is None}
+def _short_walk(yielding: Sequence[StrideFlag], params: StrideParams) -> Notice:
+    """Say which unsteady strides had to be counted."""
+    edges = "the first and last strides, where gait starts and stops, " if "first" in yielding else ""
+    near = "strides next to a turn " if "near_turn" in yielding else ""
+    return Notice(
+        "short_walk",
+        f"The walk is so short that fewer than {params.min_kept} strides of a foot would be left:"
+        f" {edges}{'and ' if edges and near else ''}{near}are counted too. Record a longer walk for steady"
+        " figures.",
+    )
 
 
 def _unused(strides: Sequence[Stride]) -> list[Notice]:

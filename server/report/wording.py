@@ -169,6 +169,7 @@ REASONS: Final[Mapping[str, str]] = {
 EXCLUDED: Final[Mapping[str, str]] = {
     "incomplete": "incomplete",
     "turn": "in a turn",
+    "near_turn": "next to a turn",
     "first": "first of a walk",
     "last": "last of a walk",
     "gap": "sensor lost",

@@ -76,7 +76,8 @@ def test_cycles_of_implausible_time_do_not_count() -> None:
     events = hand_made([1, 2, 3, 4, 4.3, 5.3, 6.3, 7.3, 8.3, 11.5, 12.5, 13.5], [])
     listed = reasons(stride_list(events, standing()))
     assert listed == [
-        "first", None, None, "incomplete", None, None, None, "last", "implausible_time", "first", "last",
+        "first", None, None, "incomplete", "incomplete", None, None, "last",
+        "implausible_time", "first", "last",
     ]  # fmt: skip
     quick = hand_made([1, 2, 3, 4, 4.3, 5.3, 6.3, 7.3], [], stance=0.2)
     assert reasons(stride_list(quick, standing()))[3] == "implausible_time"
@@ -183,3 +184,50 @@ def test_heading_is_measured_at_the_contacts_even_when_the_foot_is_steep() -> No
     q = orientation(np.full(3000, np.radians(-60.0)), 0.4)
     steep = replace(take, q={"foot_r": q, "foot_l": q})
     assert stride_list(straight(), steep).strides[0].turn_rad == pytest.approx(0.0, abs=1e-9)
+
+
+def test_strides_next_to_a_turn_are_set_aside_when_enough_are_left() -> None:
+    heading = np.clip((np.arange(3000) / RATE - 6.0) * np.pi / 2, 0.0, np.pi)
+    listed = [s for s in stride_list(straight(14), standing(heading=heading)).strides if s.side == "right"]
+    assert [s.excluded_reason for s in listed[3:9]] == [None, "near_turn", "turn", "turn", "near_turn", None]
+    assert {s.excluded_by for s in listed[4:8]} == {"rule"}
+
+
+def test_strides_next_to_a_turn_are_counted_before_the_edges_are() -> None:
+    heading = np.clip((np.arange(3000) / RATE - 4.0) * np.pi / 2, 0.0, np.pi)
+    found = stride_list(straight(), standing(heading=heading))
+    listed = [s for s in found.strides if s.side == "right"]
+    assert "near_turn" in listed[2].flags
+    assert listed[2].excluded_reason is None
+    assert listed[0].excluded_reason == "first"
+    (said,) = (n.message for n in found.notices if n.code == "short_walk")
+    assert "next to a turn" in said
+    assert "first and last" not in said
+
+
+def test_a_stride_with_a_stop_in_it_is_an_outlier() -> None:
+    contacts = [1.0 + i + (1.2 if i > 5 else 0.0) for i in range(12)]
+    assert reasons(stride_list(hand_made(contacts, []), standing()))[5] == "outlier"
+    uneven = list(np.cumsum([1.0, 1.2, 0.9, 1.1, 1.2, 0.9, 1.05, 0.95, 1.15, 1.0]))
+    assert "outlier" not in reasons(stride_list(hand_made(uneven, []), standing()))
+
+
+def test_a_single_cycle_by_itself_is_no_walking() -> None:
+    contacts = [1.0 + i for i in range(8)] + [20.0, 21.0]
+    alone = [s for s in stride_list(hand_made(contacts, []), standing()).strides if s.side == "right"][-1]
+    assert alone.flags == ("first", "last", "non_periodic")
+
+
+def test_a_cycle_in_which_the_foot_leaves_twice_missed_a_contact() -> None:
+    events = straight()
+    missed = GaitEvents(tuple(e for e in events.events if (e.side, e.kind, e.time_s) != ("right", "ic", 5.0)))
+    one_foot = GaitEvents(tuple(e for e in missed.events if e.side == "right"))
+    assert reasons(stride_list(one_foot, standing()))[3] == "incomplete"
+
+
+def test_a_person_is_told_from_a_rule_and_the_flags_stay() -> None:
+    first = stride_list(straight(), standing()).strides[0]
+    assert (first.excluded_by, first.flags) == ("rule", ("first",))
+    taken_in = replace(first, excluded_reason=None)
+    assert (taken_in.excluded_by, taken_in.flags) == (None, ("first",))
+    assert replace(first, excluded_reason="manual:stumbled").excluded_by == "person"

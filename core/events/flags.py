@@ -1,0 +1,125 @@
+"""What the neighbours of a cycle say about it, and which of its flags sets it aside.
+
+A flag is an observation and stays; the reason of exclusion is a decision made from it. Flags of steadiness
+(first, last, near a turn, alone) yield when a walk is so short that nothing would be left.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, get_args
+
+import numpy as np
+
+from core.events.result import Stride, StrideFlag
+
+ORDER: Final[tuple[StrideFlag, ...]] = get_args(StrideFlag)
+
+YIELDING: Final[tuple[tuple[StrideFlag, ...], ...]] = (
+    ("first", "last", "near_turn", "non_periodic"),
+    ("first", "last"),
+    (),
+)
+"""Flags that set a cycle aside only while enough cycles are left: all of them, then fewer."""
+
+
+@dataclass(frozen=True)
+class StrideParams:
+    """When a cycle counts.
+
+    Parameters
+    ----------
+    min_s : shorter is two events of one step; the detector itself cannot follow shorter cycles
+        (spec/fusion.md §5.4: stride < 0.4 s).
+    max_s : longer is a stop, not a stride (mobgap's stride rule: at most 3 s; spec/field.md §4a).
+    bout_break_s : a walking bout ends where a foot makes no contact for longer (mobgap: 3 s; same place).
+    turn_rad : heading change of the foot over a stride that counts as turning. Our choice: straight strides
+        of gaitmap_foot and neura_walk stay within 15°, turning ones exceed 30°.
+    turn_share : share of a stride inside the pelvis turning mask that counts as turning. Our choice.
+    turn_margin : strides set aside on each side of a turn (spec/field.md §2 thread 16: two steps). On
+        gaitmap_foot these six strides last 4 % longer, two standard deviations, than the steady ones.
+    edge_strides : strides set aside at each end of a bout: gait starts and stops within them
+        (spec/clinic.md §3, CV).
+    outlier_sd : a stride time further from the foot's median than so many robust standard deviations
+        (1.4826 × median absolute deviation) …
+    outlier_share : … and than this share of the median is an outlier. Our choice: the share keeps all that
+        gait itself varies, the worst virtual patient included; a stop inside a stride exceeds it.
+    outlier_from : least number of strides of a foot to call one of them an outlier. Our choice.
+    run_strides : fewer successive cycles than this are a shift of weight, not walking. Our choice: two, the
+        least that repeat.
+    min_kept : flags of steadiness yield when fewer strides would be left on a foot. Our choice: three
+        strides are the least with a spread worth printing; the notice `short_walk` says so.
+    """
+
+    min_s: float = 0.4
+    max_s: float = 3.0
+    bout_break_s: float = 3.0
+    turn_rad: float = float(np.radians(20.0))
+    turn_share: float = 0.25
+    turn_margin: int = 1
+    edge_strides: int = 1
+    outlier_sd: float = 3.0
+    outlier_share: float = 0.25
+    outlier_from: int = 5
+    run_strides: int = 2
+    min_kept: int = 3
+
+
+def flagged(own: Sequence[Stride], params: StrideParams) -> list[Stride]:
+    """The cycles of one foot in order of time with the flags their neighbours give them added."""
+    more: list[set[StrideFlag]] = [set(s.flags) for s in own]
+    for run in _runs(own, params):
+        for i in run[: params.edge_strides]:
+            more[i].add("first")
+        for i in run[len(run) - params.edge_strides :]:
+            more[i].add("last")
+        if len(run) < params.run_strides:
+            more[run[0]].add("non_periodic")
+        for place, i in enumerate(run):
+            near = run[max(0, place - params.turn_margin) : place + params.turn_margin + 1]
+            if "turn" not in own[i].flags and any("turn" in own[j].flags for j in near):
+                more[i].add("near_turn")
+    for i in _outliers(own, params):
+        more[i].add("outlier")
+    return [replace(s, flags=tuple(f for f in ORDER if f in m)) for s, m in zip(own, more, strict=True)]
+
+
+def decided(strides: Sequence[Stride], params: StrideParams) -> tuple[list[Stride], tuple[StrideFlag, ...]]:
+    """Set cycles aside by their flags; gives the flags that had to yield so that cycles are left."""
+    chosen: list[Stride] = []
+    soft: tuple[StrideFlag, ...] = ()
+    for soft in YIELDING:
+        yielding = tuple(f for f in YIELDING[0] if f not in soft)
+        chosen = [replace(s, excluded_reason=_reason(s, yielding)) for s in strides]
+        left = Counter(s.side for s in chosen if s.excluded_reason is None)
+        if all(left[s.side] >= params.min_kept for s in chosen if s.excluded_reason in soft):
+            break
+    return chosen, tuple(f for f in YIELDING[0] if f not in soft)
+
+
+def _reason(stride: Stride, yielding: tuple[StrideFlag, ...]) -> StrideFlag | None:
+    return next((f for f in stride.flags if f not in yielding), None)
+
+
+def _runs(own: Sequence[Stride], params: StrideParams) -> list[list[int]]:
+    """Places of successive cycles without a break."""
+    runs: list[list[int]] = [[]]
+    for i, stride in enumerate(own):
+        if stride.duration_s > params.bout_break_s:
+            runs.append([])
+        else:
+            runs[-1].append(i)
+    return [run for run in runs if run]
+
+
+def _outliers(own: Sequence[Stride], params: StrideParams) -> list[int]:
+    """Places of whole cycles whose time is far from the foot's median."""
+    whole = [i for i, s in enumerate(own) if not {"gap", "incomplete", "implausible_time"} & set(s.flags)]
+    if len(whole) < params.outlier_from:
+        return []
+    times = np.array([own[i].duration_s for i in whole])
+    off = np.abs(times - np.median(times))
+    limit = max(params.outlier_sd * 1.4826 * np.median(off), params.outlier_share * np.median(times))
+    return [i for i, o in zip(whole, off, strict=True) if o > limit]
