@@ -17,7 +17,8 @@ from core.events.foot_pitch import pitch_signal
 from core.events.result import Strides
 from core.frames import FOOT, SIDES, SUFFIX, Floats, Side
 from core.parameters.result import CycleCurves, Parameter
-from core.parameters.temporal import Column, summary
+from core.parameters.temporal import Column
+from core.parameters.variability import summary
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without

@@ -18,6 +18,9 @@ class Parameter:
     side : "left", "right" or None for the whole take.
     n : strides behind the number. mean, sd : None with a `reason` when undefined (sd also when n < 2).
     reason : None, or a stable code: "no_strides", "opposite_foot_missing", "no_terminal_contact" …
+    cv_pct : coefficient of variation; None below 10 strides, for angles and where a value is not positive.
+    ci_low, ci_high : 95 % confidence interval of the mean over the strides, None when n < 2.
+    note : what to know about the number: "few_strides" below 30; None.
     """
 
     name: str
@@ -27,6 +30,10 @@ class Parameter:
     sd: float | None
     unit: str
     reason: str | None = None
+    cv_pct: float | None = None
+    ci_low: float | None = None
+    ci_high: float | None = None
+    note: str | None = None
 
 
 @dataclass(frozen=True, eq=False)

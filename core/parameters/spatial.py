@@ -21,7 +21,8 @@ from core.body.kinematics import sole_points
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Protocol, Side
 from core.parameters.result import Parameter
-from core.parameters.temporal import Column, summary
+from core.parameters.temporal import Column
+from core.parameters.variability import summary
 from core.recording import UniformRecording
 from core.rotation import rotate
 

@@ -6,13 +6,15 @@ Definitions: spec/field.md §4b. Percentages are of the stride. A step belongs t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from core.events.result import Stride, Strides
-from core.frames import SIDES, Side
+from core.frames import SIDES
 from core.parameters.result import Parameter
+from core.parameters.variability import summary
 
 Column = tuple[float | None, ...]
 
@@ -118,16 +120,6 @@ def temporal(strides: Strides) -> tuple[Parameter, ...]:
     return tuple(parameters)
 
 
-def summary(
-    name: str, side: Side | None, values: Sequence[float], unit: str, reason: str | None = None
-) -> Parameter:
-    """One parameter from its values; without values the reason stands instead."""
-    if not values:
-        return Parameter(name, side, 0, None, None, unit, reason or "no_strides")
-    sd = float(np.std(values, ddof=1)) if len(values) > 1 else None
-    return Parameter(name, side, len(values), float(np.mean(values)), sd, unit)
-
-
 def _missing(name: str, used: Sequence[Stride]) -> str:
     """Why a parameter has no value on a side."""
     if not used:
@@ -142,10 +134,19 @@ def _missing(name: str, used: Sequence[Stride]) -> str:
 
 
 def _cadence(steps: Sequence[float], strides: Strides) -> Parameter:
-    """60 / mean step time of both feet; its sd to first order, 60 sd / mean²."""
+    """60 / mean step time of both feet; its sd to first order, 60 sd / mean², and its interval inverted."""
     if not steps:
         reason = "opposite_foot_missing" if strides.used() else "no_strides"
         return Parameter("cadence_spm", None, 0, None, None, "steps/min", reason)
-    mean = float(np.mean(steps))
-    sd = 60.0 * float(np.std(steps, ddof=1)) / mean**2 if len(steps) > 1 else None
-    return Parameter("cadence_spm", None, len(steps), 60.0 / mean, sd, "steps/min")
+    step = summary("step_time_s", None, steps, "s")
+    mean, low, high = float(np.mean(steps)), step.ci_low, step.ci_high
+    return replace(
+        step,
+        name="cadence_spm",
+        unit="steps/min",
+        mean=60.0 / mean,
+        sd=None if step.sd is None else 60.0 * step.sd / mean**2,
+        # two wildly different steps say nothing about how few a minute may have
+        ci_low=None if high is None or low is None or low <= 0.0 else 60.0 / high,
+        ci_high=None if high is None or low is None or low <= 0.0 else 60.0 / low,
+    )

@@ -91,6 +91,10 @@ def parameter_row(p: Parameter) -> dict[str, object]:
         "sd": plain(p.sd),
         "unit": p.unit,
         "reason": p.reason,
+        "cv_pct": plain(p.cv_pct),
+        "ci_low": plain(p.ci_low),
+        "ci_high": plain(p.ci_high),
+        "note": p.note,
     }
 
 

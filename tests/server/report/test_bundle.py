@@ -86,7 +86,10 @@ def test_analysis_json_is_strict_json_of_schema_1(files: Mapping[str, bytes]) ->
     assert data["warnings"][0] | {"code": "gap", "sensor": "pelvis", "t_s": 1.0} == data["warnings"][0]
     row = next(p for p in data["parameters"] if p["name"] == "stride_time_s" and p["side"] == "left")
     assert row["mean"] == pytest.approx(walk.STRIDE_S)
-    assert set(row) == {"name", "side", "n", "mean", "sd", "unit", "reason"}
+    assert set(row) == {
+        *("name", "side", "n", "mean", "sd", "unit", "reason"),
+        *("cv_pct", "ci_low", "ci_high", "note"),
+    }
 
 
 def test_angles_parquet_is_float32_degrees_with_null_where_lost() -> None:
