@@ -7,11 +7,14 @@ A sparse mode of visibly lower accuracy: never take stride lengths from it where
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
+from core.body.l7s_checks import longest_gaps, walking_checks
 from core.body.l7s_filter import L7sInputs, L7sParams, L7sState, L7sTrack, Worn, filter_block, start, warm
+from core.body.l7s_health import l7s_health, told
 from core.body.l7s_legs import BODIES, LEGS, LegModel, solve_legs
 from core.body.model import BodyModel
 from core.body.poses import Poses
@@ -56,8 +59,9 @@ def l7s_poses(
     Diagnostics by side: `knee_straight_share`, samples with a foot in motion at which the leg is at its full
     length, so that the knee is a bound and no measurement; `hinge_m`, `excess_m`, largest residuals of the
     constraints; `step_share`; `foot_turned_rad`, mean angle from measured to reported.
-    At the end: `position_sd_m` by body, `min_eigenvalue` of P.
-    A notice `foot_never_still` when a foot has no step.
+    At the end: `position_sd_m` by body, `min_eigenvalue` of P. By sensor: `gap_s`, the longest loss.
+    And those of `walking_checks`. Health and notices as of l7s_health.py; a notice `foot_never_still` when a
+    foot has no step.
 
     Raises
     ------
@@ -76,7 +80,7 @@ def l7s_poses(
     ).reshape(-1, 2)
     variances = np.diag(state.P)[:18].reshape(3, 6)[:, :3]
     measured = BODIES if worn == "3I" else BODIES[1:]
-    return Poses(
+    poses = Poses(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
         q={"pelvis": from_matrix(track.R[:, 0] @ model.to_isb("pelvis")), **legs.q},
@@ -97,8 +101,12 @@ def l7s_poses(
             "foot_turned_rad": {s: float(turned[:, i].mean()) for i, s in enumerate(LEGS)},
             "position_sd_m": {s: float(np.sqrt(x.max())) for s, x in zip(BODIES, variances, strict=True)},
             "min_eigenvalue": float(np.linalg.eigvalsh(state.P)[0]),
+            "gap_s": longest_gaps({s: orientations.valid[s] for s in measured}, orientations.rate_hz),
+            **walking_checks(inputs, track, model, orientations.rate_hz),
         },
     )
+    health = l7s_health(poses)
+    return replace(poses, health=health, notices=(*poses.notices, *told(health)))
 
 
 def free_acceleration(calibrated: CalibratedRecording, orientations: Orientations) -> dict[Segment, Floats]:

@@ -196,12 +196,16 @@ def start(inputs: L7sInputs, model: LegModel, params: L7sParams | None = None) -
         facing = float(np.arctan2(R[0, 1, 0], R[0, 0, 0]))
     else:
         R[0] = to_matrix(about(2, facing))
+    # in 2I the body faces between the feet: there they are compared with each other
+    faces = [facing] if inputs.worn == "3I" else []
     for leg, side in enumerate(LEGS):
-        apart = (np.arctan2(R[1 + leg, 1, 2], R[1 + leg, 0, 2]) - facing + np.pi) % (2.0 * np.pi) - np.pi
-        if abs(apart) > HEADING_LIMIT:
+        faces.append(float(np.arctan2(R[1 + leg, 1, 2], R[1 + leg, 0, 2])))
+        apart = abs((faces[-1] - faces[0] + np.pi) % (2.0 * np.pi) - np.pi)
+        if apart > HEADING_LIMIT:
+            other = "body" if inputs.worn == "3I" else "left foot"
             raise EstimationError(
                 "headings_apart",
-                f"The {side} foot faces {abs(np.degrees(apart)):.0f}° away from the body at the start, at "
+                f"The {side} foot faces {np.degrees(apart):.0f}° away from the {other} at the start, at "
                 "most 90° can be a person; check that no sensor is worn backwards and calibrate again.",
                 sensor=FOOT[side],
             )

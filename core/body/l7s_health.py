@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from math import pi
 from typing import Any, Final, cast
 
 import numpy as np
@@ -14,6 +16,30 @@ from core.frames import Protocol, Segment
 CONSTRAINT_MM: Final = (1.0, 10.0)
 """What constraints leave after projection: below .01 with two, 10 accepted with one
 (spec/estimators.md §6.4)."""
+
+OUT_OF_PLACE_PCT: Final = (20.0, 50.0)
+"""Of the time in motion. Right walks have 0, with a turn on the spot 10 (neura_walk); feet whose headings are
+20° apart 25 to 100."""
+
+PHASE_PCT: Final = (12.0, 25.0)
+"""Right walks have up to 3, those of one-sided patients too; a foot 0.2 s late 18, one sensor taken for both
+feet 50."""
+
+TOWARD_MPS2: Final = (-0.05, 0.1)
+"""Right walks have −1.0 to −0.28, with the feet exchanged the same with the other sign."""
+
+INNER_M: Final = (-0.03, 0.05)
+"""Right walks with turns have −0.17 to −0.07, with the feet exchanged 0 to 0.35."""
+
+TILT_DEG: Final = (7.0, 12.0)
+"""Right walks have 0.2 to 3.4, a thigh 12 and more."""
+
+FOOT_GAP_S: Final = (0.1, 0.3)
+"""Holes up to 0.1 s are interpolated. One of 0.2 s in a swing moves flexion by up to 20° for seconds, one of
+0.5 s by up to 50° (simulation): with one sensor a leg nothing knows where the foot went."""
+
+PELVIS_GAP_S: Final = (0.5, None)
+"""Up to 1 s of the pelvis cost 1 to 3° in the second after it."""
 
 LEVEL: Final[tuple[Protocol, ...]] = ("squat", "activity", "tug")
 """Protocols in which the pelvis does not keep its height, as L7S takes it to."""
@@ -35,8 +61,101 @@ def l7s_health(poses: Poses) -> tuple[Finding, ...]:
             Finding("knee_straight_pct", leg, 100.0 * d["knee_straight_share"][side]),
             Finding("foot_turned_deg", foot, float(np.degrees(d["foot_turned_rad"][side]))),
         ]
+    for segment, lost_s in d["gap_s"].items():
+        if lost_s > 0.0:
+            found.append(
+                Finding("gap_s", segment, lost_s, *(PELVIS_GAP_S if segment == "pelvis" else FOOT_GAP_S))
+            )
+    for key, name, scale, limits in JUDGED:
+        if key in d:
+            found.append(Finding(name, None, scale * d[key], *limits))
     found.append(Finding("min_eigenvalue", None, float(d["min_eigenvalue"])))
     return tuple(found)
+
+
+JUDGED: Final = (
+    ("out_of_place_share", "feet_out_of_place_pct", 100.0, OUT_OF_PLACE_PCT),
+    ("phase_off", "phase_off_pct", 100.0, PHASE_PCT),
+    ("toward_foot_mps2", "toward_foot_mps2", 1.0, TOWARD_MPS2),
+    ("inner_foot_m", "inner_foot_m", 1.0, INNER_M),
+    ("pelvis_tilt_sd_rad", "pelvis_tilt_sd_deg", 180.0 / pi, TILT_DEG),
+)
+"""Quantity of `walking_checks`, name of its finding, scale to its unit, limits."""
+
+TOLD: Final[Mapping[str, tuple[str, str]]] = {
+    "feet_out_of_place_pct": (
+        "feet_drift_apart",
+        (
+            "For {value:.0f} % of the time the feet are not side by side under the hips, up to {warn:.0f} % "
+            "are expected: the sensors disagree about where forward is. Angles and positions are wrong "
+            "there; calibrate again and check how the sensors are mounted."
+        ),
+    ),
+    "phase_off_pct": (
+        "feet_out_of_step",
+        (
+            "The feet do not take turns: one rests {value:.0f} % of a stride away from the middle of the "
+            "other's, up to {warn:.0f} % are expected. Check that both clocks agree and that no sensor was "
+            "given twice."
+        ),
+    ),
+    "toward_foot_mps2": (
+        "feet_exchanged",
+        (
+            "The pelvis falls toward the foot that it stands on ({value:+.2f} m/s², in walking it is below "
+            "{warn:g}): left and right foot look exchanged, or the pelvis sensor faces backwards."
+        ),
+    ),
+    "inner_foot_m": (
+        "feet_exchanged",
+        (
+            "In turns the inner foot goes as far as the outer one or further ({value:+.2f} m per radian, "
+            "below {warn:g} is expected): left and right foot look exchanged."
+        ),
+    ),
+    "pelvis_tilt_sd_deg": (
+        "not_a_pelvis",
+        (
+            "The sensor taken for the pelvis tilts by {value:.0f}° (standard deviation), in walking up to "
+            "{warn:.0f}° are expected: it sits on another segment, or this was no level walk."
+        ),
+    ),
+    "gap_s": (
+        "gap_not_bridged",
+        (
+            "{of} was lost for {value:.1f} s in one piece. L7S has no second sensor on a leg that could "
+            "bridge it; angles and positions are doubtful for some ten seconds from there on."
+        ),
+    ),
+    "hinge_mm": (
+        "legs_do_not_fit",
+        (
+            "The legs cannot be fitted to the sensors: {of} is {value:.0f} mm off its hinge, a right set-up "
+            "leaves up to {warn:.0f} mm. Check sides, mounting, and losses that nobody noticed."
+        ),
+    ),
+}
+"""Finding → code and words of the notice when it is not good."""
+
+SIDES_UNCHECKED: Final = (
+    "Nothing in this take shows whether left and right foot were exchanged: feet alone show it in turns, a "
+    "pelvis sensor in every step. Walk there and back, or wear the pelvis sensor."
+)
+
+
+def told(findings: Sequence[Finding]) -> tuple[Notice, ...]:
+    """What of it a person must be told; the worst of each kind."""
+    notices = {}
+    for f in sorted(findings, key=lambda f: f.value):
+        if f.verdict != "good" and f.name in TOLD:
+            code, words = TOLD[f.name]
+            sensor = f.of if f.name == "gap_s" else None
+            message = words.format(of=f.of, value=f.value, warn=f.warn)
+            notices[code] = Notice(code, message, sensor=sensor)
+    checked = {"toward_foot_mps2", "inner_foot_m"} & {f.name for f in findings}
+    if not checked:
+        notices["sides_not_checked"] = Notice("sides_not_checked", SIDES_UNCHECKED, severity="info")
+    return tuple(notices.values())
 
 
 def l7s_notices(protocol: Protocol) -> tuple[Notice, ...]:

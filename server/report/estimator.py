@@ -71,6 +71,11 @@ QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
     "hinge_mm": ("Joint off its hinge", 1, "mm"),
     "knee_straight_pct": ("Knee straight", 0, "%"),
     "foot_turned_deg": ("Foot sensor turned", 0, "°"),
+    "feet_out_of_place_pct": ("Feet not under the hips", 0, "%"),
+    "phase_off_pct": ("Feet out of step by", 0, "% of a stride"),
+    "toward_foot_mps2": ("Pelvis falls toward the standing foot", 2, "m/s²"),
+    "inner_foot_m": ("Inner foot ahead in turns", 2, "m/rad"),
+    "pelvis_tilt_sd_deg": ("Pelvis tilt, standard deviation", 1, "°"),
 }
 """Name of a finding → label, decimals, unit."""
 

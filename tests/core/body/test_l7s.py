@@ -227,4 +227,4 @@ def test_a_foot_that_never_rests_is_told() -> None:
     calibrated, orientations, steps, truth = walk()
     never = {**steps, "left": np.zeros_like(steps["left"])}
     found = l7s_poses(orientations, free_acceleration(calibrated, orientations), never, truth.body)
-    assert [n.code for n in found.notices] == ["foot_never_still"]
+    assert "foot_never_still" in {n.code for n in found.notices}

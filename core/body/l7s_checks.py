@@ -1,0 +1,131 @@
+"""Whether the sensors that L7S was given move as the feet and the pelvis of a walking person do.
+
+With two or three sensors no joint has two, so that nothing contradicts a wrong one by itself. What can be
+held against it is how people walk: feet take turns, stay under their hips, the outer foot goes further in a
+turn, and the pelvis falls away from the foot it stands on. All figures were looked at on the simulated walks
+of core/simulate and on neura_walk, right and with sensors exchanged; limits are in l7s_health.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from core.body.health import longest_run_s
+from core.body.l7s_filter import L7sInputs, L7sTrack
+from core.body.l7s_legs import LegModel
+from core.frames import Bools, Floats, Segment
+
+OUTWARD: Final = (-0.5, 2.0)
+"""Left foot left of the right one, in hip widths; healthy walks stay within 0 to 1.3, scissoring aside."""
+
+STRIDE_S: Final = (0.6, 2.5)
+"""Time from rest to rest of a foot that is a stride."""
+
+BREAK_S: Final = 0.15
+"""Two rests of a foot with less between them are one."""
+
+LEAST_STRIDES: Final = 4
+
+LEAST_TURN: Final = np.radians(60.0)
+"""Root of the sum of the squared turns of the strides below which nothing is said from turns."""
+
+
+def walking_checks(inputs: L7sInputs, track: L7sTrack, model: LegModel, rate_hz: float) -> dict[str, float]:
+    """Measured quantities by name; one that the take does not show is not there.
+
+    Returns
+    -------
+    `out_of_place_share` : of the time in motion in which the feet are not side by side under the hips.
+    `phase_off` : distance of the other foot's rest from the middle of a stride, in strides, median.
+    2I: `inner_foot_m`, way of the inner foot minus that of the outer per radian of turn, m: minus the
+    distance of the feet, and positive when the sides are exchanged; `turned_rad`, what that rests on.
+    3I: `toward_foot_mps2`, acceleration of the pelvis toward the foot that stands alone, negative in walking
+    (an inverted pendulum falls away from its foot); `pelvis_tilt_sd_rad` while moving.
+    """
+    found: dict[str, float] = {}
+    moving = np.asarray(~inputs.step.all(axis=1))
+    forward = inputs.R[:, 1, :2, 2] + inputs.R[:, 2, :2, 2]
+    heading = np.unwrap(np.arctan2(forward[:, 1], forward[:, 0]))
+    if moving.any():
+        to_left = np.stack((-np.sin(heading), np.cos(heading)), axis=1)
+        outward = np.sum(to_left * (track.p[:, 1] - track.p[:, 2])[:, :2], axis=1)[moving]
+        low, high = (x * model.hip_width for x in OUTWARD)
+        found["out_of_place_share"] = float(np.mean((outward < low) | (outward > high)))
+    rests = [_rests(inputs.step[:, leg], rate_hz) for leg in range(2)]
+    phases = _phases(rests[0], rests[1], rate_hz) + _phases(rests[1], rests[0], rate_hz)
+    if len(phases) >= LEAST_STRIDES:
+        found["phase_off"] = float(np.median(np.abs(np.array(phases) - 0.5)))
+    if inputs.worn == "3I":
+        return found | _pelvis(inputs, moving)
+    return found | _turns(rests, heading, track, STRIDE_S[1] * rate_hz)
+
+
+def longest_gaps(valid: Mapping[Segment, Bools], rate_hz: float) -> dict[Segment, float]:
+    """Longest loss of each sensor in s."""
+    return {s: longest_run_s(~ok, rate_hz) for s, ok in valid.items()}
+
+
+def _rests(step: Bools, rate_hz: float) -> np.ndarray:
+    """Middle samples of the rests of a foot."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], step, [False]))))
+    joined: list[list[int]] = []
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        if joined and start - joined[-1][1] < BREAK_S * rate_hz:
+            joined[-1][1] = stop
+        else:
+            joined.append([start, stop])
+    return np.array([(a + b) // 2 for a, b in joined], int)
+
+
+def _phases(own: np.ndarray, other: np.ndarray, rate_hz: float) -> list[float]:
+    """Where in each stride of a foot the other one rests, 0 to 1; 0 where it does not."""
+    phases = []
+    for a, b in pairwise(own):
+        if STRIDE_S[0] * rate_hz <= b - a <= STRIDE_S[1] * rate_hz:
+            inside = other[(other > a) & (other < b)]
+            if len(inside) < 2:
+                phases.append(float((inside[0] - a) / (b - a)) if len(inside) else 0.0)
+    return phases
+
+
+def _turns(rests: list[np.ndarray], heading: Floats, track: L7sTrack, longest: float) -> dict[str, float]:
+    """How much further the inner foot goes than the outer: two feet at a distance on a turning body."""
+    left, right = rests
+    if len(left) < 2 or len(right) < 2:
+        return {}
+    ways = [_way(rests[leg], heading, track.p[:, 1 + leg]) for leg in range(2)]
+    ahead = np.diff(np.interp(left, right, ways[1])) - np.diff(ways[0])
+    # standing and gaps are no strides, of either foot
+    pause = np.flatnonzero(np.diff(right) > longest)
+    walked = (np.diff(left) <= longest) & (left[:-1] >= right[0]) & (left[1:] <= right[-1])
+    for a, b in zip(right[pause], right[pause + 1], strict=True):
+        walked &= (left[1:] <= a) | (left[:-1] >= b)
+    turn = np.where(walked, np.diff(heading[left]), 0.0)
+    square = float(np.sum(turn**2))
+    if square < LEAST_TURN**2:
+        return {"turned_rad": square**0.5}
+    return {"turned_rad": square**0.5, "inner_foot_m": -float(np.sum(ahead * turn)) / square}
+
+
+def _way(rests: np.ndarray, heading: Floats, p: Floats) -> Floats:
+    """Way forward (rests,) in m that a foot has gone from its first rest on."""
+    middle = 0.5 * (heading[rests[:-1]] + heading[rests[1:]])
+    along = np.stack((np.cos(middle), np.sin(middle)), axis=1)
+    return np.concatenate(([0.0], np.cumsum(np.sum(np.diff(p[rests, :2], axis=0) * along, axis=1))))
+
+
+def _pelvis(inputs: L7sInputs, moving: Bools) -> dict[str, float]:
+    found: dict[str, float] = {}
+    R = inputs.R[:, 0]
+    to_left = R[:, :2, 1] / np.maximum(np.linalg.norm(R[:, :2, 1], axis=1), 1e-9)[:, None]
+    sideways = np.sum(to_left * inputs.acc[:, 0, :2], axis=1)
+    alone = [inputs.step[:, leg] & ~inputs.step[:, 1 - leg] for leg in range(2)]
+    if alone[0].any() and alone[1].any():
+        found["toward_foot_mps2"] = 0.5 * float(sideways[alone[0]].mean() - sideways[alone[1]].mean())
+    if moving.any():
+        found["pelvis_tilt_sd_rad"] = float(np.std(np.arctan2(-R[moving, 2, 0], R[moving, 2, 2])))
+    return found

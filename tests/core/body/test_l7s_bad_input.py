@@ -1,0 +1,317 @@
+"""L7S on what goes wrong with few sensors: a named error, or a flag with the quantity that shows it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.body.choice import Estimator
+from core.body.estimate import PoseEstimate, PoseParams
+from core.body.health import Verdict
+from core.body.l7s import free_acceleration, inputs_of, l7s_poses
+from core.body.l7s_filter import filter_block, start
+from core.body.l7s_legs import LegModel
+from core.body.model import BodyModel
+from core.calibration import calibrate
+from core.errors import EstimationError, SagittalError, SignalError
+from core.frames import FOOT, SIDES, Floats, Segment
+from core.fusion import estimate
+from core.pipeline import PipelineConfig, analyse
+from core.recording import Recording, SensorSignals, UniformRecording
+from core.rotation import about, multiply, rotate
+from core.simulate import simulate_scenario
+from tests.core.body.test_estimate import FEET, PELVIS_FEET, estimated
+from tests.core.body.test_l7s import still_feet
+from tests.walks import cut, lost, only, simulated
+
+SEEN = {"l7s_3i": PELVIS_FEET, "l7s_2i": FEET}
+BOTH: tuple[Estimator, ...] = ("l7s_3i", "l7s_2i")
+
+
+def take(estimator: Estimator, name: str = "fast_with_turns") -> UniformRecording:
+    """A walk with turns and the sensors of the estimator."""
+    return only(simulated(name, 3)[0], *SEEN[estimator])
+
+
+def run(recording: UniformRecording, estimator: Estimator) -> PoseEstimate:
+    made = estimated(recording, PoseParams(estimator=estimator))
+    assert made.poses.method == estimator
+    return made
+
+
+def codes(made: PoseEstimate) -> set[str]:
+    return {n.code for n in made.poses.notices}
+
+
+def finding(made: PoseEstimate, name: str, of: str | None = None) -> tuple[float, Verdict]:
+    (found,) = (f for f in made.poses.health if (f.name, f.of) == (name, of))
+    return found.value, found.verdict
+
+
+def wearing(recording: UniformRecording, **sensors: SensorSignals) -> UniformRecording:
+    return replace(recording, sensors={**recording.sensors, **sensors})  # type: ignore[dict-item]
+
+
+ACCUSING = {
+    "feet_drift_apart", "feet_out_of_step", "feet_exchanged", "not_a_pelvis", "gap_not_bridged",
+    "legs_do_not_fit", "foot_never_still",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        ("comfortable", 2), ("slow", 4), ("fast_with_turns", 3), ("hemiparetic", 3), ("drop_foot", 5),
+        ("antalgic", 3), ("crouch", 4), ("parkinson", 2), ("elderly", 5),
+    ],
+)  # fmt: skip
+def test_a_right_set_up_is_not_accused(name: str, seed: int, estimator: Estimator) -> None:
+    made = run(only(simulated(name, seed)[0], *SEEN[estimator]), estimator)
+    assert not codes(made) & ACCUSING
+    assert all(f.verdict == "good" for f in made.poses.health)
+
+
+@pytest.mark.parametrize("name", ["comfortable", "fast_with_turns", "hemiparetic"])
+def test_exchanged_feet_show_in_where_the_pelvis_falls(name: str) -> None:
+    recording = take("l7s_3i", name)
+    s = recording.sensors
+    made = run(wearing(recording, foot_l=s["foot_r"], foot_r=s["foot_l"]), "l7s_3i")
+    assert "feet_exchanged" in codes(made)
+    right, wrong = finding(run(recording, "l7s_3i"), "toward_foot_mps2"), finding(made, "toward_foot_mps2")
+    assert wrong[1] == "bad"
+    assert right[0] < 0.0 < wrong[0]
+
+
+def test_exchanged_feet_show_in_turns_without_a_pelvis() -> None:
+    recording = take("l7s_2i")
+    s = recording.sensors
+    made = run(wearing(recording, foot_l=s["foot_r"], foot_r=s["foot_l"]), "l7s_2i")
+    assert "feet_exchanged" in codes(made)
+    assert finding(made, "inner_foot_m")[0] > 0.0
+    # minus the distance of the feet across the way
+    assert -0.2 < finding(run(recording, "l7s_2i"), "inner_foot_m")[0] < -0.05
+
+
+def test_without_turn_and_pelvis_it_is_told_that_sides_cannot_be_checked() -> None:
+    assert "sides_not_checked" in codes(run(take("l7s_2i", "comfortable"), "l7s_2i"))
+    assert "sides_not_checked" not in codes(run(take("l7s_2i"), "l7s_2i"))
+    assert "sides_not_checked" not in codes(run(take("l7s_3i", "comfortable"), "l7s_3i"))
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_one_sensor_given_for_both_feet_is_told(estimator: Estimator) -> None:
+    recording = take(estimator)
+    made = run(wearing(recording, foot_r=recording.sensors["foot_l"]), estimator)
+    assert "feet_out_of_step" in codes(made)
+    value, verdict = finding(made, "phase_off_pct")
+    assert (round(value), verdict) == (50, "bad")
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_a_foot_with_a_late_clock_is_told(estimator: Estimator) -> None:
+    recording = take(estimator)
+    was = recording.sensors["foot_l"]
+    late = replace(was, acc=np.roll(was.acc, 20, axis=0).copy(), gyr=np.roll(was.gyr, 20, axis=0).copy())
+    made = run(wearing(recording, foot_l=late), estimator)
+    assert "feet_out_of_step" in codes(made)
+    value, verdict = finding(made, "phase_off_pct")
+    # 0.2 s of a stride of 0.94 s
+    assert value == pytest.approx(21.0, abs=3.0)
+    assert verdict == "warn"
+
+
+def test_a_sensor_taken_for_the_pelvis_that_sits_on_a_thigh_is_told() -> None:
+    thigh = simulated("fast_with_turns", 3)[0].sensors["thigh_r"]
+    made = run(wearing(take("l7s_3i"), pelvis=thigh), "l7s_3i")
+    assert "not_a_pelvis" in codes(made)
+    assert finding(made, "pelvis_tilt_sd_deg")[1] == "bad"
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_a_sensor_taken_for_a_foot_that_sits_on_the_shank_is_told(estimator: Estimator) -> None:
+    shank = simulated("fast_with_turns", 3)[0].sensors["shank_l"]
+    made = run(wearing(take(estimator), foot_l=shank), estimator)
+    assert "foot_never_still" in codes(made)
+    assert finding(made, "longest_moving_s", "foot_l")[1] == "bad"
+
+
+def test_pelvis_and_foot_exchanged_are_told() -> None:
+    recording = take("l7s_3i")
+    s = recording.sensors
+    made = run(wearing(recording, pelvis=s["foot_l"], foot_l=s["pelvis"]), "l7s_3i")
+    assert codes(made) >= {"not_a_pelvis", "feet_drift_apart"}
+    assert finding(made, "feet_out_of_place_pct")[1] == "bad"
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_calibration_finds_forward_of_a_foot_sensor_put_on_backwards(estimator: Estimator) -> None:
+    recording, half = take(estimator), about(2, np.pi)
+    was = recording.sensors["foot_l"]
+    backwards = replace(was, acc=rotate(half, was.acc), gyr=rotate(half, was.gyr), mag=None)
+    made, whole = run(wearing(recording, foot_l=backwards), estimator), run(recording, estimator)
+    for segment, p in whole.poses.p.items():
+        np.testing.assert_allclose(made.poses.p[segment], p, atol=1e-3)
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_a_foot_that_faces_backwards_after_calibration_is_refused(estimator: Estimator) -> None:
+    recording = take(estimator)
+    calibrated = calibrate(recording)
+    orientations = estimate(calibrated)
+    turned = {**orientations.q, "foot_r": multiply(about(2, np.pi), orientations.q["foot_r"])}
+    with pytest.raises(EstimationError) as error:
+        l7s_poses(
+            replace(orientations, q=turned),
+            free_acceleration(calibrated, orientations),
+            still_feet(calibrated),
+            BodyModel.from_height(1.75),
+        )
+    assert (error.value.code, error.value.sensor) == ("headings_apart", "foot_r")
+    assert re.search(r"faces 1[78]\d° away", error.value.message)
+
+
+@pytest.mark.parametrize(("off_deg", "verdict"), [(0.0, "good"), (45.0, "bad"), (-45.0, "bad")])
+@pytest.mark.parametrize("estimator", BOTH)
+def test_feet_whose_headings_disagree_are_told(
+    estimator: Estimator, off_deg: float, verdict: Verdict
+) -> None:
+    calibrated = calibrate(take(estimator))
+    orientations = estimate(calibrated)
+    acceleration, turn = free_acceleration(calibrated, orientations), about(2, np.radians(off_deg))
+    q = {**orientations.q, "foot_l": multiply(turn, orientations.q["foot_l"])}
+    moved = {**acceleration, "foot_l": rotate(turn, acceleration["foot_l"])}
+    body = simulated("fast_with_turns", 3)[1].body
+    poses = l7s_poses(replace(orientations, q=q), moved, still_feet(calibrated), body)
+    (found,) = (f for f in poses.health if f.name == "feet_out_of_place_pct")
+    assert found.verdict == verdict
+    assert ("feet_drift_apart" in {n.code for n in poses.notices}) == (verdict != "good")
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_a_gap_of_half_a_second_of_a_foot_is_told_and_the_rest_stays_finite(estimator: Estimator) -> None:
+    made = run(lost(take(estimator), "foot_l", 20.0, 20.5), estimator)
+    assert "gap_not_bridged" in codes(made)
+    value, verdict = finding(made, "gap_s", "foot_l")
+    assert (round(value, 2), verdict) == (0.5, "bad")
+    for p in made.poses.p.values():
+        assert np.isfinite(p).all()
+    assert not made.poses.valid[2000:2050].any()
+
+
+def test_a_gap_of_the_pelvis_is_bridged_by_the_feet() -> None:
+    whole = run(take("l7s_3i"), "l7s_3i")
+    made = run(lost(take("l7s_3i"), "pelvis", 20.0, 20.5), "l7s_3i")
+    assert "gap_not_bridged" not in codes(made)
+    assert finding(made, "gap_s", "pelvis")[1] == "good"
+    after = slice(2300, 4000)
+    for side in SIDES:
+        apart = made.poses.p[FOOT[side]][after] - whole.poses.p[FOOT[side]][after]
+        assert np.abs(apart - apart.mean(axis=0)).max() < 0.1
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_a_loss_that_nobody_noticed_is_told_by_what_does_not_fit(estimator: Estimator) -> None:
+    recording = take(estimator)
+    held = lost(recording, "foot_l", 20.0, 20.5).sensors["foot_l"]
+    unnoticed = replace(held, valid=recording.sensors["foot_l"].valid)
+    made = run(wearing(recording, foot_l=unnoticed), estimator)
+    assert codes(made) & {"legs_do_not_fit", "zero_velocity_refused"}
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_a_burst_of_no_numbers_is_a_gap(estimator: Estimator) -> None:
+    made = simulate_scenario("fast_with_turns", 3, worn=SEEN[estimator])
+    device = next(d for d, s in made.recording.segments.items() if s == "foot_r")
+    stream = made.recording.streams[device]
+    assert stream.gyr is not None
+    acc, gyr = stream.acc.copy(), stream.gyr.copy()
+    acc[2000:2040], gyr[2000:2040] = np.nan, np.nan
+    broken: Recording = replace(
+        made.recording, streams={**made.recording.streams, device: replace(stream, acc=acc, gyr=gyr)}
+    )
+    done = analyse(broken, PipelineConfig(poses=PoseParams(estimator=estimator)))
+    assert done.problem is None
+    assert done.poses is not None
+    assert "gap_not_bridged" in {n.code for n in done.notices}
+    for segment in done.poses.p:
+        assert np.isfinite(done.poses.p[segment]).all()
+        assert np.isfinite(done.poses.q[segment]).all()
+    assert done.angles is not None
+    assert np.isnan(done.angles.angles["knee_flexion_r"][2005:2035]).all()
+
+
+def test_a_number_that_is_none_inside_a_valid_sample_is_refused() -> None:
+    calibrated = calibrate(take("l7s_3i"))
+    orientations = estimate(calibrated)
+    model = LegModel.of(BodyModel.from_height(1.75))
+    acceleration = free_acceleration(calibrated, orientations)
+    inputs = inputs_of(orientations, acceleration, still_feet(calibrated), model, "3I").part(slice(0, 60))
+    acc: Floats = inputs.acc.copy()
+    acc[37, 1, 2] = np.nan
+    with pytest.raises(EstimationError) as error:
+        filter_block(start(inputs, model), replace(inputs, acc=acc), model, 100.0)
+    assert error.value.code == "bad_signal"
+    assert "Sample 37" in error.value.message
+
+
+@pytest.mark.parametrize("missing", ["pelvis", "foot_l", "foot_r"])
+def test_a_missing_sensor_is_named(missing: Segment) -> None:
+    recording = take("l7s_3i")
+    kept = only(recording, *(s for s in PELVIS_FEET if s != missing))
+    with pytest.raises(EstimationError) as asked:
+        estimated(kept, PoseParams(estimator="l7s_3i"))
+    assert asked.value.code == "estimator_impossible"
+    calibrated = calibrate(recording)
+    orientations = estimate(calibrated)
+    without = replace(orientations, q={s: q for s, q in orientations.q.items() if s != missing})
+    with pytest.raises(EstimationError) as given:
+        l7s_poses(
+            without,
+            free_acceleration(calibrated, without),
+            still_feet(calibrated),
+            BodyModel.from_height(1.75),
+            worn="3I",
+        )
+    assert (given.value.code, given.value.sensor) == ("sensor_missing", missing)
+
+
+def test_a_take_without_its_pelvis_is_done_with_the_feet() -> None:
+    made = estimated(only(take("l7s_3i"), *FEET))
+    assert made.poses.method == "l7s_2i"
+
+
+@pytest.mark.parametrize("name", ["hip_width", "thigh", "shank", "ankle_height", "foot"])
+@pytest.mark.parametrize("length", [0.0, -0.1, np.nan, np.inf])
+def test_a_length_that_no_leg_has_is_refused(name: str, length: float) -> None:
+    with pytest.raises(EstimationError) as error:
+        LegModel.of(replace(BodyModel.from_height(1.75), **{name: length}))  # type: ignore[arg-type]
+    assert error.value.code == "segment_length"
+    assert name in error.value.message
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_without_standing_there_is_an_error_or_a_notice(estimator: Estimator) -> None:
+    walking = take(estimator, "comfortable")
+    told = codes(run(cut(walking, 8.0, 40.0), estimator))
+    assert "started_moving" in told
+    with pytest.raises(SagittalError) as error:
+        run(cut(walking, 8.0, 24.0), estimator)
+    assert isinstance(error.value, SignalError)
+    assert error.value.code == "no_rest"
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_a_treadmill_is_told_because_its_signals_are_those_of_the_floor(estimator: Estimator) -> None:
+    made = run(replace(take(estimator), protocol="treadmill"), estimator)
+    assert "treadmill_belt" in codes(made)
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+@pytest.mark.parametrize("protocol", ["squat", "activity", "tug"])
+def test_a_protocol_in_which_the_pelvis_sinks_is_told(estimator: Estimator, protocol: str) -> None:
+    made = run(replace(take(estimator), protocol=protocol), estimator)  # type: ignore[arg-type]
+    assert "pelvis_height_assumed" in codes(made)
