@@ -1,26 +1,36 @@
 """Simulated walkers and sensors with exact truth, for tests, demo and CLI (docs/simulation.md)."""
 
+from core.simulate.chest import ChestSimulation, ChestTruth, Hold, simulate_day
 from core.simulate.magnetics import Dipole
 from core.simulate.mems import SensorNoise
+from core.simulate.movements import MOVEMENTS, Movement, simulate_movement
 from core.simulate.mt_text import mt_files, mt_text
 from core.simulate.patients import PATIENTS, Patient
+from core.simulate.phases import Phase, phase_table
 from core.simulate.script import Arc, Pivot, Script, Stand, Steps, Straight
 from core.simulate.scripts import SCRIPTS, Scenario, simulate_scenario
 from core.simulate.setup import Dropout, Setup
 from core.simulate.simulation import Simulation, simulate
 from core.simulate.soft_tissue import SoftTissue
+from core.simulate.squat import Squats, SquatSimulation, SquatTruth, simulate_squats
 from core.simulate.tables import angle_table, event_table, stride_table
 from core.simulate.truth import Truth
 from core.simulate.walker import STEADY, SideGait, Variability, Walker
 
 __all__ = [
+    "MOVEMENTS",
     "PATIENTS",
     "SCRIPTS",
     "STEADY",
     "Arc",
+    "ChestSimulation",
+    "ChestTruth",
     "Dipole",
     "Dropout",
+    "Hold",
+    "Movement",
     "Patient",
+    "Phase",
     "Pivot",
     "Scenario",
     "Script",
@@ -29,6 +39,9 @@ __all__ = [
     "SideGait",
     "Simulation",
     "SoftTissue",
+    "SquatSimulation",
+    "SquatTruth",
+    "Squats",
     "Stand",
     "Steps",
     "Straight",
@@ -39,7 +52,11 @@ __all__ = [
     "event_table",
     "mt_files",
     "mt_text",
+    "phase_table",
     "simulate",
+    "simulate_day",
+    "simulate_movement",
     "simulate_scenario",
+    "simulate_squats",
     "stride_table",
 ]

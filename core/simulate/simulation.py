@@ -2,37 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from core.frames import Bools, Segment
-from core.recording import Recording
+from core.frames import Segment
 from core.simulate.human import move
 from core.simulate.impacts import draw_impacts
-from core.simulate.recorder import Draws, oversampling, record
+from core.simulate.recorder import Draws, Recorded, oversampling, record
 from core.simulate.script import Script, plan
-from core.simulate.sensors import PLACES, Signals, draw_mounts, worn
+from core.simulate.sensors import PLACES, draw_mounts, worn
 from core.simulate.setup import Setup
 from core.simulate.truth import Truth, truth_of
 from core.simulate.walker import Walker
 
 
 @dataclass(frozen=True, eq=False)
-class Simulation:
-    """A recording, what really happened, and what ideal sensors would have measured.
+class Simulation(Recorded):
+    """A recorded walk and what really happened."""
 
-    Parameters
-    ----------
-    ideal, clipped, first_counter : see `Recorded`.
-    """
-
-    recording: Recording
     truth: Truth
-    ideal: Mapping[Segment, Signals]
-    clipped: Mapping[Segment, Bools]
-    first_counter: int
 
     def peaks(self) -> dict[Segment, tuple[float, float]]:
         """Segment → largest |specific force| in m/s² and |angular rate| in rad/s of the ideal signals."""
@@ -67,4 +56,4 @@ def simulate(
     paths = {s: worn(motion, s, mount, setup.tissue, impacts) for s, mount in mounts.items()}
     made = record(paths, setup, draws, walker.height_m)
     truth = truth_of(motion, every, mounts, made.errors, seed)
-    return Simulation(made.recording, truth, made.ideal, made.clipped, made.first_counter)
+    return Simulation(**vars(made), truth=truth)

@@ -147,14 +147,19 @@ def truth_of(
 
 
 def joint_angles(q: Mapping[Segment, Floats]) -> dict[str, Floats]:
-    """All angles (n,) in rad of seven segment orientations (n, 4), names and signs as in core/angles.py."""
+    """Angles (n,) in rad of segment orientations (n, 4), names and signs as in core/angles.py.
+
+    Parameters
+    ----------
+    q : the pelvis and one or both whole legs.
+    """
     R = {segment: to_matrix(values) for segment, values in q.items()}
     relative = R_NEUTRAL.T @ R["pelvis"]
     out = {
         "pelvis_tilt": -np.arctan2(relative[:, 1, 0], relative[:, 1, 1]),
         "pelvis_obliquity": np.arcsin(relative[:, 1, 2]),
     }
-    for side in SIDES:
+    for side in (s for s in SIDES if FOOT[s] in q):
         mirror, end = SIGN[side], SUFFIX[side]
         hip = _cardan(R["pelvis"], R[THIGH[side]])
         knee = _cardan(R[THIGH[side]], R[SHANK[side]])

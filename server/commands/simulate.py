@@ -5,48 +5,97 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from core.errors import SagittalError
 from server.storage import fs
+
+if TYPE_CHECKING:
+    from core.simulate import ChestTruth, SquatTruth, Truth
 
 
 def simulate(out: Path, script: str, seed: int) -> int:
-    """Write `recording.parquet` and `truth/` (angles, events, strides) into `out`; 2 = no such script."""
-    from core.angles import JointAngles
-    from core.formats import write_recording
-    from core.simulate import SCRIPTS, event_table, simulate_scenario, stride_table
-    from server.report.exports import angles_parquet, write_csv
+    """Write `recording.parquet` and `truth/` into `out`; 2 = no such script.
 
-    try:
-        made = simulate_scenario(script, seed)
-    except SagittalError as error:
-        sys.stderr.write(f"{error.message}\n")
+    Truth of a walk: angles, events, strides; of squats: angles, phases; of a chest: trunk, phases.
+    """
+    from core.formats import write_recording
+    from core.simulate import MOVEMENTS, SCRIPTS, Simulation, simulate_movement, simulate_scenario
+    from core.simulate.squat import SquatSimulation
+
+    if script not in SCRIPTS and script not in MOVEMENTS:
+        known = ", ".join((*SCRIPTS, *MOVEMENTS))
+        sys.stderr.write(f"No script '{script}'; expected one of {known}.\n")
         return 2
-    truth = made.truth
-    events, strides = event_table(truth), stride_table(truth)
-    strides["turn_deg"] = [math.degrees(float(turn or 0.0)) for turn in strides.pop("turn_rad")]
-    files = {
+    made = simulate_scenario(script, seed) if script in SCRIPTS else simulate_movement(script, seed)
+    if isinstance(made, Simulation):
+        files, facts = _walk(made.truth)
+    elif isinstance(made, SquatSimulation):
+        files, facts = _squats(made.truth)
+    else:
+        files, facts = _chest(made.truth)
+    title = (SCRIPTS[script] if script in SCRIPTS else MOVEMENTS[script]).title
+    truth = {"script": script, "title": title, "seed": seed, **facts}
+    files |= {
         "recording.parquet": write_recording(made.recording),
-        "truth/angles.parquet": angles_parquet(JointAngles(truth.t_s, truth.zeroed(), truth.zero_offset)),
-        "truth/events.csv": write_csv(tuple(events), list(zip(*events.values(), strict=True))),
-        "truth/strides.csv": write_csv(tuple(strides), list(zip(*strides.values(), strict=True))),
-        "truth/truth.json": json.dumps(
-            {
-                "script": script,
-                "title": SCRIPTS[script].title,
-                "seed": seed,
-                "zero_s": truth.zero,
-                "stands_s": truth.stands,
-                "walks_s": [(a[1], b[0]) for a, b in pairwise(truth.stands)],
-            },
-            indent=1,
-        ).encode(),
+        "truth/truth.json": json.dumps(truth, indent=1).encode(),
     }
     for name, content in files.items():
         fs.make_folder((out / name).parent)
         fs.write_file(out / name, content)
-    sys.stdout.write(f"{SCRIPTS[script].title}, {truth.t_s[-1]:.1f} s, seed {seed}, in {out}\n")
+    sys.stdout.write(f"{title}, {made.truth.t_s[-1]:.1f} s, seed {seed}, in {out}\n")
     sys.stdout.flush()
     return 0
+
+
+Made = tuple[dict[str, bytes], dict[str, object]]
+
+
+def _walk(truth: Truth) -> Made:
+    from core.angles import JointAngles
+    from core.simulate import event_table, stride_table
+    from server.report.exports import angles_parquet
+
+    strides: dict[str, Sequence[object]] = dict(stride_table(truth))
+    del strides["turn_rad"]
+    strides["turn_deg"] = [math.degrees(s.turn_rad) for s in truth.strides]
+    files = {
+        "truth/angles.parquet": angles_parquet(JointAngles(truth.t_s, truth.zeroed(), truth.zero_offset)),
+        "truth/events.csv": _csv(event_table(truth)),
+        "truth/strides.csv": _csv(strides),
+    }
+    walks = [(a[1], b[0]) for a, b in pairwise(truth.stands)]
+    return files, {"zero_s": truth.zero, "stands_s": truth.stands, "walks_s": walks}
+
+
+def _squats(truth: SquatTruth) -> Made:
+    from core.angles import JointAngles
+    from core.simulate import phase_table
+    from server.report.exports import angles_parquet
+
+    files = {
+        "truth/angles.parquet": angles_parquet(JointAngles(truth.t_s, truth.zeroed(), truth.zero_offset)),
+        "truth/phases.csv": _csv(phase_table(truth.phases)),
+    }
+    return files, {"depths_deg": [math.degrees(depth) for depth in truth.depths_rad]}
+
+
+def _chest(truth: ChestTruth) -> Made:
+    from core.simulate import phase_table
+
+    trunk = {
+        "t_s": truth.t_s.tolist(),
+        "trunk_pitch_deg": [math.degrees(pitch) for pitch in truth.pitch_rad.tolist()],
+        "height_m": truth.height_m.tolist(),
+        "forward_m": truth.forward_m.tolist(),
+    }
+    files = {"truth/trunk.csv": _csv(trunk), "truth/phases.csv": _csv(phase_table(truth.phases))}
+    return files, {"steps_s": truth.steps_s.tolist()}
+
+
+def _csv(columns: Mapping[str, Sequence[object]]) -> bytes:
+    from server.report.exports import write_csv
+
+    return write_csv(tuple(columns), list(zip(*columns.values(), strict=True)))
