@@ -66,7 +66,9 @@ def _parser() -> argparse.ArgumentParser:
     p = add("simulate", "Write a simulated recording and its exact truth.")
     p.add_argument("--out", type=Path, required=True, help="folder for recording and truth")
     p.add_argument(
-        "--script", default="comfortable", help="comfortable, slow, fast_with_turns, lost_sensor …"
+        "--script",
+        default="comfortable",
+        help="comfortable, fast_with_turns, hemiparetic, squats, postures … (docs/simulation.md)",
     )
     p.add_argument("--seed", type=int, default=1)
     _data_option(add("check", "Check the database, every stored file by its hash, and the audit chain."))
