@@ -45,10 +45,15 @@ def upload(client: httpx.Client, session_id: str, files: Mapping[str, bytes]) ->
     wait(client, add(client, f"/sessions/{session_id}/inspections")["id"])
 
 
-def analyse(client: httpx.Client, session_id: str, sensors: Mapping[str, str | None]) -> dict[str, Any]:
+def analyse(
+    client: httpx.Client,
+    session_id: str,
+    sensors: Mapping[str, str | None],
+    config: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
     """Analyse with this mapping and wait for the end; returns the job."""
-    manifest = {"sensors": dict(sensors)}
-    return wait(client, add(client, f"/sessions/{session_id}/analyses", manifest=manifest)["id"])
+    asked = {"manifest": {"sensors": dict(sensors)}, "config": dict(config or {})}
+    return wait(client, add(client, f"/sessions/{session_id}/analyses", **asked)["id"])
 
 
 def wait(client: httpx.Client, job_id: str) -> dict[str, Any]:

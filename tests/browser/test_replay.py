@@ -1,12 +1,17 @@
-"""The 3D figure in its frame: shows both legs, follows the clock, comes back after a lost line, goes dark."""
+"""The 3D figure in its frame: walks through the room, leaves steps, follows the clock, is not lost."""
 
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping
+from uuid import uuid4
 
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.conftest import Filled, Opener
+from tests.browser import filling
+from tests.browser.conftest import Filled, Opener, RunningServer
+from tests.data import data_folder
+from tests.walks import NEURA
 
 COUNT = """async (png) => {
   const image = new Image();
@@ -17,22 +22,24 @@ COUNT = """async (png) => {
   const context = canvas.getContext('2d');
   context.drawImage(image, 0, 0);
   const d = context.getImageData(0, 0, canvas.width, canvas.height).data;
-  const found = { orange: 0, blue: 0, sum: 0 };
+  const found = { orange: 0, blue: 0, sum: 0, x: 0 };
   for (let i = 0; i < d.length; i += 4) {
     const [r, g, b] = [d[i], d[i + 1], d[i + 2]];
-    found.orange += r > 120 && r > 1.5 * g && g > b ? 1 : 0;
-    found.blue += b > 120 && b > 1.5 * r && b > g ? 1 : 0;
+    const left = r > 120 && r > 1.5 * g && g > b, right = b > 120 && b > 1.5 * r && b > g;
+    found.orange += left ? 1 : 0;
+    found.blue += right ? 1 : 0;
+    found.x += left || right ? ((i / 4) % canvas.width) / canvas.width : 0;
     found.sum += r + g + b;
   }
-  return { ...found, mean: found.sum / (d.length / 4) / 3 };
+  return { ...found, x: found.x / (found.orange + found.blue), mean: found.sum / (d.length / 4) / 3 };
 }"""
-"""Pixels of the left leg's and the right leg's colour, and the mean brightness."""
+"""Pixels of the left and of the right leg's colour, where they are across (0 to 1), the mean brightness."""
 
 
 def test_the_figure_has_two_legs_and_follows_the_clock(
     opened: Opener, solid: Browser, filled: Filled
 ) -> None:
-    page = _open(opened, solid, filled)
+    page = _open(opened, solid, filled.done)
     before = _pixels(page)
     assert before["orange"] > 200
     assert before["blue"] > 200
@@ -47,7 +54,7 @@ def test_the_figure_has_two_legs_and_follows_the_clock(
 
 
 def test_a_lost_line_comes_back_by_itself(opened: Opener, solid: Browser, filled: Filled) -> None:
-    page = _open(opened, solid, filled)
+    page = _open(opened, solid, filled.done)
     page.evaluate("document.querySelector('gait-view').socket.close()")
     view = page.locator("gait-view")
     expect(view).to_have_attribute("data-state", "lost")
@@ -58,7 +65,7 @@ def test_a_lost_line_comes_back_by_itself(opened: Opener, solid: Browser, filled
 
 
 def test_the_figure_goes_dark_with_the_page(opened: Opener, solid: Browser, filled: Filled) -> None:
-    page = _open(opened, solid, filled)
+    page = _open(opened, solid, filled.done)
     light = _pixels(page)["mean"]
     page.locator(".rail [data-theme-toggle]").click()
     page.wait_for_timeout(1500)
@@ -66,12 +73,123 @@ def test_the_figure_goes_dark_with_the_page(opened: Opener, solid: Browser, fill
     assert _pixels(page)["mean"] < 80
 
 
-def _open(opened: Opener, solid: Browser, filled: Filled) -> Page:
-    page = opened(f"/sessions/{filled.done}", browser=solid)
+def test_the_view_follows_the_walker(opened: Opener, solid: Browser, filled: Filled) -> None:
+    page = _open(opened, solid, filled.done)
+    _switch(page, "ground")
+    for t_s in (12, 45):
+        _seek(page, t_s)
+        assert 0.35 < _pixels(page)["x"] < 0.65
+
+
+def test_from_where_the_view_stands_still_the_walk_goes_on(
+    opened: Opener, solid: Browser, filled: Filled
+) -> None:
+    page = _open(opened, solid, filled.done)
+    _switch(page, "follow")
+    seen = []
+    for t_s in (15, 30, 45):
+        _seek(page, t_s)
+        seen.append(_pixels(page))
+    assert seen[0]["x"] + 0.05 < seen[1]["x"] < seen[2]["x"] - 0.05
+    assert seen[0]["orange"] < seen[1]["orange"] < seen[2]["orange"]
+
+
+def test_steps_and_trails_are_left_behind_and_can_be_hidden(
+    opened: Opener, solid: Browser, filled: Filled
+) -> None:
+    page = _open(opened, solid, filled.done)
+    _seek(page, 30)
+    shown = _pixels(page)
+    _switch(page, "ground")
+    hidden = _pixels(page)
+    for colour in ("orange", "blue"):
+        assert shown[colour] > hidden[colour] + 150
+
+
+def test_a_lost_line_keeps_what_was_switched(opened: Opener, solid: Browser, filled: Filled) -> None:
+    page = _open(opened, solid, filled.done)
+    _switch(page, "follow")
+    page.evaluate("document.querySelector('gait-view').socket.close()")
+    expect(page.locator("gait-view")).to_have_attribute("data-state", "lost")
+    expect(page.locator("gait-view")).to_have_attribute("data-state", "open", timeout=10_000)
+    expect(page.locator("[data-switch=follow]")).to_have_attribute("aria-pressed", "false")
+
+
+def test_a_take_of_two_feet_says_which_parts_are_estimated(
+    opened: Opener, solid: Browser, running: RunningServer, filled: Filled
+) -> None:
+    files, sensors = filling.simulated_files()
+    feet = {k: v if v in ("foot_l", "foot_r") else None for k, v in sensors.items()}
+    seen = []
+    for session, estimated in ((filled.done, False), (_analysed(running, files, feet), True)):
+        page = _open(opened, solid, session)
+        expect(page.locator("[data-estimated]")).to_be_visible(visible=estimated)
+        _switch(page, "ground")
+        _seek(page, 20)
+        seen.append(_pixels(page))
+        page.close()
+    full, faint = seen
+    for colour in ("orange", "blue"):
+        assert 30 < faint[colour] < 0.6 * full[colour]
+
+
+def test_positions_for_the_eye_only_offer_no_view_of_the_whole_walk(
+    opened: Opener, solid: Browser, running: RunningServer
+) -> None:
+    session = _analysed(running, *filling.simulated_files(), "stance_foot_anchor")
+    page = _open(opened, solid, session)
+    expect(page.locator("[data-switch=follow]")).to_be_hidden()
+    expect(page.locator("[data-switch=ground]")).to_be_visible()
+
+
+def test_a_real_walk_leaves_its_steps(opened: Opener, solid: Browser, running: RunningServer) -> None:
+    folder = data_folder("neura_walk") / "rawimu"
+    files = {p.name: p.read_bytes() for p in sorted(folder.glob("*.txt"))}
+    page = _open(opened, solid, _analysed(running, files, NEURA))
+    _seek(page, 19)
+    shown = _pixels(page)
+    _switch(page, "ground")
+    assert _pixels(page)["orange"] < shown["orange"] - 100
+
+
+def _analysed(
+    running: RunningServer,
+    files: Mapping[str, bytes],
+    sensors: Mapping[str, str | None],
+    estimator: str = "auto",
+) -> str:
+    """A session with the analysis of a recording."""
+    with running.client() as client:
+        patient = filling.add(client, "/patients", code=f"P-{uuid4().hex[:6]}", height_m=1.7)["id"]
+        session = filling.add_session(client, patient, "Walk")
+        filling.upload(client, session, files)
+        job = filling.analyse(client, session, sensors, {"poses": {"estimator": estimator}})
+    assert job["state"] == "done", job
+    return session
+
+
+def _open(opened: Opener, solid: Browser, session_id: str) -> Page:
+    page = opened(f"/sessions/{session_id}", browser=solid)
     page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
     page.frame_locator("gait-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
     page.wait_for_timeout(2000)
     return page
+
+
+def _seek(page: Page, t_s: float) -> None:
+    """Move the time bar and wait until the figure is there and drawn."""
+    page.locator("time-bar input").evaluate(
+        "(e, t) => { e.value = t; e.dispatchEvent(new Event('input')); }", t_s
+    )
+    page.wait_for_function(
+        "t => Math.abs(document.querySelector('gait-view').dataset.shown - t) < 0.05", arg=t_s
+    )
+    page.wait_for_timeout(700)
+
+
+def _switch(page: Page, name: str) -> None:
+    page.locator(f"[data-switch={name}]").click()
+    page.wait_for_timeout(700)
 
 
 def _picture(page: Page) -> bytes:
