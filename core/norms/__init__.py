@@ -1,12 +1,12 @@
 """Reference tables (package data) and their lookup."""
 
+from core.norms.adults import adult_reference
 from core.norms.kinematics import NormBand, NormBands, adult_kinematics
 from core.norms.values import (
     NormValue,
     NormValues,
     angle_values,
     expected_at_speed,
-    gps_reference,
     temporal_values,
 )
 
@@ -16,8 +16,8 @@ __all__ = [
     "NormValue",
     "NormValues",
     "adult_kinematics",
+    "adult_reference",
     "angle_values",
     "expected_at_speed",
-    "gps_reference",
     "temporal_values",
 ]

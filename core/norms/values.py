@@ -93,18 +93,6 @@ class NormValues:
     reason: str | None = None
 
 
-@dataclass(frozen=True)
-class GpsReference:
-    """Gait variable score (or gait profile score) of healthy adults, degrees; the ln figures for GDI*."""
-
-    mean_deg: float
-    sd_deg: float
-    median_deg: float
-    p95_deg: float
-    mean_ln: float | None
-    sd_ln: float | None
-
-
 def angle_values(age: float | None) -> NormValues:
     """Reference of the angle parameters for an adult of this age (None = all adults)."""
     group = wbds_group(age)
@@ -179,20 +167,3 @@ def expected_at_speed(speed_mps: float, age: float | None) -> Mapping[str, NormV
             name, mean, mean * float(row["resid_sd_ln"]), int(row["n"]), group.lower(), "BMClab h2a (MIT)"
         )
     return values
-
-
-def gps_reference(*, offset_removed: bool) -> Mapping[str, GpsReference]:
-    """Scores of the healthy group, leave one out: variable, "GPS_side_9var", "GPS_overall_15" → figures."""
-    mode = "offset_removed" if offset_removed else "raw"
-    return {
-        r["variable"] or r["score"]: GpsReference(
-            mean_deg=float(r["mean"]),
-            sd_deg=float(r["sd"]),
-            median_deg=float(r["median"]),
-            p95_deg=float(r["p95"]),
-            mean_ln=float(r["mean_ln"]) if r["mean_ln"] else None,
-            sd_ln=float(r["sd_ln"]) if r["sd_ln"] else None,
-        )
-        for r in rows("gps_reference_wbds")
-        if r["mode"] == mode
-    }

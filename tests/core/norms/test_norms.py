@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from core.norms import adult_kinematics, angle_values, expected_at_speed, gps_reference, temporal_values
+from core.norms import adult_kinematics, angle_values, expected_at_speed, temporal_values
 from core.norms.tables import rows
 from core.parameters.kinematic import FIGURES
 from core.parameters.temporal import NAMES
@@ -30,7 +30,8 @@ def test_every_table_is_shipped_as_prepared_and_its_origin_written_down(name: st
 
 def test_nothing_else_is_shipped() -> None:
     shipped = {p.name for p in files("core.norms").joinpath("data").iterdir()}
-    assert shipped == {f"{name}.csv" for name in TABLES} | {"SOURCES.md"}
+    own = {"gps_sagittal_wbds.csv", "SOURCES.md"}
+    assert shipped == {f"{name}.csv" for name in TABLES} | own
 
 
 def test_the_adult_knee_is_the_published_one() -> None:
@@ -136,11 +137,3 @@ def test_expected_step_length_and_cadence_at_a_speed() -> None:
     assert young["cadence_spm"].mean == pytest.approx(104.39, abs=0.01)
     assert expected_at_speed(1.0, 70)["cadence_spm"].group == "older"
     assert expected_at_speed(0.3, 30) == {}
-
-
-def test_profile_score_reference() -> None:
-    raw = gps_reference(offset_removed=False)
-    assert raw["GPS_side_9var"].mean_deg == pytest.approx(4.95)
-    assert raw["GPS_side_9var"].mean_ln == pytest.approx(1.5547)
-    assert raw["knee_flexion"].mean_ln is None
-    assert gps_reference(offset_removed=True)["GPS_side_9var"].mean_deg == pytest.approx(2.35)

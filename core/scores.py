@@ -1,0 +1,213 @@
+"""How far gait is from a reference, in one number each: GVS, GPS, gps_sagittal, GDI* (spec/clinic.md §3).
+
+Every score exists raw and with offsets removed. Raw needs curves with the zero of the reference; angles that
+are only known from the person's own standing have none, and say so. Half of a healthy adult's raw GPS is pure
+offset, so the two are never mixed. GDI* = 100 − 10 (ln GPS − mean) / sd with mean and sd of ln GPS of the
+reference people: 100 is their middle, every 10 below it one sd (after Schwartz & Rozumalski 2008); it is not
+the GDI, whose feature matrix nobody may ship.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from math import log
+from typing import Final
+
+import numpy as np
+
+from core.anatomical import anatomical_curves
+from core.frames import SIDES, Side
+from core.norms.adults import adult_reference
+from core.norms.place import percentile_of_z
+from core.norms.profile import (
+    MODES,
+    NINE,
+    PROFILES,
+    CurveReference,
+    Mode,
+    Profile,
+    ScoreSpread,
+    gvs,
+    overall_profile,
+    side_profile,
+)
+from core.parameters.kinematic import MeanCurve, mean_curve
+from core.parameters.result import CycleCurves
+
+GDI_STAR: Final[Mapping[Profile, str]] = {"gps": "gdi_star", "gps_sagittal": "gdi_star_sagittal"}
+"""Name of the index made from each profile; the reduced one has a name of its own."""
+
+NOT_MEASURED: Final = ("pelvis_rotation", "foot_progression")
+"""Variables against the walking direction, which our angles do not have: reason "no_heading"."""
+
+NOTHING_DEG: Final = 1e-6
+"""A smaller profile is rounding: the curves are those of the reference, and the logarithm means nothing."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """One score, or why there is none.
+
+    Parameters
+    ----------
+    name : "gvs_deg", "gps_deg", "gps_sagittal_deg", "gdi_star", "gdi_star_sagittal".
+    variable : of a GVS, else None. side : None = both.
+    mode : "raw" or "offset_removed"; the two have different references.
+    value : in `unit`. n : strides behind it, the fewest of its curves.
+    healthy : spread of the score (of the GPS behind a GDI*) among the reference people, degrees.
+    percentile : of the reference people who score lower, by their log-normal spread; None for a GVS.
+    missing : variables it lacks. reason : "angle_zero_standing", "no_heading", "joint_missing", "no_strides",
+        "estimated" (no two sensors measure it), "variables_missing" (several reasons, see the GVS),
+        "no_reference", "score_zero" (the very curves of the reference: no GDI*).
+    """
+
+    name: str
+    variable: str | None
+    side: Side | None
+    mode: Mode
+    value: float | None
+    unit: str
+    n: int
+    healthy: ScoreSpread | None
+    percentile: float | None = None
+    missing: tuple[str, ...] = ()
+    reason: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """All scores of a session and whom they compare with.
+
+    Parameters
+    ----------
+    scores : by mode: GVS of nine variables of each side, then profiles and indices. The movement analysis
+        profile (MAP) is the set of GVS with the GPS: `profile`.
+    reference_n, group, source, zero : of the reference people, printed beside the scores.
+    speed_matched : False: the reference people walked at their comfortable speed, whatever the person's.
+    """
+
+    scores: tuple[Score, ...]
+    reference_n: int
+    group: str
+    source: str
+    zero: str
+    speed_matched: bool = False
+
+    def find(self, name: str, mode: Mode, side: Side | None = None, variable: str | None = None) -> Score:
+        """The score with these properties; KeyError if it cannot exist."""
+        for s in self.scores:
+            if (s.name, s.mode, s.side, s.variable) == (name, mode, side, variable):
+                return s
+        raise KeyError((name, mode, side, variable))
+
+    def profile(self, mode: Mode) -> tuple[Score, ...]:
+        """Bars of the MAP: GVS by side, then the profiles."""
+        return tuple(s for s in self.scores if s.mode == mode and s.unit == "deg")
+
+
+def scores(
+    curves: CycleCurves,
+    standing_deg: Mapping[str, float] | None = None,
+    reference: CurveReference | None = None,
+    estimated: Collection[str] = (),
+) -> Scores:
+    """Score the mean curves of the counted strides.
+
+    Parameters
+    ----------
+    curves : from standing. standing_deg : goniometer angles in standing (`core.anatomical`).
+    reference : None = 42 healthy adults. estimated : variables no two sensors measure; they are not scored.
+    """
+    reference = adult_reference() if reference is None else reference
+    level = anatomical_curves(curves, standing_deg or {}) if reference.zero == "anatomical" else curves
+    means = _means(curves)
+    found: list[Score] = []
+    for mode in MODES:
+        own = _means(level) if mode == "raw" else means
+        single = [
+            _gvs(v, side, mode, own.get((v, side)), means.get((v, side)), curves, reference, v in estimated)
+            for side in SIDES
+            for v in NINE
+        ]
+        found += single
+        for profile in PROFILES:
+            for side in (*SIDES, None):
+                found += _profile(profile, side, mode, single, reference)
+    return Scores(tuple(found), reference.n, reference.group, reference.source, reference.zero)
+
+
+Key = tuple[str, Side]
+
+
+def _means(curves: CycleCurves) -> dict[Key, MeanCurve]:
+    found = {(v, side): mean_curve(curves, v, side) for v in NINE for side in curves.curves.get(v, {})}
+    return {key: mean for key, mean in found.items() if mean.mean is not None}
+
+
+def _gvs(
+    variable: str,
+    side: Side,
+    mode: Mode,
+    own: MeanCurve | None,
+    standing: MeanCurve | None,
+    curves: CycleCurves,
+    reference: CurveReference,
+    estimated: bool,
+) -> Score:
+    healthy = reference.spreads[mode].get(variable)
+    reason = None
+    if variable not in reference.mean_deg:
+        reason = "no_reference"
+    elif standing is None:
+        there = side in curves.curves.get(variable, {})
+        reason = "no_strides" if there else "no_heading" if variable in NOT_MEASURED else "joint_missing"
+    elif estimated:
+        reason = "estimated"
+    elif own is None:
+        reason = "angle_zero_standing"
+    if reason is not None or own is None or own.mean is None:
+        missing = (variable,)
+        return Score("gvs_deg", variable, side, mode, None, "deg", 0, healthy, None, missing, reason)
+    value = float(gvs(np.degrees(own.mean), reference.mean_deg[variable], mode))
+    return Score("gvs_deg", variable, side, mode, value, "deg", own.n, healthy)
+
+
+def _profile(
+    profile: Profile, side: Side | None, mode: Mode, single: list[Score], reference: CurveReference
+) -> list[Score]:
+    """A profile of one side or both, and its index."""
+    variables = PROFILES[profile]
+    part = [s for s in single if s.variable in variables and side in (None, s.side)]
+    by_side: dict[Side, dict[str, float]] = {s: {} for s in SIDES}
+    for s in part:
+        if s.value is not None and s.side is not None and s.variable is not None:
+            by_side[s.side][s.variable] = s.value
+    value = overall_profile(by_side, variables) if side is None else side_profile(by_side[side], variables)
+    healthy = reference.spreads[mode].get(f"{profile}_{'overall' if side is None else 'side'}")
+    missing: tuple[str, ...] = ()
+    reason = None
+    if value is None:
+        lacking = [s for s in part if s.value is None]
+        reasons = {s.reason for s in lacking}
+        missing = tuple(dict.fromkeys(s.variable for s in lacking if s.variable is not None))
+        reason = reasons.pop() if len(reasons) == 1 else "variables_missing"
+    n = 0 if value is None else min(s.n for s in part if s.value is not None)
+    z = _z(value, healthy)
+    zero = value is not None and value < NOTHING_DEG
+    why = reason or (None if z is not None else "score_zero" if zero else "no_reference")
+    below = None if z is None else percentile_of_z(z)
+    index = None if z is None else 100.0 - 10.0 * z
+    return [
+        Score(f"{profile}_deg", None, side, mode, value, "deg", n, healthy, below, missing, reason),
+        Score(GDI_STAR[profile], None, side, mode, index, "points", n, healthy, below, missing, why),
+    ]
+
+
+def _z(value: float | None, healthy: ScoreSpread | None) -> float | None:
+    """Standard deviations of ln GPS above the reference people; None where they have no spread."""
+    if value is None or value < NOTHING_DEG:
+        return None
+    if healthy is None or healthy.mean_ln is None or not healthy.sd_ln:
+        return None
+    return (log(value) - healthy.mean_ln) / healthy.sd_ln

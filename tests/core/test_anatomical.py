@@ -1,0 +1,74 @@
+"""Goniometer angles: where they go, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core.anatomical import NAMES, anatomical_curves, check_standing
+from core.errors import ParameterError
+from core.frames import SIDES, Floats, Side
+from core.parameters.result import CycleCurves
+
+
+def curves(**values: float) -> CycleCurves:
+    """One stride per side, constant at so many degrees; a name with _l or _r is of one side."""
+    rows: dict[str, dict[Side, Floats]] = {}
+    for name, value in values.items():
+        base, _, suffix = name.rpartition("_")
+        only: tuple[Side, ...] = {"l": ("left",), "r": ("right",)}.get(suffix, SIDES)  # type: ignore[assignment]
+        variable = base if suffix in ("l", "r") else name
+        for side in only:
+            rows.setdefault(variable, {})[side] = np.full((1, 101), np.radians(value))
+    one = {s: np.ones(1, np.bool_) for s in SIDES}
+    return CycleCurves(rows, {s: (0,) for s in SIDES}, one, {s: np.array([62.0]) for s in SIDES})
+
+
+def degrees(found: CycleCurves, variable: str, side: Side) -> float:
+    return float(np.degrees(found.curves[variable][side][0, 50]))
+
+
+def test_the_standing_angle_is_added_to_its_own_side_only() -> None:
+    found = anatomical_curves(curves(knee_flexion=20.0, hip_flexion=5.0), {"knee_flexion_l": -8.0})
+    assert degrees(found, "knee_flexion", "left") == pytest.approx(12.0)
+    assert set(found.curves) == {"knee_flexion"}, "what nobody measured has no level"
+    assert set(found.curves["knee_flexion"]) == {"left"}
+
+
+def test_pelvic_tilt_is_one_number_for_both_sides() -> None:
+    found = anatomical_curves(curves(pelvis_tilt=2.0), {"pelvis_tilt": 10.0})
+    assert [degrees(found, "pelvis_tilt", s) for s in SIDES] == pytest.approx([12.0, 12.0])
+
+
+def test_obliquity_with_the_right_side_up_lowers_the_left() -> None:
+    found = anatomical_curves(curves(pelvis_obliquity=0.0), {"pelvis_obliquity": 3.0})
+    assert degrees(found, "pelvis_obliquity", "right") == pytest.approx(3.0)
+    assert degrees(found, "pelvis_obliquity", "left") == pytest.approx(-3.0)
+
+
+def test_the_curves_themselves_are_left_as_they_were() -> None:
+    own = curves(knee_flexion=20.0)
+    anatomical_curves(own, {"knee_flexion_l": 5.0})
+    assert degrees(own, "knee_flexion", "left") == pytest.approx(20.0)
+
+
+def test_every_angle_of_the_exports_may_be_entered() -> None:
+    assert len(NAMES) == 20
+    check_standing(dict.fromkeys(NAMES, 5.0))
+
+
+@pytest.mark.parametrize(
+    ("entered", "code"),
+    [
+        ({"knee": 5.0}, "unknown_angle"),
+        ({"knee_flexion": 5.0}, "unknown_angle"),
+        ({"pelvis_rotation": 5.0}, "unknown_angle"),
+        ({"knee_flexion_l": 61.0}, "standing_angle_implausible"),
+        ({"knee_flexion_l": float("nan")}, "standing_angle_implausible"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(entered: dict[str, float], code: str) -> None:
+    with pytest.raises(ParameterError) as error:
+        check_standing(entered)
+    assert error.value.code == code
+    assert next(iter(entered)) in error.value.message

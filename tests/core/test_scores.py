@@ -1,0 +1,143 @@
+"""Scores of a session: right numbers from right zeros, or none and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from core.frames import SIDES, Bools, Floats, Side
+from core.norms import adult_reference
+from core.norms.profile import NINE, SAGITTAL
+from core.parameters.result import CycleCurves
+from core.scores import Scores, scores
+from tests.wbds import people
+
+
+def session(curves: Mapping[str, Mapping[Side, Floats]], strides: int = 12) -> CycleCurves:
+    """A session whose strides are all alike; curves in degrees."""
+    return CycleCurves(
+        {
+            v: {s: np.radians(np.tile(c, (strides, 1))) for s, c in sides.items()}
+            for v, sides in curves.items()
+        },
+        {s: tuple(range(strides)) for s in SIDES},
+        {s: np.ones(strides, np.bool_) for s in SIDES},
+        {s: np.full(strides, 62.0) for s in SIDES},
+    )
+
+
+def norm(offset: float = 0.0, variables: tuple[str, ...] = NINE) -> CycleCurves:
+    reference = adult_reference().mean_deg
+    return session({v: dict.fromkeys(SIDES, reference[v] + offset) for v in variables})
+
+
+def standing(angle: float, variables: tuple[str, ...] = SAGITTAL) -> dict[str, float]:
+    return {f"{v}_{s}": angle for v in variables for s in "lr"}
+
+
+def value(found: Scores, name: str, mode: str, side: Side | None = None) -> float | None:
+    return found.find(name, mode, side).value  # type: ignore[arg-type]
+
+
+def test_the_norm_scores_zero() -> None:
+    found = scores(norm(), standing(0.0))
+    for side in (*SIDES, None):
+        assert value(found, "gps_sagittal_deg", "raw", side) == pytest.approx(0.0, abs=1e-9)
+        assert value(found, "gps_deg", "offset_removed", side) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_without_goniometer_angles_there_is_no_raw_score_and_the_shape_scores_stay() -> None:
+    found = scores(norm(offset=8.0))
+    assert value(found, "gps_sagittal_deg", "offset_removed") == pytest.approx(0.0, abs=1e-9)
+    for side in (*SIDES, None):
+        raw = found.find("gps_sagittal_deg", "raw", side)
+        assert (raw.value, raw.reason, raw.n) == (None, "angle_zero_standing", 0)
+        assert raw.missing == SAGITTAL
+    assert {s.reason for s in found.scores if s.mode == "raw"} == {"angle_zero_standing"}
+
+
+def test_goniometer_angles_give_the_level_back() -> None:
+    """Somebody who stands with everything bent by 10°: measured from standing, each curve is 10° too low."""
+    found = scores(norm(offset=-10.0), standing(10.0))
+    assert value(found, "gps_sagittal_deg", "raw") == pytest.approx(0.0, abs=1e-9)
+    wrong = scores(norm(offset=-10.0), standing(0.0))
+    assert value(wrong, "gps_sagittal_deg", "raw") == pytest.approx(10.0)
+    one_side = scores(norm(), {"knee_flexion_l": 0.0})
+    assert one_side.find("gvs_deg", "raw", "left", "knee_flexion").value == pytest.approx(0.0, abs=1e-9)
+    assert one_side.find("gvs_deg", "raw", "right", "knee_flexion").reason == "angle_zero_standing"
+
+
+def test_three_joints_are_never_called_gps() -> None:
+    found = scores(norm(variables=SAGITTAL), standing(0.0))
+    full = found.find("gps_deg", "raw")
+    assert (full.value, full.reason) == (None, "variables_missing")
+    assert "pelvis_rotation" in full.missing
+    assert found.find("gdi_star", "raw").value is None
+    assert found.find("gps_sagittal_deg", "raw").value is not None
+    assert found.find("gvs_deg", "raw", "left", "foot_progression").reason == "no_heading"
+    assert found.find("gvs_deg", "raw", "left", "hip_adduction").reason == "joint_missing"
+
+
+def test_pelvic_obliquity_entered_once_counts_up_on_one_side_and_down_on_the_other() -> None:
+    reference = adult_reference().mean_deg["pelvis_obliquity"]
+    # the right side 3° up while standing: zeroed there, it shows 3° too little, the left 3° too much
+    curves = session({"pelvis_obliquity": {"left": reference + 3.0, "right": reference - 3.0}})
+    found = scores(curves, {"pelvis_obliquity": 3.0})
+    for side in SIDES:
+        one = found.find("gvs_deg", "raw", side, "pelvis_obliquity")
+        assert one.value == pytest.approx(0.0, abs=1e-9)
+
+
+def test_healthy_people_have_an_index_of_one_hundred_in_the_middle() -> None:
+    """Mean 100 and sd 10 leave one out; with the person in the reference about 42/41 closer to it."""
+    found = [scores(session({v: {s: p[s][v] for s in SIDES} for v in NINE}, 2)) for p in people()]
+    spread = adult_reference().spreads["offset_removed"]["gps_overall"]
+    assert spread.sd_ln is not None
+    indices = np.array([value(f, "gdi_star", "offset_removed") for f in found], np.float64)
+    assert indices.mean() == pytest.approx(100.0 + 10.0 * np.log(42 / 41) / spread.sd_ln, abs=0.2)
+    assert indices.std(ddof=1) == pytest.approx(10.0, abs=0.1)
+    sides = [value(f, "gps_deg", "offset_removed", s) for f in found for s in SIDES]
+    assert np.mean(np.array(sides, np.float64)) == pytest.approx(2.35 * 41 / 42, abs=0.005)
+
+
+def test_an_index_of_ninety_is_one_standard_deviation_of_the_logarithm() -> None:
+    healthy = adult_reference().spreads["raw"]["gps_sagittal_overall"]
+    assert healthy.mean_ln is not None
+    assert healthy.sd_ln is not None
+    far = scores(norm(offset=float(np.exp(healthy.mean_ln + healthy.sd_ln))), standing(0.0))
+    assert value(far, "gdi_star_sagittal", "raw") == pytest.approx(90.0)
+    assert far.find("gps_sagittal_deg", "raw").percentile == pytest.approx(84.13, abs=0.01)
+    middle = scores(norm(offset=float(np.exp(healthy.mean_ln))), standing(0.0))
+    assert value(middle, "gdi_star_sagittal", "raw") == pytest.approx(100.0)
+
+
+def test_the_very_curves_of_the_norm_have_no_index() -> None:
+    score = scores(norm(), standing(0.0)).find("gdi_star_sagittal", "raw")
+    assert (score.value, score.percentile, score.reason) == (None, None, "score_zero")
+
+
+def test_angles_that_no_two_sensors_measure_are_not_scored() -> None:
+    found = scores(norm(), standing(0.0), estimated=("knee_flexion",))
+    assert found.find("gvs_deg", "offset_removed", "left", "knee_flexion").reason == "estimated"
+    assert value(found, "gps_sagittal_deg", "offset_removed") is None
+
+
+def test_excluded_strides_do_not_count() -> None:
+    curves = norm()
+    spoiled = {v: {s: rows.copy() for s, rows in sides.items()} for v, sides in curves.curves.items()}
+    spoiled["knee_flexion"]["left"][3] += 1.0
+    used: dict[Side, Bools] = {"left": np.arange(12) != 3, "right": np.ones(12, np.bool_)}
+    found = scores(CycleCurves(spoiled, curves.stride_index, used, curves.foot_off_pct), standing(0.0))
+    left = found.find("gvs_deg", "raw", "left", "knee_flexion")
+    assert left.value == pytest.approx(0.0, abs=1e-9)
+    assert left.n == 11
+    assert found.find("gps_sagittal_deg", "raw").n == 11
+
+
+def test_a_session_without_strides_says_so() -> None:
+    empty = norm()
+    none = {s: np.zeros(12, np.bool_) for s in SIDES}
+    found = scores(CycleCurves(empty.curves, empty.stride_index, none, empty.foot_off_pct))
+    assert {s.reason for s in found.scores} == {"no_strides"}
