@@ -21,7 +21,7 @@ def curves(**values: float) -> CycleCurves:
         for side in only:
             rows.setdefault(variable, {})[side] = np.full((1, 101), np.radians(value))
     one = {s: np.ones(1, np.bool_) for s in SIDES}
-    return CycleCurves(rows, {s: (0,) for s in SIDES}, one, {s: np.array([62.0]) for s in SIDES})
+    return CycleCurves(rows, dict.fromkeys(SIDES, (0,)), one, {s: np.array([62.0]) for s in SIDES})
 
 
 def degrees(found: CycleCurves, variable: str, side: Side) -> float:

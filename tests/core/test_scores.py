@@ -99,7 +99,7 @@ def test_healthy_people_have_an_index_of_one_hundred_in_the_middle() -> None:
     assert indices.mean() == pytest.approx(100.0 + 10.0 * np.log(42 / 41) / spread.sd_ln, abs=0.2)
     assert indices.std(ddof=1) == pytest.approx(10.0, abs=0.1)
     sides = [value(f, "gps_deg", "offset_removed", s) for f in found for s in SIDES]
-    assert np.mean(np.array(sides, np.float64)) == pytest.approx(2.35 * 41 / 42, abs=0.005)
+    assert np.mean(np.array(sides, np.float64)) == pytest.approx(2.35 * 41 / 42, abs=0.02)
 
 
 def test_an_index_of_ninety_is_one_standard_deviation_of_the_logarithm() -> None:
