@@ -8,9 +8,11 @@ from typing import Final
 import numpy as np
 
 from core.body.erkf_poses import ErkfRun
+from core.body.erkf_start import parts
 from core.body.health import LONGEST_MOVING_S, Finding, longest_run_s
 from core.errors import Notice, Severity
 from core.frames import Floats
+from core.rotation import conjugate, multiply, yaw
 
 RESIDUAL_MM: Final = (25.0, 80.0)
 """RMS distance of the two ends of a joint while moving. A right set-up has 3 to 19 (simulation, neura_walk),
@@ -28,6 +30,10 @@ neura_walk, gaitmap), a ramp for wheelchairs 5."""
 
 CLIMB_WAY_M: Final = 5.0
 """A shorter way than this is taken as this long: a level take of 10 s may end 0.1 m up."""
+
+START_HEADING_DEG: Final = (30.0, 90.0)
+"""A first heading off the others'. 30° is the start's own deviation; up to 90° the joints bring it back,
+beyond up to 16° stay for a take (simulation, one sensor the wrong way round)."""
 
 
 def erkf_health(run: ErkfRun) -> tuple[Finding, ...]:
@@ -51,6 +57,8 @@ def erkf_health(run: ErkfRun) -> tuple[Finding, ...]:
         lost = longest_run_s(~valid[:, i], rate)
         if lost > 0.0:
             found.append(Finding("gap_s", name, lost, warn=GAP_S))
+    if run.tree.joints:
+        found.append(_start_heading(run))
     found.append(Finding("heading_sd_deg", None, float(np.degrees(run.track.heading_sd[-1].max()))))
     found.append(Finding("min_eigenvalue", None, float(np.linalg.eigvalsh(run.final.P)[0])))
     return tuple(found)
@@ -91,6 +99,15 @@ TOLD: Final[Mapping[str, tuple[str, Severity, str]]] = {
             "expected on level ground: stairs, a slope, a sensor on the wrong foot or one that drifts."
         ),
     ),
+    "start_heading_off_deg": (
+        "start_heading_off",
+        "warning",
+        (
+            "The joints show that {of} started {value:.0f}° off the heading taken for it, up to {warn:.0f}° "
+            "are expected: a sensor put on the wrong way round or on another segment, or a wrong "
+            "calibration. Rotations and frontal angles are doubtful."
+        ),
+    ),
     "gap_s": (
         "gap_bridged",
         "info",
@@ -116,6 +133,19 @@ def erkf_notices(run: ErkfRun, findings: tuple[Finding, ...]) -> tuple[Notice, .
     if run.rest is None:
         told.append(Notice("started_moving", STARTED_MOVING, t_s=0.0))
     return tuple(told)
+
+
+def _start_heading(run: ErkfRun) -> Finding:
+    """How far the smoother turned the first heading of a sensor against its part's median, the largest."""
+    turn = yaw(multiply(run.track.q[0], conjugate(run.start.nominal[:, 6:10])))
+    part = parts(run.tree)
+    off = np.zeros(len(turn))
+    for root in set(part.tolist()):
+        apart = np.angle(np.exp(1j * (turn[part == root] - turn[root])))
+        off[part == root] = np.angle(np.exp(1j * (apart - np.median(apart))))
+    most = int(np.argmax(np.abs(off)))
+    value = float(np.degrees(abs(off[most])))
+    return Finding("start_heading_off_deg", run.tree.imus[most], value, *START_HEADING_DEG)
 
 
 def _climb_pct(run: ErkfRun, foot: int) -> float:

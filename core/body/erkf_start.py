@@ -65,7 +65,7 @@ def start_state(
         bias = float(np.hypot(params.start_gyr_bias_sd, params.gyr_walk * np.sqrt(age_s)))
     sd = np.repeat((params.start_position_sd, velocity, tilt, bias, params.start_acc_bias_sd), 3)[:m]
     P = np.diag(np.tile(sd**2, n))
-    up, part, heading = to_matrix(q)[:, 2, :], _parts(tree), np.eye(n)
+    up, part, heading = to_matrix(q)[:, 2, :], parts(tree), np.eye(n)
     if inputs.heading is None:
         # nothing tells a common heading: as none of its errors it stays what it is
         same = part[:, None] == part
@@ -86,7 +86,7 @@ def start_state(
 
 def chain_positions(tree: ImuTree, q: Floats) -> Floats:
     """Sensor positions (n, 3) in W that make the joint centres coincide, given orientations (n, 4)."""
-    p, part = np.full((len(tree.imus), 3), np.nan), _parts(tree)
+    p, part = np.full((len(tree.imus), 3), np.nan), parts(tree)
     for root in tree.roots():
         p[root] = tree.origin[root] + rotate(tree.segment_q(q)[root], tree.place[root])
     for joint in _outward(tree):
@@ -100,8 +100,8 @@ def chain_positions(tree: ImuTree, q: Floats) -> Floats:
     return p
 
 
-def _parts(tree: ImuTree) -> NDArray[np.int64]:
-    """Root (n,) of the part of the tree that each sensor belongs to."""
+def parts(tree: ImuTree) -> NDArray[np.int64]:
+    """Root (n,) of the connected part of the tree that each sensor belongs to."""
     part = np.arange(len(tree.imus))
     for joint in _outward(tree):
         part[joint.distal] = part[joint.proximal]

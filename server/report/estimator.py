@@ -64,6 +64,7 @@ QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
     "longest_moving_s": ("Longest without rest", 1, "s"),
     "climb_pct": ("Floor rises or falls, of the way", 1, "%"),
     "gap_s": ("Longest loss", 1, "s"),
+    "start_heading_off_deg": ("First heading off", 0, "°"),
     "heading_sd_deg": ("Heading uncertain by", 1, "°"),
     "min_eigenvalue": ("Smallest eigenvalue of P", 0, ""),
     "forward_axis_turned_deg": ("Forward axis turned", 0, "°"),
