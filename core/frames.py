@@ -9,7 +9,9 @@ Source: spec/estimators.md §1 (Wu et al. 2002 for ISB axes).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final, Literal, get_args
+from typing import Protocol as Shape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,3 +40,19 @@ R_NEUTRAL.setflags(write=False)
 FOOT: Final[dict[Side, Segment]] = {"left": "foot_l", "right": "foot_r"}
 SHANK: Final[dict[Side, Segment]] = {"left": "shank_l", "right": "shank_r"}
 THIGH: Final[dict[Side, Segment]] = {"left": "thigh_l", "right": "thigh_r"}
+
+
+class Oriented(Shape):
+    """Segments with their orientation over time: of a whole take, or what of it a finished analysis keeps."""
+
+    @property
+    def t_s(self) -> Floats:
+        """(n,) s from recording start."""
+
+    @property
+    def q(self) -> Mapping[Segment, Floats]:
+        """Segment → (n, 4) segment to world, scalar first."""
+
+    @property
+    def valid(self) -> Mapping[Segment, Bools]:
+        """Segment → (n,) the sensor was there."""

@@ -10,23 +10,27 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
-from core import angles, body, calibration, events, fusion, parameters, quality, timeline
+from core import angles, body, calibration, events, fusion, quality, timeline
 from core.angles import JointAngles
-from core.body.estimate import PoseParams, estimate_poses
+from core.body.estimate import PoseEstimate, PoseParams, estimate_poses
 from core.body.feet import FootTracks
+from core.body.l7s import free_acceleration
 from core.body.poses import Poses
+from core.body.walking_frame import in_walking_frame
 from core.calibration import CalibrationParams
-from core.calibration.result import Calibration
+from core.calibration.result import CalibratedRecording, Calibration
 from core.errors import Notice, SagittalError
 from core.events import FootPitchParams, StrideParams
 from core.events.result import GaitEvents, Strides
-from core.frames import SIDES
+from core.frames import FOOT, SIDES, Segment
 from core.fusion import MahonyParams
 from core.fusion.orientations import Orientations
+from core.measure import Measured, Tracks, measure
 from core.parameters.result import Parameter
+from core.parameters.spatial import surface_of
 from core.quality import QualityReport
 from core.recording import Recording, UniformRecording
 from core.timeline import TimelineParams
@@ -48,6 +52,10 @@ STAGES: Final[tuple[tuple[str, float], ...]] = (
     ("parameters", 0.98),
 )
 """Stage names in order and the share of a typical run that lies before each."""
+
+
+TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
+"""Segments whose acceleration tells how regular the gait is."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +85,7 @@ class Analysis:
     problem : the error that stopped the chain, None when every stage ran.
     orientations : as the angles take them: refined where the pose estimator does so.
     feet : paths of the feet that distances are measured on; None without a foot sensor.
+    tracks : what events, strides and parameters were measured on, and after an edit are measured on again.
     notices : all notices of all stages in order of the chain.
     provenance : input sha256 by file, digest of the parameters, version of the code.
     """
@@ -85,15 +94,29 @@ class Analysis:
     quality: QualityReport
     calibration: Calibration | None
     orientations: Orientations | None
-    events: GaitEvents | None
-    strides: Strides | None
     poses: Poses | None
     feet: FootTracks | None
     angles: JointAngles | None
-    parameters: tuple[Parameter, ...]
     problem: Notice | None
     notices: tuple[Notice, ...]
     provenance: Mapping[str, object]
+    tracks: Tracks | None = None
+    measured: Measured | None = None
+
+    @property
+    def events(self) -> GaitEvents | None:
+        """Contacts as detected."""
+        return None if self.measured is None else self.measured.events
+
+    @property
+    def strides(self) -> Strides | None:
+        """The stride list."""
+        return None if self.measured is None else self.measured.strides
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters, empty when no events were reached."""
+        return () if self.measured is None else self.measured.parameters
 
 
 def analyse(
@@ -134,6 +157,10 @@ def analyse(
             _run_stages(uniform, config, start, reached)
         except SagittalError as error:
             problem = Notice(error.code, error.message, error.sensor, error.t_s, severity="error")
+    tracks = reached.get("tracks")
+    if isinstance(tracks, Tracks):
+        start("parameters")
+        reached["measured"] = measure(tracks)
     progress("done", 1.0)
     return _bundle(recording, uniform, report, reached, problem, config, version)
 
@@ -153,9 +180,18 @@ def _run_stages(
     reached["orientations"] = orientations
     start("events")
     found = events.detect(orientations, config.events)
-    reached["events"] = found
-    strides = events.stride_list(found, orientations, calibrated.calibration.turning, config.strides)
-    reached["strides"] = strides
+    feet = [s for s in FOOT.values() if s in orientations.q]
+    tracks = Tracks(
+        t_s=uniform.t_s,
+        rate_hz=uniform.rate_hz,
+        events=found,
+        q={s: orientations.q[s] for s in feet},
+        valid={s: orientations.valid[s] for s in feet},
+        turning=calibrated.calibration.turning,
+        surface=surface_of(uniform),
+        params=config.strides,
+    )
+    reached |= {"events": found, "tracks": tracks}
     start("poses")
     lengths, assumed = body.nominal_body(uniform.subject.height_m, uniform.subject.standing_width_m)
     contacts = {
@@ -167,10 +203,25 @@ def _run_stages(
     reached |= {"poses": posed.poses, "orientations": posed.orientations, "feet": posed.feet}
     start("angles")
     joint = angles.joint_angles(posed.orientations, calibrated.calibration.zero, posed.poses)
-    reached["angles"] = joint
-    start("parameters")
-    reached["parameters"] = parameters.gait_parameters(
-        strides, joint, posed.orientations, posed.feet, parameters.surface_of(uniform)
+    reached |= {"angles": joint, "tracks": _whole(tracks, calibrated, posed, joint)}
+
+
+def _whole(
+    tracks: Tracks, calibrated: CalibratedRecording, posed: PoseEstimate, joint: JointAngles
+) -> Tracks:
+    """The tracks with all that the later stages gave; a foot whose sensor failed keeps what it had."""
+    better = {s: q for s, q in posed.orientations.q.items() if s in tracks.q}
+    acceleration = free_acceleration(calibrated, posed.orientations)
+    return replace(
+        tracks,
+        q={**tracks.q, **better},
+        feet=posed.feet,
+        angles=joint,
+        trunk={
+            s: in_walking_frame(acceleration[s], posed.orientations.q[s], tracks.rate_hz)
+            for s in TRUNK
+            if s in posed.orientations.q
+        },
     )
 
 
@@ -184,7 +235,7 @@ def _bundle(
     version: str,
 ) -> Analysis:
     notices = [*recording.notices, *uniform.notices, *report.notices]
-    for name in ("calibration", "orientations", "events", "strides", "poses", "angles"):
+    for name in ("calibration", "orientations", "events", "measured", "poses", "angles"):
         notices.extend(getattr(reached.get(name), "notices", ()))
     notices.extend(reached.get("body", ()))  # type: ignore[arg-type]
     if problem is not None:
@@ -194,9 +245,8 @@ def _bundle(
         quality=report,
         **{
             name: reached.get(name)  # type: ignore[arg-type]
-            for name in ("calibration", "orientations", "events", "strides", "poses", "feet", "angles")
+            for name in ("calibration", "orientations", "poses", "feet", "angles", "tracks", "measured")
         },
-        parameters=reached.get("parameters", ()),  # type: ignore[arg-type]
         problem=problem,
         notices=tuple(dict.fromkeys(notices)),
         provenance={

@@ -67,7 +67,9 @@ FILE_WORDS: Final[Mapping[str, str]] = {
     "analysis.json": "Quality, calibration, parameters, warnings, provenance",
     "angles.parquet": "Joint angles in degrees over time",
     "poses.parquet": "Orientation and position of every segment over time",
-    "events.csv": "Contacts and foot-offs",
+    "tracks.parquet": "Paths of the feet and what else strides are measured on",
+    "signals.parquet": "What the sensors measured, on one time axis",
+    "events.csv": "Contacts and foot-offs as detected",
     "strides.csv": "Every stride with its parameters, and why it was left out",
 }
 

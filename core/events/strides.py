@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 from math import remainder, tau
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,17 +17,13 @@ from numpy.typing import NDArray
 from core.errors import Notice
 from core.events.flags import StrideParams, decided, flagged
 from core.events.result import GaitEvents, Stride, StrideFlag, Strides
-from core.frames import FOOT, SIDES, Bools, Side
+from core.frames import FOOT, SIDES, Bools, Oriented, Side
 from core.rotation import yaw
-
-if TYPE_CHECKING:
-    # the package brings numba, which readers of results do without
-    from core.fusion.orientations import Orientations
 
 
 def stride_list(
     events: GaitEvents,
-    orientations: Orientations,
+    orientations: Oriented,
     turning: Bools | None = None,
     params: StrideParams | None = None,
 ) -> Strides:
@@ -62,7 +57,7 @@ def stride_list(
 def _side_strides(
     side: Side,
     events: GaitEvents,
-    orientations: Orientations,
+    orientations: Oriented,
     turning: Bools | None,
     params: StrideParams,
 ) -> list[Stride]:

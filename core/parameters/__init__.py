@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from core.angles import JointAngles
 from core.events.result import Strides
+from core.frames import Oriented
 from core.parameters.kinematic import (
     cycle_curves,
     foot_pitch,
@@ -19,9 +20,8 @@ from core.parameters.spatial import GROUND, Surface, per_stride_spatial, spatial
 from core.parameters.temporal import per_stride, stride_values, temporal
 
 if TYPE_CHECKING:
-    # these packages bring numba, which readers of results do without
+    # the package brings numba, which readers of results do without
     from core.body.feet import FootTracks
-    from core.fusion.orientations import Orientations
 
 __all__ = [
     "Surface",
@@ -44,7 +44,7 @@ __all__ = [
 def gait_parameters(
     strides: Strides,
     angles: JointAngles,
-    orientations: Orientations | None = None,
+    orientations: Oriented | None = None,
     feet: FootTracks | None = None,
     surface: Surface = GROUND,
 ) -> tuple[Parameter, ...]:

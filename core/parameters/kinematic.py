@@ -8,21 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
 from core.angles import JointAngles
 from core.events.foot_pitch import pitch_signal
 from core.events.result import Strides
-from core.frames import FOOT, SIDES, SUFFIX, Floats, Side
+from core.frames import FOOT, SIDES, SUFFIX, Floats, Oriented, Side
 from core.parameters.result import CycleCurves, Parameter
 from core.parameters.temporal import Column
 from core.parameters.variability import summary
-
-if TYPE_CHECKING:
-    # the package brings numba, which readers of results do without
-    from core.fusion.orientations import Orientations
 
 POINTS: Final = 101
 """Points of a curve: 0, 1, … 100 % of the cycle."""
@@ -138,7 +134,7 @@ def stride_figures(curves: CycleCurves) -> dict[str, dict[Side, Floats]]:
     return values
 
 
-def foot_pitch(orientations: Orientations, strides: Strides) -> dict[str, dict[Side, Floats]]:
+def foot_pitch(orientations: Oriented, strides: Strides) -> dict[str, dict[Side, Floats]]:
     """Pitch of the foot at IC and TC of every stride: name → side → (strides,) degrees, NaN if undefined."""
     values: dict[str, dict[Side, Floats]] = {name: {} for name in FOOT_PITCH}
     for side in SIDES:

@@ -11,17 +11,15 @@ from dataclasses import dataclass, field
 from typing import Any, cast
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from core.angles import JointAngles
 from core.body.model import BodyModel
 from core.body.poses import Poses
 from core.errors import FormatError, Notice
-from core.events.result import EventKind, GaitEvent, GaitEvents, Stride, Strides
-from core.frames import SEGMENTS, Bools, Floats, Segment, Side
+from core.events.result import EventKind, GaitEvent, GaitEvents, Stride, StrideFlag, Strides
+from core.frames import SEGMENTS, Segment, Side
 from core.parameters.result import Parameter
-from server.report.exports import SCHEMA
+from server.report.columns import SCHEMA, bools_of, floats_of, read_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,28 +73,28 @@ def load_bundle(files: Mapping[str, bytes]) -> Bundle:
 
 def read_angles(data: bytes) -> JointAngles:
     """Joint angles of angles.parquet in rad; null becomes NaN again."""
-    table, meta = _table(data)
+    table, meta = read_table(data)
     angles = {
-        name.removesuffix("_deg"): np.radians(_floats(table, name))
+        name.removesuffix("_deg"): np.radians(floats_of(table, name))
         for name in table.column_names
         if name != "t_s"
     }
     zero = {name: math.radians(offset) for name, offset in meta["zero_offset_deg"].items()}
-    return JointAngles(_floats(table, "t_s"), angles, zero, meta["angle_zero"])
+    return JointAngles(floats_of(table, "t_s"), angles, zero, meta["angle_zero"])
 
 
 def read_poses(data: bytes) -> Poses:
     """Segment poses of poses.parquet."""
-    table, meta = _table(data)
+    table, meta = read_table(data)
     present: list[Segment] = [s for s in SEGMENTS if f"{s}_q_w" in table.column_names]
     return Poses(
-        t_s=_floats(table, "t_s"),
+        t_s=floats_of(table, "t_s"),
         rate_hz=float(meta["rate_hz"]),
-        q={s: np.stack([_floats(table, f"{s}_q_{c}") for c in "wxyz"], axis=1) for s in present},
-        p={s: np.stack([_floats(table, f"{s}_p_{c}") for c in "xyz"], axis=1) for s in present},
-        valid=_bools(table, "valid"),
+        q={s: np.stack([floats_of(table, f"{s}_q_{c}") for c in "wxyz"], axis=1) for s in present},
+        p={s: np.stack([floats_of(table, f"{s}_p_{c}") for c in "xyz"], axis=1) for s in present},
+        valid=bools_of(table, "valid"),
         contact={
-            cast("Segment", f"foot_{k}"): _bools(table, f"contact_{k}")
+            cast("Segment", f"foot_{k}"): bools_of(table, f"contact_{k}")
             for k in "lr"
             if f"contact_{k}" in table.column_names
         },
@@ -134,6 +132,7 @@ def read_strides(data: bytes) -> Strides:
                 opposite_ic_s=_number(row["opposite_ic_s"]),
                 turn_rad=None if (turn := _number(row["turn_deg"])) is None else math.radians(turn),
                 excluded_reason=row["excluded_reason"] or None,
+                flags=cast("tuple[StrideFlag, ...]", tuple((row.get("flags") or "").split())),
             )
             for row in _rows(data)
         )
@@ -146,18 +145,3 @@ def _rows(data: bytes) -> csv.DictReader[str]:
 
 def _number(text: str) -> float | None:
     return float(text) if text else None
-
-
-def _table(data: bytes) -> tuple[pa.Table, dict[str, Any]]:
-    table = pq.read_table(pa.BufferReader(data))
-    meta: dict[str, Any] = json.loads((table.schema.metadata or {})[b"sagittal"])
-    return table, meta
-
-
-def _floats(table: pa.Table, name: str) -> Floats:
-    column = table.column(name).to_numpy(zero_copy_only=False)
-    return np.asarray(column, dtype=np.float64)
-
-
-def _bools(table: pa.Table, name: str) -> Bools:
-    return np.asarray(table.column(name).to_numpy(zero_copy_only=False), dtype=np.bool_)

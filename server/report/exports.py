@@ -3,6 +3,8 @@
 analysis.json   quality, calibration, parameters, warnings, provenance (schema 1)
 angles.parquet  joint angles in degrees on the uniform axis
 poses.parquet   segment poses for the replay
+tracks.parquet  what strides and parameters are measured on (server/report/tracks.py)
+signals.parquet what the sensors measured, on the common time axis (server/report/signals.py)
 events.csv      contacts: time_s, side, kind (ic | tc), source
 strides.csv     one row per stride with its temporal parameters and why it was left out
 
@@ -19,52 +21,38 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from core.angles import JointAngles
 from core.body.health import worst
 from core.body.poses import Poses
 from core.events.result import GaitEvents, Strides
-from core.frames import Floats, Side
-from core.parameters import (
-    cycle_curves,
-    foot_pitch,
-    per_stride,
-    per_stride_figures,
-    per_stride_spatial,
-    spatial_rows,
-    stride_figures,
-    surface_of,
-)
 from core.parameters.result import Parameter
-from core.parameters.spatial import Row
+from core.parameters.temporal import Column
+from server.report import signals, tracks
+from server.report.columns import SCHEMA, parquet_file, plain
 
 if TYPE_CHECKING:
     # these packages bring numba, which the web process does without
     from core.calibration.result import Calibration
-    from core.fusion.orientations import Orientations
     from core.pipeline import Analysis
 
-SCHEMA = 1
-"""Version of analysis.json and of the columns beside it; readers refuse a newer one."""
-
 STRIDE_COLUMNS = ("side", "start_s", "tc_s", "end_s", "opposite_tc_s", "opposite_ic_s", "turn_deg")
-"""What a stride is; its parameters and `excluded_reason` follow in strides.csv."""
+"""What a stride is; its parameters, `flags` and `excluded_reason` follow in strides.csv."""
 
 
 def analysis_files(analysis: Analysis) -> dict[str, bytes]:
     """Write an analysis as files, name → bytes; a stage that gave nothing leaves its file out."""
     files = {"analysis.json": _json_bytes(summary(analysis))}
-    if analysis.events is not None:
-        files["events.csv"] = events_csv(analysis.events)
-    if analysis.strides is not None:
-        rows = spatial_rows(analysis.strides, analysis.feet, surface_of(analysis.recording))
-        files["strides.csv"] = strides_csv(analysis.strides, rows, analysis.angles, analysis.orientations)
+    if analysis.measured is not None:
+        files["events.csv"] = events_csv(analysis.measured.events)
+        files["strides.csv"] = strides_csv(analysis.measured.strides, analysis.measured.columns)
     if analysis.angles is not None:
         files["angles.parquet"] = angles_parquet(analysis.angles)
     if analysis.poses is not None:
         files["poses.parquet"] = poses_parquet(analysis.poses)
+    if analysis.tracks is not None:
+        files[tracks.NAME] = tracks.tracks_parquet(analysis.tracks)
+        files[signals.NAME] = signals.signals_parquet(analysis.recording)
     return files
 
 
@@ -103,7 +91,7 @@ def angles_parquet(angles: JointAngles) -> bytes:
     columns = {f"{name}_deg": np.degrees(a).astype(np.float32) for name, a in angles.angles.items()}
     zero = {name: math.degrees(offset) for name, offset in angles.zero_offset.items()}
     meta = {"schema": SCHEMA, "angle_zero": angles.zero, "zero_offset_deg": zero}
-    return _parquet(angles.t_s, columns, meta)
+    return parquet_file(angles.t_s, columns, meta)
 
 
 def poses_parquet(poses: Poses) -> bytes:
@@ -117,7 +105,7 @@ def poses_parquet(poses: Poses) -> bytes:
     columns |= {f"contact_{segment.removeprefix('foot_')}": c for segment, c in poses.contact.items()}
     body = {name: getattr(poses.body, name) for name in poses.body.__dataclass_fields__}
     meta = {"schema": SCHEMA, "rate_hz": poses.rate_hz, "method": poses.method, "body": body}
-    return _parquet(poses.t_s, columns, meta)
+    return parquet_file(poses.t_s, columns, meta)
 
 
 def events_csv(events: GaitEvents) -> bytes:
@@ -127,24 +115,13 @@ def events_csv(events: GaitEvents) -> bytes:
     )
 
 
-def strides_csv(
-    strides: Strides,
-    rows: Sequence[Row],
-    angles: JointAngles | None = None,
-    orientations: Orientations | None = None,
-) -> bytes:
-    """Every stride, used or not, with its own parameters (spec/field.md §4b).
+def strides_csv(strides: Strides, columns: Mapping[str, Column]) -> bytes:
+    """Every stride, used or not, with its own parameters (spec/field.md §4b) and the rules that it meets.
 
     Parameters
     ----------
-    rows : of `spatial_rows`.
+    columns : parameters by name, one entry per stride.
     """
-    figures: dict[str, Mapping[Side, Floats]] = {}
-    if angles is not None:
-        figures |= stride_figures(cycle_curves(angles, strides))
-    if orientations is not None:
-        figures |= foot_pitch(orientations, strides)
-    values = per_stride(strides) | per_stride_spatial(rows) | per_stride_figures(strides, figures)
     lines = (
         (
             s.side,
@@ -154,12 +131,13 @@ def strides_csv(
             s.opposite_tc_s,
             s.opposite_ic_s,
             None if s.turn_rad is None else math.degrees(s.turn_rad),
-            *(column[i] for column in values.values()),
+            *(column[i] for column in columns.values()),
+            " ".join(s.flags),
             s.excluded_reason,
         )
         for i, s in enumerate(strides.strides)
     )
-    return write_csv((*STRIDE_COLUMNS, *values, "excluded_reason"), lines)
+    return write_csv((*STRIDE_COLUMNS, *columns, "flags", "excluded_reason"), lines)
 
 
 def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
@@ -169,23 +147,6 @@ def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
     writer.writerow(header)
     writer.writerows([_cell(v) for v in row] for row in rows)
     return text.getvalue().encode()
-
-
-def plain(value: object) -> object:
-    """Reduce mappings, sequences and numpy values to what JSON knows; non-finite numbers become null."""
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(v) for v in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, (str, bool, int)):
-        return value
-    return str(value)
 
 
 def _calibration(calibration: Calibration | None, angles: JointAngles | None) -> dict[str, object] | None:
@@ -248,16 +209,6 @@ def _estimator(analysis: Analysis) -> dict[str, object] | None:
         "estimated_angles": plain(angles.get("estimated", ())),
         "diagnostics": plain(facts),
     }
-
-
-def _parquet(t_s: Floats, columns: Mapping[str, np.ndarray], meta: Mapping[str, object]) -> bytes:
-    arrays = {"t_s": pa.array(t_s)} | {k: pa.array(v, from_pandas=True) for k, v in columns.items()}
-    table = pa.table(arrays).replace_schema_metadata({"sagittal": json.dumps(plain(meta))})
-    # neighbouring samples share their high bytes: splitting the bytes halves the file (spec/kernels.md §6)
-    split = [k for k, a in arrays.items() if pa.types.is_floating(a.type)]
-    sink = io.BytesIO()
-    pq.write_table(table, sink, compression="zstd", use_dictionary=False, use_byte_stream_split=split)  # type: ignore[arg-type] # the stubs know bool only
-    return sink.getvalue()
 
 
 def _json_bytes(value: object) -> bytes:

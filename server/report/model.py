@@ -15,8 +15,8 @@ from core.errors import Notice
 from core.frames import SIDES, Floats, Side
 from core.norms import NormBands, NormValues, adult_kinematics, angle_values, temporal_values
 from server.report.bundle import Bundle
+from server.report.columns import plain
 from server.report.estimator import EstimatorView, estimated_variables, estimator_view
-from server.report.exports import plain
 from server.report.panels import DRAWN_STRIDES, CurvePanel, SideCurve, curve_panels
 from server.report.quality_box import QualityBox, quality_box
 from server.report.table import Row, grouped, parameter_rows

@@ -10,10 +10,12 @@ from scipy.interpolate import CubicSpline
 
 from core import rotation
 from core.angles import JointAngles
+from core.body.feet import FootTracks
 from core.body.model import BodyModel
 from core.body.poses import Poses
 from core.events.result import GaitEvent, GaitEvents, Stride, Strides
 from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
+from core.measure import Tracks
 
 BODY = BodyModel(hip_width=0.2, thigh=0.43, shank=0.43, ankle_height=0.07, foot=0.26, estimated=True)
 PHASE: Mapping[Side, float] = {"left": 0.0, "right": 0.5}
@@ -119,6 +121,40 @@ def strides(duration_s: float = 12.0) -> Strides:
                 )
             )
     return Strides(tuple(sorted(out, key=lambda s: s.start_s)))
+
+
+def tracks(duration_s: float = 12.0) -> Tracks:
+    """What strides and parameters of the walk are measured on; the foot that carries rests."""
+    made = poses(duration_s)
+    whole = dict.fromkeys(SIDES, made.valid)
+    feet = FootTracks(
+        t_s=made.t_s,
+        rate_hz=made.rate_hz,
+        p={side: made.p[FOOT[side]] for side in SIDES},
+        q={side: made.q[FOOT[side]] for side in SIDES},
+        still={side: _flat(made, side) for side in SIDES},
+        valid=whole,
+        linked=True,
+        source="kinematic",
+        body=BODY,
+    )
+    return Tracks(
+        t_s=made.t_s,
+        rate_hz=made.rate_hz,
+        events=events(duration_s),
+        q={FOOT[side]: made.q[FOOT[side]] for side in SIDES},
+        valid={FOOT[side]: made.valid for side in SIDES},
+        turning=np.zeros(len(made.t_s), bool),
+        feet=feet,
+        angles=angles(duration_s),
+        trunk={"pelvis": np.stack((0 * made.t_s, 0 * made.t_s, np.sin(made.t_s)), axis=1)},
+    )
+
+
+def _flat(made: Poses, side: Side) -> Bools:
+    """The middle of the stance."""
+    phase = (made.t_s / STRIDE_S + PHASE[side]) % 1.0
+    return (phase > 0.15) & (phase < 0.35)
 
 
 def _inside(times: tuple[float, ...], start: float, end: float) -> float | None:

@@ -108,6 +108,8 @@ async def test_downloads_are_the_stored_bytes_and_never_name_the_patient(visit: 
         "analysis.json": "application/json",
         "angles.parquet": "application/vnd.apache.parquet",
         "poses.parquet": "application/vnd.apache.parquet",
+        "tracks.parquet": "application/vnd.apache.parquet",
+        "signals.parquet": "application/vnd.apache.parquet",
         "events.csv": "text/csv; charset=utf-8",
         "strides.csv": "text/csv; charset=utf-8",
     }

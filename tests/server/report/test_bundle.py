@@ -15,7 +15,7 @@ import pytest
 
 from core.calibration.result import Calibration, SegmentCalibration
 from core.errors import FormatError, Notice
-from core.parameters import gait_parameters
+from core.measure import measure
 from core.parameters.temporal import NAMES
 from core.pipeline import Analysis
 from core.quality import QualityReport
@@ -31,7 +31,7 @@ def analysis(*, reached: bool = True) -> Analysis:
     sensor = SensorSignals("A1", zeros, zeros, None, np.ones(n, bool), np.zeros(n, bool))
     problem = None if reached else Notice("no_rest", "No rest found.", severity="error")
     segment = SegmentCalibration(np.eye(3), np.array([0.01, 0.0, np.nan]), 9.8, "walking_direction", 0.9)
-    angles, strides = walk.angles(), walk.strides()
+    angles = walk.angles()
     return Analysis(
         recording=UniformRecording(walk.angles().t_s, 100.0, {"pelvis": sensor}, Subject(1.75), "walk", {}),
         quality=QualityReport("good", (), 12.0, 100.0, MappingProxyType({}), ((0.0, 2.0),), ()),
@@ -46,15 +46,14 @@ def analysis(*, reached: bool = True) -> Analysis:
         if reached
         else None,
         orientations=None,
-        events=walk.events() if reached else None,
-        strides=strides if reached else None,
         poses=walk.poses() if reached else None,
         feet=None,
         angles=angles if reached else None,
-        parameters=gait_parameters(strides, angles) if reached else (),
         problem=problem,
         notices=(Notice("gap", "0.3 s lost.", "pelvis", 1.0), *(() if problem is None else (problem,))),
         provenance={"input_sha256": {"a.txt": "ff"}, "version": "1"},
+        tracks=walk.tracks() if reached else None,
+        measured=measure(walk.tracks()) if reached else None,
     )
 
 
@@ -64,7 +63,10 @@ def files() -> Mapping[str, bytes]:
 
 
 def test_names_of_the_files(files: Mapping[str, bytes]) -> None:
-    assert set(files) == {"analysis.json", "angles.parquet", "poses.parquet", "events.csv", "strides.csv"}
+    assert set(files) == {
+        *("analysis.json", "events.csv", "strides.csv"),
+        *(f"{name}.parquet" for name in ("angles", "poses", "tracks", "signals")),
+    }
 
 
 def test_analysis_json_is_strict_json_of_schema_1(files: Mapping[str, bytes]) -> None:
@@ -117,6 +119,7 @@ def test_bundle_gives_back_angles_strides_events_and_parameters(files: Mapping[s
     assert len(bundle.strides.strides) == len(source.strides.strides)
     for read, written in zip(bundle.strides.strides, source.strides.strides, strict=True):
         assert (read.side, read.excluded_reason) == (written.side, written.excluded_reason)
+        assert read.flags == written.flags
         assert read.start_s == pytest.approx(written.start_s, abs=1e-6)
         assert read.turn_rad == pytest.approx(written.turn_rad, abs=1e-6)
     assert source.events is not None

@@ -1,0 +1,182 @@
+"""What a person changes in a take's events and strides: records, and the pure functions that apply them.
+
+The detector's events stay as they were found; a list of edits in the order in which they were made gives the
+events and strides that count. Undo is leaving the last edit out. A stride is named by a moment inside it, so
+that a decision about it survives a shift of its contacts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
+from math import isfinite
+from typing import Any, Final, Literal, cast, get_args
+
+from core.errors import ParameterError
+from core.events.result import EventKind, GaitEvent, GaitEvents, Stride, Strides
+from core.frames import SIDES, Side
+
+EditKind = Literal["move_event", "add_event", "delete_event", "exclude_stride", "include_stride"]
+KINDS: Final[tuple[EditKind, ...]] = get_args(EditKind)
+
+APART_S: Final = 0.05
+"""Two events of one foot closer than this are one (our choice: stance and swing last four times longer)."""
+
+SAME_S: Final = 0.001
+"""An event is meant when it lies this close to the time named (our choice: a tenth of a sample at 100 Hz)."""
+
+REASON_LENGTH: Final = 200
+"""Longest reason, characters (our choice)."""
+
+SOURCE: Final = "manual"
+"""Source of an event that a person placed."""
+
+
+@dataclass(frozen=True)
+class Edit:
+    """One change.
+
+    Parameters
+    ----------
+    time_s : of the event that is moved or deleted, of the new event, or a moment inside the stride, s.
+    event : kind of the event; None for strides. to_s : where the event is moved; else None.
+    reason : why a stride is left out, a line of text; else None.
+
+    Raises
+    ------
+    ParameterError
+        `bad_edit`: a member is missing, not finite, or not for this kind of edit.
+    """
+
+    kind: EditKind
+    side: Side
+    time_s: float
+    event: EventKind | None = None
+    to_s: float | None = None
+    reason: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS or self.side not in SIDES:
+            raise _bad(
+                f"expected kind {', '.join(KINDS)} and side left or right, got {self.kind} {self.side}"
+            )
+        about_event = self.kind.endswith("event")
+        if self.event not in (get_args(EventKind) if about_event else (None,)):
+            raise _bad(f"{self.kind} got event {self.event}; events are ic or tc, strides have none")
+        if (self.to_s is not None) != (self.kind == "move_event"):
+            raise _bad(f"{self.kind} got to_s {self.to_s}; a move, and only a move, says where to")
+        if not all(isfinite(t) for t in (self.time_s, self.to_s) if t is not None):
+            raise _bad("times are finite seconds from the start of the recording")
+        said = (self.reason or "").strip()
+        if bool(said) != (self.kind == "exclude_stride") or len(said) > REASON_LENGTH:
+            raise _bad(
+                f"{self.kind} got a reason of {len(said)} characters; leaving a stride out, and only that, "
+                f"needs one of 1 to {REASON_LENGTH}"
+            )
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values without the empty members."""
+        return {k: v for k, v in asdict(self).items() if v is not None}
+
+
+def edit_of(values: dict[str, Any]) -> Edit:
+    """The edit that `to_json` wrote; raises ParameterError bad_edit."""
+    try:
+        return Edit(**values)
+    except TypeError as error:
+        raise _bad(str(error)) from None
+
+
+def edited_events(events: GaitEvents, edits: Iterable[Edit], duration_s: float) -> GaitEvents:
+    """The events after all edits of events, in order of time.
+
+    Raises
+    ------
+    ParameterError
+        `no_such_event`; `event_outside` the recording; `event_order`: it would pass, or come within `APART_S`
+        of, another event of its foot.
+    """
+    found = list(events.events)
+    for edit in edits:
+        if not edit.kind.endswith("event"):
+            continue
+        if edit.kind == "add_event":
+            _put(found, edit, edit.time_s, duration_s)
+            continue
+        i = _place(found, edit)
+        old = found.pop(i)
+        if edit.kind == "move_event":
+            to_s = cast("float", edit.to_s)
+            _refuse_passing(found, edit, old.time_s, to_s)
+            _put(found, edit, to_s, duration_s)
+    found.sort(key=lambda e: e.time_s)
+    return replace(events, events=tuple(found))
+
+
+def edited_strides(strides: Strides, edits: Iterable[Edit]) -> Strides:
+    """The stride list with a person's decisions: the last one about a stride holds, over any rule.
+
+    A decision about a moment that no stride contains any more has no effect.
+    """
+    listed = list(strides.strides)
+    for edit in edits:
+        if edit.kind.endswith("stride"):
+            i = stride_at(listed, edit.side, edit.time_s)
+            if i is not None:
+                why = None if edit.reason is None else f"{SOURCE}:{edit.reason.strip()}"
+                listed[i] = replace(listed[i], excluded_reason=why)
+    return replace(strides, strides=tuple(listed))
+
+
+def stride_at(strides: Sequence[Stride], side: Side, time_s: float) -> int | None:
+    """Place of the stride of a foot that contains a moment, None if there is none."""
+    return next((i for i, s in enumerate(strides) if s.side == side and s.start_s <= time_s < s.end_s), None)
+
+
+def _place(found: Sequence[GaitEvent], edit: Edit) -> int:
+    for i, e in enumerate(found):
+        if e.side == edit.side and e.kind == edit.event and abs(e.time_s - edit.time_s) <= SAME_S:
+            return i
+    raise ParameterError(
+        "no_such_event",
+        f"There is no {_name(edit)} at {edit.time_s:.3f} s; it may have been changed meanwhile. Load again.",
+        t_s=edit.time_s,
+    )
+
+
+def _put(found: list[GaitEvent], edit: Edit, time_s: float, duration_s: float) -> None:
+    if not 0.0 <= time_s <= duration_s:
+        raise ParameterError(
+            "event_outside",
+            f"{time_s:.3f} s is outside the recording; expected 0 to {duration_s:.3f} s.",
+            t_s=time_s,
+        )
+    near = next((e for e in found if e.side == edit.side and abs(e.time_s - time_s) < APART_S), None)
+    if near is not None:
+        raise ParameterError(
+            "event_order",
+            f"The {_name(edit)} at {time_s:.3f} s would be less than {1000 * APART_S:.0f} ms from another "
+            f"event of that foot at {near.time_s:.3f} s; delete that one first.",
+            t_s=time_s,
+        )
+    found.append(GaitEvent(time_s, edit.side, cast("EventKind", edit.event), SOURCE, time_s))
+
+
+def _refuse_passing(found: Iterable[GaitEvent], edit: Edit, from_s: float, to_s: float) -> None:
+    low, high = sorted((from_s, to_s))
+    passed = next((e for e in found if e.side == edit.side and low <= e.time_s <= high), None)
+    if passed is not None:
+        raise ParameterError(
+            "event_order",
+            f"The {_name(edit)} cannot pass another event of that foot at {passed.time_s:.3f} s; delete that "
+            "one first.",
+            t_s=to_s,
+        )
+
+
+def _name(edit: Edit) -> str:
+    return f"{edit.side} {'initial contact' if edit.event == 'ic' else 'foot-off'}"
+
+
+def _bad(what: str) -> ParameterError:
+    return ParameterError("bad_edit", f"This edit is not as expected: {what}.")

@@ -1,0 +1,64 @@
+"""Columns over time as Parquet, and what JSON knows: how every result file is written and read."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from core.frames import Bools, Floats
+
+SCHEMA = 1
+"""Version of analysis.json and of the columns beside it; readers refuse a newer one."""
+
+
+def plain(value: object) -> object:
+    """Reduce mappings, sequences and numpy values to what JSON knows; non-finite numbers become null."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, (str, bool, int)):
+        return value
+    return str(value)
+
+
+def parquet_file(t_s: Floats, columns: Mapping[str, np.ndarray], meta: Mapping[str, object]) -> bytes:
+    """Columns over time as Parquet with `meta` as JSON under "sagittal"; NaN becomes null."""
+    arrays = {"t_s": pa.array(t_s)} | {k: pa.array(v, from_pandas=True) for k, v in columns.items()}
+    table = pa.table(arrays).replace_schema_metadata({"sagittal": json.dumps(plain(meta))})
+    # neighbouring samples share their high bytes: splitting the bytes halves the file (spec/kernels.md §6)
+    split = [k for k, a in arrays.items() if pa.types.is_floating(a.type)]
+    sink = io.BytesIO()
+    pq.write_table(table, sink, compression="zstd", use_dictionary=False, use_byte_stream_split=split)  # type: ignore[arg-type] # the stubs know bool only
+    return sink.getvalue()
+
+
+def read_table(data: bytes) -> tuple[pa.Table, dict[str, Any]]:
+    """A Parquet file of ours and what `parquet_file` wrote beside its columns."""
+    table = pq.read_table(pa.BufferReader(data))
+    meta: dict[str, Any] = json.loads((table.schema.metadata or {})[b"sagittal"])
+    return table, meta
+
+
+def floats_of(table: pa.Table, name: str) -> Floats:
+    """A column as float64; null becomes NaN."""
+    column = table.column(name).to_numpy(zero_copy_only=False)
+    return np.asarray(column, dtype=np.float64)
+
+
+def bools_of(table: pa.Table, name: str) -> Bools:
+    """A column of truth values."""
+    return np.asarray(table.column(name).to_numpy(zero_copy_only=False), dtype=np.bool_)
