@@ -52,6 +52,8 @@ class JointAngles:
         Zero is the mean over the calibration's standing window.
     zero_offset : name → rad that was subtracted (the raw standing angle).
     zero : "standing" (the only zero so far).
+    standing_deg : angles of that standing by goniometer, where somebody entered them (`core.standing`);
+        `core.anatomical` adds them back.
     """
 
     t_s: Floats
@@ -60,9 +62,15 @@ class JointAngles:
     zero: str = "standing"
     notices: tuple[Notice, ...] = ()
     diagnostics: Mapping[str, object] = field(default_factory=dict)
+    standing_deg: Mapping[str, float] = field(default_factory=dict)
 
 
-def joint_angles(orientations: Orientations, zero: Window, poses: Poses | None = None) -> JointAngles:
+def joint_angles(
+    orientations: Orientations,
+    zero: Window,
+    poses: Poses | None = None,
+    standing_deg: Mapping[str, float] | None = None,
+) -> JointAngles:
     """Angles of every joint whose two segments are there, zeroed on the mean over the standing window.
 
     Parameters
@@ -71,6 +79,7 @@ def joint_angles(orientations: Orientations, zero: Window, poses: Poses | None =
     zero : window whose mean angles are subtracted, seconds.
     poses : of an estimator that knows more segments than have a sensor. A joint that has not both its sensors
         takes its angles from there; `diagnostics["estimated"]` names them.
+    standing_deg : goniometer angles of that standing; kept beside the angles, not added.
 
     Returns
     -------
@@ -120,6 +129,7 @@ def joint_angles(orientations: Orientations, zero: Window, poses: Poses | None =
         offset,
         notices=tuple(notices),
         diagnostics={"estimated": tuple(name for name in estimated if name in angles)},
+        standing_deg=dict(standing_deg or {}),
     )
 
 

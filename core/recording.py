@@ -15,6 +15,7 @@ import numpy as np
 
 from core.errors import Notice, ParameterError, SignalError
 from core.frames import PROTOCOLS, SEGMENTS, Bools, Floats, Protocol, Segment
+from core.standing import check_standing
 
 
 def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], where: str) -> None:
@@ -63,10 +64,12 @@ class Subject:
     ----------
     height_m : body height, 0.5 to 2.5 m.
     standing_width_m : between the middles of the ankles while standing at the beginning, 0 to 0.8 m.
+    standing_angles_deg : joint angles in that standing by goniometer, names as `core.standing.NAMES`.
     """
 
     height_m: float | None = None
     standing_width_m: float | None = None
+    standing_angles_deg: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:
@@ -80,6 +83,8 @@ class Subject:
                 f"Ankles {self.standing_width_m:g} m apart while standing is outside 0 to 0.8 m; give the "
                 "distance of their middles in metres.",
             )
+        check_standing(self.standing_angles_deg)
+        object.__setattr__(self, "standing_angles_deg", MappingProxyType(dict(self.standing_angles_deg)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -125,8 +125,9 @@ def parse_manifest(data: bytes) -> Manifest:
     ------
     ManifestError
         manifest_bad_json, manifest_unknown_key, manifest_bad_value, unknown_segment, duplicate_segment,
-        unknown_protocol, height_implausible, standing_width_implausible, unknown_unit,
-        belt_speed_implausible, belt_speed_without_treadmill; the message names the path inside the manifest.
+        unknown_protocol, height_implausible, standing_width_implausible, unknown_angle,
+        standing_angle_implausible, unknown_unit, belt_speed_implausible, belt_speed_without_treadmill; the
+        message names the path inside the manifest.
     """
     if len(data) > MAX_BYTES:
         raise ManifestError(
@@ -144,12 +145,7 @@ def manifest_of(root: object) -> Manifest:
     top = Node(root, "")
     top.only("subject", "protocol", "mounting", "sensors", "sources", "belt_speed_mps")
     subject = top.child("subject")
-    subject.only("height_m", "standing_width_m")
-    try:
-        who = Subject(subject.number("height_m"), subject.number("standing_width_m"))
-    except ParameterError as error:
-        key = error.code.removesuffix("_implausible")
-        raise ManifestError(error.code, f"subject.{key}_m: {error.message}") from error
+    who = _subject(subject)
     protocol = top.text("protocol")
     if protocol is not None and protocol not in PROTOCOLS:
         raise ManifestError(
@@ -170,6 +166,26 @@ def manifest_of(root: object) -> Manifest:
         sources=tuple(_source(n) for n in top.children("sources")),
         belt_speed_mps=belt,
     )
+
+
+def _subject(node: Node) -> Subject:
+    node.only("height_m", "standing_width_m", "standing_angles_deg")
+    standing = node.child("standing_angles_deg")
+    angles = {name: value for name in standing.keys if (value := standing.number(name)) is not None}
+    try:
+        return Subject(node.number("height_m"), node.number("standing_width_m"), angles)
+    except ParameterError as error:
+        key = _SUBJECT_KEYS[error.code]
+        raise ManifestError(error.code, f"subject.{key}: {error.message}") from error
+
+
+_SUBJECT_KEYS: Final = {
+    "height_implausible": "height_m",
+    "standing_width_implausible": "standing_width_m",
+    "unknown_angle": "standing_angles_deg",
+    "standing_angle_implausible": "standing_angles_deg",
+}
+"""What `Subject` refuses → where the manifest says it."""
 
 
 def _sensors(node: Node) -> dict[str, Segment | None]:

@@ -76,7 +76,11 @@ def _metadata(r: Recording) -> dict[str, object]:
     return {
         "schema": SCHEMA,
         "units": {"t": "us", "acc": "m/s2", "gyr": "rad/s", "quat": "wxyz, sensor to world"},
-        "subject": {"height_m": r.subject.height_m, "standing_width_m": r.subject.standing_width_m},
+        "subject": {
+            "height_m": r.subject.height_m,
+            "standing_width_m": r.subject.standing_width_m,
+            "standing_angles_deg": dict(r.subject.standing_angles_deg),
+        },
         "protocol": r.protocol,
         "belt_speed_mps": r.belt_speed_mps,
         "mounting": dict(r.mounting),
@@ -179,7 +183,9 @@ def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Reco
     return Recording(
         streams=streams,
         segments=cast("dict[str, Segment | None]", segments),  # Recording checks them
-        subject=Subject(subject["height_m"], subject.get("standing_width_m")),
+        subject=Subject(
+            subject["height_m"], subject.get("standing_width_m"), subject.get("standing_angles_deg") or {}
+        ),
         protocol=cast("Protocol", info["protocol"]),
         mounting=mounting,
         sha256=sha,

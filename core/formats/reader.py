@@ -195,7 +195,9 @@ def _said(declared: Subject, read: Subject) -> Subject:
     """What was declared, completed by what the file says."""
     height, width = declared.height_m, declared.standing_width_m
     return Subject(
-        read.height_m if height is None else height, read.standing_width_m if width is None else width
+        read.height_m if height is None else height,
+        read.standing_width_m if width is None else width,
+        {**read.standing_angles_deg, **declared.standing_angles_deg},
     )
 
 

@@ -157,3 +157,11 @@ def test_angles_of_the_true_poses_are_the_true_angles() -> None:
 def test_sign_table_covers_every_joint_in_three_planes() -> None:
     assert set(SIGNS) == {"hip", "knee", "ankle"}
     assert all(len(rows) == 3 for rows in SIGNS.values())
+
+
+def test_goniometer_angles_stay_beside_the_angles() -> None:
+    bent = pose(shank_l=about(2, -0.3))
+    angles = joint_angles(bent, (0.0, 1.0), standing_deg={"knee_flexion_l": 8.0})
+    assert angles.standing_deg == {"knee_flexion_l": 8.0}
+    assert angles.angles["knee_flexion_l"][0] == pytest.approx(0.0)
+    assert angles.zero == "standing"

@@ -18,7 +18,7 @@ SOURCE = {"file": "a.csv", "acc_unit": "g", "columns": {"foot_l": {"acc": ["x", 
 def test_a_full_manifest_is_understood() -> None:
     m = manifest_of(
         {
-            "subject": {"height_m": 1.75},
+            "subject": {"height_m": 1.75, "standing_angles_deg": {"knee_flexion_l": 8, "pelvis_tilt": None}},
             "protocol": "walk",
             "mounting": {"pelvis": "sacrum, face backwards"},
             "sensors": {"00B40B91": "pelvis", "00B40C44": None, "x": "RightLowerLeg"},
@@ -28,6 +28,7 @@ def test_a_full_manifest_is_understood() -> None:
         }
     )
     assert m.subject.height_m == 1.75
+    assert m.subject.standing_angles_deg == {"knee_flexion_l": 8.0}
     assert dict(m.sensors) == {"00B40B91": "pelvis", "00B40C44": None, "x": "shank_r"}
     spec = m.source_of("folder/a.csv")
     assert spec is not None
@@ -56,6 +57,21 @@ def test_an_empty_manifest_says_nothing() -> None:
             {"subject": {"standing_width_m": 20}},
             "standing_width_implausible",
             "subject.standing_width_m",
+        ),
+        (
+            {"subject": {"standing_angles_deg": {"knee_l": 5}}},
+            "unknown_angle",
+            "subject.standing_angles_deg: 'knee_l'",
+        ),
+        (
+            {"subject": {"standing_angles_deg": {"knee_flexion_l": 170}}},
+            "standing_angle_implausible",
+            "knee_flexion_l",
+        ),
+        (
+            {"subject": {"standing_angles_deg": {"knee_flexion_l": "5"}}},
+            "manifest_bad_value",
+            "subject.standing_angles_deg.knee_flexion_l",
         ),
         ({"subject": {"height_m": "175"}}, "manifest_bad_value", "subject.height_m"),
         ({"subject": {"height_m": True}}, "manifest_bad_value", "subject.height_m"),

@@ -25,7 +25,7 @@ def test_everything_that_was_known_comes_back() -> None:
     recording = Recording(
         {"a.b c": s, "two": stream("two", acc + 1, None)},
         {"a.b c": "pelvis", "two": None},
-        Subject(1.7),
+        Subject(1.7, 0.2, {"knee_flexion_l": 8.0}),
         "treadmill",
         {"pelvis": "sacrum, face backwards"},
         {"x.txt": "abc"},

@@ -1,0 +1,46 @@
+"""Joint angles of quiet standing as a goniometer reads them: the link from our zero to the anatomical one.
+
+Our calibration makes the person's own standing the zero (spec/clinic.md §1, §8.4). Who stands with a knee
+bent by 10° has every knee angle 10° too small against any reference, until somebody enters these 10°.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from core.errors import ParameterError
+
+PELVIS: Final = ("pelvis_tilt", "pelvis_obliquity")
+"""Pelvis angles that standing has a zero for; obliquity is given with the right side up positive."""
+
+JOINTS: Final = (
+    "hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion", "knee_adduction", "knee_rotation",
+    "ankle_dorsiflexion", "ankle_inversion", "ankle_rotation",
+)  # fmt: skip
+"""Joint angles, each with _l and _r."""
+
+NAMES: Final = (*PELVIS, *(f"{joint}_{suffix}" for joint in JOINTS for suffix in "lr"))
+"""Angles that may be entered, named and signed as in `core.angles.JointAngles`."""
+
+LIMIT_DEG: Final = 60.0
+"""Nobody stands quietly with a larger angle; catches slips of the keyboard."""
+
+
+def check_standing(standing_deg: Mapping[str, float]) -> None:
+    """Refuse names that no angle has and angles nobody stands with.
+
+    Raises
+    ------
+    ParameterError `unknown_angle`, `standing_angle_implausible`.
+    """
+    for name, value in standing_deg.items():
+        if name not in NAMES:
+            known = ", ".join(NAMES)
+            raise ParameterError("unknown_angle", f"'{name}' is no angle; expected one of {known}.")
+        if not abs(value) <= LIMIT_DEG:
+            raise ParameterError(
+                "standing_angle_implausible",
+                f"{name}: {value:g}° in standing is outside ±{LIMIT_DEG:g}°; give what the goniometer read, "
+                "in degrees.",
+            )
