@@ -24,6 +24,8 @@ class BodyModel:
     ankle_height : ankle centre above the sole. foot : heel to toe.
     estimated : True when taken from body height by Winter's fractions, False when measured.
     standing_width : between the ankle centres while standing for calibration, None = not measured.
+    sole_back, sole_front : rear end and tip of the shoe's sole behind and in front of the ankle centre;
+        sole_tip_up : how far the tip stands off the floor when the foot is flat. None = not measured.
     """
 
     hip_width: float
@@ -33,6 +35,9 @@ class BodyModel:
     foot: float
     estimated: bool
     standing_width: float | None = None
+    sole_back: float | None = None
+    sole_front: float | None = None
+    sole_tip_up: float | None = None
 
     @classmethod
     def from_height(cls, height_m: float) -> BodyModel:

@@ -1,10 +1,8 @@
 """Paths of the feet and strides → distances: lengths, width, speed, swing paths.
 
-A foot's place is where its ankle is at its flat: the middle of the longest stillness between its contact and
-foot-off. Stride length and speed are between the two flats of one foot, in the same window (spec/field.md
-§4b); a step is between the flats of the two feet and belongs to the foot that lands. The direction of
-progression of a stride is from its first flat to its second. Heights are above the line between the floor at
-both flats, so that drift in height does not count.
+A foot's place is where its ankle is at its flat (flats.py). Stride length and speed are between the two
+flats of one foot, in the same window (spec/field.md §4b); a step is between the flats of the two feet and
+belongs to the foot that lands. The direction of progression of a stride is from its first flat to its second.
 """
 
 from __future__ import annotations
@@ -12,19 +10,22 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import atan2, ceil, degrees, hypot, remainder, tau
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.body.feet import FootTracks
-from core.body.kinematics import sole_points
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Protocol, Side
+from core.parameters.clearance import SoleHeights, heel_clearance, sole_heights, toe_clearance
+from core.parameters.flats import OTHER, Places, places
 from core.parameters.result import Parameter
 from core.parameters.temporal import Column
-from core.parameters.variability import summary
+from core.parameters.variability import summary, unit_of
 from core.recording import UniformRecording
-from core.rotation import rotate
+from core.rotation import yaw
 
 NAMES: Final[tuple[str, ...]] = (
     "gait_speed_mps",
@@ -34,21 +35,19 @@ NAMES: Final[tuple[str, ...]] = (
     "circumduction_m",
     "max_heel_clearance_m",
     "min_toe_clearance_m",
+    "toe_out_deg",
 )
 """Per-side parameters in the order of the tables."""
 
 BELT: Final = ("gait_speed_mps", "stride_length_m")
 """What the belt's speed gives on a treadmill; everything else needs the room."""
 
-STANCE_SHARE: Final = 0.7
-"""Part of the stride in which its flat is looked for when no foot-off was found."""
-
 STEP_M: Final = 0.05
 """Two rests of a foot closer than this are one place (our choice: below the error of a stride)."""
 
 Reason = Literal[
     "treadmill", "no_foot_track", "no_foot_flat", "gap", "feet_not_linked", "opposite_foot_missing",
-    "no_shoe_geometry", "standing_width_unknown",
+    "no_shoe_geometry", "no_swing_minimum", "no_terminal_contact", "standing_width_unknown",
 ]  # fmt: skip
 Value = float | Reason
 """A figure of one stride, or why it has none."""
@@ -86,14 +85,16 @@ def spatial_rows(strides: Strides, feet: FootTracks | None, surface: Surface = G
 
     Returns
     -------
-    values in m and m/s: circumduction outward positive, width positive with the feet on their own sides. On
-    a treadmill only length and speed, from the belt's speed. Width needs to know how far apart the feet
-    stood: without, calibration takes the legs to be vertical, which is wrong by up to a decimetre.
+    values in m, m/s and degrees: circumduction outward positive, width positive with the feet on their own
+    sides, toe-out external positive at the flat that begins the stride, from its direction while standing for
+    calibration. On a treadmill only length and speed, from the belt's speed. Width needs to know how far
+    apart the feet stood: without, calibration takes the legs to be vertical, which is wrong by up to a
+    decimetre.
     """
     if surface.protocol == "treadmill":
         return tuple(_on_belt(s, surface.belt_speed_mps) for s in strides.strides)
-    places = {} if feet is None else _places(strides, feet)
-    return tuple(_row(s, feet, places) for s in strides.strides)
+    paths = None if feet is None else _paths(strides, feet)
+    return tuple(_row(s, feet, paths) for s in strides.strides)
 
 
 def per_stride_spatial(rows: Sequence[Row]) -> dict[str, Column]:
@@ -124,11 +125,10 @@ def spatial(
 def _parameter(name: str, side: Side | None, rows: Sequence[Row]) -> Parameter:
     values = [v for row in rows if isinstance(v := row[name], float)]
     reasons = [v for row in rows if isinstance(v := row[name], str)]
-    unit = "m/s" if name.endswith("_mps") else "m"
     why: str | None = None
     if not values:
         why = Counter(reasons).most_common(1)[0][0] if reasons else "no_strides"
-    return summary(name, side, values, unit, why)
+    return summary(name, side, values, unit_of(name), why)
 
 
 def _total(feet: FootTracks | None, surface: Surface) -> Parameter:
@@ -157,96 +157,81 @@ def _on_belt(s: Stride, belt_mps: float | None) -> Row:
     return row
 
 
-Places = Mapping[tuple[Side, float], int | None]
-"""Foot and initial contact → sample of the flat that follows."""
+@dataclass(frozen=True, eq=False)
+class _Paths:
+    """What is looked up for every stride: flats, heights, and how often a foot was lost before a sample."""
+
+    places: Places
+    heights: Mapping[Side, SoleHeights]
+    lost: Mapping[Side, NDArray[np.int64]]
+    heading: Mapping[Side, Floats]
+    known: bool
+    """How far apart the feet stood, without which width is not known."""
 
 
-def _places(strides: Strides, feet: FootTracks) -> dict[tuple[Side, float], int | None]:
-    """The flat after every initial contact that a stride begins, ends or crosses with."""
-    until: dict[tuple[Side, float], float] = {}
-    for s in strides.strides:
-        stance = STANCE_SHARE * s.duration_s
-        until.setdefault((s.side, s.end_s), s.end_s + stance)
-        if s.opposite_ic_s is not None:
-            until.setdefault((_other(s.side), s.opposite_ic_s), s.opposite_ic_s + stance)
-    for s in strides.strides:
-        off = s.start_s + STANCE_SHARE * s.duration_s if s.tc_s is None else s.tc_s
-        # the stride before tells how long a stance is, where a small step in a turn was not found
-        until[s.side, s.start_s] = min(off, until.get((s.side, s.start_s), off))
-    return {key: _flat(feet, key[0], key[1], stop) for key, stop in until.items()}
+def _paths(strides: Strides, feet: FootTracks) -> _Paths:
+    return _Paths(
+        places=places(strides.strides, feet),
+        heights={side: sole_heights(feet, side) for side in feet.p},
+        lost={side: np.concatenate(([0], np.cumsum(~feet.valid[side]))) for side in feet.p},
+        heading={side: yaw(feet.q[side]) for side in feet.p if side in feet.q},
+        known=feet.body.standing_width is not None,
+    )
 
 
-def _flat(feet: FootTracks, side: Side, start_s: float, stop_s: float) -> int | None:
-    """Middle sample of the foot's longest rest within a stance, None when it never rests."""
-    if side not in feet.p:
-        return None
-    a, b = np.searchsorted(feet.t_s, (start_s, stop_s))
-    still = feet.still[side][a:b] & feet.valid[side][a:b]
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], still, [False]))))
-    if not len(edges):
-        return None
-    longest = int(np.argmax(edges[1::2] - edges[::2]))
-    return int(a + (edges[2 * longest] + edges[2 * longest + 1]) // 2)
-
-
-def _row(s: Stride, feet: FootTracks | None, places: Places) -> Row:
-    if feet is None or s.side not in feet.p:
+def _row(s: Stride, feet: FootTracks | None, paths: _Paths | None) -> Row:
+    if feet is None or paths is None or s.side not in feet.p:
         return dict.fromkeys(NAMES, "no_foot_track")
-    first, last = places[s.side, s.start_s], places[s.side, s.end_s]
+    first, last = paths.places[s.side, s.start_s], paths.places[s.side, s.end_s]
     if first is None or last is None:
         return dict.fromkeys(NAMES, "no_foot_flat")
-    if not feet.valid[s.side][first : last + 1].all():
+    if paths.lost[s.side][last + 1] > paths.lost[s.side][first]:
         return dict.fromkeys(NAMES, "gap")
     p = feet.p[s.side]
-    along = p[last, :2] - p[first, :2]
-    length = float(np.linalg.norm(along))
+    x, y = (p[last, :2] - p[first, :2]).tolist()
+    length = hypot(x, y)
     if length < STEP_M:
         return dict.fromkeys(NAMES, "no_foot_flat")
-    along /= length
-    outward = np.array([-along[1], along[0]]) * (1.0 if s.side == "left" else -1.0)
+    along = np.array([x / length, y / length])
+    mirror = 1.0 if s.side == "left" else -1.0
+    outward = np.array([-along[1], along[0]]) * mirror
+    heights, ankle_height = paths.heights[s.side], feet.body.ankle_height
+    toe: Value = "no_terminal_contact"
+    if heights.toe is None:
+        toe = "no_shoe_geometry"
+    elif s.tc_s is not None:
+        a, b = (ceil((t - feet.t_s[0]) * feet.rate_hz) for t in (s.tc_s, s.end_s))
+        toe = toe_clearance(heights, first, last, (a, b), ankle_height)
+    out = mirror * remainder(float(paths.heading[s.side][first]) - atan2(y, x), tau)
     row: dict[str, Value] = {
         "gait_speed_mps": length / float(feet.t_s[last] - feet.t_s[first]),
         "stride_length_m": length,
         "circumduction_m": float(((p[first : last + 1, :2] - p[first, :2]) @ outward).max()),
-        "max_heel_clearance_m": _heel_clearance(s, feet, first, last),
-        # the toe passes the floor by one or two centimetres, less than shoes differ
-        "min_toe_clearance_m": "no_shoe_geometry",
+        "max_heel_clearance_m": heel_clearance(heights, first, last, ankle_height),
+        "min_toe_clearance_m": toe,
+        "toe_out_deg": degrees(out),
     }
-    row |= _step(s, feet, places, p[last, :2], along, outward)
+    row |= _step(s, feet, paths, p[last, :2], along, outward)
     return row
 
 
 def _step(
-    s: Stride, feet: FootTracks, places: Places, landed: Floats, along: Floats, outward: Floats
+    s: Stride, feet: FootTracks, paths: _Paths, landed: Floats, along: Floats, outward: Floats
 ) -> dict[str, Value]:
     """Step that ends the stride: from the other foot's flat to this one's."""
     reason: Reason | None = None
     opposite = None
-    if s.opposite_ic_s is None or _other(s.side) not in feet.p:
+    if s.opposite_ic_s is None or OTHER[s.side] not in feet.p:
         reason = "opposite_foot_missing"
     elif not feet.linked:
         reason = "feet_not_linked"
     else:
-        opposite = places[_other(s.side), s.opposite_ic_s]
+        opposite = paths.places[OTHER[s.side], s.opposite_ic_s]
         reason = "no_foot_flat"
     if opposite is None:
         return {"step_length_m": reason or "no_foot_flat", "step_width_m": reason or "no_foot_flat"}
-    apart = landed - feet.p[_other(s.side)][opposite, :2]
-    known = feet.body.standing_width is not None
+    apart = landed - feet.p[OTHER[s.side]][opposite, :2]
     return {
         "step_length_m": float(apart @ along),
-        "step_width_m": float(apart @ outward) if known else "standing_width_unknown",
+        "step_width_m": float(apart @ outward) if paths.known else "standing_width_unknown",
     }
-
-
-def _heel_clearance(s: Stride, feet: FootTracks, first: int, last: int) -> float:
-    part = slice(first, last + 1)
-    p = feet.p[s.side][part]
-    heel = np.array(sole_points(feet.body)[0])
-    share = np.linspace(0.0, 1.0, len(p))
-    floor = p[0, 2] * (1.0 - share) + p[-1, 2] * share - feet.body.ankle_height
-    return float(((p + rotate(feet.q[s.side][part], heel))[:, 2] - floor).max())
-
-
-def _other(side: Side) -> Side:
-    return "right" if side == "left" else "left"

@@ -6,7 +6,7 @@ up and down, so that it is the least uncertainty there is, not all of it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Final
 
@@ -23,6 +23,21 @@ STEADY_STRIDES: Final = 30
 
 CONFIDENCE: Final = 0.95
 """Of the interval of the mean."""
+
+UNITS: Final[Mapping[str, str]] = {
+    "mps": "m/s",
+    "spm": "steps/min",
+    "deg": "deg",
+    "pct": "%",
+    "m": "m",
+    "s": "s",
+}
+"""Last part of a parameter's name → its unit (spec/field.md §4a: the unit is in the name); "" has none."""
+
+
+def unit_of(name: str) -> str:
+    """Unit of a parameter, "" for a ratio."""
+    return UNITS.get(name.rpartition("_")[2], "")
 
 
 def summary(

@@ -1,0 +1,85 @@
+"""How far heel and toe of the sole pass the floor in swing.
+
+Heights are above the line between the floor at the two flats of a stride, so that drift in height does not
+count. The toe passes the floor by one or two centimetres (Winter 1992), less than shoes differ: without the
+shape of the shoe there is no toe clearance, and never that of the sensor in its place (spec/field.md §2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from core.body.feet import FootTracks
+from core.body.kinematics import sole_points
+from core.frames import Floats, Side
+
+DIP_M: Final = 0.001
+"""The toe's least height in mid-swing must lie this far below the heights around it. Our choice: the smoothed
+path of a foot moves by less from sample to sample when it passes the floor."""
+
+ClearanceReason = Literal["no_shoe_geometry", "no_swing_minimum"]
+
+
+@dataclass(frozen=True, eq=False)
+class SoleHeights:
+    """Heights (n,) in m of the ankle and of the sole's ends; the tip's is None without the shoe's shape."""
+
+    ankle: Floats
+    heel: Floats
+    toe: Floats | None
+
+
+def sole_heights(feet: FootTracks, side: Side) -> SoleHeights:
+    """Heights of the ends of the sole: the shoe's where measured, else of a foot of the body's size."""
+    body = feet.body
+    heel = sole_points(body)[0][0] if body.sole_back is None else -body.sole_back
+    toe = None
+    if body.sole_front is not None:
+        toe = _height(feet, side, body.sole_front, (body.sole_tip_up or 0.0) - body.ankle_height)
+    return SoleHeights(feet.p[side][:, 2], _height(feet, side, heel, -body.ankle_height), toe)
+
+
+def heel_clearance(heights: SoleHeights, first: int, last: int, ankle_height: float) -> float:
+    """Greatest height of the heel between the flats at samples `first` and `last`, m."""
+    return float((heights.heel[first : last + 1] - _floor(heights, first, last, ankle_height)).max())
+
+
+def toe_clearance(
+    heights: SoleHeights, first: int, last: int, swing: tuple[int, int], ankle_height: float
+) -> float | ClearanceReason:
+    """Least height of the tip in mid-swing, m: the dip between its rises after foot-off and before contact.
+
+    Parameters
+    ----------
+    swing : samples [tc, ic) between the flats.
+
+    Returns
+    -------
+    "no_swing_minimum" where the tip only rises or only falls, as some hemiparetic swings do (spec/clinic.md
+    §4): any number there would be that of the window's edge.
+    """
+    if heights.toe is None:
+        return "no_shoe_geometry"
+    toe = heights.toe[first : last + 1] - _floor(heights, first, last, ankle_height)
+    h = toe[max(swing[0] - first, 0) : max(swing[1] - first, 0)]
+    if len(h) < 3:
+        return "no_swing_minimum"
+    # how deep a sample lies below the highest before it and the highest after it
+    depth = np.minimum(np.maximum.accumulate(h), np.maximum.accumulate(h[::-1])[::-1]) - h
+    deepest = int(np.argmax(depth))
+    return float(h[deepest]) if depth[deepest] >= DIP_M else "no_swing_minimum"
+
+
+def _floor(heights: SoleHeights, first: int, last: int, ankle_height: float) -> Floats:
+    a, b = float(heights.ankle[first]), float(heights.ankle[last])
+    return np.asarray(a - ankle_height + (b - a) / (last - first) * np.arange(last - first + 1.0))
+
+
+def _height(feet: FootTracks, side: Side, forward: float, up: float) -> Floats:
+    """Height (n,) of a point of the foot's sagittal plane, by the third row of its rotation matrix."""
+    w, x, y, z = feet.q[side].T
+    along, vertical = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
+    return np.asarray(feet.p[side][:, 2] + forward * along + up * vertical)
