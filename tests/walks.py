@@ -9,12 +9,12 @@ from functools import cache
 import numpy as np
 
 from core.formats import SourceFile, parse_manifest, read_recording
-from core.frames import Bools, Floats, Segment
+from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment
 from core.recording import Recording, SensorSignals, UniformRecording
 from core.rotation import rotate
 from core.simulate import SCRIPTS, Truth, simulate, simulate_scenario
 from core.simulate.script import Script
-from core.simulate.walker import Walker
+from core.simulate.walker import SIGN, Walker
 from core.timeline import synchronise
 from tests.data import data_folder
 
@@ -97,6 +97,23 @@ def lost(recording: UniformRecording, segment: Segment, start_s: float, end_s: f
     return replace(
         recording, sensors={**recording.sensors, segment: replace(x, acc=acc, gyr=gyr, valid=valid)}
     )
+
+
+def joint_gap(truth: Truth) -> float:
+    """Largest distance in m between the two ends that meet in any joint of seven true segments."""
+    body = truth.body
+    gaps = []
+    for side in SIDES:
+        thigh, shank, foot = THIGH[side], SHANK[side], FOOT[side]
+        joints: tuple[tuple[Segment, Segment, list[float]], ...] = (
+            ("pelvis", thigh, [0.0, 0.0, SIGN[side] * body.hip_width / 2]),
+            (thigh, shank, [0.0, -body.thigh, 0.0]),
+            (shank, foot, [0.0, -body.shank, 0.0]),
+        )
+        for upper, lower, joint in joints:
+            end = truth.p[upper] + rotate(truth.q[upper], np.array(joint))
+            gaps.append(np.abs(end - truth.p[lower]).max())
+    return float(max(gaps))
 
 
 def rms_deg(x: Floats, where: Bools | None = None) -> float:

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from core.errors import ParameterError
-from core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Floats, Segment, Side
+from core.frames import FOOT, SIDES, SUFFIX, Floats, Side
 from core.rotation import rotate
-from core.simulate import STEADY, Simulation, Stand, Straight, Walker
+from core.simulate import STEADY, Stand, Straight, Walker
 from core.simulate.human import Motion, move
 from core.simulate.script import plan
 from core.simulate.truth import joint_angles
-from core.simulate.walker import SIGN
 from tests.data import data_folder
+from tests.walks import joint_gap
 
 NORM_LIMITS_DEG = {
     "hip_flexion": 3.0,
@@ -30,26 +30,9 @@ NORM_LIMITS_DEG = {
 NORM_CORRELATION = {"hip_flexion": 0.98, "knee_flexion": 0.98, "ankle_dorsiflexion": 0.90}
 
 
-def _joint_gap(simulation: Simulation) -> float:
-    """Largest distance in m between the two ends that meet in any joint."""
-    truth, body = simulation.truth, simulation.truth.body
-    gaps = []
-    for side in SIDES:
-        thigh, shank, foot = THIGH[side], SHANK[side], FOOT[side]
-        joints: tuple[tuple[Segment, Segment, list[float]], ...] = (
-            ("pelvis", thigh, [0.0, 0.0, SIGN[side] * body.hip_width / 2]),
-            (thigh, shank, [0.0, -body.thigh, 0.0]),
-            (shank, foot, [0.0, -body.shank, 0.0]),
-        )
-        for upper, lower, joint in joints:
-            end = truth.p[upper] + rotate(truth.q[upper], np.array(joint))
-            gaps.append(np.abs(end - truth.p[lower]).max())
-    return float(max(gaps))
-
-
 @pytest.mark.parametrize("name", ["comfortable", "mixed"])
 def test_joints_close(name: str, request: pytest.FixtureRequest) -> None:
-    assert _joint_gap(request.getfixturevalue(name)) <= 1e-12
+    assert joint_gap(request.getfixturevalue(name).truth) <= 1e-12
 
 
 @pytest.mark.parametrize("name", ["comfortable", "mixed"])
@@ -110,6 +93,16 @@ def test_curves_are_those_of_healthy_adults(steady_motion: Motion, side: Side) -
         mean = np.degrees(np.mean(cycles, axis=0))
         assert np.sqrt(np.mean((mean - norm[name]) ** 2)) <= limit, name
         assert np.corrcoef(mean, norm[name])[0, 1] >= NORM_CORRELATION.get(name, 0.97), name
+
+
+def test_left_and_right_walk_alike(steady_motion: Motion) -> None:
+    """Half a stride apart, in the mirror (spec/estimators.md §6.2)."""
+    t, step = steady_motion.t_s, steady_motion.plan.typical_step_s
+    angles = joint_angles(steady_motion.q)
+    middle = (t > 12.0) & (t < 20.0)
+    for name in ("hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion", "ankle_dorsiflexion"):
+        left = np.interp(t[middle] + step, t, angles[f"{name}_l"])
+        assert np.degrees(left - angles[f"{name}_r"][middle]) == pytest.approx(0.0, abs=0.05), name
 
 
 def _peak_accelerations(motion: Motion) -> dict[str, float]:
