@@ -17,18 +17,7 @@ from core.events.flags import StrideParams
 from core.events.result import GaitEvents, Strides
 from core.events.strides import stride_list
 from core.frames import Bools, Floats, Segment
-from core.parameters import (
-    Surface,
-    cycle_curves,
-    foot_pitch,
-    gait_parameters,
-    per_stride,
-    per_stride_figures,
-    per_stride_spatial,
-    spatial_rows,
-    stride_figures,
-    temporal,
-)
+from core.parameters import Surface, take_figures
 from core.parameters.result import Parameter
 from core.parameters.temporal import Column
 
@@ -96,14 +85,5 @@ def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
     """
     events = edited_events(tracks.events, edits, tracks.duration_s)
     strides = edited_strides(stride_list(events, tracks, tracks.turning, tracks.params), edits)
-    rows = spatial_rows(strides, tracks.feet, tracks.surface)
-    columns = per_stride(strides) | per_stride_spatial(rows)
-    if tracks.angles is None:
-        return Measured(events, strides, temporal(strides), columns)
-    figures = stride_figures(cycle_curves(tracks.angles, strides)) | foot_pitch(tracks, strides)
-    return Measured(
-        events=events,
-        strides=strides,
-        parameters=gait_parameters(strides, tracks.angles, tracks, tracks.feet, tracks.surface),
-        columns=columns | per_stride_figures(strides, figures),
-    )
+    figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface)
+    return Measured(events, strides, figures.parameters, figures.columns)
