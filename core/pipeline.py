@@ -202,7 +202,9 @@ def _run_stages(
     posed = estimate_poses(calibrated, orientations, contacts, lengths, config.poses)
     reached |= {"poses": posed.poses, "orientations": posed.orientations, "feet": posed.feet}
     start("angles")
-    joint = angles.joint_angles(posed.orientations, calibrated.calibration.zero, posed.poses)
+    joint = angles.joint_angles(
+        posed.orientations, calibrated.calibration.zero, posed.poses, uniform.subject.standing_angles_deg
+    )
     reached |= {"angles": joint, "tracks": _whole(tracks, calibrated, posed, joint)}
 
 

@@ -80,7 +80,8 @@ def read_angles(data: bytes) -> JointAngles:
         if name != "t_s"
     }
     zero = {name: math.radians(offset) for name, offset in meta["zero_offset_deg"].items()}
-    return JointAngles(floats_of(table, "t_s"), angles, zero, meta["angle_zero"])
+    standing = dict(meta.get("standing_angles_deg", {}))
+    return JointAngles(floats_of(table, "t_s"), angles, zero, meta["angle_zero"], standing_deg=standing)
 
 
 def read_poses(data: bytes) -> Poses:

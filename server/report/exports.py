@@ -91,6 +91,8 @@ def angles_parquet(angles: JointAngles) -> bytes:
     columns = {f"{name}_deg": np.degrees(a).astype(np.float32) for name, a in angles.angles.items()}
     zero = {name: math.degrees(offset) for name, offset in angles.zero_offset.items()}
     meta = {"schema": SCHEMA, "angle_zero": angles.zero, "zero_offset_deg": zero}
+    if angles.standing_deg:
+        meta["standing_angles_deg"] = dict(angles.standing_deg)
     return parquet_file(angles.t_s, columns, meta)
 
 

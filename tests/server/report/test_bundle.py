@@ -6,6 +6,7 @@ import io
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -20,8 +21,8 @@ from core.parameters.temporal import NAMES
 from core.pipeline import Analysis
 from core.quality import QualityReport
 from core.recording import SensorSignals, Subject, UniformRecording
-from server.report.bundle import load_bundle, read_poses
-from server.report.exports import analysis_files
+from server.report.bundle import load_bundle, read_angles, read_poses
+from server.report.exports import analysis_files, angles_parquet
 from tests.server import walk
 
 
@@ -105,6 +106,12 @@ def test_angles_parquet_is_float32_degrees_with_null_where_lost() -> None:
     assert column.null_count == 20
     assert table.column("t_s").null_count == 0
     assert column[0].as_py() == pytest.approx(math.degrees(angles.angles["knee_flexion_l"][0]), abs=1e-4)
+
+
+def test_goniometer_angles_go_with_the_angles() -> None:
+    entered = {"knee_flexion_l": 8.0, "pelvis_tilt": 11.5}
+    assert read_angles(angles_parquet(replace(walk.angles(), standing_deg=entered))).standing_deg == entered
+    assert read_angles(angles_parquet(walk.angles())).standing_deg == {}
 
 
 def test_bundle_gives_back_angles_strides_events_and_parameters(files: Mapping[str, bytes]) -> None:
