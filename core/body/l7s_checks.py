@@ -30,6 +30,12 @@ BREAK_S: Final = 0.15
 
 LEAST_STRIDES: Final = 4
 
+SLOWEST_HZ: Final = 0.2
+"""Errors of acceleration make slower changes of height by themselves: 0.05 m/s² here 3 cm."""
+
+RISE_S: Final = 3.0
+"""Sitting down or half a squat takes less."""
+
 LEAST_TURN: Final = np.radians(60.0)
 """Root of the sum of the squared turns of the strides below which nothing is said from turns."""
 
@@ -44,7 +50,8 @@ def walking_checks(inputs: L7sInputs, track: L7sTrack, model: LegModel, rate_hz:
     2I: `inner_foot_m`, way of the inner foot minus that of the outer per radian of turn, m: minus the
     distance of the feet, and positive when the sides are exchanged; `turned_rad`, what that rests on.
     3I: `toward_foot_mps2`, acceleration of the pelvis toward the foot that stands alone, negative in walking
-    (an inverted pendulum falls away from its foot); `pelvis_tilt_sd_rad` while moving.
+    (an inverted pendulum falls away from its foot); `pelvis_tilt_sd_rad` while moving; `pelvis_rise_m`,
+    most that its height changes within some seconds, which L7S takes to be constant.
     """
     found: dict[str, float] = {}
     moving = np.asarray(~inputs.step.all(axis=1))
@@ -60,7 +67,7 @@ def walking_checks(inputs: L7sInputs, track: L7sTrack, model: LegModel, rate_hz:
     if len(phases) >= LEAST_STRIDES:
         found["phase_off"] = float(np.median(np.abs(np.array(phases) - 0.5)))
     if inputs.worn == "3I":
-        return found | _pelvis(inputs, moving)
+        return found | _pelvis(inputs, moving, rate_hz)
     return found | _turns(rests, heading, track, STRIDE_S[1] * rate_hz)
 
 
@@ -118,8 +125,8 @@ def _way(rests: np.ndarray, heading: Floats, p: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(np.sum(np.diff(p[rests, :2], axis=0) * along, axis=1))))
 
 
-def _pelvis(inputs: L7sInputs, moving: Bools) -> dict[str, float]:
-    found: dict[str, float] = {}
+def _pelvis(inputs: L7sInputs, moving: Bools, rate_hz: float) -> dict[str, float]:
+    found = {"pelvis_rise_m": _rise(inputs.acc[:, 0, 2], rate_hz)}
     R = inputs.R[:, 0]
     to_left = R[:, :2, 1] / np.maximum(np.linalg.norm(R[:, :2, 1], axis=1), 1e-9)[:, None]
     sideways = np.sum(to_left * inputs.acc[:, 0, :2], axis=1)
@@ -129,3 +136,15 @@ def _pelvis(inputs: L7sInputs, moving: Bools) -> dict[str, float]:
     if moving.any():
         found["pelvis_tilt_sd_rad"] = float(np.std(np.arctan2(-R[moving, 2, 0], R[moving, 2, 2])))
     return found
+
+
+def _rise(vertical: Floats, rate_hz: float) -> float:
+    """Largest change of height within `RISE_S`, by integrating what is quicker than `SLOWEST_HZ` twice."""
+    n = len(vertical)
+    f = np.fft.rfftfreq(2 * n, 1.0 / rate_hz)[1:]
+    gain = -1.0 / (2.0 * np.pi * f) ** 2 * f**4 / (f**4 + SLOWEST_HZ**4)
+    spectrum = np.fft.rfft(vertical - vertical.mean(), 2 * n)
+    height = np.fft.irfft(spectrum * np.concatenate(([0.0], gain)), 2 * n)[:n]
+    window = min(n, round(RISE_S * rate_hz))
+    parts = np.lib.stride_tricks.sliding_window_view(height, window)[:: max(1, window // 20)]
+    return float(np.ptp(parts, axis=1).max())

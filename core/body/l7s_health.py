@@ -34,6 +34,9 @@ INNER_M: Final = (-0.03, 0.05)
 TILT_DEG: Final = (7.0, 12.0)
 """Right walks have 0.2 to 3.4, a thigh 12 and more."""
 
+RISE_CM: Final = (10.0, 20.0)
+"""Walks have 1 to 8 (within 5 mm of the truth in simulation), squats and chairs 12 to 25."""
+
 FOOT_GAP_S: Final = (0.1, 0.3)
 """Holes up to 0.1 s are interpolated. One of 0.2 s in a swing moves flexion by up to 20° for seconds, one of
 0.5 s by up to 50° (simulation): with one sensor a leg nothing knows where the foot went."""
@@ -79,6 +82,7 @@ JUDGED: Final = (
     ("toward_foot_mps2", "toward_foot_mps2", 1.0, TOWARD_MPS2),
     ("inner_foot_m", "inner_foot_m", 1.0, INNER_M),
     ("pelvis_tilt_sd_rad", "pelvis_tilt_sd_deg", 180.0 / pi, TILT_DEG),
+    ("pelvis_rise_m", "pelvis_rise_cm", 100.0, RISE_CM),
 )
 """Quantity of `walking_checks`, name of its finding, scale to its unit, limits."""
 
@@ -118,6 +122,14 @@ TOLD: Final[Mapping[str, tuple[str, str]]] = {
         (
             "The sensor taken for the pelvis tilts by {value:.0f}° (standard deviation), in walking up to "
             "{warn:.0f}° are expected: it sits on another segment, or this was no level walk."
+        ),
+    ),
+    "pelvis_rise_cm": (
+        "pelvis_rises",
+        (
+            "The pelvis rises and sinks by {value:.0f} cm within seconds, in walking up to {warn:.0f} cm are "
+            "expected. L7S takes its height to be constant: in squats, stairs and on chairs its angles are "
+            "too small. Wear seven sensors for those."
         ),
     ),
     "gap_s": (

@@ -76,6 +76,7 @@ QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
     "phase_off_pct": ("Feet out of step by", 0, "% of a stride"),
     "toward_foot_mps2": ("Pelvis falls toward the standing foot", 2, "m/s²"),
     "inner_foot_m": ("Inner foot ahead in turns", 2, "m/rad"),
+    "pelvis_rise_cm": ("Pelvis rises and sinks by", 0, "cm"),
     "pelvis_tilt_sd_deg": ("Pelvis tilt, standard deviation", 1, "°"),
 }
 """Name of a finding → label, decimals, unit."""

@@ -57,7 +57,7 @@ def wearing(recording: UniformRecording, **sensors: SensorSignals) -> UniformRec
 
 ACCUSING = {
     "feet_drift_apart", "feet_out_of_step", "feet_exchanged", "not_a_pelvis", "gap_not_bridged",
-    "legs_do_not_fit", "foot_never_still",
+    "legs_do_not_fit", "foot_never_still", "pelvis_rises",
 }  # fmt: skip
 
 
@@ -315,3 +315,31 @@ def test_a_treadmill_is_told_because_its_signals_are_those_of_the_floor(estimato
 def test_a_protocol_in_which_the_pelvis_sinks_is_told(estimator: Estimator, protocol: str) -> None:
     made = run(replace(take(estimator), protocol=protocol), estimator)  # type: ignore[arg-type]
     assert "pelvis_height_assumed" in codes(made)
+
+
+@pytest.mark.parametrize(("depth_m", "verdict"), [(0.0, "good"), (0.3, "bad")])
+def test_a_squat_that_no_protocol_announced_is_told(depth_m: float, verdict: Verdict) -> None:
+    recording = take("l7s_3i")
+    calibrated = calibrate(recording)
+    orientations = estimate(calibrated)
+    acceleration = dict(free_acceleration(calibrated, orientations))
+    share = np.clip((recording.t_s - 2.0) / 3.0, 0.0, 1.0)
+    sunk = depth_m * 64.0 * share**3 * (1.0 - share) ** 3
+    down = np.gradient(np.gradient(sunk, 0.01), 0.01)
+    acceleration["pelvis"] = acceleration["pelvis"] - down[:, None] * [0.0, 0.0, 1.0]
+    body = simulated("fast_with_turns", 3)[1].body
+    poses = l7s_poses(orientations, acceleration, still_feet(calibrated), body)
+    # L7S pulls the pelvis back to its height: of 30 cm it shows few
+    assert body.thigh + body.shank + body.ankle_height - poses.p["pelvis"][200:500, 2].min() < 0.1
+    (found,) = (f for f in poses.health if f.name == "pelvis_rise_cm")
+    assert found.verdict == verdict
+    assert ("pelvis_rises" in {n.code for n in poses.notices}) == (depth_m > 0.0)
+
+
+@pytest.mark.parametrize("name", ["slow", "fast_with_turns", "hemiparetic"])
+def test_the_rise_of_the_pelvis_is_the_true_one(name: str) -> None:
+    recording, truth = simulated(name, 3)
+    height = truth.p["pelvis"][:, 2]
+    true = max(float(np.ptp(height[k : k + 300])) for k in range(0, len(height) - 300, 15))
+    value, _ = finding(run(only(recording, *PELVIS_FEET), "l7s_3i"), "pelvis_rise_cm")
+    assert value == pytest.approx(100.0 * true, abs=1.0)
