@@ -10,13 +10,21 @@ import numpy as np
 Rgb = tuple[int, int, int]
 Tint = Literal["left", "right", "body", "joint"]
 
-TINTS: Final[Mapping[Tint, Rgb]] = {
-    "left": (0xD5, 0x5E, 0x00),
-    "right": (0x00, 0x72, 0xB2),
-    "body": (0x6B, 0x76, 0x82),
-    "joint": (0xEC, 0xEE, 0xF1),
+TINTS: Final[Mapping[bool, Mapping[Tint, Rgb]]] = {
+    False: {
+        "left": (0xD5, 0x5E, 0x00),
+        "right": (0x00, 0x72, 0xB2),
+        "body": (0x6B, 0x76, 0x82),
+        "joint": (0xEC, 0xEE, 0xF1),
+    },
+    True: {
+        "left": (0xF5, 0x87, 0x3A),
+        "right": (0x56, 0xB4, 0xE9),
+        "body": (0x6B, 0x76, 0x82),
+        "joint": (0xEC, 0xEE, 0xF1),
+    },
 }
-"""The leg pair is that of the charts (experience.md)."""
+"""Dark → colours of the parts; the leg pairs are --left and --right of the page's tokens.css."""
 
 BACKGROUND: Final[Mapping[bool, Rgb]] = {False: (0xF9, 0xFA, 0xFB), True: (0x16, 0x1C, 0x22)}
 """Dark → colour behind the figure."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
 
 from core.frames import Floats
 from server.viewer.colours import BACKGROUND, FLOOR, TINTS, linear
@@ -100,7 +101,10 @@ class Figure:
         return self._t_s
 
     def set_dark(self, dark: bool) -> None:
-        """Change background, floor and letters to the theme of the page around."""
+        """Change all colours to the theme of the page around."""
+        for batch, handle in self._batches:
+            handle.batched_colors = _colours(batch, dark)
+        self._ground.set_dark(dark)
         self._server.scene.set_background_image(np.full((2, 2, 3), BACKGROUND[dark], np.uint8), format="png")
         self._grid.cell_color, self._grid.section_color = FLOOR[dark]
         self._server.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
@@ -150,6 +154,10 @@ def _turned(heading: float) -> Floats:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def _colours(batch: Batch, dark: bool) -> NDArray[np.uint8]:
+    return np.array([linear(TINTS[dark][tint]) for tint in batch.tint], np.uint8)
+
+
 def _add_batch(scene: viser.SceneApi, name: str, batch: Batch) -> viser.BatchedMeshHandle:
     measured = np.array(batch.measured)
     return scene.add_batched_meshes_simple(
@@ -158,7 +166,7 @@ def _add_batch(scene: viser.SceneApi, name: str, batch: Batch) -> viser.BatchedM
         batch.wxyz[0],
         batch.position[0],
         batched_scales=batch.scale,
-        batched_colors=np.array([linear(TINTS[t]) for t in batch.tint], np.uint8),
+        batched_colors=_colours(batch, dark=False),
         batched_opacities=None if measured.all() else np.where(measured, 1.0, _FAINT).astype(np.float32),
         lod="off",
         receive_shadow=False,

@@ -11,7 +11,7 @@ import viser
 
 from core.frames import Side
 from server.viewer import shapes
-from server.viewer.colours import TINTS, linear
+from server.viewer.colours import TINTS, Rgb, linear
 from server.viewer.motion import Motion
 from server.viewer.steps import Prints, Single, Trail
 
@@ -55,6 +55,11 @@ class Ground:
                 part.show(count)
                 self._shown[part] = count
 
+    def set_dark(self, dark: bool) -> None:
+        """Change the colours to the theme of the page around."""
+        for part in self._shown:
+            part.paint(TINTS[dark][part.side])
+
     def set_visible(self, visible: bool) -> None:
         """Show or hide everything."""
         self._all.visible = visible
@@ -64,19 +69,22 @@ class _Prints:
     def __init__(
         self, scene: viser.SceneApi, parent: str, side: Side, prints: Prints, length: float, keep: int | None
     ) -> None:
-        self.t_s, self._keep = prints.t_s, keep
+        self.side, self.t_s, self._keep = side, prints.t_s, keep
         self._node = scene.add_batched_meshes_simple(
             f"{parent}/prints_{side}",
             *shapes.footprint(length, side),
             prints.wxyz,
             prints.position,
             batched_scales=np.zeros(len(prints.t_s), np.float32),
-            batched_colors=linear(TINTS[side]),
+            batched_colors=linear(TINTS[False][side]),
             opacity=_OPACITY,
             lod="off",
             cast_shadow=False,
             receive_shadow=False,
         )
+
+    def paint(self, colour: Rgb) -> None:
+        self._node.batched_colors = np.array(linear(colour), np.uint8)
 
     def show(self, count: int) -> None:
         scales = np.zeros(len(self.t_s), np.float32)
@@ -86,14 +94,14 @@ class _Prints:
 
 class _Trail:
     def __init__(self, scene: viser.SceneApi, parent: str, side: Side, trail: Trail) -> None:
-        self.t_s, self._pieces = trail.t_s, trail.pieces
+        self.side, self.t_s, self._pieces = side, trail.t_s, trail.pieces
         self._done = 0
 
         def node(name: str, pieces: Single) -> viser.LineSegmentsHandle:
             return scene.add_line_segments(
                 f"{parent}/trail_{side}_{name}",
                 pieces,
-                TINTS[side],
+                TINTS[False][side],
                 thickness=_PIXELS,
                 thickness_units="screen",
                 visible=False,
@@ -102,6 +110,10 @@ class _Trail:
         whole = range(0, len(self.t_s) - CHUNK + 1, CHUNK)
         self._chunks = [node(str(k), self._pieces[k : k + CHUNK]) for k in whole]
         self._rest = node("rest", self._pieces[:1])
+
+    def paint(self, colour: Rgb) -> None:
+        for node in (*self._chunks, self._rest):
+            node.colors = np.array(colour, np.uint8)
 
     def show(self, count: int) -> None:
         done = count // CHUNK

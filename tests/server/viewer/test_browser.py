@@ -82,7 +82,7 @@ def test_both_legs_are_seen_in_an_iframe(served: Ward, dark: bool) -> None:
         assert page.evaluate(OPEN, [served.session_id, dark]) == pytest.approx(4.44, abs=0.021)
         frame = page.frame_locator("iframe")
         frame.locator("canvas").first.wait_for(timeout=20_000)
-        shot = _until_drawn(page.locator("iframe"))
+        shot = _until_drawn(page.locator("iframe"), dark)
         panel = frame.locator(".mantine-Paper-root")
         assert panel.count() > 0  # viser still calls it so, and we hide it
         assert not panel.first.is_visible()
@@ -92,13 +92,13 @@ def test_both_legs_are_seen_in_an_iframe(served: Ward, dark: bool) -> None:
     assert (corner.mean() < 60) == dark
 
 
-def _until_drawn(frame: object) -> np.ndarray:
+def _until_drawn(frame: object, dark: bool) -> np.ndarray:
     """Pictures of the frame until both leg colours fill more than a leg's share of it, or fail."""
     counts: dict[str, int] = {}
     for _ in range(60):
         png = frame.screenshot()  # type: ignore[attr-defined]
         shot = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
-        counts = {side: _pixels_of(shot, TINTS[side]) for side in ("left", "right")}
+        counts = {side: _pixels_of(shot, TINTS[dark][side]) for side in ("left", "right")}
         if min(counts.values()) > 800:
             return shot
     raise AssertionError(f"leg colours were not drawn: {counts}")

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from core.errors import ParameterError
 from core.frames import FOOT, SIDES, Segment
 from server.viewer.colours import TINTS, linear
 from server.viewer.motion import Motion, prepare
+from tests.data import ROOT
 from tests.server import walk
 
 
@@ -57,8 +59,13 @@ def test_bones_reach_from_joint_to_joint(motion: Motion) -> None:
 def test_left_and_right_have_the_colours_of_the_charts(motion: Motion) -> None:
     assert motion.batches["bones"].tint[:4] == ("left", "left", "right", "right")
     assert motion.batches["shoes"].tint == ("left", "right")
-    assert TINTS["left"] == (0xD5, 0x5E, 0x00)
-    assert TINTS["right"] == (0x00, 0x72, 0xB2)
+    tokens = (ROOT / "web/static/css/tokens.css").read_text()
+    light, dark = tokens.split(':root[data-theme="dark"] {')[:2]
+    for theme, text in ((False, light), (True, dark)):
+        for side in SIDES:
+            named = re.search(rf"--{side}: (#\w+);", text)
+            assert named
+            assert named[1] == "#{:02X}{:02X}{:02X}".format(*TINTS[theme][side])
 
 
 def test_soles_stand_on_the_floor(motion: Motion) -> None:
