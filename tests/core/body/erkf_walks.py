@@ -9,7 +9,9 @@ from math import pi
 import numpy as np
 
 from core.angles import joint_angles
-from core.body.erkf import ErkfInputs, ErkfTrack, erkf_inputs
+from core.body.erkf import ErkfInputs, ErkfParams, ErkfTrack, erkf_inputs, filter_block
+from core.body.erkf_start import start_state
+from core.body.smoother import smooth
 from core.body.tree import PRESETS, ImuTree, person_tree
 from core.frames import FOOT, GRAVITY, Floats, Segment
 from core.fusion.orientations import Orientations
@@ -63,6 +65,18 @@ def take_of(made: Simulation) -> Take:
     valid = np.stack([recording.sensors[s].valid for s in SEGMENTS], axis=1)
     inputs = erkf_inputs(tree, np.stack(acc, axis=1), np.stack(gyr, axis=1), valid, recording.rate_hz)
     return Take(tree, inputs, truth, recording.rate_hz)
+
+
+def filtered(take: Take, params: ErkfParams) -> ErkfTrack:
+    """The filter over the whole take, from its standing start."""
+    first = start_state(take.tree, take.inputs, params, take.rest)
+    return filter_block(first, take.inputs, take.tree, params)[0]
+
+
+def smoothed(take: Take, params: ErkfParams) -> ErkfTrack:
+    """The same through the smoother."""
+    first = start_state(take.tree, take.inputs, params, take.rest)
+    return smooth(first, take.inputs, take.tree, params)[0]
 
 
 def angles_of(take: Take, track: ErkfTrack, *, zeroed: bool = True) -> dict[str, Floats]:
