@@ -93,6 +93,17 @@ SCRIPTS: Mapping[str, Scenario] = MappingProxyType(
                 Stand(4.0),
             ),
         ),
+        "figure_of_eight": Scenario(
+            "Figure of eight",
+            (
+                Stand(6.0),
+                Straight(6.4, 0.64, 0.54),
+                Arc(1.6, 2.0 * pi, 0.5, 0.56),
+                Arc(1.6, -2.0 * pi, 0.5, 0.56),
+                Straight(6.4, 0.64, 0.54),
+                Stand(4.0),
+            ),
+        ),
         "lost_sensor": Scenario(
             "Walk with one sensor lost for ten seconds and noisy sensors",
             _COMFORTABLE,

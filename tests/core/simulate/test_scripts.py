@@ -6,7 +6,7 @@ from core.errors import ParameterError
 from core.frames import SIDES
 from core.simulate import simulate_scenario
 
-SHORT = ["comfortable", "slow", "fast_with_turns", "lost_sensor"]
+SHORT = ["comfortable", "slow", "fast_with_turns", "figure_of_eight", "lost_sensor"]
 
 
 @pytest.mark.parametrize("name", SHORT)
