@@ -33,6 +33,8 @@ class Action(StrEnum):
     UPLOAD = "upload"
     ANALYSE = "analyse"
     READ_RESULT = "read_result"
+    REVIEW = "review"
+    """Changes events and decides which strides count."""
     READ_JOB = "read_job"
     CANCEL_JOB = "cancel_job"
     MANAGE_USERS = "manage_users"
@@ -60,6 +62,7 @@ POLICY: dict[Action, frozenset[Role]] = {
     Action.UPLOAD: _UPLOADERS,
     Action.ANALYSE: _CLINICAL,
     Action.READ_RESULT: _READERS,
+    Action.REVIEW: _CLINICAL,
     Action.READ_JOB: _ALL,
     Action.CANCEL_JOB: _UPLOADERS,
     Action.MANAGE_USERS: _ADMIN,

@@ -14,7 +14,16 @@ from server.services.errors import Conflict
 from server.services.sweep import referenced, sweep
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
-from server.storage.tables import analysis, analysis_file, job, patient, recording, recording_file, session
+from server.storage.tables import (
+    analysis,
+    analysis_file,
+    edit,
+    job,
+    patient,
+    recording,
+    recording_file,
+    session,
+)
 
 
 def erase_patient(
@@ -49,6 +58,7 @@ def erase_session(db: Database, blobs: BlobStore, actor: audit.Actor | None, ses
 def _erase_session_rows(c: Connection, session_id: str) -> None:
     recordings = select(recording.c.id).where(recording.c.session_id == session_id).scalar_subquery()
     analyses = select(analysis.c.id).where(analysis.c.recording_id.in_(recordings)).scalar_subquery()
+    c.execute(delete(edit).where(edit.c.analysis_id.in_(analyses)))
     c.execute(delete(analysis_file).where(analysis_file.c.analysis_id.in_(analyses)))
     c.execute(delete(analysis).where(analysis.c.recording_id.in_(recordings)))
     c.execute(delete(job).where(job.c.recording_id.in_(recordings)))

@@ -4,7 +4,7 @@ Nothing is deleted by cascade (RESTRICT everywhere): clinical rows leave only th
 
 patient ─< session ─< recording ─< recording_file          user ─< login_session, one_time_token
                           └──< analysis ─< analysis_file    audit (append-only, refers to nothing)
-                          └──< job ─── analysis
+                          └──< job ─── analysis ─< edit (append-only, undo is a row too)
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ ROLES = ("admin", "clinician", "assistant", "viewer")
 JOB_STATES = ("queued", "running", "done", "failed", "cancelled")
 ACTIVE_STATES = ("queued", "running")
 TOKEN_PURPOSES = ("set_up", "sign_in")
+EDIT_KINDS = ("move_event", "add_event", "delete_event", "exclude_stride", "include_stride", "undo")
 
 
 def new_id() -> str:
@@ -252,6 +253,19 @@ analysis_file = Table(
     CheckConstraint("size >= 0", name="size"),
 )
 
+edit = Table(
+    "edit",
+    metadata,
+    Column("seq", Integer, primary_key=True, autoincrement=True),
+    _ref("analysis_id", "analysis"),
+    Column("kind", String(16), nullable=False),
+    Column("content", Json, nullable=False),  # core.edits.Edit; of an undo {}
+    _ref("user_id", "user", nullable=True, index=False),
+    Column("at", Utc, nullable=False),
+    _one_of("kind", EDIT_KINDS),
+    sqlite_autoincrement=True,  # a number is never given twice: it says which state of a review was seen
+)
+
 audit = Table(
     "audit",
     metadata,
@@ -276,3 +290,9 @@ AUDIT_TRIGGERS = tuple(
 )
 for _trigger in AUDIT_TRIGGERS:
     event.listen(audit, "after_create", DDL(_trigger).execute_if(dialect="sqlite"))  # type: ignore[no-untyped-call]
+
+EDIT_TRIGGER = (
+    "CREATE TRIGGER edit_no_update BEFORE UPDATE ON edit "
+    "BEGIN SELECT RAISE(ABORT, 'edits are append-only'); END"
+)
+event.listen(edit, "after_create", DDL(EDIT_TRIGGER).execute_if(dialect="sqlite"))  # type: ignore[no-untyped-call]

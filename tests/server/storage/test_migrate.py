@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from alembic import command
+from alembic.script import ScriptDirectory
 
 from server.storage import migrate
 from server.storage.db import Database
@@ -23,7 +24,7 @@ HANG = """
 import pathlib, time
 from alembic import op
 import sqlalchemy as sa
-revision, down_revision = "0002", "0001"
+revision, down_revision = "next", "{head}"
 def upgrade():
     op.create_table("extra", sa.Column("id", sa.Integer, primary_key=True))
     with op.batch_alter_table("patient") as batch:
@@ -71,6 +72,15 @@ def counts(path: Path) -> tuple[int, int]:
 
 
 @pytest.fixture
+def head(scripts: Path) -> str:
+    """The newest revision of this version; the tests' own step follows it."""
+    config = migrate.configuration(Path("none.db"), scripts)
+    found = ScriptDirectory.from_config(config).get_current_head()
+    assert found is not None
+    return found
+
+
+@pytest.fixture
 def scripts(tmp_path: Path) -> Path:
     return Path(shutil.copytree(ROOT / "migrations", tmp_path / "migrations"))
 
@@ -95,50 +105,54 @@ def test_down_and_up_again_leave_the_same_schema(tmp_path: Path) -> None:
     assert schema(path) == before
 
 
-def test_data_survive_up_and_down_and_a_backup_is_made_before(tmp_path: Path, scripts: Path) -> None:
+def test_data_survive_up_and_down_and_a_backup_is_made_before(
+    tmp_path: Path, scripts: Path, head: str
+) -> None:
     path = tmp_path / "a.db"
-    assert migrate.upgrade(path, target="0001", scripts=scripts) is None
+    assert migrate.upgrade(path, target=head, scripts=scripts) is None
     fill(path)
-    (scripts / "versions" / "0002_next.py").write_text(HANG.format(then="pass"))
+    (scripts / "versions" / "next.py").write_text(HANG.format(head=head, then="pass"))
     backup = migrate.upgrade(path, scripts=scripts)
-    assert migrate.current(path) == "0002"
+    assert migrate.current(path) == "next"
     assert counts(path) == (1, 2)
     assert backup is not None
-    assert (counts(backup), migrate.current(backup)) == ((1, 2), "0001")
-    command.downgrade(migrate.configuration(path, scripts), "0001")
+    assert (counts(backup), migrate.current(backup)) == ((1, 2), head)
+    command.downgrade(migrate.configuration(path, scripts), head)
     assert counts(path) == (1, 2)
     assert migrate.upgrade(path, scripts=scripts) is not None
     assert counts(path) == (1, 2)
 
 
-def test_a_failing_migration_leaves_exactly_the_old_revision(tmp_path: Path, scripts: Path) -> None:
+def test_a_failing_migration_leaves_exactly_the_old_revision(
+    tmp_path: Path, scripts: Path, head: str
+) -> None:
     path = tmp_path / "a.db"
-    migrate.upgrade(path, target="0001", scripts=scripts)
+    migrate.upgrade(path, target=head, scripts=scripts)
     fill(path)
     before = schema(path)
-    step = scripts / "versions" / "0002_next.py"
+    step = scripts / "versions" / "next.py"
     for wrong in (
         "raise RuntimeError('broken')",
         "op.execute(\"UPDATE session SET patient_id = 'nobody'\")",  # dangling: seen before COMMIT
     ):
-        step.write_text(HANG.format(then=wrong))
+        step.write_text(HANG.format(head=head, then=wrong))
         with pytest.raises(RuntimeError):
             migrate.upgrade(path, scripts=scripts)
-        assert (schema(path), migrate.current(path), counts(path)) == (before, "0001", (1, 2))
-    step.write_text(HANG.format(then="pass"))
+        assert (schema(path), migrate.current(path), counts(path)) == (before, head, (1, 2))
+    step.write_text(HANG.format(head=head, then="pass"))
     migrate.upgrade(path, scripts=scripts)
-    assert migrate.current(path) == "0002"
+    assert migrate.current(path) == "next"
 
 
 def test_a_migration_killed_in_the_middle_leaves_exactly_the_old_revision(
-    tmp_path: Path, scripts: Path
+    tmp_path: Path, scripts: Path, head: str
 ) -> None:
     path, marker = tmp_path / "a.db", tmp_path / "reached"
-    migrate.upgrade(path, target="0001", scripts=scripts)
+    migrate.upgrade(path, target=head, scripts=scripts)
     fill(path)
     before = schema(path)
-    step = scripts / "versions" / "0002_next.py"
-    step.write_text(HANG.format(then=f"pathlib.Path({str(marker)!r}).touch(); time.sleep(600)"))
+    step = scripts / "versions" / "next.py"
+    step.write_text(HANG.format(head=head, then=f"pathlib.Path({str(marker)!r}).touch(); time.sleep(600)"))
     script = textwrap.dedent(f"""
         from pathlib import Path
         from server.storage.migrate import upgrade
@@ -152,10 +166,10 @@ def test_a_migration_killed_in_the_middle_leaves_exactly_the_old_revision(
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    assert (schema(path), migrate.current(path), counts(path)) == (before, "0001", (1, 2))
-    step.write_text(HANG.format(then="pass"))
+    assert (schema(path), migrate.current(path), counts(path)) == (before, head, (1, 2))
+    step.write_text(HANG.format(head=head, then="pass"))
     migrate.upgrade(path, scripts=scripts)
-    assert (migrate.current(path), counts(path)) == ("0002", (1, 2))
+    assert (migrate.current(path), counts(path)) == ("next", (1, 2))
 
 
 def test_an_unknown_revision_is_refused(tmp_path: Path) -> None:
