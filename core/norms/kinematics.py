@@ -1,23 +1,22 @@
 """Reference curves of healthy adults over the gait cycle (spec/clinic.md §2, §8).
 
 The reference angles are anatomical, ours are zero at the person's own standing: bands of sagittal and frontal
-angles show the shape, not the level, and say so; what has no meaning left is marked not comparable.
+angles show the shape, not the level, and say so; what has no meaning left is marked not comparable. Where the
+standing angle is known by goniometer the level means the same and the band says nothing of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Final, Literal
 
 import numpy as np
 
 from core.frames import Floats
+from core.norms.speed import SLOW_MPS
 from core.norms.tables import WBDS, WBDS_N, rows, wbds_group
-
-SLOW_MPS: Final = 0.8
-"""No adult reference exists for walking slower than this (spec/clinic.md §8.3)."""
 
 _ZERO = (
     "The zero differs: measured from the person's own standing, the reference is anatomical; compare shapes."
@@ -40,6 +39,13 @@ _JUDGEMENT: Final[Mapping[str, tuple[bool, Literal["normal", "low"], str]]] = {
     "foot_progression": (False, "low", "Not comparable: the walking direction of the foot is not measured."),
 }
 """Variable → may the band stand behind our curve, how much to trust it, what to say beside it."""
+
+_WITH_LEVEL: Final[Mapping[str, str]] = {
+    "pelvis_obliquity": _PLANE,
+    "hip_adduction": _PLANE,
+    "hip_rotation": _HEADING,
+}
+"""What is left to say where the anatomical level is known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,20 +79,29 @@ class NormBands:
     reason: str | None = None
 
 
-def adult_kinematics(age: float | None, speed_mps: float | None = None) -> NormBands:
+def adult_kinematics(
+    age: float | None, speed_mps: float | None = None, anatomical: Collection[str] = ()
+) -> NormBands:
     """Reference bands for a person of this age, walking overground at comfortable speed (1.25 ± 0.16 m/s).
 
     Parameters
     ----------
     age : years; None = all adults.
-    speed_mps : walking speed if known; below 0.8 m/s no reference applies.
+    speed_mps : walking speed if known, on legs of 0.9 m (`WalkingSpeed.equivalent_mps`); below 0.8 m/s no
+        reference applies.
+    anatomical : variables whose level is known; their band is comparable in level too.
     """
     group = wbds_group(age)
     if group is None:
         return NormBands(reason="no_norm_for_age")
     if speed_mps is not None and speed_mps < SLOW_MPS:
         return NormBands(reason="no_speed_matched_norm")
-    return NormBands(_bands(group))
+    bands = _bands(group)
+    return NormBands({name: _level(band) if name in anatomical else band for name, band in bands.items()})
+
+
+def _level(band: NormBand) -> NormBand:
+    return replace(band, comparable=True, note=_WITH_LEVEL.get(band.variable, ""))
 
 
 @cache

@@ -1,10 +1,83 @@
-"""Where a value stands among reference people: z and percentile."""
+"""Where a value stands among reference people: z, percentile, grade."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import erf, sqrt
+from typing import Final, Literal
+
+from core.norms.values import NormValue
+
+GRADES_SD: Final = (1.5, 4.5)
+"""|z| up to which a value has grade 0 and 1, beyond 2: the steps of the Edinburgh Visual Gait Score
+(spec/clinic.md §3)."""
+
+Grade = Literal[0, 1, 2]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A value among reference people, or why it has no place.
+
+    Parameters
+    ----------
+    z : standard deviations above their mean. percentile : share in % of such people below the value, taken
+        as normally distributed. grade : 0 within 1.5 sd, 1 within 4.5, 2 beyond.
+    norm : the reference, also where it is not comparable.
+    reason : "no_value", "no_norm", "not_comparable" (`norm.note` says why), "no_spread", or the reason of a
+        lookup that found nobody.
+    """
+
+    z: float | None
+    percentile: float | None
+    grade: Grade | None
+    norm: NormValue | None
+    reason: str | None = None
+
+
+def place(value: float | None, norm: NormValue | None, reason: str = "no_norm") -> Place:
+    """Place one value; `reason` says why there is no norm where the lookup knows it."""
+    if norm is None:
+        return Place(None, None, None, None, reason)
+    if not norm.comparable:
+        return Place(None, None, None, norm, "not_comparable")
+    if value is None:
+        return Place(None, None, None, norm, "no_value")
+    return _placed(value - norm.mean, norm.sd, norm)
+
+
+def place_difference(left: float | None, right: float | None, norm: NormValue | None) -> Place:
+    """Place left minus right among the left-right differences of healthy people, whose mean is taken as 0.
+
+    Needs no level: a norm that is not comparable in itself serves, if both sides have the same zero.
+    """
+    if norm is None or norm.difference_sd is None:
+        return Place(None, None, None, norm, "no_norm")
+    if left is None or right is None:
+        return Place(None, None, None, norm, "no_value")
+    return _placed(left - right, norm.difference_sd, norm)
 
 
 def percentile_of_z(z: float) -> float:
     """Share in % of a normal population below z standard deviations."""
     return 50.0 * (1.0 + erf(z / sqrt(2.0)))
+
+
+def percentile_of_sample(z: float, n: int) -> float:
+    """Share in % below z sample standard deviations, given that mean and sd come from n people.
+
+    Crawford & Howell 1998 (Clin Neuropsychol 12:482): t = z / √(1 + 1/n) with n − 1 degrees of freedom, so
+    that a few controls do not make an extreme percentile.
+    """
+    from scipy.special import stdtr
+
+    return float(100.0 * stdtr(n - 1, z / sqrt(1.0 + 1.0 / n)))
+
+
+def _placed(distance: float, sd: float, norm: NormValue) -> Place:
+    if sd <= 0.0:
+        return Place(None, None, None, norm, "no_spread")
+    z = distance / sd
+    below = percentile_of_z(z) if norm.n is None else percentile_of_sample(z, norm.n)
+    grade: Grade = 0 if abs(z) <= GRADES_SD[0] else 1 if abs(z) <= GRADES_SD[1] else 2
+    return Place(z, below, grade, norm)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Final, Literal
+from math import sqrt
+from typing import Final, Literal, cast
 
+from core.frames import GRAVITY
 from core.norms.tables import WBDS, WBDS_N, rows, wbds_group
 
 Sex = Literal["female", "male"]
@@ -50,8 +52,8 @@ _FOOT_OFF = (
 )
 """Simulated truth: 72 ± 5 ms after the last touch; gaitmap's healthy walker has a stance of 68.6 % by it."""
 
-_WIDTH = "Not comparable: our width takes the feet to have stood under the hips."
-"""Calibration takes legs to be vertical in standing; simulated people stand closer, 4 to 9 cm too wide."""
+_WIDTH = "Not comparable: a walkway measures between the heels, we between the ankles, which is wider."
+"""Heels lie 5 to 6 cm behind the ankles: with toes out by 7 to 10° that is 1 to 2 cm, half a reference sd."""
 
 _NOT_COMPARABLE: Final[Mapping[str, str]] = {
     "step_width_m": _WIDTH,
@@ -93,8 +95,11 @@ class NormValues:
     reason: str | None = None
 
 
-def angle_values(age: float | None) -> NormValues:
-    """Reference of the angle parameters for an adult of this age (None = all adults)."""
+def angle_values(age: float | None, anatomical: Collection[str] = ()) -> NormValues:
+    """Reference of the angle parameters for an adult of this age (None = all adults).
+
+    Ranges compare always, levels of the variables in `anatomical` (`core.anatomical`) only.
+    """
     group = wbds_group(age)
     if group is None:
         return NormValues(reason="no_norm_for_age")
@@ -103,7 +108,7 @@ def angle_values(age: float | None) -> NormValues:
     values = {}
     for name, key in ANGLES.items():
         row = table[key]
-        free_of_zero = name.endswith("_rom_deg")
+        comparable = name.endswith("_rom_deg") or any(name.startswith(f"{v}_") for v in anatomical)
         values[name] = NormValue(
             name=name,
             mean=float(row[f"{column}_mean"]),
@@ -112,8 +117,8 @@ def angle_values(age: float | None) -> NormValues:
             group=group,
             source=WBDS,
             difference_sd=float(row["LR_diff_sd"]),
-            comparable=free_of_zero,
-            note="" if free_of_zero else _LEVEL,
+            comparable=comparable,
+            note="" if comparable else _LEVEL,
         )
     return NormValues(values)
 
@@ -122,12 +127,7 @@ def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -
     """Reference of the spatiotemporal parameters by age (1 to 89 years), sex and pace."""
     if age is None or sex is None:
         return NormValues(reason="age_unknown" if age is None else "sex_unknown")
-    letter = "F" if sex == "female" else "M"
-    table = {
-        r["parameter"]: r
-        for r in rows("spatiotemporal_age_sex")
-        if r["sex"] == letter and r["pace"] == pace and float(r["age_min"]) <= age < float(r["age_max"]) + 1
-    }
+    table = {r["parameter"]: r for r in _people(age, sex) if r["pace"] == pace}
     values = {}
     for name, key in TEMPORAL.items():
         if key not in table:
@@ -148,22 +148,73 @@ def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -
     return NormValues(values, None if values else "no_norm_for_age")
 
 
-def expected_at_speed(speed_mps: float, age: float | None) -> Mapping[str, NormValue]:
+def pace_of(age: float | None, sex: Sex | None, speed_mps: float | None) -> Pace | None:
+    """Class of walkway norms a speed falls into, None where no such people walked at this speed.
+
+    Ages with slow, normal and fast classes have a range of speed for each; the others walked at the one
+    speed they liked and are "normal". Without a speed, age or sex: "normal".
+    """
+    if age is None or sex is None or speed_mps is None:
+        return "normal"
+    bands = [r for r in _people(age, sex) if r["parameter"] == "speed_m_s" and r["kind"] == "speed_band"]
+    if not bands:
+        return "normal"
+    for r in bands:
+        if float(r["lo_1sd"]) <= speed_mps < float(r["hi_1sd"]):
+            return cast("Pace", r["pace"])
+    return None
+
+
+def expected_at_speed(
+    speed_mps: float, age: float | None, leg_m: float | None = None
+) -> Mapping[str, NormValue]:
     """Step length and cadence expected at a walking speed, 0.5 to 1.5 m/s on a treadmill; empty outside.
 
-    y = a·v^b with a log-normal residual; `sd` is its width to first order (spec/clinic.md §2).
+    y = a·v^b with a log-normal residual; `sd` is its width to first order (spec/clinic.md §2). With the leg
+    length it is fitted dimensionless: step length / L and cadence √(L / g) against v / √(g L).
     """
     if not 0.5 <= speed_mps <= 1.5:
         return {}
     # the source's young are 21 to 37, its older 50 to 84 years; between them all are used
     group = "All" if age is None or 40 <= age < 50 else "Young" if age < 40 else "Older"
+    if leg_m is None:
+        x, scale = speed_mps, {"StepLength": 1.0, "Cadence": 1.0}
+    else:
+        x, scale = speed_mps / sqrt(GRAVITY * leg_m), {"SLhat": leg_m, "fhat": 60.0 * sqrt(GRAVITY / leg_m)}
     values = {}
     for row in rows("spatiotemporal_speed_regression_h2a"):
-        name = {"StepLength": "step_length_m", "Cadence": "cadence_spm"}.get(row["y"])
-        if name is None or row["group"] != group:
+        if row["y"] not in scale or row["group"] != group:
             continue
-        mean = float(row["a"]) * speed_mps ** float(row["b"])
+        name = _EXPECTED[row["y"]]
+        mean = float(row["a"]) * x ** float(row["b"]) * scale[row["y"]]
         values[name] = NormValue(
-            name, mean, mean * float(row["resid_sd_ln"]), int(row["n"]), group.lower(), "BMClab h2a (MIT)"
+            name=name,
+            mean=mean,
+            sd=mean * float(row["resid_sd_ln"]),
+            n=int(row["n"]) // _SPEEDS,
+            group=f"{group.lower()} adults at this speed on a treadmill",
+            source="BMClab h2a (MIT)",
         )
     return values
+
+
+_SPEEDS: Final = 6
+"""Speeds each person of that source walked at; `n` counts walks."""
+
+_EXPECTED: Final[Mapping[str, str]] = {
+    "StepLength": "step_length_m",
+    "SLhat": "step_length_m",
+    "Cadence": "cadence_spm",
+    "fhat": "cadence_spm",
+}
+"""Fitted quantity → our parameter."""
+
+
+def _people(age: float, sex: Sex) -> list[Mapping[str, str]]:
+    """Rows of one age and sex, all paces."""
+    letter = "F" if sex == "female" else "M"
+    return [
+        r
+        for r in rows("spatiotemporal_age_sex")
+        if r["sex"] == letter and float(r["age_min"]) <= age < float(r["age_max"]) + 1
+    ]

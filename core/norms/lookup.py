@@ -1,0 +1,90 @@
+"""One person → the reference that fits: by age, sex and dimensionless speed, or none and why."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+from core.norms.kinematics import NormBand, adult_kinematics
+from core.norms.place import Place, place, place_difference
+from core.norms.speed import WalkingSpeed, walking_speed
+from core.norms.values import (
+    ANGLES,
+    NormValue,
+    Pace,
+    Sex,
+    angle_values,
+    expected_at_speed,
+    pace_of,
+    temporal_values,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Norms:
+    """Everything a person is compared with.
+
+    Parameters
+    ----------
+    speed : None = not measured; then all adults at comfortable speed are the reference.
+    pace : class of the walkway norms that this speed falls into.
+    values : parameter → reference, each with n, group, source and whether it is comparable.
+    expected : step length and cadence expected at this very speed (treadmill, 0.5 to 1.5 m/s).
+    bands : variable → band over the cycle.
+    reason : why no angle is compared: "no_norm_for_age", "no_speed_matched_norm".
+    timing_reason : why no time or distance is compared: these, or "age_unknown", "sex_unknown".
+    """
+
+    speed: WalkingSpeed | None
+    pace: Pace | None
+    values: Mapping[str, NormValue] = field(default_factory=dict)
+    expected: Mapping[str, NormValue] = field(default_factory=dict)
+    bands: Mapping[str, NormBand] = field(default_factory=dict)
+    reason: str | None = None
+    timing_reason: str | None = None
+
+    def place(self, name: str, value: float | None) -> Place:
+        """Where a value of a parameter stands."""
+        reason = self.reason if name in ANGLES else self.timing_reason
+        return place(value, self.values.get(name), reason or "no_norm")
+
+    def place_difference(self, name: str, left: float | None, right: float | None) -> Place:
+        """Where left minus right stands among healthy differences."""
+        return place_difference(left, right, self.values.get(name))
+
+
+def norms_for(
+    age: float | None,
+    sex: Sex | None = None,
+    speed_mps: float | None = None,
+    height_m: float | None = None,
+    anatomical: Collection[str] = (),
+) -> Norms:
+    """Look up the reference of a person.
+
+    Parameters
+    ----------
+    age : years; None = all adults, and nobody for times and distances. sex : None = nobody for these.
+    speed_mps : walking speed. height_m : makes it dimensionless.
+    anatomical : variables whose anatomical level is known on both sides (`core.anatomical`); the others
+        compare in shape and range only.
+    """
+    speed = None if speed_mps is None else walking_speed(speed_mps, height_m)
+    at = None if speed is None else speed.equivalent_mps
+    bands = adult_kinematics(age, at, anatomical)
+    if bands.reason is not None:
+        return Norms(speed, None, reason=bands.reason, timing_reason=bands.reason)
+    pace = pace_of(age, sex, at)
+    timing = temporal_values(age, sex, pace or "normal")
+    missing = timing.reason or (None if pace is not None else "no_speed_matched_norm")
+    values = dict(angle_values(age, anatomical).values)
+    if missing is None:
+        values |= timing.values
+    return Norms(
+        speed,
+        pace if missing is None else None,
+        values,
+        {} if speed is None else expected_at_speed(speed.speed_mps, age, speed.leg_m),
+        bands.bands,
+        timing_reason=missing,
+    )

@@ -1,0 +1,143 @@
+"""One person and the reference that fits, or none and why."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.frames import GRAVITY
+from core.norms import NormValue, expected_at_speed, norms_for
+from core.norms.place import percentile_of_sample, percentile_of_z, place, place_difference
+from core.norms.speed import walking_speed
+from core.norms.values import pace_of
+
+
+REFERENCE = NormValue("x", mean=60.0, sd=4.0, n=42, group="g", source="s")
+
+
+def norm(**changes: Any) -> NormValue:
+    return replace(REFERENCE, **changes)
+
+
+def test_a_value_gets_its_z_and_percentile() -> None:
+    above = place(68.0, norm())
+    assert above.z == pytest.approx(2.0)
+    assert above.percentile == pytest.approx(97.3, abs=0.1), "42 people: a little less sure than 97.7"
+    assert above.grade == 1
+    assert place(60.0, norm()).percentile == pytest.approx(50.0)
+    assert (place(55.0, norm()).grade, place(38.0, norm()).grade) == (0, 2)
+
+
+def test_few_controls_make_no_extreme_percentile() -> None:
+    """Crawford & Howell 1998: with five controls z = 2 is t = 1.826 with 4 degrees of freedom."""
+    assert percentile_of_sample(2.0, 5) == pytest.approx(92.9, abs=0.1)
+    assert percentile_of_sample(2.0, 100_000) == pytest.approx(percentile_of_z(2.0), abs=0.01)
+    assert percentile_of_z(1.0) == pytest.approx(84.134, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("value", "reference", "reason"),
+    [
+        (None, norm(), "no_value"),
+        (60.0, None, "no_norm"),
+        (60.0, norm(comparable=False, note="another zero"), "not_comparable"),
+        (60.0, norm(sd=0.0), "no_spread"),
+    ],
+)
+def test_no_place_says_why(value: float | None, reference: NormValue | None, reason: str) -> None:
+    found = place(value, reference)
+    assert (found.z, found.percentile, found.grade, found.reason) == (None, None, None, reason)
+
+
+def test_differences_between_sides_compare_even_where_the_level_does_not() -> None:
+    unlevel = norm(comparable=False, difference_sd=3.4)
+    assert place_difference(50.0, 60.2, unlevel).z == pytest.approx(-3.0)
+    assert place_difference(50.0, None, unlevel).reason == "no_value"
+    assert place_difference(50.0, 60.0, norm()).reason == "no_norm"
+
+
+def test_dimensionless_speed_makes_short_and_tall_people_alike() -> None:
+    """Hof 1996; spec/clinic.md §2 gives 0.29 and 0.43 as about 0.86 and 1.27 m/s on legs of 0.9 m."""
+    leg = 0.53 * 1.698
+    assert walking_speed(0.86, 1.698).dimensionless == pytest.approx(0.29, abs=0.002)
+    assert walking_speed(1.27, 1.698).leg_m == pytest.approx(leg)
+    small, tall = walking_speed(1.0, 1.5), walking_speed(1.0 * sqrt(1.9 / 1.5), 1.9)
+    assert small.dimensionless == pytest.approx(tall.dimensionless)
+    assert small.equivalent_mps == pytest.approx(tall.equivalent_mps)
+    assert small.equivalent_mps > 1.0
+    unknown = walking_speed(1.0)
+    assert (unknown.dimensionless, unknown.equivalent_mps) == (None, 1.0)
+
+
+def test_slow_walking_has_no_norm_at_all() -> None:
+    slow = norms_for(60, "female", speed_mps=0.7)
+    assert (dict(slow.values), dict(slow.bands)) == ({}, {})
+    assert (slow.reason, slow.timing_reason) == ("no_speed_matched_norm", "no_speed_matched_norm")
+    assert slow.place("knee_flexion_rom_deg", 40.0).reason == "no_speed_matched_norm"
+    assert slow.place("cadence_spm", 90.0).reason == "no_speed_matched_norm"
+
+
+def test_the_limit_of_slowness_follows_the_legs() -> None:
+    assert norms_for(60, "female", 0.78, height_m=1.45).reason is None
+    assert norms_for(60, "female", 0.82, height_m=1.95).reason == "no_speed_matched_norm"
+
+
+@pytest.mark.parametrize(
+    ("age", "speed", "pace"),
+    [(25, 1.0, "slow"), (25, 1.2, "normal"), (25, 1.7, "fast"), (25, 3.0, None), (25, 0.82, None),
+     (75, 0.9, "normal"), (25, None, "normal")],
+)  # fmt: skip
+def test_the_walkway_norm_is_that_of_the_pace_walked(
+    age: float, speed: float | None, pace: str | None
+) -> None:
+    assert pace_of(age, "male", speed) == pace
+    found = norms_for(age, "male", speed)
+    assert found.pace == pace
+    if pace is None:
+        assert found.timing_reason == "no_speed_matched_norm"
+        assert "cadence_spm" not in found.values
+        assert "knee_flexion_rom_deg" in found.values
+    else:
+        assert f"{pace} pace" in found.values["cadence_spm"].group
+
+
+def test_without_age_or_sex_angles_are_compared_and_times_are_not() -> None:
+    found = norms_for(None, None, 1.2)
+    assert found.place("knee_flexion_rom_deg", 64.69).z == pytest.approx(0.0)
+    assert found.place("cadence_spm", 100.0).reason == "age_unknown"
+    assert norms_for(30, None, 1.2).place("cadence_spm", 100.0).reason == "sex_unknown"
+
+
+def test_levels_compare_only_where_the_anatomical_level_is_known() -> None:
+    standing = norms_for(30, "male", 1.2)
+    assert standing.place("knee_flexion_max_swing_deg", 61.0).reason == "not_comparable"
+    known = norms_for(30, "male", 1.2, anatomical=("knee_flexion", "pelvis_tilt"))
+    assert known.place("knee_flexion_max_swing_deg", 61.08).z == pytest.approx(0.0)
+    assert known.place("hip_flexion_min_deg", -8.0).reason == "not_comparable"
+    assert known.bands["pelvis_tilt"].comparable
+    assert known.bands["knee_flexion"].note == ""
+    assert known.bands["hip_flexion"].note != ""
+    assert not standing.bands["pelvis_tilt"].comparable
+
+
+def test_every_norm_shown_has_source_group_and_number_or_none() -> None:
+    found = norms_for(72, "female", 1.1, 1.62)
+    for value in (*found.values.values(), *found.expected.values()):
+        assert value.source
+        assert value.group
+        assert value.n is None or value.n > 10
+
+
+def test_expected_step_and_cadence_multiply_to_the_speed_on_any_legs() -> None:
+    for speed in np.linspace(0.5, 1.5, 6):
+        for leg in (None, 0.78, 0.9, 1.05):
+            e = expected_at_speed(float(speed), 30, leg)
+            made = e["step_length_m"].mean * e["cadence_spm"].mean / 60.0
+            assert made == pytest.approx(speed, rel=0.03), "two fits of the same walks"
+    short, long = expected_at_speed(1.2, 30, 0.78), expected_at_speed(1.2, 30, 1.05)
+    assert short["cadence_spm"].mean > long["cadence_spm"].mean
+    assert sqrt(GRAVITY / 0.9) == pytest.approx(3.30, abs=0.01)
