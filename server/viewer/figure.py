@@ -18,6 +18,7 @@ from server.viewer.ground import Ground
 from server.viewer.motion import Batch, Motion
 
 _FOV_RAD = np.deg2rad(31.0)
+_FLOOR_M = 60.0
 _FAINT = 0.35
 """Opacity of a part that no sensor supports."""
 
@@ -51,8 +52,10 @@ class Figure:
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
         scene.configure_default_lights(True, cast_shadow=True)
-        self._grid = scene.add_grid("/floor", infinite_grid=True, shadow_opacity=0.2)
         self._room = scene.add_frame("/room", show_axes=False)
+        size = _FLOOR_M + 6.0 * float(np.ptp(motion.root, axis=0).max())
+        x, y = (float(v) for v in self._middle)
+        self._grid = scene.add_grid("/room/floor", size, size, shadow_opacity=0.2, position=(x, y, 0.0))
         self._batches = [
             (b, _add_batch(scene, f"/room/{name}", b)) for name, b in motion.batches.items() if b.tint
         ]
@@ -93,9 +96,6 @@ class Figure:
                 letter.visible = valid and self._follow
                 letter.position = m.toes[side][i]
             self._room.position = (x, y, 0.0)
-            # the grid has no end only as long as it stays below the camera
-            section = self._grid.section_size
-            self._grid.position = (x % section, y % section, 0.0)
             self._ground.show(self._t_s)
         self._server.flush()
         return self._t_s
