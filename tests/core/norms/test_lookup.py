@@ -15,7 +15,6 @@ from core.norms.place import percentile_of_sample, percentile_of_z, place, place
 from core.norms.speed import walking_speed
 from core.norms.values import pace_of
 
-
 REFERENCE = NormValue("x", mean=60.0, sd=4.0, n=42, group="g", source="s")
 
 

@@ -1,0 +1,216 @@
+"""A clinic's own control group: references from sessions of healthy people, measured with the same sensors.
+
+They need no excuse for another zero, foot-off or width: what is compared was measured alike. Whose sessions
+may be used (consent, health) is decided before; here is only arithmetic. One person counts once, however many
+sessions there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from core.frames import SIDES, Floats, Side
+from core.norms.kinematics import NormBand
+from core.norms.lookup import Norms
+from core.norms.profile import SAGITTAL, CurveReference, MeanCurves, leave_one_out, person_mean
+from core.norms.speed import walking_speed
+from core.norms.values import NormValue, Sex
+from core.parameters.kinematic import mean_curve
+from core.parameters.result import CycleCurves, Parameter
+
+FEWEST: Final = 5
+"""People below which there is no group (our choice; percentiles allow for small groups, see `place`)."""
+
+FEW: Final = 20
+"""Groups smaller than this say so (our choice)."""
+
+Range = tuple[float, float]
+Values = Mapping[tuple[str, Side | None], float]
+
+
+@dataclass(frozen=True, eq=False)
+class ControlSession:
+    """One session of a healthy person.
+
+    Parameters
+    ----------
+    person : code of the person, equal in all their sessions.
+    parameters : of the session. curves : mean curves of the counted strides, degrees from standing.
+    """
+
+    person: str
+    age: float | None
+    sex: Sex | None
+    parameters: Sequence[Parameter]
+    curves: MeanCurves
+
+    @property
+    def speed_mps(self) -> float | None:
+        """Walking speed of the session."""
+        return next((p.mean for p in self.parameters if p.name == "gait_speed_mps"), None)
+
+
+@dataclass(frozen=True, eq=False)
+class ControlGroup:
+    """References made from a clinic's own controls.
+
+    Parameters
+    ----------
+    n : people. group, source : printed beside every figure.
+    values, bands : as those of the shipped tables. reference : for scores; None without joint angles.
+    reason : "few_controls" below five people, then there is nothing else; None otherwise.
+    note : "small_group" below twenty.
+    """
+
+    n: int
+    group: str
+    source: str
+    values: Mapping[str, NormValue] = field(default_factory=dict)
+    bands: Mapping[str, NormBand] = field(default_factory=dict)
+    reference: CurveReference | None = None
+    reason: str | None = None
+    note: str | None = None
+
+    def norms(self, speed_mps: float | None = None, height_m: float | None = None) -> Norms:
+        """The group as the reference of a person."""
+        speed = None if speed_mps is None else walking_speed(speed_mps, height_m)
+        return Norms(
+            speed,
+            None,
+            self.values,
+            bands=self.bands,
+            reason=self.reason,
+            timing_reason=self.reason,
+        )
+
+
+def control_group(
+    sessions: Sequence[ControlSession],
+    name: str = "own controls",
+    age: Range | None = None,
+    sex: Sex | None = None,
+    speed_mps: Range | None = None,
+) -> ControlGroup:
+    """Make references from the sessions that fit; a session whose age, sex or speed is asked and not known
+    does not.
+
+    Parameters
+    ----------
+    age, speed_mps : smallest and largest, both included. sex : None = both.
+    """
+    people: dict[str, list[ControlSession]] = {}
+    for s in sessions:
+        if _within(s.age, age) and _within(s.speed_mps, speed_mps) and sex in (None, s.sex):
+            people.setdefault(s.person, []).append(s)
+    n = len(people)
+    who = ", ".join(
+        part
+        for part in (
+            name,
+            sex or "",
+            "" if age is None else f"{age[0]:g} to {age[1]:g} years",
+            "" if speed_mps is None else f"{speed_mps[0]:g} to {speed_mps[1]:g} m/s",
+        )
+        if part
+    )
+    source = f"{n} controls of this clinic, same sensors and method"
+    if n < FEWEST:
+        return ControlGroup(n, who, source, reason="few_controls")
+    values = [_mean_values(s) for s in people.values()]
+    curves = [_mean_curves(s) for s in people.values()]
+    bands = _bands(curves, who, source)
+    reference = CurveReference(
+        {v: b.mean_deg for v, b in bands.items()}, leave_one_out(curves), "standing", n, who, source
+    )
+    return ControlGroup(
+        n,
+        who,
+        source,
+        _values(values, who, source),
+        bands,
+        reference if bands else None,
+        note="small_group" if n < FEW else None,
+    )
+
+
+def mean_curves(curves: CycleCurves) -> MeanCurves:
+    """Mean curves of the counted strides in degrees, as a control session keeps them."""
+    found: dict[Side, dict[str, Floats]] = {}
+    for variable, sides in curves.curves.items():
+        for side in sides:
+            mean = mean_curve(curves, variable, side).mean
+            if mean is not None:
+                found.setdefault(side, {})[variable] = np.degrees(mean)
+    return found
+
+
+def _within(value: float | None, limits: Range | None) -> bool:
+    return limits is None or (value is not None and limits[0] <= value <= limits[1])
+
+
+def _mean_values(sessions: Sequence[ControlSession]) -> Values:
+    """A person's mean of every parameter over their sessions."""
+    found: dict[tuple[str, Side | None], list[float]] = {}
+    for s in sessions:
+        for p in s.parameters:
+            if p.mean is not None:
+                found.setdefault((p.name, p.side), []).append(p.mean)
+    return {key: float(np.mean(v)) for key, v in found.items()}
+
+
+def _mean_curves(sessions: Sequence[ControlSession]) -> MeanCurves:
+    found: dict[Side, dict[str, list[Floats]]] = {}
+    for s in sessions:
+        for side, curves in s.curves.items():
+            for variable, curve in curves.items():
+                found.setdefault(side, {}).setdefault(variable, []).append(curve)
+    return {side: {v: np.mean(c, axis=0) for v, c in own.items()} for side, own in found.items()}
+
+
+def _values(people: Sequence[Values], group: str, source: str) -> dict[str, NormValue]:
+    """Mean over people and sides; sd of one side between people; sd of left − right."""
+    found: dict[str, NormValue] = {}
+    for name in dict.fromkeys(name for p in people for name, _ in p):
+        columns = [[p[name, s] for p in people if (name, s) in p] for s in (None, *SIDES)]
+        columns = [c for c in columns if len(c) >= FEWEST]
+        if not columns:
+            continue
+        differences = [
+            p[name, "left"] - p[name, "right"] for p in people if (name, "left") in p and (name, "right") in p
+        ]
+        found[name] = NormValue(
+            name=name,
+            mean=float(np.mean([np.mean(c) for c in columns])),
+            sd=float(np.sqrt(np.mean([np.var(c, ddof=1) for c in columns]))),
+            n=min(len(c) for c in columns),
+            group=group,
+            source=source,
+            difference_sd=float(np.std(differences, ddof=1)) if len(differences) >= FEWEST else None,
+        )
+    return found
+
+
+def _bands(people: Sequence[MeanCurves], group: str, source: str) -> dict[str, NormBand]:
+    found: dict[str, NormBand] = {}
+    for variable in dict.fromkeys(v for p in people for own in p.values() for v in own):
+        means = [m for p in people if (m := person_mean(p, variable)) is not None]
+        if len(means) < FEWEST:
+            continue
+        sides = [[p[s][variable] for p in people if variable in p.get(s, {})] for s in SIDES]
+        spread = [np.var(rows, axis=0, ddof=1) for rows in sides if len(rows) > 1]
+        found[variable] = NormBand(
+            variable=variable,
+            mean_deg=np.mean(means, axis=0),
+            sd_deg=np.sqrt(np.mean(spread, axis=0)),
+            n=len(means),
+            group=group,
+            source=source,
+            comparable=True,
+            confidence="normal" if variable in SAGITTAL else "low",
+            note="",
+        )
+    return found
