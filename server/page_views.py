@@ -11,8 +11,9 @@ from sqlalchemy import Connection, func, select
 
 from server.auth.roles import Role
 from server.jobs.queue import JobView
+from server.report.exports import parameter_row
 from server.report.wording import TERMS
-from server.services import analyses, jobs, sessions
+from server.services import analyses, jobs, reviews, sessions
 from server.services.patients import Patient
 from server.storage.blobs import BlobStore
 from server.storage.tables import ACTIVE_STATES, job, patient
@@ -120,8 +121,7 @@ def visits(c: Connection, blobs: BlobStore, patient_id: str, *, results: bool) -
     rows = []
     for s in sessions.of_patient(c, patient_id):
         latest = analyses.latest(c, s.id) if results else None
-        summary = json.loads(analyses.file_bytes(blobs, latest, "analysis.json")) if latest else {}
-        cells, strides = key_cells(summary.get("parameters", []))
+        cells, strides = key_cells(_parameters(c, blobs, latest) if latest else [])
         rows.append(
             {
                 **vars(s),
@@ -135,6 +135,16 @@ def visits(c: Connection, blobs: BlobStore, patient_id: str, *, results: bool) -
         )
     follow_few([row["job"] for row in rows])
     return rows
+
+
+def _parameters(c: Connection, blobs: BlobStore, found: analyses.Analysis) -> Sequence[Mapping[str, Any]]:
+    """Parameters as stored, or as a person's edits give them."""
+    edits = reviews.edits_of(c, found.id)
+    if edits.made:
+        return [parameter_row(p) for p in reviews.bundle(blobs, found, edits).parameters]
+    stored = json.loads(analyses.file_bytes(blobs, found, "analysis.json"))
+    parameters: list[Mapping[str, Any]] = stored["parameters"]
+    return parameters
 
 
 def key_cells(parameters: Sequence[Mapping[str, Any]]) -> tuple[list[dict[str, Any]], dict[str, int] | None]:

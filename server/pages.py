@@ -17,7 +17,7 @@ from server.auth.identity import Identity
 from server.auth.passwords import MIN_LENGTH
 from server.auth.roles import Action, Role
 from server.problems import TEMPLATES
-from server.services import analyses, patients, recordings, sessions
+from server.services import analyses, patients, recordings, reviews, sessions
 from server.services.provenance import CODE_VERSION
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -210,10 +210,11 @@ def _session_page(
     with db.read() as c:
         context = session_views.base(c, sid)
         latest = analyses.latest(c, sid) if who.may(Action.READ_RESULT) else None
+        edits = reviews.Edits() if latest is None else reviews.edits_of(c, latest.id)
     if latest is None and paper:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
     if latest is not None:
-        context["report"] = session_views.report(blobs, latest, context, paper=paper)
+        context["report"] = session_views.report(blobs, latest, edits, context, paper=paper)
     _opened(db, who, "session", sid)
     return _page(request, db, who, template, "patients", **context)
 

@@ -16,7 +16,7 @@ from server.report.model import ReportModel
 from server.report.panels import CurvePanel
 from server.report.table import Row
 from server.report.wording import ZERO_WORDS
-from server.services import analyses, patients, recordings, reports, sessions
+from server.services import analyses, patients, recordings, reports, reviews, sessions
 from server.storage.blobs import BlobStore
 from web.words import day, seconds
 
@@ -143,11 +143,16 @@ def _mapping(manifest: Mapping[str, Any] | None) -> list[tuple[str, str]]:
 
 
 def report(
-    blobs: BlobStore, found: analyses.Analysis, context: Mapping[str, Any], *, paper: bool
+    blobs: BlobStore,
+    found: analyses.Analysis,
+    edits: reviews.Edits,
+    context: Mapping[str, Any],
+    *,
+    paper: bool,
 ) -> dict[str, Any]:
     """The report of an analysis with its charts drawn, for the page or for paper."""
     patient, session = context["patient"], context["session"]
-    bundle, model = reports.read(blobs, found, patient, session)
+    bundle, model = reports.read(blobs, found, edits, patient, session)
     last_row = len(model.panels) - COLUMNS
     heights = PAPER_HEIGHTS if paper else PAGE_HEIGHTS
     curves = [_chart(p, heights[i >= last_row], x_unit=i >= last_row) for i, p in enumerate(model.panels)]

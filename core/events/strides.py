@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 from math import remainder, tau
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from core.events.flags import StrideParams, decided, flagged
 from core.events.result import GaitEvents, Stride, StrideFlag, Strides
 from core.frames import FOOT, SIDES, Bools, Oriented, Side
 from core.rotation import yaw
+
+NOTICES: Final = ("short_walk", "no_strides")
+"""Codes of what the stride list says about itself."""
 
 
 def stride_list(

@@ -6,20 +6,33 @@ import csv
 import io
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, cast
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, cast
 
 import numpy as np
 
 from core.angles import JointAngles
 from core.body.model import BodyModel
 from core.body.poses import Poses
+from core.edits import Edit, EditKind
 from core.errors import FormatError, Notice
 from core.events.result import EventKind, GaitEvent, GaitEvents, Stride, StrideFlag, Strides
+from core.events.strides import NOTICES
 from core.frames import SEGMENTS, Segment, Side
+from core.measure import Measured
 from core.parameters.result import Parameter
 from server.report.columns import SCHEMA, bools_of, floats_of, read_table
+
+EDIT_WORDS: Final[Mapping[EditKind, tuple[str, str]]] = {
+    "move_event": ("event moved", "events moved"),
+    "add_event": ("event added", "events added"),
+    "delete_event": ("event deleted", "events deleted"),
+    "exclude_stride": ("stride left out", "strides left out"),
+    "include_stride": ("stride counted in spite of a rule", "strides counted in spite of a rule"),
+}
+"""Kind of edit → words for one and for several."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +81,26 @@ def load_bundle(files: Mapping[str, bytes]) -> Bundle:
         angles=read_angles(files["angles.parquet"]) if "angles.parquet" in files else None,
         events=read_events(files["events.csv"]) if "events.csv" in files else GaitEvents(()),
         strides=read_strides(files["strides.csv"]) if "strides.csv" in files else Strides(()),
+    )
+
+
+def reviewed(bundle: Bundle, measured: Measured, edits: Sequence[Edit]) -> Bundle:
+    """The same analysis with what a person's edits give, and a notice that says so."""
+    done = Counter(EDIT_WORDS[e.kind] for e in edits)
+    notice = Notice(
+        "edited",
+        f"Changed by hand: {', '.join(f'{n} {words[n > 1]}' for words, n in done.items())}. The stored "
+        "analysis stays as it was; its files are those before the changes.",
+        severity="info",
+    )
+    warnings = [n for n in bundle.warnings if n.code not in NOTICES]
+    return replace(
+        bundle,
+        events=measured.events,
+        strides=measured.strides,
+        parameters=measured.parameters,
+        warnings=(*warnings, *measured.notices, notice),
+        provenance={**bundle.provenance, "edits": len(edits)},
     )
 
 

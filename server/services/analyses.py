@@ -15,7 +15,7 @@ from sqlalchemy import Connection, insert, select, update
 from core.errors import ParameterError
 from server import audit
 from server.jobs.queue import Claim, JobQueue, JobView
-from server.services import recordings
+from server.services import recordings, sessions
 from server.services.errors import NotFound
 from server.services.provenance import CODE_VERSION
 from server.storage.blobs import Blob, BlobStore
@@ -207,6 +207,15 @@ def latest(c: Connection, session_id: str) -> Analysis | None:
     """The analysis a session's pages show, None before the first result."""
     found = of_session(c, session_id)
     return found[0] if found else None
+
+
+def shown(c: Connection, session_id: str) -> Analysis:
+    """The same; raises NotFound when there is no session or no result."""
+    sessions.get(c, session_id)
+    found = latest(c, session_id)
+    if found is None:
+        raise NotFound("analysis of session", session_id)
+    return found
 
 
 def file_bytes(blobs: BlobStore, found: Analysis, name: str) -> bytes:

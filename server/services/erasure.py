@@ -9,7 +9,7 @@ from __future__ import annotations
 from sqlalchemy import Connection, delete, select
 
 from server import audit
-from server.services import patients, sessions
+from server.services import patients, reviews, sessions
 from server.services.errors import Conflict
 from server.services.sweep import referenced, sweep
 from server.storage.blobs import BlobStore
@@ -42,6 +42,7 @@ def erase_patient(
         c.execute(delete(patient).where(patient.c.id == patient_id))
         audit.record(c, actor, "patient.erased", "patient", patient_id, {"sessions": found.sessions})
     blobs.erase(patient_id)
+    reviews.forget()
     db.fold()
 
 
@@ -52,6 +53,7 @@ def erase_session(db: Database, blobs: BlobStore, actor: audit.Actor | None, ses
         own = {sha256 for space, sha256 in referenced(c, session_id) if space == found.patient_id}
         _erase_session_rows(c, session_id)
         audit.record(c, actor, "session.erased", "session", session_id, {"patient_id": found.patient_id})
+    reviews.forget()
     sweep(db, blobs, grace_s=0.0, only={(found.patient_id, sha256) for sha256 in own})
 
 
