@@ -185,6 +185,21 @@ def test_any_split_into_blocks_gives_the_same_bits() -> None:
         assert np.array_equal(end.P, state.P)
 
 
+def test_the_covariance_and_the_figure_after_ten_minutes_are_those_after_one() -> None:
+    """Sy 2021 §V-D expects that long walks need a limit on the covariance; they do not."""
+    calibrated, orientations, steps, _ = walk()
+    acceleration = free_acceleration(calibrated, orientations)
+    for worn in ("3I", "2I"):
+        inputs = inputs_of(orientations, acceleration, steps, MODEL, worn)
+        state, least, apart = start(inputs, MODEL), [], []
+        for _ in range(12):
+            track, state = filter_block(state, inputs, MODEL, 100.0)
+            least.append(float(np.linalg.eigvalsh(state.P)[0]))
+            apart.append(track.p[-1] - track.p[-1, 0])
+        assert least[-1] == pytest.approx(least[1], rel=1e-3)
+        np.testing.assert_allclose(apart[-1], apart[1], atol=1e-3)
+
+
 def test_a_common_turn_of_the_world_turns_the_result() -> None:
     calibrated, orientations, steps, _ = walk()
     acceleration = free_acceleration(calibrated, orientations)
