@@ -19,7 +19,7 @@ from core.events.strides import stride_list
 from core.frames import Bools, Floats, Segment
 from core.parameters import Surface, take_figures
 from core.parameters.result import Parameter
-from core.parameters.temporal import Column
+from core.parameters.rows import Column
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,5 +85,5 @@ def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
     """
     events = edited_events(tracks.events, edits, tracks.duration_s)
     strides = edited_strides(stride_list(events, tracks, tracks.turning, tracks.params), edits)
-    figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface)
+    figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk)
     return Measured(events, strides, figures.parameters, figures.columns)

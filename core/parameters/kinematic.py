@@ -13,11 +13,12 @@ from typing import Final, Literal
 import numpy as np
 
 from core.angles import JointAngles
-from core.events.foot_pitch import pitch_signal
 from core.events.result import Strides
-from core.frames import FOOT, SIDES, SUFFIX, Floats, Oriented, Side
+from core.frames import FOOT, SIDES, SUFFIX, Floats, Oriented, Segment, Side
+from core.parameters.resample import resample
 from core.parameters.result import CycleCurves, Parameter
-from core.parameters.temporal import Column
+from core.parameters.rows import Column, as_column
+from core.parameters.stance import foot_pitches
 from core.parameters.variability import summary
 
 POINTS: Final = 101
@@ -89,7 +90,7 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
                 names[name] = name
         if not names:
             continue
-        rows = _cut(np.stack([angles.angles[name] for name in names]), angles.t_s, bounds)
+        rows = resample(np.stack([angles.angles[name] for name in names]), angles.t_s, bounds, POINTS)
         for (name, base), row in zip(names.items(), rows, strict=True):
             sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
             curves.setdefault(base, {})[side] = sign * row
@@ -134,32 +135,45 @@ def stride_figures(curves: CycleCurves) -> dict[str, dict[Side, Floats]]:
     return values
 
 
-def foot_pitch(orientations: Oriented, strides: Strides) -> dict[str, dict[Side, Floats]]:
-    """Pitch of the foot at IC and TC of every stride: name → side → (strides,) degrees, NaN if undefined."""
+def foot_pitch(
+    orientations: Oriented, strides: Strides, pitch: Mapping[Segment, Floats] | None = None
+) -> dict[str, dict[Side, Floats]]:
+    """Pitch of the foot at IC and TC of every stride: name → side → (strides,) degrees, NaN if undefined.
+
+    Parameters
+    ----------
+    pitch : of `foot_pitches`, where somebody has it already.
+    """
     values: dict[str, dict[Side, Floats]] = {name: {} for name in FOOT_PITCH}
-    for side in SIDES:
-        if FOOT[side] not in orientations.q:
-            continue
-        s = pitch_signal(orientations.q[FOOT[side]])
-        pitch = np.where(orientations.valid[FOOT[side]], np.degrees(np.arcsin(np.clip(s, -1.0, 1.0))), np.nan)
+    for foot, angle in (foot_pitches(orientations) if pitch is None else pitch).items():
+        side: Side = "left" if foot == FOOT["left"] else "right"
         own = [s for s in strides.strides if s.side == side]
         moments = {
             "foot_pitch_ic_deg": [s.start_s for s in own],
             "foot_pitch_tc_deg": [np.nan if s.tc_s is None else s.tc_s for s in own],
         }
         for name, times in moments.items():
-            values[name][side] = np.interp(np.asarray(times, np.float64), orientations.t_s, pitch)
+            at = np.asarray(times, np.float64)
+            values[name][side] = np.interp(at, orientations.t_s, np.degrees(angle))
     return values
 
 
+def turning_angle(strides: Strides) -> dict[str, dict[Side, Floats]]:
+    """Heading change of the foot over every stride: name → side → (strides,) degrees, left positive."""
+    turns: dict[Side, list[float]] = {side: [] for side in SIDES}
+    for s in strides.strides:
+        turns[s.side].append(np.nan if s.turn_rad is None else s.turn_rad)
+    return {"turning_angle_deg": {side: np.degrees(values) for side, values in turns.items()}}
+
+
 def kinematic(
-    curves: CycleCurves, pitch: Mapping[str, Mapping[Side, Floats]] | None = None
+    curves: CycleCurves, more: Mapping[str, Mapping[Side, Floats]] | None = None
 ) -> tuple[Parameter, ...]:
     """Angle parameters over the counted strides of each side, degrees.
 
     Parameters
     ----------
-    pitch : result of `foot_pitch`, None leaves those two out.
+    more : further figures, those of `foot_pitch` and `turning_angle`.
 
     Returns
     -------
@@ -167,7 +181,7 @@ def kinematic(
     """
     figures: dict[str, Mapping[Side, Floats]] = {name: {} for name in FIGURES}
     figures |= stride_figures(curves)
-    figures |= pitch or {}
+    figures |= more or {}
     parameters = []
     for side in SIDES:
         used = curves.used[side]
@@ -185,23 +199,14 @@ def kinematic(
 
 def per_stride_figures(strides: Strides, figures: Mapping[str, Mapping[Side, Floats]]) -> dict[str, Column]:
     """Columns of the stride table, one entry per stride of the list in its order, from values per side."""
+    places = {side: [i for i, s in enumerate(strides.strides) if s.side == side] for side in SIDES}
     columns: dict[str, Column] = {}
     for name, sides in figures.items():
-        queue = {side: iter(values.tolist()) for side, values in sides.items()}
-        column = (next(queue[s.side]) if s.side in queue else np.nan for s in strides.strides)
-        columns[name] = tuple(v if np.isfinite(v) else None for v in column)
+        column = np.full(len(strides.strides), np.nan)
+        for side, values in sides.items():
+            column[places[side]] = values
+        columns[name] = as_column(column)
     return columns
-
-
-def _cut(signals: Floats, t_s: Floats, bounds: Floats) -> Floats:
-    """Interpolate (k, n) signals on a uniform axis to (k, strides, 101); rows that touch NaN become NaN."""
-    times = bounds[:, :1] + (bounds[:, 1:] - bounds[:, :1]) * np.linspace(0.0, 1.0, POINTS)
-    place = (times - t_s[0]) * ((len(t_s) - 1) / (t_s[-1] - t_s[0]))
-    low = np.clip(np.floor(place).astype(np.int64), 0, len(t_s) - 2)
-    u = place - low
-    rows = signals[:, low] * (1.0 - u) + signals[:, low + 1] * u
-    rows[~np.isfinite(rows).all(axis=-1)] = np.nan
-    return np.asarray(rows)
 
 
 def _foot_off(strides: Strides, i: int) -> float:

@@ -7,7 +7,6 @@ belongs to the foot that lands. The direction of progression of a stride is from
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import atan2, ceil, degrees, hypot, remainder, tau
@@ -22,8 +21,8 @@ from core.frames import SIDES, Floats, Protocol, Side
 from core.parameters.clearance import SoleHeights, heel_clearance, sole_heights, toe_clearance
 from core.parameters.flats import OTHER, Places, places
 from core.parameters.result import Parameter
-from core.parameters.temporal import Column
-from core.parameters.variability import summary, unit_of
+from core.parameters.rows import Column, Row, Value, row_columns, row_parameter
+from core.parameters.variability import summary
 from core.recording import UniformRecording
 from core.rotation import yaw
 
@@ -49,10 +48,6 @@ Reason = Literal[
     "treadmill", "no_foot_track", "no_foot_flat", "gap", "feet_not_linked", "opposite_foot_missing",
     "no_shoe_geometry", "no_swing_minimum", "no_terminal_contact", "standing_width_unknown",
 ]  # fmt: skip
-Value = float | Reason
-"""A figure of one stride, or why it has none."""
-
-Row = Mapping[str, Value]
 
 
 @dataclass(frozen=True)
@@ -99,7 +94,7 @@ def spatial_rows(strides: Strides, feet: FootTracks | None, surface: Surface = G
 
 def per_stride_spatial(rows: Sequence[Row]) -> dict[str, Column]:
     """Columns of the stride table, one entry per stride."""
-    return {n: tuple(v if isinstance(v := row[n], float) else None for row in rows) for n in NAMES}
+    return row_columns(rows, NAMES)
 
 
 def spatial(
@@ -114,21 +109,12 @@ def spatial(
     counted = [
         (s.side, row) for s, row in zip(strides.strides, rows, strict=True) if s.excluded_reason is None
     ]
-    found = [_parameter("gait_speed_mps", None, [row for _, row in counted])]
+    found = [row_parameter("gait_speed_mps", None, [row for _, row in counted])]
     found.append(_total(feet, surface))
     for side in SIDES:
         own = [row for s, row in counted if s == side]
-        found += [_parameter(name, side, own) for name in NAMES[1:]]
+        found += [row_parameter(name, side, own) for name in NAMES[1:]]
     return tuple(found)
-
-
-def _parameter(name: str, side: Side | None, rows: Sequence[Row]) -> Parameter:
-    values = [v for row in rows if isinstance(v := row[name], float)]
-    reasons = [v for row in rows if isinstance(v := row[name], str)]
-    why: str | None = None
-    if not values:
-        why = Counter(reasons).most_common(1)[0][0] if reasons else "no_strides"
-    return summary(name, side, values, unit_of(name), why)
 
 
 def _total(feet: FootTracks | None, surface: Surface) -> Parameter:

@@ -8,11 +8,25 @@ from typing import TYPE_CHECKING
 
 from core.angles import JointAngles
 from core.events.result import Strides
-from core.frames import Floats, Oriented, Side
-from core.parameters.kinematic import cycle_curves, foot_pitch, kinematic, per_stride_figures, stride_figures
+from core.frames import Floats, Oriented, Segment, Side
+from core.parameters.kinematic import (
+    cycle_curves,
+    foot_pitch,
+    kinematic,
+    per_stride_figures,
+    stride_figures,
+    turning_angle,
+)
+from core.parameters.phases import NAMES as PHASES
+from core.parameters.phases import phase_rows
 from core.parameters.result import Parameter
+from core.parameters.rows import Column, row_columns, side_parameters
 from core.parameters.spatial import GROUND, Surface, per_stride_spatial, spatial, spatial_rows
-from core.parameters.temporal import Column, per_stride, temporal
+from core.parameters.stance import NAMES as PARTS
+from core.parameters.stance import foot_pitches, stances
+from core.parameters.symmetry import phase_coordination
+from core.parameters.temporal import per_stride, temporal
+from core.parameters.trunk import trunk_regularity
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
@@ -38,24 +52,45 @@ def take_figures(
     orientations: Oriented | None = None,
     feet: FootTracks | None = None,
     surface: Surface = GROUND,
+    trunk: Mapping[Segment, Floats] | None = None,
 ) -> TakeFigures:
-    """Temporal, spatial, angles over the cycle, foot pitch at the contacts.
+    """Temporal, spatial, parts of stance and swing, angles over the cycle, regularity of the trunk.
 
     Parameters
     ----------
     angles : None = the take was not analysed so far: times only.
     orientations : of the feet, for their pitch; None leaves it out. feet : None = there are no distances.
+    trunk : pelvis → (n, 3) acceleration in the walking frame, on the axis of the angles.
     """
     columns = per_stride(strides)
+    times = (*temporal(strides), phase_coordination(strides))
     if angles is None:
-        return TakeFigures(temporal(strides), columns)
+        return TakeFigures(times, columns)
+    pitch = {} if orientations is None else foot_pitches(orientations)
+    flat = stances(strides, angles.t_s, pitch)
     rows = spatial_rows(strides, feet, surface)
+    phases = phase_rows(strides, flat, angles, pitch, feet)
     curves = cycle_curves(angles, strides)
-    pitch = None if orientations is None else foot_pitch(orientations, strides)
-    figures: dict[str, Mapping[Side, Floats]] = {**stride_figures(curves), **(pitch or {})}
+    of_feet = turning_angle(strides)
+    if orientations is not None:
+        of_feet |= foot_pitch(orientations, strides, pitch)
+    figures: dict[str, Mapping[Side, Floats]] = {**stride_figures(curves), **of_feet}
     return TakeFigures(
-        parameters=temporal(strides) + spatial(strides, feet, rows, surface) + kinematic(curves, pitch),
-        columns=columns | per_stride_spatial(rows) | per_stride_figures(strides, figures),
+        parameters=(
+            *times,
+            *spatial(strides, feet, rows, surface),
+            *side_parameters(strides, flat.rows, PARTS),
+            *side_parameters(strides, phases, PHASES),
+            *kinematic(curves, of_feet),
+            *trunk_regularity(strides, angles.t_s, trunk or {}),
+        ),
+        columns={
+            **columns,
+            **per_stride_spatial(rows),
+            **row_columns(flat.rows, PARTS),
+            **row_columns(phases, PHASES),
+            **per_stride_figures(strides, figures),
+        },
     )
 
 
@@ -65,6 +100,7 @@ def gait_parameters(
     orientations: Oriented | None = None,
     feet: FootTracks | None = None,
     surface: Surface = GROUND,
+    trunk: Mapping[Segment, Floats] | None = None,
 ) -> tuple[Parameter, ...]:
     """The parameters alone."""
-    return take_figures(strides, angles, orientations, feet, surface).parameters
+    return take_figures(strides, angles, orientations, feet, surface, trunk).parameters

@@ -5,62 +5,18 @@ Definitions: spec/field.md §4b. Percentages are of the stride. A step belongs t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from math import isnan
 from typing import Final
 
 import numpy as np
 
 from core.events.result import Stride, Strides
-from core.frames import SIDES
+from core.frames import SIDES, Floats
 from core.parameters.result import Parameter
-from core.parameters.variability import summary
-
-Column = tuple[float | None, ...]
-
-
-def _stance(s: Stride) -> float | None:
-    return None if s.tc_s is None else s.tc_s - s.start_s
-
-
-def _swing(s: Stride) -> float | None:
-    return None if s.tc_s is None else s.end_s - s.tc_s
-
-
-def _step(s: Stride) -> float | None:
-    return None if s.opposite_ic_s is None else s.end_s - s.opposite_ic_s
-
-
-def _initial_double(s: Stride) -> float | None:
-    return None if s.opposite_tc_s is None else s.opposite_tc_s - s.start_s
-
-
-def _terminal_double(s: Stride) -> float | None:
-    # a foot that leaves before the other lands runs: there is no double support to measure
-    if s.tc_s is None or s.opposite_ic_s is None or s.tc_s < s.opposite_ic_s:
-        return None
-    return s.tc_s - s.opposite_ic_s
-
-
-def _double(s: Stride) -> float | None:
-    initial, terminal = _initial_double(s), _terminal_double(s)
-    return None if initial is None or terminal is None else initial + terminal
-
-
-def _single(s: Stride) -> float | None:
-    if s.opposite_tc_s is None or s.opposite_ic_s is None:
-        return None
-    return s.opposite_ic_s - s.opposite_tc_s
-
-
-_PHASES: Final[Mapping[str, Callable[[Stride], float | None]]] = {
-    "stance": _stance,
-    "swing": _swing,
-    "initial_double_support": _initial_double,
-    "terminal_double_support": _terminal_double,
-    "double_support": _double,
-    "single_support": _single,
-}
+from core.parameters.rows import Column, as_column
+from core.parameters.variability import summary, unit_of
 
 NAMES: Final[tuple[str, ...]] = (
     "stride_time_s",
@@ -83,18 +39,36 @@ NAMES: Final[tuple[str, ...]] = (
 
 def stride_values(stride: Stride) -> dict[str, float | None]:
     """Temporal parameters of one stride by name (`NAMES`), s or % of the stride; None where undefined."""
-    values: dict[str, float | None] = {"stride_time_s": stride.duration_s, "step_time_s": _step(stride)}
-    for phase, measure in _PHASES.items():
-        seconds = measure(stride)
-        values[f"{phase}_time_s" if phase in ("stance", "swing") else f"{phase}_s"] = seconds
-        values[f"{phase}_pct"] = None if seconds is None else 100.0 * seconds / stride.duration_s
-    return values
+    return {name: None if isnan(v := float(x[0])) else v for name, x in temporal_values((stride,)).items()}
 
 
 def per_stride(strides: Strides) -> dict[str, Column]:
     """Columns of the stride table, one entry per stride of the list (counted or not), in its order."""
-    rows = [stride_values(s) for s in strides.strides]
-    return {name: tuple(row[name] for row in rows) for name in NAMES}
+    return {name: as_column(x) for name, x in temporal_values(strides.strides).items()}
+
+
+def temporal_values(strides: Sequence[Stride]) -> dict[str, Floats]:
+    """Temporal parameters (strides,) by name (`NAMES`), s or % of the stride; NaN where undefined."""
+    start, tc, end, opposite_tc, opposite_ic = np.array(
+        [(s.start_s, s.tc_s, s.end_s, s.opposite_tc_s, s.opposite_ic_s) for s in strides], np.float64
+    ).reshape(-1, 5).T  # fmt: skip
+    initial = opposite_tc - start
+    # a foot that leaves before the other lands runs: there is no double support to measure
+    terminal = np.where(tc >= opposite_ic, tc - opposite_ic, np.nan)
+    stride = end - start
+    phases = {
+        "stance_time": tc - start,
+        "swing_time": end - tc,
+        "initial_double_support": initial,
+        "terminal_double_support": terminal,
+        "double_support": initial + terminal,
+        "single_support": opposite_ic - opposite_tc,
+    }
+    values = {"stride_time_s": stride, "step_time_s": end - opposite_ic}
+    for phase, seconds in phases.items():
+        values[f"{phase}_s"] = seconds
+        values[f"{phase.removesuffix('_time')}_pct"] = 100.0 * seconds / stride
+    return values
 
 
 def temporal(strides: Strides) -> tuple[Parameter, ...]:
@@ -109,11 +83,11 @@ def temporal(strides: Strides) -> tuple[Parameter, ...]:
     steps: list[float] = []
     for side in SIDES:
         used = strides.used(side)
-        rows = [stride_values(s) for s in used]
-        for name in NAMES:
-            values = [v for row in rows if (v := row[name]) is not None]
-            reason = None if values else _missing(name, used)
-            parameters.append(summary(name, side, values, "%" if name.endswith("_pct") else "s", reason))
+        for name, column in temporal_values(used).items():
+            values = column[~np.isnan(column)].tolist()
+            parameters.append(
+                summary(name, side, values, unit_of(name), None if values else _missing(name, used))
+            )
             if name == "step_time_s":
                 steps.extend(values)
     parameters.append(_cadence(steps, strides))

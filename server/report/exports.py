@@ -27,7 +27,7 @@ from core.body.health import worst
 from core.body.poses import Poses
 from core.events.result import GaitEvents, Strides
 from core.parameters.result import Parameter
-from core.parameters.temporal import Column
+from core.parameters.rows import Column
 from server.report import signals, tracks
 from server.report.columns import SCHEMA, parquet_file, plain
 

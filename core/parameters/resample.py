@@ -1,0 +1,48 @@
+"""Signals cut at times of strides, each piece on the same number of points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from core.frames import Floats
+
+
+def resample(signals: Floats, t_s: Floats, bounds: Floats, points: int = 101) -> Floats:
+    """Interpolate (k, n) signals on a uniform axis linearly to (k, pieces, points), both ends included.
+
+    Parameters
+    ----------
+    bounds : (pieces, 2) s. A piece that touches NaN in a signal is NaN throughout.
+    """
+    place = (bounds - t_s[0]) * ((len(t_s) - 1) / (t_s[-1] - t_s[0]))
+    place = place[:, :1] + (place[:, 1:] - place[:, :1]) * np.linspace(0.0, 1.0, points)
+    known = np.isfinite(place)
+    low = np.clip(np.floor(np.where(known, place, 0.0)).astype(np.int64), 0, len(t_s) - 2)
+    here = np.take(signals, low, axis=1)
+    rows = np.take(signals, low + 1, axis=1)
+    # in place: ten minutes of all angles are a million points
+    rows -= here
+    rows *= place - low
+    rows += here
+    rows[~np.isfinite(rows.sum(axis=-1))] = np.nan
+    return rows
+
+
+def first_crossing(pieces: Floats) -> Floats:
+    """Where the rows of (m, points) first pass zero upwards, as a share 0 to 1 of the piece; NaN if never."""
+    return _crossing(pieces, last=False)
+
+
+def last_crossing(pieces: Floats) -> Floats:
+    """Where the rows of (m, points) last pass zero upwards, as a share 0 to 1 of the piece; NaN if never."""
+    return _crossing(pieces, last=True)
+
+
+def _crossing(pieces: Floats, *, last: bool) -> Floats:
+    m, points = pieces.shape
+    up = (pieces[:, :-1] < 0.0) & (pieces[:, 1:] >= 0.0)
+    at = points - 2 - np.argmax(up[:, ::-1], axis=1) if last else np.argmax(up, axis=1)
+    each = np.arange(m)
+    a, b = pieces[each, at], pieces[each, at + 1]
+    rise = np.where(up.any(axis=1), b - a, np.nan)
+    return np.asarray((at - a / rise) / (points - 1))

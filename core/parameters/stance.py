@@ -1,0 +1,117 @@
+"""Parts of the stance: loading, foot flat, push-off, from the pitch of the foot.
+
+The foot is flat around its quietest moment for as long as its pitch stays within `FLAT_RAD` of that moment's
+(spec/field.md §4b: IC to foot flat, flat, heel-off to TC, in % of stance). Fitted to nothing: the limit is
+the geometry of a centimetre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+from typing import Final
+
+import numpy as np
+
+from core.events.foot_pitch import pitch_signal
+from core.events.result import Strides
+from core.frames import FOOT, SIDES, Floats, Oriented, Segment
+from core.parameters.resample import resample
+from core.parameters.rows import Row
+
+NAMES: Final = ("loading_pct", "foot_flat_pct", "push_pct")
+"""In % of stance, in the order of the tables."""
+
+FLAT_RAD: Final = radians(3.0)
+"""Pitch at which heel or toe of a foot of 20 cm between them is 1 cm off the floor."""
+
+LEVEL_RAD: Final = radians(10.0)
+"""A foot whose quiet pitch lies further from that of standing is not flat on the floor, as in walking on the
+toes. Our choice: the quiet pitch of every stance of gaitmap_foot is within 2° of standing."""
+
+QUIET: Final = 10
+"""Points, in % of stance, over which the quietest moment is looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stances:
+    """When each foot was flat, one entry per stride of the list.
+
+    Parameters
+    ----------
+    flat_s, heel_off_s : (strides,) s, NaN where there is no such moment. rows : their parts of the stance in
+        %, or why not: "no_foot_sensor", "no_terminal_contact", "gap", "no_foot_flat".
+    """
+
+    flat_s: Floats
+    heel_off_s: Floats
+    rows: tuple[Row, ...]
+
+
+def foot_pitches(orientations: Oriented) -> dict[Segment, Floats]:
+    """Foot → pitch (n,) in rad, toes up positive, 0 while standing; NaN where its sensor was lost."""
+    found: dict[Segment, Floats] = {}
+    for foot in FOOT.values():
+        if foot in orientations.q:
+            angle = np.arcsin(np.clip(pitch_signal(orientations.q[foot]), -1.0, 1.0))
+            found[foot] = np.where(orientations.valid[foot], angle, np.nan)
+    return found
+
+
+def stances(strides: Strides, t_s: Floats, pitch: dict[Segment, Floats]) -> Stances:
+    """Find when each foot is flat in every stride.
+
+    Parameters
+    ----------
+    pitch : of `foot_pitches`, on `t_s` (n,).
+    """
+    n = len(strides.strides)
+    part = np.full((n, 2), np.nan)
+    reason = np.full(n, "no_foot_sensor", object)
+    start = np.array([s.start_s for s in strides.strides], np.float64)
+    off = np.array([np.nan if s.tc_s is None else s.tc_s for s in strides.strides], np.float64)
+    for side in SIDES:
+        own = np.array([i for i, s in enumerate(strides.strides) if s.side == side], np.int64)
+        if FOOT[side] not in pitch or not len(own):
+            continue
+        pieces = resample(pitch[FOOT[side]][None], t_s, np.stack((start[own], off[own]), axis=1))[0]
+        part[own] = _flat_part(pieces)
+        reason[own] = np.where(np.isnan(off[own]), "no_terminal_contact",
+                               np.where(np.isnan(pieces[:, 0]), "gap", "no_foot_flat"))  # fmt: skip
+    whole = off - start
+    percent = 100.0 * np.stack((part[:, 0], part[:, 1] - part[:, 0], 1.0 - part[:, 1]), axis=1)
+    rows = (
+        dict.fromkeys(NAMES, str(why)) if np.isnan(p[0]) else dict(zip(NAMES, p, strict=True))
+        for p, why in zip(percent.tolist(), reason, strict=True)
+    )
+    return Stances(start + part[:, 0] * whole, start + part[:, 1] * whole, tuple(rows))
+
+
+def _flat_part(pitch: Floats) -> Floats:
+    """Start and end (m, 2) of the flat in pieces (m, 101), as shares of the stance; NaN without one."""
+    m, points = pitch.shape
+    known = np.asarray(np.isfinite(pitch).all(axis=1), np.bool_)
+    pitch = np.where(known[:, None], pitch, 0.0)
+    way = np.concatenate((np.zeros((m, 1)), np.cumsum(np.abs(np.diff(pitch, axis=1)), axis=1)), axis=1)
+    moved = way[:, QUIET:] - way[:, :-QUIET]
+    quiet = np.argmin(moved, axis=1)
+    each = np.arange(m)
+    windows = quiet[:, None] + np.arange(QUIET + 1)
+    level = np.mean(pitch[each[:, None], windows], axis=1)
+    off = np.abs(pitch - level[:, None]) - FLAT_RAD
+    index, middle = np.arange(points), quiet + QUIET // 2
+    # the last point off the floor before the quiet middle, the first one after it
+    before = np.where((off >= 0.0) & (index < middle[:, None]), index, -1).max(axis=1)
+    after = np.where((off >= 0.0) & (index > middle[:, None]), index, points).min(axis=1)
+    first, last = np.maximum(before, 0), np.minimum(after, points - 1)
+    # where between two points the limit is passed
+    enter = np.where(before < 0, 0.0, first + _share(off[each, first], off[each, first + 1]))
+    leave = np.where(after == points, points - 1.0, last - _share(off[each, last], off[each, last - 1]))
+    flat = known & (moved[each, quiet] < FLAT_RAD) & (np.abs(level) < LEVEL_RAD) & (off[each, middle] < 0.0)
+    return np.where(flat[:, None], np.stack((enter, leave), axis=1) / (points - 1), np.nan)
+
+
+def _share(outside: Floats, inside: Floats) -> Floats:
+    """Where zero lies on the way from a value ≥ 0 to one < 0."""
+    way = outside - inside
+    return np.asarray(np.clip(outside / np.where(way > 0.0, way, 1.0), 0.0, 1.0))

@@ -1,0 +1,126 @@
+"""Left against right, or the affected side against the other: indices with their sign, or the difference.
+
+The sides are stored; what compares them is derived when it is shown (spec/clinic.md §8.5). Every index says
+which side it puts first, and none is 0 or absolute for want of something better (spec/field.md §2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import atan, degrees
+from typing import Final
+
+import numpy as np
+
+from core.events.result import Strides
+from core.frames import SIDES, Side
+from core.parameters.flats import OTHER
+from core.parameters.result import Parameter
+from core.parameters.variability import CV_STRIDES, STEADY_STRIDES, cv_pct
+
+LEAST: Final[Mapping[str, float]] = {"s": 0.05, "m": 0.05, "%": 2.0, "m/s": 0.05}
+"""Unit → smallest value that may be divided by. Our choice: five times what a contact (a sample of 10 ms) or
+a place of a foot (1 cm) is known to; of a share of the stride about two samples."""
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """One parameter of the two sides compared.
+
+    Parameters
+    ----------
+    first : the side that stands first: the affected one, else left. reference : "affected/unaffected" or
+        "left/right".
+    difference : first − other, in `unit`. ratio : first / other.
+    index_pct : 100 (first − other) / mean of both (Robinson 1987), positive when the first is larger.
+    angle_pct : (45° − atan(first / other)) / 90° · 100 (Zifchock 2008), as published: NEGATIVE when the
+        first is larger.
+    reason : why there is no ratio: "angle" (its zero is a convention), "near_zero" (a side too small to
+        divide by, or negative); else None.
+    """
+
+    name: str
+    unit: str
+    first: Side
+    reference: str
+    difference: float
+    ratio: float | None = None
+    index_pct: float | None = None
+    angle_pct: float | None = None
+    reason: str | None = None
+
+
+def symmetries(parameters: Sequence[Parameter], affected: Side | None = None) -> tuple[Symmetry, ...]:
+    """Compare the sides of every parameter that has a value on both, in the order given.
+
+    Parameters
+    ----------
+    affected : the affected side, None = none or both: left against right.
+    """
+    first: Side = affected or "left"
+    found = {(p.name, p.side): p for p in parameters}
+    pairs = (
+        (found.get((p.name, first)), found.get((p.name, OTHER[first]))) for p in parameters if p.side == first
+    )
+    return tuple(
+        _symmetry(a, a.mean, b.mean, first, "left/right" if affected is None else "affected/unaffected")
+        for a, b in pairs
+        if a is not None and b is not None and a.mean is not None and b.mean is not None
+    )
+
+
+def ratio(first: float, other: float) -> float:
+    """first / other."""
+    return first / other
+
+
+def index_pct(first: float, other: float) -> float:
+    """Symmetry index of Robinson 1987: 100 (first − other) / (½ (first + other)), signed."""
+    return 100.0 * (first - other) / (0.5 * (first + other))
+
+
+def angle_pct(first: float, other: float) -> float:
+    """Symmetry angle of Zifchock 2008 of two positive values: (45° − atan(first / other)) / 90° · 100."""
+    return (45.0 - degrees(atan(first / other))) / 90.0 * 100.0
+
+
+def phase_coordination(strides: Strides) -> Parameter:
+    """`pci_pct`: how near to half a stride the other foot lands, and how steadily (Plotnik et al. 2007).
+
+    φ = 360° · (time of the other foot's contact in the stride / stride time), over the counted strides of the
+    foot with the longer swing; PCI = CV(φ) + 100 mean|φ − 180°| / 180°, so that 0 is perfect.
+
+    Returns
+    -------
+    without a value a reason: "no_strides", "opposite_foot_missing", "no_terminal_contact", "few_strides"
+    (below 10, like every variation).
+    """
+    name = "pci_pct"
+    swings = {side: [s.end_s - s.tc_s for s in strides.used(side) if s.tc_s is not None] for side in SIDES}
+    if not strides.used():
+        return Parameter(name, None, 0, None, None, "%", "no_strides")
+    if not all(swings.values()):
+        reason = "opposite_foot_missing" if not all(strides.used(x) for x in SIDES) else "no_terminal_contact"
+        return Parameter(name, None, 0, None, None, "%", reason)
+    longer = max(SIDES, key=lambda side: float(np.mean(swings[side])))
+    phi = np.array([
+        360.0 * (s.opposite_ic_s - s.start_s) / s.duration_s
+        for s in strides.used(longer)
+        if s.opposite_ic_s is not None
+    ])  # fmt: skip
+    cv = cv_pct(phi, "") if len(phi) >= CV_STRIDES else None
+    if cv is None:
+        return Parameter(name, None, len(phi), None, None, "%", "few_strides")
+    value = cv + 100.0 * float(np.abs(phi - 180.0).mean()) / 180.0
+    note = "few_strides" if len(phi) < STEADY_STRIDES else None
+    return Parameter(name, None, len(phi), value, None, "%", note=note)
+
+
+def _symmetry(of: Parameter, a: float, b: float, first: Side, reference: str) -> Symmetry:
+    plain = Symmetry(of.name, of.unit, first, reference, a - b)
+    if of.unit == "deg":
+        return replace(plain, reason="angle")
+    if min(a, b) <= LEAST.get(of.unit, 0.0):
+        return replace(plain, reason="near_zero")
+    return replace(plain, ratio=ratio(a, b), index_pct=index_pct(a, b), angle_pct=angle_pct(a, b))

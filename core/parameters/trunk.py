@@ -1,0 +1,134 @@
+"""How regular the trunk moves: harmonic ratio and regularity of its acceleration in straight walking.
+
+Harmonic ratio of a stride: the acceleration over one stride as a Fourier series of the stride's frequency;
+the sum of the amplitudes of the first ten even harmonics over that of the first ten odd ones, for left-right
+the reverse (Gage 1964; Smidt, Arora and Johnston 1971; Bellanca et al. 2013). Two equal steps make the even
+ones; the ratio tells how alike the two steps of a stride are. It has no norm here (spec/clinic.md §8.2).
+
+Regularity: the unbiased autocorrelation at the time of one step and of one stride, where its peak is
+(Moe-Nilssen and Helbostad 2004); 1 = every step, or stride, like the one before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from core.events.result import Stride, Strides
+from core.frames import SIDES, Floats, Segment
+from core.parameters.resample import resample
+from core.parameters.result import Parameter
+from core.parameters.variability import summary
+
+AXES: Final[Mapping[str, int]] = {"v": 2, "ap": 0, "ml": 1}
+"""Ending of the name → column of the acceleration: vertical, forward, sideways."""
+
+REGULAR_AXES: Final = ("v", "ap")
+"""Sideways a step is the mirror image of the one before and has no regularity of steps."""
+
+HARMONICS: Final = 20
+"""Harmonics of the stride's frequency in the ratio: ten even, ten odd."""
+
+POINTS: Final = 200
+"""Points of a stride for its series: ten for the shortest period."""
+
+SEARCH: Final = 0.15
+"""How far from half a stride and from a stride, in strides, the peak is looked for: unequal steps move it.
+Our choice: not so far that a step could be taken for a stride."""
+
+RUN_STRIDES: Final = 3
+"""Fewest strides in a row that tell how alike strides are. Our choice: two overlaps of a stride."""
+
+NAMES: Final = (
+    *(f"harmonic_ratio_{axis}" for axis in AXES),
+    *(f"step_regularity_{axis}" for axis in REGULAR_AXES),
+    *(f"stride_regularity_{axis}" for axis in REGULAR_AXES),
+)
+"""In the order of the tables."""
+
+
+def trunk_regularity(strides: Strides, t_s: Floats, trunk: Mapping[Segment, Floats]) -> tuple[Parameter, ...]:
+    """Harmonic ratios and regularity over the counted strides of one foot.
+
+    Parameters
+    ----------
+    trunk : pelvis → (n, 3) acceleration free of gravity, forward, left, up, on the
+        uniform axis `t_s` (n,); NaN where lost.
+
+    Returns
+    -------
+    the ratio with its spread over strides, the regularity of all walking together; without a value a reason:
+    "no_pelvis_sensor", "no_strides", "gap", "no_run" (never three counted strides in a row).
+    """
+    if "pelvis" not in trunk:
+        return tuple(summary(name, None, [], "", "no_pelvis_sensor") for name in NAMES)
+    # strides of both feet overlap: one foot's tell everything once
+    own = max((strides.used(side) for side in SIDES), key=len)
+    if not own:
+        return tuple(summary(name, None, [], "", "no_strides") for name in NAMES)
+    acceleration = trunk["pelvis"]
+    return (*_harmonic_ratios(own, t_s, acceleration), *_regularity(own, t_s, acceleration))
+
+
+def harmonic_ratios(pieces: Floats) -> dict[str, Floats]:
+    """Ratios (strides,) by axis of accelerations (3, strides, points) over whole strides, end left out."""
+    amplitude = np.abs(np.fft.rfft(pieces, axis=-1))[..., 1 : HARMONICS + 1]
+    odd, even = amplitude[..., ::2].sum(axis=-1), amplitude[..., 1::2].sum(axis=-1)
+    found = {}
+    for axis, column in AXES.items():
+        above, below = (odd[column], even[column]) if axis == "ml" else (even[column], odd[column])
+        found[axis] = above / np.where(below > 0.0, below, np.nan)
+    return found
+
+
+def _harmonic_ratios(own: Sequence[Stride], t_s: Floats, acceleration: Floats) -> Iterator[Parameter]:
+    bounds = np.array([(s.start_s, s.end_s) for s in own])
+    pieces = resample(acceleration.T, t_s, bounds, POINTS + 1)[..., :-1]
+    for axis, values in harmonic_ratios(pieces).items():
+        known = values[np.isfinite(values)]
+        yield summary(f"harmonic_ratio_{axis}", None, known.tolist(), "", "gap")
+
+
+def _regularity(own: Sequence[Stride], t_s: Floats, acceleration: Floats) -> Iterator[Parameter]:
+    runs = [run for run in _runs(own) if len(run) >= RUN_STRIDES]
+    pieces = [acceleration[slice(*np.searchsorted(t_s, (r[0].start_s, r[-1].end_s)))] for r in runs]
+    whole = [(r, a) for r, a in zip(runs, pieces, strict=True) if np.isfinite(a).all()]
+    n = sum(len(r) for r, _ in whole)
+    stride = float(np.median([s.duration_s for s in own])) * (len(t_s) - 1) / float(t_s[-1] - t_s[0])
+    for name, share in (("step", 0.5), ("stride", 1.0)):
+        lags = np.arange(round((share - SEARCH) * stride), round((share + SEARCH) * stride) + 1)
+        for axis in REGULAR_AXES:
+            label = f"{name}_regularity_{axis}"
+            if not whole:
+                yield summary(label, None, [], "", "gap" if runs else "no_run")
+                continue
+            alike = _autocorrelation([a[:, AXES[axis]] for _, a in whole], lags)
+            yield Parameter(label, None, n, float(alike.max()), None, "")
+
+
+def _autocorrelation(pieces: Sequence[Floats], lags: np.ndarray) -> Floats:
+    """Unbiased autocorrelation (lags,) of pieces of one signal, each about the mean of all."""
+    mean = np.concatenate(pieces).mean()
+    centred = [a - mean for a in pieces]
+    # a signal that never changes is not alike anything
+    power = sum(float(a @ a) for a in centred) / sum(len(a) for a in centred) or np.inf
+    products, counts = np.zeros(len(lags)), np.zeros(len(lags))
+    for a in centred:
+        for i, lag in enumerate(lags[lags < len(a)].tolist()):
+            products[i] += float(a[lag:] @ a[: len(a) - lag])
+            counts[i] += len(a) - lag
+    return np.asarray(products / np.maximum(counts, 1.0) / power)
+
+
+def _runs(own: Sequence[Stride]) -> Iterator[list[Stride]]:
+    """Strides of one foot that follow each other without a break."""
+    run: list[Stride] = []
+    for s in own:
+        if run and s.start_s != run[-1].end_s:
+            yield run
+            run = []
+        run.append(s)
+    if run:
+        yield run
