@@ -136,6 +136,49 @@ def test_headings_that_start_apart_come_together(
     assert np.sqrt(np.mean(smooth_error[round(TOE_OFF_S * take.rate_hz) :] ** 2)) < 1.5
 
 
+@pytest.mark.parametrize("params", [LIVE, OFFLINE], ids=["live", "offline"])
+@pytest.mark.parametrize(("angle", "sd"), [(30.0, 30.0), (60.0, 30.0), (60.0, 90.0), (90.0, 90.0)])
+def test_with_known_positions_they_come_together_at_the_first_step(
+    params: ErkfParams, angle: float, sd: float
+) -> None:
+    """The oracle of spec/estimators.md §6.3: below 3° within 1 s of the first toe-off, positions given."""
+    take = mixed_walk()
+    wide = replace(params, start_heading_sd=radians(sd))
+    start = turned_start(alternately(angle), wide)
+    nominal, P, m = start.nominal.copy(), np.zeros_like(start.P), wide.states
+    nominal[:, 0:3] = [
+        take.truth.p[s][0] + rotate(take.truth.q[s][0], take.tree.place[i]) for i, s in enumerate(SEGMENTS)
+    ]
+    for at in range(0, len(P), 3):
+        k = slice(at, at + 3)
+        P[k, k] = start.P[k, k] if at % m else wide.start_position_sd**2 * np.eye(3)
+    first = replace(start, nominal=nominal, P=P)
+    error = apart_deg(take, filter_block(first, take.inputs, take.tree, wide)[0])
+    assert error[round((TOE_OFF_S + 0.6) * take.rate_hz) :].max() < 3.0
+
+
+def test_a_measured_heading_holds_the_common_one_and_leaves_angles_alone() -> None:
+    """The pelvis' heading five times a second with 10° of noise, as from a magnetometer, in a take that
+    starts facing 20° off it."""
+    take, rng = mixed_walk(), np.random.default_rng(8)
+    true = yaw(take.truth.q["pelvis"][: len(take.inputs.step_s)])
+    heading = np.full(take.inputs.valid.shape, np.nan)
+    heading[::20, 0] = true[::20] + radians(10.0) * rng.standard_normal(len(true[::20]))
+    aided = replace(take, inputs=replace(take.inputs, heading=heading))
+    first = turned_start(dict.fromkeys(range(len(SEGMENTS)), 20.0), LIVE)
+    q = first.nominal[:, 6:10]
+    open_start = start_state(take.tree, aided.inputs, LIVE, take.rest, q=q)
+    with_aid = filter_block(open_start, aided.inputs, take.tree, LIVE)[0]
+    without = filter_block(first, take.inputs, take.tree, LIVE)[0]
+    off = [np.degrees(yaw(take.tree.segment_q(t.q)[-500:, 0]) - true[-500:]) for t in (with_aid, without)]
+    assert abs(np.angle(np.exp(1j * np.radians(off[0]))).mean()) < radians(5.0)
+    assert abs(np.angle(np.exp(1j * np.radians(off[1]))).mean()) > radians(15.0)
+    a, b = (angles_of(take, track, zeroed=False) for track in (with_aid, without))
+    late = slice(round(LATE_S * take.rate_hz), None)
+    for name in ("hip_flexion_l", "knee_flexion_r", "hip_rotation_r", "ankle_inversion_l"):
+        assert np.degrees(np.abs((a[name] - b[name])[late]).max()) < 1.0, name
+
+
 @pytest.mark.parametrize("angle", [30.0, 60.0, 90.0])
 def test_one_sensor_is_brought_back_from_up_to_ninety_degrees(angle: float) -> None:
     take = mixed_walk()

@@ -100,6 +100,27 @@ def test_three_percent_of_lost_packets_cost_little() -> None:
     assert np.sqrt(np.mean(stride_errors_m(holes, track) ** 2)) < 0.006
 
 
+def test_samples_that_all_sensors_lack_are_stepped_over_by_their_time() -> None:
+    """A tenth of the instants taken out: the step's own Δt counts, not the rate (spec/estimators.md §3.3)."""
+    take, rng, x = mixed_walk(), np.random.default_rng(4), mixed_walk().inputs
+    kept = np.flatnonzero((rng.random(len(x.step_s)) > 0.1) | (np.arange(len(x.step_s)) < 500))
+    step = np.diff(np.cumsum(x.step_s)[kept], prepend=0.0)
+    assert step.max() > 0.025
+    flags = (x.valid[kept], x.contact[kept], x.still[kept])
+
+    def against_pelvis(q: Floats) -> Floats:
+        return np.asarray(multiply(conjugate(q[:, :1]), q))
+
+    def off_deg(step_s: Floats) -> float:
+        thinned = replace(take, inputs=ErkfInputs(step_s, x.acc[kept], x.gyr[kept], *flags))
+        found, whole = (take.tree.segment_q(t.q) for t in (filtered(thinned, LIVE), filtered(take, LIVE)))
+        same = np.abs(np.sum(against_pelvis(found) * against_pelvis(whole[kept]), axis=-1))
+        return float(np.degrees(np.sqrt(np.mean((2.0 * np.arccos(np.clip(same[1000:], 0.0, 1.0))) ** 2))))
+
+    assert off_deg(step) < 1.0
+    assert off_deg(np.where(step > 0.0, 1.0 / take.rate_hz, 0.0)) > 5.0, "what a fixed rate would do"
+
+
 def test_false_contacts_are_refused_and_cost_little() -> None:
     take = mixed_walk()
     rng = np.random.default_rng(5)
