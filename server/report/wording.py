@@ -95,9 +95,12 @@ class Term:
 _WAY, _TIMING, _PHASES = "Speed and distance", "Timing", "Phases of the stride"
 _SUPPORT = "Support in seconds"
 _HIP_KNEE, _ANKLE_FOOT = "Hip and knee angles", "Ankle and foot angles"
+_PARTS, _TRUNK = "Parts of stance and swing", "Regularity of the trunk"
 
 _WIDTH: Final[Comparison] = ("wider", "narrower")
 _HEIGHT: Final[Comparison] = ("higher", "lower")
+_OUT: Final[Comparison] = ("turned out more", "turned out less")
+_TURN: Final[Comparison] = ("more to the left", "more to the right")
 
 TERMS: Final[Mapping[str, Term]] = {
     "gait_speed_mps": Term("Gait speed", "m/s", _WAY, 2, (0, 2), _SIZE),
@@ -109,6 +112,7 @@ TERMS: Final[Mapping[str, Term]] = {
     "min_toe_clearance_m": Term("Toe clearance, least in swing", "m", _WAY, 3, (-0.02, 0.12), _HEIGHT),
     "total_distance_m": Term("Distance walked", "m", _WAY, 1, (0, 100), _SIZE),
     "cadence_spm": Term("Cadence", "steps/min", _TIMING, 0, (40, 150), _SIZE),
+    "pci_pct": Term("Phase coordination index", "%", _TIMING, 1, (0, 15), _SIZE),
     "stride_time_s": Term("Stride time", "s", _TIMING, 2, (0.7, 2.1), _TIME),
     "step_time_s": Term("Step time", "s", _TIMING, 2, (0.3, 1.1), _TIME),
     "stance_time_s": Term("Stance time", "s", _TIMING, 2, (0.4, 1.6), _TIME),
@@ -119,6 +123,14 @@ TERMS: Final[Mapping[str, Term]] = {
     "initial_double_support_pct": Term("Initial double support", "%", _PHASES, 1, (0, 30), _TIME),
     "terminal_double_support_pct": Term("Terminal double support", "%", _PHASES, 1, (0, 30), _TIME),
     "single_support_pct": Term("Single support", "%", _PHASES, 1, (15, 50), _TIME),
+    "loading_pct": Term("Loading, of stance", "%", _PARTS, 1, (0, 40), _TIME),
+    "foot_flat_pct": Term("Foot flat, of stance", "%", _PARTS, 1, (20, 90), _TIME),
+    "push_pct": Term("Heel-off to foot-off, of stance", "%", _PARTS, 1, (0, 60), _TIME),
+    "mid_stance_pct": Term("Mid stance", "%", _PARTS, 1, (0, 40), _TIME),
+    "terminal_stance_pct": Term("Terminal stance", "%", _PARTS, 1, (0, 30), _TIME),
+    "initial_swing_pct": Term("Initial swing", "%", _PARTS, 1, (0, 30), _TIME),
+    "mid_swing_pct": Term("Mid swing", "%", _PARTS, 1, (0, 25), _TIME),
+    "terminal_swing_pct": Term("Terminal swing", "%", _PARTS, 1, (0, 30), _TIME),
     "hip_flexion_ic_deg": Term("Hip flexion at contact", "°", _HIP_KNEE, 1, (-10, 60), _FLEX),
     "hip_flexion_min_deg": Term("Hip flexion, least", "°", _HIP_KNEE, 1, (-40, 30), _FLEX),
     "hip_flexion_rom_deg": Term("Hip flexion range", "°", _HIP_KNEE, 1, (0, 70), _SIZE),
@@ -138,6 +150,15 @@ TERMS: Final[Mapping[str, Term]] = {
     "ankle_dorsiflexion_rom_deg": Term("Dorsiflexion range", "°", _ANKLE_FOOT, 1, (0, 60), _SIZE),
     "foot_pitch_ic_deg": Term("Foot pitch at contact", "°", _ANKLE_FOOT, 1, (-30, 45), _TOES),
     "foot_pitch_tc_deg": Term("Foot pitch at foot-off", "°", _ANKLE_FOOT, 1, (-90, 10), _TOES),
+    "toe_out_deg": Term("Toe-out, from standing", "°", _ANKLE_FOOT, 1, (-25, 25), _OUT),
+    "turning_angle_deg": Term("Turn of the foot in a stride", "°", _ANKLE_FOOT, 1, (-15, 15), _TURN),
+    "harmonic_ratio_v": Term("Harmonic ratio, vertical", "", _TRUNK, 2, (0, 6), _SIZE),
+    "harmonic_ratio_ap": Term("Harmonic ratio, forward", "", _TRUNK, 2, (0, 6), _SIZE),
+    "harmonic_ratio_ml": Term("Harmonic ratio, sideways", "", _TRUNK, 2, (0, 6), _SIZE),
+    "step_regularity_v": Term("Regularity of steps, vertical", "", _TRUNK, 2, (0, 1), _SIZE),
+    "step_regularity_ap": Term("Regularity of steps, forward", "", _TRUNK, 2, (0, 1), _SIZE),
+    "stride_regularity_v": Term("Regularity of strides, vertical", "", _TRUNK, 2, (0, 1), _SIZE),
+    "stride_regularity_ap": Term("Regularity of strides, forward", "", _TRUNK, 2, (0, 1), _SIZE),
     "double_support_s": Term("Double support", "s", _SUPPORT, 2, (0, 0.8), _TIME),
     "initial_double_support_s": Term("Initial double support", "s", _SUPPORT, 2, (0, 0.4), _TIME),
     "terminal_double_support_s": Term("Terminal double support", "s", _SUPPORT, 2, (0, 0.4), _TIME),
@@ -161,6 +182,15 @@ REASONS: Final[Mapping[str, str]] = {
     "standing_width_unknown": "not measured: enter how far apart the ankles are while standing",
     "feet_not_linked": "not measured: needs sensors on both legs and the pelvis to place the feet",
     "no_shoe_geometry": "not measured: needs the shape of the shoe",
+    "no_swing_minimum": "not measured: the toe's height has no dip in swing",
+    "no_foot_sensor": "not measured: no sensor on this foot",
+    "no_pelvis_sensor": "not measured: no sensor on the pelvis",
+    "no_run": "not measured: never three strides in a row that count",
+    "few_strides": "not measured: needs at least 10 strides that count",
+    "no_mid_stance": "not measured: the heel rises before the other foot leaves the floor",
+    "no_terminal_stance": "not measured: the heel stays down until the other foot lands",
+    "feet_not_adjacent": "not measured: the swinging foot does not pass the other",
+    "tibia_not_vertical": "not measured: the shank does not pass the vertical in swing",
     "no_heading": "not measured: needs a heading reference shared by the sensors",
     "not_reached": "not measured: the analysis stopped before this",
 }
