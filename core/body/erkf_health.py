@@ -50,6 +50,7 @@ def erkf_health(run: ErkfRun) -> tuple[Finding, ...]:
         name, contact = run.tree.imus[i], run.inputs.contact[:, i]
         refused = 100.0 * run.track.refused[contact, i].mean() if contact.any() else 0.0
         found.append(Finding("zero_velocity_refused_pct", name, float(refused), warn=REFUSED_PCT))
+        found.append(Finding("contact_pct", name, 100.0 * float(contact.mean())))
         found.append(Finding("longest_moving_s", name, longest_run_s(~contact, rate), *LONGEST_MOVING_S))
         if contact.any():
             found.append(Finding("climb_pct", name, _climb_pct(run, i), warn=CLIMB_PCT))

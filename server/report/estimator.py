@@ -61,6 +61,7 @@ REDUCED: Final[Mapping[str, str]] = {
 QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
     "joint_residual_mm": ("Joint ends apart", 0, "mm"),
     "zero_velocity_refused_pct": ("Rests refused", 1, "%"),
+    "contact_pct": ("Foot at rest, of the take", 0, "%"),
     "longest_moving_s": ("Longest without rest", 1, "s"),
     "climb_pct": ("Floor rises or falls, of the way", 1, "%"),
     "gap_s": ("Longest loss", 1, "s"),
