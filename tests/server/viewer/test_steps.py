@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from core import rotation
 from core.body.poses import Poses
@@ -12,6 +13,7 @@ from core.frames import FOOT, SIDES, Floats
 from server.viewer.motion import Motion, prepare
 from server.viewer.steps import PIECE_M, prints, trail
 from tests.server import walk
+from tests.walks import simulated
 
 T_S = np.arange(500) / 50.0
 FLAT = np.tile([1.0, 0.0, 0.0, 0.0], (500, 1))
@@ -48,6 +50,25 @@ def test_prints_are_a_stride_apart_on_a_walk(motion: Motion) -> None:
         np.testing.assert_allclose(steps, 1.2 * walk.STRIDE_S, atol=0.02)
 
 
+@pytest.mark.parametrize("known", [True, False], ids=["contacts known", "contacts missed"])
+@pytest.mark.parametrize("name", ["fast_with_turns", "severe_shuffle"])
+def test_prints_are_those_of_the_simulated_walker(name: str, known: bool) -> None:
+    _, truth = simulated(name)
+    always = np.ones(len(truth.t_s), bool)
+    contact = {FOOT[s]: c if known else always for s, c in truth.contact.items()}
+    poses = Poses(truth.t_s, truth.rate_hz, truth.q, truth.p, always, contact, truth.body, "erkf_smoothed")
+    found = prepare(poses).prints
+    for side in SIDES:
+        true = truth.footprints[side]
+        heading = np.array([f.foot_rad for f in true])
+        assert len(found[side].t_s) == len(true)
+        ahead = 0.25 * truth.body.foot * np.stack((np.cos(heading), np.sin(heading)), axis=1)
+        place = np.array([(f.x_m, f.y_m) for f in true]) + ahead
+        np.testing.assert_allclose(found[side].position[:, :2], place, atol=0.01)
+        turned = rotation.yaw(found[side].wxyz.astype(float)) - heading
+        np.testing.assert_allclose(np.angle(np.exp(1j * turned)), 0, atol=np.radians(1))
+
+
 def test_a_print_lies_flat_and_points_where_the_toes_point() -> None:
     path, contact = stepping()
     turned = rotation.multiply(rotation.about(2, np.radians(30)), rotation.about(1, np.radians(-12)))
@@ -62,6 +83,19 @@ def test_a_restless_standing_foot_leaves_one_print() -> None:
     wobble = np.stack((0.004 * np.sin(9 * T_S), 0 * T_S, 0 * T_S), axis=1)
     found = prints(T_S, np.ones(500, bool), np.sin(20 * T_S) > 0, wobble, FLAT)
     assert len(found.t_s) == 1
+
+
+def test_a_step_that_the_contacts_miss_leaves_its_print() -> None:
+    path, contact = stepping()
+    missed = contact | ((T_S > 2.9) & (T_S < 4.1))
+    found = prints(T_S, np.ones(500, bool), missed, path, FLAT)
+    np.testing.assert_allclose(found.position[:, 0], 1.2 * np.arange(5), atol=1e-5)
+
+
+def test_a_foot_that_slides_through_its_contact_leaves_a_print_all_the_same() -> None:
+    found = prints(T_S, np.ones(500, bool), (T_S > 3) & (T_S < 4), straight(0.5), FLAT)
+    assert len(found.t_s) == 1
+    assert 3 < found.t_s[0] < 4
 
 
 def test_a_foot_that_never_rests_leaves_no_print() -> None:
