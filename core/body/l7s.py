@@ -6,7 +6,7 @@ A sparse mode of visibly lower accuracy: never take stride lengths from it where
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -54,7 +54,8 @@ def l7s_poses(
 
     Returns
     -------
-    Poses in ISB frames, method "l7s_3i" or "l7s_2i", `contact` = steps. The feet's orientation is that of the
+    Poses in ISB frames, method "l7s_3i" or "l7s_2i", `contact` = steps. After a loss of a foot they are valid
+    again from its next rest on: until then nobody knows where it went. The feet's orientation is that of the
     constrained state and differs from the measured one by some degrees (spec/estimators.md §4.4).
     Diagnostics by side: `knee_straight_share`, samples with a foot in motion at which the leg is at its full
     length, so that the knee is a bound and no measurement; `hinge_m`, `excess_m`, largest residuals of the
@@ -85,7 +86,7 @@ def l7s_poses(
         rate_hz=orientations.rate_hz,
         q={"pelvis": from_matrix(track.R[:, 0] @ model.to_isb("pelvis")), **legs.q},
         p={"pelvis": track.p[:, 0], **legs.p},
-        valid=np.logical_and.reduce([orientations.valid[s] for s in measured]),
+        valid=_known(orientations, inputs.step, measured),
         contact={FOOT[s]: np.asarray(steps[s], bool) for s in LEGS},
         body=body,
         method=f"l7s_{worn.lower()}",
@@ -164,6 +165,18 @@ def inputs_of(
     if worn == "2I":
         acc[:, 0] = 0.5 * (acc[:, 1] + acc[:, 2])
     return L7sInputs(R, acc, np.stack([steps[side] for side in LEGS], axis=1), worn)
+
+
+def _known(orientations: Orientations, step: Bools, measured: Sequence[Segment]) -> Bools:
+    """Samples (n,) at which every worn sensor is there and no foot is on its way after a loss."""
+    known = np.logical_and.reduce([orientations.valid[s] for s in measured])
+    index = np.arange(len(step))
+    for leg, side in enumerate(LEGS):
+        there = orientations.valid[FOOT[side]]
+        lost = np.maximum.accumulate(np.where(there, -1, index))
+        rested = np.maximum.accumulate(np.where(there & step[:, leg], index, -1))
+        known &= rested >= lost
+    return np.asarray(known)
 
 
 def _never_still(steps: Mapping[Side, Bools]) -> tuple[Notice, ...]:
