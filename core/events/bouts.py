@@ -1,0 +1,141 @@
+"""Contacts → walking bouts, and the stops inside and between them.
+
+A bout is walking without a long break; a gait that only shuffles the feet once is none. Terms and the two
+limits: spec/field.md §4a (mobgap's rules as executed: at least 4 strides in total, breaks of at most 3 s).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import inf
+
+import numpy as np
+
+from core.events.result import GaitEvents
+from core.rest import Window
+
+
+@dataclass(frozen=True)
+class BoutParams:
+    """When contacts are walking.
+
+    Parameters
+    ----------
+    break_s : longest time between two contacts of a bout. min_strides : least strides of a bout, those of
+        both feet counted (spec/field.md §4a).
+    stop_share : a step that takes so many times the median step of its bout holds a stop. Our choice: a step
+        cannot take that long without one foot standing still; the steps of the virtual patients stay below
+        1.7, a start or end of gait included.
+    stop_s : shortest such step, so that quick walking has no stops. Our choice.
+    near_s : a rest so close to a bout's end is where the walk began or ended. Our choice: the longest rest
+        that the quiet window of 1 s cannot see (core/rest.py) and a step.
+    """
+
+    break_s: float = 3.0
+    min_strides: int = 4
+    stop_share: float = 2.0
+    stop_s: float = 1.0
+    near_s: float = 2.0
+
+
+@dataclass(frozen=True)
+class Bout:
+    """Walking without a long break.
+
+    Parameters
+    ----------
+    start_s : the foot that steps first leaves the floor, or its contact where the leaving is not known.
+    first_s, end_s : first and last contact. contacts : number of contacts, of both feet.
+    step_s : median time between contacts; with one foot known, of its strides.
+    stops : half-open ranges between two contacts that hold a stop.
+    from_rest, to_rest : standing still before and after; None where rest is not known.
+    """
+
+    start_s: float
+    first_s: float
+    end_s: float
+    contacts: int
+    step_s: float
+    stops: tuple[Window, ...] = ()
+    from_rest: bool | None = None
+    to_rest: bool | None = None
+
+    @property
+    def duration_s(self) -> float:
+        """From the first foot-off to the last contact, s."""
+        return self.end_s - self.start_s
+
+    @property
+    def initiation_s(self) -> float | None:
+        """Gait initiation: first foot-off to first contact, s; None unless it starts from rest with one."""
+        return self.first_s - self.start_s if self.from_rest and self.first_s > self.start_s else None
+
+
+def walking_bouts(
+    contacts: Sequence[float],
+    leavings: Sequence[float] = (),
+    rests: Sequence[Window] | None = None,
+    feet: int = 2,
+    params: BoutParams | None = None,
+) -> tuple[Bout, ...]:
+    """Walking bouts of contacts in order of time.
+
+    Parameters
+    ----------
+    contacts, leavings : initial and terminal contacts of all feet that are known, s, increasing.
+    rests : windows of rest, None if not known. feet : how many feet the contacts are of.
+    """
+    params = params or BoutParams()
+    found = []
+    ended = -inf
+    for run in _runs(contacts, params.break_s):
+        if len(run) - feet < (params.min_strides if feet == 2 else params.min_strides // 2):
+            continue
+        steps = np.diff(run)
+        typical = float(np.median(steps))
+        limit = max(params.stop_s, params.stop_share * typical)
+        start = next((t for t in leavings if max(ended, run[0] - params.break_s) < t < run[0]), run[0])
+        ended = run[-1]
+        found.append(
+            Bout(
+                start_s=start,
+                first_s=run[0],
+                end_s=run[-1],
+                contacts=len(run),
+                step_s=typical,
+                stops=tuple((a, b) for a, b in pairwise(run) if b - a > limit),
+                from_rest=_touches(rests, start, params.near_s, before=True),
+                to_rest=_touches(rests, run[-1], params.near_s, before=False),
+            )
+        )
+    return tuple(found)
+
+
+def bouts_of(
+    events: GaitEvents, rests: Sequence[Window] | None = None, params: BoutParams | None = None
+) -> tuple[Bout, ...]:
+    """Walking bouts of the contacts of the feet."""
+    contacts = sorted(e.time_s for e in events.events if e.kind == "ic")
+    leavings = sorted(e.time_s for e in events.events if e.kind == "tc")
+    feet = len({e.side for e in events.events if e.kind == "ic"})
+    return walking_bouts(contacts, leavings, rests, max(1, feet), params)
+
+
+def _runs(contacts: Sequence[float], break_s: float) -> list[list[float]]:
+    """Successive contacts without a break."""
+    runs: list[list[float]] = []
+    for t in contacts:
+        if runs and t - runs[-1][-1] <= break_s:
+            runs[-1].append(t)
+        else:
+            runs.append([t])
+    return runs
+
+
+def _touches(rests: Sequence[Window] | None, t: float, near_s: float, *, before: bool) -> bool | None:
+    """Does a rest end shortly before t, or start shortly after it?"""
+    if rests is None:
+        return None
+    return any(-0.5 <= (t - end if before else start - t) <= near_s for start, end in rests)

@@ -1,0 +1,277 @@
+"""Steps from one sensor on the trunk: lower back, sacrum or chest, mounted anyhow.
+
+The trunk is lowest, and its vertical acceleration highest, while both feet carry it: the maxima of the
+smoothed vertical acceleration stand 20 to 70 ms after the initial contacts (mobgap_lowback). With the scale
+of a Gaussian this is the differentiated vertical velocity of McCamley et al. 2012 (Gait & Posture 36:316).
+Ours is what makes it safe: scale and least distance of the maxima follow the step time that the whole
+movement repeats with (core/events/periodicity.py), since a slow walk has two maxima a step, and where nothing
+repeats no step is reported.
+
+Which foot landed: the pelvis turns towards the side that is in front, so its yaw alternates between the
+contacts. A thorax turns against or with the pelvis, depending on speed: the chest tells no side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from core.errors import Notice, SignalError
+from core.events.bouts import Bout, BoutParams, walking_bouts
+from core.events.periodicity import Periodicity, PeriodicityParams, step_times
+from core.events.steps import Step, Steps
+from core.frames import Bools, Floats, Segment, Side
+from core.recording import SensorSignals, UniformRecording
+from core.rest import rest_windows, runs
+
+TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
+
+
+@dataclass(frozen=True)
+class LumbarParams:
+    """Parameters of the detector.
+
+    Parameters
+    ----------
+    scale : σ of the Gaussian as share of the step time: 64 ms at the 0.6 s of mobgap_lowback Test5.
+    prominence : least height of a maximum above its surroundings, m/s². Our choice: standing has 0.1, the
+        severest simulated shuffle 1; between 0.15 and 0.4 mobgap_lowback gives the same (F1 0.94 to 0.95).
+    apart : least distance of two steps as share of the step time. Our choice: the shorter step of a limp of
+        1 : 1.7 (the worst virtual patient has 1 : 1.4) and the longest gap between two maxima of one step.
+    up_s : σ of the Gaussian over which specific force is averaged to find up: several steps.
+    moving : std of the vertical acceleration over 1 s above which somebody moves, m/s². Our choice: standing
+        has at most 0.07 (core/calibration/walking.py).
+    merge_s : pauses shorter than this do not divide the take into parts of their own step time.
+    step_s : step times that count as walking.
+    side_share, side_steps : agreement of the alternating yaw (0 to 1) and number of steps without a stop from
+        which sides are told. Our choice.
+    row_steps : maxima that stand together; fewer are a shift of weight or a push from outside. Our choice: a
+        stride, three contacts.
+    bout_score : least mean score of a bout in a take that has walking somewhere. Our choice: noise has 0.2,
+        daily life with turns and stops (mobgap_lowback Test11) at least 0.29.
+    min_rate_hz : spec/fusion.md §6 for a trunk sensor.
+    """
+
+    scale: float = 0.107
+    prominence: float = 0.4
+    apart: float = 0.6
+    up_s: float = 2.0
+    moving: float = 0.2
+    merge_s: float = 2.0
+    step_s: tuple[float, float] = (0.25, 1.3)
+    side_share: float = 0.5
+    side_steps: int = 4
+    row_steps: int = 3
+    min_rate_hz: float = 20.0
+    periodicity: PeriodicityParams = field(default_factory=PeriodicityParams)
+    bout_score: float = 0.25
+    bouts: BoutParams = field(default_factory=BoutParams)
+
+
+def trunk_sensor(recording: UniformRecording) -> Segment | None:
+    """The sensor steps can be read from, the lower back before the chest."""
+    return next((s for s in TRUNK if s in recording.sensors), None)
+
+
+def detect_steps(recording: UniformRecording, params: LumbarParams | None = None) -> Steps:
+    """Steps, their feet where they can be told, and walking bouts of a take with a trunk sensor.
+
+    Parameters
+    ----------
+    recording : with "pelvis" or "chest"; neither rest nor calibration is needed.
+
+    Returns
+    -------
+    steps inside walking bouts; the notice `no_walking` (nobody moved), `non_periodic` (movement without a
+    rhythm of steps) or `few_steps` (no bout) says why there are none.
+
+    Raises
+    ------
+    SignalError : `no_trunk_sensor`, `sample_rate_too_low`.
+    """
+    params = params or LumbarParams()
+    segment = trunk_sensor(recording)
+    if segment is None:
+        raise SignalError("no_trunk_sensor", "Steps of the trunk need a sensor on the pelvis or the chest.")
+    rate = recording.rate_hz
+    if rate < params.min_rate_hz:
+        raise SignalError(
+            "sample_rate_too_low",
+            f"Steps need at least {params.min_rate_hz:g} Hz, the recording has {rate:g} Hz. Record at a"
+            " higher rate.",
+            sensor=segment,
+        )
+    signals = recording.sensors[segment]
+    vertical, yaw_rate = about_up(signals, rate, params)
+    moving = _moving(vertical, signals.valid, rate, params)
+    if not moving.any():
+        return _nothing(segment, "no_walking", "The trunk hardly moved: no steps were found.")
+    rhythm = step_times(vertical, signals.gyr, rate, params.periodicity)
+    if not rhythm.walks(params.step_s, params.periodicity):
+        return _nothing(
+            segment,
+            "non_periodic",
+            f"The movement of the trunk has no rhythm of steps (best score {rhythm.score.max():.2f}; needed"
+            f" for several seconds: {params.periodicity.row_score:g}): no steps are reported. Record at least"
+            " ten steps straight ahead.",
+        )
+    times = _steps(vertical, moving, rhythm, rate, params)
+    rests = rest_windows(recording, segments=(segment,))
+    bouts = tuple(
+        b for b in walking_bouts(times, rests=rests, params=params.bouts) if _repeats(b, rhythm, params)
+    )
+    if not bouts:
+        return _nothing(
+            segment,
+            "few_steps",
+            f"{len(times)} steps were found, nowhere {params.bouts.min_strides + 2} without a break: no"
+            " walking bout is reported. Record a longer walk.",
+        )
+    steps: list[Step] = []
+    for bout in bouts:
+        for run in _unbroken([t for t in times if bout.first_s <= t <= bout.end_s], bout):
+            sides = _sides(run, yaw_rate, bout.step_s, rate, params) if segment == "pelvis" else None
+            steps += [Step(t, None if sides is None else sides[i]) for i, t in enumerate(run)]
+    notices = []
+    if any(s.side is None for s in steps):
+        notices.append(
+            Notice(
+                "side_unknown",
+                "Which foot made a step cannot be told"
+                + (" from the chest." if segment == "chest" else " in every walking bout from this sensor.")
+                + " Step times and cadence do not depend on it.",
+                segment,
+                severity="info",
+            )
+        )
+    return Steps(tuple(steps), bouts, segment, tuple(notices), {"score": float(rhythm.score.max())})
+
+
+def about_up(
+    signals: SensorSignals, rate_hz: float, params: LumbarParams | None = None
+) -> tuple[Floats, Floats]:
+    """Vertical acceleration free of gravity (n,) in m/s² and yaw rate (n,) in rad/s, left positive.
+
+    Up is where the specific force points on average over several steps: an upright trunk needs no filter.
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    params = params or LumbarParams()
+    force = gaussian_filter1d(signals.acc, params.up_s * rate_hz, axis=0, mode="nearest")
+    norm = np.maximum(np.linalg.norm(force, axis=1), 1e-9)
+    up = force / norm[:, None]
+    return np.einsum("ni,ni->n", signals.acc, up) - norm, np.einsum("ni,ni->n", signals.gyr, up)
+
+
+def _moving(vertical: Floats, valid: Bools, rate_hz: float, params: LumbarParams) -> Bools:
+    """Samples at which the trunk moves vertically as in walking and the sensor is there."""
+    from scipy.ndimage import uniform_filter1d
+
+    width = max(2, round(rate_hz))
+    mean = uniform_filter1d(vertical, width, mode="nearest")
+    spread = uniform_filter1d(vertical**2, width, mode="nearest") - mean**2
+    return np.asarray((spread > params.moving**2) & valid)
+
+
+def _good(rhythm: Periodicity, params: LumbarParams) -> Bools:
+    low, high = params.step_s
+    in_range = (rhythm.step_s >= low) & (rhythm.step_s <= high)
+    return np.asarray(in_range & (rhythm.score >= params.periodicity.least))
+
+
+def _steps(
+    vertical: Floats, moving: Bools, rhythm: Periodicity, rate_hz: float, params: LumbarParams
+) -> list[float]:
+    """Times of the maxima of every moving part, at the scale of its own step time."""
+    from scipy.ndimage import gaussian_filter1d
+    from scipy.signal import find_peaks
+
+    good = _good(rhythm, params)
+    usual = float(np.median(rhythm.step_s[good]))
+    times: list[float] = []
+    for first, end in _parts(moving, params.merge_s * rate_hz):
+        here = good & (rhythm.t_s * rate_hz >= first) & (rhythm.t_s * rate_hz <= end)
+        step = float(np.median(rhythm.step_s[here])) if here.any() else usual
+        reach = round(2.0 * step * rate_hz)
+        low = max(0, first - reach)
+        smooth = gaussian_filter1d(vertical[low : end + reach], params.scale * step * rate_hz, mode="nearest")
+        peaks, _ = find_peaks(smooth, prominence=params.prominence, distance=params.apart * step * rate_hz)
+        inside = [int(p) for p in peaks + low if first <= p < end and moving[p]]
+        row = [float(p + _offset(smooth, p - low)) / rate_hz for p in inside]
+        times += _together(row, params.bouts.stop_share * step, params.row_steps)
+    return times
+
+
+def _repeats(bout: Bout, rhythm: Periodicity, params: LumbarParams) -> bool:
+    """Is there enough of a rhythm in a bout?"""
+    reach = 0.5 * params.periodicity.hop_s
+    here = (rhythm.t_s >= bout.start_s - reach) & (rhythm.t_s <= bout.end_s + reach)
+    return bool(here.any() and rhythm.score[here].mean() >= params.bout_score)
+
+
+def _parts(moving: Bools, merge: float) -> list[tuple[int, int]]:
+    """Runs of movement, those closer than `merge` samples joined."""
+    parts: list[tuple[int, int]] = []
+    for first, end in runs(moving):
+        if parts and first - parts[-1][1] < merge:
+            parts[-1] = (parts[-1][0], end)
+        else:
+            parts.append((first, end))
+    return parts
+
+
+def _offset(x: Floats, i: int) -> float:
+    """Where between the samples the maximum is, within ±0.5: a parabola through three of them."""
+    bend = x[i - 1] - 2.0 * x[i] + x[i + 1]
+    return 0.0 if bend >= 0.0 else float(0.5 * (x[i - 1] - x[i + 1]) / bend)
+
+
+def _together(times: list[float], longest: float, least: int) -> list[float]:
+    """Times that stand in a row of at least `least`, none further than `longest` from the next."""
+    kept: list[float] = []
+    row: list[float] = []
+    for t in times:
+        if row and t - row[-1] > longest:
+            kept += row if len(row) >= least else []
+            row = []
+        row.append(t)
+    return kept + (row if len(row) >= least else [])
+
+
+def _unbroken(times: list[float], bout: Bout) -> list[list[float]]:
+    """Steps of a bout between its stops."""
+    ends = {a for a, _ in bout.stops}
+    rows: list[list[float]] = [[]]
+    for t in times:
+        rows[-1].append(t)
+        if t in ends:
+            rows.append([])
+    return rows
+
+
+def _sides(
+    times: list[float], yaw_rate: Floats, step_s: float, rate_hz: float, params: LumbarParams
+) -> list[Side] | None:
+    """Foot of each step, None where the yaw does not alternate with them.
+
+    The yaw about its mean over a stride is left (positive) when the right foot is in front.
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    yaw = np.cumsum(yaw_rate) / rate_hz
+    stride = max(3, round(2.0 * step_s * rate_hz))
+    swing = yaw - uniform_filter1d(uniform_filter1d(yaw, stride, mode="nearest"), stride, mode="nearest")
+    at = swing[[min(len(swing) - 1, round(t * rate_hz)) for t in times]]
+    # where a maximum was missed, two steps went by
+    gone = np.maximum(1, np.round(np.diff(times) / step_s)).astype(int)
+    parity = (-1.0) ** np.concatenate(([0], np.cumsum(gone)))
+    agreement = float((at * parity).sum() / max(np.abs(at).sum(), 1e-12))
+    if len(times) < params.side_steps or abs(agreement) < params.side_share:
+        return None
+    return ["right" if p * agreement > 0.0 else "left" for p in parity]
+
+
+def _nothing(segment: Segment, code: str, message: str) -> Steps:
+    return Steps((), (), segment, (Notice(code, message, segment),))

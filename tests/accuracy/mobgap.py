@@ -1,0 +1,81 @@
+"""mobgap_lowback for tests: takes of one lower-back sensor and the walking that INDIP found in them.
+
+INDIP (pressure insoles and foot sensors) is the reference of the initial contacts; its walking periods leave
+out what it does not call walking, so steps outside of them are no errors (the stereophotogrammetry has one
+more walk in Test11).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.io import loadmat
+
+from core.frames import GRAVITY, Floats
+from core.recording import ImuStream, Recording, UniformRecording
+from core.timeline import synchronise
+from tests.data import data_folder
+
+TRIALS = (("Test5", "Trial1"), ("Test5", "Trial2"), ("Test11", "Trial1"))
+"""Two straight walks of 5 m, and daily life for two minutes: one healthy older adult."""
+
+
+@dataclass(frozen=True, eq=False)
+class Period:
+    """One walking period of the reference: range, initial contacts (s) and their feet, its own cadence."""
+
+    start_s: float
+    end_s: float
+    contacts: Floats
+    sides: tuple[str, ...]
+    cadence_spm: float
+
+
+def _signals(trial: tuple[str, str]) -> object:
+    data = loadmat(
+        data_folder("mobgap_lowback", "data", "lab", "HA", "001") / "data.mat",
+        squeeze_me=True,
+        struct_as_record=False,
+    )["data"]
+    return getattr(getattr(data.TimeMeasure1, trial[0]), trial[1])
+
+
+@cache
+def recording(trial: tuple[str, str]) -> Recording:
+    """The lower-back sensor of a trial, mapped to the pelvis."""
+    sensor = _signals(trial).SU.LowerBack  # type: ignore[attr-defined]
+    n = len(sensor.Acc)
+    stream = ImuStream(
+        device_id="LowerBack",
+        source="data.mat",
+        t_s=np.arange(n) / 100.0,
+        acc=np.array(sensor.Acc, np.float64) * GRAVITY,
+        gyr=np.radians(np.array(sensor.Gyr, np.float64)),
+        mag=None,
+        quat=None,
+        rate_hz=100.0,
+        clock="index",
+        digest="-".join(trial),
+    )
+    return Recording({"LowerBack": stream}, {"LowerBack": "pelvis"})
+
+
+@cache
+def uniform(trial: tuple[str, str]) -> UniformRecording:
+    """The same on the uniform axis."""
+    return synchronise(recording(trial))
+
+
+@cache
+def periods(trial: tuple[str, str]) -> tuple[Period, ...]:
+    """Walking periods of INDIP; a contact written down twice within 0.1 s counts once."""
+    found = []
+    reference = _signals(trial).Standards.INDIP.ContinuousWalkingPeriod  # type: ignore[attr-defined]
+    for w in np.atleast_1d(reference):
+        times = np.asarray(w.InitialContact_Event, np.float64)
+        whole = np.isfinite(times) & np.concatenate(([True], np.diff(times) > 0.1))
+        feet = tuple(str(s).lower() for s in np.asarray(w.InitialContact_LeftRight)[whole])
+        found.append(Period(float(w.Start), float(w.End), times[whole], feet, float(w.Cadence)))
+    return tuple(found)
