@@ -193,7 +193,9 @@ def _run_stages(
     )
     reached |= {"events": found, "tracks": tracks}
     start("poses")
-    lengths, assumed = body.nominal_body(uniform.subject.height_m, uniform.subject.standing_width_m)
+    lengths, assumed = body.nominal_body(
+        uniform.subject.height_m, uniform.subject.standing_width_m, uniform.subject.shoe
+    )
     contacts = {
         side: body.contact_mask(uniform.t_s, found.times(side, "ic"), found.times(side, "tc"))
         for side in SIDES

@@ -15,6 +15,7 @@ import numpy as np
 
 from core.errors import Notice, ParameterError, SignalError
 from core.frames import PROTOCOLS, SEGMENTS, Bools, Floats, Protocol, Segment
+from core.shoe import Shoe
 from core.standing import check_standing
 
 
@@ -65,11 +66,13 @@ class Subject:
     height_m : body height, 0.5 to 2.5 m.
     standing_width_m : between the middles of the ankles while standing at the beginning, 0 to 0.8 m.
     standing_angles_deg : joint angles in that standing by goniometer, names as `core.standing.NAMES`.
+    shoe : the shape of its sole.
     """
 
     height_m: float | None = None
     standing_width_m: float | None = None
     standing_angles_deg: Mapping[str, float] = field(default_factory=dict, hash=False)
+    shoe: Shoe | None = None
 
     def __post_init__(self) -> None:
         if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:

@@ -21,6 +21,7 @@ from core.body.poses import Poses
 from core.errors import Notice
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from core.rotation import rotate
+from core.shoe import Shoe
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
@@ -46,16 +47,18 @@ class AnchorParams:
 
 
 def nominal_body(
-    height_m: float | None, standing_width_m: float | None = None
+    height_m: float | None, standing_width_m: float | None = None, shoe: Shoe | None = None
 ) -> tuple[BodyModel, tuple[Notice, ...]]:
     """Body model from height in m, or from 1.70 m with a notice `height_assumed` when nobody gave one."""
+    body = replace(BodyModel.from_height(height_m or NOMINAL_HEIGHT_M), standing_width=standing_width_m)
+    if shoe is not None:
+        body = replace(body, sole_back=shoe.back_m, sole_front=shoe.front_m, sole_tip_up=shoe.tip_up_m)
     if height_m is not None:
-        return replace(BodyModel.from_height(height_m), standing_width=standing_width_m), ()
+        return body, ()
     message = (
         f"Body height is not given; the figure is drawn with {NOMINAL_HEIGHT_M:.2f} m. Enter the height "
         "to see true proportions and distances; joint angles do not depend on it."
     )
-    body = replace(BodyModel.from_height(NOMINAL_HEIGHT_M), standing_width=standing_width_m)
     return body, (Notice("height_assumed", message, severity="info"),)
 
 

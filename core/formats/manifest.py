@@ -18,6 +18,7 @@ from core.formats.aliases import segment_named
 from core.formats.json_tree import Node, no_constant, unique
 from core.frames import GRAVITY, PROTOCOLS, SEGMENTS, Protocol, Segment
 from core.recording import Subject, check_belt
+from core.shoe import Shoe
 
 ACC_UNITS: Final[dict[str, float]] = {
     "m/s2": 1.0,
@@ -126,8 +127,8 @@ def parse_manifest(data: bytes) -> Manifest:
     ManifestError
         manifest_bad_json, manifest_unknown_key, manifest_bad_value, unknown_segment, duplicate_segment,
         unknown_protocol, height_implausible, standing_width_implausible, unknown_angle,
-        standing_angle_implausible, unknown_unit, belt_speed_implausible, belt_speed_without_treadmill; the
-        message names the path inside the manifest.
+        standing_angle_implausible, shoe_implausible, unknown_unit, belt_speed_implausible,
+        belt_speed_without_treadmill; the message names the path inside the manifest.
     """
     if len(data) > MAX_BYTES:
         raise ManifestError(
@@ -169,14 +170,26 @@ def manifest_of(root: object) -> Manifest:
 
 
 def _subject(node: Node) -> Subject:
-    node.only("height_m", "standing_width_m", "standing_angles_deg")
+    node.only("height_m", "standing_width_m", "standing_angles_deg", "shoe")
     standing = node.child("standing_angles_deg")
     angles = {name: value for name in standing.keys if (value := standing.number(name)) is not None}
     try:
-        return Subject(node.number("height_m"), node.number("standing_width_m"), angles)
+        return Subject(
+            node.number("height_m"), node.number("standing_width_m"), angles, _shoe(node.child("shoe"))
+        )
     except ParameterError as error:
         key = _SUBJECT_KEYS[error.code]
         raise ManifestError(error.code, f"subject.{key}: {error.message}") from error
+
+
+def _shoe(node: Node) -> Shoe | None:
+    node.only("back_m", "front_m", "tip_up_m")
+    if not node.keys:
+        return None
+    back, front = node.number("back_m"), node.number("front_m")
+    if back is None or front is None:
+        raise ManifestError("manifest_bad_value", f"{node.path} needs both back_m and front_m, or neither.")
+    return Shoe(back, front, node.number("tip_up_m") or 0.0)
 
 
 _SUBJECT_KEYS: Final = {
@@ -184,6 +197,7 @@ _SUBJECT_KEYS: Final = {
     "standing_width_implausible": "standing_width_m",
     "unknown_angle": "standing_angles_deg",
     "standing_angle_implausible": "standing_angles_deg",
+    "shoe_implausible": "shoe",
 }
 """What `Subject` refuses → where the manifest says it."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any, Final, cast
 
 import numpy as np
@@ -20,6 +21,7 @@ from core.errors import FormatError, Notice, SagittalError
 from core.formats.draft import signal_digest
 from core.frames import Floats, Protocol, Segment
 from core.recording import ImuStream, Recording, Subject
+from core.shoe import Shoe
 
 MAGIC: Final = b"PAR1"
 SCHEMA: Final = 1
@@ -80,6 +82,7 @@ def _metadata(r: Recording) -> dict[str, object]:
             "height_m": r.subject.height_m,
             "standing_width_m": r.subject.standing_width_m,
             "standing_angles_deg": dict(r.subject.standing_angles_deg),
+            "shoe": None if r.subject.shoe is None else asdict(r.subject.shoe),
         },
         "protocol": r.protocol,
         "belt_speed_mps": r.belt_speed_mps,
@@ -184,7 +187,10 @@ def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Reco
         streams=streams,
         segments=cast("dict[str, Segment | None]", segments),  # Recording checks them
         subject=Subject(
-            subject["height_m"], subject.get("standing_width_m"), subject.get("standing_angles_deg") or {}
+            subject["height_m"],
+            subject.get("standing_width_m"),
+            subject.get("standing_angles_deg") or {},
+            None if (shoe := subject.get("shoe")) is None else Shoe(**shoe),
         ),
         protocol=cast("Protocol", info["protocol"]),
         mounting=mounting,

@@ -198,6 +198,7 @@ def _said(declared: Subject, read: Subject) -> Subject:
         read.height_m if height is None else height,
         read.standing_width_m if width is None else width,
         {**read.standing_angles_deg, **declared.standing_angles_deg},
+        declared.shoe or read.shoe,
     )
 
 

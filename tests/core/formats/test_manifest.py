@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from core.errors import ManifestError
 from core.formats.aliases import segment_in, segment_named
 from core.formats.manifest import Channels, manifest_of, parse_manifest
+from core.shoe import Shoe
 
 SOURCE = {"file": "a.csv", "acc_unit": "g", "columns": {"foot_l": {"acc": ["x", "y", "z"]}}}
 
@@ -18,7 +19,11 @@ SOURCE = {"file": "a.csv", "acc_unit": "g", "columns": {"foot_l": {"acc": ["x", 
 def test_a_full_manifest_is_understood() -> None:
     m = manifest_of(
         {
-            "subject": {"height_m": 1.75, "standing_angles_deg": {"knee_flexion_l": 8, "pelvis_tilt": None}},
+            "subject": {
+                "height_m": 1.75,
+                "standing_angles_deg": {"knee_flexion_l": 8, "pelvis_tilt": None},
+                "shoe": {"back_m": 0.06, "front_m": 0.2},
+            },
             "protocol": "walk",
             "mounting": {"pelvis": "sacrum, face backwards"},
             "sensors": {"00B40B91": "pelvis", "00B40C44": None, "x": "RightLowerLeg"},
@@ -29,6 +34,7 @@ def test_a_full_manifest_is_understood() -> None:
     )
     assert m.subject.height_m == 1.75
     assert m.subject.standing_angles_deg == {"knee_flexion_l": 8.0}
+    assert m.subject.shoe == Shoe(0.06, 0.2, 0.0)
     assert dict(m.sensors) == {"00B40B91": "pelvis", "00B40C44": None, "x": "shank_r"}
     spec = m.source_of("folder/a.csv")
     assert spec is not None
@@ -73,6 +79,9 @@ def test_an_empty_manifest_says_nothing() -> None:
             "manifest_bad_value",
             "subject.standing_angles_deg.knee_flexion_l",
         ),
+        ({"subject": {"shoe": {"back_m": 0.06}}}, "manifest_bad_value", "subject.shoe needs both"),
+        ({"subject": {"shoe": {"back_m": 6, "front_m": 0.19}}}, "shoe_implausible", "subject.shoe: back_m"),
+        ({"subject": {"shoe": {"length_m": 0.3}}}, "manifest_unknown_key", "subject.shoe.length_m"),
         ({"subject": {"height_m": "175"}}, "manifest_bad_value", "subject.height_m"),
         ({"subject": {"height_m": True}}, "manifest_bad_value", "subject.height_m"),
         ({"subject": []}, "manifest_bad_value", "subject"),

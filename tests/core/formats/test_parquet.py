@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from core.errors import FormatError, Notice
 from core.formats import SourceFile, read_recording, write_recording
 from core.recording import ImuStream, Recording, Subject
+from core.shoe import Shoe
 from tests.core.formats.making import mt_file, signals, stream
 
 
@@ -25,7 +26,7 @@ def test_everything_that_was_known_comes_back() -> None:
     recording = Recording(
         {"a.b c": s, "two": stream("two", acc + 1, None)},
         {"a.b c": "pelvis", "two": None},
-        Subject(1.7, 0.2, {"knee_flexion_l": 8.0}),
+        Subject(1.7, 0.2, {"knee_flexion_l": 8.0}, Shoe(0.06, 0.2, 0.015)),
         "treadmill",
         {"pelvis": "sacrum, face backwards"},
         {"x.txt": "abc"},
