@@ -9,7 +9,7 @@ from core.simulate.patients import PATIENTS, Patient
 from core.simulate.phases import Phase, phase_table
 from core.simulate.script import Arc, Pivot, Script, Stand, Steps, Straight
 from core.simulate.scripts import SCRIPTS, Scenario, simulate_scenario
-from core.simulate.setup import Dropout, Setup
+from core.simulate.setup import Dropout, Lag, Setup
 from core.simulate.simulation import Simulation, simulate
 from core.simulate.soft_tissue import SoftTissue
 from core.simulate.squat import Squats, SquatSimulation, SquatTruth, simulate_squats
@@ -28,6 +28,7 @@ __all__ = [
     "Dipole",
     "Dropout",
     "Hold",
+    "Lag",
     "Movement",
     "Patient",
     "Phase",

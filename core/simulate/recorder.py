@@ -83,7 +83,7 @@ def record(
     for (segment, path), number in zip(paths.items(), ids, strict=True):
         t = path.t_s[::every]
         ideal[segment] = measured = ideal_signals(path, every, setup.sampling, north, setup.dipoles)
-        if late := setup.late_s.get(segment, 0.0):
+        if late := sum(lag.late_s for lag in setup.lags if lag.segment == segment):
             measured = ideal_signals(path.later(late), every, setup.sampling, north, setup.dipoles)
         beyond[segment] = np.zeros(len(t), bool)
         if setup.noise is not None:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import pi
-from types import MappingProxyType
 
 from core.errors import ParameterError
 from core.frames import SEGMENTS, Segment
@@ -25,6 +23,21 @@ class Dropout:
 
 
 @dataclass(frozen=True)
+class Lag:
+    """A sensor whose clock lags: samples show what happened `late_s` (−1 to 1) earlier than they say."""
+
+    segment: Segment
+    late_s: float
+
+    def __post_init__(self) -> None:
+        if not abs(self.late_s) <= 1.0:
+            raise ParameterError(
+                "clock_offset_range",
+                f"The clock at {self.segment} lags {self.late_s:g} s; expected −1 to 1 s.",
+            )
+
+
+@dataclass(frozen=True)
 class Setup:
     """How it is recorded.
 
@@ -35,8 +48,7 @@ class Setup:
     impacts : contacts of the feet shake the sensors.
     acc_range, gyr_range : full scale per axis, m/s² and rad/s; real sensors cut off what is beyond.
     dipoles : iron in the room. packet_loss : share of lost samples, in short runs, 0 to 0.5.
-    late_s : segment → by how much the clock of its sensor lags, so that its samples come that much later on
-        the common axis than what they show happened; at most 1 s.
+    dropouts, lags : of single sensors.
     worn : the sensors that are recorded.
     """
 
@@ -51,7 +63,7 @@ class Setup:
     dipoles: tuple[Dipole, ...] = ()
     packet_loss: float = 0.0
     dropouts: tuple[Dropout, ...] = ()
-    late_s: Mapping[Segment, float] = field(default_factory=lambda: MappingProxyType({}))
+    lags: tuple[Lag, ...] = ()
     worn: tuple[Segment, ...] = SEGMENTS
 
     def __post_init__(self) -> None:
@@ -66,8 +78,3 @@ class Setup:
                 "range_not_positive",
                 f"Ranges {self.acc_range:g} m/s² and {self.gyr_range:g} rad/s; expected above 0.",
             )
-        for segment, late in self.late_s.items():
-            if not abs(late) <= 1.0:
-                raise ParameterError(
-                    "clock_offset_range", f"The clock at {segment} lags {late:g} s; expected −1 to 1 s."
-                )

@@ -9,7 +9,7 @@ import pytest
 
 from core.errors import ParameterError
 from core.frames import Floats, Segment
-from core.simulate import Dropout, Setup, Simulation, Stand, Straight, simulate
+from core.simulate import Dropout, Lag, Setup, Simulation, Stand, Straight, simulate
 from core.timeline import synchronise
 
 SCRIPT = (Stand(3.0), Straight(6.4, 0.64, 0.54), Stand(2.0))
@@ -43,7 +43,7 @@ def _lag_s(early: Floats, late: Floats, rate_hz: float) -> float:
 @pytest.mark.parametrize("late_s", [0.010, 0.0137, -0.025])
 def test_a_lagging_clock_shows_everything_later(late_s: float) -> None:
     plain = simulate(SCRIPT, seed=4, setup=EXACT)
-    lagging = simulate(SCRIPT, seed=4, setup=replace(EXACT, late_s={"thigh_l": late_s}))
+    lagging = simulate(SCRIPT, seed=4, setup=replace(EXACT, lags=(Lag("thigh_l", late_s),)))
     a, b = _stream(plain, "thigh_l"), _stream(lagging, "thigh_l")
     assert np.array_equal(a.t_s, b.t_s)
     assert _lag_s(a.gyr[:, 2], b.gyr[:, 2], 100.0) == pytest.approx(late_s, abs=5e-4)
@@ -53,7 +53,7 @@ def test_a_lagging_clock_shows_everything_later(late_s: float) -> None:
 
 def test_a_lag_of_whole_samples_moves_them() -> None:
     plain = simulate(SCRIPT, seed=4, setup=EXACT)
-    lagging = simulate(SCRIPT, seed=4, setup=replace(EXACT, late_s={"foot_r": 0.05}))
+    lagging = simulate(SCRIPT, seed=4, setup=replace(EXACT, lags=(Lag("foot_r", 0.05),)))
     a, b = _stream(plain, "foot_r"), _stream(lagging, "foot_r")
     # the grid of nodes differs in places, so the two splines do by less than the noise of a sensor
     assert b.gyr[10:-10] == pytest.approx(a.gyr[5:-15], abs=1e-3)
@@ -62,7 +62,7 @@ def test_a_lag_of_whole_samples_moves_them() -> None:
 
 def test_a_lag_survives_the_common_time_axis() -> None:
     """Counters alone cannot show it: this is what makes it dangerous (spec/estimators.md §3.3, §7)."""
-    recording = simulate(SCRIPT, seed=4, setup=replace(EXACT, late_s={"thigh_l": 0.02})).recording
+    recording = simulate(SCRIPT, seed=4, setup=replace(EXACT, lags=(Lag("thigh_l", 0.02),))).recording
     plain = synchronise(simulate(SCRIPT, seed=4, setup=EXACT).recording)
     uniform = synchronise(recording)
     lag = _lag_s(plain.sensors["thigh_l"].gyr[:, 2], uniform.sensors["thigh_l"].gyr[:, 2], uniform.rate_hz)
@@ -104,7 +104,6 @@ def test_a_sensor_that_fails_halfway_is_known_as_lost() -> None:
 @pytest.mark.parametrize(
     ("wrong", "code"),
     [
-        ({"late_s": {"foot_l": 3.0}}, "clock_offset_range"),
         ({"acc_range": 0.0}, "range_not_positive"),
         ({"gyr_range": float("nan")}, "range_not_positive"),
     ],
@@ -113,3 +112,9 @@ def test_an_impossible_setup_is_refused(wrong: dict[str, object], code: str) -> 
     with pytest.raises(ParameterError) as caught:
         Setup(**wrong)  # type: ignore[arg-type]
     assert caught.value.code == code
+
+
+def test_a_lag_of_seconds_is_refused() -> None:
+    with pytest.raises(ParameterError) as caught:
+        Lag("foot_l", 3.0)
+    assert caught.value.code == "clock_offset_range"
