@@ -100,15 +100,13 @@ def edited_events(events: GaitEvents, edits: Iterable[Edit], duration_s: float) 
     for edit in edits:
         if not edit.kind.endswith("event"):
             continue
-        if edit.kind == "add_event":
-            _put(found, edit, edit.time_s, duration_s)
-            continue
-        i = _place(found, edit)
-        old = found.pop(i)
-        if edit.kind == "move_event":
-            to_s = cast("float", edit.to_s)
+        to_s = edit.time_s if edit.to_s is None else edit.to_s
+        _refuse_outside(to_s, duration_s)
+        if edit.kind != "add_event":
+            old = found.pop(_place(found, edit))
             _refuse_passing(found, edit, old.time_s, to_s)
-            _put(found, edit, to_s, duration_s)
+        if edit.kind != "delete_event":
+            _put(found, edit, to_s)
     found.sort(key=lambda e: e.time_s)
     return replace(events, events=tuple(found))
 
@@ -144,13 +142,16 @@ def _place(found: Sequence[GaitEvent], edit: Edit) -> int:
     )
 
 
-def _put(found: list[GaitEvent], edit: Edit, time_s: float, duration_s: float) -> None:
+def _refuse_outside(time_s: float, duration_s: float) -> None:
     if not 0.0 <= time_s <= duration_s:
         raise ParameterError(
             "event_outside",
             f"{time_s:.3f} s is outside the recording; expected 0 to {duration_s:.3f} s.",
             t_s=time_s,
         )
+
+
+def _put(found: list[GaitEvent], edit: Edit, time_s: float) -> None:
     near = next((e for e in found if e.side == edit.side and abs(e.time_s - time_s) < APART_S), None)
     if near is not None:
         raise ParameterError(

@@ -25,6 +25,7 @@ from server.api import (
     jobs,
     patients,
     reports,
+    reviews,
     sessions,
     sign_in,
     users,
@@ -98,7 +99,7 @@ def create_app(settings: Settings) -> FastAPI:
     problems.install(app)
 
     api = APIRouter(prefix="/api/v1")
-    for part in (sign_in, patients, sessions, files, analyses, reports, jobs, users, audit_log):
+    for part in (sign_in, patients, sessions, files, analyses, reports, reviews, jobs, users, audit_log):
         api.include_router(part.router)
 
     @api.get("/openapi.json", include_in_schema=False)

@@ -28,12 +28,15 @@ from server.storage.db import Database
 from server.storage.tables import edit as rows
 from server.storage.tables import now, user
 
+_Value = TypeVar("_Value")
+
 UNDO: Final = "undo"
 NOT_READ: Final = ("poses.parquet", signals.NAME)
 """Files that only the replay and the drawing of signals need."""
 
-TAKES_KEPT, RESULTS_KEPT = 3, 12
-"""Finished analyses and results of edits kept in memory: those at work, some 20 MB for ten minutes each."""
+TAKES_KEPT, RESULTS_KEPT, PARTS_KEPT = 3, 12, 24
+"""Finished analyses, results of edits and signals of one sensor kept in memory: those at work. Ten minutes
+are some 20 MB, 1 MB and 2 MB."""
 
 ACTIONS: Final = {
     "move_event": "event.moved",
@@ -133,10 +136,16 @@ def bundle(blobs: BlobStore, found: analyses.Analysis, edits: Edits) -> Bundle:
     return stored if result is None else reviewed(stored, result, edits.edits)
 
 
+def kept(key: tuple[str, ...], make_value: Callable[[], _Value]) -> _Value:
+    """A part of a finished analysis that is looked at again and again, by a key that begins with its id."""
+    value: _Value = _parts.get(key, make_value)
+    return value
+
+
 def forget() -> None:
     """Keep nothing in memory: what is erased on disk must not stay here."""
-    _takes.clear()
-    _results.clear()
+    for memory in (_takes, _results, _parts):
+        memory.clear()
 
 
 def make(
@@ -235,9 +244,6 @@ def _measure(blobs: BlobStore, found: analyses.Analysis, edits: tuple[Edit, ...]
     return measure(known, edits)
 
 
-_Value = TypeVar("_Value")
-
-
 class _Kept(Generic[_Value]):
     """The values used last, made at most once at a time."""
 
@@ -269,3 +275,4 @@ class _Kept(Generic[_Value]):
 
 _takes: _Kept[Take] = _Kept(TAKES_KEPT)
 _results: _Kept[Measured] = _Kept(RESULTS_KEPT)
+_parts: _Kept[Any] = _Kept(PARTS_KEPT)

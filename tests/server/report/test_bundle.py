@@ -7,55 +7,18 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from core.calibration.result import Calibration, SegmentCalibration
-from core.errors import FormatError, Notice
-from core.measure import measure
+from core.errors import FormatError
 from core.parameters.temporal import NAMES
-from core.pipeline import Analysis
-from core.quality import QualityReport
-from core.recording import SensorSignals, Subject, UniformRecording
 from server.report.bundle import load_bundle, read_angles, read_poses
 from server.report.exports import analysis_files, angles_parquet
 from tests.server import walk
-
-
-def analysis(*, reached: bool = True) -> Analysis:
-    n = len(walk.angles().t_s)
-    zeros = np.zeros((n, 3))
-    sensor = SensorSignals("A1", zeros, zeros, None, np.ones(n, bool), np.zeros(n, bool))
-    problem = None if reached else Notice("no_rest", "No rest found.", severity="error")
-    segment = SegmentCalibration(np.eye(3), np.array([0.01, 0.0, np.nan]), 9.8, "walking_direction", 0.9)
-    angles = walk.angles()
-    return Analysis(
-        recording=UniformRecording(walk.angles().t_s, 100.0, {"pelvis": sensor}, Subject(1.75), "walk", {}),
-        quality=QualityReport("good", (), 12.0, 100.0, MappingProxyType({}), ((0.0, 2.0),), ()),
-        calibration=Calibration(
-            {"pelvis": segment},
-            ((0.0, 2.0),),
-            ((2.0, 9.0),),
-            (0.0, 2.0),
-            np.zeros(n, bool),
-            "walking_direction",
-        )
-        if reached
-        else None,
-        orientations=None,
-        poses=walk.poses() if reached else None,
-        feet=None,
-        angles=angles if reached else None,
-        problem=problem,
-        notices=(Notice("gap", "0.3 s lost.", "pelvis", 1.0), *(() if problem is None else (problem,))),
-        provenance={"input_sha256": {"a.txt": "ff"}, "version": "1"},
-        tracks=walk.tracks() if reached else None,
-        measured=measure(walk.tracks()) if reached else None,
-    )
+from tests.server.analysed import analysis
 
 
 @pytest.fixture(scope="module")

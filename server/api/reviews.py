@@ -1,0 +1,148 @@
+"""Review of a session's analysis: events and strides as they count, edits, undo, the signals behind them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+from fastapi.responses import JSONResponse
+from starlette.responses import Response
+
+from core.edits import edit_of
+from server import audit
+from server import review_schemas as schemas
+from server.api.context import Blobs, Db, Id
+from server.api.documents import refusals
+from server.api.downloads import BINARY, attachment
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.report.exports import events_csv, parameter_row, strides_csv
+from server.report.wording import excluded_words
+from server.services import analyses, reviews, signals
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+
+router = APIRouter(prefix="/sessions/{session_id}", tags=["review"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+Reviewer = Annotated[Identity, require(Action.REVIEW)]
+Seen = Annotated[
+    int | None,
+    Query(ge=0, le=2**53, description="the version that was seen; an older one than the newest is refused"),
+]
+_REVIEW: dict[int | str, dict[str, Any]] = {200: {"model": schemas.Review}}
+_MADE: dict[int | str, dict[str, Any]] = {201: {"model": schemas.Review}, **refusals(409)}
+_CSV: dict[int | str, dict[str, Any]] = {
+    200: {"description": "The table", "content": {"text/csv": {"schema": BINARY}}}
+}
+
+
+@router.get("/edits", response_model=None, responses=_REVIEW)
+def read_review(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+    """Events, strides and parameters as they count now, and the edits that made them so."""
+    return _review(blobs, *_opened(db, who, session_id, "review"))
+
+
+@router.post("/edits", status_code=201, response_model=None, responses=_MADE)
+def make_edit(
+    session_id: Id, body: schemas.EditNew, db: Db, blobs: Blobs, who: Reviewer, seen: Seen = None
+) -> Response:
+    """Move, add or delete an event, leave a stride out or count it; everything is measured again."""
+    edit = edit_of(body.model_dump(exclude_none=True))
+    found, edits = reviews.make(db, blobs, who, session_id, edit, seen=seen)
+    return _review(blobs, found, edits, 201)
+
+
+@router.delete("/edits", response_model=None, responses=_REVIEW | refusals(409))
+def undo_edit(session_id: Id, db: Db, blobs: Blobs, who: Reviewer, seen: Seen = None) -> Response:
+    """Undo the last edit that is not undone yet."""
+    return _review(blobs, *reviews.undo(db, who, session_id, seen=seen))
+
+
+@router.get("/events.csv", response_class=Response, responses=_CSV)
+def read_events(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+    """Contacts and foot-offs as they count, edited ones with the source "manual"."""
+    found, edits = _opened(db, who, session_id, "events")
+    events = reviews.bundle(blobs, found, edits).events
+    return attachment(events_csv(events), f"events-{session_id[:8]}.csv")
+
+
+@router.get("/strides.csv", response_class=Response, responses=_CSV)
+def read_strides(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+    """Every stride with its parameters, as it counts."""
+    found, edits = _opened(db, who, session_id, "strides")
+    result = reviews.measured(blobs, found, edits)
+    content = (
+        analyses.file_bytes(blobs, found, "strides.csv")
+        if result is None
+        else strides_csv(result.strides, result.columns)
+    )
+    return attachment(content, f"strides-{session_id[:8]}.csv")
+
+
+@router.get("/signals", response_model=list[schemas.Lane])
+def list_signals(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> tuple[signals.Lane, ...]:
+    """Which signals there are: derived ones of feet and joints, raw ones of every sensor."""
+    found, _ = _shown(db, session_id)
+    return signals.lanes(blobs, found)
+
+
+@router.get("/signals/{name}", response_model=None, responses={200: {"model": schemas.Piece}})
+def read_signal(
+    session_id: Id,
+    name: str,
+    db: Db,
+    blobs: Blobs,
+    who: Reader,
+    start_s: Annotated[float, Query(ge=0, le=1e6, allow_inf_nan=False)] = 0.0,
+    end_s: Annotated[float, Query(ge=0, le=1e6, allow_inf_nan=False)] = 1e6,
+    points: Annotated[int, Query(ge=1, le=signals.MOST_POINTS)] = 1000,
+) -> Response:
+    """A window of a signal in at most so many parts, the least and the greatest value of each."""
+    found, _ = _shown(db, session_id)
+    return JSONResponse(asdict(signals.piece(blobs, found, name, start_s, end_s, points)))
+
+
+def _shown(db: Database, session_id: str) -> tuple[analyses.Analysis, reviews.Edits]:
+    with db.read() as c:
+        found = analyses.shown(c, session_id)
+        return found, reviews.edits_of(c, found.id)
+
+
+def _opened(
+    db: Database, who: Identity, session_id: str, what: str
+) -> tuple[analyses.Analysis, reviews.Edits]:
+    with db.write() as c:
+        found = analyses.shown(c, session_id)
+        audit.record(c, who, f"{what}.opened", "session", session_id, {"analysis_id": found.id})
+        return found, reviews.edits_of(c, found.id)
+
+
+def _review(blobs: BlobStore, found: analyses.Analysis, edits: reviews.Edits, status: int = 200) -> Response:
+    """Written without a model: two thousand events would be checked longer than they are measured."""
+    bundle = reviews.bundle(blobs, found, edits)
+    content = {
+        "analysis_id": found.id,
+        "editable": reviews.take(blobs, found).tracks is not None,
+        "version": edits.version,
+        "edits": [{"seq": m.seq, "by": m.by, "at": m.at.isoformat(), **m.edit.to_json()} for m in edits.made],
+        "events": [
+            {"side": e.side, "kind": e.kind, "time_s": round(e.time_s, 6), "source": e.source}
+            for e in bundle.events.events
+        ],
+        "strides": [
+            {
+                "side": s.side,
+                "start_s": round(s.start_s, 6),
+                "tc_s": None if s.tc_s is None else round(s.tc_s, 6),
+                "end_s": round(s.end_s, 6),
+                "flags": s.flags,
+                "excluded_by": s.excluded_by,
+                "excluded": None if s.excluded_reason is None else excluded_words(s.excluded_reason),
+            }
+            for s in bundle.strides.strides
+        ],
+        "parameters": [parameter_row(p) for p in bundle.parameters],
+    }
+    return JSONResponse(content, status_code=status)

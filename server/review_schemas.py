@@ -1,0 +1,91 @@
+"""What goes over the wire about a review: edits, events and strides as they count, signals."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from server.schemas import Line, Request, Response
+
+Seconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False, description="s from the start")]
+
+
+class EditNew(Request):
+    """A change of an event (move, add, delete) or a decision about a stride (exclude, include)."""
+
+    kind: Literal["move_event", "add_event", "delete_event", "exclude_stride", "include_stride"]
+    side: Literal["left", "right"]
+    time_s: Seconds = Field(description="of the event, or a moment inside the stride")
+    event: Literal["ic", "tc"] | None = Field(default=None, description="contact or foot-off; events only")
+    to_s: Seconds | None = Field(default=None, description="where the event is moved")
+    reason: Line | None = Field(default=None, description="why a stride is left out")
+
+
+class MadeEdit(Response):
+    """An edit that counts, by whom and when."""
+
+    seq: int
+    by: str | None
+    at: dt.datetime
+    kind: str
+    side: str
+    time_s: float
+    event: str | None = None
+    to_s: float | None = None
+    reason: str | None = None
+
+
+class Event(Response):
+    """A contact (ic) or foot-off (tc); its source is a detector, or "manual"."""
+
+    side: str
+    kind: str
+    time_s: float
+    source: str
+
+
+class ReviewedStride(Response):
+    """A stride: what the rules found about it, and whether and why it is left out."""
+
+    side: str
+    start_s: float
+    tc_s: float | None
+    end_s: float
+    flags: list[str]
+    excluded_by: Literal["rule", "person"] | None
+    excluded: str | None
+
+
+class Review(Response):
+    """Events, strides and parameters of an analysis as they count now; `version` grows with every change."""
+
+    analysis_id: str
+    editable: bool
+    version: int
+    edits: list[MadeEdit]
+    events: list[Event]
+    strides: list[ReviewedStride]
+    parameters: list[dict[str, Any]]
+
+
+class Lane(Response):
+    """A signal over time: what its lines are, its unit, which way is up; raw = as one sensor measured it."""
+
+    name: str
+    label: str
+    unit: str
+    up: str
+    lines: list[str]
+    raw: bool
+
+
+class Piece(Response):
+    """A window of a signal: of every part of `step_s` the least and the greatest value, null while lost."""
+
+    lane: Lane
+    start_s: float
+    step_s: float
+    low: dict[str, list[float | None]]
+    high: dict[str, list[float | None]]
