@@ -19,7 +19,7 @@ CONSTRAINT_MM: Final = (1.0, 10.0)
 
 OUT_OF_PLACE_PCT: Final = (20.0, 50.0)
 """Of the time in motion. Right walks have 0, with a turn on the spot 10 (neura_walk); feet whose headings are
-20° apart 25 to 100."""
+20° apart 58 to 97."""
 
 PHASE_PCT: Final = (12.0, 25.0)
 """Right walks have up to 3, those of one-sided patients too; a foot 0.2 s late 18, one sensor taken for both
