@@ -117,10 +117,12 @@ def mean_curve(curves: CycleCurves, variable: str, side: Side) -> MeanCurve:
     return MeanCurve(rows.mean(axis=0) if n else None, rows.std(axis=0, ddof=1) if n > 1 else None, n)
 
 
-def stride_figures(curves: CycleCurves) -> dict[str, dict[Side, Floats]]:
+def stride_figures(
+    curves: CycleCurves, figures: Mapping[str, CurveFigure] = FIGURES
+) -> dict[str, dict[Side, Floats]]:
     """Angle parameters of every stride: name → side → (strides,) degrees, NaN where undefined."""
     values: dict[str, dict[Side, Floats]] = {}
-    for name, figure in FIGURES.items():
+    for name, figure in figures.items():
         for side, rows in curves.curves.get(figure.variable, {}).items():
             part = np.degrees(rows[:, figure.start_pct : figure.end_pct + 1])
             if figure.statistic == "at":

@@ -1,0 +1,225 @@
+"""Session values → flags: each value against its limit, or why it cannot be held against it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal
+
+import numpy as np
+
+from core.anatomical import anatomical_curves
+from core.flags.rules import CURVES, RULES, SWING_TO_STANCE, Beyond, Kind, Rule
+from core.frames import SIDES, Side
+from core.norms.lookup import Norms
+from core.norms.speed import walking_speed
+from core.norms.tables import WBDS
+from core.parameters.flats import OTHER
+from core.parameters.kinematic import stride_figures
+from core.parameters.result import CycleCurves, Parameter
+
+Zero = Literal["anatomical", "standing"]
+
+SMALLEST: Final = 1e-6
+"""A side that is not larger than this has no ratio."""
+
+
+@dataclass(frozen=True)
+class Flag:
+    """One rule on one side: a value against a limit, never what a person has.
+
+    Parameters
+    ----------
+    side : of the value; of a ratio the side that is larger, None where there is no ratio.
+    value, unit : measured, mean over `n` counted strides. limit, beyond : exceeded when above or below it.
+    exceeded : None where it cannot be said, then `reason`: "angle_zero_standing" (the level needs
+        goniometer angles), "joint_missing", "no_strides", "gap", "no_controls" (no own control group has
+        the measure), "side_missing", or the parameter's own.
+    marked : beyond the second, stronger limit too.
+    zero : what an angle is measured from, None where its zero does not matter.
+    source : of the limit. verified : False = to be shown as "unverified cut-off".
+    note : "no_speed_matched_norm": the people of the limit walk faster than this person;
+        "sides_stand_differently": the difference of two angles from standing contains that of the posture;
+        "late_foot_off": our foot-off is 0.07 s later than a walkway's on both sides, which makes a ratio of
+        swing times larger and one of stance times smaller by a few hundredths.
+    """
+
+    name: str
+    side: Side | None
+    measure: str
+    kind: Kind
+    value: float | None
+    unit: str
+    limit: float | None
+    beyond: Beyond
+    exceeded: bool | None
+    source: str
+    verified: bool
+    n: int = 0
+    marked: bool = False
+    zero: Zero | None = None
+    reason: str | None = None
+    note: str | None = None
+
+
+@dataclass(frozen=True)
+class _Value:
+    mean: float | None
+    n: int = 0
+    reason: str | None = None
+
+
+@dataclass(frozen=True)
+class _Values:
+    """What was measured, by measure and side: parameters, angles from standing, anatomical angles."""
+
+    plain: Mapping[tuple[str, Side], _Value]
+    standing: Mapping[tuple[str, Side], _Value] = field(default_factory=dict)
+    anatomical: Mapping[tuple[str, Side], _Value] = field(default_factory=dict)
+
+
+def flags(
+    curves: CycleCurves | None,
+    parameters: Sequence[Parameter],
+    standing_deg: Mapping[str, float] | None = None,
+    height_m: float | None = None,
+    controls: Norms | None = None,
+) -> tuple[Flag, ...]:
+    """Hold every rule against both sides.
+
+    Parameters
+    ----------
+    curves : from standing; None without joint angles. parameters : of the session.
+    standing_deg : goniometer angles in standing (`core.standing`). height_m : makes speed dimensionless.
+    controls : own control group (`ControlGroup.norms`) for rules whose limit is theirs.
+
+    Returns
+    -------
+    one flag per rule and side in the order of `RULES`, one per rule for ratios.
+    """
+    found = _values(curves, parameters, standing_deg or {})
+    speed = next((p.mean for p in parameters if p.name == "gait_speed_mps"), None)
+    slow = speed is not None and not walking_speed(speed, height_m).has_norm
+    result: list[Flag] = []
+    for rule in RULES:
+        limited = _with_limit(rule, controls)
+        if rule.kind == "ratio":
+            result.append(_ratio(limited, found))
+            continue
+        for side in SIDES:
+            flag = _difference(limited, side, found) if rule.kind == "difference" else None
+            flag = flag or _level(limited, side, found)
+            slower = slow and WBDS in limited.source and flag.note is None
+            result.append(replace(flag, note="no_speed_matched_norm") if slower else flag)
+    return tuple(result)
+
+
+def _values(
+    curves: CycleCurves | None, parameters: Sequence[Parameter], standing_deg: Mapping[str, float]
+) -> _Values:
+    plain = {(p.name, p.side): _Value(p.mean, p.n, p.reason) for p in parameters if p.side is not None}
+    for side in SIDES:
+        swing, stance = plain.get(("swing_time_s", side)), plain.get(("stance_time_s", side))
+        if swing is not None and stance is not None and swing.mean is not None and stance.mean:
+            plain[SWING_TO_STANCE, side] = _Value(swing.mean / stance.mean, min(swing.n, stance.n))
+    if curves is None:
+        return _Values(plain)
+    return _Values(plain, _figures(curves), _figures(anatomical_curves(curves, standing_deg)))
+
+
+def _figures(curves: CycleCurves) -> dict[tuple[str, Side], _Value]:
+    """Mean over the counted strides of what `CURVES` reads."""
+    found: dict[tuple[str, Side], _Value] = {}
+    for name, sides in stride_figures(curves, CURVES).items():
+        for side, values in sides.items():
+            counted = values[curves.used[side]]
+            whole = counted[np.isfinite(counted)]
+            if len(whole):
+                found[name, side] = _Value(float(whole.mean()), len(whole))
+            else:
+                found[name, side] = _Value(None, 0, "gap" if len(counted) else "no_strides")
+    return found
+
+
+def _with_limit(rule: Rule, controls: Norms | None) -> Rule:
+    """The rule with the limit of the own controls, where it has none and they know the measure."""
+    if rule.limit is not None or controls is None or rule.measure not in controls.values:
+        return rule
+    norm = controls.values[rule.measure]
+    sign = 1.0 if rule.beyond == "above" else -1.0
+    return replace(rule, limit=norm.mean + sign * 2.0 * norm.sd, source=f"{rule.source}: {norm.source}")
+
+
+def _level(rule: Rule, side: Side, found: _Values) -> Flag:
+    """A value of one side."""
+    key = rule.measure, side
+    if rule.measure not in CURVES:
+        return _flag(rule, side, found.plain.get(key) or _Value(None, 0, "no_strides"), None)
+    if key in found.anatomical:
+        return _flag(rule, side, found.anatomical[key], "anatomical")
+    value = found.standing.get(key) or _Value(None, 0, "joint_missing")
+    flag = _flag(rule, side, value, "standing")
+    if rule.level and value.mean is not None:
+        return replace(flag, exceeded=None, marked=False, reason="angle_zero_standing")
+    return flag
+
+
+def _difference(rule: Rule, side: Side, found: _Values) -> Flag:
+    """Other side minus this side, both from the same zero."""
+    own, other = (rule.measure, side), (rule.measure, OTHER[side])
+    free = CURVES[rule.measure].statistic == "range"
+    both = own in found.anatomical and other in found.anatomical
+    table = found.anatomical if both and not free else found.standing
+    zero: Zero | None = None if free else "anatomical" if both else "standing"
+    a, b = table.get(own), table.get(other)
+    if a is None or b is None:
+        return _flag(rule, side, _Value(None, 0, "joint_missing" if a is None else "side_missing"), zero)
+    if a.mean is None or b.mean is None:
+        return _flag(rule, side, _Value(None, 0, a.reason or "side_missing"), zero)
+    flag = _flag(rule, side, _Value(b.mean - a.mean, min(a.n, b.n)), zero)
+    return replace(flag, note="sides_stand_differently") if zero == "standing" else flag
+
+
+def _ratio(rule: Rule, found: _Values) -> Flag:
+    """Larger side over smaller side; the flag belongs to the larger."""
+    left, right = (found.plain.get((rule.measure, s)) or _Value(None, 0, "no_strides") for s in SIDES)
+    if left.mean is None or right.mean is None:
+        why = left.reason if left.mean is None else right.reason
+        return _flag(rule, None, _Value(None, 0, why or "side_missing"), None)
+    small, large = sorted((left.mean, right.mean))
+    if small <= SMALLEST:
+        return _flag(rule, None, _Value(None, 0, "near_zero"), None)
+    side: Side = "left" if left.mean >= right.mean else "right"
+    flag = _flag(rule, side, _Value(large / small, min(left.n, right.n)), None)
+    return flag if rule.measure == "step_length_m" else replace(flag, note="late_foot_off")
+
+
+def _flag(rule: Rule, side: Side | None, value: _Value, zero: Zero | None) -> Flag:
+    exceeded, reason, marked = None, value.reason, False
+    if value.mean is not None:
+        if rule.limit is None:
+            reason = "no_controls"
+        else:
+            exceeded = _beyond(value.mean, rule.limit, rule.beyond)
+            marked = rule.marked is not None and _beyond(value.mean, rule.marked, rule.beyond)
+    return Flag(
+        name=rule.name,
+        side=side,
+        measure=rule.measure,
+        kind=rule.kind,
+        value=value.mean,
+        unit=rule.unit,
+        limit=rule.limit,
+        beyond=rule.beyond,
+        exceeded=exceeded,
+        source=rule.source,
+        verified=rule.verified,
+        n=value.n,
+        marked=marked,
+        zero=zero if value.mean is not None else None,
+        reason=reason,
+    )
+
+
+def _beyond(value: float, limit: float, beyond: Beyond) -> bool:
+    return value > limit if beyond == "above" else value < limit

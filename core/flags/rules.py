@@ -1,0 +1,139 @@
+"""Limits that values are held against, each with its source (spec/clinic.md §3, §4).
+
+A limit nobody of us has read in its source is kept and marked unverified (spec §8.2). Not here: the range
+from foot-off to the swing peak of the knee (our foot-off is 0.07 s late, worth 20° of it), and hip abduction
+as a sign of circumduction (it stays normal when the pelvis is hiked; the path of the foot shows it).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from core.norms.tables import WBDS, rows
+from core.parameters.kinematic import CurveFigure
+
+Kind = Literal["value", "difference", "ratio"]
+Beyond = Literal["above", "below"]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """When a value is beyond its limit.
+
+    Parameters
+    ----------
+    measure : parameter, figure of `CURVES` or `SWING_TO_STANCE`.
+    kind : "value"; "difference" = other side − this side; "ratio" = larger side over smaller side.
+    limit : None = mean ± twice the sd of the clinic's own controls. marked : a second, stronger limit.
+    level : the value means nothing without the anatomical zero.
+    verified : False = "unverified cut-off": seen in the literature, not read in its source.
+    """
+
+    name: str
+    measure: str
+    kind: Kind
+    beyond: Beyond
+    limit: float | None
+    source: str
+    unit: str = "deg"
+    marked: float | None = None
+    level: bool = False
+    verified: bool = True
+
+
+CURVES: Final[Mapping[str, CurveFigure]] = {
+    "knee_flexion_peak_swing_deg": CurveFigure("knee_flexion", "max", 60, 85),
+    "knee_flexion_min_stance_deg": CurveFigure("knee_flexion", "min", 20, 60),
+    "knee_flexion_rom_deg": CurveFigure("knee_flexion", "range"),
+    "hip_flexion_min_deg": CurveFigure("hip_flexion", "min"),
+    "hip_flexion_rom_deg": CurveFigure("hip_flexion", "range"),
+    "ankle_dorsiflexion_max_swing_deg": CurveFigure("ankle_dorsiflexion", "max", 75, 100),
+    "ankle_dorsiflexion_rom_deg": CurveFigure("ankle_dorsiflexion", "range"),
+    "pelvis_obliquity_max_swing_deg": CurveFigure("pelvis_obliquity", "max", 60, 100),
+}
+"""What is read from the cycle curves, in the windows of spec/clinic.md §4."""
+
+SWING_TO_STANCE: Final = "swing_to_stance"
+"""Swing time over stance time of a side; its ratio between the sides is the overall temporal symmetry of
+Patterson et al. 2008."""
+
+_STIFF: Final = (
+    "cluster analysis of 50 people after stroke at their own speed; abstract read, authors not (clinic.md §4)"
+)
+_PRACTICE: Final = "clinical use; no source confirmed"
+_CONTROLS: Final = "mean ± 2 SD of own controls"
+_RATIO: Final = "Patterson et al. 2010, 95 % of healthy people; source not confirmed"
+_OVERALL: Final = "Patterson et al. 2008 (Arch Phys Med Rehabil 89:304): 0.9 to 1.1 in 24 healthy people"
+
+
+def _wbds(parameter: str) -> tuple[float, float, float]:
+    """Mean, sd and sd of left − right of one row, all adults."""
+    row = next(r for r in rows("kinematic_parameters_wbds") if r["parameter"] == parameter)
+    return float(row["all_mean"]), float(row["all_std"]), float(row["LR_diff_sd"])
+
+
+def _above_norm(name: str, measure: str, parameter: str, *, level: bool) -> Rule:
+    mean, sd, _ = _wbds(parameter)
+    return Rule(name, measure, "value", "above", mean + 2.0 * sd, f"mean + 2 SD, {WBDS}", level=level)
+
+
+def _apart(joint: str, variable: str, parameter: str) -> Rule:
+    limit = 2.0 * _wbds(parameter)[2]
+    source = f"2 SD of left − right, {WBDS}"
+    return Rule(f"{joint}_range_asymmetry", f"{variable}_rom_deg", "difference", "above", limit, source)
+
+
+RULES: Final[tuple[Rule, ...]] = (
+    Rule("stiff_knee", "knee_flexion_peak_swing_deg", "difference", "above", 17.0, _STIFF),
+    Rule("low_knee_flexion_swing", "knee_flexion_peak_swing_deg", "value", "below", 44.3, _STIFF, level=True),
+    Rule(
+        name="knee_hyperextension",
+        measure="knee_flexion_min_stance_deg",
+        kind="value",
+        beyond="below",
+        limit=0.0,
+        source=_PRACTICE,
+        marked=-5.0,
+        level=True,
+        verified=False,
+    ),
+    Rule(
+        name="low_dorsiflexion_swing",
+        measure="ankle_dorsiflexion_max_swing_deg",
+        kind="value",
+        beyond="below",
+        limit=0.0,
+        source=_PRACTICE,
+        level=True,
+        verified=False,
+    ),
+    Rule("flat_contact", "foot_pitch_ic_deg", "value", "below", 0.0, _PRACTICE, verified=False),
+    Rule("low_toe_clearance", "min_toe_clearance_m", "value", "below", None, _CONTROLS, "m"),
+    Rule("circumduction", "circumduction_m", "value", "above", None, _CONTROLS, "m"),
+    _above_norm(
+        "hip_hiking", "pelvis_obliquity_max_swing_deg", "pelvis_obliquity_swing_max(60-100%)", level=False
+    ),
+    _above_norm("low_hip_extension", "hip_flexion_min_deg", "hip_extension_peak", level=True),
+    _apart("hip", "hip_flexion", "hip_sagittal_ROM"),
+    _apart("knee", "knee_flexion", "knee_sagittal_ROM"),
+    _apart("ankle", "ankle_dorsiflexion", "ankle_ROM"),
+    Rule("step_length_asymmetry", "step_length_m", "ratio", "above", 1.08, _RATIO, "", verified=False),
+    Rule("stance_asymmetry", "stance_time_s", "ratio", "above", 1.05, _RATIO, "", verified=False),
+    Rule("swing_asymmetry", "swing_time_s", "ratio", "above", 1.06, _RATIO, "", verified=False),
+    Rule("temporal_asymmetry", SWING_TO_STANCE, "ratio", "above", 1.1, _OVERALL, ""),
+)
+"""In the order of a report: knee, ankle and foot, pelvis and hip, sides against each other."""
+
+PERRY_MPS: Final = (0.4, 0.8)
+"""Speeds between the classes of walking after stroke: Perry et al. 1995 (spec/clinic.md §3)."""
+
+Ambulation = Literal["household", "limited_community", "community"]
+
+
+def ambulation(speed_mps: float) -> Ambulation:
+    """Class of walking after stroke: below 0.4, to 0.8, above 0.8 m/s."""
+    if speed_mps < PERRY_MPS[0]:
+        return "household"
+    return "limited_community" if speed_mps <= PERRY_MPS[1] else "community"

@@ -1,0 +1,184 @@
+"""Values against limits, by hand: which side, which zero, which limit, and what cannot be said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from core.flags import RULES, Flag, ambulation, flags
+from core.frames import SIDES, Floats, Side
+from core.norms.controls import ControlSession, control_group
+from core.norms.tables import WBDS
+from core.parameters.result import CycleCurves, Parameter
+
+
+def curves(values: Mapping[str, tuple[float, float]], strides: int = 10) -> CycleCurves:
+    """Left and right of variables that are constant over the cycle, degrees."""
+    rows: dict[str, dict[Side, Floats]] = {
+        name: {s: np.full((strides, 101), np.radians(v)) for s, v in zip(SIDES, pair, strict=True)}
+        for name, pair in values.items()
+    }
+    return CycleCurves(
+        rows,
+        dict.fromkeys(SIDES, tuple(range(strides))),
+        {s: np.ones(strides, np.bool_) for s in SIDES},
+        {s: np.full(strides, 62.0) for s in SIDES},
+    )
+
+
+def sides(name: str, left: float | None, right: float | None, unit: str = "m") -> list[Parameter]:
+    pair = zip(SIDES, (left, right), strict=True)
+    return [
+        Parameter(name, s, 0 if v is None else 10, v, None, unit, "no_strides" if v is None else None)
+        for s, v in pair
+    ]
+
+
+def flag(found: tuple[Flag, ...], name: str, side: Side | None) -> Flag:
+    (one,) = (f for f in found if f.name == name and f.side == side)
+    return one
+
+
+def test_sides_are_given_left_then_right() -> None:
+    assert SIDES == ("left", "right")
+
+
+def test_every_rule_names_its_source_and_says_whether_it_was_read() -> None:
+    assert len({r.name for r in RULES}) == len(RULES)
+    for rule in RULES:
+        assert rule.source
+        assert rule.verified or "not confirmed" in rule.source or "no source confirmed" in rule.source
+    unread = {r.name for r in RULES if not r.verified}
+    assert unread == {
+        "knee_hyperextension", "low_dorsiflexion_swing", "flat_contact", "step_length_asymmetry",
+        "stance_asymmetry", "swing_asymmetry",
+    }  # fmt: skip
+
+
+def test_a_stiff_knee_is_found_by_the_other_knee() -> None:
+    found = flags(curves({"knee_flexion": (40.0, 58.0)}), [])
+    left, right = (flag(found, "stiff_knee", s) for s in SIDES)
+    assert (left.exceeded, right.exceeded) == (True, False)
+    assert left.value == pytest.approx(18.0)
+    assert right.value == pytest.approx(-18.0)
+    assert (left.limit, left.n, left.zero) == (17.0, 10, "standing")
+    assert left.note == "sides_stand_differently"
+
+
+def test_a_knee_that_stands_bent_is_not_stiff_once_the_goniometer_says_so() -> None:
+    bent = curves({"knee_flexion": (40.0, 58.0)})
+    found = flags(bent, [], {"knee_flexion_l": 12.0, "knee_flexion_r": 0.0})
+    left = flag(found, "stiff_knee", "left")
+    assert (left.exceeded, left.zero, left.note) == (False, "anatomical", None)
+    assert left.value == pytest.approx(6.0)
+    half = flag(flags(bent, [], {"knee_flexion_l": 12.0}), "stiff_knee", "left")
+    assert half.value == pytest.approx(18.0), "one side entered: both are compared from standing"
+
+
+@pytest.mark.parametrize(
+    ("name", "variable", "angle", "exceeded", "marked"),
+    [
+        ("knee_hyperextension", "knee_flexion", -8.0, True, True),
+        ("knee_hyperextension", "knee_flexion", -3.0, True, False),
+        ("knee_hyperextension", "knee_flexion", 2.0, False, False),
+        ("low_knee_flexion_swing", "knee_flexion", 44.0, True, False),
+        ("low_knee_flexion_swing", "knee_flexion", 45.0, False, False),
+        ("low_dorsiflexion_swing", "ankle_dorsiflexion", -1.0, True, False),
+        ("low_hip_extension", "hip_flexion", 6.0, True, False),
+        ("low_hip_extension", "hip_flexion", 5.0, False, False),
+    ],
+)
+def test_levels_are_judged_from_the_anatomical_zero_only(
+    name: str, variable: str, angle: float, exceeded: bool, marked: bool
+) -> None:
+    walked = curves({variable: (angle - 4.0, angle - 4.0)})
+    blind = flag(flags(walked, []), name, "left")
+    assert (blind.exceeded, blind.marked, blind.reason) == (None, False, "angle_zero_standing")
+    assert blind.value == pytest.approx(angle - 4.0)
+    assert blind.zero == "standing"
+    known = flag(flags(walked, [], {f"{variable}_l": 4.0}), name, "left")
+    assert (known.exceeded, known.marked, known.zero) == (exceeded, marked, "anatomical")
+    assert known.value == pytest.approx(angle)
+
+
+def test_hip_hiking_is_two_standard_deviations_above_the_norm() -> None:
+    found = flags(curves({"pelvis_obliquity": (2.6, -2.6)}), [])
+    left = flag(found, "hip_hiking", "left")
+    assert left.limit == pytest.approx(2.55)
+    assert (left.exceeded, flag(found, "hip_hiking", "right").exceeded) == (True, False)
+    assert WBDS in left.source
+
+
+def test_ranges_compare_without_any_zero() -> None:
+    swing = np.zeros((10, 101))
+    swing[:, 72] = np.radians(60.0)
+    stiff = swing * 0.8
+    made = curves({"knee_flexion": (0.0, 0.0)})
+    made = CycleCurves(
+        {"knee_flexion": {"left": stiff, "right": swing}}, made.stride_index, made.used, made.foot_off_pct
+    )
+    left = flag(flags(made, []), "knee_range_asymmetry", "left")
+    assert left.value == pytest.approx(12.0)
+    assert left.limit == pytest.approx(2 * 3.77)
+    assert (left.exceeded, left.zero, left.note) == (True, None, None)
+
+
+def test_a_ratio_belongs_to_the_larger_side() -> None:
+    steps = sides("step_length_m", 0.50, 0.56)
+    found = flag(flags(None, steps), "step_length_asymmetry", "right")
+    assert (found.exceeded, found.verified, found.note) == (True, False, None)
+    assert found.value == pytest.approx(1.12)
+    times = sides("stance_time_s", 0.70, 0.71, "s") + sides("swing_time_s", 0.40, 0.39, "s")
+    even = flags(None, times)
+    assert flag(even, "stance_asymmetry", "right").exceeded is False
+    assert flag(even, "temporal_asymmetry", "left").value == pytest.approx((0.40 / 0.70) / (0.39 / 0.71))
+    assert flag(even, "temporal_asymmetry", "left").note == "late_foot_off"
+
+
+def test_a_step_of_no_length_has_no_ratio() -> None:
+    found = flag(flags(None, sides("step_length_m", 0.5, -0.01)), "step_length_asymmetry", None)
+    assert (found.value, found.exceeded, found.reason) == (None, None, "near_zero")
+
+
+def test_circumduction_is_held_against_own_controls_or_nothing() -> None:
+    """No table knows how far healthy feet swing out (spec/clinic.md §4 names none)."""
+    wide = sides("circumduction_m", 0.12, 0.03)
+    alone = flag(flags(None, wide), "circumduction", "left")
+    assert (alone.value, alone.limit, alone.exceeded, alone.reason) == (0.12, None, None, "no_controls")
+    people = [
+        ControlSession(f"c{i}", 40.0, "male", sides("circumduction_m", 0.02 + 0.002 * i, 0.03), {})
+        for i in range(6)
+    ]
+    found = flags(None, wide, controls=control_group(people).norms())
+    left, right = (flag(found, "circumduction", s) for s in SIDES)
+    assert left.limit is not None
+    assert 0.03 < left.limit < 0.04
+    assert (left.exceeded, right.exceeded, left.reason) == (True, False, None)
+    assert "6 controls of this clinic" in left.source
+
+
+def test_who_walks_slower_than_any_norm_is_told_so() -> None:
+    slow = [Parameter("gait_speed_mps", None, 20, 0.5, 0.1, "m/s")]
+    found = flags(curves({"pelvis_obliquity": (5.0, 0.0), "knee_flexion": (30.0, 60.0)}), slow)
+    hike = flag(found, "hip_hiking", "left")
+    assert (hike.exceeded, hike.note) == (True, "no_speed_matched_norm")
+    assert flag(found, "stiff_knee", "left").note == "sides_stand_differently", "its limit is of patients"
+
+
+def test_nothing_measured_gives_reasons_and_no_flag() -> None:
+    found = flags(None, [])
+    assert {f.exceeded for f in found} == {None}
+    assert all(f.reason for f in found)
+    assert {f.name for f in found} == {r.name for r in RULES}
+    none = curves({"knee_flexion": (50.0, 50.0)}, strides=0)
+    assert flag(flags(none, []), "stiff_knee", "left").reason == "no_strides"
+
+
+@pytest.mark.parametrize(
+    ("speed", "group"),
+    [(0.39, "household"), (0.4, "limited_community"), (0.8, "limited_community"), (0.81, "community")],
+)
+def test_classes_of_walking_by_speed(speed: float, group: str) -> None:
+    assert ambulation(speed) == group

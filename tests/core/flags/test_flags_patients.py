@@ -1,0 +1,111 @@
+"""Virtual patients with their exact truth: each shows the flags it was made for, healthy walkers none."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from core.angles import JointAngles
+from core.body.feet import FootTracks
+from core.events.result import Stride, Strides
+from core.flags import Flag, flags
+from core.frames import FOOT, SIDES
+from core.fusion.orientations import Orientations
+from core.norms.controls import ControlSession, control_group
+from core.norms.lookup import Norms
+from core.parameters import cycle_curves, take_figures
+from core.parameters.result import CycleCurves, Parameter
+from tests.walks import simulated
+
+STRAIGHT = np.radians(10.0)
+
+
+@cache
+def session(name: str, seed: int = 5) -> tuple[CycleCurves, tuple[Parameter, ...], dict[str, float]]:
+    """Curves from standing, parameters, and what an exact goniometer reads in standing."""
+    truth = simulated(name, seed)[1]
+    made = []
+    for side in SIDES:
+        own = [s for s in truth.strides if s.side == side]
+        others = [s for s in truth.strides if s.side != side]
+        for s in own[1:-1]:
+            ic = [o.start_s for o in others if s.start_s < o.start_s < s.end_s]
+            tc = [o.release_s for o in others if s.start_s < o.release_s < s.end_s]
+            turned = None if abs(s.turn_rad) < STRAIGHT else "turn"
+            first, last = min(tc, default=None), min(ic, default=None)
+            made.append(Stride(side, s.start_s, s.release_s, s.end_s, first, last, s.turn_rad, turned))
+    strides = Strides(tuple(made))
+    angles = JointAngles(truth.t_s, truth.zeroed(), truth.zero_offset)
+    p, q = ({s: of[FOOT[s]] for s in SIDES} for of in (truth.p, truth.q))
+    there = np.ones(len(truth.t_s), np.bool_)
+    feet = FootTracks(
+        truth.t_s, truth.rate_hz, p, q, truth.flat, dict.fromkeys(SIDES, there), True, "truth", truth.body
+    )
+    oriented = Orientations(truth.t_s, truth.rate_hz, truth.q, dict.fromkeys(truth.q, there), "truth")
+    found = take_figures(strides, angles, oriented, feet).parameters
+    standing = {k: float(np.degrees(v)) for k, v in truth.zero_offset.items()}
+    return cycle_curves(angles, strides), found, standing
+
+
+@cache
+def controls() -> Norms:
+    """Six healthy walks as a clinic's own controls: what the simulator's healthy walker does."""
+    people = [
+        ControlSession(f"c{seed}", 40.0, None, session("healthy", seed)[1], {}) for seed in (1, 2, 3, 4, 6, 7)
+    ]
+    return control_group(people).norms()
+
+
+def raised(name: str, *, goniometer: bool = True) -> set[tuple[str, str | None]]:
+    curves, parameters, standing = session(name)
+    found = flags(curves, parameters, standing if goniometer else None, 1.7, controls())
+    return {(f.name, f.side) for f in found if f.exceeded}
+
+
+def test_a_healthy_walker_raises_nothing_but_what_its_six_controls_are_too_alike_for() -> None:
+    """Six simulated controls differ by noise alone; their spread of swing paths is not a population's."""
+    found = {name for name, _ in raised("healthy")}
+    assert found <= {"circumduction", "low_toe_clearance"}
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("stiff_knee", {"stiff_knee", "low_knee_flexion_swing", "hip_hiking", "circumduction"}),
+        ("drop_foot", {"low_dorsiflexion_swing", "flat_contact"}),
+        ("hemiparetic", {"flat_contact", "hip_hiking", "circumduction", "low_knee_flexion_swing"}),
+    ],
+)
+def test_each_patient_shows_on_the_affected_left_what_it_was_made_for(name: str, expected: set[str]) -> None:
+    assert {(flag, "left") for flag in expected} <= raised(name)
+
+
+def test_asymmetries_have_the_side_they_were_made_with() -> None:
+    hemi = raised("hemiparetic")
+    assert {
+        ("step_length_asymmetry", "left"),
+        ("stance_asymmetry", "right"),
+        ("swing_asymmetry", "left"),
+    } <= hemi
+    assert ("temporal_asymmetry", "left") in hemi
+    spatial = raised("step_asym")
+    assert ("step_length_asymmetry", "right") in spatial
+    assert not {n for n, _ in spatial} & {"stance_asymmetry", "swing_asymmetry", "temporal_asymmetry"}
+
+
+def test_without_a_goniometer_levels_are_not_judged_but_sides_are() -> None:
+    names = {name for name, _ in raised("stiff_knee", goniometer=False)}
+    assert "stiff_knee" in names
+    assert not names & {"low_knee_flexion_swing", "knee_hyperextension", "low_hip_extension"}
+
+
+def test_values_are_those_of_the_patient() -> None:
+    curves, parameters, standing = session("stiff_knee")
+    found: dict[tuple[str, str | None], Flag] = {
+        (f.name, f.side): f for f in flags(curves, parameters, standing, 1.7)
+    }
+    # spec/patients.md §3: knee 60.3 right, 39.9 left, difference 20.4
+    assert found["stiff_knee", "left"].value == pytest.approx(20.4, abs=3.0)
+    assert found["low_knee_flexion_swing", "left"].value == pytest.approx(39.9, abs=2.0)
