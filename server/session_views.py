@@ -47,6 +47,7 @@ SHOWN: Final = (
     "curve_notes",
     "used",
     "replay",
+    "profile",
 )
 """Members of ReportModel that templates use as they are."""
 
@@ -177,6 +178,23 @@ def report(
         "provenance_line": f"Sagittal {found.code_version} · settings {found.config_sha256[:8]} · "
         f"input {found.input_sha256[:8]} · {day(found.created_at)}",
         "has_poses": "poses.parquet" in found.files,
+    }
+
+
+def numbers(
+    blobs: BlobStore, found: analyses.Analysis, edits: reviews.Edits, context: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What of the report stands beside the timeline and changes with every edit."""
+    _, model = reports.read(blobs, found, edits, context["patient"], context["session"])
+    return {
+        "groups": _groups(model, paper=False),
+        "norm_note": model.norm_note,
+        "key_curve": _chart(model.key_curve, KEY_HEIGHT, x_unit=True),
+        "used": model.used,
+        "norm_source": model.norm_source,
+        "stride_words": f"{sum(model.used.values())} of {len(model.strides)} used",
+        "replay": {**model.replay, "curves": {}},
+        "empty_reason": _why_empty(model),
     }
 
 

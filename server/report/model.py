@@ -14,10 +14,13 @@ import numpy as np
 from core.errors import Notice
 from core.frames import SIDES, Floats, Side
 from core.norms import NormBands, NormValues, adult_kinematics, angle_values, temporal_values
+from core.parameters import cycle_curves
+from core.scores import scores
 from server.report.bundle import Bundle
 from server.report.columns import plain
 from server.report.estimator import EstimatorView, estimated_variables, estimator_view
 from server.report.panels import DRAWN_STRIDES, CurvePanel, SideCurve, curve_panels
+from server.report.profile import ProfileView, profile_view
 from server.report.quality_box import QualityBox, quality_box
 from server.report.table import Row, grouped, parameter_rows
 from server.report.wording import NO_NORM, VARIABLES, ZERO_WORDS, excluded_words, number, place_words
@@ -93,6 +96,7 @@ class ReportModel:
     ----------
     problem : what stopped the analysis, None when it ran to its end.
     estimator : which pose estimator ran and its health, None when it was not reached.
+    profile : distance of the curves from healthy adults, None without curves.
     groups : parameter rows under their headings. key_curve : the panel shown on the overview.
     norm_note : source, number and speed of the reference people, or why there is none.
     curve_notes : how to read the curves, in sentences: zero, offsets, confidence, what is drawn.
@@ -113,6 +117,7 @@ class ReportModel:
     zero_offset_deg: Mapping[str, float]
     provenance: Mapping[str, object]
     estimator: EstimatorView | None = None
+    profile: ProfileView | None = None
 
     @property
     def key_curve(self) -> CurvePanel:
@@ -155,6 +160,7 @@ class ReportModel:
                 "angle_zero": self.angle_zero,
                 "zero_offset_deg": self.zero_offset_deg,
                 "estimator": None if self.estimator is None else asdict(self.estimator),
+                "profile": None if self.profile is None else _profile_json(self.profile),
                 "provenance": self.provenance,
             }
         )
@@ -177,7 +183,8 @@ def report_model(
     angle_norms, time_norms = angle_values(age), temporal_values(age, sex)
     values = {} if bands.reason else {**time_norms.values, **angle_norms.values}
     rows = parameter_rows(bundle.parameters, values, estimated_variables(bundle.estimator))
-    panels = curve_panels(bundle, bands)
+    curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
+    panels = curve_panels(bundle, curves, bands)
     stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
     angles = bundle.angles
     return ReportModel(
@@ -213,6 +220,9 @@ def report_model(
         else {k: float(np.degrees(v)) for k, v in angles.zero_offset.items()},
         provenance=bundle.provenance,
         estimator=estimator_view(bundle.estimator),
+        profile=None
+        if curves is None
+        else profile_view(scores(curves, estimated=estimated_variables(bundle.estimator))),
     )
 
 
@@ -316,6 +326,11 @@ def _norm_notes(panels: tuple[CurvePanel, ...]) -> list[str]:
     return [
         f"{', '.join(labels).capitalize()}: {note[0].lower()}{note[1:]}" for note, labels in concerned.items()
     ]
+
+
+def _profile_json(profile: ProfileView) -> dict[str, object]:
+    rows = [{k: v for k, v in asdict(row).items() if k != "svg"} for row in profile.rows]
+    return {"rows": rows, "index": profile.index, "note": profile.note}
 
 
 def _panel_json(p: CurvePanel) -> dict[str, object]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from core.frames import SIDES, Floats, Side
 from core.norms import NormBand, NormBands
-from core.parameters import cycle_curves, mean_curve
+from core.parameters import mean_curve
 from core.parameters.result import CycleCurves
 from server.report.bundle import Bundle
 from server.report.estimator import estimated_variables
@@ -60,9 +60,13 @@ class CurvePanel:
     sides: Mapping[Side, SideCurve]
 
 
-def curve_panels(bundle: Bundle, norms: NormBands) -> tuple[CurvePanel, ...]:
-    """All panels in reading order; a variable without a curve keeps its place and says why."""
-    curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
+def curve_panels(bundle: Bundle, curves: CycleCurves | None, norms: NormBands) -> tuple[CurvePanel, ...]:
+    """All panels in reading order; a variable without a curve keeps its place and says why.
+
+    Parameters
+    ----------
+    curves : of the bundle's angles over its strides, None without angles.
+    """
     zero = None if bundle.angles is None else bundle.angles.zero
     estimated = estimated_variables(bundle.estimator)
     return tuple(

@@ -1,0 +1,130 @@
+"""The movement analysis profile: how far each curve is from healthy adults (spec/clinic.md §3, §7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from core.frames import SIDES, Side
+from core.scores import Score, Scores
+from server.report.wording import VARIABLES, number, reason_words
+
+SCALE_DEG: Final = 24.0
+"""Right end of the bars; a GVS of 24° is beyond any pathology in the tables."""
+
+WIDTH: Final = 150
+
+LABELS: Final = {v.name: v.label for v in VARIABLES}
+PLANES: Final = {v.name: v.plane for v in VARIABLES}
+
+MODE: Final = "offset_removed"
+"""Our angles start from the person's own standing, so levels say nothing; the shape does."""
+
+
+@dataclass(frozen=True)
+class ProfileRow:
+    """A bar of the profile: GVS of one variable, or a profile over several, in degrees as text."""
+
+    title: str
+    left: str
+    right: str
+    healthy: str
+    svg: str
+    low_confidence: bool
+    total: bool
+
+
+@dataclass(frozen=True)
+class ProfileView:
+    """Rows of the profile, GDI* in words, what it leaves out, and who the reference people are."""
+
+    rows: tuple[ProfileRow, ...]
+    index: str
+    note: str
+
+
+def profile_view(scores: Scores) -> ProfileView | None:
+    """None when no curve could be scored."""
+    rows = []
+    for variable in dict.fromkeys(s.variable for s in scores.scores if s.variable is not None):
+        found = {side: scores.find("gvs_deg", MODE, side, variable) for side in SIDES}
+        if any(s.value is not None for s in found.values()):
+            label, plane = LABELS.get(variable, variable), PLANES.get(variable)
+            rows.append(_row(label, found, low=plane != "sagittal", total=False))
+    if not rows:
+        return None
+    sagittal = {side: scores.find("gps_sagittal_deg", MODE, side) for side in SIDES}
+    if any(s.value is not None for s in sagittal.values()):
+        rows.append(_row("gps_sagittal", sagittal, low=False, total=True))
+    return ProfileView(tuple(rows), _index(scores), _note(scores))
+
+
+def _row(title: str, found: dict[Side, Score], *, low: bool, total: bool) -> ProfileRow:
+    healthy = next((s.healthy for s in found.values() if s.healthy is not None), None)
+    marks = {side: s.value for side, s in found.items() if s.value is not None}
+    ends = None if healthy is None else (healthy.median_deg, healthy.p75_deg, healthy.p95_deg)
+    return ProfileRow(
+        title=title,
+        left=_text(found["left"]),
+        right=_text(found["right"]),
+        healthy="" if healthy is None else number(healthy.median_deg, 1),
+        svg=_bar(marks, ends),
+        low_confidence=low,
+        total=total,
+    )
+
+
+def _text(score: Score) -> str:
+    return "–" if score.value is None else number(score.value, 1)
+
+
+def _bar(marks: dict[Side, float], healthy: tuple[float, float, float] | None) -> str:
+    """Healthy to the 75th (dark) and 95th percentile (light), median as a line; left disc, right ring."""
+
+    def x(value: float) -> str:
+        return f"{6 + (WIDTH - 12) * min(value / SCALE_DEG, 1.0):.1f}"
+
+    parts = [f'<line class="ax" x1="2" x2="{WIDTH - 2}" y1="13" y2="13"/>']
+    if healthy is not None:
+        median, p75, p95 = healthy
+        for end in (p95, p75):
+            width = float(x(end)) - 6
+            parts.append(f'<rect class="band" x="6" y="5" width="{width:.1f}" height="16" rx="2"/>')
+        parts.append(f'<line class="nm" x1="{x(median)}" x2="{x(median)}" y1="5" y2="21"/>')
+    for side, css, radius in (("right", "dr", 4.6), ("left", "dl", 5.2)):
+        if side in marks:
+            parts.append(f'<circle class="{css}" cx="{x(marks[side])}" cy="13" r="{radius}"/>')  # type: ignore[index]
+    return (
+        f'<svg class="chart range" width="{WIDTH}" height="26" viewBox="0 0 {WIDTH} 26" aria-hidden="true">'
+        f"{''.join(parts)}</svg>"
+    )
+
+
+def _index(scores: Scores) -> str:
+    """GDI* of the sagittal profile; an index that misses is said with its reason."""
+    parts = []
+    for side in SIDES:
+        s = scores.find("gdi_star_sagittal", MODE, side)
+        if s.value is not None:
+            parts.append(f"{side} {number(s.value)}")
+    return (
+        f"GDI*, sagittal: {', '.join(parts)} (100 is the middle of healthy adults, 10 is one SD)."
+        if parts
+        else ""
+    )
+
+
+def _note(scores: Scores) -> str:
+    gps = scores.find("gps_deg", MODE, "left")
+    missing = [LABELS.get(v, v.replace("_", " ").capitalize()).lower() for v in gps.missing]
+    without = (
+        f" There is no GPS: {', '.join(missing)} {reason_words(gps.reason)}."
+        if gps.value is None and missing
+        else ""
+    )
+    return (
+        f"Root mean square distance of each mean curve from that of {scores.reference_n} healthy adults, the "
+        "level of each curve removed, because angles start from the person's standing. Dark to the 75th, light "
+        "to the 95th percentile of these adults, their median as a line; they walked at their own comfortable "
+        f"speed.{without} {scores.source}."
+    )

@@ -1,0 +1,47 @@
+"""The movement analysis profile as a page shows it."""
+
+from __future__ import annotations
+
+from server.report.model import report_model
+from server.report.profile import profile_view
+from tests.server.report.conftest import MakeBundle
+from tests.server.report.test_estimator import section
+
+
+def test_every_scored_curve_has_a_bar_and_the_profile_comes_last(make_bundle: MakeBundle) -> None:
+    profile = report_model(make_bundle()).profile
+    assert profile is not None
+    titles = [row.title for row in profile.rows]
+    assert titles[-1] == "gps_sagittal"
+    assert "Knee flexion" in titles
+    assert "Pelvic rotation" not in titles, "not measured against the walking direction"
+    assert [row.total for row in profile.rows].count(True) == 1
+    knee = profile.rows[titles.index("Knee flexion")]
+    assert float(knee.left) > 0.0
+    assert not knee.low_confidence
+    assert profile.rows[titles.index("Hip adduction")].low_confidence
+    assert 'class="dl"' in knee.svg
+    assert 'class="dr"' in knee.svg
+
+
+def test_what_it_leaves_out_and_compares_with_is_said(make_bundle: MakeBundle) -> None:
+    profile = report_model(make_bundle()).profile
+    assert profile is not None
+    assert "There is no GPS" in profile.note
+    assert "42 healthy adults" in profile.note
+    assert profile.index.startswith("GDI*, sagittal: left ")
+
+
+def test_estimated_angles_are_not_scored(make_bundle: MakeBundle) -> None:
+    bundle = make_bundle(estimator=section(estimated_angles=["knee_flexion_l", "knee_flexion_r"]))
+    profile = report_model(bundle).profile
+    assert profile is not None
+    assert "Knee flexion" not in [row.title for row in profile.rows]
+    assert "gps_sagittal" not in [row.title for row in profile.rows]
+
+
+def test_without_angles_there_is_none(make_bundle: MakeBundle) -> None:
+    assert report_model(make_bundle(angles=None)).profile is None
+    from core.scores import Scores
+
+    assert profile_view(Scores((), 42, "", "", "")) is None
