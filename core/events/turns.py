@@ -1,0 +1,146 @@
+"""Turns of the body while walking or on the spot, from the yaw of its steadiest sensor.
+
+As El-Gohary et al. 2014 (Sensors 14:356) find them for a lumbar sensor: the low-passed yaw rate exceeds
+15 °/s somewhere, the turn lasts while it stays above 5 °/s, neighbours of one direction are one turn, 45° or
+more in 0.5 to 10 s. Their 1.5 Hz lets the pelvis' own rotation through, more than 5 °/s with every step of
+most people; edges and angle are taken at 0.5 Hz here (our choice), the peak velocity at theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from core.frames import Bools, Floats, Oriented, Segment
+from core.rest import runs
+from core.rotation import conjugate, log, multiply
+
+LEVELS: Final[tuple[tuple[Segment, ...], ...]] = (
+    ("pelvis",),
+    ("chest",),
+    ("thigh_l", "thigh_r"),
+    ("shank_l", "shank_r"),
+    ("foot_l", "foot_r"),
+)
+"""Sensors that show the turn of the body, the steadiest first."""
+
+
+@dataclass(frozen=True)
+class TurnParams:
+    """What counts as a turn (El-Gohary et al. 2014 where not said otherwise).
+
+    Parameters
+    ----------
+    peak_rad_s, edge_rad_s : a turn exceeds the first and lasts above the second. join_s : pause between two
+        turns of one direction that are one. seconds : shortest and longest. angle_rad : least.
+    cutoff_hz, peak_cutoff_hz : of the yaw rate for edges and angle (our choice) and for the peak velocity.
+    """
+
+    peak_rad_s: float = float(np.radians(15.0))
+    edge_rad_s: float = float(np.radians(5.0))
+    join_s: float = 0.05
+    seconds: tuple[float, float] = (0.5, 10.0)
+    angle_rad: float = float(np.radians(45.0))
+    cutoff_hz: float = 0.5
+    peak_cutoff_hz: float = 1.5
+
+
+@dataclass(frozen=True)
+class Turn:
+    """One turn: half-open range in s, angle in rad (left positive), greatest yaw rate in rad/s (positive)."""
+
+    start_s: float
+    end_s: float
+    angle_rad: float
+    peak_rad_s: float
+
+    @property
+    def duration_s(self) -> float:
+        """Length, s."""
+        return self.end_s - self.start_s
+
+    @property
+    def direction(self) -> Literal["left", "right"]:
+        """Seen by the person."""
+        return "left" if self.angle_rad > 0.0 else "right"
+
+
+def turns(
+    yaw_rate: Floats, valid: Bools, rate_hz: float, params: TurnParams | None = None
+) -> tuple[Turn, ...]:
+    """Turns of a take in order of time.
+
+    Parameters
+    ----------
+    yaw_rate : (n,) rad/s about the vertical, left positive. valid : (n,) False where the sensor was lost; no
+        turn is reported that touches such a sample.
+    """
+    params = params or TurnParams()
+    if len(yaw_rate) < rate_hz * params.seconds[0]:
+        return ()
+    smooth = _low_pass(yaw_rate, params.cutoff_hz, rate_hz)
+    quick = _low_pass(yaw_rate, params.peak_cutoff_hz, rate_hz)
+    found: list[tuple[int, int]] = []
+    for sign in (1.0, -1.0):
+        for first, end in _joined(runs(sign * smooth > params.edge_rad_s), params.join_s * rate_hz):
+            if (sign * smooth[first:end]).max() >= params.peak_rad_s and valid[first:end].all():
+                found.append((first, end))
+    listed = [
+        Turn(
+            start_s=first / rate_hz,
+            end_s=end / rate_hz,
+            angle_rad=float(smooth[first:end].sum() / rate_hz),
+            peak_rad_s=float(np.abs(quick[first:end]).max()),
+        )
+        for first, end in sorted(found)
+    ]
+    low, high = params.seconds
+    return tuple(t for t in listed if abs(t.angle_rad) >= params.angle_rad and low <= t.duration_s <= high)
+
+
+def body_yaw_rate(take: Oriented, rate_hz: float) -> tuple[Floats, Bools]:
+    """Yaw rate (n,) in rad/s of the steadiest segment, or the mean of a pair, and where it is known (n,).
+
+    One leg alone does not tell: its own swing is not even over a turn (20° and more).
+    """
+    n = len(take.t_s)
+    levels = [level for level in LEVELS if all(s in take.q for s in level)]
+    worn = max(levels, key=lambda level: _share(take.valid, level), default=())
+    if not worn:
+        return np.zeros(n), np.zeros(n, np.bool_)
+    valid = np.logical_and.reduce([take.valid[s] for s in worn])
+    rate = np.mean([_vertical_rate(take.q[s]) for s in worn], axis=0) * rate_hz
+    return np.asarray(rate), np.asarray(valid)
+
+
+def _share(valid: Mapping[Segment, Bools], worn: tuple[Segment, ...]) -> float:
+    """How much of a take sensors saw, in tenths so that the steadier ones win a tie."""
+    return round(float(np.logical_and.reduce([valid[s] for s in worn]).mean()), 1)
+
+
+def _vertical_rate(q: Floats) -> Floats:
+    """World z component (n,) of the rotation from each sample to the next, rad."""
+    step = log(multiply(q[1:], conjugate(q[:-1])))[:, 2]
+    return np.append(step, step[-1:] if len(step) else 0.0)
+
+
+def _low_pass(x: Floats, cutoff_hz: float, rate_hz: float) -> Floats:
+    """Zero-phase Butterworth, twice second order."""
+    from scipy.signal import butter, sosfiltfilt
+
+    sos = butter(2, min(0.99, cutoff_hz / (0.5 * rate_hz)), output="sos")
+    return np.asarray(sosfiltfilt(sos, x, padlen=min(len(x) - 1, round(2.0 * rate_hz))))
+
+
+def _joined(found: list[tuple[int, int]], pause: float) -> list[tuple[int, int]]:
+    """Index ranges, those with at most `pause` samples between them joined."""
+    joined: list[tuple[int, int]] = []
+    for first, end in found:
+        if joined and first - joined[-1][1] <= pause:
+            joined[-1] = (joined[-1][0], end)
+        else:
+            joined.append((first, end))
+    return joined

@@ -1,0 +1,70 @@
+"""Walking bouts, turns and the steps of a trunk sensor → parameters of the whole take (spec/field.md §4b)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from core.events.bouts import Bout
+from core.events.steps import Steps
+from core.events.turns import Turn
+from core.parameters.result import Parameter
+from core.parameters.variability import summary
+
+
+def bout_parameters(bouts: Sequence[Bout]) -> tuple[Parameter, ...]:
+    """How often and how long somebody walked; the minutes are those of all bouts together."""
+    n = len(bouts)
+    minutes = sum(b.duration_s for b in bouts) / 60.0
+    return (
+        Parameter("walking_bout_count", None, n, float(n), None, ""),
+        Parameter("walking_duration_min", None, n, minutes if n else None, None, "min", _none(n, "no_bouts")),
+    )
+
+
+def turn_parameters(turns: Sequence[Turn]) -> tuple[Parameter, ...]:
+    """Turns to both sides: number, angle (without direction), duration, peak yaw rate."""
+    angle = [float(np.degrees(abs(t.angle_rad))) for t in turns]
+    peak = [float(np.degrees(t.peak_rad_s)) for t in turns]
+    return (
+        Parameter("turn_count", None, len(turns), float(len(turns)), None, ""),
+        summary("turn_angle_deg", None, angle, "deg", "no_turns"),
+        summary("turn_duration_s", None, [t.duration_s for t in turns], "s", "no_turns"),
+        summary("turn_peak_velocity_dps", None, peak, "deg/s", "no_turns"),
+    )
+
+
+def step_parameters(steps: Steps) -> tuple[Parameter, ...]:
+    """Cadence, step time and number of steps of a trunk sensor, both feet together.
+
+    A step belongs to the whole take: which foot landed is told for whole walks or not at all, and a step's
+    two ends have errors of different feet.
+    """
+    times = steps.step_times_s
+    reason = None if times else next((n.code for n in steps.notices), "no_strides")
+    step = summary("step_time_s", None, times, "s", reason)
+    n = len(steps.steps)
+    return (_cadence(step), step, Parameter("step_count", None, n, float(n), None, ""))
+
+
+def _cadence(step: Parameter) -> Parameter:
+    """60 / mean step time; its sd to first order, its interval inverted, as core/parameters/temporal.py."""
+    cadence = replace(step, name="cadence_spm", unit="steps/min", cv_pct=None)
+    if step.mean is None:
+        return cadence
+    low, high = step.ci_low, step.ci_high
+    known = low is not None and high is not None and low > 0.0
+    return replace(
+        cadence,
+        mean=60.0 / step.mean,
+        sd=None if step.sd is None else 60.0 * step.sd / step.mean**2,
+        cv_pct=step.cv_pct,
+        ci_low=60.0 / high if known and high is not None else None,
+        ci_high=60.0 / low if known and low is not None else None,
+    )
+
+
+def _none(n: int, reason: str) -> str | None:
+    return None if n else reason
