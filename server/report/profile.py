@@ -93,7 +93,7 @@ def _bar(marks: dict[Side, float], healthy: tuple[float, float, float] | None) -
         parts.append(f'<line class="nm" x1="{x(median)}" x2="{x(median)}" y1="5" y2="21"/>')
     for side, css, radius in (("right", "dr", 4.6), ("left", "dl", 5.2)):
         if side in marks:
-            parts.append(f'<circle class="{css}" cx="{x(marks[side])}" cy="13" r="{radius}"/>')  # type: ignore[index]
+            parts.append(f'<circle class="{css}" cx="{x(marks[side])}" cy="13" r="{radius}"/>')
     return (
         f'<svg class="chart range" width="{WIDTH}" height="26" viewBox="0 0 {WIDTH} 26" aria-hidden="true">'
         f"{''.join(parts)}</svg>"
@@ -124,7 +124,7 @@ def _note(scores: Scores) -> str:
     )
     return (
         f"Root mean square distance of each mean curve from that of {scores.reference_n} healthy adults, the "
-        "level of each curve removed, because angles start from the person's standing. Dark to the 75th, light "
-        "to the 95th percentile of these adults, their median as a line; they walked at their own comfortable "
-        f"speed.{without} {scores.source}."
+        "level of each curve removed, because angles start from the person's standing. Dark to the 75th, "
+        "light to the 95th percentile of these adults, their median as a line; they walked at their own "
+        f"comfortable speed.{without} {scores.source}."
     )
