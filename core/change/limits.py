@@ -1,0 +1,171 @@
+"""How much a figure must change to be more than measurement error, and to matter (spec/clinic.md §2).
+
+MDC: the minimal detectable change at 95 % unless its source says otherwise. MCID: the minimal clinically
+important difference. Each was found on certain people with a certain method; both are printed beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import Final, Literal
+
+import numpy as np
+
+Limb = Literal["affected", "unaffected"]
+
+FEWEST: Final = 5
+"""People measured twice below which there is no own limit (our choice)."""
+
+
+@dataclass(frozen=True)
+class ChangeLimit:
+    """A smallest change of one figure.
+
+    Parameters
+    ----------
+    value : in the unit of the figure. people : who it was found on. source : where.
+    """
+
+    value: float
+    people: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Measurement error of a figure from people measured repeatedly without treatment.
+
+    Parameters
+    ----------
+    sem : standard error of measurement, within people. mdc95 : 1.96 √2 sem. people, repeats : behind it.
+    """
+
+    sem: float
+    mdc95: float
+    people: int
+    repeats: int
+
+    @property
+    def limit(self) -> ChangeLimit:
+        """As a limit of change."""
+        return ChangeLimit(
+            self.mdc95,
+            f"{self.people} people of this clinic",
+            f"own repeated measurements, n = {self.people}",
+        )
+
+
+def repeatability(values: Sequence[Sequence[float]]) -> Repeatability | None:
+    """Measurement error from one list of values per person; None with fewer than five people measured twice.
+
+    SEM² = pooled variance within people (Weir 2005, J Strength Cond Res 19:231).
+    """
+    repeated = [np.asarray(v, np.float64) for v in values if len(v) > 1]
+    if len(repeated) < FEWEST:
+        return None
+    freedom = sum(len(v) - 1 for v in repeated)
+    sem = sqrt(sum(float(((v - v.mean()) ** 2).sum()) for v in repeated) / freedom)
+    return Repeatability(sem, _mdc95(sem), len(repeated), sum(len(v) for v in repeated))
+
+
+def detectable(name: str, baseline: float, limb: Limb | None = None) -> ChangeLimit | None:
+    """MDC of a parameter; None where no source has one.
+
+    Parameters
+    ----------
+    baseline : value before; speed has limits by how fast somebody walked.
+    limb : None = no side is affected: the larger limit of the two.
+    """
+    if name == "gait_speed_mps":
+        return next(limit for below, limit in _SPEED if baseline < below)
+    if name in _BY_LIMB:
+        return _of_limb(_BY_LIMB[name][0], limb)
+    if name.endswith("_pct") and name.removesuffix("_pct") in _TEMPORAL:
+        return _TIMES
+    return _MDC.get(name)
+
+
+def detectable_ratio(name: str) -> ChangeLimit | None:
+    """MDC of the ratio affected / unaffected of a parameter."""
+    return _RATIOS.get(name)
+
+
+def relevant(name: str, limb: Limb | None = None) -> ChangeLimit | None:
+    """MCID of a parameter or score; None where no source has one."""
+    if name in _BY_LIMB:
+        return _of_limb(_BY_LIMB[name][1], limb)
+    return _MCID.get(name)
+
+
+def _mdc95(sem: float) -> float:
+    return 1.96 * sqrt(2.0) * sem
+
+
+def _of_limb(pair: tuple[ChangeLimit, ChangeLimit], limb: Limb | None) -> ChangeLimit:
+    if limb is None:
+        return max(pair, key=lambda limit: limit.value)
+    return pair[0] if limb == "affected" else pair[1]
+
+
+_CHRONIC: Final = "people in the chronic phase after stroke"
+_LEWEK: Final = "Lewek 2019, MDC95 by speed before"
+_SPEED: Final = (
+    (0.4, ChangeLimit(0.10, _CHRONIC, _LEWEK)),
+    (0.8, ChangeLimit(0.15, _CHRONIC, _LEWEK)),
+    (float("inf"), ChangeLimit(0.18, _CHRONIC, _LEWEK)),
+)
+"""Speed below → limit."""
+
+_KESAR: Final = "Kesar et al. 2011 (Gait Posture 33:314), treadmill"
+_TIMES: Final = ChangeLimit(4.2, _CHRONIC, f"{_KESAR}: the largest of its temporal limits, 3.2 to 4.2 %")
+_TEMPORAL: Final = (
+    "stance", "swing", "single_support", "double_support", "initial_double_support",
+    "terminal_double_support",
+)  # fmt: skip
+_ANGLE: Final = ChangeLimit(11.5, _CHRONIC, f"{_KESAR}: the largest of its joint angles, 3.8 to 11.5°")
+_MDC: Final = {
+    "step_length_m": ChangeLimit(0.067, _CHRONIC, f"{_KESAR}, affected side"),
+    "hip_flexion_min_deg": ChangeLimit(11.5, _CHRONIC, _KESAR),
+    "hip_flexion_ic_deg": _ANGLE,
+    "knee_flexion_ic_deg": _ANGLE,
+    "knee_flexion_max_loading_deg": _ANGLE,
+    "knee_flexion_min_stance_deg": _ANGLE,
+    "knee_flexion_max_swing_deg": _ANGLE,
+    "ankle_dorsiflexion_ic_deg": _ANGLE,
+    "ankle_dorsiflexion_max_stance_deg": _ANGLE,
+    "ankle_dorsiflexion_min_deg": _ANGLE,
+    "ankle_dorsiflexion_max_swing_deg": _ANGLE,
+}
+"""Angles of which only the range of all limits was read take its largest."""
+
+_GUZIK_KNEE: Final = "Guzik et al. 2020 (J Clin Med 9:3305)"
+_GUZIK_HIP: Final = "Guzik et al. 2021 (Front Neurol 12:700190)"
+
+
+def _pair(affected: float, unaffected: float, source: str) -> tuple[ChangeLimit, ChangeLimit]:
+    return ChangeLimit(affected, _CHRONIC, source), ChangeLimit(unaffected, _CHRONIC, source)
+
+
+def _from_sem(affected: float, unaffected: float, source: str) -> tuple[ChangeLimit, ChangeLimit]:
+    return _pair(_mdc95(affected), _mdc95(unaffected), f"{source}, 1.96 √2 of its error of measurement")
+
+
+_BY_LIMB: Final = {
+    "knee_flexion_rom_deg": (_from_sem(1.86, 5.63, _GUZIK_KNEE), _pair(8.48, 6.81, _GUZIK_KNEE)),
+    "hip_flexion_rom_deg": (_from_sem(1.56, 1.04, _GUZIK_HIP), _pair(5.81, 2.86, _GUZIK_HIP)),
+}
+"""Parameter → MDC and MCID of the affected and the unaffected limb."""
+
+_RATIO: Final = "Lewek & Randall 2011 (J Neurol Phys Ther 35:116), comfortable speed, affected / unaffected"
+_RATIOS: Final = {
+    "step_length_m": ChangeLimit(0.15, _CHRONIC, _RATIO),
+    "swing_time_s": ChangeLimit(0.26, _CHRONIC, _RATIO),
+    "stance_time_s": ChangeLimit(0.09, _CHRONIC, _RATIO),
+}
+
+_MCID: Final = {
+    "gait_speed_mps": ChangeLimit(0.16, "people in the first months after stroke", "Tilson et al. 2010"),
+    "gps_deg": ChangeLimit(1.6, "children", "Baker et al. 2012"),
+}

@@ -1,0 +1,189 @@
+"""Two sessions → what changed: within measurement error, real, or clinically relevant (spec/clinic.md §2).
+
+"Real" only beyond the MDC, "clinically relevant" only beyond MDC and MCID. A published MDC takes enough
+strides for granted: the limit is never smaller than what the strides of the two sessions leave open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import hypot
+from typing import Final, Literal
+
+from core.change.limits import (
+    ChangeLimit,
+    Limb,
+    Repeatability,
+    detectable,
+    detectable_ratio,
+    relevant,
+)
+from core.frames import Side
+from core.norms.values import NormValue
+from core.parameters.result import Parameter
+from core.parameters.symmetry import Symmetry
+from core.scores import Score
+
+Verdict = Literal["within_measurement_error", "real_change", "clinically_relevant"]
+
+STRIDES: Final = "strides of the two sessions, 95 %"
+"""Source of a limit that comes from the spread of the strides alone."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """One figure in two sessions.
+
+    Parameters
+    ----------
+    before, after : values; difference = after − before, in `unit`.
+    limit, limit_source, people : the change must pass this to be real; None without a source.
+    mcid, mcid_source : and this to matter; None without a source.
+    verdict : None with a `reason`: "no_value" (one of the sessions has none, or of other sides), "no_mdc"
+        (no source has a limit for it).
+    towards_norm : nearer to the middle of the norm than before; None without a comparable norm.
+    note : "from_standing": a change of how the person stands is part of it.
+    """
+
+    name: str
+    side: Side | None
+    unit: str
+    before: float | None
+    after: float | None
+    difference: float | None
+    verdict: Verdict | None
+    limit: float | None = None
+    limit_source: str | None = None
+    people: str | None = None
+    mcid: float | None = None
+    mcid_source: str | None = None
+    towards_norm: bool | None = None
+    reason: str | None = None
+    note: str | None = None
+
+
+def parameter_changes(
+    before: Sequence[Parameter],
+    after: Sequence[Parameter],
+    affected: Side | None = None,
+    norms: Mapping[str, NormValue] | None = None,
+    own: Mapping[str, Repeatability] | None = None,
+) -> tuple[Change, ...]:
+    """Compare the parameters of two sessions, in the order of the later one.
+
+    Parameters
+    ----------
+    affected : side, None = none or both. norms : reference by name.
+    own : measurement error of this clinic by name; it goes before any published limit.
+    """
+    earlier = {(p.name, p.side): p for p in before}
+    return tuple(
+        _parameter(
+            earlier.get((p.name, p.side)), p, affected, (norms or {}).get(p.name), (own or {}).get(p.name)
+        )
+        for p in after
+    )
+
+
+def ratio_changes(before: Sequence[Symmetry], after: Sequence[Symmetry]) -> tuple[Change, ...]:
+    """Compare the side ratios of two sessions; only ratios affected / unaffected have limits."""
+    earlier = {s.name: s for s in before}
+    changes = []
+    for s in after:
+        was = earlier.get(s.name)
+        alike = was is not None and (was.first, was.reference) == (s.first, s.reference)
+        old = was.ratio if was is not None and alike else None
+        change = _plain(f"{s.name}_ratio", None, "", old, s.ratio)
+        mdc = detectable_ratio(s.name) if s.reference == "affected/unaffected" else None
+        changes.append(_judged(change, mdc, None))
+    return tuple(changes)
+
+
+def score_changes(
+    before: Sequence[Score], after: Sequence[Score], own: Mapping[str, Repeatability] | None = None
+) -> tuple[Change, ...]:
+    """Compare the scores of two sessions, raw with raw and shape with shape; names as `score_name`.
+
+    No source has an MDC of the GPS; without the clinic's own there is no verdict.
+    """
+    earlier = {(score_name(s), s.side): s.value for s in before}
+    changes = []
+    for s in after:
+        name = score_name(s)
+        mine = (own or {}).get(name)
+        change = _plain(name, s.side, s.unit, earlier.get((name, s.side)), s.value)
+        if change.difference:
+            # a score in degrees is a distance from the norm, an index grows towards it
+            change = replace(change, towards_norm=(change.difference < 0.0) == (s.unit == "deg"))
+        mcid = relevant(s.name) if s.mode == "raw" else None
+        changes.append(_judged(change, None if mine is None else mine.limit, mcid))
+    return tuple(changes)
+
+
+def score_name(score: Score) -> str:
+    """Name of a score across sessions: "gps_sagittal_deg raw", "gvs_deg knee_flexion offset_removed"."""
+    return " ".join(part for part in (score.name, score.variable, score.mode) if part)
+
+
+def _parameter(
+    old: Parameter | None,
+    new: Parameter,
+    affected: Side | None,
+    norm: NormValue | None,
+    own: Repeatability | None,
+) -> Change:
+    change = _plain(new.name, new.side, new.unit, None if old is None else old.mean, new.mean)
+    if old is None or old.mean is None or new.mean is None:
+        return change
+    limb: Limb | None = None
+    if affected is not None and new.side is not None:
+        limb = "affected" if new.side == affected else "unaffected"
+    mdc = detectable(new.name, old.mean, limb) if own is None else own.limit
+    open_by_strides = _strides(old, new)
+    if mdc is not None and open_by_strides > mdc.value:
+        mdc = ChangeLimit(open_by_strides, "these strides", STRIDES)
+    if norm is not None and norm.comparable and old.mean != new.mean:
+        change = replace(change, towards_norm=abs(new.mean - norm.mean) < abs(old.mean - norm.mean))
+    if _from_standing(new):
+        change = replace(change, note="from_standing")
+    return _judged(change, mdc, relevant(new.name, limb))
+
+
+def _strides(old: Parameter, new: Parameter) -> float:
+    """Half width of the interval of the difference of two means, 0 where a session has no interval."""
+    halves = [
+        0.5 * (p.ci_high - p.ci_low) for p in (old, new) if p.ci_low is not None and p.ci_high is not None
+    ]
+    return hypot(*halves) if len(halves) == 2 else 0.0
+
+
+def _from_standing(p: Parameter) -> bool:
+    """The level of a joint angle, whose zero is how the person stood that day; the floor is the same."""
+    return (
+        p.unit == "deg"
+        and p.name.startswith(("hip_", "knee_", "ankle_", "pelvis_"))
+        and (not p.name.endswith("_rom_deg"))
+    )
+
+
+def _plain(name: str, side: Side | None, unit: str, before: float | None, after: float | None) -> Change:
+    if before is None or after is None:
+        return Change(name, side, unit, before, after, None, None, reason="no_value")
+    return Change(name, side, unit, before, after, after - before, None)
+
+
+def _judged(change: Change, mdc: ChangeLimit | None, mcid: ChangeLimit | None) -> Change:
+    if mcid is not None:
+        change = replace(change, mcid=mcid.value, mcid_source=f"{mcid.source}, {mcid.people}")
+    if mdc is not None:
+        change = replace(change, limit=mdc.value, limit_source=mdc.source, people=mdc.people)
+    if change.difference is None:
+        return change
+    if mdc is None:
+        return replace(change, reason="no_mdc")
+    size = abs(change.difference)
+    if size <= mdc.value:
+        return replace(change, verdict="within_measurement_error")
+    beyond = mcid is not None and size > mcid.value
+    return replace(change, verdict="clinically_relevant" if beyond else "real_change")
