@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -40,6 +41,12 @@ def run(recording: UniformRecording, estimator: Estimator) -> PoseEstimate:
     made = estimated(recording, PoseParams(estimator=estimator))
     assert made.poses.method == estimator
     return made
+
+
+@cache
+def right(estimator: Estimator, name: str = "fast_with_turns") -> PoseEstimate:
+    """What the walk gives when nothing is wrong."""
+    return run(take(estimator, name), estimator)
 
 
 def codes(made: PoseEstimate) -> set[str]:
@@ -81,9 +88,9 @@ def test_exchanged_feet_show_in_where_the_pelvis_falls(name: str) -> None:
     s = recording.sensors
     made = run(wearing(recording, foot_l=s["foot_r"], foot_r=s["foot_l"]), "l7s_3i")
     assert "feet_exchanged" in codes(made)
-    right, wrong = finding(run(recording, "l7s_3i"), "toward_foot_mps2"), finding(made, "toward_foot_mps2")
+    as_worn, wrong = (finding(m, "toward_foot_mps2") for m in (right("l7s_3i", name), made))
     assert wrong[1] == "bad"
-    assert right[0] < 0.0 < wrong[0]
+    assert as_worn[0] < 0.0 < wrong[0]
 
 
 def test_exchanged_feet_show_in_turns_without_a_pelvis() -> None:
@@ -93,13 +100,13 @@ def test_exchanged_feet_show_in_turns_without_a_pelvis() -> None:
     assert "feet_exchanged" in codes(made)
     assert finding(made, "inner_foot_m")[0] > 0.0
     # minus the distance of the feet across the way
-    assert -0.2 < finding(run(recording, "l7s_2i"), "inner_foot_m")[0] < -0.05
+    assert -0.2 < finding(right("l7s_2i"), "inner_foot_m")[0] < -0.05
 
 
 def test_without_turn_and_pelvis_it_is_told_that_sides_cannot_be_checked() -> None:
-    assert "sides_not_checked" in codes(run(take("l7s_2i", "comfortable"), "l7s_2i"))
-    assert "sides_not_checked" not in codes(run(take("l7s_2i"), "l7s_2i"))
-    assert "sides_not_checked" not in codes(run(take("l7s_3i", "comfortable"), "l7s_3i"))
+    assert "sides_not_checked" in codes(right("l7s_2i", "comfortable"))
+    assert "sides_not_checked" not in codes(right("l7s_2i"))
+    assert "sides_not_checked" not in codes(right("l7s_3i", "comfortable"))
 
 
 @pytest.mark.parametrize("estimator", BOTH)
@@ -152,7 +159,7 @@ def test_calibration_finds_forward_of_a_foot_sensor_put_on_backwards(estimator: 
     recording, half = take(estimator), about(2, np.pi)
     was = recording.sensors["foot_l"]
     backwards = replace(was, acc=rotate(half, was.acc), gyr=rotate(half, was.gyr), mag=None)
-    made, whole = run(wearing(recording, foot_l=backwards), estimator), run(recording, estimator)
+    made, whole = run(wearing(recording, foot_l=backwards), estimator), right(estimator)
     for segment, p in whole.poses.p.items():
         np.testing.assert_allclose(made.poses.p[segment], p, atol=1e-3)
 
@@ -207,7 +214,7 @@ def test_a_gap_of_half_a_second_of_a_foot_is_told_and_the_rest_stays_finite(esti
 
 
 def test_a_gap_of_the_pelvis_is_bridged_by_the_feet() -> None:
-    whole = run(take("l7s_3i"), "l7s_3i")
+    whole = right("l7s_3i")
     made = run(lost(take("l7s_3i"), "pelvis", 20.0, 20.5), "l7s_3i")
     assert "gap_not_bridged" not in codes(made)
     assert finding(made, "gap_s", "pelvis")[1] == "good"
