@@ -1,7 +1,6 @@
 """Contacts of the whole chain on the simulated scripts: figures for docs/accuracy.md.
 
-The simulator shapes the landing pitch to peak at contact, so IC errors look better than on people; a slow
-walker's shaped pitch has a second, earlier peak (spec/patients.md §7), which the rule sometimes takes.
+The simulator shapes the landing pitch to peak at contact, so IC errors look better than on people.
 """
 
 from __future__ import annotations
