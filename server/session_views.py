@@ -33,8 +33,8 @@ SEVERITIES: Final = ("bad", "warn", "info")
 NO_STRIDE_CODES: Final = ("foot_missing", "no_strides", "few_steps")
 """Notices that explain a take without strides."""
 
-NOT_ON_PAPER: Final = "Support in seconds"
-"""This group says in seconds what another says in percent; the sheet has no room for both."""
+SECONDARY: Final = ("Parts of stance and swing", "Regularity of the trunk", "Support in seconds")
+"""Groups for those who look closer: folded on the page, not on paper."""
 
 SHOWN: Final = (
     "problem",
@@ -161,11 +161,12 @@ def report(
     return {
         **{name: getattr(model, name) for name in SHOWN},
         "groups": _groups(model, paper=paper),
+        "more": [(name, rows) for name, rows in model.groups if name in SECONDARY],
         "missing": [
             (r.title, r.reason.removeprefix("not measured: "))
-            for _, rows in model.groups
+            for name, rows in model.groups
             for r in rows
-            if r.reason
+            if r.reason and name not in SECONDARY
         ],
         "warnings": _notices(model),
         "curves": curves,
@@ -205,10 +206,11 @@ def _groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[Row, ..
     """
     if all(row.reason for _, rows in model.groups for row in rows):
         return []
+    groups = [(name, rows) for name, rows in model.groups if name not in SECONDARY]
     if not paper:
-        return list(model.groups)
-    measured = ((name, tuple(r for r in rows if r.reason is None)) for name, rows in model.groups)
-    return [(name, rows) for name, rows in measured if rows and name != NOT_ON_PAPER]
+        return groups
+    measured = ((name, tuple(r for r in rows if r.reason is None)) for name, rows in groups)
+    return [(name, rows) for name, rows in measured if rows]
 
 
 def _why_empty(model: ReportModel) -> str:
