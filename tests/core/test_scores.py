@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Mapping
 
 import numpy as np
@@ -141,3 +143,9 @@ def test_a_session_without_strides_says_so() -> None:
     none = {s: np.zeros(12, np.bool_) for s in SIDES}
     found = scores(CycleCurves(empty.curves, empty.stride_index, none, empty.foot_off_pct))
     assert {s.reason for s in found.scores} == {"no_strides"}
+
+
+def test_scores_flags_changes_and_norms_need_no_compiler() -> None:
+    """The web process imports them: numba would cost it seconds and memory."""
+    code = "import sys, core.scores, core.flags, core.change, core.norms.controls; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
