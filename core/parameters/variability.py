@@ -29,6 +29,8 @@ UNITS: Final[Mapping[str, str]] = {
     "spm": "steps/min",
     "deg": "deg",
     "pct": "%",
+    "dps": "deg/s",
+    "min": "min",
     "m": "m",
     "s": "s",
 }

@@ -1,0 +1,55 @@
+"""What a perfect analysis of a simulated walk would measure on: its true events, paths and angles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from core.angles import JointAngles
+from core.body.feet import FootTracks
+from core.events.result import GaitEvent, GaitEvents
+from core.frames import FOOT, SIDES
+from core.measure import Measured, Tracks, measure
+from core.pipeline import PipelineConfig, analyse
+from core.simulate import Truth, simulate_scenario
+
+
+def true_tracks(truth: Truth) -> Tracks:
+    """Tracks without any error; a foot is off the floor when its sole is 5 mm up, where it ever is."""
+    n = len(truth.t_s)
+    events = []
+    for side, contacts in truth.contacts.items():
+        off = np.where(np.isnan(contacts.lift5), contacts.release, contacts.lift5)
+        events += [GaitEvent(t, side, "ic", "truth", t) for t in contacts.contact.tolist()]
+        events += [GaitEvent(t, side, "tc", "truth", t) for t in off.tolist()]
+    feet = FootTracks(
+        t_s=truth.t_s,
+        rate_hz=truth.rate_hz,
+        p={s: truth.p[FOOT[s]] for s in SIDES},
+        q={s: truth.q[FOOT[s]] for s in SIDES},
+        still=truth.flat,
+        valid=dict.fromkeys(SIDES, np.ones(n, np.bool_)),
+        linked=True,
+        source="truth",
+        body=replace(truth.body, standing_width=0.2),
+    )
+    return Tracks(
+        t_s=truth.t_s,
+        rate_hz=truth.rate_hz,
+        events=GaitEvents(tuple(sorted(events, key=lambda e: e.time_s))),
+        q={FOOT[s]: truth.q[FOOT[s]] for s in SIDES},
+        valid={FOOT[s]: np.ones(n, np.bool_) for s in SIDES},
+        feet=feet,
+        angles=JointAngles(truth.t_s, truth.zeroed(), truth.zero_offset),
+    )
+
+
+@cache
+def measured_walk(name: str, seed: int = 5) -> tuple[Truth, Measured, Measured]:
+    """A named script: its truth, what is measured on the truth, and what the analysis measures."""
+    take = simulate_scenario(name, seed)
+    analysis = analyse(take.recording, PipelineConfig())
+    assert analysis.measured is not None
+    return take.truth, measure(true_tracks(take.truth)), analysis.measured
