@@ -17,7 +17,7 @@ from server.auth.identity import Identity
 from server.auth.passwords import MIN_LENGTH
 from server.auth.roles import Action, Role
 from server.problems import TEMPLATES
-from server.services import analyses, patients, recordings, reviews, sessions
+from server.services import analyses, patients, recordings, reviews, sessions, signals
 from server.services.provenance import CODE_VERSION
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -131,6 +131,36 @@ def kinematics(
 ) -> Response:
     """All cycle curves with the replay."""
     return _session_page(request, db, blobs, sid, who, "kinematics.html")
+
+
+@router.get("/sessions/{sid}/timeline")
+def timeline(
+    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+) -> Response:
+    """Strides, events and signals over time, to look at and to correct."""
+    with db.read() as c:
+        context = session_views.base(c, sid)
+        latest = analyses.latest(c, sid)
+        edits = reviews.Edits() if latest is None else reviews.edits_of(c, latest.id)
+    if latest is not None:
+        context["numbers"] = session_views.numbers(blobs, latest, edits, context)
+        context["lanes"] = [vars(lane) for lane in signals.lanes(blobs, latest)]
+        context["editable"] = reviews.take(blobs, latest).tracks is not None and who.may(Action.REVIEW)
+    _opened(db, who, "session", sid)
+    return _page(request, db, who, "timeline.html", "patients", **context)
+
+
+@router.get("/sessions/{sid}/timeline/numbers")
+def timeline_numbers(
+    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+) -> Response:
+    """The part of the timeline page that follows an edit."""
+    with db.read() as c:
+        context = session_views.base(c, sid)
+        latest = analyses.shown(c, sid)
+        edits = reviews.edits_of(c, latest.id)
+    numbers = session_views.numbers(blobs, latest, edits, context)
+    return TEMPLATES.TemplateResponse(request, "_numbers.html", {"numbers": numbers})
 
 
 @router.get("/sessions/{sid}/print")

@@ -23,6 +23,13 @@ class Clock extends EventTarget {
     return (100 * (this.t - s.start_s)) / (s.end_s - s.start_s);
   }
 
+  // Another stride list, as a correction gives it; the time stays.
+  load(strides) {
+    this.strides = strides;
+    this.stride = this.at(this.t) ?? strides.find((s) => s.start_s >= this.t) ?? strides.at(-1) ?? null;
+    this.dispatchEvent(new Event("tick"));
+  }
+
   at(t, side = this.stride?.side) {
     const inside = this.strides.filter((s) => t >= s.start_s && t < s.end_s);
     return inside.find((s) => s.side === side) ?? inside[0] ?? null;

@@ -1,0 +1,368 @@
+// <take-timeline>: strides, events and signals over one stretch of time; every change goes to the server, and
+// what depends on it is drawn again from the answer.
+import { showProblem } from "./api.js";
+import { clock } from "./clock.js";
+import { WORD, h, seconds } from "./timeline/dom.js";
+import { EventHandles } from "./timeline/handles.js";
+import { SignalLane } from "./timeline/lane.js";
+import { editRows, strideBox, strideRows } from "./timeline/panel.js";
+import { Review } from "./timeline/review.js";
+import { StrideBlocks } from "./timeline/strides.js";
+import { TimeWindow } from "./timeline/window.js";
+
+const FIRST_SPAN_S = 6;
+const FIRST_LANES = ["foot_pitch", "foot_rate", "knee_flexion"];
+
+class TakeTimeline extends HTMLElement {
+  async connectedCallback() {
+    this.session = this.getAttribute("session");
+    this.editable = this.hasAttribute("editable");
+    this.win = new TimeWindow(clock.duration);
+    this.review = new Review(this.session);
+    this.find = (name) => this.querySelector(`[data-${name}]`);
+    this.prepareStrides();
+    this.prepareLanes();
+    this.prepareTools();
+    this.win.addEventListener("move", () => this.moved());
+    clock.addEventListener("tick", () => this.ticked());
+    this.review.addEventListener("change", () => this.changed());
+    this.review.addEventListener("busy", () => this.toggleAttribute("aria-busy", this.review.busy));
+    await this.attempt(() => this.review.load());
+    this.start();
+  }
+
+  // A link to a moment opens it: …/timeline#t=12.3; else the first counted stride.
+  start() {
+    const said = Number(new URLSearchParams(location.hash.slice(1)).get("t") ?? NaN);
+    const at = Number.isFinite(said) ? said : (clock.stride?.start_s ?? 0);
+    if (Number.isFinite(said)) clock.set(said);
+    this.win.set(at - 1, at - 1 + FIRST_SPAN_S);
+    this.moved();
+    this.ticked();
+  }
+
+  prepareStrides() {
+    const pick = (i) => this.pick(i);
+    this.over = new StrideBlocks(this.find("overview"), { sides: ["left", "right"], onPick: () => {} });
+    this.over.show(0, this.win.duration);
+    this.brush = h("i", { class: "tl-brush", "aria-hidden": "true" });
+    this.find("overview").append(this.brush);
+    this.follow(this.find("overview"), (share) => {
+      const t = share * this.win.duration;
+      this.win.set(t - this.win.span / 2, t + this.win.span / 2);
+    });
+    const shared = {
+      win: this.win, review: this.review, editable: this.editable,
+      onMove: (event, to) => this.move(event, to),
+      onDelete: (event) => this.remove(event),
+      onPick: (event) => clock.set(event.time_s),
+    };
+    this.feet = [...this.querySelectorAll("[data-side]")].map((host) => ({
+      blocks: new StrideBlocks(host, { sides: [host.dataset.side], onPick: pick }),
+      handles: new EventHandles(host, host.dataset.side, shared),
+    }));
+    for (const host of this.querySelectorAll("[data-side]")) host.addEventListener("dblclick", (e) => this.askEvent(host.dataset.side, this.timeAt(e, host)));
+  }
+
+  prepareLanes() {
+    const known = JSON.parse(document.getElementById("lanes-data").textContent);
+    this.lanes = [...this.querySelectorAll("[data-lane]")].map((host, n) => {
+      const label = host.previousElementSibling;
+      const lane = new SignalLane(host, label.querySelector("[data-values]"), this.session, this.win);
+      const choice = label.querySelector("select");
+      const wanted = known.find((l) => l.name === FIRST_LANES[n]) ?? known[Math.min(n, known.length - 1)];
+      choice.value = wanted.name;
+      const open = (l) => this.attempt(async () => { await lane.open(l); this.ticked(); });
+      choice.addEventListener("change", () => open(known.find((l) => l.name === choice.value)));
+      open(wanted);
+      this.drag(host);
+      return lane;
+    });
+  }
+
+  prepareTools() {
+    const grid = this.find("grid");
+    for (const b of this.querySelectorAll("[data-zoom]")) b.addEventListener("click", () => this.win.zoom(Number(b.dataset.zoom), this.anchor()));
+    for (const b of this.querySelectorAll("[data-go]")) b.addEventListener("click", () => this.win.pan(Number(b.dataset.go) * this.win.span * 0.6));
+    this.find("whole").addEventListener("click", () => this.win.whole());
+    this.find("undo")?.addEventListener("click", () => this.undo());
+    this.find("add")?.addEventListener("click", () => this.askEvent());
+    grid.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
+    new ResizeObserver(() => this.moved()).observe(grid);
+    document.addEventListener("keydown", (e) => this.key(e));
+    document.querySelector("[data-leave-out]")?.addEventListener("submit", (e) => this.leaveOut(e));
+    document.querySelector("[data-add-event]")?.addEventListener("submit", (e) => this.add(e));
+    const [why, words] = [document.getElementById("why"), document.getElementById("words")];
+    words?.addEventListener("input", () => words.value && (why.value = ""));
+  }
+
+  // ---- time
+
+  timeAt(e, host) {
+    const box = host.getBoundingClientRect();
+    return this.win.start + ((e.clientX - box.left) / box.width) * this.win.span;
+  }
+
+  anchor() {
+    return clock.t > this.win.start && clock.t < this.win.end ? clock.t : undefined;
+  }
+
+  wheel(e) {
+    const plot = e.target.closest(".tl-plot");
+    if (!plot) return;
+    const sideways = Math.abs(e.deltaX) > Math.abs(e.deltaY) || e.shiftKey;
+    if (!e.ctrlKey && !sideways) return; // the page scrolls
+    e.preventDefault();
+    if (e.ctrlKey) this.win.zoom(Math.exp(e.deltaY / 300), this.timeAt(e, plot));
+    else this.win.pan(((e.deltaX || e.deltaY) / plot.clientWidth) * this.win.span);
+  }
+
+  // A click sets the cursor, a drag moves the window, two fingers zoom.
+  drag(host) {
+    const fingers = new Map();
+    let moved = false;
+    host.addEventListener("pointerdown", (e) => {
+      if (e.button !== 0) return;
+      host.setPointerCapture(e.pointerId);
+      fingers.set(e.pointerId, e.clientX);
+      moved = fingers.size > 1;
+    });
+    host.addEventListener("pointermove", (e) => {
+      if (!fingers.has(e.pointerId)) return;
+      const by = e.clientX - fingers.get(e.pointerId);
+      if (!moved && Math.abs(by) < 4) return;
+      moved = true;
+      if (fingers.size === 1) this.win.pan((-by / host.clientWidth) * this.win.span);
+      else {
+        const other = [...fingers].find(([id]) => id !== e.pointerId)[1];
+        const [was, is] = [Math.abs(fingers.get(e.pointerId) - other), Math.abs(e.clientX - other)];
+        if (is > 10) this.win.zoom(was / is, this.timeAt({ clientX: (e.clientX + other) / 2 }, host));
+      }
+      fingers.set(e.pointerId, e.clientX);
+    });
+    const end = (e) => {
+      if (fingers.delete(e.pointerId) && !moved && e.type === "pointerup") clock.set(this.timeAt(e, host));
+    };
+    for (const name of ["pointerup", "pointercancel"]) host.addEventListener(name, end);
+  }
+
+  follow(host, act) {
+    const go = (e) => act((e.clientX - host.getBoundingClientRect().left) / host.clientWidth);
+    host.addEventListener("pointerdown", (e) => {
+      if (e.button !== 0) return;
+      host.setPointerCapture(e.pointerId);
+      go(e);
+    });
+    host.addEventListener("pointermove", (e) => host.hasPointerCapture(e.pointerId) && go(e));
+  }
+
+  key(e) {
+    const typing = e.target.closest("input,select,textarea,dialog,[contenteditable]");
+    if ((e.ctrlKey || e.metaKey) && e.key === "z" && !typing && this.editable) {
+      e.preventDefault();
+      return this.undo();
+    }
+    if (e.ctrlKey || e.metaKey || e.altKey || typing) return;
+    const acts = {
+      "+": () => this.win.zoom(0.5, this.anchor()),
+      "-": () => this.win.zoom(2, this.anchor()),
+      0: () => this.win.whole(),
+      ",": () => this.win.pan(-this.win.span * 0.6),
+      ".": () => this.win.pan(this.win.span * 0.6),
+      a: () => this.askEvent(),
+      x: () => this.toggleStride(),
+    };
+    if (!acts[e.key]) return;
+    e.preventDefault();
+    acts[e.key]();
+  }
+
+  // ---- what is drawn
+
+  moved() {
+    const { win } = this;
+    for (const { blocks } of this.feet) blocks.show(win.start, win.end);
+    this.brush.style.left = `${(100 * win.start) / win.duration}%`;
+    this.brush.style.width = `${(100 * win.span) / win.duration}%`;
+    this.find("span").textContent = `${seconds(win.start, 1)} to ${seconds(win.end, 1)} s of ${seconds(win.duration, 1)} s`;
+    this.axis();
+    this.cursor();
+    clearTimeout(this.listing);
+    this.listing = setTimeout(() => this.list(), 60);
+  }
+
+  axis() {
+    const { win } = this;
+    const most = Math.max(3, Math.floor(this.find("axis").clientWidth / 70));
+    const step = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600].find((s) => win.span / s <= most) ?? 1200;
+    const ticks = [];
+    for (let i = Math.ceil(win.start / step - 1e-9); i * step <= win.end + 1e-9; i++) {
+      const tick = h("span", {}, `${seconds(i * step, step < 0.1 ? 2 : step < 1 ? 1 : 0)}\u2009s`);
+      tick.style.left = `${100 * win.place(i * step)}%`;
+      ticks.push(tick);
+    }
+    this.find("axis").replaceChildren(...ticks);
+  }
+
+  cursor() {
+    const at = this.win.place(clock.t);
+    const line = this.find("cursor");
+    line.hidden = at < 0 || at > 1;
+    line.style.setProperty("--at", at);
+  }
+
+  ticked() {
+    if (clock.playing && (clock.t > this.win.end || clock.t < this.win.start)) this.win.set(clock.t - 0.05 * this.win.span, clock.t + 0.95 * this.win.span);
+    this.cursor();
+    for (const lane of this.lanes) lane.read(clock.t);
+    const now = this.review.strides.findIndex((s) => s.side === clock.stride?.side && s.start_s === clock.stride?.start_s);
+    if (now === this.picked) return;
+    this.picked = now;
+    if (!clock.playing && now >= 0 && !this.feet.some(({ handles }) => handles.held)) this.win.reveal(this.review.strides[now].start_s, this.review.strides[now].end_s);
+    this.panel();
+  }
+
+  changed() {
+    const { review } = this;
+    clock.load(review.strides);
+    for (const blocks of [this.over, ...this.feet.map((f) => f.blocks)]) blocks.draw(review.strides);
+    for (const { handles } of this.feet) handles.renew();
+    for (const side of ["left", "right"]) {
+      const own = review.strides.filter((s) => s.side === side);
+      this.querySelector(`[data-counts=${side}]`).textContent = `${own.filter((s) => s.used).length} of ${own.length}`;
+    }
+    const undo = this.find("undo");
+    if (undo) undo.disabled = !review.edits.length;
+    this.find("edits").replaceChildren(...editRows(review.edits));
+    this.find("edit-count").textContent = review.edits.length ? String(review.edits.length) : "";
+    this.picked = null;
+    this.ticked();
+    this.panel();
+  }
+
+  panel() {
+    const stride = this.review.strides[this.picked] ?? null;
+    for (const { blocks } of this.feet) blocks.pick(this.picked);
+    const acts = {
+      editable: this.editable, review: this.review,
+      onMove: (event, to) => this.move(event, to),
+      onDelete: (event) => this.remove(event),
+      onLeaveOut: (s) => this.askReason(s),
+      onCount: (s) => this.count(s),
+    };
+    this.find("stride-box").replaceChildren(...strideBox(stride, acts));
+    document.getElementById("h-stride").textContent = stride ? `${stride.side === "left" ? "Left" : "Right"} stride, ${seconds(stride.start_s)} s` : "Stride";
+    this.find("state").textContent = "";
+    if (stride) this.find("state").append(h("span", { class: `badge plain${stride.used ? " ok" : ""}` }, stride.used ? "counts" : "left out"));
+    this.list();
+  }
+
+  list() {
+    const { words, rows } = strideRows(this.review, this.win, this.picked, (i) => this.pick(i, true));
+    this.find("listed").textContent = words;
+    this.find("list").replaceChildren(...rows);
+  }
+
+  // ---- what a person does
+
+  // The first click shows a stride, the second asks whether it counts.
+  pick(i, only = false) {
+    if (i === this.picked && !only) return this.toggleStride();
+    clock.pick(clock.strides[i]);
+    this.win.reveal(this.review.strides[i].start_s, this.review.strides[i].end_s);
+  }
+
+  toggleStride() {
+    const stride = this.review.strides[this.picked];
+    if (!stride || !this.editable) return;
+    if (stride.used) this.askReason(stride);
+    else this.count(stride);
+  }
+
+  askReason(stride) {
+    this.asked = stride;
+    const dialog = document.getElementById("leave-out");
+    dialog.querySelector("[data-which]").textContent = `The ${stride.side} stride from ${seconds(stride.start_s)} to ${seconds(stride.end_s)} s no longer counts in any number. Undo brings it back.`;
+    dialog.querySelector("form").reset();
+    dialog.showModal();
+  }
+
+  leaveOut(e) {
+    e.preventDefault();
+    const { why, words } = e.target.elements;
+    const reason = words.value.trim() || why.value;
+    if (!reason) return words.focus();
+    e.target.closest("dialog").close();
+    this.change({ kind: "exclude_stride", side: this.asked.side, time_s: middle(this.asked), reason }, `The ${this.asked.side} stride is left out.`);
+  }
+
+  count(stride) {
+    this.change({ kind: "include_stride", side: stride.side, time_s: middle(stride) }, `The ${stride.side} stride counts.`);
+  }
+
+  askEvent(side = clock.stride?.side ?? "left", time = clock.t) {
+    if (!this.editable) return;
+    const dialog = document.getElementById("add-event");
+    const form = dialog.querySelector("form");
+    const before = this.review.events.filter((e) => e.side === side && e.time_s < time).at(-1);
+    form.elements.side.value = side;
+    form.elements.event.value = before?.kind === "ic" ? "tc" : "ic";
+    form.elements.time_s.value = time.toFixed(3);
+    dialog.showModal();
+  }
+
+  add(e) {
+    e.preventDefault();
+    const { side, event, time_s } = e.target.elements;
+    e.target.closest("dialog").close();
+    this.change({ kind: "add_event", side: side.value, event: event.value, time_s: Number(time_s.value) }, `${WORD[event.value]} added.`);
+  }
+
+  move(event, to) {
+    return this.change({ kind: "move_event", side: event.side, event: event.kind, time_s: event.time_s, to_s: to }, `${event.side} ${WORD[event.kind]} moved to ${seconds(to, 3)} s.`);
+  }
+
+  remove(event) {
+    this.change({ kind: "delete_event", side: event.side, event: event.kind, time_s: event.time_s }, `${event.side} ${WORD[event.kind]} deleted.`);
+  }
+
+  undo() {
+    if (this.review.edits.length) this.done(() => this.review.undo(), "The last change is undone.");
+  }
+
+  change(edit, said) {
+    return this.done(() => this.review.change(edit), said);
+  }
+
+  async done(act, said) {
+    const began = performance.now();
+    if (!(await this.attempt(act))) return;
+    await this.attempt(() => this.numbers());
+    this.dataset.took = Math.round(performance.now() - began);
+    const used = this.review.strides.filter((s) => s.used).length;
+    this.find("said").textContent = `${said} ${used} of ${this.review.strides.length} strides count.`;
+  }
+
+  // The numbers are written by the server, as on the other pages.
+  async numbers() {
+    const answer = await fetch(`/sessions/${this.session}/timeline/numbers`, { credentials: "same-origin" });
+    if (!answer.ok) throw { title: "The numbers could not be loaded", detail: "Load the page again." };
+    const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+    document.getElementById("numbers").replaceWith(page.getElementById("numbers"));
+  }
+
+  async attempt(act) {
+    this.find("problem").hidden = true;
+    try {
+      await act();
+      return true;
+    } catch (problem) {
+      showProblem(this.find("problem"), problem);
+      return false;
+    }
+  }
+}
+
+const middle = (stride) => (stride.start_s + stride.end_s) / 2;
+
+customElements.define("take-timeline", TakeTimeline);

@@ -1,0 +1,77 @@
+// What stands beside and below the drawing: the picked stride, the changes, and the table of strides in view.
+import { WORD, chip, h, icon, seconds } from "./dom.js";
+
+const LISTED = 40;
+
+const stance = (s) => (s.tc_s === null ? "–" : ((100 * (s.tc_s - s.start_s)) / (s.end_s - s.start_s)).toFixed(1));
+
+// The picked stride with its three events as fields, and whether it counts.
+export function strideBox(stride, { editable, review, onMove, onDelete, onLeaveOut, onCount }) {
+  if (!stride) return [h("p", { class: "small mut" }, "No stride here. Pick one above, or press J.")];
+  const rows = [
+    ["ic", "Contact", stride.start_s],
+    ["tc", "Foot-off", stride.tc_s],
+    ["ic", "Next contact", stride.end_s],
+  ].map(([kind, label, time]) => eventRow(stride, kind, label, time, { editable, review, onMove, onDelete }));
+  const facts = h("p", { class: "small mut num" }, `${seconds(stride.end_s - stride.start_s)} s, stance ${stance(stride)} %`);
+  const said = stride.used
+    ? stride.flags.length ? `Counts, although a rule says: ${stride.flags.join(", ").replaceAll("_", " ")}.` : ""
+    : `Left out ${stride.excluded_by === "person" ? "by hand" : "by rule"}: ${stride.excluded}.`;
+  const act = stride.used
+    ? h("button", { class: "btn", type: "button", "data-out": true, onclick: () => onLeaveOut(stride) }, "Leave out…")
+    : h("button", { class: "btn", type: "button", "data-count": true, onclick: () => onCount(stride) }, "Count it");
+  return [facts, said ? h("p", { class: "small" }, said) : null, h("div", { class: "tl-fields" }, ...rows.flat()), editable ? act : null].filter(Boolean);
+}
+
+function eventRow(stride, kind, label, time, { editable, review, onMove, onDelete }) {
+  const id = `t-${label.replaceAll(" ", "-").toLowerCase()}`;
+  const event = time === null ? null : review.at(stride.side, kind, time);
+  if (!event) return [h("span", { class: "small" }, label), h("span", { class: "small dim" }, "not found"), h("span")];
+  const field = h("input", { class: "input num", id, type: "number", step: "0.01", min: 0, value: event.time_s.toFixed(3), readonly: !editable });
+  field.addEventListener("change", () => {
+    const to = Number(field.value);
+    if (field.value === "" || Math.abs(to - event.time_s) < 0.0005) field.value = event.time_s.toFixed(3);
+    else onMove(event, to);
+  });
+  const remove = editable
+    ? h("button", { class: "btn icon ghost", type: "button", "aria-label": `Delete ${label.toLowerCase()}`, title: `Delete ${label.toLowerCase()}`, onclick: () => onDelete(event) }, icon("trash"))
+    : h("span");
+  return [h("label", { class: "small", for: id }, label), h("span", { class: "row g2" }, field, h("span", { class: "unit" }, "s")), remove];
+}
+
+// The table that says in words and numbers what the drawing above shows.
+export function strideRows(review, win, picked, onPick) {
+  const seen = review.strides.map((s, i) => [s, i]).filter(([s]) => s.end_s > win.start && s.start_s < win.end);
+  const words = `${seen.length} of ${review.strides.length}${seen.length > LISTED ? `; the first ${LISTED} are listed, zoom in for the others` : ""}`;
+  const rows = seen.slice(0, LISTED).map(([s, i]) =>
+    h(
+      "tr",
+      { class: i === picked ? "on" : "", "aria-current": i === picked ? "true" : null },
+      h("td", {}, chip(s.side)),
+      ...[s.start_s, s.tc_s, s.end_s].map((t) => h("td", { class: "n" }, t === null ? "–" : seconds(t))),
+      h("td", { class: "n" }, seconds(s.end_s - s.start_s)),
+      h("td", { class: "n" }, stance(s)),
+      h("td", {}, s.used ? "yes" : h("span", { class: "mut" }, `no: ${s.excluded}`)),
+      h("td", { class: "n" }, h("button", { class: "btn sm", type: "button", "aria-label": `Open ${s.side} stride at ${seconds(s.start_s)} s`, onclick: () => onPick(i) }, "Open")),
+    ),
+  );
+  return { words, rows };
+}
+
+// Changes that count, the newest first.
+export function editRows(edits) {
+  if (!edits.length) return [h("li", { class: "mut" }, "None. Everything is as it was detected.")];
+  return edits.toReversed().map((e) => {
+    const day = new Date(e.at).toLocaleString("en-GB", { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" });
+    return h("li", {}, chip(e.side), h("span", {}, what(e), h("span", { class: "xs dim block" }, `${e.by ?? "unknown"}, ${day}`)));
+  });
+}
+
+function what(e) {
+  const at = `${seconds(e.time_s, 2)} s`;
+  if (e.kind === "move_event") return `${WORD[e.event]} moved from ${at} to ${seconds(e.to_s, 2)} s`;
+  if (e.kind === "add_event") return `${WORD[e.event]} added at ${at}`;
+  if (e.kind === "delete_event") return `${WORD[e.event]} at ${at} deleted`;
+  if (e.kind === "exclude_stride") return `stride at ${at} left out: ${e.reason}`;
+  return `stride at ${at} counted`;
+}
