@@ -96,7 +96,7 @@ class Figure:
                 letter.visible = valid and self._follow
                 letter.position = m.toes[side][i]
             self._room.position = (x, y, 0.0)
-            self._ground.show(self._t_s)
+            self._ground.show(self._t_s, recent=self._follow)
         self._server.flush()
         return self._t_s
 

@@ -1,7 +1,8 @@
 """What the walk leaves on the floor of a scene: footprints and the trails of the feet, up to a moment.
 
 A trail is cut into chunks that are sent once and only switched on; at a moment only the unfinished chunk is
-sent, so that a frame costs the same at the end of a long take as at its start.
+sent, so that a frame costs the same at the end of a long take as at its start. Close to the walker only the
+last strides are shown: of a corridor walked twenty times nothing could be told apart.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from server.viewer.steps import Prints, Single, Trail
 CHUNK = 256
 """Pieces of a trail per scene node, about eight strides."""
 
-PLAIN_PRINTS = 3
-"""Footprints kept per side where positions are for the eye only, latest first."""
+RECENT_PRINTS = 12
+"""Footprints per side shown close to the walker; of a trail the last whole chunk and the unfinished one."""
 
 _PIXELS = 1.6
 _OPACITY = 0.6
@@ -35,25 +36,20 @@ class Ground:
 
     def __init__(self, scene: viser.SceneApi, parent: str, motion: Motion) -> None:
         self._all = scene.add_frame(f"{parent}/ground", show_axes=False)
-        length = motion.body.foot
-        keep = None if motion.placed else PLAIN_PRINTS
+        under, length = self._all.name, motion.body.foot
         parts: list[_Prints | _Trail] = [
-            *(
-                _Prints(scene, self._all.name, s, x, length, keep)
-                for s, x in motion.prints.items()
-                if len(x.t_s)
-            ),
-            *(_Trail(scene, self._all.name, s, x) for s, x in motion.trails.items() if len(x.t_s)),
+            *(_Prints(scene, under, s, x, length) for s, x in motion.prints.items() if len(x.t_s)),
+            *(_Trail(scene, under, s, x) for s, x in motion.trails.items() if len(x.t_s)),
         ]
-        self._shown = dict.fromkeys(parts, 0)
+        self._shown = dict.fromkeys(parts, (0, True))
 
-    def show(self, t_s: float) -> None:
-        """Show what has been left until a time."""
+    def show(self, t_s: float, recent: bool) -> None:
+        """Show what has been left until a time, all of it or the last strides."""
         for part, shown in self._shown.items():
             count = int(np.searchsorted(part.t_s, t_s, side="right"))
-            if count != shown:
-                part.show(count)
-                self._shown[part] = count
+            if (count, recent) != shown:
+                part.show(count, recent)
+                self._shown[part] = (count, recent)
 
     def set_dark(self, dark: bool) -> None:
         """Change the colours to the theme of the page around."""
@@ -66,10 +62,8 @@ class Ground:
 
 
 class _Prints:
-    def __init__(
-        self, scene: viser.SceneApi, parent: str, side: Side, prints: Prints, length: float, keep: int | None
-    ) -> None:
-        self.side, self.t_s, self._keep = side, prints.t_s, keep
+    def __init__(self, scene: viser.SceneApi, parent: str, side: Side, prints: Prints, length: float) -> None:
+        self.side, self.t_s = side, prints.t_s
         self._node = scene.add_batched_meshes_simple(
             f"{parent}/prints_{side}",
             *shapes.footprint(length, side),
@@ -86,16 +80,16 @@ class _Prints:
     def paint(self, colour: Rgb) -> None:
         self._node.batched_colors = np.array(linear(colour), np.uint8)
 
-    def show(self, count: int) -> None:
+    def show(self, count: int, recent: bool) -> None:
         scales = np.zeros(len(self.t_s), np.float32)
-        scales[0 if self._keep is None else max(0, count - self._keep) : count] = 1.0
+        scales[max(0, count - RECENT_PRINTS) if recent else 0 : count] = 1.0
         self._node.batched_scales = scales
 
 
 class _Trail:
     def __init__(self, scene: viser.SceneApi, parent: str, side: Side, trail: Trail) -> None:
         self.side, self.t_s, self._pieces = side, trail.t_s, trail.pieces
-        self._done = 0
+        self._seen: set[int] = set()
 
         def node(name: str, pieces: Single) -> viser.LineSegmentsHandle:
             return scene.add_line_segments(
@@ -115,11 +109,12 @@ class _Trail:
         for node in (*self._chunks, self._rest):
             node.colors = np.array(colour, np.uint8)
 
-    def show(self, count: int) -> None:
+    def show(self, count: int, recent: bool) -> None:
         done = count // CHUNK
-        for k in range(min(self._done, done), max(self._done, done)):
-            self._chunks[k].visible = k < done
-        self._done = done
+        chunks = set(range(max(0, done - 1) if recent else 0, done))
+        for k in chunks ^ self._seen:
+            self._chunks[k].visible = k in chunks
+        self._seen = chunks
         self._rest.visible = count > done * CHUNK
         if self._rest.visible:
             self._rest.points = self._pieces[done * CHUNK : count]

@@ -11,7 +11,7 @@ import pytest
 import viser
 
 from server.viewer.figure import Figure
-from server.viewer.ground import CHUNK, PLAIN_PRINTS
+from server.viewer.ground import CHUNK, RECENT_PRINTS
 from server.viewer.motion import Motion, prepare
 from tests.server import walk
 
@@ -51,19 +51,40 @@ def server() -> Iterator[viser.ViserServer]:
     started.stop()
 
 
-@pytest.mark.parametrize("way", [(5.0,), (110.0, 5.0), (1.0, 60.0, 119.0, 30.0), (119.9, 0.0)])
-def test_a_moment_looks_the_same_whatever_was_shown_before(
+WAYS = [(5.0,), (110.0, 5.0), (1.0, 60.0, 119.0, 30.0), (119.9, 0.0)]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_standing_back_shows_all_that_was_left_whatever_was_shown_before(
     server: viser.ViserServer, long_walk: Motion, way: tuple[float, ...]
 ) -> None:
     scene = Scene(server, long_walk)
     for t_s in way:
         scene.figure.pose(t_s)
+    scene.figure.set_follow(False)
     for side, trail in long_walk.trails.items():
         past = trail.t_s <= way[-1] + 0.01
         np.testing.assert_array_equal(scene.drawn(side), trail.pieces[past])
-        np.testing.assert_array_equal(
-            scene.prints(side), np.flatnonzero(long_walk.prints[side].t_s <= way[-1] + 0.01)
-        )
+        left = np.flatnonzero(long_walk.prints[side].t_s <= way[-1] + 0.01)
+        np.testing.assert_array_equal(scene.prints(side), left)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_following_shows_the_last_strides_whatever_was_shown_before(
+    server: viser.ViserServer, long_walk: Motion, way: tuple[float, ...]
+) -> None:
+    scene = Scene(server, long_walk)
+    scene.figure.set_follow(False)
+    for t_s in way:
+        scene.figure.pose(t_s)
+    scene.figure.set_follow(True)
+    for side, trail in long_walk.trails.items():
+        past = trail.pieces[trail.t_s <= way[-1] + 0.01]
+        drawn = scene.drawn(side)
+        assert min(len(past), CHUNK) <= len(drawn) < 2 * CHUNK
+        np.testing.assert_array_equal(drawn, past[len(past) - len(drawn) :])
+        left = np.flatnonzero(long_walk.prints[side].t_s <= way[-1] + 0.01)
+        np.testing.assert_array_equal(scene.prints(side), left[-RECENT_PRINTS:])
 
 
 def test_a_frame_sends_at_most_one_chunk_of_a_trail(server: viser.ViserServer, long_walk: Motion) -> None:
@@ -82,10 +103,12 @@ def test_a_view_of_ten_minutes_is_ready_at_once(server: viser.ViserServer) -> No
     assert time.thread_time() - start < 0.2
 
 
-def test_where_positions_are_for_the_eye_only_the_last_prints_stay(server: viser.ViserServer) -> None:
+def test_where_positions_are_for_the_eye_only_there_are_prints_and_no_trail(
+    server: viser.ViserServer,
+) -> None:
     scene = Scene(server, prepare(replace(walk.poses(12.0), method="stance_foot_anchor")))
     scene.figure.pose(11.0)
-    assert len(scene.prints("left")) == PLAIN_PRINTS
+    assert len(scene.prints("left")) >= 9
     assert len(scene.drawn("left")) == 0
 
 
