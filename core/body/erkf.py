@@ -14,16 +14,16 @@ Jacobian (eq 27) is carried in the next step's transition. Source: spec/estimato
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from core.body.erkf_kernel import CONTACT, INVALID, STILL, Links, Noise, Record, forward
 from core.body.erkf_params import ErkfParams as ErkfParams
+from core.body.gaps import bridged
 from core.body.still import AT_REST, FOOT_STILL, still_samples
 from core.body.tree import ImuTree
 from core.errors import EstimationError, ParameterError, SignalError
-from core.frames import GRAVITY, Bools, Floats
+from core.frames import Bools, Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ class ErkfTrack:
 def erkf_inputs(
     tree: ImuTree, acc: Floats, gyr: Floats, valid: Bools, rate_hz: float, heading: Floats | None = None
 ) -> ErkfInputs:
-    """Inputs of a recording on a uniform axis: holds lost samples, finds contacts and rest (still.py).
+    """Inputs of a recording on a uniform axis: bridges gaps (gaps.py), finds contacts and rest (still.py).
 
     Parameters
     ----------
@@ -122,44 +122,20 @@ def erkf_inputs(
     ------
     SignalError `bad_signal` when an IMU has no valid sample.
     """
-    acc, gyr = np.array(acc, np.float64), np.array(gyr, np.float64)
+    acc, gyr = np.asarray(acc, np.float64), np.asarray(gyr, np.float64)
     valid = np.asarray(valid & np.isfinite(acc).all(axis=2) & np.isfinite(gyr).all(axis=2))
     contact, still = np.zeros(valid.shape, bool), np.zeros(valid.shape, bool)
     for i, name in enumerate(tree.imus):
         if not valid[:, i].any():
             raise SignalError("bad_signal", f"{name}: no valid sample; leave this sensor out.", sensor=name)
-        last = np.maximum.accumulate(np.where(valid[:, i], np.arange(len(valid)), -1))
-        last[last < 0] = int(np.argmax(valid[:, i]))
-        acc[:, i], gyr[:, i] = acc[last, i], gyr[last, i]
-        _rest_in_gaps(acc[:, i], gyr[:, i], valid[:, i], rate_hz)
+    acc, gyr = bridged(tree, acc, gyr, valid, rate_hz)
+    for i in range(len(tree.imus)):
         still[:, i] = still_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz, AT_REST)
         if i in tree.feet:
             contact[:, i] = still_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz, FOOT_STILL)
     step = np.full(len(acc), 1.0 / rate_hz)
     step[:1] = 0.0
     return ErkfInputs(step, acc, gyr, valid, contact, still, heading)
-
-
-HOLD_S: Final = 0.3
-"""A lost sensor is taken to go on as it last did for so long; then to travel on upright at an even speed."""
-
-POSTURE_S: Final = 1.0
-"""About a stride: the mean specific force over it is gravity in the mean posture."""
-
-
-def _rest_in_gaps(acc: Floats, gyr: Floats, valid: Bools, rate_hz: float) -> None:
-    """After `HOLD_S` of a gap: no rotation, gravity as in the mean posture before it; causal, in place.
-
-    Holding the last rate on would turn the sensor round and round, and the joints its neighbours with it.
-    """
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], ~valid, [False]))))
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        begin = start + round(HOLD_S * rate_hz)
-        if begin >= stop or start == 0:
-            continue
-        posture = acc[max(0, start - round(POSTURE_S * rate_hz)) : start].mean(axis=0)
-        acc[begin:stop] = GRAVITY * posture / np.linalg.norm(posture)
-        gyr[begin:stop] = 0.0
 
 
 def filter_block(

@@ -44,7 +44,8 @@ def bent(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
     σ² is the variance of the two sensors' relative heading: where that is off by ψ, a lever's end is off by
     (1 − cos ψ) r that the rows do not know. Added to the centre's variance as in the second-order filter
     (Jazwinski 1970 §9.3; Bar-Shalom 2001 §10.3.2) it keeps the first steps from fixing headings too early;
-    at the 2° and less of a walk it is below 0.3 mm.
+    at the 2° and less of a walk it is below 0.3 mm. At most 1.5 |r_xy|², the mean square of (1 − cos ψ) r
+    over all headings.
     """
     a, b = i * m + 6, j * m + 6
     var = 0.0
@@ -56,7 +57,7 @@ def bent(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
     for k in range(2):
         reach += (R[i, k, 0] * ri[0] + R[i, k, 1] * ri[1] + R[i, k, 2] * ri[2]) ** 2
         reach += (R[j, k, 0] * rj[0] + R[j, k, 1] * rj[1] + R[j, k, 2] * rj[2]) ** 2
-    return 0.5 * var * var * reach
+    return min(0.5 * var * var, 1.5) * reach
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]

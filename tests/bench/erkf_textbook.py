@@ -130,11 +130,11 @@ class Textbook:
         return found
 
     def second_order(self, R: Floats, i: int, j: int, a: Floats, b: Floats) -> float:
-        """½ σ⁴ |r_xy|² of both levers for the variance σ² of the relative heading."""
+        """½ σ⁴ |r_xy|² of both levers for the variance σ² of the relative heading, ½ σ⁴ at most 1.5."""
         apart = np.zeros(len(self.P))
         apart[self.at(i, 6)], apart[self.at(j, 6)] = R[i].T @ UP, -R[j].T @ UP
         levers = np.concatenate(((R[i] @ a)[:2], (R[j] @ b)[:2]))
-        return float(0.5 * (apart @ self.P @ apart) ** 2 * levers @ levers)
+        return float(min(0.5 * (apart @ self.P @ apart) ** 2, 1.5) * levers @ levers)
 
     def accepts(self, k: int, i: int) -> bool:
         """The gate on a zero velocity, and its rule of re-acceptance (spec/estimators.md §3.3)."""
