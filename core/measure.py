@@ -13,13 +13,18 @@ from core.angles import JointAngles
 from core.body.feet import FootTracks
 from core.edits import Edit, edited_events, edited_strides
 from core.errors import Notice
+from core.events.bouts import Bout, bouts_of
 from core.events.flags import StrideParams
 from core.events.result import GaitEvents, Strides
+from core.events.steps import Steps
 from core.events.strides import stride_list
+from core.events.turns import Turn
 from core.frames import Bools, Floats, Segment
 from core.parameters import Surface, take_figures
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
+from core.parameters.walking import bout_parameters, step_parameters, turn_parameters
+from core.rest import Window
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +40,8 @@ class Tracks:
     feet : paths of the feet, None where no distance can be measured. angles : None when not reached.
     trunk : pelvis, chest → (n, 3) acceleration free of gravity, forward, left, up (m/s²): core/walking_frame.
     params : of the stride list.
+    rests : windows of standing still, None if not known. turns : of the body. steps : of a trunk sensor,
+        where no foot carries one; they are not edited.
     """
 
     t_s: Floats
@@ -48,6 +55,9 @@ class Tracks:
     trunk: Mapping[Segment, Floats] = field(default_factory=dict)
     surface: Surface = field(default_factory=Surface)
     params: StrideParams = field(default_factory=StrideParams)
+    rests: tuple[Window, ...] | None = None
+    turns: tuple[Turn, ...] = ()
+    steps: Steps | None = None
 
     @property
     def duration_s(self) -> float:
@@ -62,17 +72,21 @@ class Measured:
     Parameters
     ----------
     columns : parameters of every stride of the list, counted or not, in its order.
+    bouts : walking without a long break. turns : of the body. steps : of a trunk sensor without foot sensors.
     """
 
     events: GaitEvents
     strides: Strides
     parameters: tuple[Parameter, ...]
     columns: Mapping[str, Column]
+    bouts: tuple[Bout, ...] = ()
+    turns: tuple[Turn, ...] = ()
+    steps: Steps | None = None
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """Of the stride list."""
-        return self.strides.notices
+        """Of the stride list and the steps."""
+        return self.strides.notices + (() if self.steps is None else self.steps.notices)
 
 
 def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
@@ -86,4 +100,9 @@ def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
     events = edited_events(tracks.events, edits, tracks.duration_s)
     strides = edited_strides(stride_list(events, tracks, tracks.turning, tracks.params), edits)
     figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk)
-    return Measured(events, strides, figures.parameters, figures.columns)
+    steps = tracks.steps
+    bouts = bouts_of(events, tracks.rests) if steps is None else steps.bouts
+    walking = bout_parameters(bouts) + turn_parameters(tracks.turns)
+    # without a foot there is no stride: what the trunk tells stands alone, not among missing numbers
+    first = figures.parameters if steps is None else step_parameters(steps)
+    return Measured(events, strides, first + walking, figures.columns, bouts, tracks.turns, steps)

@@ -24,7 +24,9 @@ from core.calibration import CalibrationParams
 from core.calibration.result import CalibratedRecording, Calibration
 from core.errors import Notice, SagittalError
 from core.events import FootPitchParams, StrideParams
+from core.events.lumbar import LumbarParams, about_up, detect_steps, trunk_sensor
 from core.events.result import GaitEvents, Strides
+from core.events.turns import TurnParams, body_yaw_rate, turns
 from core.frames import FOOT, SIDES, Segment
 from core.fusion import MahonyParams
 from core.fusion.orientations import Orientations
@@ -66,6 +68,8 @@ class PipelineConfig:
     calibration: CalibrationParams = field(default_factory=CalibrationParams)
     fusion: MahonyParams = field(default_factory=MahonyParams)
     events: FootPitchParams = field(default_factory=FootPitchParams)
+    lumbar: LumbarParams = field(default_factory=LumbarParams)
+    turns: TurnParams = field(default_factory=TurnParams)
     strides: StrideParams = field(default_factory=StrideParams)
     poses: PoseParams = field(default_factory=PoseParams)
 
@@ -172,6 +176,10 @@ def _run_stages(
     reached: dict[str, object],
 ) -> None:
     """Fill `reached` stage by stage, so that an error leaves everything before it."""
+    if all(s in TRUNK for s in uniform.sensors):
+        start("events")
+        reached["tracks"] = _of_trunk(uniform, config)
+        return
     start("calibration")
     calibrated = calibration.calibrate(uniform, config.calibration)
     reached["calibration"] = calibrated.calibration
@@ -190,6 +198,9 @@ def _run_stages(
         turning=calibrated.calibration.turning,
         surface=surface_of(uniform),
         params=config.strides,
+        rests=calibrated.calibration.rest,
+        turns=turns(*body_yaw_rate(orientations, uniform.rate_hz), uniform.rate_hz, config.turns),
+        steps=None if feet or trunk_sensor(uniform) is None else detect_steps(uniform, config.lumbar),
     )
     reached |= {"events": found, "tracks": tracks}
     start("poses")
@@ -208,6 +219,24 @@ def _run_stages(
         posed.orientations, calibrated.calibration.zero, posed.poses, uniform.subject.standing_angles_deg
     )
     reached |= {"angles": joint, "tracks": _whole(tracks, calibrated, posed, joint)}
+
+
+def _of_trunk(uniform: UniformRecording, config: PipelineConfig) -> Tracks:
+    """Steps and turns of a single trunk sensor: they need neither rest nor calibration."""
+    steps = detect_steps(uniform, config.lumbar)
+    signals = uniform.sensors[steps.source]
+    yaw_rate = about_up(signals, uniform.rate_hz, config.lumbar)[1]
+    return Tracks(
+        t_s=uniform.t_s,
+        rate_hz=uniform.rate_hz,
+        events=GaitEvents(()),
+        q={},
+        valid={},
+        surface=surface_of(uniform),
+        params=config.strides,
+        turns=turns(yaw_rate, signals.valid, uniform.rate_hz, config.turns),
+        steps=steps,
+    )
 
 
 def _whole(

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Final
 
 import numpy as np
 
 from core.errors import Notice
 from core.events.bouts import Bout
 from core.frames import Segment, Side
+
+EDGE_STEPS: Final = 2
+"""Steps at each end of a bout that are not steady: one stride (core/events/flags.py, edge_strides)."""
 
 
 @dataclass(frozen=True)
@@ -33,15 +37,19 @@ class Steps:
 
     @property
     def step_times_s(self) -> tuple[float, ...]:
-        """Times from contact to contact inside the bouts, those of stops left out."""
-        return tuple(
-            b.time_s - a.time_s
-            for a, b in pairwise(self.steps)
-            if any(
-                bout.first_s <= a.time_s and b.time_s <= bout.end_s and (a.time_s, b.time_s) not in bout.stops
-                for bout in self.bouts
-            )
-        )
+        """Times from contact to contact inside the bouts, without stops.
+
+        The steps of the first and last stride of a bout, where gait starts and stops, are left out as in the
+        stride list, unless nothing else was walked.
+        """
+        inside = [self._times(bout) for bout in self.bouts]
+        steady = [t for times in inside for t in times[EDGE_STEPS : len(times) - EDGE_STEPS] if t is not None]
+        return tuple(steady or (t for times in inside for t in times if t is not None))
+
+    def _times(self, bout: Bout) -> list[float | None]:
+        """Step times of a bout in order, None for one that holds a stop."""
+        contacts = [s.time_s for s in self.steps if bout.first_s <= s.time_s <= bout.end_s]
+        return [None if (a, b) in bout.stops else b - a for a, b in pairwise(contacts)]
 
     @property
     def cadence_spm(self) -> float | None:

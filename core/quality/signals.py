@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.frames import GRAVITY, Floats
 
@@ -30,7 +31,9 @@ class Facts:
     Parameters
     ----------
     still : the quietest second is quiet enough to be standing still (whatever the unit).
-    still_norm : mean |acc| in the quietest second, m/s² if the unit is right. still_gyro : mean |ω| there.
+    still_norm : mean |acc| in the quietest second, m/s² if the unit is right.
+    still_gyro : least mean |ω| of all seconds in which acc is still: somebody may turn on the spot in the
+        quietest one.
     still_slice : samples of that second.
     median_norm, acc_std : median and standard deviation of |acc| over the take.
     gyro_top : 99.9th percentile of |ω|, rad/s, None without gyroscope.
@@ -65,12 +68,12 @@ def facts(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
     at = slice(k, k + width)
     still_norm = float(norm[at].mean())
     speed = None if gyr is None else np.linalg.norm(gyr, axis=1)
-    quiet_speed = None if speed is None else speed[good][at]
+    calm = np.union1d([k], np.flatnonzero(spread < STILL * np.linalg.norm(mean, axis=1)))
     known = None if speed is None else speed[np.isfinite(speed)]
     return Facts(
         still=bool(spread[k] < STILL * np.linalg.norm(mean[k])),
         still_norm=still_norm,
-        still_gyro=_mean(quiet_speed),
+        still_gyro=None if speed is None else _least(speed[good], calm, width),
         still_slice=slice(int(good[at][0]), int(good[at][-1]) + 1),
         median_norm=float(np.median(norm)),
         acc_std=float(norm.std()),
@@ -78,10 +81,15 @@ def facts(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
     )
 
 
-def _mean(x: Floats | None) -> float | None:
-    if x is None or not np.isfinite(x).any():
+def _least(speed: Floats, starts: NDArray[np.int64], width: int) -> float | None:
+    """Least mean speed of the windows that begin at `starts`; missing samples are left out."""
+    known = np.isfinite(speed)
+    total = np.concatenate(([0.0], np.cumsum(np.where(known, speed, 0.0))))
+    count = np.concatenate(([0], np.cumsum(known)))
+    n = count[starts + width] - count[starts]
+    if not n.any():
         return None
-    return float(np.nanmean(x))
+    return float(((total[starts + width] - total[starts])[n > 0] / n[n > 0]).min())
 
 
 def saturation(x: Floats, floor: float) -> tuple[float, float | None]:

@@ -6,6 +6,7 @@ poses.parquet   segment poses for the replay
 tracks.parquet  what strides and parameters are measured on (server/report/tracks.py)
 signals.parquet what the sensors measured, on the common time axis (server/report/signals.py)
 events.csv      contacts: time_s, side, kind (ic | tc), source
+steps.csv       steps of a trunk sensor, where no foot carries one: time_s, side
 strides.csv     one row per stride with its temporal parameters and why it was left out
 
 Undefined is an empty cell or null, never NaN. `server.report.bundle` reads them back.
@@ -26,6 +27,7 @@ from core.angles import JointAngles
 from core.body.health import worst
 from core.body.poses import Poses
 from core.events.result import GaitEvents, Strides
+from core.events.steps import Steps
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
 from server.report import signals, tracks
@@ -46,6 +48,8 @@ def analysis_files(analysis: Analysis) -> dict[str, bytes]:
     if analysis.measured is not None:
         files["events.csv"] = events_csv(analysis.measured.events)
         files["strides.csv"] = strides_csv(analysis.measured.strides, analysis.measured.columns)
+        if analysis.measured.steps is not None:
+            files["steps.csv"] = steps_csv(analysis.measured.steps)
     if analysis.angles is not None:
         files["angles.parquet"] = angles_parquet(analysis.angles)
     if analysis.poses is not None:
@@ -64,6 +68,7 @@ def summary(analysis: Analysis) -> dict[str, object]:
         "calibration": _calibration(analysis.calibration, analysis.angles),
         "estimator": _estimator(analysis),
         "parameters": [parameter_row(p) for p in analysis.parameters],
+        "walking": _walking(analysis),
         "warnings": [n.to_json() for n in analysis.notices],
         "provenance": plain(analysis.provenance),
     }
@@ -115,6 +120,11 @@ def events_csv(events: GaitEvents) -> bytes:
     return write_csv(
         ("time_s", "side", "kind", "source"), ((e.time_s, e.side, e.kind, e.source) for e in events.events)
     )
+
+
+def steps_csv(steps: Steps) -> bytes:
+    """Steps of a trunk sensor in order of time; the side is empty where it cannot be told."""
+    return write_csv(("time_s", "side"), ((s.time_s, s.side) for s in steps.steps))
 
 
 def strides_csv(strides: Strides, columns: Mapping[str, Column]) -> bytes:
@@ -179,6 +189,38 @@ def _calibration(calibration: Calibration | None, angles: JointAngles | None) ->
     )
     assert isinstance(result, dict)  # noqa: S101 (narrows the type; `plain` keeps mappings)
     return result
+
+
+def _walking(analysis: Analysis) -> dict[str, object] | None:
+    """Walking bouts with their stops, and turns."""
+    measured = analysis.measured
+    if measured is None:
+        return None
+    return {
+        "bouts": [
+            {
+                "start_s": b.start_s,
+                "end_s": b.end_s,
+                "contacts": b.contacts,
+                "initiation_s": b.initiation_s,
+                "stops_s": plain(b.stops),
+                "from_rest": b.from_rest,
+                "to_rest": b.to_rest,
+            }
+            for b in measured.bouts
+        ],
+        "turns": [
+            {
+                "start_s": t.start_s,
+                "end_s": t.end_s,
+                "turn_angle_deg": math.degrees(t.angle_rad),
+                "turn_duration_s": t.duration_s,
+                "turn_peak_velocity_dps": math.degrees(t.peak_rad_s),
+                "turn_direction": t.direction,
+            }
+            for t in measured.turns
+        ],
+    }
 
 
 def _estimator(analysis: Analysis) -> dict[str, object] | None:

@@ -17,8 +17,11 @@ import pyarrow as pa
 from core.angles import JointAngles
 from core.body.feet import FootTracks
 from core.body.model import BodyModel
+from core.events.bouts import Bout
 from core.events.flags import StrideParams
 from core.events.result import GaitEvents
+from core.events.steps import Step, Steps
+from core.events.turns import Turn
 from core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
 from core.measure import Tracks
 from core.parameters import Surface
@@ -53,6 +56,9 @@ def tracks_parquet(tracks: Tracks) -> bytes:
         "rate_hz": tracks.rate_hz,
         "params": dataclasses.asdict(tracks.params),
         "surface": dataclasses.asdict(tracks.surface),
+        "rests": tracks.rests,
+        "turns": [dataclasses.asdict(t) for t in tracks.turns],
+        "steps": None if tracks.steps is None else _steps_meta(tracks.steps),
         "feet": None
         if feet is None
         else {"linked": feet.linked, "source": feet.source, "body": dataclasses.asdict(feet.body)},
@@ -79,6 +85,27 @@ def read_tracks(data: bytes, events: GaitEvents, angles: JointAngles | None) -> 
         trunk={s: _gathered(table, f"{s}_acc", "xyz") for s in trunk},
         surface=_made(Surface, meta["surface"]),
         params=_made(StrideParams, meta["params"]),
+        rests=None if meta.get("rests") is None else tuple((a, b) for a, b in meta["rests"]),
+        turns=tuple(_made(Turn, t) for t in meta.get("turns", ())),
+        steps=None if meta.get("steps") is None else _steps(meta["steps"]),
+    )
+
+
+def _steps_meta(steps: Steps) -> dict[str, object]:
+    """Steps of a trunk sensor as JSON; their notices lie with all others in analysis.json."""
+    return {
+        "source": steps.source,
+        "steps": [(s.time_s, s.side) for s in steps.steps],
+        "bouts": [dataclasses.asdict(b) for b in steps.bouts],
+    }
+
+
+def _steps(meta: Mapping[str, Any]) -> Steps:
+    bouts = [{**b, "stops": tuple((x, y) for x, y in b["stops"])} for b in meta["bouts"]]
+    return Steps(
+        steps=tuple(Step(t, side) for t, side in meta["steps"]),
+        bouts=tuple(_made(Bout, b) for b in bouts),
+        source=meta["source"],
     )
 
 

@@ -284,3 +284,15 @@ def test_the_raw_gaitmap_copy_shows_its_clipped_heel_strikes() -> None:
     report = assess(recording, synchronise(recording))
     assert {(n.code, n.severity) for n in report.notices} == {("saturated", "info")}
     assert report.level == "good"
+
+
+def test_turning_on_the_spot_while_the_trunk_is_level_is_no_wrong_unit() -> None:
+    """mobgap_lowback Test5: the quietest second of the accelerometer lies in a turn."""
+    still = np.tile([0.0, 0.0, GRAVITY], (1000, 1))
+    acc = still + np.random.default_rng(0).normal(0.0, 0.05, still.shape)
+    acc[400:600] = still[400:600]
+    gyr = np.full(still.shape, 0.02)
+    gyr[400:600, 2] = 0.8
+    assert facts(acc, gyr, 100.0).still_gyro == pytest.approx(0.02 * 3**0.5)
+    everywhere = np.full(still.shape, 1.0)
+    assert facts(acc, everywhere, 100.0).still_gyro == pytest.approx(3**0.5)

@@ -1,0 +1,97 @@
+"""A take with one trunk sensor, whole chain: cadence, steps, walking bouts and turns, no joint angles."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+from core.frames import Segment
+from core.measure import measure
+from core.parameters.result import Parameter
+from core.pipeline import Analysis, analyse
+from core.simulate import simulate_scenario
+from server.report.bundle import load_bundle
+from server.report.exports import analysis_files
+from server.report.tracks import NAME, read_tracks
+from tests.accuracy.mobgap import TRIALS, recording
+
+
+@cache
+def analysis(*worn: Segment, name: str = "fast_with_turns") -> Analysis:
+    return analyse(simulate_scenario(name, 1, worn=worn).recording)
+
+
+def figures(a: Analysis) -> dict[str, Parameter]:
+    return {p.name: p for p in a.parameters if p.side is None}
+
+
+def test_a_single_pelvis_sensor_gives_cadence_steps_bouts_and_turns() -> None:
+    a = analysis("pelvis")
+    assert a.problem is None
+    found = figures(a)
+    assert found["cadence_spm"].mean == pytest.approx(124.0, rel=0.02)
+    assert found["step_time_s"].mean == pytest.approx(0.484, rel=0.02)
+    assert found["step_count"].mean == pytest.approx(89, abs=3)
+    assert found["walking_bout_count"].mean == 1
+    assert found["walking_duration_min"].mean == pytest.approx(0.71, abs=0.03)
+    assert found["turn_count"].mean == 3
+    assert found["turn_angle_deg"].mean == pytest.approx(180.0, abs=5.0)
+    assert a.angles is None
+    assert a.calibration is None
+
+
+def test_a_recording_of_a_lower_back_alone_needs_no_calibration() -> None:
+    """mobgap_lowback: no manifest, no declared mounting, 12 s of a person."""
+    a = analyse(recording(TRIALS[0]))
+    assert a.problem is None
+    assert figures(a)["cadence_spm"].mean == pytest.approx(99.4, rel=0.05)
+    assert a.measured is not None
+    assert len(a.measured.bouts) == 1
+
+
+def test_its_files_read_back_to_the_same_numbers() -> None:
+    a = analysis("pelvis")
+    files = analysis_files(a)
+    assert len(files["steps.csv"].splitlines()) == 1 + len(a.measured.steps.steps)  # type: ignore[union-attr]
+    bundle = load_bundle(files)
+    assert bundle.parameters == a.parameters
+    again = measure(read_tracks(files[NAME], bundle.events, bundle.angles))
+    assert again.parameters == a.parameters
+    assert again.bouts == a.measured.bouts  # type: ignore[union-attr]
+
+
+def test_thighs_and_pelvis_without_feet_keep_their_angles_and_get_steps() -> None:
+    a = analysis("pelvis", "thigh_l", "thigh_r", name="comfortable")
+    assert a.angles is not None
+    assert figures(a)["step_count"].mean == pytest.approx(72, abs=3)
+
+
+def test_with_a_foot_sensor_the_foot_decides() -> None:
+    a = analysis("pelvis", "foot_l", "foot_r", name="comfortable")
+    assert a.measured is not None
+    assert a.measured.steps is None
+    assert "step_count" not in figures(a)
+    assert figures(a)["walking_bout_count"].mean == len(a.measured.bouts) > 0
+    assert all(b.from_rest for b in a.measured.bouts)
+    assert all(b.initiation_s is not None and 0.2 < b.initiation_s < 1.5 for b in a.measured.bouts)
+
+
+def test_sitting_with_a_trunk_sensor_says_that_nobody_walked() -> None:
+    from dataclasses import replace
+
+    take = simulate_scenario("comfortable", 1, worn=("pelvis",)).recording
+    (stream,) = take.streams.values()
+    still = stream.t_s < 5.5
+    short = replace(
+        stream,
+        t_s=stream.t_s[still],
+        acc=stream.acc[still],
+        gyr=None if stream.gyr is None else stream.gyr[still],
+        mag=None,
+    )
+    a = analyse(replace(take, streams={stream.device_id: short}))
+    assert "no_walking" in {n.code for n in a.notices}
+    assert figures(a)["cadence_spm"].mean is None
+    assert figures(a)["cadence_spm"].reason == "no_walking"
+    assert figures(a)["walking_bout_count"].mean == 0
