@@ -67,7 +67,7 @@ def start_state(
     P = np.diag(np.tile(sd**2, n))
     up, part, heading = to_matrix(q)[:, 2, :], parts(tree), np.eye(n)
     if inputs.heading is None:
-        # nothing tells a common heading: as none of its errors it stays what it is
+        # the heading that all have in common is nobody's error: it is what W's x means
         same = part[:, None] == part
         heading -= same / same.sum(axis=0)
     for i, j in zip(*np.nonzero(heading), strict=True):
