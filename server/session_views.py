@@ -48,6 +48,7 @@ SHOWN: Final = (
     "used",
     "replay",
     "profile",
+    "limits",
 )
 """Members of ReportModel that templates use as they are."""
 

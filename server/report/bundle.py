@@ -107,14 +107,22 @@ def reviewed(bundle: Bundle, measured: Measured, edits: Sequence[Edit]) -> Bundl
 def read_angles(data: bytes) -> JointAngles:
     """Joint angles of angles.parquet in rad; null becomes NaN again."""
     table, meta = read_table(data)
-    angles = {
+    found = {
         name.removesuffix("_deg"): np.radians(floats_of(table, name))
         for name in table.column_names
         if name != "t_s"
     }
+    headings = {name: found.pop(name) for name in tuple(found) if name.endswith("_heading")}
     zero = {name: math.radians(offset) for name, offset in meta["zero_offset_deg"].items()}
     standing = dict(meta.get("standing_angles_deg", {}))
-    return JointAngles(floats_of(table, "t_s"), angles, zero, meta["angle_zero"], standing_deg=standing)
+    return JointAngles(
+        floats_of(table, "t_s"),
+        found,
+        zero,
+        meta["angle_zero"],
+        standing_deg=standing,
+        headings={name.removesuffix("_heading"): course for name, course in headings.items()},
+    )
 
 
 def read_poses(data: bytes) -> Poses:

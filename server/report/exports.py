@@ -94,6 +94,7 @@ def parameter_row(p: Parameter) -> dict[str, object]:
 def angles_parquet(angles: JointAngles) -> bytes:
     """Joint angles as Parquet: `t_s` (float64) and `<name>_deg` (float32); lost samples are null."""
     columns = {f"{name}_deg": np.degrees(a).astype(np.float32) for name, a in angles.angles.items()}
+    columns |= {f"{s}_heading_deg": np.degrees(a).astype(np.float32) for s, a in angles.headings.items()}
     zero = {name: math.degrees(offset) for name, offset in angles.zero_offset.items()}
     meta = {"schema": SCHEMA, "angle_zero": angles.zero, "zero_offset_deg": zero}
     if angles.standing_deg:

@@ -6,19 +6,23 @@ A pure function of stored results (law 10): under 50 ms for a 10 min session.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
 
 from core.errors import Notice
+from core.flags import flags
 from core.frames import SIDES, Floats, Side
-from core.norms import NormBands, NormValues, adult_kinematics, angle_values, temporal_values
+from core.norms.lookup import Norms, norms_for
+from core.norms.values import ANGLES
 from core.parameters import cycle_curves
+from core.parameters.result import CycleCurves
 from core.scores import scores
 from server.report.bundle import Bundle
 from server.report.columns import plain
 from server.report.estimator import EstimatorView, estimated_variables, estimator_view
+from server.report.limits import LimitsView, limits_view
 from server.report.panels import DRAWN_STRIDES, CurvePanel, SideCurve, curve_panels
 from server.report.profile import ProfileView, profile_view
 from server.report.quality_box import QualityBox, quality_box
@@ -96,6 +100,7 @@ class ReportModel:
     ----------
     problem : what stopped the analysis, None when it ran to its end.
     estimator : which pose estimator ran and its health, None when it was not reached.
+    limits : values against limits, None where no stride counts.
     profile : distance of the curves from healthy adults, None without curves.
     groups : parameter rows under their headings. key_curve : the panel shown on the overview.
     norm_note : source, number and speed of the reference people, or why there is none.
@@ -118,6 +123,7 @@ class ReportModel:
     provenance: Mapping[str, object]
     estimator: EstimatorView | None = None
     profile: ProfileView | None = None
+    limits: LimitsView | None = None
 
     @property
     def key_curve(self) -> CurvePanel:
@@ -161,6 +167,7 @@ class ReportModel:
                 "zero_offset_deg": self.zero_offset_deg,
                 "estimator": None if self.estimator is None else asdict(self.estimator),
                 "profile": None if self.profile is None else _profile_json(self.profile),
+                "limits": None if self.limits is None else asdict(self.limits),
                 "provenance": self.provenance,
             }
         )
@@ -168,7 +175,12 @@ class ReportModel:
 
 
 def report_model(
-    bundle: Bundle, *, age: float | None = None, sex: Sex | None = None, speed_mps: float | None = None
+    bundle: Bundle,
+    *,
+    age: float | None = None,
+    sex: Sex | None = None,
+    speed_mps: float | None = None,
+    height_m: float | None = None,
 ) -> ReportModel:
     """Build the report of a finished analysis.
 
@@ -176,15 +188,14 @@ def report_model(
     ----------
     age : years at the visit; without it curves are compared with all adults, timing with nobody.
     speed_mps : walking speed, None = the take's own; below 0.8 m/s no reference applies.
+    height_m : makes the speed dimensionless, so that legs of any length find their reference.
     """
     if speed_mps is None:
         speed_mps = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
-    bands = adult_kinematics(age, speed_mps)
-    angle_norms, time_norms = angle_values(age), temporal_values(age, sex)
-    values = {} if bands.reason else {**time_norms.values, **angle_norms.values}
-    rows = parameter_rows(bundle.parameters, values, estimated_variables(bundle.estimator))
+    norms = norms_for(age, sex, speed_mps, height_m)
+    rows = parameter_rows(bundle.parameters, norms, estimated_variables(bundle.estimator))
     curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
-    panels = curve_panels(bundle, curves, bands)
+    panels = curve_panels(bundle, curves, norms)
     stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
     angles = bundle.angles
     return ReportModel(
@@ -211,7 +222,7 @@ def report_model(
             for s in bundle.strides.strides
         ),
         duration_s=_duration(bundle),
-        norm_note=_norm_note(rows, panels, bands, time_norms),
+        norm_note=_norm_note(rows, panels, norms),
         norm_source=next((p.norm.source for p in panels if p.norm is not None), None),
         curve_notes=_curve_notes(bundle, panels),
         angle_zero=None if angles is None else angles.zero,
@@ -220,10 +231,23 @@ def report_model(
         else {k: float(np.degrees(v)) for k, v in angles.zero_offset.items()},
         provenance=bundle.provenance,
         estimator=estimator_view(bundle.estimator),
+        limits=_limits(bundle, curves, height_m),
         profile=None
         if curves is None
         else profile_view(scores(curves, estimated=estimated_variables(bundle.estimator))),
     )
+
+
+def _limits(bundle: Bundle, curves: CycleCurves | None, height_m: float | None) -> LimitsView | None:
+    """Estimated angles are not held against anything."""
+    if not bundle.strides.used():
+        return None
+    unsure = estimated_variables(bundle.estimator)
+    if curves is not None:
+        measured = {v: c for v, c in curves.curves.items() if v not in unsure}
+        curves = replace(curves, curves=measured)
+    standing = {} if bundle.angles is None else bundle.angles.standing_deg
+    return limits_view(flags(curves, bundle.parameters, standing, height_m))
 
 
 def rounded(values: Floats | None) -> list[float] | None:
@@ -265,12 +289,10 @@ def _key_number(row: Row) -> KeyNumber:
     )
 
 
-def _norm_note(
-    rows: tuple[Row, ...], panels: tuple[CurvePanel, ...], bands: NormBands, timing: NormValues
-) -> str:
+def _norm_note(rows: tuple[Row, ...], panels: tuple[CurvePanel, ...], norms: Norms) -> str:
     """Who the reference people are, or why there are none; always something."""
-    if bands.reason is not None:
-        return NO_NORM.get(bands.reason, bands.reason)
+    if norms.reason is not None:
+        return NO_NORM.get(norms.reason, norms.reason)
     sentences = []
     band = next((p.norm for p in panels if p.norm is not None), None)
     if band is not None:
@@ -279,10 +301,10 @@ def _norm_note(
             f"Norm: {band.n} {who}, overground at their comfortable 1.25 ± 0.16 m/s, mean ± 1 SD "
             f"({band.source})."
         )
-    if timing.reason is not None:
-        sentences.append(NO_NORM.get(timing.reason, timing.reason))
-    elif shown := [r for r in rows if r.norm is not None and r.name in timing.values]:
-        sentences.append(f"Timing: {timing.values[shown[0].name].group} ({shown[0].norm_source}).")
+    if norms.timing_reason is not None:
+        sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
+    elif shown := [r for r in rows if r.norm is not None and r.name not in ANGLES]:
+        sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
     return " ".join(sentences)
 
 

@@ -9,7 +9,8 @@ from typing import Final
 import numpy as np
 
 from core.frames import SIDES, Floats, Side
-from core.norms import NormBand, NormBands
+from core.norms import NormBand
+from core.norms.lookup import Norms
 from core.parameters import mean_curve
 from core.parameters.result import CycleCurves
 from server.report.bundle import Bundle
@@ -60,7 +61,7 @@ class CurvePanel:
     sides: Mapping[Side, SideCurve]
 
 
-def curve_panels(bundle: Bundle, curves: CycleCurves | None, norms: NormBands) -> tuple[CurvePanel, ...]:
+def curve_panels(bundle: Bundle, curves: CycleCurves | None, norms: Norms) -> tuple[CurvePanel, ...]:
     """All panels in reading order; a variable without a curve keeps its place and says why.
 
     Parameters

@@ -58,7 +58,7 @@ def quality_box(bundle: Bundle) -> QualityBox:
     severities = {n.severity for n in bundle.warnings}
     if "error" in severities:
         kind, word = "bad", "Analysis stopped"
-    elif not bundle.strides.used():
+    elif not bundle.strides.used() and not _trunk_steps(bundle):
         kind, word = "bad", "No strides"
     elif level == "poor":
         kind, word = "bad", "Poor data"
@@ -67,12 +67,25 @@ def quality_box(bundle: Bundle) -> QualityBox:
     else:
         kind, word = "ok", "Good data"
     items = [
-        _strides(bundle),
+        *_counted(bundle),
         *_signals(bundle.quality),
         *_calibration(bundle.calibration),
         *_estimator(bundle.estimator),
     ]
     return QualityBox(kind, word, tuple(items))
+
+
+def _trunk_steps(bundle: Bundle) -> int:
+    """Steps that a trunk sensor told, where no foot carries one."""
+    return next((int(p.mean) for p in bundle.parameters if p.name == "step_count" and p.mean is not None), 0)
+
+
+def _counted(bundle: Bundle) -> list[QualityItem]:
+    """Strides of the feet, or steps of the trunk where there are none."""
+    steps = _trunk_steps(bundle)
+    if steps and not bundle.strides.strides:
+        return [QualityItem("Steps", str(steps), "trunk sensor")]
+    return [_strides(bundle)]
 
 
 def _strides(bundle: Bundle) -> QualityItem:

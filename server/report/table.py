@@ -6,24 +6,47 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from core.norms import NormValue
+from core.norms.lookup import Norms
 from core.parameters.result import Parameter
 from server.report.curves import range_svg
 from server.report.wording import TERMS, Term, difference_words, number, reason_words
 
-COUNTED: Final[Mapping[str, str]] = {"cadence_spm": "steps", "total_distance_m": "feet"}
+NOBODY: Final = Norms(None, None)
+"""No reference people at all."""
+
+COUNTED: Final[Mapping[str, str]] = {
+    "cadence_spm": "steps",
+    "total_distance_m": "feet",
+    "step_count": "steps",
+    "walking_bout_count": "bouts",
+    "walking_duration_min": "bouts",
+    "turn_count": "turns",
+    "turn_angle_deg": "turns",
+    "turn_duration_s": "turns",
+    "turn_peak_velocity_dps": "turns",
+}
 """What a number is the mean of, where not of strides."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One number with what is behind it; `title` says it in full."""
+    """One number with what is behind it; `title` says it in full.
+
+    Parameters
+    ----------
+    ci : 95 % confidence interval of the mean over the strides. cv_pct : None below 10 strides.
+    z, percentile : among the norm's people, None without a comparable norm.
+    """
 
     value: float
     sd: float | None
     n: int
     text: str
     title: str
+    ci: tuple[float, float] | None = None
+    cv_pct: float | None = None
+    z: float | None = None
+    percentile: float | None = None
 
 
 @dataclass(frozen=True)
@@ -58,6 +81,14 @@ class Row:
     low_confidence: bool = False
 
     @property
+    def z_words(self) -> str:
+        """Standard deviations from the norm's mean, left and right; empty without a norm."""
+        cells = (self.both,) if self.both is not None else (self.left, self.right)
+        if all(c is None or c.z is None for c in cells):
+            return ""
+        return "z " + " | ".join("–" if c is None or c.z is None else number(c.z, 1) for c in cells)
+
+    @property
     def plot(self) -> str:
         """Range bar as SVG."""
         cells = {"left": self.left, "right": self.right, "both": self.both}
@@ -69,7 +100,7 @@ class Row:
 
 def parameter_rows(
     parameters: Sequence[Parameter],
-    norms: Mapping[str, NormValue],
+    norms: Norms = NOBODY,
     estimated: Collection[str] = (),
 ) -> tuple[Row, ...]:
     """Rows in the order of the table; parameters without wording come last under their own name.
@@ -83,7 +114,7 @@ def parameter_rows(
         found.setdefault(p.name, {})[p.side] = p
     known = [name for name in TERMS if name in found]
     other = [name for name in found if name not in TERMS]
-    rows = (_row(name, found[name], norms.get(name)) for name in (*known, *other))
+    rows = (_row(name, found[name], norms) for name in (*known, *other))
     return tuple(_unsure(r) if any(r.name.startswith(f"{v}_") for v in estimated) else r for r in rows)
 
 
@@ -93,9 +124,9 @@ def grouped(rows: Sequence[Row]) -> tuple[tuple[str, tuple[Row, ...]], ...]:
     return tuple((name, tuple(r for r in rows if r.group == name)) for name in names)
 
 
-def _row(name: str, sides: Mapping[str | None, Parameter], norm: NormValue | None) -> Row:
-    term = TERMS.get(name) or _unknown(name, sides)
-    both, left, right = (_cell(sides.get(side), term) for side in (None, "left", "right"))
+def _row(name: str, sides: Mapping[str | None, Parameter], norms: Norms) -> Row:
+    term, norm = TERMS.get(name) or _unknown(name, sides), norms.values.get(name)
+    both, left, right = (_cell(sides.get(side), term, norms) for side in (None, "left", "right"))
     missing = both is None and left is None and right is None
     shown = norm if norm is not None and norm.comparable else None
     return Row(
@@ -121,8 +152,22 @@ def _row(name: str, sides: Mapping[str | None, Parameter], norm: NormValue | Non
 
 
 def _unsure(row: Row) -> Row:
+    """An estimated angle is not held against anybody."""
+
+    def bare(cell: Cell | None) -> Cell | None:
+        return None if cell is None else replace(cell, z=None, percentile=None)
+
     return replace(
-        row, norm=None, norm_mean=None, norm_sd=None, norm_n=None, norm_source=None, low_confidence=True
+        row,
+        both=bare(row.both),
+        left=bare(row.left),
+        right=bare(row.right),
+        norm=None,
+        norm_mean=None,
+        norm_sd=None,
+        norm_n=None,
+        norm_source=None,
+        low_confidence=True,
     )
 
 
@@ -137,13 +182,32 @@ def _difference(
     return f"{side} {reason_words(None if absent is None else absent.reason)}"
 
 
-def _cell(p: Parameter | None, term: Term) -> Cell | None:
+def _cell(p: Parameter | None, term: Term, norms: Norms) -> Cell | None:
     if p is None or p.mean is None:
         return None
+    digits = max(term.digits, 1)
     spread = "" if p.sd is None else f" ± {number(p.sd, _sd_digits(term))}"
     what = COUNTED.get(p.name, "strides")
-    full = f"{number(p.mean, max(term.digits, 1))}{spread}\u202f{term.unit}, mean ± SD of {p.n} {what}"
-    return Cell(p.mean, p.sd, p.n, number(p.mean, term.digits), full)
+    told = [f"{number(p.mean, digits)}{spread}\u202f{term.unit}, mean ± SD of {p.n} {what}"]
+    ci = None if p.ci_low is None or p.ci_high is None else (p.ci_low, p.ci_high)
+    if ci is not None:
+        told.append(f"95 % CI {number(ci[0], digits)} to {number(ci[1], digits)}")
+    if p.cv_pct is not None:
+        told.append(f"CV {number(p.cv_pct, 1)} %{' of few strides' if p.note == 'few_strides' else ''}")
+    place = norms.place(p.name, p.mean)
+    if place.z is not None and place.percentile is not None:
+        told.append(f"z {number(place.z, 1)}, percentile {number(place.percentile)} of the norm")
+    return Cell(
+        p.mean,
+        p.sd,
+        p.n,
+        number(p.mean, term.digits),
+        "; ".join(told),
+        ci,
+        p.cv_pct,
+        place.z,
+        place.percentile,
+    )
 
 
 def _sd_digits(term: Term) -> int:

@@ -96,6 +96,7 @@ _WAY, _TIMING, _PHASES = "Speed and distance", "Timing", "Phases of the stride"
 _SUPPORT = "Support in seconds"
 _HIP_KNEE, _ANKLE_FOOT = "Hip and knee angles", "Ankle and foot angles"
 _PARTS, _TRUNK = "Parts of stance and swing", "Regularity of the trunk"
+_WALKING = "Walking and turning"
 
 _WIDTH: Final[Comparison] = ("wider", "narrower")
 _HEIGHT: Final[Comparison] = ("higher", "lower")
@@ -152,6 +153,13 @@ TERMS: Final[Mapping[str, Term]] = {
     "foot_pitch_tc_deg": Term("Foot pitch at foot-off", "°", _ANKLE_FOOT, 1, (-90, 10), _TOES),
     "toe_out_deg": Term("Toe-out, from standing", "°", _ANKLE_FOOT, 1, (-25, 25), _OUT),
     "turning_angle_deg": Term("Turn of the foot in a stride", "°", _ANKLE_FOOT, 1, (-15, 15), _TURN),
+    "step_count": Term("Steps", "", _WALKING, 0, (0, 1000), _SIZE),
+    "walking_bout_count": Term("Walks without a long break", "", _WALKING, 0, (0, 10), _SIZE),
+    "walking_duration_min": Term("Time walked", "min", _WALKING, 1, (0, 10), _TIME),
+    "turn_count": Term("Turns", "", _WALKING, 0, (0, 20), _SIZE),
+    "turn_angle_deg": Term("Angle of a turn", "°", _WALKING, 0, (0, 360), _SIZE),
+    "turn_duration_s": Term("Time for a turn", "s", _WALKING, 1, (0, 6), _TIME),
+    "turn_peak_velocity_dps": Term("Fastest in a turn", "°/s", _WALKING, 0, (0, 300), _SIZE),
     "harmonic_ratio_v": Term("Harmonic ratio, vertical", "", _TRUNK, 2, (0, 6), _SIZE),
     "harmonic_ratio_ap": Term("Harmonic ratio, forward", "", _TRUNK, 2, (0, 6), _SIZE),
     "harmonic_ratio_ml": Term("Harmonic ratio, sideways", "", _TRUNK, 2, (0, 6), _SIZE),
@@ -172,6 +180,11 @@ ZERO_WORDS: Final[Mapping[str, str]] = {"standing": "from standing"}
 REASONS: Final[Mapping[str, str]] = {
     "no_strides": "not measured: no complete stride of this side",
     "no_terminal_contact": "not measured: no foot-off was found",
+    "no_turns": "not measured: no turn in this take",
+    "no_bouts": "not measured: nobody walked for long enough",
+    "no_walking": "not measured: the trunk hardly moved",
+    "non_periodic": "not measured: the trunk's movement has no rhythm of steps",
+    "few_steps": "not measured: too few steps in a row",
     "opposite_foot_missing": "not measured: needs sensors on both feet",
     "no_double_support": "not measured: the feet were never on the floor together",
     "joint_missing": "not measured: a segment of this joint carries no sensor",

@@ -16,4 +16,5 @@ def read(
     """Describe an analysis with its edits for this person on that day; raises IntegrityError."""
     bundle = reviews.bundle(blobs, found, edits)
     age = session.performed_on.year - patient.birth_year if patient.birth_year else None
-    return bundle, report_model(bundle, age=age, sex=patient.sex)  # type: ignore[arg-type]
+    height = session.height_m if session.height_m is not None else patient.height_m
+    return bundle, report_model(bundle, age=age, sex=patient.sex, height_m=height)  # type: ignore[arg-type]

@@ -78,6 +78,15 @@ def test_goniometer_angles_go_with_the_angles() -> None:
     assert read_angles(angles_parquet(walk.angles())).standing_deg == {}
 
 
+def test_headings_go_with_the_angles_and_are_no_angles() -> None:
+    turning = walk.angles()
+    course = np.linspace(0.0, 20.0, len(turning.t_s))
+    back = read_angles(angles_parquet(replace(turning, headings={"pelvis": course, "foot_l": -course})))
+    assert set(back.angles) == set(turning.angles)
+    assert set(back.headings) == {"pelvis", "foot_l"}
+    np.testing.assert_allclose(back.headings["pelvis"], course, atol=1e-5)
+
+
 def test_bundle_gives_back_angles_strides_events_and_parameters(files: Mapping[str, bytes]) -> None:
     bundle, source = load_bundle(files), analysis()
     assert bundle.angles is not None

@@ -27,7 +27,7 @@ def row(rows: tuple[Row, ...], name: str) -> Row:
 
 
 def rows_of(*parameters: Parameter) -> tuple[Row, ...]:
-    return parameter_rows(parameters, {})
+    return parameter_rows(parameters)
 
 
 def of(name: str, side: str | None, mean: float | None, reason: str | None = None) -> Parameter:
