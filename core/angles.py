@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from core.errors import Notice
-from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
+from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Oriented, Segment, Side
 from core.rest import Window, samples
-from core.rotation import conjugate, from_matrix, multiply, to_matrix
+from core.rotation import conjugate, from_matrix, multiply, rotate, to_matrix
 
 if TYPE_CHECKING:
     # these packages bring numba, which readers of results do without
@@ -54,6 +54,8 @@ class JointAngles:
     zero : "standing" (the only zero so far).
     standing_deg : angles of that standing by goniometer, where somebody entered them (`core.standing`);
         `core.anatomical` adds them back.
+    headings : "pelvis", "foot_l", "foot_r" → (n,) rad about the vertical, left positive, unwrapped, from a
+        zero of its own; only of segments with a sensor. Its course over a stride means something.
     """
 
     t_s: Floats
@@ -63,6 +65,7 @@ class JointAngles:
     notices: tuple[Notice, ...] = ()
     diagnostics: Mapping[str, object] = field(default_factory=dict)
     standing_deg: Mapping[str, float] = field(default_factory=dict)
+    headings: Mapping[str, Floats] = field(default_factory=dict)
 
 
 def joint_angles(
@@ -130,7 +133,33 @@ def joint_angles(
         notices=tuple(notices),
         diagnostics={"estimated": tuple(name for name in estimated if name in angles)},
         standing_deg=dict(standing_deg or {}),
+        headings=headings(orientations),
     )
+
+
+def headings(orientations: Oriented) -> dict[str, Floats]:
+    """Course of pelvis and feet about the vertical, as `JointAngles.headings`; NaN where lost.
+
+    The pelvis turns with its medio-lateral axis, as in the decomposition above; a foot points with its own.
+    """
+    found: dict[str, Floats] = {}
+    for segment, axis in _COURSES.items():
+        if segment not in orientations.q:
+            continue
+        ok = orientations.valid[segment]
+        x, y, _ = rotate(orientations.q[segment][ok], np.array(axis)).T
+        course = np.full(len(ok), np.nan)
+        course[ok] = np.unwrap(np.arctan2(y, x))
+        found[segment] = course
+    return found
+
+
+_COURSES: Final[dict[Segment, tuple[float, float, float]]] = {
+    "pelvis": (0.0, 0.0, 1.0),
+    "foot_l": (1.0, 0.0, 0.0),
+    "foot_r": (1.0, 0.0, 0.0),
+}
+"""Segment → the axis whose direction over the floor is its course: the pelvis's right, a foot's front."""
 
 
 def _source(

@@ -32,14 +32,11 @@ from core.norms.profile import (
     overall_profile,
     side_profile,
 )
-from core.parameters.kinematic import MeanCurve, mean_curve
+from core.parameters.kinematic import MEAN_ZERO, MeanCurve, mean_curve
 from core.parameters.result import CycleCurves
 
 GDI_STAR: Final[Mapping[Profile, str]] = {"gps": "gdi_star", "gps_sagittal": "gdi_star_sagittal"}
 """Name of the index made from each profile; the reduced one has a name of its own."""
-
-NOT_MEASURED: Final = ("pelvis_rotation", "foot_progression")
-"""Variables against the walking direction, which our angles do not have: reason "no_heading"."""
 
 NOTHING_DEG: Final = 1e-6
 """A smaller profile is rounding: the curves are those of the reference, and the logarithm means nothing."""
@@ -57,7 +54,8 @@ class Score:
     value : in `unit`. n : strides behind it, the fewest of its curves.
     healthy : spread of the score (of the GPS behind a GDI*) among the reference people, degrees.
     percentile : of the reference people who score lower, by their log-normal spread; None for a GVS.
-    missing : variables it lacks. reason : "angle_zero_standing", "no_heading", "joint_missing", "no_strides",
+    missing : variables it lacks. reason : "angle_zero_standing", "no_level" (rotation and progression are
+        measured from their own mean, never against the walking direction), "joint_missing", "no_strides",
         "estimated" (no two sensors measure it), "variables_missing" (several reasons, see the GVS),
         "no_reference", "score_zero" (the very curves of the reference: no GDI*).
     """
@@ -161,11 +159,11 @@ def _gvs(
         reason = "no_reference"
     elif standing is None:
         there = side in curves.curves.get(variable, {})
-        reason = "no_strides" if there else "no_heading" if variable in NOT_MEASURED else "joint_missing"
+        reason = "no_strides" if there else "joint_missing"
     elif estimated:
         reason = "estimated"
     elif own is None:
-        reason = "angle_zero_standing"
+        reason = "no_level" if variable in MEAN_ZERO else "angle_zero_standing"
     if reason is not None or own is None or own.mean is None:
         missing = (variable,)
         return Score("gvs_deg", variable, side, mode, None, "deg", 0, healthy, None, missing, reason)

@@ -32,11 +32,15 @@ _JUDGEMENT: Final[Mapping[str, tuple[bool, Literal["normal", "low"], str]]] = {
     "hip_rotation": (True, "low", f"{_ZERO} {_HEADING}"),
     "pelvis_tilt": (False, "low", "Not comparable: measured from standing, pelvic tilt has lost its level."),
     "pelvis_rotation": (
+        True,
+        "low",
+        "Measured from its own mean over the stride, not against the walking direction; compare shapes.",
+    ),
+    "foot_progression": (
         False,
         "low",
-        "Not comparable: rotation against the walking direction is not measured.",
+        "Not comparable in level: measured from its own mean over the stride.",
     ),
-    "foot_progression": (False, "low", "Not comparable: the walking direction of the foot is not measured."),
 }
 """Variable → may the band stand behind our curve, how much to trust it, what to say beside it."""
 

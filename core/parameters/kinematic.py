@@ -24,6 +24,9 @@ from core.parameters.variability import summary
 POINTS: Final = 101
 """Points of a curve: 0, 1, … 100 % of the cycle."""
 
+MEAN_ZERO: Final = ("pelvis_rotation", "foot_progression")
+"""Variables whose zero is their own mean over each stride: they have a shape and no level."""
+
 
 @dataclass(frozen=True)
 class CurveFigure:
@@ -74,6 +77,8 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
     """Cut every angle into gait cycles.
 
     Pelvis angles appear once per side, over that side's cycles; obliquity is positive with that side up.
+    Pelvic rotation (that side forward) and foot progression (toes in) are measured from their own mean over
+    the stride: against the walking direction they have no level (`MEAN_ZERO`).
     A stride in which the angle is not known throughout is a row of NaN.
     """
     index = {side: tuple(i for i, s in enumerate(strides.strides) if s.side == side) for side in SIDES}
@@ -88,6 +93,11 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
                 names[name] = base
             elif suffix not in SUFFIX.values():
                 names[name] = name
+        for segment, variable in (("pelvis", "pelvis_rotation"), (FOOT[side], "foot_progression")):
+            if segment in angles.headings:
+                (row,) = resample(angles.headings[segment][np.newaxis], angles.t_s, bounds, POINTS)
+                turned = row - row[:, :-1].mean(axis=1, keepdims=True)
+                curves.setdefault(variable, {})[side] = -turned if side == "left" else turned
         if not names:
             continue
         rows = resample(np.stack([angles.angles[name] for name in names]), angles.t_s, bounds, POINTS)

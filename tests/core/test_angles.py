@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.angles import SIGNS, cardan_zxy, joint_angles, pelvis_angles
-from core.frames import R_NEUTRAL, SIDES, SUFFIX, Floats, Segment
+from core.angles import SIGNS, cardan_zxy, headings, joint_angles, pelvis_angles
+from core.frames import R_NEUTRAL, SIDES, SUFFIX, Bools, Floats, Segment
 from core.fusion.orientations import Orientations
 from core.rotation import about, from_matrix, multiply, rotate
 from tests.walks import simulated
@@ -165,3 +165,16 @@ def test_goniometer_angles_stay_beside_the_angles() -> None:
     assert angles.standing_deg == {"knee_flexion_l": 8.0}
     assert angles.angles["knee_flexion_l"][0] == pytest.approx(0.0)
     assert angles.zero == "standing"
+
+
+def test_headings_are_continuous_over_turns_and_only_of_sensors() -> None:
+    n = 400
+    turning = np.linspace(0.0, 4.0 * np.pi, n)
+    q = multiply(about(2, turning), np.tile(NEUTRAL, (n, 1)))
+    valid: dict[Segment, Bools] = {"pelvis": np.ones(n, bool)}
+    valid["pelvis"][50:60] = False
+    course = headings(Orientations(np.arange(n) / 100.0, 100.0, {"pelvis": q}, valid, "test"))
+    assert set(course) == {"pelvis"}
+    assert np.isnan(course["pelvis"][50:60]).all()
+    known = np.isfinite(course["pelvis"])
+    np.testing.assert_allclose((course["pelvis"] - turning)[known], course["pelvis"][0], atol=1e-9)

@@ -12,8 +12,10 @@ import pytest
 from core.frames import SIDES, Bools, Floats, Side
 from core.norms import adult_reference
 from core.norms.profile import NINE, SAGITTAL
+from core.parameters.kinematic import MEAN_ZERO
 from core.parameters.result import CycleCurves
 from core.scores import Scores, scores
+from core.standing import NAMES
 from tests.wbds import people
 
 
@@ -57,7 +59,9 @@ def test_without_goniometer_angles_there_is_no_raw_score_and_the_shape_scores_st
         raw = found.find("gps_sagittal_deg", "raw", side)
         assert (raw.value, raw.reason, raw.n) == (None, "angle_zero_standing", 0)
         assert raw.missing == SAGITTAL
-    assert {s.reason for s in found.scores if s.mode == "raw"} == {"angle_zero_standing"}
+    raw_scores = [s for s in found.scores if s.mode == "raw"]
+    assert all(s.value is None and s.reason for s in raw_scores)
+    assert found.find("gps_deg", "raw").reason == "variables_missing"
 
 
 def test_goniometer_angles_give_the_level_back() -> None:
@@ -74,12 +78,23 @@ def test_goniometer_angles_give_the_level_back() -> None:
 def test_three_joints_are_never_called_gps() -> None:
     found = scores(norm(variables=SAGITTAL), standing(0.0))
     full = found.find("gps_deg", "raw")
-    assert (full.value, full.reason) == (None, "variables_missing")
+    assert (full.value, full.reason) == (None, "joint_missing")
     assert "pelvis_rotation" in full.missing
     assert found.find("gdi_star", "raw").value is None
     assert found.find("gps_sagittal_deg", "raw").value is not None
-    assert found.find("gvs_deg", "raw", "left", "foot_progression").reason == "no_heading"
+    assert found.find("gvs_deg", "raw", "left", "foot_progression").reason == "joint_missing"
     assert found.find("gvs_deg", "raw", "left", "hip_adduction").reason == "joint_missing"
+
+
+def test_rotation_and_progression_have_a_shape_and_no_level() -> None:
+    """Nobody's goniometer gives the walking direction: there is no raw GPS of all nine, and it says why."""
+    found = scores(norm(), dict.fromkeys(NAMES, 0.0))
+    for variable in MEAN_ZERO:
+        assert found.find("gvs_deg", "raw", "left", variable).reason == "no_level"
+        assert found.find("gvs_deg", "offset_removed", "left", variable).value == pytest.approx(0.0, abs=1e-9)
+    full = found.find("gps_deg", "raw")
+    assert (full.value, full.reason, full.missing) == (None, "no_level", MEAN_ZERO)
+    assert found.find("gps_deg", "offset_removed").value == pytest.approx(0.0, abs=1e-9)
 
 
 def test_pelvic_obliquity_entered_once_counts_up_on_one_side_and_down_on_the_other() -> None:
@@ -147,5 +162,6 @@ def test_a_session_without_strides_says_so() -> None:
 
 def test_scores_flags_changes_and_norms_need_no_compiler() -> None:
     """The web process imports them: numba would cost it seconds and memory."""
-    code = "import sys, core.scores, core.flags, core.change, core.norms.controls; sys.exit('numba' in sys.modules)"
+    code = "import sys, core.scores, core.flags, core.change, core.norms.controls as c\n"
+    code += "sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0

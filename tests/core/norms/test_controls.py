@@ -99,7 +99,7 @@ def test_controls_score_raw_from_standing_because_they_stand_alike() -> None:
     raw = found.find("gps_deg", "raw")
     assert raw.value is not None
     assert 2.0 < raw.value < 9.0
-    assert scores(curves).find("gps_deg", "raw").reason == "angle_zero_standing"
+    assert scores(curves).find("gps_deg", "raw").reason == "variables_missing"
     kept = mean_curves(curves)
     assert kept["left"]["knee_flexion"] == pytest.approx(person["left"]["knee_flexion"])
 

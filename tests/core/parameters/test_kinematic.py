@@ -5,18 +5,22 @@ from __future__ import annotations
 import csv
 import gzip
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from core.angles import JointAngles
+from core.angles import JointAngles, headings
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Bools, Floats, Side
+from core.fusion.orientations import Orientations
+from core.norms import adult_kinematics
 from core.parameters import cycle_curves, foot_pitch, gait_parameters, kinematic, mean_curve
 from core.parameters.kinematic import FIGURES, per_stride_figures, stride_figures
 from core.parameters.result import CycleCurves
 from tests.core.events.foot_signal import orientations
 from tests.data import data_folder
+from tests.walks import simulated
 
 RATE = 100.0
 T = np.arange(3000) / RATE
@@ -202,3 +206,32 @@ def test_our_figures_are_those_of_the_reference_table() -> None:
             means.append(stride_figures(curves)[name]["left"].mean())
         assert np.mean(means) == pytest.approx(reference[name].mean, abs=0.02), name
         assert np.std(means, ddof=1) == pytest.approx(reference[name].sd, abs=0.02), name
+
+
+def test_rotation_and_progression_have_the_side_that_goes_forward_or_inward() -> None:
+    """Turning to the left brings the right hip forward and the right toes in, the left ones back and out."""
+    turned = {"pelvis": wave(), "foot_l": wave(), "foot_r": wave()}
+    curves = cycle_curves(replace(angles(), headings=turned), strides()).curves
+    for variable in ("pelvis_rotation", "foot_progression"):
+        right_row, left_row = curves[variable]["right"][0], curves[variable]["left"][0]
+        assert right_row[:-1].mean() == pytest.approx(0.0, abs=1e-12)
+        assert np.ptp(right_row) > 0.0
+        at = cycle_curves(angles(pelvis_tilt=wave()), strides()).curves["pelvis_tilt"]
+        np.testing.assert_allclose(right_row - right_row[0], at["right"][0] - at["right"][0][0], atol=1e-12)
+        np.testing.assert_allclose(left_row - left_row[0], at["left"][0][0] - at["left"][0], atol=1e-12)
+
+
+def test_the_simulated_pelvis_rotates_as_the_norm_it_was_made_from() -> None:
+    """spec/patients.md §1: rotation is the WBDS mean, antisymmetrised between the sides."""
+    truth = simulated("healthy", 5)[1]
+    there = dict.fromkeys(truth.q, np.ones(len(truth.t_s), bool))
+    oriented = Orientations(truth.t_s, truth.rate_hz, truth.q, there, "truth")
+    own = Strides(tuple(
+        Stride(s.side, s.start_s, s.release_s, s.end_s) for s in truth.strides if abs(s.turn_rad) < 0.1
+    ))  # fmt: skip
+    curves = cycle_curves(JointAngles(truth.t_s, {}, {}, headings=headings(oriented)), own)
+    norm = adult_kinematics(None).bands["pelvis_rotation"].mean_deg
+    for side in SIDES:
+        rows = np.degrees(curves.curves["pelvis_rotation"][side])
+        shape = np.median(rows, axis=0) - (norm - norm.mean())
+        assert np.sqrt(np.mean(shape**2)) < 1.0, side
