@@ -143,8 +143,8 @@ def _foot_lanes(
                 lines[side] = np.sqrt(sum(axes[c] ** 2 for c in AXES))
             return t_s, lines
 
-        yield Lane("foot_rate", "Foot, turning up and down", "°/s", "toes rise", worn), rate
-        yield Lane("foot_acceleration", "Foot, acceleration", "m/s²", "more", worn), strength
+        yield Lane("foot_rate", "Foot turning rate", "°/s", "toes rise", worn), rate
+        yield Lane("foot_acceleration", "Foot acceleration", "m/s²", "more", worn), strength
     feet = tracks.feet
     if feet is not None and feet.p:
         placed = tuple(side for side in SIDES if side in feet.p)
@@ -152,7 +152,7 @@ def _foot_lanes(
         def height() -> tuple[Floats, Mapping[str, Floats]]:
             return feet.t_s, {str(s): np.where(feet.valid[s], feet.p[s][:, 2], np.nan) for s in placed}
 
-        yield Lane("foot_height", "Height of the ankle", "m", "higher", placed), height
+        yield Lane("foot_height", "Ankle height", "m", "higher", placed), height
 
 
 def _angle_lanes(known: reviews.Take) -> Iterator[tuple[Lane, Read]]:

@@ -42,6 +42,13 @@ class Clock extends EventTarget {
     this.dispatchEvent(new Event("tick"));
   }
 
+  // Another moment while the stride that was picked stays picked.
+  look(t, stride = this.stride) {
+    this.t = Math.min(Math.max(t, 0), this.duration);
+    this.stride = stride;
+    this.dispatchEvent(new Event("tick"));
+  }
+
   setPercent(p) {
     const s = this.stride;
     if (!s) return;

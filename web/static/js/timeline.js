@@ -55,7 +55,7 @@ class TakeTimeline extends HTMLElement {
       win: this.win, review: this.review, editable: this.editable,
       onMove: (event, to) => this.move(event, to),
       onDelete: (event) => this.remove(event),
-      onPick: (event) => clock.set(event.time_s),
+      onPick: (event) => clock.look(event.time_s, this.strideOf(event)),
     };
     this.feet = [...this.querySelectorAll("[data-side]")].map((host) => ({
       blocks: new StrideBlocks(host, { sides: [host.dataset.side], onPick: pick }),
@@ -261,6 +261,12 @@ class TakeTimeline extends HTMLElement {
     const { words, rows } = strideRows(this.review, this.win, this.picked, (i) => this.pick(i, true));
     this.find("listed").textContent = words;
     this.find("list").replaceChildren(...rows);
+  }
+
+  // The stride that an event begins or lies in, else the one it ends.
+  strideOf({ side, time_s }) {
+    const own = this.review.strides.filter((s) => s.side === side);
+    return own.find((s) => s.start_s <= time_s && time_s < s.end_s) ?? own.find((s) => s.end_s === time_s) ?? clock.stride;
   }
 
   // ---- what a person does

@@ -17,8 +17,7 @@ export class EventHandles {
   // Handles of the events in view; those already there are kept, so that the focus stays.
   show() {
     const close = this.host.clientWidth / this.win.span >= CLOSE_PX_PER_S;
-    const margin = this.win.span * 0.02;
-    const seen = close ? this.review.events.filter((e) => e.side === this.side && e.time_s >= this.win.start - margin && e.time_s <= this.win.end + margin) : [];
+    const seen = close ? this.review.events.filter((e) => e.side === this.side && e.time_s >= this.win.start && e.time_s <= this.win.end) : [];
     for (const [event, handle] of this.made) {
       if (!seen.includes(event) && event !== this.held) {
         handle.remove();
@@ -77,7 +76,7 @@ export class EventHandles {
     this.at = Math.round(1000 * this.clamp(event, t)) / 1000;
     this.made.get(event)?.classList.add("held");
     this.put(event, this.at);
-    clock.set(this.at);
+    clock.look(this.at);
   }
 
   // The held event is where it shall stay.
@@ -96,7 +95,7 @@ export class EventHandles {
     this.held = null;
     this.made.get(event)?.classList.remove("held");
     this.put(event, event.time_s);
-    clock.set(event.time_s);
+    clock.look(event.time_s);
   }
 
   grab(e, event, handle) {
