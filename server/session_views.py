@@ -33,7 +33,12 @@ SEVERITIES: Final = ("bad", "warn", "info")
 NO_STRIDE_CODES: Final = ("foot_missing", "no_strides", "few_steps")
 """Notices that explain a take without strides."""
 
-SECONDARY: Final = ("Parts of stance and swing", "Regularity of the trunk", "Support in seconds")
+SECONDARY: Final = (
+    "Parts of stance and swing",
+    "Walking and turning",
+    "Regularity of the trunk",
+    "Support in seconds",
+)
 """Groups for those who look closer: folded on the page, not on paper."""
 
 SHOWN: Final = (
