@@ -24,6 +24,7 @@ from server.api import (
     health,
     jobs,
     patients,
+    programmes,
     reports,
     reviews,
     sessions,
@@ -99,7 +100,19 @@ def create_app(settings: Settings) -> FastAPI:
     problems.install(app)
 
     api = APIRouter(prefix="/api/v1")
-    for part in (sign_in, patients, sessions, files, analyses, reports, reviews, jobs, users, audit_log):
+    for part in (
+        sign_in,
+        patients,
+        programmes,
+        sessions,
+        files,
+        analyses,
+        reports,
+        reviews,
+        jobs,
+        users,
+        audit_log,
+    ):
         api.include_router(part.router)
 
     @api.get("/openapi.json", include_in_schema=False)

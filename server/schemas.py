@@ -24,6 +24,7 @@ Password = Annotated[str, StringConstraints(min_length=MIN_LENGTH, max_length=MA
 Height = Annotated[float, Field(ge=0.5, le=2.5, allow_inf_nan=False, description="m")]
 BirthYear = Annotated[int, Field(ge=1850, le=2200)]
 Sex = Literal["female", "male"]
+HexId = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{32}$")]
 
 
 def _storable(value: dict[str, Any]) -> dict[str, Any]:
@@ -178,6 +179,51 @@ class SessionNew(Request):
 
 class SessionChange(SessionNew):
     """What to change of a session; members left out stay as they are."""
+
+
+class PlannedSessionNew(SessionNew):
+    """A new visit, perhaps one that was planned in a programme."""
+
+    planned_visit_id: HexId | None = None
+
+
+class ProgrammeNew(Request):
+    """A programme for a patient; `starts_on` is the day of the first training."""
+
+    starts_on: dt.date
+    template: Literal["six_weeks"] = "six_weeks"
+
+
+class PlannedVisitChange(Request):
+    """Another day of a planned visit, or the session that it was (null: it was none)."""
+
+    planned_on: dt.date = dt.date.min
+    session_id: HexId | None = None
+
+
+class PlannedVisit(Response):
+    """A visit of a programme; week 1 is that of the first training."""
+
+    id: str
+    label: str
+    kind: Literal["assessment", "training"]
+    week: int
+    planned_on: dt.date
+    session_id: str | None
+    performed_on: dt.date | None
+    state: Literal["done", "missing", "next", "planned"]
+
+
+class Programme(Response):
+    """The visits that are planned for a patient, in the order of their days."""
+
+    id: str
+    patient_id: str
+    template: str
+    words: str
+    starts_on: dt.date
+    created_at: dt.datetime
+    visits: list[PlannedVisit]
 
 
 class Session(Response):

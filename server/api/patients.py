@@ -12,7 +12,7 @@ from server.api.documents import refusals
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.services import erasure, patients, sessions
+from server.services import erasure, patients, programmes, sessions
 
 router = APIRouter(prefix="/patients", tags=["patients"])
 
@@ -84,13 +84,20 @@ def list_sessions(
         return sessions.of_patient(c, patient_id)
 
 
-@router.post("/{patient_id}/sessions", status_code=201, response_model=schemas.Session)
+@router.post(
+    "/{patient_id}/sessions", status_code=201, response_model=schemas.Session, responses=refusals(409)
+)
 def add_session(
     patient_id: Id,
-    body: schemas.SessionNew,
+    body: schemas.PlannedSessionNew,
     db: Db,
     who: Annotated[Identity, require(Action.CREATE_SESSION)],
 ) -> sessions.Session:
     """Add a visit."""
+    values = body.values()
+    planned = values.pop("planned_visit_id", None)
     with db.write() as c:
-        return sessions.create(c, who, patient_id, **body.values())
+        made = sessions.create(c, who, patient_id, **values)
+        if planned is not None:
+            programmes.change_visit(c, who, planned, {"session_id": made.id})
+        return made

@@ -6,7 +6,7 @@ have written goes with the sweep.
 
 from __future__ import annotations
 
-from sqlalchemy import Connection, delete, select
+from sqlalchemy import Connection, delete, select, update
 
 from server import audit
 from server.services import patients, reviews, sessions
@@ -20,6 +20,8 @@ from server.storage.tables import (
     edit,
     job,
     patient,
+    planned_visit,
+    programme,
     recording,
     recording_file,
     session,
@@ -39,6 +41,9 @@ def erase_patient(
         mine = select(session.c.id).where(session.c.patient_id == patient_id)
         for session_id in c.execute(mine).scalars().all():
             _erase_session_rows(c, session_id)
+        plans = select(programme.c.id).where(programme.c.patient_id == patient_id).scalar_subquery()
+        c.execute(delete(planned_visit).where(planned_visit.c.programme_id.in_(plans)))
+        c.execute(delete(programme).where(programme.c.patient_id == patient_id))
         c.execute(delete(patient).where(patient.c.id == patient_id))
         audit.record(c, actor, "patient.erased", "patient", patient_id, {"sessions": found.sessions})
     blobs.erase(patient_id)
@@ -66,4 +71,6 @@ def _erase_session_rows(c: Connection, session_id: str) -> None:
     c.execute(delete(job).where(job.c.recording_id.in_(recordings)))
     c.execute(delete(recording_file).where(recording_file.c.recording_id.in_(recordings)))
     c.execute(delete(recording).where(recording.c.session_id == session_id))
+    # the plan outlives the session: its visit is open again
+    c.execute(update(planned_visit).where(planned_visit.c.session_id == session_id).values(session_id=None))
     c.execute(delete(session).where(session.c.id == session_id))

@@ -4,7 +4,8 @@ Nothing is deleted by cascade (RESTRICT everywhere): clinical rows leave only th
 
 patient ─< session ─< recording ─< recording_file          user ─< login_session, one_time_token
                           └──< analysis ─< analysis_file    audit (append-only, refers to nothing)
-                          └──< job ─── analysis ─< edit (append-only, undo is a row too)
+        │                 └──< job ─── analysis ─< edit (append-only, undo is a row too)
+        └──< programme ─< planned_visit ─── session (at most one each)
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ ROLES = ("admin", "clinician", "assistant", "viewer")
 JOB_STATES = ("queued", "running", "done", "failed", "cancelled")
 ACTIVE_STATES = ("queued", "running")
 TOKEN_PURPOSES = ("set_up", "sign_in")
+VISIT_KINDS = ("assessment", "training")
 EDIT_KINDS = ("move_event", "add_event", "delete_event", "exclude_stride", "include_stride", "undo")
 
 
@@ -264,6 +266,32 @@ edit = Table(
     Column("at", Utc, nullable=False),
     _one_of("kind", EDIT_KINDS),
     sqlite_autoincrement=True,  # a number is never given twice: it says which state of a review was seen
+)
+
+programme = Table(
+    "programme",
+    metadata,
+    _id(),
+    _ref("patient_id", "patient"),
+    Column("template", String(32), nullable=False),
+    Column("starts_on", Date, nullable=False),  # day of the first training
+    Column("created_at", Utc, nullable=False),
+)
+
+planned_visit = Table(
+    "planned_visit",
+    metadata,
+    _id(),
+    _ref("programme_id", "programme"),
+    Column("position", Integer, nullable=False),  # order within the programme
+    Column("label", String(16), nullable=False),
+    Column("kind", String(16), nullable=False),
+    Column("week", Integer, nullable=False),  # of the programme, 1 = that of the first training
+    Column("planned_on", Date, nullable=False),
+    _ref("session_id", "session", nullable=True, index=False),  # the visit that took place
+    _one_of("kind", VISIT_KINDS),
+    UniqueConstraint("session_id"),
+    UniqueConstraint("programme_id", "position"),
 )
 
 audit = Table(

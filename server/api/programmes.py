@@ -1,0 +1,56 @@
+"""Programmes: the visits planned for a patient, and the sessions that took place of them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter
+
+from server import schemas
+from server.api.context import Db, Id
+from server.api.documents import refusals
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.services import patients, programmes
+
+router = APIRouter(tags=["programmes"])
+Planner = Annotated[Identity, require(Action.WRITE_SESSION)]
+
+
+@router.get("/patients/{patient_id}/programmes", response_model=list[schemas.Programme])
+def list_programmes(
+    patient_id: Id, db: Db, who: Annotated[Identity, require(Action.READ_SESSION)]
+) -> list[programmes.Programme]:
+    """The patient's programmes, the newest first, with what was done, is missing and comes next."""
+    with db.read() as c:
+        patients.get(c, patient_id)
+        return programmes.of_patient(c, patient_id)
+
+
+@router.post(
+    "/patients/{patient_id}/programmes",
+    status_code=201,
+    response_model=schemas.Programme,
+    responses=refusals(409),
+)
+def start_programme(patient_id: Id, body: schemas.ProgrammeNew, db: Db, who: Planner) -> programmes.Programme:
+    """Put the patient on a programme."""
+    with db.write() as c:
+        return programmes.start(c, who, patient_id, **body.values())
+
+
+@router.delete("/programmes/{programme_id}", status_code=204)
+def end_programme(programme_id: Id, db: Db, who: Planner) -> None:
+    """Remove a programme with its plan; the sessions stay."""
+    with db.write() as c:
+        programmes.end(c, who, programme_id)
+
+
+@router.patch("/planned-visits/{visit_id}", response_model=schemas.Programme, responses=refusals(409))
+def change_planned_visit(
+    visit_id: Id, body: schemas.PlannedVisitChange, db: Db, who: Planner
+) -> programmes.Programme:
+    """Move a planned visit, or say which session it was; members left out stay as they are."""
+    with db.write() as c:
+        return programmes.change_visit(c, who, visit_id, body.values())
