@@ -12,6 +12,7 @@ from core.frames import SIDES, Floats, Side
 from core.norms import NormBand
 from core.norms.lookup import Norms
 from core.parameters import mean_curve
+from core.parameters.kinematic import MEAN_ZERO
 from core.parameters.result import CycleCurves
 from server.report.bundle import Bundle
 from server.report.estimator import estimated_variables
@@ -81,6 +82,8 @@ def _panel(
     sides = {} if curves is None else {s: _side(curves, variable.name, s) for s in SIDES}
     sides = {s: c for s, c in sides.items() if c.mean_deg is not None}
     reason = None if sides else _why_missing(variable, curves)
+    if variable.name in MEAN_ZERO:
+        zero = "stride_mean"
     words = "" if zero is None else ZERO_WORDS.get(zero, zero)
     return CurvePanel(
         variable=variable,
@@ -96,8 +99,6 @@ def _panel(
 def _why_missing(variable: Variable, curves: CycleCurves | None) -> str:
     if curves is None:
         return reason_words("not_reached")
-    if variable.name == "pelvis_rotation":
-        return reason_words("no_heading")
     return reason_words("no_strides" if variable.name in curves.curves else "joint_missing")
 
 

@@ -174,7 +174,10 @@ TERMS: Final[Mapping[str, Term]] = {
 }
 """Parameter name → how the table shows it, in the order of the table."""
 
-ZERO_WORDS: Final[Mapping[str, str]] = {"standing": "from standing"}
+ZERO_WORDS: Final[Mapping[str, str]] = {
+    "standing": "from standing",
+    "stride_mean": "from its mean over the stride",
+}
 """`angle_zero` → what is added to titles of angles."""
 
 REASONS: Final[Mapping[str, str]] = {
@@ -193,6 +196,7 @@ REASONS: Final[Mapping[str, str]] = {
     "no_foot_track": "not measured: no sensor on this foot",
     "no_foot_flat": "not measured: the foot never rested on the floor",
     "angle_zero_standing": "not measured: angles start from standing; enter goniometer angles",
+    "no_level": "not measured: has a shape over the stride, no level against the walking direction",
     "variables_missing": "not measured: some of its variables are missing",
     "estimated": "not measured by two sensors",
     "standing_width_unknown": "not measured: enter how far apart the ankles are while standing",
@@ -207,7 +211,6 @@ REASONS: Final[Mapping[str, str]] = {
     "no_terminal_stance": "not measured: the heel stays down until the other foot lands",
     "feet_not_adjacent": "not measured: the swinging foot does not pass the other",
     "tibia_not_vertical": "not measured: the shank does not pass the vertical in swing",
-    "no_heading": "not measured: needs a heading reference shared by the sensors",
     "not_reached": "not measured: the analysis stopped before this",
 }
 """Reason code → words in place of a number."""

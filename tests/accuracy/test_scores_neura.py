@@ -118,8 +118,8 @@ def test_scores_agree_with_those_of_vicon() -> None:
         "Scores on neura_walk",
         ["score °", "left, ours / Vicon", "right, ours / Vicon", "limit of the difference °"],
         rows,
-        "Shape: offsets removed. Raw: Vicon's standing angles in whole degrees as goniometer. The shape of all "
-        "nine takes our own pelvic tilt and obliquity on both sides, which Vicon's table does not have.",
+        "Shape: offsets removed. Raw: Vicon's standing angles in whole degrees as goniometer. The shape of "
+        "all nine takes our own pelvic tilt and obliquity on both sides, which Vicon's table does not have.",
     )
     for label, limit in LIMIT_DEG.items():
         assert worst[label] < limit, label

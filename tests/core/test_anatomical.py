@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.anatomical import anatomical_curves
+from core.anatomical import anatomical_curves, anatomical_parameters, anatomical_variables
 from core.errors import ParameterError
 from core.frames import SIDES, Floats, Side
 from core.parameters.result import CycleCurves
@@ -56,3 +56,19 @@ def test_an_angle_that_does_not_exist_is_refused() -> None:
     with pytest.raises(ParameterError) as error:
         anatomical_curves(curves(knee_flexion=20.0), {"knee_l": 3.0})
     assert error.value.code == "unknown_angle"
+
+
+def test_parameters_have_a_second_value_where_a_goniometer_was_used() -> None:
+    found = anatomical_parameters(curves(knee_flexion=20.0, hip_flexion=5.0), {"knee_flexion_l": -8.0})
+    assert {p.side for p in found} == {"left"}
+    assert {p.name for p in found} == {
+        "knee_flexion_ic_deg", "knee_flexion_max_loading_deg", "knee_flexion_min_stance_deg",
+        "knee_flexion_max_swing_deg",
+    }, "the hip was not measured; a range has no zero"  # fmt: skip
+    assert [p.mean for p in found] == pytest.approx([12.0] * 4)
+    assert anatomical_parameters(curves(knee_flexion=20.0), {}) == ()
+
+
+def test_a_variable_has_its_level_when_both_sides_have() -> None:
+    entered = {"knee_flexion_l": 1.0, "knee_flexion_r": 0.0, "hip_flexion_l": 3.0, "pelvis_tilt": 10.0}
+    assert anatomical_variables(entered) == ("pelvis_tilt", "knee_flexion")
