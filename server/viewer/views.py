@@ -27,7 +27,7 @@ IDLE_S = 30.0
 
 SWEEP_S = 1.0
 MAX_VIEWS = 48
-"""Open views at most, about 13 MB each for a 10 min walk if all show different ones."""
+"""Open views at most, about 15 MB each for a 10 min walk if all show different ones."""
 
 Key = tuple[str, ...]
 
