@@ -1,4 +1,8 @@
-"""The shape of a shoe's sole as a tape measures it: what the clearance of heel and toe is measured on."""
+"""The shape of a shoe's sole as a tape measures it: what the clearance of heel and toe is measured on.
+
+It is measured from the sensor: where that sits on the foot is known to a few centimetres only, and a heel
+that is 7 cm wrong along the sole is 6 cm wrong in height when the foot leaves the floor.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +10,21 @@ from dataclasses import dataclass
 
 from core.errors import ParameterError
 
+LIMITS = {"back_m": (0.0, 0.35), "front_m": (0.0, 0.35), "tip_up_m": (0.0, 0.1)}
+"""What a tape can read, m."""
+
+LENGTHS = (0.1, 0.4)
+"""Of a whole sole, m."""
+
 
 @dataclass(frozen=True)
 class Shoe:
-    """The sole seen from the side, in m from the middle of the ankle, the foot flat on the floor.
+    """The sole seen from the side, the foot flat on the floor; m.
 
     Parameters
     ----------
-    back_m, front_m : backwards to its rear end (0.01 to 0.2 m) and forwards to its tip (0.05 to 0.35 m),
-        along the floor. tip_up_m : how far the tip stands off the floor, 0 to 0.1 m.
+    back_m, front_m : along the floor from the middle of the foot's sensor backwards to the sole's rear end
+        and forwards to its tip. tip_up_m : how far the tip stands off the floor.
 
     Raises
     ------
@@ -26,12 +36,12 @@ class Shoe:
     tip_up_m: float = 0.0
 
     def __post_init__(self) -> None:
-        limits = {"back_m": (0.01, 0.2), "front_m": (0.05, 0.35), "tip_up_m": (0.0, 0.1)}
-        for name, (low, high) in limits.items():
-            value = getattr(self, name)
+        values = {name: (getattr(self, name), limits) for name, limits in LIMITS.items()}
+        values["back_m + front_m"] = (self.back_m + self.front_m, LENGTHS)
+        for name, (value, (low, high)) in values.items():
             if not low <= value <= high:
                 raise ParameterError(
                     "shoe_implausible",
-                    f"{name} {value:g} m is outside {low:g} to {high:g} m; give the distance from the middle "
-                    "of the ankle in metres.",
+                    f"{name} {value:g} m is outside {low:g} to {high:g} m; give distances along the sole "
+                    "from the middle of the foot's sensor, in metres.",
                 )

@@ -13,7 +13,17 @@ from core.events.result import GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES
 from core.measure import Measured, Tracks, measure
 from core.pipeline import PipelineConfig, analyse
+from core.shoe import Shoe
 from core.simulate import Truth, simulate_scenario
+from core.simulate.sensors import PLACES
+from core.simulate.walker import Anatomy
+
+_ANATOMY = Anatomy()
+HEEL_M, TIP_M = _ANATOMY.heel, _ANATOMY.toe
+"""The reference person's sole behind and in front of the ankle."""
+
+TIP_UP_M = _ANATOMY.rocker_radius - np.sqrt(_ANATOMY.rocker_radius**2 - (TIP_M - _ANATOMY.rocker_start) ** 2)
+"""How far the rolling forefoot holds the tip off the floor."""
 
 
 def true_tracks(truth: Truth) -> Tracks:
@@ -33,7 +43,9 @@ def true_tracks(truth: Truth) -> Tracks:
         valid=dict.fromkeys(SIDES, np.ones(n, np.bool_)),
         linked=True,
         source="truth",
-        body=replace(truth.body, standing_width=0.2),
+        body=replace(
+            truth.body, standing_width=0.2, sole_back=HEEL_M, sole_front=TIP_M, sole_tip_up=TIP_UP_M
+        ),
     )
     return Tracks(
         t_s=truth.t_s,
@@ -46,10 +58,20 @@ def true_tracks(truth: Truth) -> Tracks:
     )
 
 
+def standing_width(truth: Truth) -> float:
+    """Between the ankles in the first standing, to the centimetre of a tape."""
+    standing = (truth.t_s >= truth.zero[0]) & (truth.t_s < truth.zero[1])
+    apart = (truth.p["foot_l"] - truth.p["foot_r"])[standing, :2].mean(axis=0)
+    return round(float(np.hypot(*apart)), 2)
+
+
 @cache
 def measured_walk(name: str, seed: int = 5) -> tuple[Truth, Measured, Measured]:
     """A named script: its truth, what is measured on the truth, and what the analysis measures."""
     take = simulate_scenario(name, seed)
-    analysis = analyse(take.recording, PipelineConfig())
+    ahead = PLACES["foot_l"][0]
+    shoe = Shoe(HEEL_M + ahead, TIP_M - ahead, TIP_UP_M)
+    subject = replace(take.recording.subject, shoe=shoe, standing_width_m=standing_width(take.truth))
+    analysis = analyse(replace(take.recording, subject=subject), PipelineConfig())
     assert analysis.measured is not None
     return take.truth, measure(true_tracks(take.truth)), analysis.measured

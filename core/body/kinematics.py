@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
+from core.body.places import FOOT as SENSOR_ON_FOOT
 from core.body.poses import Poses
 from core.errors import Notice
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
@@ -52,7 +53,9 @@ def nominal_body(
     """Body model from height in m, or from 1.70 m with a notice `height_assumed` when nobody gave one."""
     body = replace(BodyModel.from_height(height_m or NOMINAL_HEIGHT_M), standing_width=standing_width_m)
     if shoe is not None:
-        body = replace(body, sole_back=shoe.back_m, sole_front=shoe.front_m, sole_tip_up=shoe.tip_up_m)
+        # what the nominal place of the sensor is wrong by is wrong in the ankle's path, too, and cancels
+        back, front = shoe.back_m - SENSOR_ON_FOOT[0], shoe.front_m + SENSOR_ON_FOOT[0]
+        body = replace(body, sole_back=back, sole_front=front, sole_tip_up=shoe.tip_up_m)
     if height_m is not None:
         return body, ()
     message = (

@@ -24,8 +24,9 @@ class BodyModel:
     ankle_height : ankle centre above the sole. foot : heel to toe.
     estimated : True when taken from body height by Winter's fractions, False when measured.
     standing_width : between the ankle centres while standing for calibration, None = not measured.
-    sole_back, sole_front : rear end and tip of the shoe's sole behind and in front of the ankle centre;
-        sole_tip_up : how far the tip stands off the floor when the foot is flat. None = not measured.
+    sole_back, sole_front : rear end and tip of the shoe's sole behind and in front of the ankle centre, by
+        the nominal place of the sensor; sole_tip_up : how far the tip stands off the floor when the foot is
+        flat. None = not measured.
     """
 
     hip_width: float

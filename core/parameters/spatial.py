@@ -148,7 +148,7 @@ class _Paths:
     """What is looked up for every stride: flats, heights, and how often a foot was lost before a sample."""
 
     places: Places
-    heights: Mapping[Side, SoleHeights]
+    heights: Mapping[Side, SoleHeights | None]
     lost: Mapping[Side, NDArray[np.int64]]
     heading: Mapping[Side, Floats]
     known: bool
@@ -181,24 +181,33 @@ def _row(s: Stride, feet: FootTracks | None, paths: _Paths | None) -> Row:
     along = np.array([x / length, y / length])
     mirror = 1.0 if s.side == "left" else -1.0
     outward = np.array([-along[1], along[0]]) * mirror
-    heights, ankle_height = paths.heights[s.side], feet.body.ankle_height
-    toe: Value = "no_terminal_contact"
-    if heights.toe is None:
-        toe = "no_shoe_geometry"
-    elif s.tc_s is not None:
-        a, b = (ceil((t - feet.t_s[0]) * feet.rate_hz) for t in (s.tc_s, s.end_s))
-        toe = toe_clearance(heights, first, last, (a, b), ankle_height)
     out = mirror * remainder(float(paths.heading[s.side][first]) - atan2(y, x), tau)
     row: dict[str, Value] = {
         "gait_speed_mps": length / float(feet.t_s[last] - feet.t_s[first]),
         "stride_length_m": length,
         "circumduction_m": float(((p[first : last + 1, :2] - p[first, :2]) @ outward).max()),
-        "max_heel_clearance_m": heel_clearance(heights, first, last, ankle_height),
-        "min_toe_clearance_m": toe,
         "toe_out_deg": degrees(out),
     }
+    row |= _clearance(s, feet, paths.heights[s.side], first, last)
     row |= _step(s, feet, paths, p[last, :2], along, outward)
     return row
+
+
+def _clearance(
+    s: Stride, feet: FootTracks, heights: SoleHeights | None, first: int, last: int
+) -> dict[str, Value]:
+    """Of the sole between the two flats."""
+    if heights is None:
+        return {"max_heel_clearance_m": "no_shoe_geometry", "min_toe_clearance_m": "no_shoe_geometry"}
+    ankle_height = feet.body.ankle_height
+    toe: Value = "no_terminal_contact"
+    if s.tc_s is not None:
+        a, b = (ceil((t - feet.t_s[0]) * feet.rate_hz) for t in (s.tc_s, s.end_s))
+        toe = toe_clearance(heights, first, last, (a, b), ankle_height)
+    return {
+        "max_heel_clearance_m": heel_clearance(heights, first, last, ankle_height),
+        "min_toe_clearance_m": toe,
+    }
 
 
 def _step(

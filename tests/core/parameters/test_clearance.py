@@ -39,19 +39,16 @@ def tipped(*pitch_deg: float) -> FootTracks:
 def test_heights_of_the_ends_are_those_of_the_turned_foot() -> None:
     tracks = tipped(0.0, 30.0, -40.0)
     found = sole_heights(tracks, "left")
+    assert found is not None
     heel, tip = np.array([-0.06, -ANKLE, 0.0]), np.array([0.19, 0.01 - ANKLE, 0.0])
     assert found.heel == pytest.approx(0.3 + rotate(tracks.q["left"], heel)[:, 2])
     assert found.toe == pytest.approx(0.3 + rotate(tracks.q["left"], tip)[:, 2])
-    assert found.toe is not None
     assert found.toe[0] == pytest.approx(0.3 - ANKLE + 0.01)
     assert found.toe[1] > found.toe[0] > found.toe[2]
 
 
-def test_without_a_shoe_there_is_a_heel_of_the_bodys_size_and_no_toe() -> None:
-    bare = replace(tipped(0.0, 10.0), body=BodyModel.from_height(1.7))
-    found = sole_heights(bare, "left")
-    assert found.toe is None
-    assert toe_clearance(found, 0, 1, (0, 1), ANKLE) == "no_shoe_geometry"
+def test_without_a_shoe_there_are_no_ends_of_the_sole() -> None:
+    assert sole_heights(replace(tipped(0.0, 10.0), body=BodyModel.from_height(1.7)), "left") is None
 
 
 def swing(heights: Floats, climb: float = 0.0) -> SoleHeights:
@@ -83,8 +80,9 @@ def test_a_swing_without_a_dip_has_no_least_height() -> None:
 
 
 def test_the_shoe_reaches_the_feet() -> None:
-    body, _ = nominal_body(1.7, 0.2, Shoe(0.06, 0.2, 0.015))
-    assert (body.sole_back, body.sole_front, body.sole_tip_up) == (0.06, 0.2, 0.015)
+    """The tape starts at the sensor, the body model at the ankle 7 cm behind its nominal place."""
+    body, _ = nominal_body(1.7, 0.2, Shoe(0.12, 0.14, 0.015))
+    assert (body.sole_back, body.sole_front, body.sole_tip_up) == pytest.approx((0.05, 0.21, 0.015))
     assert (body.standing_width, body.estimated) == (0.2, True)
     assert nominal_body(1.7)[0].sole_front is None
 

@@ -21,8 +21,9 @@ from tests.walks import simulated
 
 RATE = 100.0
 BODY = BodyModel(
-    hip_width=0.18, thigh=0.42, shank=0.42, ankle_height=0.08, foot=0.26, estimated=True, standing_width=0.2
-)
+    hip_width=0.18, thigh=0.42, shank=0.42, ankle_height=0.08, foot=0.26, estimated=True, standing_width=0.2,
+    sole_back=0.055, sole_front=0.2,
+)  # fmt: skip
 TURN = 1.0  # s of one stride
 
 
@@ -144,7 +145,9 @@ def test_what_cannot_be_known_has_a_reason() -> None:
     restless = replace(feet(), still=dict.fromkeys(SIDES, np.zeros(800, bool)))
     assert parameters(restless)["gait_speed_mps", None].reason == "no_foot_flat"
     assert parameters(restless)["total_distance_m", None].reason == "no_foot_flat"
-    assert parameters(feet())["min_toe_clearance_m", "left"].reason == "no_shoe_geometry"
+    barefoot = parameters(replace(feet(), body=replace(BODY, sole_back=None)))
+    assert barefoot["min_toe_clearance_m", "left"].reason == "no_shoe_geometry"
+    assert barefoot["max_heel_clearance_m", "left"].reason == "no_shoe_geometry"
     nobody = {p.reason for p in spatial(Strides(()), None, ())}
     assert nobody == {"no_strides", "no_foot_track"}
 
