@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 from urllib.parse import quote
 
@@ -33,6 +33,17 @@ BASIS_WORDS: Final = {
 KINDS: Final = {"error": "bad", "warning": "warn", "info": ""}
 """Severity of a notice → its look."""
 
+GONIOMETER: Final = (
+    ("pelvis_tilt", "Pelvic tilt forward"),
+    ("hip_flexion_l", "Hip flexion, left"),
+    ("hip_flexion_r", "Hip flexion, right"),
+    ("knee_flexion_l", "Knee flexion, left"),
+    ("knee_flexion_r", "Knee flexion, right"),
+    ("ankle_dorsiflexion_l", "Dorsiflexion, left"),
+    ("ankle_dorsiflexion_r", "Dorsiflexion, right"),
+)
+"""Standing angles that the page asks for; the manifest takes the others too (core/standing.py)."""
+
 DUPLICATE: Final = "duplicate_stream"
 
 
@@ -57,12 +68,18 @@ def upload_view(c: Connection, this: Recording | None, s: Session, p: Patient) -
         if this is None or this.inspection is None or waiting
         else found_view(this, remembered(c, s)),
         "segments": SEGMENT_CHOICES,
-        "said": {
-            "height_m": subject.get("height_m") or s.height_m or p.height_m,
-            "standing_width_m": subject.get("standing_width_m"),
-            "belt_speed_mps": manifest.get("belt_speed_mps"),
-        },
+        "said": dict(_paths({**manifest, "subject": {"height_m": s.height_m or p.height_m, **subject}})),
+        "goniometer": GONIOMETER,
     }
+
+
+def _paths(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, object]]:
+    """Values of nested mappings by their path, "subject.shoe.back_m"."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _paths(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}", value
 
 
 def remembered(c: Connection, s: Session) -> Mapping[str, str | None]:

@@ -88,3 +88,32 @@ def test_the_belts_speed_is_asked_for_on_a_treadmill_only(
     page.wait_for_url(re.compile(rf"/sessions/{session}$"), wait_until="commit")
     expect(page.locator(".kpis")).to_contain_text("1.10", timeout=60_000)
     expect(page.locator(".params tr", has_text="Step length")).to_contain_text("on a treadmill")
+
+
+def test_goniometer_and_shoe_go_into_the_manifest_and_leave_it(
+    opened: Opener, walk: str, running: RunningServer
+) -> None:
+    page = opened(f"/sessions/{walk}/upload")
+    page.get_by_text("Angles of standing by goniometer").click()
+    page.get_by_label("Knee flexion, left").fill("8")
+    page.get_by_label("Knee flexion, right").fill("-2")
+    page.get_by_text("Sole of the shoe by tape").click()
+    page.get_by_label("To the rear end").fill("0.16")
+    page.get_by_label("To the tip").fill("0.12")
+    page.get_by_role("button", name="Analyse").click()
+    page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")
+    expect(page.locator("job-progress")).to_have_count(0, timeout=60_000)
+    page.reload()
+    clearance = page.locator(".params tr", has_text="Toe clearance")
+    expect(clearance.locator("td.n .num").first).to_have_text(re.compile(r"^−?0\.\d+$"))
+    with running.client() as client:
+        said = client.get(f"/api/v1/sessions/{walk}/recording").json()["manifest"]["subject"]
+    assert said["standing_angles_deg"] == {"knee_flexion_l": 8, "knee_flexion_r": -2}
+    page.goto(f"/sessions/{walk}/upload")
+    page.get_by_text("Sole of the shoe by tape").click()
+    page.get_by_label("To the rear end").fill("")
+    page.get_by_label("To the tip").fill("")
+    page.get_by_role("button", name="Analyse").click()
+    page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")
+    with running.client() as client:
+        assert "shoe" not in client.get(f"/api/v1/sessions/{walk}/recording").json()["manifest"]["subject"]

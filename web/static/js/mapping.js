@@ -140,13 +140,7 @@ class SensorMap extends HTMLElement {
   manifest() {
     const manifest = JSON.parse(this.getAttribute("manifest") || "{}") || {};
     manifest.sensors = Object.fromEntries(this.rows.map((r) => [r.dataset.device, this.segment(r) || null]));
-    for (const input of this.measures) {
-      const [name, of] = input.name.split(".").reverse();
-      const into = of ? (manifest[of] ??= {}) : manifest;
-      const value = parseFloat(input.value.replace(",", "."));
-      if (Number.isFinite(value)) into[name] = value;
-      else delete into[name];
-    }
+    for (const input of this.measures) put(manifest, input.name.split("."), parseFloat(input.value.replace(",", ".")));
     return manifest;
   }
 
@@ -163,4 +157,15 @@ class SensorMap extends HTMLElement {
     }
   }
 }
+// "subject.shoe.back_m" goes three levels deep; a field left empty takes its place away.
+function put(into, [first, ...rest], value) {
+  if (rest.length) {
+    const inner = into[first] ?? {};
+    put(inner, rest, value);
+    if (Object.keys(inner).length) into[first] = inner;
+    else delete into[first];
+  } else if (Number.isFinite(value)) into[first] = value;
+  else delete into[first];
+}
+
 customElements.define("sensor-map", SensorMap);
