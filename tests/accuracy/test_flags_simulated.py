@@ -86,7 +86,7 @@ def test_scores_are_near_those_of_the_truth() -> None:
         shown = []
         for mode in ("raw", "offset_removed"):
             for side in ("left", "right"):
-                a, b = (s.find("gps_sagittal_deg", mode, side).value for s in (found, true))  # type: ignore[arg-type]
+                a, b = (s.find("gps_sagittal_deg", mode, side).value for s in (found, true))
                 assert a is not None
                 assert b is not None
                 assert abs(a - b) < SCORE_DEG, (name, mode, side)
@@ -110,6 +110,6 @@ def test_scores_are_near_those_of_the_truth() -> None:
             "of one only",
         ],
         rows,
-        "gps_sagittal, chain / truth. Flags that only the chain or only the truth raises lie within 3° or 0.08 "
-        f"of their limit. Limit of the scores: {SCORE_DEG}°.",
+        "gps_sagittal, chain / truth. Flags that only the chain or only the truth raises lie within 3° or "
+        f"0.08 of their limit. Limit of the scores: {SCORE_DEG}°.",
     )
