@@ -44,38 +44,31 @@ def sole_heights(feet: FootTracks, side: Side) -> SoleHeights | None:
     )
 
 
-def heel_clearance(heights: SoleHeights, first: int, last: int, ankle_height: float) -> float:
-    """Greatest height of the heel between the flats at samples `first` and `last`, m."""
-    return float((heights.heel[first : last + 1] - _floor(heights, first, last, ankle_height)).max())
+def over_floor(heights: SoleHeights, first: int, last: int, ankle_height: float) -> tuple[Floats, Floats]:
+    """Heights of heel and tip over the floor from the flat at sample `first` to that at `last`, m."""
+    a, b = float(heights.ankle[first]) - ankle_height, float(heights.ankle[last]) - ankle_height
+    floor = a + (b - a) / (last - first) * np.arange(last - first + 1.0)
+    return heights.heel[first : last + 1] - floor, heights.toe[first : last + 1] - floor
 
 
-def toe_clearance(
-    heights: SoleHeights, first: int, last: int, swing: tuple[int, int], ankle_height: float
-) -> float | ClearanceReason:
+def toe_clearance(h: Floats) -> float | ClearanceReason:
     """Least height of the tip in mid-swing, m: the dip between its rises after foot-off and before contact.
 
     Parameters
     ----------
-    swing : samples [tc, ic) between the flats.
+    h : heights of the tip over the floor from foot-off to contact.
 
     Returns
     -------
     "no_swing_minimum" where the tip only rises or only falls, as some hemiparetic swings do (spec/clinic.md
     §4): any number there would be that of the window's edge.
     """
-    toe = heights.toe[first : last + 1] - _floor(heights, first, last, ankle_height)
-    h = toe[max(swing[0] - first, 0) : max(swing[1] - first, 0)]
     if len(h) < 3:
         return "no_swing_minimum"
     # how deep a sample lies below the highest before it and the highest after it
     depth = np.minimum(np.maximum.accumulate(h), np.maximum.accumulate(h[::-1])[::-1]) - h
     deepest = int(np.argmax(depth))
     return float(h[deepest]) if depth[deepest] >= DIP_M else "no_swing_minimum"
-
-
-def _floor(heights: SoleHeights, first: int, last: int, ankle_height: float) -> Floats:
-    a, b = float(heights.ankle[first]), float(heights.ankle[last])
-    return np.asarray(a - ankle_height + (b - a) / (last - first) * np.arange(last - first + 1.0))
 
 
 def _height(feet: FootTracks, side: Side, forward: float, up: float) -> Floats:

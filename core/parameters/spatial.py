@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from core.body.feet import FootTracks
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Protocol, Side
-from core.parameters.clearance import SoleHeights, heel_clearance, sole_heights, toe_clearance
+from core.parameters.clearance import SoleHeights, over_floor, sole_heights, toe_clearance
 from core.parameters.flats import OTHER, Places, places
 from core.parameters.result import Parameter
 from core.parameters.rows import Column, Row, Value, row_columns, row_parameter
@@ -145,22 +145,28 @@ def _on_belt(s: Stride, belt_mps: float | None) -> Row:
 
 @dataclass(frozen=True, eq=False)
 class _Paths:
-    """What is looked up for every stride: flats, heights, and how often a foot was lost before a sample."""
+    """What is looked up for every stride: flats and the foot's heading there, heights, and how often the
+    foot was lost before a sample."""
 
     places: Places
     heights: Mapping[Side, SoleHeights | None]
     lost: Mapping[Side, NDArray[np.int64]]
-    heading: Mapping[Side, Floats]
+    heading: Mapping[tuple[Side, int], float]
     known: bool
     """How far apart the feet stood, without which width is not known."""
 
 
 def _paths(strides: Strides, feet: FootTracks) -> _Paths:
+    found = places(strides.strides, feet)
+    heading: dict[tuple[Side, int], float] = {}
+    for side in feet.p:
+        flats = [at for (foot, _), at in found.items() if foot == side and at is not None]
+        heading |= {(side, at): v for at, v in zip(flats, yaw(feet.q[side][flats]).tolist(), strict=True)}
     return _Paths(
-        places=places(strides.strides, feet),
+        places=found,
         heights={side: sole_heights(feet, side) for side in feet.p},
         lost={side: np.concatenate(([0], np.cumsum(~feet.valid[side]))) for side in feet.p},
-        heading={side: yaw(feet.q[side]) for side in feet.p if side in feet.q},
+        heading=heading,
         known=feet.body.standing_width is not None,
     )
 
@@ -181,7 +187,7 @@ def _row(s: Stride, feet: FootTracks | None, paths: _Paths | None) -> Row:
     along = np.array([x / length, y / length])
     mirror = 1.0 if s.side == "left" else -1.0
     outward = np.array([-along[1], along[0]]) * mirror
-    out = mirror * remainder(float(paths.heading[s.side][first]) - atan2(y, x), tau)
+    out = mirror * remainder(paths.heading[s.side, first] - atan2(y, x), tau)
     row: dict[str, Value] = {
         "gait_speed_mps": length / float(feet.t_s[last] - feet.t_s[first]),
         "stride_length_m": length,
@@ -199,15 +205,12 @@ def _clearance(
     """Of the sole between the two flats."""
     if heights is None:
         return {"max_heel_clearance_m": "no_shoe_geometry", "min_toe_clearance_m": "no_shoe_geometry"}
-    ankle_height = feet.body.ankle_height
+    heel, tip = over_floor(heights, first, last, feet.body.ankle_height)
     toe: Value = "no_terminal_contact"
     if s.tc_s is not None:
-        a, b = (ceil((t - feet.t_s[0]) * feet.rate_hz) for t in (s.tc_s, s.end_s))
-        toe = toe_clearance(heights, first, last, (a, b), ankle_height)
-    return {
-        "max_heel_clearance_m": heel_clearance(heights, first, last, ankle_height),
-        "min_toe_clearance_m": toe,
-    }
+        a, b = (max(ceil((t - feet.t_s[0]) * feet.rate_hz) - first, 0) for t in (s.tc_s, s.end_s))
+        toe = toe_clearance(tip[a:b])
+    return {"max_heel_clearance_m": float(heel.max()), "min_toe_clearance_m": toe}
 
 
 def _step(

@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 
-from core.events.foot_pitch import pitch_signal
 from core.events.result import Strides
 from core.frames import FOOT, SIDES, Floats, Oriented, Segment
 from core.parameters.resample import resample
@@ -53,7 +52,9 @@ def foot_pitches(orientations: Oriented) -> dict[Segment, Floats]:
     found: dict[Segment, Floats] = {}
     for foot in FOOT.values():
         if foot in orientations.q:
-            angle = np.arcsin(np.clip(pitch_signal(orientations.q[foot]), -1.0, 1.0))
+            w, x, y, z = orientations.q[foot].T
+            # how far the forward axis rises: the sine that events are found in (core/events/foot_pitch.py)
+            angle = np.arcsin(np.clip(2.0 * (x * z - w * y), -1.0, 1.0))
             found[foot] = np.where(orientations.valid[foot], angle, np.nan)
     return found
 

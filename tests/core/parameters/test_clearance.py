@@ -12,7 +12,7 @@ from core.body.kinematics import nominal_body
 from core.body.model import BodyModel
 from core.frames import FOOT, R_NEUTRAL, SIDES, Floats, Side
 from core.measure import measure
-from core.parameters.clearance import SoleHeights, heel_clearance, sole_heights, toe_clearance
+from core.parameters.clearance import SoleHeights, over_floor, sole_heights, toe_clearance
 from core.rotation import about, from_matrix, multiply, rotate
 from core.shoe import Shoe
 from core.simulate import simulate_scenario
@@ -65,18 +65,19 @@ def dip(depth: float = 0.02) -> Floats:
 @pytest.mark.parametrize("climb", [0.0, 0.05, -0.08])
 def test_the_least_height_in_mid_swing_is_told_whatever_the_drift(climb: float) -> None:
     found = swing(dip(), climb)
-    assert toe_clearance(found, 0, 100, (5, 98), ANKLE) == pytest.approx(0.02)
-    assert heel_clearance(found, 0, 100, ANKLE) == pytest.approx(0.10)
+    heel, tip = over_floor(found, 0, 100, ANKLE)
+    assert toe_clearance(tip[5:98]) == pytest.approx(0.02)
+    assert heel.max() == pytest.approx(0.10)
 
 
 def test_a_toe_that_scuffs_has_a_negative_clearance_and_not_zero() -> None:
-    assert toe_clearance(swing(dip(-0.005)), 0, 100, (5, 98), ANKLE) == pytest.approx(-0.005)
+    assert toe_clearance(dip(-0.005)[5:98]) == pytest.approx(-0.005)
 
 
 def test_a_swing_without_a_dip_has_no_least_height() -> None:
     rising = np.interp(np.arange(101), [0, 60, 100], [0.0, 0.12, 0.0])
-    assert toe_clearance(swing(rising), 0, 100, (5, 98), ANKLE) == "no_swing_minimum"
-    assert toe_clearance(swing(dip()), 0, 100, (99, 100), ANKLE) == "no_swing_minimum"
+    assert toe_clearance(rising[5:98]) == "no_swing_minimum"
+    assert toe_clearance(dip()[99:100]) == "no_swing_minimum"
 
 
 def test_the_shoe_reaches_the_feet() -> None:
