@@ -1,0 +1,202 @@
+"""Several detectors → one list of contacts, each with the share of detectors that saw it.
+
+Detectors mean different moments by a contact (a zero crossing, a peak 50 ms later): each is first moved by
+its own median distance from the leading one, then contacts within a window are one. The lead's time is kept,
+so that a consensus is never less exact than the lead where both found a contact. A detector that abstained on
+a foot has no vote on it. All of this is our choice; tests/accuracy/test_events_consensus.py measures it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from core.errors import Notice
+from core.events.detection import detect
+from core.events.foot_pitch import FootPitchParams
+from core.events.gyro_peaks import LIMB, PRESETS, gyro_peak_events
+from core.events.result import EventKind, GaitEvent, GaitEvents
+from core.frames import FOOT, SIDES, Side
+from core.fusion.orientations import Orientations
+
+SOURCE = "consensus"
+
+
+@dataclass(frozen=True)
+class ConsensusParams:
+    """How detectors agree.
+
+    Parameters
+    ----------
+    presets : gyro-peak detectors beside the foot-pitch rule: one of the foot, two of the shank.
+    window_s : contacts of one foot this close, after the median distance is taken off, are one.
+    pair_s, pairs : detectors' contacts this close make the median distance, from so many of them.
+    least : a contact needs this share of the votes, and more than it without the lead's.
+    """
+
+    presets: tuple[str, ...] = ("mariani", "gouwanda", "catalfamo")
+    window_s: float = 0.12
+    pair_s: float = 0.25
+    pairs: int = 3
+    least: float = 0.5
+
+
+@dataclass(frozen=True)
+class _Vote:
+    detector: str
+    time_s: float
+    detected_s: float
+
+
+def all_detectors(
+    orientations: Orientations,
+    lead: GaitEvents | None = None,
+    foot_pitch: FootPitchParams | None = None,
+    params: ConsensusParams | None = None,
+) -> dict[str, GaitEvents]:
+    """What every detector finds whose sensors are worn, the leading foot-pitch rule first.
+
+    Parameters
+    ----------
+    lead : the foot-pitch events, if they are known already.
+    """
+    params = params or ConsensusParams()
+    found = {"foot_pitch": lead or detect(orientations, foot_pitch)}
+    for name in params.presets:
+        preset = PRESETS[name]
+        if any(LIMB[preset.segment][side] in orientations.q for side in SIDES):
+            found[name] = gyro_peak_events(orientations, orientations.rate_hz, preset)
+    return found
+
+
+def with_confidence(found: Mapping[str, GaitEvents], params: ConsensusParams | None = None) -> GaitEvents:
+    """The lead's contacts, none added and none taken away, with the share of detectors that saw each.
+
+    Parameters
+    ----------
+    found : detector → its events; the first leads. A foot on which no other detector voted keeps None.
+    """
+    params = params or ConsensusParams()
+    lead = next(iter(found.values()))
+    shares: dict[GaitEvent, float] = {}
+    for side in SIDES:
+        voters = _voters(found, side)
+        if len(voters) < 2 or not lead.times(side, "ic"):
+            continue
+        for kind in ("ic", "tc"):
+            for votes in _clusters(voters, side, kind, params):
+                own = next((v for v in votes if v.detector == next(iter(found))), None)
+                for e in lead.events if own is not None else ():
+                    if (e.side, e.kind) == (side, kind) and own is not None and e.time_s == own.time_s:
+                        shares[e] = len(votes) / len(voters)
+    return replace(lead, events=tuple(replace(e, confidence=shares.get(e)) for e in lead.events))
+
+
+def consensus(found: Mapping[str, GaitEvents], params: ConsensusParams | None = None) -> GaitEvents:
+    """Contacts that enough detectors agree on.
+
+    Parameters
+    ----------
+    found : detector → its events, all of one take; the first leads.
+
+    Returns
+    -------
+    events with `confidence`, the share of the detectors that did not abstain on the foot. The lead's notices
+    stay; `led_by_other` says where the lead abstained and others agreed, `detectors_disagree` how many
+    contacts of a foot only few saw.
+    """
+    params = params or ConsensusParams()
+    lead = next(iter(found))
+    events: list[GaitEvent] = []
+    notices = list(found[lead].notices)
+    for side in SIDES:
+        voters = _voters(found, side)
+        if not voters:
+            continue
+        leads = next(iter(voters))
+        if leads != lead:
+            notices.append(_led_by_other(side, leads, voters))
+        dropped = 0
+        for kind in ("ic", "tc"):
+            for votes in _clusters(voters, side, kind, params):
+                share = len(votes) / len(voters)
+                own = next((v for v in votes if v.detector == leads), None)
+                if share < params.least or (own is None and share <= params.least):
+                    dropped += 1
+                    continue
+                time = own.time_s if own is not None else float(np.median([v.time_s for v in votes]))
+                known = max(v.detected_s for v in votes)
+                events.append(GaitEvent(time, side, kind, SOURCE, max(known, time), share))
+        if dropped:
+            notices.append(_disagree(side, dropped, len(voters)))
+    events.sort(key=lambda e: (e.time_s, e.side, e.kind))
+    return GaitEvents(tuple(events), tuple(notices), {"detectors": tuple(found)})
+
+
+def _voters(found: Mapping[str, GaitEvents], side: Side) -> dict[str, GaitEvents]:
+    """Detectors that found contacts of a foot, in their order."""
+    return {name: events for name, events in found.items() if events.times(side, "ic")}
+
+
+def _clusters(
+    voters: Mapping[str, GaitEvents], side: Side, kind: EventKind, params: ConsensusParams
+) -> list[list[_Vote]]:
+    """Contacts that are one, at most one vote of each detector, in order of time."""
+    lead, *others = voters
+    clusters = [[v] for v in _votes(lead, voters[lead], side, kind)]
+    for name in others:
+        moved = _moved(_votes(name, voters[name], side, kind), voters[lead].times(side, kind), params)
+        free = []
+        taken: set[int] = set()
+        for vote in moved:
+            near = [
+                (abs(c[0].time_s - vote.time_s), i)
+                for i, c in enumerate(clusters)
+                if i not in taken and abs(c[0].time_s - vote.time_s) <= params.window_s
+            ]
+            if near:
+                taken.add(min(near)[1])
+                clusters[min(near)[1]].append(vote)
+            else:
+                free.append([vote])
+        clusters += free
+    return sorted(clusters, key=lambda c: c[0].time_s)
+
+
+def _votes(name: str, events: GaitEvents, side: Side, kind: EventKind) -> list[_Vote]:
+    own = (e for e in events.events if (e.side, e.kind) == (side, kind))
+    return [_Vote(name, e.time_s, e.detected_s) for e in own]
+
+
+def _moved(votes: list[_Vote], lead: Sequence[float], params: ConsensusParams) -> list[_Vote]:
+    """Votes without the median distance of their detector from the lead."""
+    if not lead or not votes:
+        return votes
+    reference = np.array(lead)
+    off = np.array([v.time_s - reference[np.argmin(np.abs(reference - v.time_s))] for v in votes])
+    off = off[np.abs(off) <= params.pair_s]
+    if len(off) < params.pairs:
+        return votes
+    return [replace(v, time_s=v.time_s - float(np.median(off))) for v in votes]
+
+
+def _led_by_other(side: Side, leads: str, voters: Mapping[str, GaitEvents]) -> Notice:
+    return Notice(
+        "led_by_other",
+        f"The foot-pitch rule found no contacts of the {side} foot; these are of {leads}"
+        + (f" and {len(voters) - 1} other detectors" if len(voters) > 1 else " alone")
+        + " (reconstructions of published ones). Compare them with the signals before using the numbers.",
+        FOOT[side],
+    )
+
+
+def _disagree(side: Side, dropped: int, n: int) -> Notice:
+    return Notice(
+        "detectors_disagree",
+        f"{dropped} possible contacts of the {side} foot were seen by too few of {n} detectors and are left"
+        " out.",
+        FOOT[side],
+        severity="info",
+    )

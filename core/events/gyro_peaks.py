@@ -1,0 +1,247 @@
+"""Contacts from the sagittal angular rate of foot or shank: one detector, its rules chosen by parameters.
+
+Every swing is a peak of the rate (forward positive). After it the segment slows down, its rate passes zero
+and has a negative peak: one of the two is the initial contact. Before it, while the heel rises, the rate has
+its deepest minimum: the terminal contact. The published detectors differ in segment, feature, waiting times
+and threshold. Their full rules are not openly readable; the presets put together what is public of them
+(spec/fusion.md §5.6) and are called reconstructions: figures of theirs are not figures of the papers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from math import radians
+from types import MappingProxyType
+from typing import Final, Literal
+
+import numpy as np
+
+from core.errors import Notice, SignalError
+from core.events.result import GaitEvent, GaitEvents
+from core.frames import FOOT, SHANK, SIDES, Bools, Floats, Oriented, Segment, Side
+from core.rotation import conjugate, log, multiply
+
+
+@dataclass(frozen=True)
+class GyroPeakParams:
+    """Rules of the detector.
+
+    Parameters
+    ----------
+    name : source of its events.
+    segment : which segment's rate.
+    contact : "zero_cross" = the rate passes zero after the swing, "neg_peak" = the deepest minimum of the
+        `contact_s` after that.
+    leaving : "before_swing" = the last minimum before the swing, "deepest" = the deepest between contact and
+        swing; both after the waiting time and at least `leaving_rad_s` deep.
+    swing_rad_s : least peak of a swing. refractory_s : least time between two swings.
+    unclear : share of the threshold, and of the swings: so many peaks between that share and the threshold
+        make a foot's swings unclear, and none of them is reported. Our choice: in the severe simulated
+        shuffle half of the swings of the foot exceed the threshold. apart_s : distance of two swings for it.
+    wait_s : from a contact to the terminal contact that may follow it.
+    low_pass_hz : zero-phase low-pass of the rate, None = as it is.
+    longest_s : from swing peak to contact, and from terminal contact to swing peak. min_rate_hz : spec §5.3.
+    """
+
+    name: str = "gyro_peaks"
+    segment: Literal["foot", "shank"] = "shank"
+    contact: Literal["zero_cross", "neg_peak"] = "neg_peak"
+    leaving: Literal["before_swing", "deepest"] = "before_swing"
+    swing_rad_s: float = radians(100.0)
+    refractory_s: float = 0.35
+    unclear: tuple[float, float] = (0.6, 0.2)
+    apart_s: float = 0.5
+    contact_s: float = 0.15
+    wait_s: float = 0.1
+    leaving_rad_s: float = radians(20.0)
+    low_pass_hz: float | None = None
+    longest_s: float = 0.6
+    min_rate_hz: float = 40.0
+
+
+PRESETS: Final[Mapping[str, GyroPeakParams]] = MappingProxyType(
+    {
+        p.name: p
+        for p in (
+            # shank, zero crossing with heuristics, TC ≥ 100 ms after IC, 350 ms refractory
+            GyroPeakParams("gouwanda", "shank", "zero_cross", refractory_s=0.35, wait_s=0.1),
+            # shank, IC = minimum after the swing peak, TC = later minimum below a threshold
+            GyroPeakParams("catalfamo", "shank", "neg_peak", wait_s=0.3),
+            # shank, swing peak, IC = first negative minimum, 300 ms wait, TC = next minimum
+            GyroPeakParams("maqbool", "shank", "neg_peak", "deepest", wait_s=0.3, low_pass_hz=10.0),
+            # foot pitch rate around mid-swing
+            GyroPeakParams("mariani", "foot", "zero_cross"),
+            # foot, amplitude threshold between stance and swing
+            GyroPeakParams("perez_ibarra", "foot", "neg_peak", swing_rad_s=radians(150.0)),
+        )
+    }
+)
+"""Reconstructions of published detectors (spec/fusion.md §5.6), by the first author's name."""
+
+RECONSTRUCTION: Final = "reconstruction"
+"""What a preset is called wherever its name is shown."""
+
+LIMB: Final[Mapping[str, Mapping[Side, Segment]]] = MappingProxyType({"foot": FOOT, "shank": SHANK})
+
+
+def gyro_peak_events(take: Oriented, rate_hz: float, params: GyroPeakParams | None = None) -> GaitEvents:
+    """Contacts of every side that carries the segment's sensor.
+
+    Parameters
+    ----------
+    take : orientations of the segments, ISB axes.
+
+    Returns
+    -------
+    events in order of time; `detected_s` is when the rule knows. Notices: `segment_missing`, `no_swing`,
+    `swing_unclear`.
+
+    Raises
+    ------
+    SignalError : `sample_rate_too_low`.
+    """
+    params = params or GyroPeakParams()
+    if rate_hz < params.min_rate_hz:
+        raise SignalError(
+            "sample_rate_too_low",
+            f"Gait events need at least {params.min_rate_hz:g} Hz, the recording has {rate_hz:g} Hz. Record"
+            " at a higher rate.",
+        )
+    events: list[GaitEvent] = []
+    notices: list[Notice] = []
+    for side in SIDES:
+        segment = LIMB[params.segment][side]
+        if segment not in take.q or not take.valid[segment].any():
+            message = f"No sensor on the {side} {params.segment}: {params.name} finds no contacts of it."
+            notices.append(Notice("segment_missing", message, segment))
+            continue
+        rate = sagittal_rate(take.q[segment], rate_hz)
+        if params.low_pass_hz is not None:
+            rate = _low_pass(rate, params.low_pass_hz, rate_hz)
+        unclear = _unclear(rate[take.valid[segment]], rate_hz, params)
+        if unclear:
+            notices.append(_say_unclear(side, segment, unclear, params))
+            continue
+        found = _events(side, rate, take.valid[segment], take.t_s, rate_hz, params)
+        events += found
+        if not found:
+            top = float(np.degrees(rate[take.valid[segment]].max(initial=0.0)))
+            notices.append(
+                Notice(
+                    "no_swing",
+                    f"The {side} {params.segment} never swung faster than"
+                    f" {np.degrees(params.swing_rad_s):.0f}°/s (fastest was {top:.0f}°/s), so {params.name}"
+                    " found no contacts on it.",
+                    segment,
+                )
+            )
+    events.sort(key=lambda e: (e.time_s, e.side, e.kind))
+    return GaitEvents(tuple(events), tuple(notices))
+
+
+def sagittal_rate(q: Floats, rate_hz: float) -> Floats:
+    """Angular rate (n,) in rad/s about the segment's own rightward axis: the lower end forward positive."""
+    step = log(multiply(conjugate(q[:-1]), q[1:]))[:, 2] * rate_hz
+    return np.append(step, step[-1:] if len(step) else 0.0)
+
+
+def _events(
+    side: Side, rate: Floats, valid: Bools, t_s: Floats, rate_hz: float, params: GyroPeakParams
+) -> list[GaitEvent]:
+    """Contacts of one segment, swing by swing."""
+    from scipy.signal import find_peaks
+
+    distance = max(1.0, params.refractory_s * rate_hz)
+    swings, _ = find_peaks(np.where(valid, rate, 0.0), height=params.swing_rad_s, distance=distance)
+    reach = round(params.longest_s * rate_hz)
+    step = 1.0 / rate_hz
+    events: list[GaitEvent] = []
+    landed = 0
+    ends = [*(int(s) for s in swings), len(rate)]
+    for swing, following in pairwise(ends):
+        # waiting after a contact matters only when that contact is near
+        start = max(landed + round(params.wait_s * rate_hz) if landed else 0, swing - reach)
+        leaving = _leaving(rate, start, swing, params)
+        if leaving is not None and valid[leaving : swing + 1].all():
+            # the minimum is believed when the swing shows that the foot has left
+            known = t_s[swing]
+            time = float(t_s[leaving] + _vertex(rate, leaving) * step)
+            events.append(GaitEvent(time, side, "tc", params.name, float(known)))
+        contact = _contact(rate, swing, min(following, swing + reach), rate_hz, params)
+        if contact is not None and valid[swing : contact[1] + 1].all():
+            at, known_at = contact
+            events.append(GaitEvent(float(t_s[0] + at * step), side, "ic", params.name, float(t_s[known_at])))
+            landed = known_at
+    return events
+
+
+def _contact(
+    rate: Floats, swing: int, end: int, rate_hz: float, params: GyroPeakParams
+) -> tuple[float, int] | None:
+    """Sample (fractional) of the contact after a swing, and the sample at which it is known."""
+    below = np.flatnonzero(rate[swing:end] <= 0.0)
+    if not len(below):
+        return None
+    after = swing + int(below[0])
+    if params.contact == "zero_cross":
+        return after - float(rate[after] / (rate[after] - rate[after - 1])), after
+    lows = after + _minima(rate[after : min(end, after + round(params.contact_s * rate_hz) + 1)])
+    if not len(lows):
+        return None
+    low = int(lows[np.argmin(rate[lows])])
+    return low + _vertex(rate, low), low + 1
+
+
+def _unclear(rate: Floats, rate_hz: float, params: GyroPeakParams) -> tuple[int, int] | None:
+    """Number of peaks just below the threshold and above it, where that leaves the swings unclear."""
+    from scipy.signal import find_peaks
+
+    share, most = params.unclear
+    low = share * params.swing_rad_s
+    # a swing may have a smaller peak beside its own: only what stands for itself counts
+    distance = max(1.0, params.apart_s * rate_hz)
+    peaks, _ = find_peaks(rate, height=low, prominence=low, distance=distance)
+    above = int((rate[peaks] >= params.swing_rad_s).sum())
+    below = len(peaks) - above
+    return (below, above) if above and below > most * above else None
+
+
+def _say_unclear(side: Side, segment: Segment, found: tuple[int, int], params: GyroPeakParams) -> Notice:
+    return Notice(
+        "swing_unclear",
+        f"{found[0]} swings of the {side} {params.segment} stay just below"
+        f" {np.degrees(params.swing_rad_s):.0f}°/s and {found[1]} exceed it: {params.name} would miss many"
+        " contacts, so it reports none.",
+        segment,
+    )
+
+
+def _leaving(rate: Floats, start: int, swing: int, params: GyroPeakParams) -> int | None:
+    """Sample of the minimum before a swing, None if there is none deep enough."""
+    lows = start + _minima(rate[start:swing])
+    lows = lows[rate[lows] <= -params.leaving_rad_s]
+    if not len(lows):
+        return None
+    if params.leaving == "deepest":
+        return int(lows[np.argmin(rate[lows])])
+    return int(lows[-1])
+
+
+def _minima(x: Floats) -> np.ndarray:
+    """Places of the local minima of x (n,), ends excluded."""
+    return np.flatnonzero((x[1:-1] < x[:-2]) & (x[1:-1] <= x[2:])) + 1
+
+
+def _vertex(x: Floats, i: int) -> float:
+    """Where between the samples the extremum at i is, within ±0.5: a parabola through three of them."""
+    bend = x[i - 1] - 2.0 * x[i] + x[i + 1]
+    return 0.0 if bend == 0.0 else float(np.clip(0.5 * (x[i - 1] - x[i + 1]) / bend, -0.5, 0.5))
+
+
+def _low_pass(x: Floats, cutoff_hz: float, rate_hz: float) -> Floats:
+    from scipy.signal import butter, sosfiltfilt
+
+    sos = butter(2, min(0.99, cutoff_hz / (0.5 * rate_hz)), output="sos")
+    return np.asarray(sosfiltfilt(sos, x, padlen=min(len(x) - 1, round(2.0 * rate_hz))))
