@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from core.norms.tables import WBDS, rows
+from core.norms.values import single_side_sd
 from core.parameters.kinematic import CurveFigure
 
 Kind = Literal["value", "difference", "ratio"]
@@ -69,13 +70,14 @@ _OVERALL: Final = "Patterson et al. 2008 (Arch Phys Med Rehabil 89:304): 0.9 to 
 
 
 def _wbds(parameter: str) -> tuple[float, float, float]:
-    """Mean, sd and sd of left − right of one row, all adults."""
+    """Mean, sd of both sides' mean, and sd of left − right, of one row, all adults."""
     row = next(r for r in rows("kinematic_parameters_wbds") if r["parameter"] == parameter)
     return float(row["all_mean"]), float(row["all_std"]), float(row["LR_diff_sd"])
 
 
 def _above_norm(name: str, measure: str, parameter: str, *, level: bool) -> Rule:
-    mean, sd, _ = _wbds(parameter)
+    mean, sd, apart = _wbds(parameter)
+    sd = single_side_sd(sd, apart)
     return Rule(name, measure, "value", "above", mean + 2.0 * sd, f"mean + 2 SD, {WBDS}", level=level)
 
 

@@ -72,19 +72,23 @@ def norms_for(
     speed = None if speed_mps is None else walking_speed(speed_mps, height_m)
     at = None if speed is None else speed.equivalent_mps
     bands = adult_kinematics(age, at, anatomical)
-    if bands.reason is not None:
-        return Norms(speed, None, reason=bands.reason, timing_reason=bands.reason)
-    pace = pace_of(age, sex, at)
+    values = {} if bands.reason else dict(angle_values(age, anatomical).values)
+    # a class of speeds is of people of this age and sex, whose legs are in it already
+    pace = pace_of(age, sex, speed_mps)
     timing = temporal_values(age, sex, pace or "normal")
-    missing = timing.reason or (None if pace is not None else "no_speed_matched_norm")
-    values = dict(angle_values(age, anatomical).values)
+    slow = bands.reason == "no_speed_matched_norm" or pace is None
+    missing = timing.reason or ("no_speed_matched_norm" if slow else None)
+    expected: Mapping[str, NormValue] = {}
     if missing is None:
         values |= timing.values
+    if speed is not None and not bands.reason:
+        expected = expected_at_speed(speed.speed_mps, age, speed.leg_m)
     return Norms(
         speed,
-        pace if missing is None else None,
+        None if missing else pace,
         values,
-        {} if speed is None else expected_at_speed(speed.speed_mps, age, speed.leg_m),
+        expected,
         bands.bands,
+        reason=bands.reason,
         timing_reason=missing,
     )

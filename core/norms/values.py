@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from math import sqrt
+from math import hypot, sqrt
 from typing import Final, Literal, cast
 
 from core.frames import GRAVITY
@@ -71,7 +71,8 @@ class NormValue:
 
     Parameters
     ----------
-    mean, sd : over people, in the unit the name ends with. n : people, None where the source gives none.
+    mean, sd : over people, of a single side where there are sides, in the unit the name ends with.
+    n : people, None where the source gives none.
     difference_sd : sd of left − right in healthy people, None if not known.
     comparable : False where our value has another zero, or where mean ± sd is not a spread; see `note`.
     """
@@ -112,7 +113,7 @@ def angle_values(age: float | None, anatomical: Collection[str] = ()) -> NormVal
         values[name] = NormValue(
             name=name,
             mean=float(row[f"{column}_mean"]),
-            sd=float(row[f"{column}_std"]),
+            sd=single_side_sd(float(row[f"{column}_std"]), float(row["LR_diff_sd"])),
             n=WBDS_N[group],
             group=group,
             source=WBDS,
@@ -121,6 +122,15 @@ def angle_values(age: float | None, anatomical: Collection[str] = ()) -> NormVal
             note="" if comparable else _LEVEL,
         )
     return NormValues(values)
+
+
+def single_side_sd(mean_sd: float, difference_sd: float) -> float:
+    """sd of one side between people from the sd of their mean of both sides and of left − right.
+
+    The table's sd is of the mean of both sides, narrower than what a single side is held against:
+    var(side) = var(mean) + var(left − right) / 4, averaged over the sides.
+    """
+    return hypot(mean_sd, 0.5 * difference_sd)
 
 
 def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -> NormValues:
@@ -134,7 +144,8 @@ def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -
             continue
         row = table[key]
         note = _BAND if row["kind"] != "mean_sd" else _NOT_COMPARABLE.get(name, "")
-        ages = f"{row['age_min']} to {row['age_max']} years"
+        first, last = row["age_min"], row["age_max"]
+        ages = f"{first} years" if first == last else f"{first} to {last} years"
         values[name] = NormValue(
             name=name,
             mean=float(row["mean"]),

@@ -291,9 +291,9 @@ def _key_number(row: Row) -> KeyNumber:
 
 def _norm_note(rows: tuple[Row, ...], panels: tuple[CurvePanel, ...], norms: Norms) -> str:
     """Who the reference people are, or why there are none; always something."""
-    if norms.reason is not None:
-        return NO_NORM.get(norms.reason, norms.reason)
     sentences = []
+    if norms.reason is not None:
+        sentences.append(NO_NORM.get(norms.reason, norms.reason))
     band = next((p.norm for p in panels if p.norm is not None), None)
     if band is not None:
         who = _GROUPS.get(band.group, band.group)
@@ -301,7 +301,7 @@ def _norm_note(rows: tuple[Row, ...], panels: tuple[CurvePanel, ...], norms: Nor
             f"Norm: {band.n} {who}, overground at their comfortable 1.25 ± 0.16 m/s, mean ± 1 SD "
             f"({band.source})."
         )
-    if norms.timing_reason is not None:
+    if norms.timing_reason is not None and norms.timing_reason != norms.reason:
         sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
     elif shown := [r for r in rows if r.norm is not None and r.name not in ANGLES]:
         sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")

@@ -140,3 +140,12 @@ def test_expected_step_and_cadence_multiply_to_the_speed_on_any_legs() -> None:
     short, long = expected_at_speed(1.2, 30, 0.78), expected_at_speed(1.2, 30, 1.05)
     assert short["cadence_spm"].mean > long["cadence_spm"].mean
     assert sqrt(GRAVITY / 0.9) == pytest.approx(3.30, abs=0.01)
+
+
+def test_children_have_times_and_no_angles() -> None:
+    child = norms_for(8, "female", 1.2)
+    assert (child.reason, child.timing_reason, child.pace) == ("no_norm_for_age", None, "normal")
+    assert child.values["cadence_spm"].source == "Lythgo2011"
+    assert child.place("knee_flexion_rom_deg", 60.0).reason == "no_norm_for_age"
+    assert not child.expected
+    assert norms_for(8, "female", 0.5).timing_reason == "no_speed_matched_norm"

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.resources import files
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from core.frames import SIDES, Floats
 from core.norms import adult_kinematics, angle_values, expected_at_speed, temporal_values
 from core.norms.tables import rows
 from core.parameters.kinematic import FIGURES
 from core.parameters.temporal import NAMES
 from tests.data import data_folder
+from tests.wbds import people
 
 TABLES = (
     "kinematics_wbds_adult", "kinematic_parameters_wbds", "gps_reference_wbds", "spatiotemporal_age_sex",
@@ -137,3 +140,24 @@ def test_expected_step_length_and_cadence_at_a_speed() -> None:
     assert older.group.startswith("older")
     assert older.n == 21
     assert expected_at_speed(0.3, 30) == {}
+
+
+def test_a_single_side_spreads_more_than_the_mean_of_both() -> None:
+    """The table's sd is of the mean of both sides; ours of one side, recomputed from the strides."""
+    values = angle_values(None).values
+    for name, figure in FIGURES.items():
+        part = slice(figure.start_pct, figure.end_pct + 1)
+        read = FIGURE[figure.statistic]
+        both = np.array([[read(p[s][figure.variable][part]) for s in SIDES] for p in people()])
+        single = np.sqrt(both.var(axis=0, ddof=1).mean())
+        assert values[name].mean == pytest.approx(both.mean(), abs=0.006)
+        assert values[name].sd == pytest.approx(single, abs=0.011), name
+        assert values[name].difference_sd == pytest.approx(np.std(both[:, 0] - both[:, 1], ddof=1), abs=0.006)
+
+
+FIGURE: dict[str, Callable[[Floats], float]] = {
+    "at": lambda c: float(c[0]),
+    "max": lambda c: float(c.max()),
+    "min": lambda c: float(c.min()),
+    "range": lambda c: float(np.ptp(c)),
+}

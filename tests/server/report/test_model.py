@@ -140,7 +140,8 @@ def test_source_and_number_of_the_norm_are_printed_or_why_there_is_none(bundle: 
     child = report_model(bundle, age=10, sex="female")
     assert child.norm_note.startswith("No norm for this age")
     assert all(p.norm is None for p in child.panels)
-    assert all(r.norm is None for _, rows in child.groups for r in rows)
+    assert "Timing: female, 10 years, normal pace (Lythgo2011)." in child.norm_note
+    assert all(r.norm is None for _, rows in child.groups for r in rows if r.unit == "°")
     assert report_model(bundle, age=40, speed_mps=0.5).norm_note.startswith("No speed-matched norm")
 
 
