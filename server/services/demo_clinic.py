@@ -10,11 +10,10 @@ import datetime as dt
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from math import inf
+from math import degrees, hypot, inf
 from typing import TYPE_CHECKING
 
 from core.frames import Segment
-from core.recording import Recording
 from server.jobs.table import TableQueue
 from server.services import analyses, patients, recordings, sessions
 from server.settings import Settings, load_settings
@@ -24,6 +23,9 @@ from server.storage.tables import now
 
 if TYPE_CHECKING:
     from core.simulate import Simulation
+
+GONIOMETER = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
+"""Angles of standing that are entered."""
 
 FEET: tuple[Segment, ...] = ("foot_l", "foot_r")
 
@@ -113,7 +115,16 @@ def fill(settings: Settings) -> None:
         for visit in VISITS:
             made = record(visit)
             files = mt_files(made.recording, visit.script, made.first_counter)
-            _add(db, blobs, settings, visit, known[visit.person.code], made.recording, files)
+            _add(db, blobs, settings, visit, known[visit.person.code], _manifest(made), files)
+
+
+def _manifest(made: Simulation) -> dict[str, object]:
+    """The sensors, and what a therapist would take with tape and goniometer while the person stands."""
+    truth = made.truth
+    apart = truth.p["foot_l"][0, :2] - truth.p["foot_r"][0, :2]
+    angles = {n: round(degrees(a)) for n, a in truth.zero_offset.items() if n.startswith(GONIOMETER)}
+    subject = {"standing_width_m": round(float(hypot(*apart)), 2), "standing_angles_deg": angles}
+    return {"sensors": dict(made.recording.segments), "subject": subject}
 
 
 def _add(
@@ -122,7 +133,7 @@ def _add(
     settings: Settings,
     visit: Visit,
     patient_id: str,
-    recording: Recording,
+    manifest: Mapping[str, object],
     files: Mapping[str, bytes],
 ) -> None:
     day = now().date() - dt.timedelta(days=visit.days_ago)
@@ -134,7 +145,7 @@ def _add(
             upload.keep()
     with db.write() as c:
         queue = TableQueue(db, settings.lease_s)
-        recordings.set_manifest(c, None, session.id, {"sensors": dict(recording.segments)})
+        recordings.set_manifest(c, None, session.id, manifest)
         recordings.inspect(c, queue, None, session.id)
         analyses.submit(c, queue, None, session.id)
 
