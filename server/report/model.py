@@ -18,7 +18,7 @@ from core.norms.lookup import Norms, norms_for
 from core.norms.values import ANGLES
 from core.parameters import cycle_curves
 from core.parameters.result import CycleCurves
-from core.scores import scores
+from core.scores import Scores, scores
 from server.report.bundle import Bundle
 from server.report.columns import plain
 from server.report.estimator import EstimatorView, estimated_variables, estimator_view
@@ -232,10 +232,13 @@ def report_model(
         provenance=bundle.provenance,
         estimator=estimator_view(bundle.estimator),
         limits=_limits(bundle, curves, height_m),
-        profile=None
-        if curves is None
-        else profile_view(scores(curves, estimated=estimated_variables(bundle.estimator))),
+        profile=None if curves is None else profile_view(_scores(bundle, curves)),
     )
+
+
+def _scores(bundle: Bundle, curves: CycleCurves) -> Scores:
+    standing = {} if bundle.angles is None else bundle.angles.standing_deg
+    return scores(curves, standing, estimated=estimated_variables(bundle.estimator))
 
 
 def _limits(bundle: Bundle, curves: CycleCurves | None, height_m: float | None) -> LimitsView | None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from core.frames import SIDES, Side
+from core.norms.profile import Mode
 from core.scores import Score, Scores
 from server.report.wording import VARIABLES, number, reason_words
 
@@ -17,8 +18,17 @@ WIDTH: Final = 150
 LABELS: Final = {v.name: v.label for v in VARIABLES}
 PLANES: Final = {v.name: v.plane for v in VARIABLES}
 
-MODE: Final = "offset_removed"
+MODE: Final[Mode] = "offset_removed"
 """Our angles start from the person's own standing, so levels say nothing; the shape does."""
+
+
+TOTALS: Final[tuple[tuple[str, Mode, str], ...]] = (
+    ("gps_sagittal_deg", "offset_removed", "gps_sagittal"),
+    ("gps_deg", "offset_removed", "GPS, levels removed"),
+    ("gps_sagittal_deg", "raw", "gps_sagittal with levels"),
+    ("gps_deg", "raw", "GPS"),
+)
+"""Profiles over several curves → their titles; those with levels need goniometer angles of standing."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +63,10 @@ def profile_view(scores: Scores) -> ProfileView | None:
             rows.append(_row(label, found, low=plane != "sagittal", total=False))
     if not rows:
         return None
-    sagittal = {side: scores.find("gps_sagittal_deg", MODE, side) for side in SIDES}
-    if any(s.value is not None for s in sagittal.values()):
-        rows.append(_row("gps_sagittal", sagittal, low=False, total=True))
+    for name, mode, title in TOTALS:
+        both = {side: scores.find(name, mode, side) for side in SIDES}
+        if any(s.value is not None for s in both.values()):
+            rows.append(_row(title, both, low=name == "gps_deg", total=True))
     return ProfileView(tuple(rows), _index(scores), _note(scores))
 
 
