@@ -20,7 +20,7 @@ from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Segment
 from core.parameters.resample import resample
 from core.parameters.result import Parameter
-from core.parameters.variability import summary
+from core.parameters.variability import STEADY_STRIDES, summary
 
 AXES: Final[Mapping[str, int]] = {"v": 2, "ap": 0, "ml": 1}
 """Ending of the name → column of the acceleration: vertical, forward, sideways."""
@@ -105,7 +105,8 @@ def _regularity(own: Sequence[Stride], t_s: Floats, acceleration: Floats) -> Ite
                 yield summary(label, None, [], "", "gap" if runs else "no_run")
                 continue
             alike = _autocorrelation([a[:, AXES[axis]] for _, a in whole], lags)
-            yield Parameter(label, None, n, float(alike.max()), None, "")
+            note = "few_strides" if n < STEADY_STRIDES else None
+            yield Parameter(label, None, n, float(alike.max()), None, "", note=note)
 
 
 def _autocorrelation(pieces: Sequence[Floats], lags: np.ndarray) -> Floats:
