@@ -11,6 +11,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from core.anatomical import anatomical_variables
 from core.errors import Notice
 from core.flags import flags
 from core.frames import SIDES, Floats, Side
@@ -22,6 +23,7 @@ from core.scores import Scores, scores
 from server.report.bundle import Bundle
 from server.report.columns import plain
 from server.report.estimator import EstimatorView, estimated_variables, estimator_view
+from server.report.level import level_rows
 from server.report.limits import LimitsView, limits_view
 from server.report.panels import DRAWN_STRIDES, CurvePanel, SideCurve, curve_panels
 from server.report.profile import ProfileView, profile_view
@@ -196,6 +198,10 @@ def report_model(
     rows = parameter_rows(bundle.parameters, norms, estimated_variables(bundle.estimator))
     curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
     panels = curve_panels(bundle, curves, norms)
+    standing = {} if bundle.angles is None else bundle.angles.standing_deg
+    if curves is not None and standing:
+        level = norms_for(age, sex, speed_mps, height_m, anatomical_variables(standing))
+        rows += level_rows(curves, standing, level, estimated_variables(bundle.estimator))
     stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
     angles = bundle.angles
     return ReportModel(
