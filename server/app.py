@@ -29,6 +29,7 @@ from server.api import (
     reviews,
     sessions,
     sign_in,
+    trends,
     users,
 )
 from server.api.body_limit import BodyLimit
@@ -109,6 +110,7 @@ def create_app(settings: Settings) -> FastAPI:
         analyses,
         reports,
         reviews,
+        trends,
         jobs,
         users,
         audit_log,

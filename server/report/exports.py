@@ -19,6 +19,7 @@ import io
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,10 +29,13 @@ from core.body.health import worst
 from core.body.poses import Poses
 from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
+from core.parameters import cycle_curves
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
+from core.scores import Scores, scores
 from server.report import signals, tracks
 from server.report.columns import SCHEMA, parquet_file, plain
+from server.report.estimator import estimated_variables
 
 if TYPE_CHECKING:
     # these packages bring numba, which the web process does without
@@ -68,10 +72,29 @@ def summary(analysis: Analysis) -> dict[str, object]:
         "calibration": _calibration(analysis.calibration, analysis.angles),
         "estimator": _estimator(analysis),
         "parameters": [parameter_row(p) for p in analysis.parameters],
+        "scores": _scores(analysis),
         "walking": _walking(analysis),
         "warnings": [n.to_json() for n in analysis.notices],
         "provenance": plain(analysis.provenance),
     }
+
+
+def _scores(analysis: Analysis) -> list[dict[str, object]]:
+    """Profiles and indices over several curves, so that a trend over many visits reads no signals."""
+    if analysis.angles is None or analysis.measured is None:
+        return []
+    curves = cycle_curves(analysis.angles, analysis.measured.strides)
+    unsure = estimated_variables(_estimator(analysis))
+    return score_rows(scores(curves, analysis.angles.standing_deg, estimated=unsure))
+
+
+def score_rows(found: Scores) -> list[dict[str, object]]:
+    """Profiles and indices as JSON; what belongs to one curve is left out."""
+    return [
+        {name: plain(value) for name, value in asdict(s).items() if name != "variable"}
+        for s in found.scores
+        if s.variable is None
+    ]
 
 
 def parameter_row(p: Parameter) -> dict[str, object]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from core.change import Change
 from core.parameters.kinematic import POINTS
 from server.report.exports import write_csv
 from server.report.model import ReportModel
+from server.report.trends import Trend, Visit
 
 
 def parameters_csv(report: ReportModel) -> bytes:
@@ -43,6 +45,33 @@ def parameters_csv(report: ReportModel) -> bytes:
                     )
 
     return write_csv(header, rows())
+
+
+def trends_csv(visits: Sequence[Visit], found: Sequence[Trend]) -> bytes:
+    """One row per figure, side and visit, with its change against the first assessment and the limits."""
+    header = (
+        *("name", "side", "unit", "date", "session_id", "visit", "kind"),
+        *("n", "mean", "sd", "ci_low", "ci_high"),
+        *("change", "verdict", "mdc", "mdc_source", "mcid", "mcid_source", "reason"),
+    )
+
+    def rows() -> Iterator[Sequence[object]]:
+        for trend in found:
+            for line in trend.lines:
+                for p in line.points:
+                    v, c = visits[p.visit], p.change
+                    yield (
+                        *(trend.name, line.side or "", trend.term.unit),
+                        *(v.performed_on.isoformat(), v.session_id, v.label or "", v.kind),
+                        *(p.n, p.value, p.sd, p.ci_low, p.ci_high),
+                        *((None,) * 7 if c is None else _judged(c)),
+                    )
+
+    return write_csv(header, rows())
+
+
+def _judged(c: Change) -> tuple[object, ...]:
+    return (c.difference, c.verdict, c.limit, c.limit_source, c.mcid, c.mcid_source, c.reason)
 
 
 def curves_csv(report: ReportModel) -> bytes:

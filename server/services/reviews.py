@@ -21,6 +21,7 @@ from core.measure import Measured, Tracks, measure
 from server import audit
 from server.report import signals, tracks
 from server.report.bundle import Bundle, load_bundle, reviewed
+from server.report.numbers import Numbers, numbers_of, read_numbers
 from server.services import analyses
 from server.services.errors import Conflict
 from server.storage.blobs import BlobStore
@@ -34,9 +35,9 @@ UNDO: Final = "undo"
 NOT_READ: Final = ("poses.parquet", signals.NAME)
 """Files that only the replay and the drawing of signals need."""
 
-TAKES_KEPT, RESULTS_KEPT, PARTS_KEPT = 3, 12, 24
-"""Finished analyses, results of edits and signals of one sensor kept in memory: those at work. Ten minutes
-are some 20 MB, 1 MB and 2 MB."""
+TAKES_KEPT, RESULTS_KEPT, PARTS_KEPT, NUMBERS_KEPT = 3, 12, 24, 240
+"""Finished analyses, results of edits, signals of one sensor and numbers kept in memory: those at work. Ten
+minutes are some 20 MB, 1 MB, 2 MB and 50 kB."""
 
 ACTIONS: Final = {
     "move_event": "event.moved",
@@ -136,6 +137,19 @@ def bundle(blobs: BlobStore, found: analyses.Analysis, edits: Edits) -> Bundle:
     return stored if result is None else reviewed(stored, result, edits.edits)
 
 
+def numbers(blobs: BlobStore, found: analyses.Analysis, edits: Edits) -> Numbers:
+    """Parameters and scores as they count; without an edit no signal is read; raises IntegrityError."""
+
+    def read() -> Numbers:
+        if not edits.made:
+            stored = read_numbers(analyses.file_bytes(blobs, found, "analysis.json"))
+            if stored is not None:
+                return stored
+        return numbers_of(bundle(blobs, found, edits))
+
+    return _numbers.get((found.id, edits.key), read)
+
+
 def kept(key: tuple[str, ...], make_value: Callable[[], _Value]) -> _Value:
     """A part of a finished analysis that is looked at again and again, by a key that begins with its id."""
     value: _Value = _parts.get(key, make_value)
@@ -144,7 +158,7 @@ def kept(key: tuple[str, ...], make_value: Callable[[], _Value]) -> _Value:
 
 def forget() -> None:
     """Keep nothing in memory: what is erased on disk must not stay here."""
-    for memory in (_takes, _results, _parts):
+    for memory in (_takes, _results, _numbers, _parts):
         memory.clear()
 
 
@@ -275,4 +289,5 @@ class _Kept(Generic[_Value]):
 
 _takes: _Kept[Take] = _Kept(TAKES_KEPT)
 _results: _Kept[Measured] = _Kept(RESULTS_KEPT)
+_numbers: _Kept[Numbers] = _Kept(NUMBERS_KEPT)
 _parts: _Kept[Any] = _Kept(PARTS_KEPT)

@@ -1,0 +1,116 @@
+"""Figures over the visits of a patient: what changed since the first assessment, and how sure that is."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+from fastapi.responses import JSONResponse
+from starlette.responses import Response
+
+from core.frames import Protocol
+from server import audit, trend_schemas
+from server.api.context import Blobs, Db, Id
+from server.api.downloads import BINARY, attachment
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.report.change_words import change_words
+from server.report.columns import plain
+from server.report.tables import trends_csv
+from server.report.trends import Line, Trend, names_in, trends
+from server.services import histories, patients
+from server.services.histories import History
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+
+router = APIRouter(prefix="/patients/{patient_id}", tags=["trends"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+Names = Annotated[
+    list[Annotated[str, Query(max_length=64)]],
+    Query(alias="show", max_length=100, description="names of figures; none = all that were measured"),
+]
+Walked = Annotated[
+    Protocol | None, Query(description="visits of this protocol; none = that of the newest visit")
+]
+_JSON: dict[int | str, dict[str, Any]] = {200: {"model": trend_schemas.Trends}}
+_CSV: dict[int | str, dict[str, Any]] = {
+    200: {"description": "The table", "content": {"text/csv": {"schema": BINARY}}}
+}
+
+
+@router.get("/trends", response_model=None, responses=_JSON)
+def read_trends(
+    patient_id: Id,
+    db: Db,
+    blobs: Blobs,
+    who: Reader,
+    show: Names = [],
+    protocol: Walked = None,  # noqa: B006
+) -> Response:
+    """Values by visit with the norm, and the change since the first assessment against MDC and MCID."""
+    known, found = _opened(db, blobs, who, patient_id, show, protocol)
+    visits = [
+        {
+            "session_id": v.session_id,
+            "performed_on": v.performed_on.isoformat(),
+            "title": v.title,
+            "label": v.label,
+            "kind": v.kind,
+        }
+        for v in known.visits
+    ]
+    content = {"protocol": known.protocol, "visits": visits, "trends": [_trend(t) for t in found]}
+    return JSONResponse(plain(content))
+
+
+@router.get("/trends.csv", response_class=Response, responses=_CSV)
+def read_trends_table(
+    patient_id: Id,
+    db: Db,
+    blobs: Blobs,
+    who: Reader,
+    show: Names = [],
+    protocol: Walked = None,  # noqa: B006
+) -> Response:
+    """The same as a table: one row per figure, side and visit."""
+    known, found = _opened(db, blobs, who, patient_id, show, protocol)
+    return attachment(trends_csv(known.visits, found), f"trends-{patient_id[:8]}.csv")
+
+
+def _opened(
+    db: Database, blobs: BlobStore, who: Identity, patient_id: str, names: list[str], protocol: str | None
+) -> tuple[History, tuple[Trend, ...]]:
+    with db.write() as c:
+        patient = patients.get(c, patient_id)
+        audit.record(c, who, "trends.opened", "patient", patient_id)
+    with db.read() as c:
+        done, plans = histories.read(c, patient)
+    known = histories.history(blobs, patient, done, plans, protocol)
+    there = names_in(known.visits)
+    wanted = [n for n in names if n in there] if names else there
+    return known, trends(known.visits, wanted, known.norms, known.usual)
+
+
+def _trend(trend: Trend) -> dict[str, Any]:
+    return {
+        "name": trend.name,
+        "title": trend.term.label,
+        "unit": trend.term.unit,
+        "norm": None if trend.norm is None else asdict(trend.norm),
+        "lines": [_line(line) for line in trend.lines],
+    }
+
+
+def _line(line: Line) -> dict[str, Any]:
+    change = line.change
+    return {
+        "side": line.side,
+        "mdc": line.mdc,
+        "mcid": line.mcid,
+        "points": [asdict(p) for p in line.points],
+        "base": line.base,
+        "latest": line.latest,
+        "words": None if change is None else change_words(change).verdict,
+    }

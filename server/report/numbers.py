@@ -1,0 +1,47 @@
+"""The numbers of a finished analysis without its signals: what a look over many visits reads."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from core.norms.profile import ScoreSpread
+from core.parameters import cycle_curves
+from core.parameters.result import Parameter
+from core.scores import Score, scores
+from server.report.bundle import Bundle
+from server.report.estimator import estimated_variables
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Parameters, and the scores over several curves, of one analysis."""
+
+    parameters: tuple[Parameter, ...]
+    scores: tuple[Score, ...]
+
+
+def read_numbers(content: bytes) -> Numbers | None:
+    """The numbers in analysis.json; None if it is of a version that wrote no scores."""
+    data = json.loads(content)
+    if "scores" not in data:
+        return None
+    parameters = tuple(Parameter(**row) for row in data["parameters"])
+    return Numbers(parameters, tuple(_score(row) for row in data["scores"]))
+
+
+def numbers_of(bundle: Bundle) -> Numbers:
+    """The numbers of an analysis that was read with its curves."""
+    if bundle.angles is None:
+        return Numbers(bundle.parameters, ())
+    curves = cycle_curves(bundle.angles, bundle.strides)
+    found = scores(curves, bundle.angles.standing_deg, estimated=estimated_variables(bundle.estimator))
+    return Numbers(bundle.parameters, tuple(s for s in found.scores if s.variable is None))
+
+
+def _score(row: Mapping[str, Any]) -> Score:
+    healthy = row["healthy"]
+    known = {**row, "healthy": None if healthy is None else ScoreSpread(**healthy)}
+    return Score(variable=None, **{**known, "missing": tuple(row["missing"])})

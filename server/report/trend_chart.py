@@ -1,0 +1,226 @@
+"""Draws one line of a trend: assessments large, trainings small, the measurement error as a band.
+
+The rules are those of the cycle curves (server/report/curves.py): the plot stretches, text and strokes do
+not, colours come from CSS classes.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from itertools import pairwise
+from typing import Final
+
+from server.report.curves import KEY
+from server.report.trends import Line, Trend, Visit
+from server.report.wording import number
+from web.words import MONTHS
+
+TOP, BOTTOM, LEFT, RIGHT = 22, 22, 44, 12
+"""Margins in px, the padding of `<div class="chart trend-plot">`."""
+
+ROOM: Final = 0.06
+"""Part of the time axis left free at both ends."""
+
+TICKS: Final = 5
+LABEL_PX: Final = 46
+"""Width that a label under the axis takes."""
+
+WIDTH_PX: Final = 420
+"""Narrowest width a chart is read at; labels that would touch there are left out."""
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """A planned assessment that is still to come."""
+
+    label: str
+    day: dt.date
+
+
+def value_range(trend: Trend) -> tuple[float, float]:
+    """Ends of the value axis, the same for both sides: values, bands and norm with some room."""
+    values: list[float] = []
+    for line in trend.lines:
+        values += [p.value for p in line.points]
+        base = line.points[line.base].value
+        for size in (line.mdc, line.mcid):
+            values += [] if size is None else [base - size, base + size]
+    if trend.norm is not None:
+        values += [trend.norm.mean - trend.norm.sd, trend.norm.mean + trend.norm.sd]
+    low, high = min(values), max(values)
+    room = 0.08 * (high - low) or 0.5 * abs(high) or 1.0
+    return low - room, high + room
+
+
+def trend_svg(
+    trend: Trend, line: Line, visits: Sequence[Visit], ahead: Sequence[Ahead] = (), height: int = 196
+) -> str:
+    """Draw one side of a trend over the days of all visits, so that all charts of a person share their axis.
+
+    Parameters
+    ----------
+    ahead : planned assessments to come, hairlines with their label. height : px with margins.
+    """
+    plot = _Plot(value_range(trend), visits, ahead, height - TOP - BOTTOM)
+    base = line.points[line.base].value
+    if trend.norm is not None:
+        plot.band("band", trend.norm.mean - trend.norm.sd, trend.norm.mean + trend.norm.sd)
+    if line.mdc is not None:
+        plot.band("mdc", base - line.mdc, base + line.mdc)
+    plot.grid(_ticks(*value_range(trend)))
+    if trend.norm is not None:
+        plot.level("nm", trend.norm.mean)
+    if line.mdc is not None:
+        plot.level("mdcl", base - line.mdc)
+        plot.level("mdcl", base + line.mdc)
+    if line.mcid is not None:
+        plot.level("mcid", base - line.mcid)
+        plot.level("mcid", base + line.mcid)
+    plot.days()
+    plot.points(line, trend.term.digits)
+    plot.labels(line)
+    title = f"{trend.term.label}{'' if line.side is None else f', {line.side}'}"
+    return (
+        '<div class="chart trend-plot">'
+        f'<svg width="100%" height="{plot.height}" overflow="visible" role="img">'
+        f"<title>{escape(title)} over the visits; the table has the numbers</title>{plot.svg()}</svg></div>"
+    )
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """Round values inside the axis, at most five."""
+    raw = (high - low) / TICKS
+    power = 10.0 ** math.floor(math.log10(raw))
+    step = next(f * power for f in (1, 2, 5, 10) if f * power >= raw)
+    first = math.ceil(low / step)
+    return [step * i for i in range(first, math.floor(high / step) + 1)]
+
+
+class _Plot:
+    """Collects what stretches (0 to 1000 both ways) and what does not (percent and px)."""
+
+    def __init__(
+        self,
+        y_range: tuple[float, float],
+        visits: Sequence[Visit],
+        ahead: Sequence[Ahead],
+        height: int,
+    ) -> None:
+        self.height = height
+        self._low, self._high = y_range
+        self._visits, self._ahead = visits, ahead
+        days = [v.performed_on for v in visits] + [a.day for a in ahead]
+        self._first = min(days)
+        span = (max(days) - self._first).days
+        self._span = float(span) if span else 1.0
+        self._alone = span == 0
+        self._stretched: list[str] = []
+        self._fixed: list[str] = []
+
+    def band(self, css: str, low: float, high: float) -> None:
+        top, bottom = self._y(high), self._y(low)
+        self._stretched.append(
+            f'<rect class="{css}" x="0" width="1000" y="{_f(top)}" height="{_f(bottom - top)}"/>'
+        )
+
+    def level(self, css: str, value: float) -> None:
+        y = _f(self._y(value))
+        self._stretched.append(f'<line class="{css}" x1="0" x2="1000" y1="{y}" y2="{y}"/>')
+
+    def grid(self, ticks: Sequence[float]) -> None:
+        step = abs(ticks[1] - ticks[0]) if len(ticks) > 1 else 1.0
+        digits = max(0, -math.floor(math.log10(step) + 1e-9))
+        for tick in ticks:
+            self.level("g", tick)
+            self._text("0", self._px(tick), number(tick, digits), "", "end", dx=-7, dy=4)
+
+    def days(self) -> None:
+        """Hairlines of what is planned, and what stands under the axis: assessments first, then trainings."""
+        wanted = [(v.performed_on, v.label or _day(v.performed_on), "words") for v in self._visits
+                  if v.kind == "assessment"]  # fmt: skip
+        wanted += [(a.day, a.label, "") for a in self._ahead]
+        wanted.sort(key=lambda w: (w[0] != self._visits[0].performed_on, w[0]))
+        taken: list[float] = []
+        for day, label, css in wanted:
+            x = self._x(day)
+            if all(abs(x - other) * WIDTH_PX / 1000 >= LABEL_PX for other in taken):
+                taken.append(x)
+                self._text(_pct(x), self.height, label, css, "middle", dy=15)
+        for planned in self._ahead:
+            at = _f(self._x(planned.day))
+            self._stretched.append(f'<line class="ax" x1="{at}" x2="{at}" y1="0" y2="1000"/>')
+
+    def points(self, line: Line, digits: int) -> None:
+        key = "b" if line.side is None else KEY[line.side]
+        assessed = [p for p in line.points if self._visits[p.visit].kind == "assessment"]
+        for a, b in pairwise(assessed):
+            ends = (self._at(a.visit), a.value), (self._at(b.visit), b.value)
+            d = "L".join(f"{_f(x)} {_f(self._y(value))}" for x, value in ends)
+            self._stretched.append(f'<path class="tr-{key}" d="M{d}"/>')
+        for p in line.points:
+            large = self._visits[p.visit].kind == "assessment"
+            css, radius = (f"pl-{key}", 5.0) if large else (f"ps-{key}", 2.8)
+            self._dot(self._at(p.visit), p.value, css, radius)
+        shown = {line.base} if line.latest is None else {line.base, line.latest}
+        for i in sorted(shown):
+            p = line.points[i]
+            x, y = _pct(self._at(p.visit)), self._px(p.value)
+            self._text(x, y, number(p.value, digits), "strong halo", "middle", dy=-11)
+
+    def labels(self, line: Line) -> None:
+        """Name the band and the limit at the right end, on the side of the band where there is more room."""
+        base = line.points[line.base].value
+        if line.mdc is not None:
+            y = self._px(base - line.mdc)
+            self._text("100%", y, "within measurement error (MDC)", "words halo", "end", dx=-4, dy=-5)
+        if line.mcid is not None and (line.mdc is None or line.mcid != line.mdc):
+            y = self._px(base + line.mcid)
+            self._text("100%", y, "MCID", "words halo", "end", dx=-4, dy=-4)
+
+    def svg(self) -> str:
+        return (
+            '<svg viewBox="0 0 1000 1000" preserveAspectRatio="none" width="100%" height="100%" '
+            f'overflow="hidden">{"".join(self._stretched)}</svg>{"".join(self._fixed)}'
+        )
+
+    def _dot(self, x: float, value: float, css: str, radius: float) -> None:
+        self._fixed.append(
+            f'<svg x="{_pct(x)}" y="{_f(self._px(value))}" overflow="visible" width="1" height="1">'
+            f'<circle class="{css}" r="{radius}"/></svg>'
+        )
+
+    def _at(self, visit: int) -> float:
+        return self._x(self._visits[visit].performed_on)
+
+    def _x(self, day: dt.date) -> float:
+        if self._alone:
+            return 500.0
+        return 1000 * (ROOM + (1 - 2 * ROOM) * (day - self._first).days / self._span)
+
+    def _y(self, value: float) -> float:
+        return 1000 - 1000 * (value - self._low) / (self._high - self._low)
+
+    def _px(self, value: float) -> float:
+        return self._y(value) / 1000 * self.height
+
+    def _text(self, x: str, y: float, text: str, css: str, anchor: str, dx: int = 0, dy: int = 0) -> None:
+        self._fixed.append(
+            f'<text class="{css}" x="{x}" y="{_f(y)}" dx="{dx}" dy="{dy}" text-anchor="{anchor}">'
+            f"{escape(text)}</text>"
+        )
+
+
+def _day(day: dt.date) -> str:
+    return f"{day.day} {MONTHS[day.month - 1]}"
+
+
+def _pct(x: float) -> str:
+    return f"{_f(x / 10)}%"
+
+
+def _f(value: float) -> str:
+    return f"{value:.1f}".removesuffix(".0")

@@ -1,0 +1,226 @@
+"""Figures over the visits of a person: what changed since the first assessment, and by how much it must.
+
+The first assessment is the base: its measurement error is the band that a later value must leave to be a real
+change (spec/clinic.md §2, §7). Trainings are shown and not judged on: an assessment is.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from core.change import Change, detectable, parameter_changes, relevant
+from core.change.limits import Limb
+from core.frames import SIDES, Side
+from core.norms import Norms, NormValue
+from core.parameters.result import Parameter
+from server.report.change_words import SCORE_TERMS, term_of
+from server.report.numbers import Numbers
+from server.report.wording import TERMS, Term
+
+VisitKind = Literal["assessment", "training"]
+
+PRIMARY: Final = (
+    "gait_speed_mps",
+    "cadence_spm",
+    "step_length_m",
+    "knee_flexion_rom_deg",
+    "stance_pct",
+    "gps_sagittal_deg",
+)
+"""Figures shown when the reader has chosen none."""
+
+SCORE_MODE: Final = "offset_removed"
+"""Shape without level: angles start from the standing of that day."""
+
+
+@dataclass(frozen=True, eq=False)
+class Visit:
+    """An analysed session.
+
+    Parameters
+    ----------
+    label : of the planned visit, "PRE" or "T4"; None outside a programme.
+    kind : an unplanned session counts as an assessment. numbers : what was measured.
+    """
+
+    session_id: str
+    performed_on: dt.date
+    title: str
+    label: str | None
+    kind: VisitKind
+    protocol: str
+    numbers: Numbers
+
+
+@dataclass(frozen=True)
+class Point:
+    """A value at a visit; `change` = against the base, None for the base itself."""
+
+    visit: int
+    value: float
+    sd: float | None
+    n: int
+    ci_low: float | None
+    ci_high: float | None
+    change: Change | None
+
+
+@dataclass(frozen=True)
+class Line:
+    """One side of a figure, or the whole take.
+
+    Parameters
+    ----------
+    points : visits with a value, oldest first. base : index of the first assessment among them.
+    latest : index of the last assessment after it, else None: nothing to judge yet.
+    mdc, mcid : around the base; None without a source.
+    """
+
+    side: Side | None
+    points: tuple[Point, ...]
+    base: int
+    latest: int | None
+    mdc: float | None
+    mcid: float | None
+
+    @property
+    def change(self) -> Change | None:
+        """From the first to the last assessment."""
+        return None if self.latest is None else self.points[self.latest].change
+
+
+@dataclass(frozen=True, eq=False)
+class Trend:
+    """A figure over the visits; `norm` = of people like this one, None where nobody compares."""
+
+    name: str
+    term: Term
+    lines: tuple[Line, ...]
+    norm: NormValue | None
+
+
+def names_in(visits: Sequence[Visit]) -> tuple[str, ...]:
+    """Figures with a value in any visit, in the order of the table."""
+    found = {p.name for visit in visits for p in _figures(visit.numbers) if p.mean is not None}
+    known = (*TERMS, *SCORE_TERMS)
+    return (*(n for n in known if n in found), *sorted(found.difference(known)))
+
+
+def trends(
+    visits: Sequence[Visit],
+    names: Sequence[str],
+    norms: Norms | None = None,
+    usual: Mapping[str, NormValue] | None = None,
+    affected: Side | None = None,
+) -> tuple[Trend, ...]:
+    """Follow figures over visits of one protocol, oldest first; those without a value are left out.
+
+    Parameters
+    ----------
+    norms : of this person at the speed of the last visit. usual : of people of this age and sex at their own
+        comfortable speed; the reference of speed itself, which cannot be matched by speed.
+    affected : side, None = none or both.
+    """
+    tables = [{(p.name, p.side): p for p in _figures(visit.numbers)} for visit in visits]
+    found = []
+    for name in names:
+        norm = _norm(name, visits, norms, usual or {})
+        lines = [_line(name, side, visits, tables, norm, affected) for side in (None, *SIDES)]
+        kept = tuple(line for line in lines if line is not None)
+        if kept:
+            found.append(Trend(name, term_of(name, _unit(name, tables)), kept, norm))
+    return tuple(found)
+
+
+def _figures(numbers: Numbers) -> tuple[Parameter, ...]:
+    """Parameters, and the scores of the two legs as if they were."""
+    made = [
+        Parameter(s.name, s.side, s.n, s.value, None, s.unit, s.reason)
+        for s in numbers.scores
+        if s.name in SCORE_TERMS and s.mode == SCORE_MODE and s.side is not None
+    ]
+    return (*numbers.parameters, *made)
+
+
+Table = Mapping[tuple[str, Side | None], Parameter]
+
+
+def _unit(name: str, tables: Sequence[Table]) -> str:
+    return next(p.unit for table in tables for p in table.values() if p.name == name)
+
+
+def _norm(
+    name: str, visits: Sequence[Visit], norms: Norms | None, usual: Mapping[str, NormValue]
+) -> NormValue | None:
+    if name in SCORE_TERMS:
+        return _score_norm(name, visits)
+    values = usual if name == "gait_speed_mps" else {} if norms is None else norms.values
+    norm = values.get(name)
+    return norm if norm is not None and norm.comparable else None
+
+
+def _score_norm(name: str, visits: Sequence[Visit]) -> NormValue | None:
+    spread = next(
+        (
+            s.healthy
+            for visit in visits
+            for s in visit.numbers.scores
+            if (s.name, s.mode) == ("gps_sagittal_deg", SCORE_MODE) and s.side is not None and s.healthy
+        ),
+        None,
+    )
+    if spread is None:
+        return None
+    # GDI* is 100 ± 10 among the reference people by its definition
+    mean, sd = (spread.mean_deg, spread.sd_deg) if name == "gps_sagittal_deg" else (100.0, 10.0)
+    return NormValue(name, mean, sd, None, "healthy adults", "Fukuchi et al. 2018, leave one out")
+
+
+def _line(
+    name: str,
+    side: Side | None,
+    visits: Sequence[Visit],
+    tables: Sequence[Table],
+    norm: NormValue | None,
+    affected: Side | None,
+) -> Line | None:
+    measured = [
+        (i, p, p.mean)
+        for i, table in enumerate(tables)
+        if (p := table.get((name, side))) is not None and p.mean is not None
+    ]
+    if not measured:
+        return None
+    assessed = [k for k, (i, _, _) in enumerate(measured) if visits[i].kind == "assessment"]
+    base = assessed[0] if assessed else 0
+    first = measured[base][1]
+    known = None if norm is None else {name: norm}
+    points = [
+        Point(
+            i, value, p.sd, p.n, p.ci_low, p.ci_high,
+            None if k == base else parameter_changes([first], [p], affected, known)[0],
+        )
+        for k, (i, p, value) in enumerate(measured)
+    ]  # fmt: skip
+    later = [k for k in assessed if k > base]
+    latest = later[-1] if later else None
+    mdc, mcid = _limits(first, points, latest, affected)
+    return Line(side, tuple(points), base, latest, mdc, mcid)
+
+
+def _limits(
+    first: Parameter, points: Sequence[Point], latest: int | None, affected: Side | None
+) -> tuple[float | None, float | None]:
+    """What the last assessment is judged by; before there is one, what it will be."""
+    change = None if latest is None else points[latest].change
+    if change is not None:
+        return change.limit, change.mcid
+    limb: Limb | None = None
+    if affected is not None and first.side is not None:
+        limb = "affected" if first.side == affected else "unaffected"
+    mdc = None if first.mean is None else detectable(first.name, first.mean, limb)
+    mcid = relevant(first.name, limb)
+    return None if mdc is None else mdc.value, None if mcid is None else mcid.value

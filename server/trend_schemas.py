@@ -1,0 +1,80 @@
+"""What goes over the wire about visits compared with each other."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Any, Literal
+
+from server.schemas import Response
+
+
+class TrendVisit(Response):
+    """An analysed visit; `label` of the programme's plan, null outside one."""
+
+    session_id: str
+    performed_on: dt.date
+    title: str
+    label: str | None
+    kind: Literal["assessment", "training"]
+
+
+class Change(Response):
+    """One figure in two sessions; beyond `limit` (MDC) the change is real, beyond `mcid` relevant too."""
+
+    name: str
+    side: str | None
+    unit: str
+    before: float | None
+    after: float | None
+    difference: float | None
+    verdict: Literal["within_measurement_error", "real_change", "clinically_relevant"] | None
+    limit: float | None
+    limit_source: str | None
+    people: str | None
+    mcid: float | None
+    mcid_source: str | None
+    towards_norm: bool | None
+    reason: str | None
+    note: str | None
+
+
+class TrendPoint(Response):
+    """A value at a visit (index into `visits`); `change` is against the first assessment."""
+
+    visit: int
+    value: float
+    sd: float | None
+    n: int
+    ci_low: float | None
+    ci_high: float | None
+    change: Change | None
+
+
+class TrendLine(Response):
+    """One side; `base` and `latest` are indices of the first and the last assessment among the points."""
+
+    side: str | None
+    mdc: float | None
+    mcid: float | None
+    points: list[TrendPoint]
+    base: int
+    latest: int | None
+    words: str | None
+
+
+class Trend(Response):
+    """A figure over the visits, with the norm of people like this one."""
+
+    name: str
+    title: str
+    unit: str
+    norm: dict[str, Any] | None
+    lines: list[TrendLine]
+
+
+class Trends(Response):
+    """Figures over the visits of one protocol."""
+
+    protocol: str | None
+    visits: list[TrendVisit]
+    trends: list[Trend]
