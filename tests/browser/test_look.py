@@ -29,6 +29,7 @@ PAGES: dict[str, Address] = {
     "session": lambda f: f"/sessions/{f.done}",
     "session-empty": lambda f: f"/sessions/{f.empty}",
     "session-failed": lambda f: f"/sessions/{f.unusable}",
+    "timeline": lambda f: f"/sessions/{f.done}/timeline",
     "kinematics": lambda f: f"/sessions/{f.done}/kinematics",
     "data": lambda f: f"/sessions/{f.done}/data",
     "print": lambda f: f"/sessions/{f.done}/print",
@@ -113,19 +114,19 @@ def test_screenshots_of_every_page(
         if name in FIGURE:
             _wait_for_figure(page)
         page.screenshot(path=folder / f"{name}.png")
-        if name in {"session", "found", "kinematics"}:
+        if name in {"session", "found", "timeline", "kinematics"}:
             page.set_viewport_size({"width": TABLET[0], "height": TABLET[1]})
             page.wait_for_timeout(300)
             page.screenshot(path=folder / f"{name}-tablet.png")
         page.close()
-        if name in {"session", "kinematics", "patients"}:
+        if name in {"session", "timeline", "kinematics", "patients"}:
             page = opened(address(filled), scheme="dark", **browser)
             if name in FIGURE:
                 _wait_for_figure(page)
             page.screenshot(path=folder / f"{name}-dark.png")
             page.close()
     sizes = [p.stat().st_size for p in folder.glob("*.png")]
-    assert len(sizes) == len(PAGES) + 6
+    assert len(sizes) == len(PAGES) + 8
     assert sum(sizes) < 6_000_000
 
 

@@ -90,10 +90,22 @@ class TakeTimeline extends HTMLElement {
     grid.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     new ResizeObserver(() => this.moved()).observe(grid);
     document.addEventListener("keydown", (e) => this.key(e));
+    this.find("figure").addEventListener("click", () => this.showFigure());
+    if (remembered()) this.showFigure();
     document.querySelector("[data-leave-out]")?.addEventListener("submit", (e) => this.leaveOut(e));
     document.querySelector("[data-add-event]")?.addEventListener("submit", (e) => this.add(e));
     const [why, words] = [document.getElementById("why"), document.getElementById("words")];
     words?.addEventListener("input", () => words.value && (why.value = ""));
+  }
+
+  // The figure draws in this page's own thread, so it comes when asked for, and from then on each time.
+  showFigure() {
+    this.find("no-figure").replaceWith(document.getElementById("figure").content.cloneNode(true));
+    try {
+      localStorage.timelineFigure = "1";
+    } catch {
+      // it is asked for again next time
+    }
   }
 
   // ---- time
@@ -252,8 +264,8 @@ class TakeTimeline extends HTMLElement {
     };
     this.find("stride-box").replaceChildren(...strideBox(stride, acts));
     document.getElementById("h-stride").textContent = stride ? `${stride.side === "left" ? "Left" : "Right"} stride, ${seconds(stride.start_s)} s` : "Stride";
-    this.find("state").textContent = "";
-    if (stride) this.find("state").append(h("span", { class: `badge plain${stride.used ? " ok" : ""}` }, stride.used ? "counts" : "left out"));
+    this.find("verdict").textContent = "";
+    if (stride) this.find("verdict").append(h("span", { class: `badge plain${stride.used ? " ok" : ""}` }, stride.used ? "counts" : "left out"));
     this.list();
   }
 
@@ -342,7 +354,7 @@ class TakeTimeline extends HTMLElement {
 
   async done(act, said) {
     const began = performance.now();
-    if (!(await this.attempt(act))) return;
+    if (!(await this.attempt(act))) return this.panel(); // fields show again what holds
     await this.attempt(() => this.numbers());
     this.dataset.took = Math.round(performance.now() - began);
     const used = this.review.strides.filter((s) => s.used).length;
@@ -366,6 +378,14 @@ class TakeTimeline extends HTMLElement {
       showProblem(this.find("problem"), problem);
       return false;
     }
+  }
+}
+
+function remembered() {
+  try {
+    return localStorage.timelineFigure === "1";
+  } catch {
+    return false;
   }
 }
 

@@ -1,0 +1,281 @@
+"""The timeline: events are dragged, nudged, added and deleted, strides left out; every number follows."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+from uuid import uuid4
+
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from tests.browser import filling
+from tests.browser.conftest import Opener, RunningServer
+
+
+@pytest.fixture(scope="module")
+def walked(running: RunningServer) -> str:
+    """A session of these tests alone, analysed."""
+    files, sensors = filling.simulated_files()
+    with running.client() as client:
+        patient = filling.add(client, "/patients", code=f"P-{uuid4().hex[:6]}", height_m=1.76)["id"]
+        session = filling.add_session(client, patient, "Walk")
+        filling.upload(client, session, files)
+        assert filling.analyse(client, session, sensors)["state"] == "done"
+    return session
+
+
+@pytest.fixture
+def timeline(opened: Opener, running: RunningServer, walked: str) -> Iterator[Page]:
+    """The page; what a test changed is undone after it."""
+    page = opened(f"/sessions/{walked}/timeline")
+    expect(page.locator("[data-counts=left]")).to_have_text(re.compile(r"\d+ of \d+"))
+    page.locator(".ev").first.wait_for()
+    yield page
+    with running.client() as client:
+        while client.delete(f"/api/v1/sessions/{walked}/edits").is_success:
+            pass
+
+
+def review(running: RunningServer, session: str) -> dict[str, Any]:
+    with running.client() as client:
+        found: dict[str, Any] = client.get(f"/api/v1/sessions/{session}/edits").json()
+    return found
+
+
+def handle(page: Page, kind: str, n: int = 2, side: str = "left") -> Locator:
+    return page.locator(f"[data-side={side}] .ev.{kind}").nth(n)
+
+
+def drag(page: Page, what: Locator, by_px: float) -> None:
+    box = what.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + by_px, y, steps=5)
+    page.mouse.up()
+
+
+def done(page: Page, words: str) -> None:
+    """The change has been answered and what depends on it drawn again."""
+    expect(page.locator("[data-said]")).to_contain_text(words)
+
+
+def numbers(page: Page) -> str:
+    return page.locator("#numbers").inner_text()
+
+
+def pick_counted(page: Page) -> Locator:
+    """A counted left stride in view, picked by a click."""
+    mark = page.locator("[data-side=left] g[data-stride]:not(:has(.x))").nth(1)
+    mark.click()
+    expect(page.locator("[data-verdict]")).to_have_text("counts")
+    return mark
+
+
+def test_a_dragged_foot_off_changes_the_numbers_within_a_second_and_undo_brings_them_back(
+    timeline: Page, running: RunningServer, walked: str
+) -> None:
+    before = numbers(timeline)
+    event = handle(timeline, "tc")
+    was = float(event.get_attribute("aria-valuenow") or 0)
+    drag(timeline, event, 20)
+    done(timeline, "left foot-off moved")
+    (edit,) = review(running, walked)["edits"]
+    assert (edit["kind"], edit["side"], edit["event"]) == ("move_event", "left", "tc")
+    assert edit["time_s"] == pytest.approx(was, abs=0.001)
+    assert 0.05 < edit["to_s"] - was < 0.4
+    after = numbers(timeline)
+    assert after != before
+    assert int(timeline.locator("take-timeline").get_attribute("data-took") or 10_000) < 1000
+    expect(timeline.locator("[data-edits]")).to_contain_text("foot-off moved from")
+    timeline.locator("[data-undo]").click()
+    done(timeline, "undone")
+    assert numbers(timeline) == before
+    expect(timeline.locator("[data-undo]")).to_be_disabled()
+
+
+def test_an_event_stops_at_its_neighbour_of_the_same_foot(
+    timeline: Page, running: RunningServer, walked: str
+) -> None:
+    contact = handle(timeline, "ic")
+    drag(timeline, contact, 700)
+    done(timeline, "left contact moved")
+    found = review(running, walked)
+    moved = found["edits"][0]["to_s"]
+    following = min(e["time_s"] for e in found["events"] if e["side"] == "left" and e["time_s"] > moved)
+    assert following - moved == pytest.approx(0.051, abs=0.002)
+
+
+def test_arrow_keys_nudge_by_a_sample_and_several_presses_are_one_change(
+    timeline: Page, running: RunningServer, walked: str
+) -> None:
+    event = handle(timeline, "ic")
+    event.focus()
+    was = float(event.get_attribute("aria-valuenow") or 0)
+    for _ in range(3):
+        timeline.keyboard.press("ArrowRight")
+    assert float(event.get_attribute("aria-valuenow") or 0) == pytest.approx(was + 0.03, abs=1e-6)
+    done(timeline, "left contact moved")
+    (edit,) = review(running, walked)["edits"]
+    assert edit["to_s"] == pytest.approx(was + 0.03, abs=0.002)
+    # the focus is still on the event that was moved
+    label = timeline.evaluate("document.activeElement.ariaValueText")
+    assert label.endswith("placed by hand")
+    timeline.keyboard.press("ArrowLeft")
+    timeline.keyboard.press("Escape")
+    timeline.wait_for_timeout(1200)
+    assert len(review(running, walked)["edits"]) == 1
+
+
+def test_keys_alone_delete_an_event_and_bring_it_back(
+    timeline: Page, running: RunningServer, walked: str
+) -> None:
+    count = len(review(running, walked)["events"])
+    handle(timeline, "ic").focus()
+    timeline.keyboard.press("ArrowDown")
+    assert "tc" in timeline.evaluate("document.activeElement.className")
+    timeline.keyboard.press("Delete")
+    done(timeline, "left foot-off deleted")
+    assert len(review(running, walked)["events"]) == count - 1
+    timeline.keyboard.press("Control+z")
+    done(timeline, "undone")
+    assert len(review(running, walked)["events"]) == count
+
+
+def test_an_event_is_added_where_the_cursor_is(timeline: Page, running: RunningServer, walked: str) -> None:
+    event = handle(timeline, "tc")
+    event.focus()
+    at = event.get_attribute("aria-valuenow")
+    timeline.keyboard.press("Delete")
+    done(timeline, "deleted")
+    timeline.keyboard.press("a")
+    dialog = timeline.locator("dialog[open]")
+    expect(dialog.locator("#add-side")).to_have_value("left")
+    expect(dialog.locator("#add-kind")).to_have_value("tc")
+    expect(dialog.locator("#add-time")).to_have_value(at or "")
+    dialog.get_by_role("button", name="Add").click()
+    done(timeline, "foot-off added")
+    added = [e for e in review(running, walked)["events"] if e["source"] == "manual"]
+    assert [(e["side"], e["kind"]) for e in added] == [("left", "tc")]
+    expect(timeline.locator("[data-side=left] .ev.manual")).to_have_count(1)
+
+
+def test_a_second_click_leaves_a_stride_out_with_its_reason_and_the_overview_follows(
+    timeline: Page, opened: Opener, running: RunningServer, walked: str
+) -> None:
+    words = timeline.locator("[data-counts=left]").inner_text()
+    mark = pick_counted(timeline)
+    mark.click()
+    dialog = timeline.locator("dialog[open]")
+    dialog.locator("#words").fill("looked at the dog")
+    dialog.get_by_role("button", name="Leave it out").click()
+    done(timeline, "left out")
+    used = int(words.split()[0])
+    expect(timeline.locator("[data-counts=left]")).to_have_text(words.replace(str(used), str(used - 1), 1))
+    expect(timeline.locator("[data-verdict]")).to_have_text("left out")
+    expect(timeline.locator("[data-list] tr.on")).to_contain_text("no: looked at the dog")
+    overview = opened(f"/sessions/{walked}")
+    expect(overview.locator("[data-words]").first).to_be_visible()
+    assert "1 stride left out" in overview.locator("#warnings").inner_text()
+    timeline.locator("[data-count]").click()
+    done(timeline, "counts")
+    expect(timeline.locator("[data-counts=left]")).to_have_text(words)
+    assert [e["kind"] for e in review(running, walked)["edits"]] == ["exclude_stride", "include_stride"]
+
+
+def test_the_fields_of_a_stride_move_its_events_and_refuse_what_cannot_be(
+    timeline: Page, running: RunningServer, walked: str
+) -> None:
+    pick_counted(timeline)
+    field = timeline.get_by_label("Foot-off", exact=True)
+    was = field.input_value()
+    field.fill("0.5")
+    field.press("Enter")
+    problem = timeline.locator("[data-problem]")
+    expect(problem).to_contain_text("cannot pass another event")
+    expect(field).to_have_value(was)
+    assert review(running, walked)["version"] >= 0
+    field.fill(f"{float(was) + 0.02:.3f}")
+    field.press("Enter")
+    done(timeline, "left foot-off moved")
+    expect(problem).to_be_hidden()
+
+
+def test_zooming_and_moving_keep_all_lanes_and_the_table_together(timeline: Page) -> None:
+    span = timeline.locator("[data-span]")
+    first = span.inner_text()
+    timeline.keyboard.press("0")
+    expect(span).to_have_text(re.compile(r"^0\.0 to (\d+\.\d) s of \1 s$"))
+    expect(timeline.locator(".ev")).to_have_count(0)  # too close together to be told apart
+    views = timeline.evaluate("[...document.querySelectorAll('.tl-lines')].map(e => e.viewBox.baseVal.width)")
+    assert len(set(views)) == 1
+    total = timeline.locator("[data-listed]")
+    expect(total).to_contain_text("zoom in for the others")
+    for _ in range(4):
+        timeline.locator("[data-zoom='0.5']").click()
+    assert timeline.locator(".ev").count() > 4
+    timeline.wait_for_function("document.querySelectorAll('[data-list] tr').length < 16")
+    timeline.keyboard.press(".")
+    assert span.inner_text() != first
+
+
+def test_the_value_beside_a_lane_is_the_signals_own(
+    timeline: Page, running: RunningServer, walked: str
+) -> None:
+    timeline.locator("#lane-0").select_option("knee_flexion")
+    handle(timeline, "ic").focus()
+    at = float(timeline.evaluate("document.activeElement.ariaValueNow"))
+    with running.client() as client:
+        query = {"start_s": max(at - 0.005, 0), "end_s": at + 0.005, "points": 10}
+        piece = client.get(f"/api/v1/sessions/{walked}/signals/knee_flexion", params=query).json()
+    near = [v for v in piece["low"]["left"] if v is not None]
+    timeline.wait_for_timeout(600)
+    text = timeline.locator("[data-values]").first.inner_text().replace("−", "-")
+    found = re.search(r"L (-?[\d.]+)", text)
+    assert found is not None
+    assert min(near) - 0.6 <= float(found[1]) <= max(near) + 0.6
+
+
+def test_a_raw_signal_shows_its_three_axes(timeline: Page) -> None:
+    timeline.locator("#lane-1").select_option("shank_l_acc")
+    expect(timeline.locator("[data-lane='1'] path")).to_have_count(3)
+    expect(timeline.locator("[data-values]").nth(1)).to_contain_text(re.compile(r"x .*y .*z "))
+
+
+def test_the_figure_comes_when_asked_for_and_stands_where_the_event_is(
+    opened: Opener, solid: Browser, walked: str
+) -> None:
+    page = opened(f"/sessions/{walked}/timeline#t=20", browser=solid)
+    expect(page.locator("gait-view")).to_have_count(0)
+    page.get_by_role("button", name="Show the figure").click()
+    page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
+    page.locator("[data-side=left] .ev.ic").first.focus()
+    at = float(page.evaluate("document.activeElement.ariaValueNow"))
+    page.wait_for_function(
+        "t => Math.abs(document.querySelector('gait-view').dataset.shown - t) < 0.02", arg=at, timeout=30_000
+    )
+
+
+def test_a_link_opens_a_moment(opened: Opener, walked: str) -> None:
+    page = opened(f"/sessions/{walked}/timeline#t=30.5")
+    page.locator(".ev").first.wait_for()
+    start, end = re.findall(r"\d+\.\d", page.locator("[data-span]").inner_text())[:2]
+    assert float(start) < 30.5 < float(end)
+    assert float(page.locator("time-bar input").input_value()) == pytest.approx(30.5, abs=0.02)
+
+
+def test_what_somebody_else_changed_meanwhile_is_said_and_shown(
+    timeline: Page, running: RunningServer, walked: str
+) -> None:
+    stride = next(s for s in review(running, walked)["strides"] if s["excluded_by"] is None)
+    body = {"kind": "exclude_stride", "side": stride["side"], "reason": "by a colleague"}
+    with running.client() as client:
+        moment = (stride["start_s"] + stride["end_s"]) / 2
+        client.post(f"/api/v1/sessions/{walked}/edits", json={**body, "time_s": moment}).raise_for_status()
+    drag(timeline, handle(timeline, "tc"), 12)
+    expect(timeline.locator("[data-problem]")).to_contain_text("Somebody else has changed")
+    expect(timeline.locator("[data-edits]")).to_contain_text("by a colleague")
+    assert len(review(running, walked)["edits"]) == 1
