@@ -11,9 +11,9 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Final, Literal, get_args
 
-from core import angles, body, calibration, events, fusion, quality, timeline
+from core import angles, body, calibration, fusion, quality, timeline
 from core.angles import JointAngles
 from core.body.estimate import PoseEstimate, PoseParams, estimate_poses
 from core.body.feet import FootTracks
@@ -22,8 +22,9 @@ from core.body.poses import Poses
 from core.body.walking_frame import in_walking_frame
 from core.calibration import CalibrationParams
 from core.calibration.result import CalibratedRecording, Calibration
-from core.errors import Notice, SagittalError
+from core.errors import Notice, ParameterError, SagittalError
 from core.events import FootPitchParams, StrideParams
+from core.events.consensus import ConsensusParams, all_detectors, consensus, with_confidence
 from core.events.lumbar import LumbarParams, about_up, detect_steps, trunk_sensor
 from core.events.result import GaitEvents, Strides
 from core.events.turns import TurnParams, body_yaw_rate, turns
@@ -60,18 +61,41 @@ TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 """Segments whose acceleration tells how regular the gait is."""
 
 
+Detector = Literal["foot_pitch", "consensus"]
+"""Whose contacts count: the foot-pitch rule's own, or what most detectors agree on."""
+
+
 @dataclass(frozen=True)
 class PipelineConfig:
-    """Parameters of every stage; its hash is part of each result's provenance."""
+    """Parameters of every stage; its hash is part of each result's provenance.
+
+    Parameters
+    ----------
+    detector : the foot-pitch rule has the smallest error and refuses feet that hardly pitch; the consensus
+        finds those by the shanks (tests/accuracy/test_events_consensus.py).
+
+    Raises
+    ------
+    ParameterError : `unknown_detector`.
+    """
 
     timeline: TimelineParams = field(default_factory=TimelineParams)
     calibration: CalibrationParams = field(default_factory=CalibrationParams)
     fusion: MahonyParams = field(default_factory=MahonyParams)
     events: FootPitchParams = field(default_factory=FootPitchParams)
+    detector: Detector = "foot_pitch"
+    consensus: ConsensusParams = field(default_factory=ConsensusParams)
     lumbar: LumbarParams = field(default_factory=LumbarParams)
     turns: TurnParams = field(default_factory=TurnParams)
     strides: StrideParams = field(default_factory=StrideParams)
     poses: PoseParams = field(default_factory=PoseParams)
+
+    def __post_init__(self) -> None:
+        if self.detector not in get_args(Detector):
+            raise ParameterError(
+                "unknown_detector",
+                f"Detector '{self.detector}' is not one of {', '.join(get_args(Detector))}.",
+            )
 
     @property
     def digest(self) -> str:
@@ -187,7 +211,7 @@ def _run_stages(
     orientations = fusion.estimate(calibrated, config.fusion)
     reached["orientations"] = orientations
     start("events")
-    found = events.detect(orientations, config.events)
+    found = _contacts(orientations, config)
     feet = [s for s in FOOT.values() if s in orientations.q]
     tracks = Tracks(
         t_s=uniform.t_s,
@@ -219,6 +243,13 @@ def _run_stages(
         posed.orientations, calibrated.calibration.zero, posed.poses, uniform.subject.standing_angles_deg
     )
     reached |= {"angles": joint, "tracks": _whole(tracks, calibrated, posed, joint)}
+
+
+def _contacts(orientations: Orientations, config: PipelineConfig) -> GaitEvents:
+    """Contacts of the chosen detector, each with the share of all detectors that saw it."""
+    found = all_detectors(orientations, config.events, config.consensus)
+    agreed = consensus if config.detector == "consensus" else with_confidence
+    return agreed(found, config.consensus)
 
 
 def _of_trunk(uniform: UniformRecording, config: PipelineConfig) -> Tracks:

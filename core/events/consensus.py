@@ -8,8 +8,10 @@ a foot has no vote on it. All of this is our choice; tests/accuracy/test_events_
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
@@ -21,7 +23,8 @@ from core.events.result import EventKind, GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES, Side
 from core.fusion.orientations import Orientations
 
-SOURCE = "consensus"
+SOURCE: Final = "consensus"
+KINDS: Final[tuple[EventKind, EventKind]] = ("ic", "tc")
 
 
 @dataclass(frozen=True)
@@ -52,18 +55,12 @@ class _Vote:
 
 def all_detectors(
     orientations: Orientations,
-    lead: GaitEvents | None = None,
     foot_pitch: FootPitchParams | None = None,
     params: ConsensusParams | None = None,
 ) -> dict[str, GaitEvents]:
-    """What every detector finds whose sensors are worn, the leading foot-pitch rule first.
-
-    Parameters
-    ----------
-    lead : the foot-pitch events, if they are known already.
-    """
+    """What every detector finds whose sensors are worn, the leading foot-pitch rule first."""
     params = params or ConsensusParams()
-    found = {"foot_pitch": lead or detect(orientations, foot_pitch)}
+    found = {"foot_pitch": detect(orientations, foot_pitch)}
     for name in params.presets:
         preset = PRESETS[name]
         if any(LIMB[preset.segment][side] in orientations.q for side in SIDES):
@@ -77,21 +74,29 @@ def with_confidence(found: Mapping[str, GaitEvents], params: ConsensusParams | N
     Parameters
     ----------
     found : detector → its events; the first leads. A foot on which no other detector voted keeps None.
+
+    Returns
+    -------
+    the lead's events and notices; `others_found_contacts` where the lead abstained and two others did not.
     """
     params = params or ConsensusParams()
     lead = next(iter(found.values()))
-    shares: dict[GaitEvent, float] = {}
+    notices = list(lead.notices)
+    name = next(iter(found))
+    shares: dict[tuple[Side, EventKind, float], float] = {}
     for side in SIDES:
         voters = _voters(found, side)
-        if len(voters) < 2 or not lead.times(side, "ic"):
+        if name not in voters and len(voters) >= 2:
+            notices.append(_others(side, voters))
+        if name not in voters or len(voters) < 2:
             continue
-        for kind in ("ic", "tc"):
+        for kind in KINDS:
             for votes in _clusters(voters, side, kind, params):
-                own = next((v for v in votes if v.detector == next(iter(found))), None)
-                for e in lead.events if own is not None else ():
-                    if (e.side, e.kind) == (side, kind) and own is not None and e.time_s == own.time_s:
-                        shares[e] = len(votes) / len(voters)
-    return replace(lead, events=tuple(replace(e, confidence=shares.get(e)) for e in lead.events))
+                # a cluster begins with the lead's contact where it has one
+                if votes[0].detector == name:
+                    shares[side, kind, votes[0].time_s] = len(votes) / len(voters)
+    events = tuple(replace(e, confidence=shares.get((e.side, e.kind, e.time_s))) for e in lead.events)
+    return replace(lead, events=events, notices=tuple(notices))
 
 
 def consensus(found: Mapping[str, GaitEvents], params: ConsensusParams | None = None) -> GaitEvents:
@@ -119,10 +124,10 @@ def consensus(found: Mapping[str, GaitEvents], params: ConsensusParams | None = 
         if leads != lead:
             notices.append(_led_by_other(side, leads, voters))
         dropped = 0
-        for kind in ("ic", "tc"):
+        for kind in KINDS:
             for votes in _clusters(voters, side, kind, params):
                 share = len(votes) / len(voters)
-                own = next((v for v in votes if v.detector == leads), None)
+                own = votes[0] if votes[0].detector == leads else None
                 if share < params.least or (own is None and share <= params.least):
                     dropped += 1
                     continue
@@ -145,24 +150,24 @@ def _clusters(
 ) -> list[list[_Vote]]:
     """Contacts that are one, at most one vote of each detector, in order of time."""
     lead, *others = voters
+    reference = voters[lead].times(side, kind)
     clusters = [[v] for v in _votes(lead, voters[lead], side, kind)]
     for name in others:
-        moved = _moved(_votes(name, voters[name], side, kind), voters[lead].times(side, kind), params)
-        free = []
+        times = [c[0].time_s for c in clusters]
         taken: set[int] = set()
-        for vote in moved:
-            near = [
-                (abs(c[0].time_s - vote.time_s), i)
-                for i, c in enumerate(clusters)
-                if i not in taken and abs(c[0].time_s - vote.time_s) <= params.window_s
-            ]
+        free = []
+        for vote in _moved(_votes(name, voters[name], side, kind), reference, params):
+            first = bisect_left(times, vote.time_s - params.window_s)
+            end = bisect_right(times, vote.time_s + params.window_s)
+            near = [(abs(times[i] - vote.time_s), i) for i in range(first, end) if i not in taken]
             if near:
-                taken.add(min(near)[1])
-                clusters[min(near)[1]].append(vote)
+                at = min(near)[1]
+                taken.add(at)
+                clusters[at].append(vote)
             else:
                 free.append([vote])
-        clusters += free
-    return sorted(clusters, key=lambda c: c[0].time_s)
+        clusters = sorted(clusters + free, key=lambda c: c[0].time_s)
+    return clusters
 
 
 def _votes(name: str, events: GaitEvents, side: Side, kind: EventKind) -> list[_Vote]:
@@ -180,6 +185,17 @@ def _moved(votes: list[_Vote], lead: Sequence[float], params: ConsensusParams) -
     if len(off) < params.pairs:
         return votes
     return [replace(v, time_s=v.time_s - float(np.median(off))) for v in votes]
+
+
+def _others(side: Side, voters: Mapping[str, GaitEvents]) -> Notice:
+    counts = ", ".join(f"{name} {len(e.times(side, 'ic'))}" for name, e in voters.items())
+    return Notice(
+        "others_found_contacts",
+        f"Other detectors found contacts of the {side} foot ({counts}). The analysis can be run with the"
+        " consensus of all detectors instead; compare its contacts with the signals.",
+        FOOT[side],
+        severity="info",
+    )
 
 
 def _led_by_other(side: Side, leads: str, voters: Mapping[str, GaitEvents]) -> Notice:

@@ -96,8 +96,14 @@ def test_with_feet_alone_the_shuffle_stays_refused() -> None:
 def test_the_foot_pitch_events_keep_their_times_with_confidence() -> None:
     take = fusion.estimate(calibration.calibrate(simulated("comfortable")[0]))
     lead = detect(take)
-    told = with_confidence(all_detectors(take, lead))
+    told = with_confidence(all_detectors(take))
     assert [(e.time_s, e.kind, e.side) for e in told.events] == [
         (e.time_s, e.kind, e.side) for e in lead.events
     ]
     assert {e.confidence for e in told.events} == {1.0}
+
+
+def test_where_the_foot_pitch_rule_abstains_the_others_are_pointed_to() -> None:
+    told = with_confidence(detectors("severe_shuffle"))
+    assert told.events == ()
+    assert [n.code for n in told.notices] == ["no_toe_off"] * 2 + ["others_found_contacts"] * 2
