@@ -18,21 +18,12 @@ from server.auth.passwords import MIN_LENGTH
 from server.auth.roles import Action, Role
 from server.problems import TEMPLATES
 from server.services import analyses, patients, recordings, reviews, sessions, signals
-from server.services.provenance import CODE_VERSION
+from server.shell import opened as _opened
+from server.shell import page as _page
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
-from web.words import FILTERS
 
-TEMPLATES.env.filters.update(FILTERS)
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
-
-NAVIGATION = (
-    ("patients", "people", "Patients", "/patients", Action.READ_PATIENT),
-    ("jobs", "jobs", "Jobs", "/jobs", Action.READ_JOB),
-    ("users", "users", "Users", "/users", Action.MANAGE_USERS),
-    ("audit", "audit", "Audit", "/audit", Action.READ_AUDIT),
-)
-"""Rail entries: page, icon, word, address, and what one must be allowed to do to see it."""
 
 PATIENTS_SHOWN = 200
 AUDIT_ROWS = 100
@@ -247,23 +238,3 @@ def _session_page(
         context["report"] = session_views.report(blobs, latest, edits, context, paper=paper)
     _opened(db, who, "session", sid)
     return _page(request, db, who, template, "patients", **context)
-
-
-def _opened(db: Database, who: Identity, resource: str, resource_id: str) -> None:
-    with db.write() as c:
-        audit.record(c, who, f"{resource}.opened", resource, resource_id)
-
-
-def _page(
-    request: Request, db: Database, who: Identity, template: str, here: str, **context: object
-) -> Response:
-    with db.read() as c:
-        running = page_views.running_jobs(c)
-    shell = {
-        "nav": NAVIGATION,
-        "here": here,
-        "running": running,
-        "version": CODE_VERSION,
-        "may": lambda action: who.may(Action(action)),
-    }
-    return TEMPLATES.TemplateResponse(request, template, shell | context)

@@ -45,6 +45,7 @@ def test_analysis_json_is_strict_json_of_schema_1(files: Mapping[str, bytes]) ->
         "calibration",
         "estimator",
         "parameters",
+        "scores",
         "walking",
         "warnings",
         "provenance",

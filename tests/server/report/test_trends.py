@@ -6,7 +6,7 @@ import datetime as dt
 import re
 
 import pytest
-from defusedxml import ElementTree as ET
+from defusedxml import ElementTree
 
 from core.norms import norms_for, temporal_values
 from core.parameters.result import Parameter
@@ -121,7 +121,7 @@ def test_the_chart_shows_every_visit_and_every_limit() -> None:
     ]
     trend = one(*visits)
     svg = trend_svg(trend, trend.lines[0], visits, [Ahead("POST1", DAY + dt.timedelta(days=60))])
-    root = ET.fromstring(svg)
+    root = ElementTree.fromstring(svg)
     classes = [e.get("class") for e in root.iter() if e.get("class")]
     assert classes.count("pl-b") == 2
     assert classes.count("ps-b") == 1
