@@ -14,6 +14,7 @@ from core.norms.values import (
     Pace,
     Sex,
     angle_values,
+    comfortable_speed,
     expected_at_speed,
     pace_of,
     temporal_values,
@@ -32,7 +33,8 @@ class Norms:
     expected : step length and cadence expected at this very speed (treadmill, 0.5 to 1.5 m/s).
     bands : variable → band over the cycle.
     reason : why no angle is compared: "no_norm_for_age", "no_speed_matched_norm".
-    timing_reason : why no time or distance is compared: these, or "age_unknown", "sex_unknown".
+    timing_reason : why no time or distance is compared: these, or "age_unknown", "sex_unknown". Gait speed
+        itself is held against the speed healthy people like, however slow the person.
     """
 
     speed: WalkingSpeed | None
@@ -81,6 +83,9 @@ def norms_for(
     expected: Mapping[str, NormValue] = {}
     if missing is None:
         values |= timing.values
+    if (usual := comfortable_speed(age, sex)) is not None:
+        # how fast somebody likes to walk is not a matter of how fast they walk
+        values["gait_speed_mps"] = usual
     if speed is not None and not bands.reason:
         expected = expected_at_speed(speed.speed_mps, age, speed.leg_m)
     return Norms(

@@ -8,6 +8,7 @@ from math import hypot, sqrt
 from typing import Final, Literal, cast
 
 from core.frames import GRAVITY
+from core.norms.speed import WBDS_MPS
 from core.norms.tables import WBDS, WBDS_N, rows, wbds_group
 
 Sex = Literal["female", "male"]
@@ -157,6 +158,24 @@ def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -
             note=note,
         )
     return NormValues(values, None if values else "no_norm_for_age")
+
+
+def comfortable_speed(age: float | None, sex: Sex | None) -> NormValue | None:
+    """Speed at which healthy people of this age like to walk: what a person's speed itself is held against.
+
+    By age and sex where the walkway tables have a mean, else of the adults of the angle norms; None for
+    children of whom only the range of a pace class is known.
+    """
+    if age is not None and sex is not None:
+        found = temporal_values(age, sex).values.get("gait_speed_mps")
+        if found is not None and found.comparable:
+            return found
+    group = wbds_group(age)
+    if group is None:
+        return None
+    mean, sd = WBDS_MPS
+    everybody = "adult_21_84"
+    return NormValue("gait_speed_mps", mean, sd, WBDS_N[everybody], everybody, WBDS)
 
 
 def pace_of(age: float | None, sex: Sex | None, speed_mps: float | None) -> Pace | None:

@@ -46,6 +46,8 @@ KEY_NUMBERS: Final = (
 SHOWN_LARGE: Final = 4
 """So many of them are shown, those that were measured."""
 
+SPEED: Final = "gait_speed_mps"
+
 KEY_CURVE: Final = "knee_flexion"
 
 _GROUPS: Final = {
@@ -312,8 +314,13 @@ def _norm_note(rows: tuple[Row, ...], panels: tuple[CurvePanel, ...], norms: Nor
         )
     if norms.timing_reason is not None and norms.timing_reason != norms.reason:
         sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
-    elif shown := [r for r in rows if r.norm is not None and r.name not in ANGLES]:
+    elif shown := [
+        r for r in rows if r.norm is not None and r.name not in (*ANGLES, SPEED) and r.unit != "°"
+    ]:
         sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
+    if any(r.name == SPEED and r.norm is not None for r in rows):
+        usual = norms.values[SPEED]
+        sentences.append(f"Gait speed: {_GROUPS.get(usual.group, usual.group)} ({usual.source}).")
     return " ".join(sentences)
 
 

@@ -74,10 +74,21 @@ def test_dimensionless_speed_makes_short_and_tall_people_alike() -> None:
 
 def test_slow_walking_has_no_norm_at_all() -> None:
     slow = norms_for(60, "female", speed_mps=0.7)
-    assert (dict(slow.values), dict(slow.bands)) == ({}, {})
+    assert (set(slow.values), dict(slow.bands)) == ({"gait_speed_mps"}, {})
     assert (slow.reason, slow.timing_reason) == ("no_speed_matched_norm", "no_speed_matched_norm")
     assert slow.place("knee_flexion_rom_deg", 40.0).reason == "no_speed_matched_norm"
     assert slow.place("cadence_spm", 90.0).reason == "no_speed_matched_norm"
+
+
+def test_gait_speed_itself_is_held_against_the_speed_people_like() -> None:
+    """70 and older by age and sex (Hollman 2011), younger adults the 42 of the angle norms."""
+    old = norms_for(72, "female", 0.5)
+    assert old.place("gait_speed_mps", 0.5).z == pytest.approx((0.5 - 1.16) / 0.20)
+    adult = norms_for(40, "female", 0.5)
+    assert adult.place("gait_speed_mps", 0.5).z == pytest.approx((0.5 - 1.25) / 0.16)
+    assert adult.values["gait_speed_mps"].n == 42
+    assert norms_for(None, None, 1.25).place("gait_speed_mps", 1.25).z == pytest.approx(0.0)
+    assert norms_for(8, "male", 1.2).place("gait_speed_mps", 1.2).reason == "not_comparable"
 
 
 def test_the_limit_of_slowness_follows_the_legs() -> None:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -143,6 +144,17 @@ def test_source_and_number_of_the_norm_are_printed_or_why_there_is_none(bundle: 
     assert "Timing: female, 10 years, normal pace (Lythgo2011)." in child.norm_note
     assert all(r.norm is None for _, rows in child.groups for r in rows if r.unit == "°")
     assert report_model(bundle, age=40, speed_mps=0.5).norm_note.startswith("No speed-matched norm")
+
+
+def test_slow_walking_keeps_the_norm_of_speed_itself(bundle: Bundle) -> None:
+    slow = (*bundle.parameters, Parameter("gait_speed_mps", None, 20, 0.5, 0.05, "m/s"))
+    model = report_model(replace(bundle, parameters=slow), age=40, sex="female")
+    assert model.norm_note.startswith("No speed-matched norm")
+    assert "Gait speed: adults 21–84 years (Fukuchi" in model.norm_note
+    rows = {r.name: r for _, group in model.groups for r in group}
+    assert rows["gait_speed_mps"].both is not None
+    assert rows["gait_speed_mps"].both.z == pytest.approx(-4.7, abs=0.05)
+    assert {r.name for r in rows.values() if r.norm is not None} == {"gait_speed_mps"}
 
 
 def test_offsets_that_were_subtracted_are_printed(bundle: Bundle) -> None:
