@@ -147,8 +147,9 @@ def test_source_and_number_of_the_norm_are_printed_or_why_there_is_none(bundle: 
 
 
 def test_slow_walking_keeps_the_norm_of_speed_itself(bundle: Bundle) -> None:
-    slow = (*bundle.parameters, Parameter("gait_speed_mps", None, 20, 0.5, 0.05, "m/s"))
-    model = report_model(replace(bundle, parameters=slow), age=40, sex="female")
+    speed = Parameter("gait_speed_mps", None, 20, 0.5, 0.05, "m/s")
+    others = tuple(p for p in bundle.parameters if p.name != speed.name)
+    model = report_model(replace(bundle, parameters=(speed, *others)), age=40, sex="female")
     assert model.norm_note.startswith("No speed-matched norm")
     assert "Gait speed: adults 21–84 years (Fukuchi" in model.norm_note
     rows = {r.name: r for _, group in model.groups for r in group}
