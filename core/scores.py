@@ -10,7 +10,7 @@ the GDI, whose feature matrix nobody may ship.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import log
 from typing import Final
 
@@ -32,6 +32,7 @@ from core.norms.profile import (
     overall_profile,
     side_profile,
 )
+from core.norms.tables import wbds_group
 from core.parameters.kinematic import MEAN_ZERO, MeanCurve, mean_curve
 from core.parameters.result import CycleCurves
 
@@ -57,7 +58,7 @@ class Score:
     missing : variables it lacks. reason : "angle_zero_standing", "no_level" (rotation and progression are
         measured from their own mean, never against the walking direction), "joint_missing", "no_strides",
         "estimated" (no two sensors measure it), "variables_missing" (several reasons, see the GVS),
-        "no_reference", "score_zero" (the very curves of the reference: no GDI*).
+        "no_reference", "no_norm_for_age", "score_zero" (the very curves of the reference: no GDI*).
     """
 
     name: str
@@ -109,6 +110,7 @@ def scores(
     standing_deg: Mapping[str, float] | None = None,
     reference: CurveReference | None = None,
     estimated: Collection[str] = (),
+    age: float | None = None,
 ) -> Scores:
     """Score the mean curves of the counted strides.
 
@@ -116,7 +118,9 @@ def scores(
     ----------
     curves : from standing. standing_deg : goniometer angles in standing (`core.anatomical`).
     reference : None = 42 healthy adults. estimated : variables no two sensors measure; they are not scored.
+    age : years; below 18 there is no score against adults (`no_norm_for_age`). None = an adult.
     """
+    child = reference is None and wbds_group(age) is None
     reference = adult_reference() if reference is None else reference
     level = anatomical_curves(curves, standing_deg or {}) if reference.zero == "anatomical" else curves
     means = _means(curves)
@@ -132,8 +136,12 @@ def scores(
         for profile in PROFILES:
             for side in (*SIDES, None):
                 found += _profile(profile, side, mode, single, reference)
+    if child:
+        found = [replace(s, value=None, n=0, healthy=None, percentile=None, reason=_CHILD) for s in found]
     return Scores(tuple(found), reference.n, reference.group, reference.source, reference.zero)
 
+
+_CHILD: Final = "no_norm_for_age"
 
 Key = tuple[str, Side]
 

@@ -13,7 +13,7 @@ from core.flags.rules import CURVES, RULES, SWING_TO_STANCE, Beyond, Kind, Rule
 from core.frames import SIDES, Side
 from core.norms.lookup import Norms
 from core.norms.speed import walking_speed
-from core.norms.tables import WBDS
+from core.norms.tables import WBDS, wbds_group
 from core.parameters.flats import OTHER
 from core.parameters.kinematic import stride_figures
 from core.parameters.result import CycleCurves, Parameter
@@ -34,7 +34,7 @@ class Flag:
     value, unit : measured, mean over `n` counted strides. limit, beyond : exceeded when above or below it.
     exceeded : None where it cannot be said, then `reason`: "angle_zero_standing" (the level needs
         goniometer angles), "joint_missing", "no_strides", "gap", "no_controls" (no own control group has
-        the measure), "side_missing", or the parameter's own.
+        the measure), "no_norm_for_age", "side_missing", or the parameter's own.
     marked : beyond the second, stronger limit too.
     zero : what an angle is measured from, None where its zero does not matter.
     source : of the limit. verified : False = to be shown as "unverified cut-off".
@@ -84,6 +84,7 @@ def flags(
     standing_deg: Mapping[str, float] | None = None,
     height_m: float | None = None,
     controls: Norms | None = None,
+    age: float | None = None,
 ) -> tuple[Flag, ...]:
     """Hold every rule against both sides.
 
@@ -92,6 +93,7 @@ def flags(
     curves : from standing; None without joint angles. parameters : of the session.
     standing_deg : goniometer angles in standing (`core.standing`). height_m : makes speed dimensionless.
     controls : own control group (`ControlGroup.norms`) for rules whose limit is theirs.
+    age : years; below 18 limits made of the adult norms are not held against anybody. None = an adult.
 
     Returns
     -------
@@ -100,6 +102,7 @@ def flags(
     found = _values(curves, parameters, standing_deg or {})
     speed = next((p.mean for p in parameters if p.name == "gait_speed_mps"), None)
     slow = speed is not None and not walking_speed(speed, height_m).has_norm
+    child = wbds_group(age) is None
     result: list[Flag] = []
     for rule in RULES:
         limited = _with_limit(rule, controls)
@@ -109,8 +112,11 @@ def flags(
         for side in SIDES:
             flag = _difference(limited, side, found) if rule.kind == "difference" else None
             flag = flag or _level(limited, side, found)
-            slower = slow and WBDS in limited.source and flag.note is None
-            result.append(replace(flag, note="no_speed_matched_norm") if slower else flag)
+            if WBDS in limited.source and child:
+                flag = replace(flag, limit=None, exceeded=None, reason=flag.reason or "no_norm_for_age")
+            elif WBDS in limited.source and slow and flag.note is None:
+                flag = replace(flag, note="no_speed_matched_norm")
+            result.append(flag)
     return tuple(result)
 
 

@@ -40,6 +40,7 @@ REASONS: Final[Mapping[str, str]] = {
     "no_controls": "needs this clinic's own controls",
     "side_missing": "the other side is missing",
     "near_zero": "a side is near zero",
+    "no_norm_for_age": "the people of the limit are adults",
 }
 """Why a value cannot be held against its limit; other codes as in the table."""
 

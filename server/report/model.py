@@ -239,17 +239,19 @@ def report_model(
         else {k: float(np.degrees(v)) for k, v in angles.zero_offset.items()},
         provenance=bundle.provenance,
         estimator=estimator_view(bundle.estimator),
-        limits=_limits(bundle, curves, height_m),
-        profile=None if curves is None else profile_view(_scores(bundle, curves)),
+        limits=_limits(bundle, curves, height_m, age),
+        profile=None if curves is None else profile_view(_scores(bundle, curves, age)),
     )
 
 
-def _scores(bundle: Bundle, curves: CycleCurves) -> Scores:
+def _scores(bundle: Bundle, curves: CycleCurves, age: float | None) -> Scores:
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
-    return scores(curves, standing, estimated=estimated_variables(bundle.estimator))
+    return scores(curves, standing, estimated=estimated_variables(bundle.estimator), age=age)
 
 
-def _limits(bundle: Bundle, curves: CycleCurves | None, height_m: float | None) -> LimitsView | None:
+def _limits(
+    bundle: Bundle, curves: CycleCurves | None, height_m: float | None, age: float | None
+) -> LimitsView | None:
     """Estimated angles are not held against anything."""
     if not bundle.strides.used():
         return None
@@ -258,7 +260,7 @@ def _limits(bundle: Bundle, curves: CycleCurves | None, height_m: float | None) 
         measured = {v: c for v, c in curves.curves.items() if v not in unsure}
         curves = replace(curves, curves=measured)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
-    return limits_view(flags(curves, bundle.parameters, standing, height_m))
+    return limits_view(flags(curves, bundle.parameters, standing, height_m, age=age))
 
 
 def rounded(values: Floats | None) -> list[float] | None:

@@ -153,6 +153,14 @@ def test_excluded_strides_do_not_count() -> None:
     assert found.find("gps_sagittal_deg", "raw").n == 11
 
 
+def test_children_are_not_scored_against_adults() -> None:
+    child = scores(norm(offset=5.0), standing(0.0), age=9)
+    assert {(s.value, s.percentile, s.reason) for s in child.scores} == {(None, None, "no_norm_for_age")}
+    assert value(scores(norm(offset=5.0), standing(0.0), age=18), "gps_sagittal_deg", "raw") is not None
+    own = adult_reference()
+    assert value(scores(norm(), standing(0.0), own, age=9), "gps_sagittal_deg", "raw") is not None
+
+
 def test_a_session_without_strides_says_so() -> None:
     empty = norm()
     none = {s: np.zeros(12, np.bool_) for s in SIDES}

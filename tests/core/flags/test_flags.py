@@ -168,6 +168,15 @@ def test_who_walks_slower_than_any_norm_is_told_so() -> None:
     assert flag(found, "stiff_knee", "left").note == "sides_stand_differently", "its limit is of patients"
 
 
+def test_children_are_not_held_against_adult_norms() -> None:
+    walked = curves({"pelvis_obliquity": (5.0, 0.0), "knee_flexion": (30.0, 60.0)})
+    hike = flag(flags(walked, [], age=9), "hip_hiking", "left")
+    assert hike.value == pytest.approx(5.0)
+    assert (hike.limit, hike.exceeded, hike.reason) == (None, None, "no_norm_for_age")
+    assert flag(flags(walked, [], age=9), "stiff_knee", "left").exceeded is True
+    assert flag(flags(walked, [], age=40), "hip_hiking", "left").exceeded is True
+
+
 def test_nothing_measured_gives_reasons_and_no_flag() -> None:
     found = flags(None, [])
     assert {f.exceeded for f in found} == {None}
