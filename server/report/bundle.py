@@ -155,6 +155,7 @@ def read_events(data: bytes) -> GaitEvents:
                 kind=cast("EventKind", row["kind"]),
                 source=row["source"],
                 detected_s=t,
+                confidence=_number(row.get("confidence") or ""),
             )
             for row in _rows(data)
         )
