@@ -23,7 +23,8 @@ from core.frames import Bools, Floats, Segment
 from core.parameters import Surface, take_figures
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
-from core.parameters.walking import bout_parameters, step_parameters, turn_parameters
+from core.parameters.trunk import trunk_regularity
+from core.parameters.walking import bout_parameters, step_parameters, step_strides, turn_parameters
 from core.rest import Window
 
 
@@ -89,6 +90,10 @@ class Measured:
         return self.strides.notices + (() if self.steps is None else self.steps.notices)
 
 
+def _regular(tracks: Tracks, steps: Steps) -> tuple[Parameter, ...]:
+    return trunk_regularity(step_strides(steps), tracks.t_s, tracks.trunk)
+
+
 def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
     """Apply the edits and measure again.
 
@@ -104,5 +109,5 @@ def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
     bouts = bouts_of(events, tracks.rests) if steps is None else steps.bouts
     walking = bout_parameters(bouts) + turn_parameters(tracks.turns)
     # without a foot there is no stride: what the trunk tells stands alone, not among missing numbers
-    first = figures.parameters if steps is None else step_parameters(steps)
+    first = figures.parameters if steps is None else (*step_parameters(steps), *_regular(tracks, steps))
     return Measured(events, strides, first + walking, figures.columns, bouts, tracks.turns, steps)

@@ -13,6 +13,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal, get_args
 
+import numpy as np
+
 from core import angles, body, calibration, fusion, quality, timeline
 from core.angles import JointAngles
 from core.body.estimate import PoseEstimate, PoseParams, estimate_poses
@@ -224,7 +226,7 @@ def _run_stages(
         params=config.strides,
         rests=calibrated.calibration.rest,
         turns=turns(*body_yaw_rate(orientations, uniform.rate_hz), uniform.rate_hz, config.turns),
-        steps=None if feet or trunk_sensor(uniform) is None else detect_steps(uniform, config.lumbar),
+        steps=None if found.events or trunk_sensor(uniform) is None else detect_steps(uniform, config.lumbar),
     )
     reached |= {"events": found, "tracks": tracks}
     start("poses")
@@ -246,9 +248,13 @@ def _run_stages(
 
 
 def _contacts(orientations: Orientations, config: PipelineConfig) -> GaitEvents:
-    """Contacts of the chosen detector, each with the share of all detectors that saw it."""
+    """Contacts of the chosen detector, each with the share of all detectors that saw it.
+
+    Without a foot sensor there is no foot-pitch rule: the shanks' detectors agree among themselves.
+    """
     found = all_detectors(orientations, config.events, config.consensus)
-    agreed = consensus if config.detector == "consensus" else with_confidence
+    feet = any(s in orientations.q for s in FOOT.values())
+    agreed = with_confidence if feet and config.detector == "foot_pitch" else consensus
     return agreed(found, config.consensus)
 
 
@@ -256,7 +262,10 @@ def _of_trunk(uniform: UniformRecording, config: PipelineConfig) -> Tracks:
     """Steps and turns of a single trunk sensor: they need neither rest nor calibration."""
     steps = detect_steps(uniform, config.lumbar)
     signals = uniform.sensors[steps.source]
-    yaw_rate = about_up(signals, uniform.rate_hz, config.lumbar)[1]
+    vertical, yaw_rate = about_up(signals, uniform.rate_hz, config.lumbar)
+    # which way is forward nobody knows without a calibration
+    upwards = np.full((len(vertical), 3), np.nan)
+    upwards[:, 2] = np.where(signals.valid, vertical, np.nan)
     return Tracks(
         t_s=uniform.t_s,
         rate_hz=uniform.rate_hz,
@@ -265,6 +274,7 @@ def _of_trunk(uniform: UniformRecording, config: PipelineConfig) -> Tracks:
         valid={},
         surface=surface_of(uniform),
         params=config.strides,
+        trunk={steps.source: upwards},
         turns=turns(yaw_rate, signals.valid, uniform.rate_hz, config.turns),
         steps=steps,
     )

@@ -26,7 +26,7 @@ from core.parameters.stance import NAMES as PARTS
 from core.parameters.stance import foot_pitches, stances
 from core.parameters.symmetry import phase_coordination
 from core.parameters.temporal import per_stride, temporal
-from core.parameters.trunk import trunk_regularity
+from core.parameters.trunk import one_foot, trunk_regularity
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
@@ -82,7 +82,7 @@ def take_figures(
             *side_parameters(strides, flat.rows, PARTS),
             *side_parameters(strides, phases, PHASES),
             *kinematic(curves, of_feet),
-            *trunk_regularity(strides, angles.t_s, trunk or {}),
+            *trunk_regularity(one_foot(strides), angles.t_s, trunk or {}),
         ),
         columns={
             **columns,

@@ -16,11 +16,12 @@ from typing import Final
 
 import numpy as np
 
-from core.events.result import Stride, Strides
+from core.events.result import Strides
 from core.frames import SIDES, Floats, Segment
 from core.parameters.resample import resample
 from core.parameters.result import Parameter
 from core.parameters.variability import STEADY_STRIDES, summary
+from core.rest import Window
 
 AXES: Final[Mapping[str, int]] = {"v": 2, "ap": 0, "ml": 1}
 """Ending of the name → column of the acceleration: vertical, forward, sideways."""
@@ -49,27 +50,34 @@ NAMES: Final = (
 """In the order of the tables."""
 
 
-def trunk_regularity(strides: Strides, t_s: Floats, trunk: Mapping[Segment, Floats]) -> tuple[Parameter, ...]:
-    """Harmonic ratios and regularity over the counted strides of one foot.
+def one_foot(strides: Strides) -> tuple[Window, ...]:
+    """Counted strides of the foot that has more of them: those of both overlap, one foot's tell all once."""
+    return tuple((s.start_s, s.end_s) for s in max((strides.used(side) for side in SIDES), key=len))
+
+
+def trunk_regularity(
+    strides: Sequence[Window], t_s: Floats, trunk: Mapping[Segment, Floats]
+) -> tuple[Parameter, ...]:
+    """Harmonic ratios and regularity over strides of one foot.
 
     Parameters
     ----------
-    trunk : pelvis → (n, 3) acceleration free of gravity, forward, left, up, on the
-        uniform axis `t_s` (n,); NaN where lost.
+    strides : first and last contact of each, s, in order.
+    trunk : pelvis → (n, 3) acceleration free of gravity, forward, left, up, on the uniform axis `t_s` (n,);
+        NaN where lost, a column of NaN where an axis is not known.
 
     Returns
     -------
     the ratio with its spread over strides, the regularity of all walking together; without a value a reason:
-    "no_pelvis_sensor", "no_strides", "gap", "no_run" (never three counted strides in a row).
+    "no_pelvis_sensor", "no_strides", "no_forward" (an axis that is nowhere known), "gap", "no_run" (never
+    three strides in a row).
     """
     if "pelvis" not in trunk:
         return tuple(summary(name, None, [], "", "no_pelvis_sensor") for name in NAMES)
-    # strides of both feet overlap: one foot's tell everything once
-    own = max((strides.used(side) for side in SIDES), key=len)
-    if not own:
+    if not strides:
         return tuple(summary(name, None, [], "", "no_strides") for name in NAMES)
     acceleration = trunk["pelvis"]
-    return (*_harmonic_ratios(own, t_s, acceleration), *_regularity(own, t_s, acceleration))
+    return (*_harmonic_ratios(strides, t_s, acceleration), *_regularity(strides, t_s, acceleration))
 
 
 def harmonic_ratios(pieces: Floats) -> dict[str, Floats]:
@@ -83,28 +91,32 @@ def harmonic_ratios(pieces: Floats) -> dict[str, Floats]:
     return found
 
 
-def _harmonic_ratios(own: Sequence[Stride], t_s: Floats, acceleration: Floats) -> Iterator[Parameter]:
-    bounds = np.array([(s.start_s, s.end_s) for s in own])
-    pieces = resample(acceleration.T, t_s, bounds, POINTS + 1)[..., :-1]
+def _why(acceleration: Floats, axis: str) -> str:
+    """Why an axis has no values: lost, or never known."""
+    return "gap" if np.isfinite(acceleration[:, AXES[axis]]).any() else "no_forward"
+
+
+def _harmonic_ratios(own: Sequence[Window], t_s: Floats, acceleration: Floats) -> Iterator[Parameter]:
+    pieces = resample(acceleration.T, t_s, np.array(own), POINTS + 1)[..., :-1]
     for axis, values in harmonic_ratios(pieces).items():
         known = values[np.isfinite(values)]
-        yield summary(f"harmonic_ratio_{axis}", None, known.tolist(), "", "gap")
+        yield summary(f"harmonic_ratio_{axis}", None, known.tolist(), "", _why(acceleration, axis))
 
 
-def _regularity(own: Sequence[Stride], t_s: Floats, acceleration: Floats) -> Iterator[Parameter]:
+def _regularity(own: Sequence[Window], t_s: Floats, acceleration: Floats) -> Iterator[Parameter]:
     runs = [run for run in _runs(own) if len(run) >= RUN_STRIDES]
-    pieces = [acceleration[slice(*np.searchsorted(t_s, (r[0].start_s, r[-1].end_s)))] for r in runs]
-    whole = [(r, a) for r, a in zip(runs, pieces, strict=True) if np.isfinite(a).all()]
-    n = sum(len(r) for r, _ in whole)
-    stride = float(np.median([s.duration_s for s in own])) * (len(t_s) - 1) / float(t_s[-1] - t_s[0])
+    pieces = [acceleration[slice(*np.searchsorted(t_s, (r[0][0], r[-1][1])))] for r in runs]
+    stride = float(np.median(np.diff(np.array(own)))) * (len(t_s) - 1) / float(t_s[-1] - t_s[0])
     for name, share in (("step", 0.5), ("stride", 1.0)):
         lags = np.arange(round((share - SEARCH) * stride), round((share + SEARCH) * stride) + 1)
         for axis in REGULAR_AXES:
-            label = f"{name}_regularity_{axis}"
+            label, along = f"{name}_regularity_{axis}", [a[:, AXES[axis]] for a in pieces]
+            whole = [(len(r), a) for r, a in zip(runs, along, strict=True) if np.isfinite(a).all()]
+            n = sum(strides for strides, _ in whole)
             if not whole:
-                yield summary(label, None, [], "", "gap" if runs else "no_run")
+                yield summary(label, None, [], "", _why(acceleration, axis) if runs else "no_run")
                 continue
-            alike = _autocorrelation([a[:, AXES[axis]] for _, a in whole], lags)
+            alike = _autocorrelation([a for _, a in whole], lags)
             note = "few_strides" if n < STEADY_STRIDES else None
             yield Parameter(label, None, n, float(alike.max()), None, "", note=note)
 
@@ -123,11 +135,11 @@ def _autocorrelation(pieces: Sequence[Floats], lags: np.ndarray) -> Floats:
     return np.asarray(products / np.maximum(counts, 1.0) / power)
 
 
-def _runs(own: Sequence[Stride]) -> Iterator[list[Stride]]:
+def _runs(own: Sequence[Window]) -> Iterator[list[Window]]:
     """Strides of one foot that follow each other without a break."""
-    run: list[Stride] = []
+    run: list[Window] = []
     for s in own:
-        if run and s.start_s != run[-1].end_s:
+        if run and s[0] != run[-1][1]:
             yield run
             run = []
         run.append(s)

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from core.events.bouts import Bout
-from core.events.steps import Steps
+from core.events.steps import EDGE_STEPS, Steps
 from core.events.turns import Turn
 from core.parameters.result import Parameter
 from core.parameters.variability import summary
+from core.rest import Window
 
 
 def bout_parameters(bouts: Sequence[Bout]) -> tuple[Parameter, ...]:
@@ -34,6 +35,18 @@ def turn_parameters(turns: Sequence[Turn]) -> tuple[Parameter, ...]:
         summary("turn_duration_s", None, [t.duration_s for t in turns], "s", "no_turns"),
         summary("turn_peak_velocity_dps", None, peak, "deg/s", "no_turns"),
     )
+
+
+def step_strides(steps: Steps) -> tuple[Window, ...]:
+    """Strides of one foot between a trunk sensor's steps: two steady steps each, none with a stop inside."""
+    strides: list[Window] = []
+    for bout in steps.bouts:
+        contacts = [s.time_s for s in steps.steps if bout.first_s <= s.time_s <= bout.end_s]
+        steady = contacts[EDGE_STEPS : len(contacts) - EDGE_STEPS]
+        stops = [first for first, _ in bout.stops]
+        pairs = zip(steady[:-2:2], steady[2::2], strict=True)
+        strides += [(a, b) for a, b in pairs if not any(a <= stop < b for stop in stops)]
+    return tuple(strides)
 
 
 def step_parameters(steps: Steps) -> tuple[Parameter, ...]:

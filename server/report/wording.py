@@ -205,6 +205,7 @@ REASONS: Final[Mapping[str, str]] = {
     "no_swing_minimum": "not measured: the toe's height has no dip in swing",
     "no_foot_sensor": "not measured: no sensor on this foot",
     "no_pelvis_sensor": "not measured: no sensor on the pelvis",
+    "no_forward": "not measured: a trunk sensor alone does not know which way is forward",
     "no_run": "not measured: never three strides in a row that count",
     "few_strides": "not measured: needs at least 10 strides that count",
     "no_mid_stance": "not measured: the heel rises before the other foot leaves the floor",

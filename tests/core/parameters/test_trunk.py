@@ -8,11 +8,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from core.events.bouts import Bout
 from core.events.result import Stride, Strides
+from core.events.steps import Step, Steps
 from core.frames import Floats
 from core.measure import measure
 from core.parameters.result import Parameter
-from core.parameters.trunk import NAMES, harmonic_ratios, trunk_regularity
+from core.parameters.trunk import NAMES, harmonic_ratios, one_foot, trunk_regularity
+from core.parameters.walking import step_strides
 from core.simulate import simulate_scenario
 from tests.true_walks import true_tracks
 
@@ -38,7 +41,7 @@ def wave(*amplitudes: float) -> Floats:
 
 def found(forward: Floats, sideways: Floats, up: Floats, of: Strides | None = None) -> dict[str, Parameter]:
     acceleration = np.stack((forward, sideways, up), axis=1)
-    return {p.name: p for p in trunk_regularity(of or strides(), T, {"pelvis": acceleration})}
+    return {p.name: p for p in trunk_regularity(one_foot(of or strides()), T, {"pelvis": acceleration})}
 
 
 def test_the_ratio_is_that_of_the_amplitudes() -> None:
@@ -102,15 +105,32 @@ def test_strides_set_aside_are_not_looked_at() -> None:
 
 
 def test_what_is_missing_has_its_own_reason() -> None:
-    assert {p.reason for p in trunk_regularity(strides(), T, {})} == {"no_pelvis_sensor"}
-    assert {p.name for p in trunk_regularity(strides(), T, {})} == set(NAMES)
+    nobody = trunk_regularity(one_foot(strides()), T, {})
+    assert {p.reason for p in nobody} == {"no_pelvis_sensor"}
+    assert {p.name for p in nobody} == set(NAMES)
     a = wave(0.0, 1.0)
     assert {p.reason for p in found(a, a, a, Strides(())).values()} == {"no_strides"}
     lost = np.full(len(T), np.nan)
-    assert {p.reason for p in found(lost, lost, lost).values()} == {"gap"}
+    assert {p.reason for p in found(lost, lost, lost).values()} == {"no_forward"}
+    upright = found(lost, lost, a)
+    assert upright["harmonic_ratio_ap"].reason == "no_forward"
+    assert upright["stride_regularity_v"].mean == pytest.approx(1.0, abs=0.02)
+    torn = np.where(np.arange(len(T)) % 40 == 0, np.nan, a)
+    assert {p.reason for p in found(torn, torn, torn).values()} == {"gap"}
     pairs = found(a, a, a, strides(2))
     assert pairs["stride_regularity_v"].reason == "no_run"
     assert pairs["harmonic_ratio_v"].n == 2
+
+
+def test_two_steady_steps_of_a_trunk_sensor_are_a_stride() -> None:
+    times = [1.0, 1.5, 2.1, 2.6, 3.2, 3.7, 4.3, 4.8, 8.0, 8.5]
+    bout = Bout(1.0, 1.0, 8.5, len(times), 0.55, stops=((4.8, 8.0),))
+    steps = Steps(tuple(Step(t, None) for t in times), (bout,), "pelvis")
+    # the steps of the first and last stride start and stop the walk
+    assert step_strides(steps) == ((2.1, 3.2), (3.2, 4.3))
+    stopped = Steps(steps.steps, (replace(bout, stops=((3.2, 3.7),)),), "pelvis")
+    assert step_strides(stopped) == ((2.1, 3.2),)
+    assert step_strides(Steps(steps.steps[:3], (replace(bout, end_s=2.1, stops=()),), "pelvis")) == ()
 
 
 @cache
@@ -123,7 +143,7 @@ def simulated(name: str) -> dict[str, float]:
     listed = measure(true_tracks(truth)).strides
     return {
         p.name: p.mean
-        for p in trunk_regularity(listed, truth.t_s, {"pelvis": acceleration})
+        for p in trunk_regularity(one_foot(listed), truth.t_s, {"pelvis": acceleration})
         if p.mean is not None
     }
 
