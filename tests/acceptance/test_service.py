@@ -55,7 +55,14 @@ def test_neura_walk_through_rest_equals_the_command_line(service: Service, tmp_p
     done = sagittal("analyse", folder, "--manifest", manifest, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert report["parameters"] == result(tmp_path / "out")["parameters"]
-    for name in ("angles.parquet", "poses.parquet", "events.csv", "strides.csv"):
+    for name in (
+        "angles.parquet",
+        "poses.parquet",
+        "tracks.parquet",
+        "signals.parquet",
+        "events.csv",
+        "strides.csv",
+    ):
         assert client.get(f"{address}/{name}").content == (tmp_path / "out" / name).read_bytes(), name
 
 

@@ -165,7 +165,7 @@ async def test_every_page_about_a_person_leaves_one_audit_row(visit: Visit) -> N
     async with clinic.client("admin", headers={"Accept": "text/html"}) as client:
         patient = (await client.get(f"{API}/sessions/{visit.session}")).json()["patient_id"]
         pages = {f"/patients/{patient}": patient, f"/patients/{patient}/sessions/new": patient}
-        for tab in ("", "/upload", "/kinematics", "/data", "/print"):
+        for tab in ("", "/upload", "/timeline", "/kinematics", "/data", "/print"):
             pages[f"/sessions/{visit.session}{tab}"] = visit.session
         for page, resource in pages.items():
             before = (await client.get(f"{API}/audit", params={"limit": 1})).json()[0]["seq"]

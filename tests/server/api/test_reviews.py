@@ -203,6 +203,18 @@ async def test_an_analysis_of_an_earlier_version_opens_but_cannot_be_edited(clin
     assert "Run the analysis again" in refused.json()["detail"]
     assert "knee_flexion" in {lane["name"] for lane in lanes}
     assert page.status_code == 200
+    assert "Run the analysis again to edit it" in page.text
+    assert " editable" not in page.text
+
+
+async def test_who_may_only_read_sees_the_timeline_without_tools(clinic: Clinic, path: str) -> None:
+    address = path.removeprefix(API) + "/timeline"
+    pages = {}
+    for role in ("viewer", "clinician"):
+        async with clinic.client(role, headers={"Accept": "text/html"}) as client:
+            pages[role] = (await client.get(address)).text
+    assert ("data-undo" in pages["clinician"], "data-undo" in pages["viewer"]) == (True, False)
+    assert "Run the analysis again" not in pages["viewer"]
 
 
 async def test_an_erased_session_takes_its_edits_along(clinic: Clinic, path: str) -> None:

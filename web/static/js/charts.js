@@ -63,6 +63,8 @@ class StrideStrip extends HTMLElement {
       line.setAttribute("x1", x);
       line.setAttribute("x2", x);
     }
+    const link = this.querySelector("[data-timeline]");
+    if (link) link.hash = `t=${clock.t.toFixed(2)}`;
     const words = this.querySelector("[data-words]");
     if (words && now >= 0) words.textContent = `${clock.stride.side === "left" ? "Left" : "Right"}, ${clock.stride.start_s.toFixed(1)} s`;
   }
