@@ -2,7 +2,7 @@
 
 The reference angles are anatomical, ours are zero at the person's own standing: bands of sagittal and frontal
 angles show the shape, not the level, and say so; what has no meaning left is marked not comparable. Where the
-standing angle is known by goniometer the level means the same and the band says nothing of it.
+standing angle is known by goniometer the level is compared too.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from core.frames import Floats
 from core.norms.speed import SLOW_MPS
-from core.norms.tables import WBDS, WBDS_N, rows, wbds_group
+from core.norms.tables import LEVEL, WBDS, WBDS_N, rows, wbds_group
 
 _ZERO = (
     "The zero differs: measured from the person's own standing, the reference is anatomical; compare shapes."
@@ -45,11 +45,11 @@ _JUDGEMENT: Final[Mapping[str, tuple[bool, Literal["normal", "low"], str]]] = {
 """Variable → may the band stand behind our curve, how much to trust it, what to say beside it."""
 
 _WITH_LEVEL: Final[Mapping[str, str]] = {
-    "pelvis_obliquity": _PLANE,
-    "hip_adduction": _PLANE,
-    "hip_rotation": _HEADING,
+    "pelvis_obliquity": f"{LEVEL} {_PLANE}",
+    "hip_adduction": f"{LEVEL} {_PLANE}",
+    "hip_rotation": f"{LEVEL} {_HEADING}",
 }
-"""What is left to say where the anatomical level is known."""
+"""What is left to say where the anatomical level is known; of the others `LEVEL` alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def adult_kinematics(
 
 
 def _level(band: NormBand) -> NormBand:
-    return replace(band, comparable=True, note=_WITH_LEVEL.get(band.variable, ""))
+    return replace(band, comparable=True, note=_WITH_LEVEL.get(band.variable, LEVEL))
 
 
 @cache

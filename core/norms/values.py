@@ -9,7 +9,7 @@ from typing import Final, Literal, cast
 
 from core.frames import GRAVITY
 from core.norms.speed import WBDS_MPS
-from core.norms.tables import WBDS, WBDS_N, rows, wbds_group
+from core.norms.tables import LEVEL, WBDS, WBDS_N, rows, wbds_group
 
 Sex = Literal["female", "male"]
 Pace = Literal["slow", "normal", "fast"]
@@ -46,7 +46,7 @@ TEMPORAL: Final[Mapping[str, str]] = {
 }
 """Our parameter → parameter of spatiotemporal_age_sex.csv."""
 
-_LEVEL = "Not comparable: measured from the person's own standing, the reference is anatomical."
+_NOT_LEVEL = "Not comparable: measured from the person's own standing, the reference is anatomical."
 _BAND = "The range defines the pace class, it is not mean ± SD."
 _FOOT_OFF = (
     "Not comparable: our foot-off is the foot's lowest pitch, about 0.07 s after a walkway's last contact."
@@ -120,7 +120,7 @@ def angle_values(age: float | None, anatomical: Collection[str] = ()) -> NormVal
             source=WBDS,
             difference_sd=float(row["LR_diff_sd"]),
             comparable=comparable,
-            note="" if comparable else _LEVEL,
+            note=_NOT_LEVEL if not comparable else "" if name.endswith("_rom_deg") else LEVEL,
         )
     return NormValues(values)
 

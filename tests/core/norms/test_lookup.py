@@ -129,8 +129,10 @@ def test_levels_compare_only_where_the_anatomical_level_is_known() -> None:
     assert known.place("knee_flexion_max_swing_deg", 61.08).z == pytest.approx(0.0)
     assert known.place("hip_flexion_min_deg", -8.0).reason == "not_comparable"
     assert known.bands["pelvis_tilt"].comparable
-    assert known.bands["knee_flexion"].note == ""
-    assert known.bands["hip_flexion"].note != ""
+    assert "depends on the protocol" in known.bands["knee_flexion"].note
+    assert "depends on the protocol" in known.values["knee_flexion_max_swing_deg"].note
+    assert known.values["knee_flexion_rom_deg"].note == ""
+    assert "zero differs" in known.bands["hip_flexion"].note
     assert not standing.bands["pelvis_tilt"].comparable
 
 
