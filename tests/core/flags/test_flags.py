@@ -80,9 +80,9 @@ def test_a_knee_that_stands_bent_is_not_stiff_once_the_goniometer_says_so() -> N
 @pytest.mark.parametrize(
     ("name", "variable", "angle", "exceeded", "marked"),
     [
-        ("knee_hyperextension", "knee_flexion", -8.0, True, True),
-        ("knee_hyperextension", "knee_flexion", -3.0, True, False),
-        ("knee_hyperextension", "knee_flexion", 2.0, False, False),
+        ("knee_hyperextension", "knee_flexion", -9.5, True, True),
+        ("knee_hyperextension", "knee_flexion", -6.0, True, False),
+        ("knee_hyperextension", "knee_flexion", -3.0, False, False),
         ("low_knee_flexion_swing", "knee_flexion", 44.0, True, False),
         ("low_knee_flexion_swing", "knee_flexion", 45.0, False, False),
         ("low_dorsiflexion_swing", "ankle_dorsiflexion", -1.0, True, False),

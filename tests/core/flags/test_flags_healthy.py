@@ -1,0 +1,39 @@
+"""How often healthy people pass the limits: rarely, or the limit says little."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from core.flags import flags
+from core.frames import SIDES
+from core.parameters.result import CycleCurves
+from core.standing import NAMES
+from tests.wbds import people
+
+OFTEN = {"knee_hyperextension": 0.15}
+"""Rule → share of healthy sides beyond it, where more than 5 % are: the limit is an unverified one."""
+
+
+def test_one_healthy_side_in_twenty_at_most_passes_a_limit() -> None:
+    beyond: Counter[str] = Counter()
+    judged: Counter[str] = Counter()
+    for person in people():
+        curves = CycleCurves(
+            {v: {s: np.radians(person[s][v])[np.newaxis] for s in SIDES} for v in person["left"]},
+            dict.fromkeys(SIDES, (0,)),
+            {s: np.ones(1, np.bool_) for s in SIDES},
+            {s: np.full(1, 62.0) for s in SIDES},
+        )
+        for f in flags(curves, [], dict.fromkeys(NAMES, 0.0)):
+            if f.exceeded is not None:
+                judged[f.name] += 1
+                beyond[f.name] += f.exceeded
+    shares = {name: beyond[name] / n for name, n in judged.items()}
+    assert {name for name, n in judged.items() if n == 84} == {
+        "stiff_knee", "low_knee_flexion_swing", "knee_hyperextension", "low_dorsiflexion_swing", "hip_hiking",
+        "low_hip_extension", "hip_range_asymmetry", "knee_range_asymmetry", "ankle_range_asymmetry",
+    }  # fmt: skip
+    for name, share in shares.items():
+        assert share <= OFTEN.get(name, 0.05), (name, share)
