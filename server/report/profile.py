@@ -15,7 +15,7 @@ SCALE_DEG: Final = 24.0
 
 WIDTH: Final = 150
 
-LABELS: Final = {v.name: v.label for v in VARIABLES}
+LABELS: Final = {v.name: v.label for v in VARIABLES} | {"foot_progression": "Foot progression"}
 PLANES: Final = {v.name: v.plane for v in VARIABLES}
 
 MODE: Final[Mode] = "offset_removed"
