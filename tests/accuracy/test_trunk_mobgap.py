@@ -1,7 +1,7 @@
 """Regularity of a lower back's vertical acceleration on mobgap_lowback: straight walks against daily life.
 
-There is no reference of these figures. Held is only that two straight walks of a healthy adult are regular and
-short walks about a room less so; the limits are our choice.
+There is no reference of these figures. Held is only that two straight walks of a healthy adult are regular
+and short walks about a room less so; the limits are our choice.
 """
 
 from __future__ import annotations
