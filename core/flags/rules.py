@@ -60,9 +60,9 @@ SWING_TO_STANCE: Final = "swing_to_stance"
 """Swing time over stance time of a side; its ratio between the sides is the overall temporal symmetry of
 Patterson et al. 2008."""
 
-_STIFF: Final = (
-    "cluster analysis of 50 people after stroke at their own speed; abstract read, authors not (clinic.md §4)"
-)
+_STIFF: Final = "cluster analysis of 50 people after stroke, 24 with a stiff knee, at their own speed"
+"""spec/clinic.md §4; its abstract was read, which names no authors."""
+
 _PRACTICE: Final = "clinical use; no source confirmed"
 _CONTROLS: Final = "mean ± 2 SD of own controls"
 _RATIO: Final = "Patterson et al. 2010, 95 % of healthy people; source not confirmed"
@@ -103,7 +103,7 @@ RULES: Final[tuple[Rule, ...]] = (
         beyond="below",
         # not 0°: 45 % of healthy sides pass it, as the zero of a knee depends on the protocol by 5°
         limit=-5.0,
-        source=f"{_PRACTICE}; marked: mean − 2 SD of healthy adults",
+        source=f"{_PRACTICE}; second limit: mean − 2 SD of healthy adults",
         marked=_below_norm("knee_min_stance(20-60%)"),
         level=True,
         verified=False,
