@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from core.events.result import Stride, Strides
@@ -43,6 +43,7 @@ def test_the_affected_side_stands_first(affected: Side, sign: float) -> None:
     assert np.sign(found.angle_pct) == -sign
 
 
+@settings(deadline=None)
 @given(st.floats(0.1, 2.0), st.floats(0.1, 2.0))
 def test_an_index_keeps_the_side_it_turns_its_sign_with_it(a: float, b: float) -> None:
     (left,), (right,) = (symmetries(of("step_length_m", a, b, "m"), side) for side in ("left", "right"))
