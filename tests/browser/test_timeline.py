@@ -12,6 +12,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
+from tests.browser.design import layout_faults, text_faults
 
 
 @pytest.fixture(scope="module")
@@ -279,3 +280,31 @@ def test_what_somebody_else_changed_meanwhile_is_said_and_shown(
     expect(timeline.locator("[data-problem]")).to_contain_text("Somebody else has changed")
     expect(timeline.locator("[data-edits]")).to_contain_text("by a colleague")
     assert len(review(running, walked)["edits"]) == 1
+
+
+def test_a_drag_on_a_lane_moves_all_of_them_and_picks_nothing(timeline: Page) -> None:
+    lane = timeline.locator("[data-side=left] .tl-blocks")
+    box = lane.bounding_box()
+    assert box is not None
+    start = float(re.findall(r"\d+\.\d", timeline.locator("[data-span]").inner_text())[0])
+    heading = timeline.locator("#h-stride").inner_text()
+    x, y = box["x"] + 0.7 * box["width"], box["y"] + box["height"] / 2
+    timeline.mouse.move(x, y)
+    timeline.mouse.down()
+    timeline.mouse.move(x - box["width"] / 3, y, steps=6)
+    timeline.mouse.up()
+    moved = float(re.findall(r"\d+\.\d", timeline.locator("[data-span]").inner_text())[0])
+    assert moved - start == pytest.approx(2.0, abs=0.15)
+    assert timeline.locator("#h-stride").inner_text() == heading
+    expect(timeline.locator("dialog[open]")).to_have_count(0)
+
+
+@pytest.mark.parametrize("width", [1280, 360])
+def test_the_dialogs_obey_the_design_system(opened: Opener, walked: str, width: int) -> None:
+    page = opened(f"/sessions/{walked}/timeline", width=width, height=760)
+    expect(page.locator("[data-verdict]")).to_have_text("counts")
+    for button in ("[data-add]", "[data-out]"):
+        page.locator(button).click()
+        found = layout_faults(page) | text_faults(page)
+        assert not found, f"{button} {width}: {found}"
+        page.locator("dialog[open]").get_by_role("button", name="Cancel").click()

@@ -61,7 +61,7 @@ class TakeTimeline extends HTMLElement {
       blocks: new StrideBlocks(host, { sides: [host.dataset.side], onPick: pick }),
       handles: new EventHandles(host, host.dataset.side, shared),
     }));
-    for (const host of this.querySelectorAll("[data-side]")) host.addEventListener("dblclick", (e) => this.askEvent(host.dataset.side, this.timeAt(e, host)));
+    for (const host of this.querySelectorAll("[data-side]")) this.drag(host, () => {});
   }
 
   prepareLanes() {
@@ -75,7 +75,7 @@ class TakeTimeline extends HTMLElement {
       const open = (l) => this.attempt(async () => { await lane.open(l); this.ticked(); });
       choice.addEventListener("change", () => open(known.find((l) => l.name === choice.value)));
       open(wanted);
-      this.drag(host);
+      this.drag(host, (e) => clock.set(this.timeAt(e, host)));
       return lane;
     });
   }
@@ -129,13 +129,12 @@ class TakeTimeline extends HTMLElement {
     else this.win.pan(((e.deltaX || e.deltaY) / plot.clientWidth) * this.win.span);
   }
 
-  // A click sets the cursor, a drag moves the window, two fingers zoom.
-  drag(host) {
+  // A drag moves the window, two fingers zoom; a click that is neither goes to who asked.
+  drag(host, onClick) {
     const fingers = new Map();
     let moved = false;
     host.addEventListener("pointerdown", (e) => {
       if (e.button !== 0) return;
-      host.setPointerCapture(e.pointerId);
       fingers.set(e.pointerId, e.clientX);
       moved = fingers.size > 1;
     });
@@ -143,6 +142,7 @@ class TakeTimeline extends HTMLElement {
       if (!fingers.has(e.pointerId)) return;
       const by = e.clientX - fingers.get(e.pointerId);
       if (!moved && Math.abs(by) < 4) return;
+      if (!moved || !host.hasPointerCapture(e.pointerId)) host.setPointerCapture(e.pointerId); // not before: it would take the click
       moved = true;
       if (fingers.size === 1) this.win.pan((-by / host.clientWidth) * this.win.span);
       else {
@@ -153,9 +153,9 @@ class TakeTimeline extends HTMLElement {
       fingers.set(e.pointerId, e.clientX);
     });
     const end = (e) => {
-      if (fingers.delete(e.pointerId) && !moved && e.type === "pointerup") clock.set(this.timeAt(e, host));
+      if (fingers.delete(e.pointerId) && !moved && e.type === "pointerup") onClick(e);
     };
-    for (const name of ["pointerup", "pointercancel"]) host.addEventListener(name, end);
+    for (const name of ["pointerup", "pointercancel", "pointerleave"]) host.addEventListener(name, end);
   }
 
   follow(host, act) {
