@@ -81,8 +81,20 @@ def test_a_foot_that_is_told_is_the_right_one() -> None:
             if step.side is not None and abs(period.contacts[nearest] - step.time_s) <= WINDOW_S:
                 told += 1
                 right += step.side == period.sides[nearest]
-    assert told >= 9
+    assert told >= 30
     assert right == told
+
+
+def test_the_feet_of_neura_walk_are_told_right() -> None:
+    steps = detect_steps(only(neura_walk(), "pelvis")).steps
+    heels = [(t, side) for side in SIDES for t in heel_stops(side)]
+    told = 0
+    for step in steps:
+        time, side = min(heels, key=lambda h: abs(h[0] - step.time_s))
+        if step.side is not None and abs(time - step.time_s) <= WINDOW_S:
+            told += 1
+            assert step.side == side
+    assert told >= 10
 
 
 def test_every_walk_of_the_reference_is_in_a_bout() -> None:
