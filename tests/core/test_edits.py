@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from core.edits import Edit, edit_of, edited_events, edited_strides
+from core.edits import APART_S, Edit, edit_of, edited_events, edited_strides
 from core.errors import ParameterError
 from core.events.result import GaitEvent, GaitEvents, Stride, Strides
+from core.frames import SIDES
 
 END = 10.0
 
@@ -137,3 +142,35 @@ def test_an_edit_comes_back_from_json() -> None:
         Edit("exclude_stride", "right", 2.0, reason="x"),
     ):
         assert edit_of(edit.to_json()) == edit
+
+
+@given(
+    steps=st.lists(
+        st.tuples(
+            st.sampled_from(["move_event", "add_event", "delete_event"]),
+            st.sampled_from(SIDES),
+            st.sampled_from(["ic", "tc"]),
+            st.floats(-1.0, END + 1.0),
+            st.floats(-1.0, END + 1.0),
+        ),
+        max_size=12,
+    )
+)
+def test_whatever_is_done_events_stay_in_order_apart_and_inside(steps: list[Any]) -> None:
+    edits: list[Edit] = []
+    for kind, side, event, time, to in steps:
+        own = edited_events(found(), edits, END).times(side, event)
+        # an event that is there, where one is named; else the time as it came
+        at = time if kind == "add_event" or not own else own[int(np.argmin(np.abs(np.subtract(own, time))))]
+        edit = Edit(kind, side, at, event, to if kind == "move_event" else None)
+        try:
+            edited_events(found(), [*edits, edit], END)
+        except ParameterError:
+            continue
+        edits.append(edit)
+    after = edited_events(found(), edits, END).events
+    assert [e.time_s for e in after] == sorted(e.time_s for e in after)
+    assert all(0.0 <= e.time_s <= END for e in after)
+    for side in SIDES:
+        own = [e.time_s for e in after if e.side == side]
+        assert all(b - a >= APART_S for a, b in pairwise(own))

@@ -1,0 +1,121 @@
+"""Edits as rows: append-only, in order, one winner when two people edit at once, nothing left in memory."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+from sqlalchemy import delete, func, select, update
+from sqlalchemy.exc import IntegrityError as DatabaseIntegrityError
+
+from core.edits import Edit
+from server.services import analyses, erasure, patients, reviews, sessions
+from server.services.errors import Conflict
+from server.storage import tables
+from tests.server import analysed, walk
+from tests.server.clinic import Clinic, open_clinic
+
+pytestmark = pytest.mark.anyio
+
+CONTACT = walk.events().times("right", "ic")[4]
+MOVE = Edit("move_event", "right", CONTACT, "ic", CONTACT + 0.03)
+LEAVE_OUT = Edit("exclude_stride", "right", CONTACT + 0.4, reason="stumbled")
+
+
+@pytest.fixture
+def anyio_backend() -> str:
+    return "asyncio"
+
+
+@pytest.fixture
+async def clinic(tmp_path: Path, anyio_backend: str) -> AsyncIterator[Clinic]:
+    async with open_clinic(tmp_path) as running:
+        yield running
+
+
+def session_of(clinic: Clinic) -> str:
+    with clinic.db.write() as c:
+        patient = patients.create(c, None, code="P-1", height_m=1.75).id
+        session = sessions.create(c, None, patient).id
+    analysed.finish(clinic, patient, session, analysed.files())
+    return session
+
+
+def make(clinic: Clinic, session: str, edit: Edit, seen: int | None = None) -> reviews.Edits:
+    return reviews.make(clinic.db, clinic.app.state.blobs, None, session, edit, seen=seen)[1]
+
+
+def rows(clinic: Clinic) -> list[str]:
+    with clinic.db.read() as c:
+        return list(c.execute(select(tables.edit.c.kind).order_by(tables.edit.c.seq)).scalars())
+
+
+async def test_undo_is_a_row_and_nothing_is_ever_rewritten(clinic: Clinic) -> None:
+    session = session_of(clinic)
+    make(clinic, session, MOVE)
+    make(clinic, session, LEAVE_OUT)
+    _, after = reviews.undo(clinic.db, None, session)
+    assert after.edits == (MOVE,)
+    assert rows(clinic) == ["move_event", "exclude_stride", "undo"]
+    with pytest.raises(DatabaseIntegrityError, match="append-only"), clinic.db.write() as c:
+        c.execute(update(tables.edit).values(kind="undo"))
+
+
+async def test_a_number_of_a_state_is_never_given_twice(clinic: Clinic) -> None:
+    session = session_of(clinic)
+    first = make(clinic, session, MOVE).version
+    with clinic.db.write() as c:
+        c.execute(delete(tables.edit))
+    assert make(clinic, session, MOVE).version > first
+
+
+async def test_who_measured_on_a_state_that_changed_meanwhile_is_refused(
+    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = session_of(clinic)
+    measure = reviews._measure
+    calls = []
+
+    def interrupted(*args: object) -> object:
+        calls.append(args)
+        if len(calls) == 1:
+            make(clinic, session, LEAVE_OUT)  # a colleague, while the numbers are being computed
+        return measure(*args)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(reviews, "_measure", interrupted)
+    with pytest.raises(Conflict) as refused:
+        make(clinic, session, MOVE)
+    assert refused.value.code == "edited_meanwhile"
+    assert rows(clinic) == ["exclude_stride"]
+
+
+async def test_an_edit_that_is_refused_leaves_no_row(clinic: Clinic) -> None:
+    session = session_of(clinic)
+    with pytest.raises(Exception, match="no right initial contact"):
+        make(clinic, session, Edit("delete_event", "right", CONTACT + 0.2, "ic"))
+    assert rows(clinic) == []
+
+
+async def test_what_is_measured_is_kept_for_the_state_and_undo_finds_it_again(clinic: Clinic) -> None:
+    session = session_of(clinic)
+    blobs = clinic.app.state.blobs
+    one = make(clinic, session, MOVE)
+    with clinic.db.read() as c:
+        found = analyses.shown(c, session)
+    kept = reviews.measured(blobs, found, one)
+    make(clinic, session, LEAVE_OUT)
+    _, back = reviews.undo(clinic.db, None, session)
+    assert back.version != one.version
+    assert reviews.measured(blobs, found, back) is kept
+
+
+async def test_an_erased_session_is_erased_from_memory_too(clinic: Clinic) -> None:
+    session = session_of(clinic)
+    make(clinic, session, MOVE)
+    assert reviews._takes._values
+    erasure.erase_session(clinic.db, clinic.app.state.blobs, None, session)
+    assert not reviews._takes._values
+    assert not reviews._results._values
+    with clinic.db.read() as c:
+        assert c.execute(select(func.count()).select_from(tables.edit)).scalar_one() == 0
