@@ -23,6 +23,7 @@ from core.frames import Bools, Floats, Segment
 from core.parameters import Surface, take_figures
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
+from core.parameters.smoothness import stride_smoothness
 from core.parameters.trunk import trunk_regularity
 from core.parameters.walking import bout_parameters, step_parameters, step_strides, turn_parameters
 from core.rest import Window
@@ -91,7 +92,11 @@ class Measured:
 
 
 def _regular(tracks: Tracks, steps: Steps) -> tuple[Parameter, ...]:
-    return trunk_regularity(step_strides(steps), tracks.t_s, tracks.trunk)
+    strides = step_strides(steps)
+    return (
+        *trunk_regularity(strides, tracks.t_s, tracks.trunk),
+        stride_smoothness(strides, tracks.t_s, tracks.trunk),
+    )
 
 
 def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:

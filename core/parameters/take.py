@@ -21,6 +21,7 @@ from core.parameters.phases import NAMES as PHASES
 from core.parameters.phases import phase_rows
 from core.parameters.result import Parameter
 from core.parameters.rows import Column, row_columns, side_parameters
+from core.parameters.smoothness import stride_smoothness
 from core.parameters.spatial import GROUND, Surface, per_stride_spatial, spatial, spatial_rows
 from core.parameters.stance import NAMES as PARTS
 from core.parameters.stance import foot_pitches, stances
@@ -83,6 +84,7 @@ def take_figures(
             *side_parameters(strides, phases, PHASES),
             *kinematic(curves, of_feet),
             *trunk_regularity(one_foot(strides), angles.t_s, trunk or {}),
+            stride_smoothness(one_foot(strides), angles.t_s, trunk or {}),
         ),
         columns={
             **columns,

@@ -167,6 +167,7 @@ TERMS: Final[Mapping[str, Term]] = {
     "step_regularity_ap": Term("Regularity of steps, forward", "", _TRUNK, 2, (0, 1), _SIZE),
     "stride_regularity_v": Term("Regularity of strides, vertical", "", _TRUNK, 2, (0, 1), _SIZE),
     "stride_regularity_ap": Term("Regularity of strides, forward", "", _TRUNK, 2, (0, 1), _SIZE),
+    "stride_sparc": Term("Smoothness of a stride (SPARC)", "", _TRUNK, 2, (-6, -1), _SIZE),
     "double_support_s": Term("Double support", "s", _SUPPORT, 2, (0, 0.8), _TIME),
     "initial_double_support_s": Term("Initial double support", "s", _SUPPORT, 2, (0, 0.4), _TIME),
     "terminal_double_support_s": Term("Terminal double support", "s", _SUPPORT, 2, (0, 0.4), _TIME),

@@ -46,7 +46,7 @@ def test_every_number_has_the_unit_that_its_name_says() -> None:
     """Seen: documentation says hours, the code gives minutes."""
     tracks = true_tracks(simulate_scenario("comfortable", 5).truth)
     measured = measure(tracks)
-    bare = ("harmonic_ratio_", "step_regularity_", "stride_regularity_")
+    bare = ("harmonic_ratio_", "step_regularity_", "stride_regularity_", "stride_sparc")
     for p in measured.parameters:
         assert p.unit == unit_of(p.name), p.name
         assert p.unit or p.name.endswith("_count") or p.name.startswith(bare), p.name

@@ -1,0 +1,79 @@
+"""Smoothness of the trunk over a stride: the spectral arc length of its acceleration.
+
+SPARC (Balasubramanian et al. 2015, J NeuroEng Rehabil 12:112): minus the length of the curve of the
+normalised amplitude spectrum up to the last frequency, 10 Hz at most, at which it exceeds 5 %; of an
+accelerometer the signal is | ‖f‖ − g | (its table 3). More sub-movements make more peaks and a longer curve:
+nearer to 0 is smoother. It has no norm here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from core.frames import GRAVITY, Floats, Segment
+from core.parameters.resample import resample
+from core.parameters.result import Parameter
+from core.parameters.variability import summary
+from core.rest import Window
+
+NAME: Final = "stride_sparc"
+
+THRESHOLD: Final = 0.05
+"""Share of the amplitude at 0 Hz below which the end of the spectrum does not count (same paper)."""
+
+LIMIT_HZ: Final = 10.0
+"""Highest frequency of a movement (same paper)."""
+
+POINTS: Final = 128
+"""Points of a stride: above 10 Hz up to strides of 6 s."""
+
+PADDING: Final = 16
+"""Times the length, for a smooth spectrum (2⁴, as the authors' programme)."""
+
+
+def stride_smoothness(strides: Sequence[Window], t_s: Floats, trunk: Mapping[Segment, Floats]) -> Parameter:
+    """`stride_sparc` of the pelvis over these strides.
+
+    Parameters
+    ----------
+    strides : first and last contact of each, s. trunk : pelvis → (n, 3) acceleration free of gravity,
+        forward, left, up, on the uniform axis `t_s` (n,).
+
+    Returns
+    -------
+    without a value a reason: "no_pelvis_sensor", "no_strides", "no_forward", "gap".
+    """
+    if "pelvis" not in trunk:
+        return summary(NAME, None, [], "", "no_pelvis_sensor")
+    if not strides:
+        return summary(NAME, None, [], "", "no_strides")
+    force = np.linalg.norm(trunk["pelvis"] + (0.0, 0.0, GRAVITY), axis=1)
+    bounds = np.array(strides)
+    pieces = resample(np.abs(force - GRAVITY)[None], t_s, bounds, POINTS + 1)[0, :, :-1]
+    values = spectral_arc_length(pieces, (bounds[:, 1] - bounds[:, 0]) / POINTS)
+    known = values[np.isfinite(values)].tolist()
+    return summary(NAME, None, known, "", "gap" if np.isfinite(force).any() else "no_forward")
+
+
+def spectral_arc_length(pieces: Floats, step_s: Floats) -> Floats:
+    """SPARC (m,) of signals (m, points) that are not negative, their samples `step_s` (m,) apart.
+
+    NaN where the signal is 0 throughout, not finite or too coarse for a spectrum.
+    """
+    n = PADDING * pieces.shape[1]
+    kept = int(np.ceil(LIMIT_HZ * n * float(np.max(step_s, initial=0.0)))) + 2
+    spectrum = np.abs(np.fft.rfft(pieces, n, axis=1))[:, :kept]
+    dc = spectrum[:, :1]
+    shape = spectrum / np.where(dc > 0.0, dc, np.nan)
+    frequency = np.arange(shape.shape[1]) / (n * step_s[:, None])
+    counts = (shape > THRESHOLD) & (frequency <= LIMIT_HZ)
+    last = shape.shape[1] - 1 - np.argmax(counts[:, ::-1], axis=1)
+    # frequency runs from 0 to 1 over what counts
+    along = 1.0 / np.maximum(last, 1)[:, None]
+    steps = np.hypot(along, np.diff(shape, axis=1))
+    inside = np.arange(steps.shape[1]) < last[:, None]
+    length = np.where(inside, steps, 0.0).sum(axis=1)
+    return np.asarray(np.where(counts.any(axis=1) & (last > 0) & np.isfinite(dc[:, 0]), -length, np.nan))
