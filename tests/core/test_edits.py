@@ -172,5 +172,5 @@ def test_whatever_is_done_events_stay_in_order_apart_and_inside(steps: list[Any]
     assert [e.time_s for e in after] == sorted(e.time_s for e in after)
     assert all(0.0 <= e.time_s <= END for e in after)
     for side in SIDES:
-        own = [e.time_s for e in after if e.side == side]
-        assert all(b - a >= APART_S for a, b in pairwise(own))
+        kept = [e.time_s for e in after if e.side == side]
+        assert all(b - a >= APART_S for a, b in pairwise(kept))
