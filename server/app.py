@@ -16,10 +16,11 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 import web
-from server import pages, problems
+from server import number_pages, pages, problems, visit_pages
 from server.api import (
     analyses,
     audit_log,
+    comparisons,
     files,
     health,
     jobs,
@@ -111,6 +112,7 @@ def create_app(settings: Settings) -> FastAPI:
         reports,
         reviews,
         trends,
+        comparisons,
         jobs,
         users,
         audit_log,
@@ -122,7 +124,15 @@ def create_app(settings: Settings) -> FastAPI:
         """Describe this API as OpenAPI."""
         return openapi(app)
 
-    for router in (api, sign_in.address_router, health.router, pages.router, proxy.router):
+    for router in (
+        api,
+        sign_in.address_router,
+        health.router,
+        pages.router,
+        visit_pages.router,
+        number_pages.router,
+        proxy.router,
+    ):
         app.include_router(router)
     app.mount("/static", Assets(directory=STATIC), name="static")
     declared_actions(app.routes)

@@ -332,6 +332,27 @@ class Report(Response):
     provenance: dict[str, Any]
 
 
+class StrideFigure(Response):
+    """The figure of one stride; null where it has none."""
+
+    index: int
+    side: str
+    start_s: float
+    end_s: float
+    value: float | None
+    text: str
+    counted: bool
+    excluded: str | None
+
+
+class ParameterBehind(Response):
+    """A parameter as in the table, its definition, and every stride of the list with its own figure."""
+
+    parameter: dict[str, Any]
+    definition: str
+    strides: list[StrideFigure]
+
+
 class AuditRow(Response):
     """Who opened or changed what, when; each row's hash covers the row before it."""
 

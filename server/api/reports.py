@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Path
 from starlette.responses import Response
 
 from server import audit, schemas
@@ -37,6 +37,24 @@ def read_parameters(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Respon
     """The table of parameters, left and right, with the norm."""
     report = _opened(db, blobs, who, session_id)
     return attachment(parameters_csv(report), f"parameters-{session_id[:8]}.csv")
+
+
+@router.get("/parameters/{name}", response_model=schemas.ParameterBehind)
+def read_parameter(
+    session_id: Id,
+    name: Annotated[str, Path(pattern=r"^[a-z0-9_]{1,64}$")],
+    db: Db,
+    blobs: Blobs,
+    who: Reader,
+) -> dict[str, object]:
+    """One parameter with its definition and the value of every stride, counted or not."""
+    with db.write() as c:
+        session = sessions.get(c, session_id)
+        patient = patients.get(c, session.patient_id)
+        found = analyses.shown(c, session_id)
+        edits = reviews.edits_of(c, found.id)
+        audit.record(c, who, "parameter.opened", "session", session_id, {"parameter": name})
+    return reports.behind_number(blobs, found, edits, patient, session, name).to_json()
 
 
 @router.get("/curves.csv", response_class=Response, responses=_CSV)

@@ -23,7 +23,9 @@ from core.events.strides import NOTICES
 from core.frames import SEGMENTS, Segment, Side
 from core.measure import Measured
 from core.parameters.result import Parameter
+from core.parameters.rows import Column
 from server.report.columns import SCHEMA, bools_of, floats_of, read_table
+from server.report.exports import STRIDE_COLUMNS
 
 EDIT_WORDS: Final[Mapping[EditKind, tuple[str, str]]] = {
     "move_event": ("event moved", "events moved"),
@@ -180,6 +182,14 @@ def read_strides(data: bytes) -> Strides:
             for row in _rows(data)
         )
     )
+
+
+def read_columns(data: bytes) -> dict[str, Column]:
+    """The parameters of strides.csv by name, one entry per stride."""
+    rows = list(_rows(data))
+    known = {*STRIDE_COLUMNS, "flags", "excluded_reason"}
+    names = [name for name in (rows[0] if rows else ()) if name not in known]
+    return {name: tuple(_number(row[name]) for row in rows) for name in names}
 
 
 def _rows(data: bytes) -> csv.DictReader[str]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import datetime as dt
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar
 
@@ -18,9 +18,10 @@ from sqlalchemy import Connection, insert, select
 
 from core.edits import Edit, edit_of
 from core.measure import Measured, Tracks, measure
+from core.parameters.rows import Column
 from server import audit
 from server.report import signals, tracks
-from server.report.bundle import Bundle, load_bundle, reviewed
+from server.report.bundle import Bundle, load_bundle, read_columns, reviewed
 from server.report.numbers import Numbers, numbers_of, read_numbers
 from server.services import analyses
 from server.services.errors import Conflict
@@ -129,6 +130,16 @@ def measured(blobs: BlobStore, found: analyses.Analysis, edits: Edits) -> Measur
     if not edits.made:
         return None
     return _results.get((found.id, edits.key), lambda: _measure(blobs, found, edits.edits))
+
+
+def columns(blobs: BlobStore, found: analyses.Analysis, edits: Edits) -> Mapping[str, Column]:
+    """Figures of every stride of the list as they count, by parameter; raises IntegrityError."""
+    result = measured(blobs, found, edits)
+    if result is not None:
+        return result.columns
+    return (
+        read_columns(analyses.file_bytes(blobs, found, "strides.csv")) if "strides.csv" in found.files else {}
+    )
 
 
 def bundle(blobs: BlobStore, found: analyses.Analysis, edits: Edits) -> Bundle:

@@ -1,0 +1,38 @@
+"""The page that opens a number: its definition, its strides, and the way to their moments."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Request
+from fastapi.responses import HTMLResponse
+from starlette.responses import Response
+
+from server import session_views
+from server.api.context import Blobs, Db, Id
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.services import analyses, reports, reviews
+from server.shell import opened, page
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+
+@router.get("/sessions/{sid}/parameters/{name}")
+def parameter(
+    request: Request,
+    db: Db,
+    blobs: Blobs,
+    sid: Id,
+    name: Annotated[str, Path(pattern=r"^[a-z0-9_]{1,64}$")],
+    who: Annotated[Identity, require(Action.READ_RESULT)],
+) -> Response:
+    """One parameter of a session with every stride behind it."""
+    with db.read() as c:
+        context = session_views.base(c, sid)
+        found = analyses.shown(c, sid)
+        edits = reviews.edits_of(c, found.id)
+    number = reports.behind_number(blobs, found, edits, context["patient"], context["session"], name)
+    opened(db, who, "session", sid)
+    return page(request, db, who, "parameter.html", "patients", number=number, **context)

@@ -1,0 +1,142 @@
+"""What is behind a number: the strides it is the mean of, and those it is not, each with its moment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from html import escape
+from typing import Final
+
+from core.events.result import Strides
+from core.frames import SIDES, Side
+from core.parameters.rows import Column
+from server.report.columns import plain
+from server.report.definitions import DEFINITIONS
+from server.report.table import Row
+from server.report.wording import TERMS, excluded_words, number
+
+HEIGHT: Final = 220
+TOP, BOTTOM = 12, 24
+"""Chart and its margins, px."""
+
+TICKS: Final = 5
+CSS: Final[dict[Side, tuple[str, float]]] = {"left": ("dl", 5.2), "right": ("dr", 4.6)}
+
+
+@dataclass(frozen=True)
+class StrideValue:
+    """The figure of one stride; None where it has none. `index` is its place in the stride list."""
+
+    index: int
+    side: Side
+    start_s: float
+    end_s: float
+    value: float | None
+    text: str
+    counted: bool
+    excluded: str | None
+
+
+@dataclass(frozen=True)
+class Behind:
+    """One parameter and its strides.
+
+    Parameters
+    ----------
+    row : as in the table. definition : in a sentence. strides : of the whole list; empty for a figure that is
+        not one of strides. svg : its strides over time, empty without any.
+    """
+
+    row: Row
+    definition: str
+    strides: tuple[StrideValue, ...]
+    svg: str
+
+    def to_json(self) -> dict[str, object]:
+        """Plain JSON."""
+        content = {
+            "parameter": asdict(self.row),
+            "definition": self.definition,
+            "strides": [asdict(s) for s in self.strides],
+        }
+        result = plain(content)
+        return result if isinstance(result, dict) else {}
+
+
+def behind(row: Row, strides: Strides, column: Column | None, duration_s: float) -> Behind:
+    """Open a row of the table.
+
+    Parameters
+    ----------
+    column : the figure of every stride of the list, None where it is not one of strides.
+    """
+    digits = TERMS[row.name].digits if row.name in TERMS else 2
+    values = () if column is None else tuple(
+        StrideValue(
+            index=i,
+            side=s.side,
+            start_s=s.start_s,
+            end_s=s.end_s,
+            value=v,
+            text="–" if v is None else number(v, max(digits, 2)),
+            counted=s.excluded_reason is None,
+            excluded=None if s.excluded_reason is None else excluded_words(s.excluded_reason),
+        )
+        for i, (s, v) in enumerate(zip(strides.strides, column, strict=True))
+    )  # fmt: skip
+    return Behind(row, DEFINITIONS.get(row.name, ""), values, _chart(row, values, duration_s))
+
+
+def _chart(row: Row, values: Sequence[StrideValue], duration_s: float) -> str:
+    """Every stride as a mark that leads to its moment, the norm as a band, means of the counted as lines."""
+    shown = [s for s in values if s.value is not None]
+    if not shown or duration_s <= 0.0:
+        return ""
+    figures = [s.value for s in shown if s.value is not None]
+    if row.norm_mean is not None and row.norm_sd is not None:
+        figures += [row.norm_mean - row.norm_sd, row.norm_mean + row.norm_sd]
+    low, high = min(figures), max(figures)
+    pad = 0.08 * (high - low) or 0.1 * abs(high) or 1.0
+    low, high = low - pad, high + pad
+    plot = HEIGHT - TOP - BOTTOM
+
+    def y(value: float) -> float:
+        return TOP + plot * (high - value) / (high - low)
+
+    parts = []
+    if row.norm_mean is not None and row.norm_sd is not None:
+        top, foot = y(row.norm_mean + row.norm_sd), y(row.norm_mean - row.norm_sd)
+        parts.append(f'<rect class="band" x="0" width="100%" y="{top:.1f}" height="{foot - top:.1f}"/>')
+    digits = max(TERMS[row.name].digits, 1) if row.name in TERMS else 2
+    for k in range(TICKS):
+        at = low + pad + (high - low - 2 * pad) * k / (TICKS - 1)
+        parts.append(f'<line class="g" x1="0" x2="100%" y1="{y(at):.1f}" y2="{y(at):.1f}"/>')
+        parts.append(
+            f'<text x="0" y="{y(at):.1f}" dx="-7" dy="4" text-anchor="end">{number(at, digits)}</text>'
+        )
+    step = next((s for s in (1, 2, 5, 10, 30, 60) if duration_s / s <= 12), 120)
+    for t in range(0, int(duration_s) + 1, step):
+        x = 100 * t / duration_s
+        parts.append(f'<text x="{x:.1f}%" y="{HEIGHT}" dy="-6" text-anchor="middle">{t}\u2009s</text>')
+    for side, cell in zip(SIDES, (row.left, row.right), strict=True):
+        if cell is not None:
+            line = f'x1="0" x2="100%" y1="{y(cell.value):.1f}" y2="{y(cell.value):.1f}"'
+            parts.append(f'<line class="m{side[0]}" {line}/>')
+    parts += [_mark(s, y(s.value), duration_s) for s in shown if s.value is not None]
+    return (
+        f'<div class="chart behind"><svg width="100%" height="{HEIGHT}" overflow="visible" role="img">'
+        f"<title>{escape(row.title)} of every stride over time</title>{''.join(parts)}</svg></div>"
+    )
+
+
+def _mark(s: StrideValue, y: float, duration_s: float) -> str:
+    css, radius = CSS[s.side]
+    x = 100 * 0.5 * (s.start_s + s.end_s) / duration_s
+    said = f"{s.side} stride at {s.start_s:.2f} s: {s.text}" + (
+        f", left out: {s.excluded}" if s.excluded else ""
+    )
+    faded = "" if s.counted else " out"
+    return (
+        f'<a href="timeline#t={s.start_s:.3f}"><circle class="{css}{faded}" cx="{x:.2f}%" cy="{y:.1f}" '
+        f'r="{radius}"><title>{escape(said)}</title></circle></a>'
+    )

@@ -1,0 +1,51 @@
+"""What a number opens to."""
+
+from __future__ import annotations
+
+import pytest
+
+from server.report.behind import behind
+from server.report.bundle import read_columns
+from server.report.definitions import DEFINITIONS
+from server.report.exports import strides_csv
+from server.report.model import report_model
+from server.report.wording import TERMS
+from tests.server import walk
+from tests.server.report.conftest import MakeBundle
+
+
+def test_every_parameter_of_the_table_is_defined_in_a_sentence() -> None:
+    assert set(TERMS) == set(DEFINITIONS)
+    assert all(text[0].isupper() or text[0].isdigit() for text in DEFINITIONS.values())
+    assert all(text.endswith(".") for text in DEFINITIONS.values())
+
+
+def test_a_number_is_the_mean_of_the_strides_it_opens_to(make_bundle: MakeBundle) -> None:
+    bundle = make_bundle()
+    rows = {r.name: r for _, group in report_model(bundle).groups for r in group}
+    column = tuple(s.end_s - s.start_s for s in bundle.strides.strides)
+    number = behind(rows["stride_time_s"], bundle.strides, column, 12.0)
+    counted = [s.value for s in number.strides if s.counted and s.side == "left" and s.value is not None]
+    assert rows["stride_time_s"].left is not None
+    assert sum(counted) / len(counted) == pytest.approx(rows["stride_time_s"].left.value)
+    assert rows["stride_time_s"].left.n == len(counted)
+    left_out = [s for s in number.strides if not s.counted]
+    assert left_out
+    assert all(s.excluded for s in left_out)
+    assert number.svg.count("<circle") == len(number.strides)
+    assert number.svg.count('href="timeline#t=') == len(number.strides)
+
+
+def test_a_figure_of_the_take_has_no_strides(make_bundle: MakeBundle) -> None:
+    bundle = make_bundle()
+    rows = {r.name: r for _, group in report_model(bundle).groups for r in group}
+    number = behind(rows["cadence_spm"], bundle.strides, None, 12.0)
+    assert (number.strides, number.svg) == ((), "")
+    assert number.to_json()["definition"] == DEFINITIONS["cadence_spm"]
+
+
+def test_columns_come_back_from_the_stride_table() -> None:
+    strides = walk.strides()
+    column = tuple(None if i == 2 else float(i) for i in range(len(strides.strides)))
+    back = read_columns(strides_csv(strides, {"stride_length_m": column}))
+    assert back == {"stride_length_m": column}
