@@ -31,8 +31,8 @@ DEFINITIONS: Final[Mapping[str, str]] = {
     "total_distance_m": "Way of the take from rest to rest of a foot, turns and all; mean of the feet.",
     "cadence_spm": "60 over the mean step time of both feet.",
     "pci_pct": (
-        "Phase coordination index (Plotnik 2007): how far and how variably the step times depart from half of "
-        "the stride; 0 is perfectly alternating."
+        "Phase coordination index (Plotnik 2007): how far and how variably the step times depart from half "
+        "of the stride; 0 is perfectly alternating."
     ),
     "stride_time_s": "From a contact of the foot to its next.",
     "step_time_s": "From the other foot's contact to this foot's; it belongs to the foot that lands.",
