@@ -11,7 +11,7 @@ from core.events.bouts import Bout
 from core.events.steps import EDGE_STEPS, Steps
 from core.events.turns import Turn
 from core.parameters.result import Parameter
-from core.parameters.variability import summary
+from core.parameters.variability import summary, unit_of
 from core.rest import Window
 
 
@@ -29,11 +29,15 @@ def turn_parameters(turns: Sequence[Turn]) -> tuple[Parameter, ...]:
     """Turns to both sides: number, angle (without direction), duration, peak yaw rate."""
     angle = [float(np.degrees(abs(t.angle_rad))) for t in turns]
     peak = [float(np.degrees(t.peak_rad_s)) for t in turns]
+    figures = {
+        "turn_angle_deg": angle,
+        "turn_duration_s": [t.duration_s for t in turns],
+        "turn_peak_velocity_dps": peak,
+    }
     return (
         Parameter("turn_count", None, len(turns), float(len(turns)), None, ""),
-        summary("turn_angle_deg", None, angle, "deg", "no_turns"),
-        summary("turn_duration_s", None, [t.duration_s for t in turns], "s", "no_turns"),
-        summary("turn_peak_velocity_dps", None, peak, "deg/s", "no_turns"),
+        # the note on few strides is none on turns
+        *(replace(summary(n, None, x, unit_of(n), "no_turns"), note=None) for n, x in figures.items()),
     )
 
 
