@@ -26,7 +26,7 @@ class TakeTimeline extends HTMLElement {
     this.win.addEventListener("move", () => this.moved());
     clock.addEventListener("tick", () => this.ticked());
     this.review.addEventListener("change", () => this.changed());
-    this.review.addEventListener("busy", () => this.toggleAttribute("aria-busy", this.review.busy));
+    this.review.addEventListener("busy", () => this.setAttribute("aria-busy", this.review.busy));
     await this.attempt(() => this.review.load());
     this.start();
   }
@@ -262,7 +262,9 @@ class TakeTimeline extends HTMLElement {
       onLeaveOut: (s) => this.askReason(s),
       onCount: (s) => this.count(s),
     };
+    const field = this.find("stride-box").contains(document.activeElement) ? document.activeElement.id : "";
     this.find("stride-box").replaceChildren(...strideBox(stride, acts));
+    if (field) document.getElementById(field)?.focus(); // the fields are new ones, the place of the keyboard is not
     document.getElementById("h-stride").textContent = stride ? `${stride.side === "left" ? "Left" : "Right"} stride, ${seconds(stride.start_s)} s` : "Stride";
     this.find("verdict").textContent = "";
     if (stride) this.find("verdict").append(h("span", { class: `badge plain${stride.used ? " ok" : ""}` }, stride.used ? "counts" : "left out"));

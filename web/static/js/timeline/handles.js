@@ -86,6 +86,7 @@ export class EventHandles {
     this.held = null;
     this.made.get(event)?.classList.remove("held");
     if (Math.abs(this.at - event.time_s) < 0.0005) return this.put(event, event.time_s);
+    this.moved = event;
     await this.onMove(event, this.at);
     if (this.review.events.includes(event)) this.put(event, event.time_s); // refused: back where it was
   }
@@ -164,10 +165,11 @@ export class EventHandles {
     for (const handle of this.made.values()) handle.remove();
     this.made.clear();
     this.show();
-    const time = this.at ?? focused?.time_s;
+    const time = focused && this.moved === focused ? this.at : focused?.time_s;
     if (focused) {
       const again = this.review.at(this.side, focused.kind, focused.time_s) ?? this.review.at(this.side, focused.kind, time);
-      if (again) this.focus(again);
+      const nearest = this.review.events.filter((e) => e.side === this.side).sort((a, b) => Math.abs(a.time_s - time) - Math.abs(b.time_s - time))[0];
+      if (again ?? nearest) this.focus(again ?? nearest);
     }
   }
 }
