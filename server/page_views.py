@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -139,12 +138,8 @@ def visits(c: Connection, blobs: BlobStore, patient_id: str, *, results: bool) -
 
 def _parameters(c: Connection, blobs: BlobStore, found: analyses.Analysis) -> Sequence[Mapping[str, Any]]:
     """Parameters as stored, or as a person's edits give them."""
-    edits = reviews.edits_of(c, found.id)
-    if edits.made:
-        return [parameter_row(p) for p in reviews.bundle(blobs, found, edits).parameters]
-    stored = json.loads(analyses.file_bytes(blobs, found, "analysis.json"))
-    parameters: list[Mapping[str, Any]] = stored["parameters"]
-    return parameters
+    numbers = reviews.numbers(blobs, found, reviews.edits_of(c, found.id))
+    return [parameter_row(p) for p in numbers.parameters]
 
 
 def key_cells(parameters: Sequence[Mapping[str, Any]]) -> tuple[list[dict[str, Any]], dict[str, int] | None]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
-from server import audit, page_views, session_views, upload_views
+from server import audit, page_views, session_views, upload_views, visit_views
 from server.api.context import Blobs, Db, Id
 from server.auth import accounts, one_time
 from server.auth.access import require
@@ -17,11 +16,21 @@ from server.auth.identity import Identity
 from server.auth.passwords import MIN_LENGTH
 from server.auth.roles import Action, Role
 from server.problems import TEMPLATES
-from server.services import analyses, patients, recordings, reviews, sessions, signals
+from server.services import (
+    analyses,
+    histories,
+    patients,
+    programmes,
+    recordings,
+    reviews,
+    sessions,
+    signals,
+)
 from server.shell import opened as _opened
 from server.shell import page as _page
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.storage.tables import now
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -69,14 +78,21 @@ def patient_list(
 def patient_page(
     request: Request, db: Db, blobs: Blobs, pid: Id, who: Annotated[Identity, require(Action.READ_PATIENT)]
 ) -> Response:
-    """One patient: visits on a time line, results by visit."""
+    """One patient: programme, the trend of one figure, results by visit."""
     with db.read() as c:
         patient = patients.get(c, pid)
         visits = page_views.visits(c, blobs, pid, results=who.may(Action.READ_RESULT))
+        done, plans = histories.read(c, patient)
     _opened(db, who, "patient", pid)
+    trend = None
+    if who.may(Action.READ_RESULT):
+        trend = visit_views.teaser(histories.history(blobs, patient, done, plans))
     return _page(
         request, db, who, "patient.html", "patients",
         patient=page_views.patient_view(patient), visits=visits, keys=page_views.KEY_PARAMETERS,
+        programme=visit_views.programme_view(plans[0], now().date()) if plans else None,
+        planned={v.session_id: v.label for plan in plans for v in plan.visits if v.session_id},
+        trend=trend, comparable=len(done) > 1,
     )  # fmt: skip
 
 
@@ -85,13 +101,16 @@ def new_session(
     request: Request, db: Db, pid: Id, who: Annotated[Identity, require(Action.CREATE_SESSION)]
 ) -> Response:
     """Ask for protocol, date, height and aids of a new visit."""
+    today = now().date()
     with db.read() as c:
         patient = patients.get(c, pid)
+        plans = programmes.of_patient(c, pid)
     _opened(db, who, "patient", pid)
-    today = dt.datetime.now(dt.UTC).date().isoformat()
+    open_visits = [v for plan in plans[:1] for v in plan.visits if v.session_id is None]
     return _page(
         request, db, who, "session-new.html", "patients",
-        patient=patient, protocols=page_views.PROTOCOLS, today=today,
+        patient=patient, protocols=page_views.PROTOCOLS, today=today.isoformat(), open_visits=open_visits,
+        near=plans[0].near(today) if plans else None,
     )  # fmt: skip
 
 

@@ -239,15 +239,20 @@ def _notices(model: ReportModel) -> list[dict[str, Any]]:
     return list(boxes.values())
 
 
-def _chart(panel: CurvePanel, height: int, *, x_unit: bool) -> dict[str, Any]:
+def chart_view(panel: CurvePanel, svg: str) -> dict[str, Any]:
+    """A drawn panel with its captions."""
     return {
         "name": panel.variable.name,
         "title": panel.variable.label,
         "zero": panel.title.removeprefix(panel.variable.label).lstrip(", "),
         "low": panel.low_confidence,
         "reason": panel.reason,
-        "svg": cycle_svg(panel, height=height, x_unit=x_unit),
+        "svg": svg,
     }
+
+
+def _chart(panel: CurvePanel, height: int, *, x_unit: bool) -> dict[str, Any]:
+    return chart_view(panel, cycle_svg(panel, height=height, x_unit=x_unit))
 
 
 def _identity(patient: Any, session: Any) -> list[tuple[str, str]]:

@@ -78,3 +78,28 @@ class Trends(Response):
     protocol: str | None
     visits: list[TrendVisit]
     trends: list[Trend]
+
+
+class ComparedSession(Response):
+    """One of two sessions."""
+
+    session_id: str
+    performed_on: dt.date
+    title: str
+    protocol: str
+    analysis_id: str
+
+
+class ChangeInWords(Change):
+    """A change and its verdict as the pages say it."""
+
+    words: str
+
+
+class Comparison(Response):
+    """Two sessions, the earlier one first; `cautions` say how the measurements themselves differ."""
+
+    before: ComparedSession
+    after: ComparedSession
+    cautions: list[str]
+    changes: list[ChangeInWords]

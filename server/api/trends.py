@@ -47,7 +47,7 @@ def read_trends(
     blobs: Blobs,
     who: Reader,
     show: Names = [],
-    protocol: Walked = None,  # noqa: B006
+    protocol: Walked = None,
 ) -> Response:
     """Values by visit with the norm, and the change since the first assessment against MDC and MCID."""
     known, found = _opened(db, blobs, who, patient_id, show, protocol)
@@ -72,7 +72,7 @@ def read_trends_table(
     blobs: Blobs,
     who: Reader,
     show: Names = [],
-    protocol: Walked = None,  # noqa: B006
+    protocol: Walked = None,
 ) -> Response:
     """The same as a table: one row per figure, side and visit."""
     known, found = _opened(db, blobs, who, patient_id, show, protocol)

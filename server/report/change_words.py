@@ -16,7 +16,7 @@ VERDICTS: Final[Mapping[str, str]] = {
 }
 """Verdict → words (spec/clinic.md §2)."""
 
-NO_LIMIT: Final = "no measurement error is published for it"
+NO_LIMIT: Final = "no measurement error known"
 
 SCORE_TERMS: Final[Mapping[str, Term]] = {
     "gps_sagittal_deg": Term(

@@ -28,7 +28,12 @@ _CLOSE_PCT = 6.0
 
 
 def cycle_svg(
-    panel: CurvePanel, *, height: int = 176, x_unit: bool = False, single_strides: bool = True
+    panel: CurvePanel,
+    *,
+    height: int = 176,
+    x_unit: bool = False,
+    single_strides: bool = True,
+    earlier: CurvePanel | None = None,
 ) -> str:
     """Draw one panel: band, grid, foot-off, single strides, means, cursor, words, from back to front.
 
@@ -37,6 +42,7 @@ def cycle_svg(
     height : px with margins, of which the stylesheet gives 18 above and 20 (34 with `x_unit`) below.
     x_unit : print "% of gait cycle" below; once per column.
     single_strides : draw thin strides, each a path with its number in the stride list as `data-stride`.
+    earlier : the same variable in an earlier session; its means are drawn thin, behind.
 
     Returns
     -------
@@ -55,9 +61,10 @@ def cycle_svg(
     if single_strides:
         for side, curve in panel.sides.items():
             plot.strides(side, curve)
-    for side, curve in panel.sides.items():
-        if curve.mean_deg is not None:
-            plot.curve(curve.mean_deg, f"m{KEY[side]}")
+    for css, drawn in (("pv", {} if earlier is None else earlier.sides), ("m", panel.sides)):
+        for side, curve in drawn.items():
+            if curve.mean_deg is not None:
+                plot.curve(curve.mean_deg, f"{css}{KEY[side]}")
     plot.foot_offs(panel.sides)
     plot.cursor()
     plot.x_axis("% of gait cycle" if x_unit else None)

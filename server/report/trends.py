@@ -104,7 +104,7 @@ class Trend:
 
 def names_in(visits: Sequence[Visit]) -> tuple[str, ...]:
     """Figures with a value in any visit, in the order of the table."""
-    found = {p.name for visit in visits for p in _figures(visit.numbers) if p.mean is not None}
+    found = {p.name for visit in visits for p in figures(visit.numbers) if p.mean is not None}
     known = (*TERMS, *SCORE_TERMS)
     return (*(n for n in known if n in found), *sorted(found.difference(known)))
 
@@ -124,7 +124,7 @@ def trends(
         comfortable speed; the reference of speed itself, which cannot be matched by speed.
     affected : side, None = none or both.
     """
-    tables = [{(p.name, p.side): p for p in _figures(visit.numbers)} for visit in visits]
+    tables = [{(p.name, p.side): p for p in figures(visit.numbers)} for visit in visits]
     found = []
     for name in names:
         norm = _norm(name, visits, norms, usual or {})
@@ -135,7 +135,7 @@ def trends(
     return tuple(found)
 
 
-def _figures(numbers: Numbers) -> tuple[Parameter, ...]:
+def figures(numbers: Numbers) -> tuple[Parameter, ...]:
     """Parameters, and the scores of the two legs as if they were."""
     made = [
         Parameter(s.name, s.side, s.n, s.value, None, s.unit, s.reason)
@@ -157,8 +157,9 @@ def _norm(
 ) -> NormValue | None:
     if name in SCORE_TERMS:
         return _score_norm(name, visits)
-    values = usual if name == "gait_speed_mps" else {} if norms is None else norms.values
-    norm = values.get(name)
+    norm = None if norms is None else norms.values.get(name)
+    if norm is None and name == "gait_speed_mps":
+        norm = usual.get(name)
     return norm if norm is not None and norm.comparable else None
 
 

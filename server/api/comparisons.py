@@ -1,0 +1,69 @@
+"""Two sessions of a patient compared, figure by figure."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter
+from fastapi.responses import JSONResponse
+from starlette.responses import Response
+
+from server import audit, trend_schemas
+from server.api.context import Blobs, Db, Id
+from server.api.documents import refusals
+from server.api.downloads import BINARY, attachment
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.report.columns import plain
+from server.report.comparison import comparison_csv
+from server.services import comparisons
+from server.services.comparisons import Pair
+from server.services.histories import Analysed
+from server.storage.db import Database
+
+router = APIRouter(prefix="/sessions/{session_id}/compare", tags=["trends"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+_JSON: dict[int | str, dict[str, Any]] = {200: {"model": trend_schemas.Comparison}, **refusals(409)}
+_CSV: dict[int | str, dict[str, Any]] = {
+    200: {"description": "The table", "content": {"text/csv": {"schema": BINARY}}},
+    **refusals(409),
+}
+
+
+@router.get("/{other_id}", response_model=None, responses=_JSON)
+def compare(session_id: Id, other_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+    """Every figure before and after, its change against MDC and MCID, and what may be in the way."""
+    found = _opened(db, who, session_id, other_id)
+    content = {
+        "before": _session(found.before),
+        "after": _session(found.after),
+        "cautions": found.cautions,
+        "changes": [{**vars(r.change), "words": r.words.verdict} for r in comparisons.rows(blobs, found)],
+    }
+    return JSONResponse(plain(content))
+
+
+@router.get("/{other_id}/changes.csv", response_class=Response, responses=_CSV)
+def compare_as_table(session_id: Id, other_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+    """The same as a table."""
+    found = _opened(db, who, session_id, other_id)
+    name = f"changes-{found.before.session.id[:8]}-{found.after.session.id[:8]}.csv"
+    return attachment(comparison_csv(comparisons.rows(blobs, found)), name)
+
+
+def _opened(db: Database, who: Identity, session_id: str, other_id: str) -> Pair:
+    with db.write() as c:
+        found = comparisons.pair(c, session_id, other_id)
+        audit.record(c, who, "comparison.opened", "session", session_id, {"with": other_id})
+    return found
+
+
+def _session(a: Analysed) -> dict[str, Any]:
+    return {
+        "session_id": a.session.id,
+        "performed_on": a.session.performed_on.isoformat(),
+        "title": a.session.title,
+        "protocol": a.session.protocol,
+        "analysis_id": a.found.id,
+    }

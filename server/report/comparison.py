@@ -1,0 +1,81 @@
+"""Two sessions of a person side by side: every figure before and after, the change and its verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from core.change import Change, parameter_changes
+from core.frames import Side
+from core.norms import Norms, NormValue
+from server.report.change_words import SCORE_TERMS, ChangeWords, change_words, term_of
+from server.report.exports import write_csv
+from server.report.numbers import Numbers
+from server.report.trends import figures
+from server.report.wording import TERMS, number, reason_words
+
+
+@dataclass(frozen=True)
+class ComparedRow:
+    """A figure of one side, or of the whole take.
+
+    Parameters
+    ----------
+    before, after : as printed, "–" where not measured. reason : why there is no number after, else None.
+    """
+
+    title: str
+    unit: str
+    group: str
+    side: Side | None
+    before: str
+    after: str
+    words: ChangeWords
+    reason: str | None
+    change: Change
+
+
+def changes(
+    before: Numbers, after: Numbers, norms: Norms | None = None, affected: Side | None = None
+) -> tuple[Change, ...]:
+    """What changed of every figure that either session has, in the order of the table."""
+    known: Mapping[str, NormValue] = {} if norms is None else norms.values
+    there = {(p.name, p.side) for n in (before, after) for p in figures(n) if p.mean is not None}
+    order = {name: i for i, name in enumerate((*TERMS, *SCORE_TERMS))}
+    found = [
+        c
+        for c in parameter_changes(figures(before), figures(after), affected, known)
+        if (c.name, c.side) in there
+    ]
+    return tuple(sorted(found, key=lambda c: order.get(c.name, len(order))))
+
+
+def compared_rows(before: Numbers, after: Numbers, norms: Norms | None = None) -> tuple[ComparedRow, ...]:
+    """The table of a comparison."""
+    reasons = {(p.name, p.side): p.reason for p in figures(after)}
+    rows = []
+    for c in changes(before, after, norms):
+        term = term_of(c.name, c.unit)
+        old, new = ("–" if value is None else number(value, term.digits) for value in (c.before, c.after))
+        reason = reason_words(reasons.get((c.name, c.side))) if c.after is None else None
+        rows.append(
+            ComparedRow(term.label, term.unit, term.group, c.side, old, new, change_words(c), reason, c)
+        )
+    return tuple(rows)
+
+
+def comparison_csv(rows: Sequence[ComparedRow]) -> bytes:
+    """One row per figure and side, numbers in full."""
+    header = (
+        *("name", "side", "unit", "before", "after", "change", "verdict", "towards_norm"),
+        *("mdc", "mdc_source", "mcid", "mcid_source", "reason"),
+    )
+
+    def cells() -> Iterator[Sequence[object]]:
+        for c in (r.change for r in rows):
+            yield (
+                *(c.name, c.side or "", c.unit, c.before, c.after, c.difference, c.verdict, c.towards_norm),
+                *(c.limit, c.limit_source, c.mcid, c.mcid_source, c.reason),
+            )
+
+    return write_csv(header, cells())

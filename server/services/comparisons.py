@@ -1,0 +1,104 @@
+"""Which two sessions of a patient are compared: any two with a result, or one and the one before it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sqlalchemy import Connection
+
+from core.norms import Norms, norms_for
+from server.report.comparison import ComparedRow, compared_rows
+from server.report.numbers import Numbers
+from server.services import analyses, patients, reviews, sessions
+from server.services.errors import Conflict, ServiceError
+from server.services.histories import Analysed
+from server.services.patients import Patient
+from server.services.sessions import Session
+from server.storage.blobs import BlobStore
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two analysed sessions of a patient, the earlier one first."""
+
+    patient: Patient
+    before: Analysed
+    after: Analysed
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """Why a difference may come from how it was measured, in sentences."""
+        said = []
+        old, new = self.before, self.after
+        if old.session.protocol != new.session.protocol:
+            said.append(
+                f"The protocols differ: {old.session.protocol}, then {new.session.protocol}. Walking over "
+                "ground and on a treadmill differ by themselves."
+            )
+        if _sensors(old) != _sensors(new):
+            said.append("Other segments carried sensors in the two sessions.")
+        if old.found.config_sha256 != new.found.config_sha256:
+            said.append("The two analyses have different settings; run the earlier one again to compare.")
+        elif old.found.code_version != new.found.code_version:
+            said.append(
+                f"The analyses are of different versions ({old.found.code_version}, "
+                f"{new.found.code_version}); run the earlier one again to compare."
+            )
+        return tuple(said)
+
+
+def pair(c: Connection, session_id: str, other_id: str) -> Pair:
+    """Two sessions to compare, in whatever order they are named.
+
+    Raises
+    ------
+    NotFound: a session or its result. Conflict: other_patient. ServiceError bad_value: one and the same.
+    """
+    if session_id == other_id:
+        raise ServiceError("bad_value", "A session is compared with another one, not with itself.")
+    both = [_analysed(c, sid) for sid in (session_id, other_id)]
+    if both[0].session.patient_id != both[1].session.patient_id:
+        raise Conflict("other_patient", "These sessions belong to different patients.")
+    both.sort(key=lambda a: (a.session.performed_on, a.session.created_at))
+    return Pair(patients.get(c, both[0].session.patient_id), *both)
+
+
+def before(c: Connection, session: Session) -> Analysed | None:
+    """The analysed session of the same protocol that came last before this one."""
+    earlier = [
+        s
+        for s in sessions.of_patient(c, session.patient_id)
+        if s.protocol == session.protocol
+        and (s.performed_on, s.created_at) < (session.performed_on, session.created_at)
+    ]
+    for s in earlier:
+        found = analyses.latest(c, s.id)
+        if found is not None:
+            return Analysed(s, found, reviews.edits_of(c, found.id))
+    return None
+
+
+def rows(blobs: BlobStore, found: Pair) -> tuple[ComparedRow, ...]:
+    """The table of a comparison; raises IntegrityError."""
+    old = reviews.numbers(blobs, found.before.found, found.before.edits)
+    new = reviews.numbers(blobs, found.after.found, found.after.edits)
+    return compared_rows(old, new, norms(found.patient, found.after.session, new))
+
+
+def norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
+    """The reference of a person on the day of a session, at its speed."""
+    speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
+    age = session.performed_on.year - patient.birth_year if patient.birth_year else None
+    height = session.height_m if session.height_m is not None else patient.height_m
+    return norms_for(age, patient.sex, speed, height)  # type: ignore[arg-type]
+
+
+def _analysed(c: Connection, session_id: str) -> Analysed:
+    session = sessions.get(c, session_id)
+    found = analyses.shown(c, session_id)
+    return Analysed(session, found, reviews.edits_of(c, found.id))
+
+
+def _sensors(a: Analysed) -> frozenset[str]:
+    mapped = (a.found.manifest or {}).get("sensors") or {}
+    return frozenset(segment for segment in mapped.values() if segment)

@@ -1,0 +1,104 @@
+"""Two sessions compared over the API and the page: the earlier one first, whatever the order of naming."""
+
+from __future__ import annotations
+
+import csv
+import datetime as dt
+import io
+
+import pytest
+
+from server.services import patients, sessions
+from server.storage.tables import new_id
+from tests.server import analysed
+from tests.server.clinic import Clinic
+
+pytestmark = pytest.mark.anyio
+
+API = "/api/v1"
+
+
+def _patient(clinic: Clinic) -> str:
+    with clinic.db.write() as c:
+        return patients.create(c, None, code=f"P-{new_id()[:8]}", height_m=1.75).id
+
+
+def _session(
+    clinic: Clinic, patient: str, days: int, protocol: str = "walk", duration_s: float = 12.0
+) -> str:
+    with clinic.db.write() as c:
+        day = dt.date(2026, 3, 2) + dt.timedelta(days=days)
+        made = sessions.create(c, None, patient, performed_on=day, protocol=protocol).id
+    analysed.finish(clinic, patient, made, analysed.files(duration_s))
+    return made
+
+
+async def test_the_earlier_session_comes_first_in_either_order(clinic: Clinic) -> None:
+    patient = _patient(clinic)
+    late, early = _session(clinic, patient, 30, duration_s=24.0), _session(clinic, patient, 0)
+    async with clinic.client("viewer") as client:
+        one = (await client.get(f"{API}/sessions/{late}/compare/{early}")).json()
+        two = (await client.get(f"{API}/sessions/{early}/compare/{late}")).json()
+        rows = (await client.get(f"{API}/sessions/{late}/compare/{early}/changes.csv")).text
+        pages = [await client.get(f"/sessions/{a}/compare/{b}") for a, b in ((late, early), (early, late))]
+    assert one == two
+    assert (one["before"]["session_id"], one["after"]["session_id"]) == (early, late)
+    stance = next(c for c in one["changes"] if (c["name"], c["side"]) == ("stance_pct", "left"))
+    assert stance["verdict"] == "within_measurement_error"
+    assert stance["words"] == "within measurement error"
+    assert {c["name"] for c in one["changes"]} >= {"gps_sagittal_deg", "stride_time_s"}
+    assert len(list(csv.DictReader(io.StringIO(rows)))) == len(one["changes"])
+    assert [p.status_code for p in pages] == [200, 200]
+    assert 'class="pvl"' in pages[0].text
+
+
+async def test_another_protocol_is_said_to_be_in_the_way(clinic: Clinic) -> None:
+    patient = _patient(clinic)
+    walk, belt = _session(clinic, patient, 0), _session(clinic, patient, 7, protocol="treadmill")
+    async with clinic.client("viewer") as client:
+        found = (await client.get(f"{API}/sessions/{belt}/compare/{walk}")).json()
+    assert any("protocols differ" in caution for caution in found["cautions"])
+
+
+async def test_sessions_of_two_people_or_one_session_are_not_compared(clinic: Clinic) -> None:
+    one, two = (_session(clinic, _patient(clinic), 0) for _ in range(2))
+    async with clinic.client("viewer") as client:
+        foreign = await client.get(f"{API}/sessions/{one}/compare/{two}")
+        same = await client.get(f"{API}/sessions/{one}/compare/{one}")
+        page = await client.get(f"/sessions/{one}/compare/{two}")
+    assert (foreign.status_code, foreign.json()["code"]) == (409, "other_patient")
+    assert (same.status_code, same.json()["code"]) == (422, "bad_value")
+    assert page.status_code == 409
+
+
+async def test_two_ticked_visits_lead_to_their_comparison_and_others_back(clinic: Clinic) -> None:
+    patient = _patient(clinic)
+    one, two = _session(clinic, patient, 0), _session(clinic, patient, 7)
+    async with clinic.client("viewer") as client:
+        both = await client.get(f"/patients/{patient}/compare", params={"visit": [one, two]})
+        single = await client.get(f"/patients/{patient}/compare", params={"visit": [one]})
+    assert both.headers["location"] == f"/sessions/{one}/compare/{two}"
+    assert single.headers["location"] == f"/patients/{patient}"
+
+
+async def test_a_session_without_a_result_has_nothing_to_compare(clinic: Clinic) -> None:
+    patient = _patient(clinic)
+    done = _session(clinic, patient, 0)
+    with clinic.db.write() as c:
+        empty = sessions.create(c, None, patient).id
+    async with clinic.client("viewer") as client:
+        assert (await client.get(f"{API}/sessions/{done}/compare/{empty}")).status_code == 404
+
+
+async def test_pages_of_trends_and_programme_open_for_everybody_who_may(clinic: Clinic) -> None:
+    patient = _patient(clinic)
+    async with clinic.client("viewer") as client:
+        assert "Nothing to follow yet" in (await client.get(f"/patients/{patient}/trends")).text
+        assert "No programme" in (await client.get(f"/patients/{patient}/programme")).text
+    _session(clinic, patient, 0)
+    async with clinic.client("viewer") as client:
+        assert "one assessment so far" in (await client.get(f"/patients/{patient}/trends")).text
+    async with clinic.client("assistant") as client:
+        assert (await client.get(f"/patients/{patient}/programme")).status_code == 200
+        assert (await client.get(f"/patients/{patient}/trends")).status_code == 403
+        assert (await client.get(f"/patients/{patient}")).status_code == 200
