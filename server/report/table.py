@@ -8,8 +8,9 @@ from typing import Final
 
 from core.norms.lookup import Norms
 from core.parameters.result import Parameter
+from core.parameters.symmetry import Symmetry, symmetries
 from server.report.curves import range_svg
-from server.report.wording import TERMS, Term, difference_words, number, reason_words
+from server.report.wording import TERMS, Term, difference_words, number, reason_words, symmetry_words
 
 NOBODY: Final = Norms(None, None)
 """No reference people at all."""
@@ -60,6 +61,7 @@ class Row:
         behind it; None where no comparable norm exists, `norm_note` then says why if there is a reason.
     reason : words in place of all numbers, None if there is any.
     low_confidence : of an angle that the estimator's model gives; it has no norm.
+    symmetry : left against right in numbers, None unless both sides have one.
     """
 
     name: str
@@ -79,6 +81,12 @@ class Row:
     norm_source: str | None = None
     norm_note: str = ""
     low_confidence: bool = False
+    symmetry: Symmetry | None = None
+
+    @property
+    def symmetry_words(self) -> str:
+        """Ratio, index and angle of the two sides in words; empty where there is none."""
+        return "" if self.symmetry is None else symmetry_words(self.symmetry)
 
     @property
     def z_words(self) -> str:
@@ -148,6 +156,7 @@ def _row(name: str, sides: Mapping[str | None, Parameter], norms: Norms) -> Row:
         norm_n=None if shown is None else shown.n,
         norm_source=None if shown is None else shown.source,
         norm_note="" if norm is None else norm.note,
+        symmetry=next(iter(symmetries(tuple(sides.values()))), None),
     )
 
 

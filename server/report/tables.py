@@ -10,6 +10,13 @@ from server.report.exports import write_csv
 from server.report.model import ReportModel
 from server.report.trends import Trend, Visit
 
+SYMMETRY = {
+    "ratio": "ratio_left_right",
+    "index_pct": "symmetry_index_pct",
+    "angle_pct": "symmetry_angle_pct",
+}
+"""What of the sides compared (core/parameters/symmetry.py) → its column."""
+
 
 def parameters_csv(report: ReportModel) -> bytes:
     """One row per parameter and side, numbers in full, norm where comparable, reason where no number."""
@@ -21,6 +28,7 @@ def parameters_csv(report: ReportModel) -> bytes:
         "sd",
         "unit",
         "difference",
+        *SYMMETRY.values(),
         "norm_mean",
         "norm_sd",
         "norm_source",
@@ -40,6 +48,7 @@ def parameters_csv(report: ReportModel) -> bytes:
                         *numbers,
                         r.unit,
                         r.difference,
+                        *(None if r.symmetry is None else getattr(r.symmetry, what) for what in SYMMETRY),
                         *norm,
                         r.reason if c is None else None,
                     )

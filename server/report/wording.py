@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from core.parameters.symmetry import Symmetry
+
 Plane = Literal["sagittal", "frontal", "transverse"]
 
 
@@ -260,6 +262,23 @@ def number(value: float, digits: int = 0) -> str:
     """A number with a real minus sign and without a negative zero."""
     text = f"{value:.{digits}f}"
     return text.removeprefix("-") if float(text) == 0 else text.replace("-", "−")
+
+
+def symmetry_words(s: Symmetry) -> str:
+    """The indices of two sides with what they put first; "" for angles, whose difference says it all."""
+    if s.ratio is None or s.index_pct is None or s.angle_pct is None:
+        return "a side is too near zero for a ratio" if s.reason == "near_zero" else ""
+    first, other = s.reference.split("/")
+    return (
+        f"{first} / {other} {number(s.ratio, 2)}, symmetry index {_signed(s.index_pct)} % (positive: {first} "
+        f"larger), symmetry angle {_signed(s.angle_pct)} % (negative: {first} larger)"
+    )
+
+
+def _signed(value: float, digits: int = 1) -> str:
+    """A number that always carries its sign, unless it rounds to 0."""
+    text = number(value, digits)
+    return f"+{text}" if value > 0 and float(f"{value:.{digits}f}") else text
 
 
 def difference_words(left: float, right: float, term: Term) -> str:

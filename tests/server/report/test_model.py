@@ -180,12 +180,33 @@ def test_replay_data_is_what_the_clock_needs(bundle: Bundle) -> None:
     assert set(replay["curves"]["knee_flexion"]) == {"left", "right"}
 
 
+def test_sides_are_compared_in_numbers_and_words() -> None:
+    found = row(rows_of(*both("step_length_m", 0.39, 0.25)), "step_length_m")
+    assert found.symmetry is not None
+    assert found.symmetry.index_pct == pytest.approx(43.75)
+    assert found.symmetry_words == (
+        "left / right 1.56, symmetry index +43.8 % (positive: left larger), "
+        "symmetry angle −13.7 % (negative: left larger)"
+    )
+    near = row(rows_of(*both("circumduction_m", 0.14, 0.03)), "circumduction_m")
+    assert near.symmetry_words == "a side is too near zero for a ratio"
+    angle = row(rows_of(*both("knee_flexion_ic_deg", 8.0, 2.0, "deg")), "knee_flexion_ic_deg")
+    assert (angle.symmetry_words, angle.difference) == ("", "left more flexed by 6°")
+
+
+def both(name: str, left: float, right: float, unit: str = "m") -> tuple[Parameter, Parameter]:
+    return Parameter(name, "left", 12, left, None, unit), Parameter(name, "right", 12, right, None, unit)
+
+
 def test_tables_have_a_csv_twin(bundle: Bundle) -> None:
     model = report_model(bundle, age=40, sex="male")
     parameters = list(csv.DictReader(io.StringIO(parameters_csv(model).decode())))
     stance = [r for r in parameters if r["name"] == "stance_pct"]
     assert [r["side"] for r in stance] == ["left", "right"]
     assert float(stance[0]["mean"]) == pytest.approx(62.0, abs=0.1)
+    assert float(stance[0]["ratio_left_right"]) == pytest.approx(
+        float(stance[0]["mean"]) / float(stance[1]["mean"])
+    )
     curves = list(csv.DictReader(io.StringIO(curves_csv(model).decode())))
     knee = [r for r in curves if r["variable"] == "knee_flexion" and r["side"] == "right"]
     assert len(knee) == 101
