@@ -110,9 +110,16 @@ def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
     events = edited_events(tracks.events, edits, tracks.duration_s)
     strides = edited_strides(stride_list(events, tracks, tracks.turning, tracks.params), edits)
     figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk)
-    steps = tracks.steps
+    # contacts, found or set by a person, say more than the trunk
+    steps = None if events.events else tracks.steps
     bouts = bouts_of(events, tracks.rests) if steps is None else steps.bouts
-    walking = bout_parameters(bouts) + turn_parameters(tracks.turns)
-    # without a foot there is no stride: what the trunk tells stands alone, not among missing numbers
-    first = figures.parameters if steps is None else (*step_parameters(steps), *_regular(tracks, steps))
-    return Measured(events, strides, first + walking, figures.columns, bouts, tracks.turns, steps)
+    first = figures.parameters if steps is None else _of_steps(tracks, steps, figures.parameters)
+    parameters = first + bout_parameters(bouts) + turn_parameters(tracks.turns)
+    return Measured(events, strides, parameters, figures.columns, bouts, tracks.turns, steps)
+
+
+def _of_steps(tracks: Tracks, steps: Steps, figures: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
+    """What the trunk tells; beside it, where feet were worn and not understood, what they do not tell."""
+    told = (*step_parameters(steps), *_regular(tracks, steps))
+    known = {(p.name, p.side) for p in told}
+    return told + tuple(p for p in figures if tracks.q and (p.name, p.side) not in known)
