@@ -49,7 +49,7 @@ export class EventHandles {
     }, s("svg", { class: "flag", viewBox: "0 0 14 12", "aria-hidden": "true" }, s("path", { d: "M1 1h12L7 11Z" })));
     handle.addEventListener("pointerdown", (e) => this.grab(e, event, handle));
     handle.addEventListener("keydown", (e) => this.key(e, event));
-    handle.addEventListener("focus", () => this.onPick(event));
+    handle.addEventListener("focus", () => this.renewing || this.onPick(event));
     handle.addEventListener("blur", () => this.release(event));
     return handle;
   }
@@ -169,7 +169,9 @@ export class EventHandles {
     if (focused) {
       const again = this.review.at(this.side, focused.kind, focused.time_s) ?? this.review.at(this.side, focused.kind, time);
       const nearest = this.review.events.filter((e) => e.side === this.side).sort((a, b) => Math.abs(a.time_s - time) - Math.abs(b.time_s - time))[0];
+      this.renewing = true; // the cursor stays where it is: a deleted event is often put back elsewhere
       if (again ?? nearest) this.focus(again ?? nearest);
+      this.renewing = false;
     }
   }
 }

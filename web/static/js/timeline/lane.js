@@ -5,6 +5,7 @@ import { LETTER, h, s, seconds } from "./dom.js";
 const MS = 1000;
 const COARSE_POINTS = 2000;
 const WAIT_MS = 90;
+const DENSE_S = 0.08;
 const MARGIN = 1; // so many windows on each side are loaded along
 const CLASS = { left: "tl-l", right: "tl-r", both: "tl-x", x: "tl-x", y: "tl-y", z: "tl-z" };
 const SHORT = { left: "L", right: "R", both: "" };
@@ -104,6 +105,8 @@ export class SignalLane {
   draw(piece) {
     if (this.drawn === piece) return;
     this.drawn = piece;
+    // where a pixel holds a whole swing, both feet must be seen through each other
+    this.svg.classList.toggle("dense", piece.step_s > DENSE_S);
     this.group.replaceChildren(...Object.keys(piece.low).map((line) => s("path", { class: CLASS[line], d: this.trace(piece, line) })));
   }
 
