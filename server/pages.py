@@ -18,6 +18,7 @@ from server.auth.roles import Action, Role
 from server.problems import TEMPLATES
 from server.services import (
     analyses,
+    comparisons,
     histories,
     patients,
     programmes,
@@ -251,6 +252,7 @@ def _session_page(
         context = session_views.base(c, sid)
         latest = analyses.latest(c, sid) if who.may(Action.READ_RESULT) else None
         edits = reviews.Edits() if latest is None else reviews.edits_of(c, latest.id)
+        context["before"] = None if latest is None else comparisons.before(c, context["session"])
     if latest is None and paper:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
     if latest is not None:

@@ -329,6 +329,7 @@ class Report(Response):
     curve_notes: list[str]
     angle_zero: str | None
     zero_offset_deg: dict[str, float]
+    since: dict[str, Any] | None
     provenance: dict[str, Any]
 
 

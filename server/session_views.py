@@ -159,7 +159,7 @@ def report(
 ) -> dict[str, Any]:
     """The report of an analysis with its charts drawn, for the page or for paper."""
     patient, session = context["patient"], context["session"]
-    bundle, model = reports.read(blobs, found, edits, patient, session)
+    bundle, model = reports.read(blobs, found, edits, patient, session, context.get("before"))
     last_row = len(model.panels) - COLUMNS
     heights = PAPER_HEIGHTS if paper else PAGE_HEIGHTS
     curves = [_chart(p, heights[i >= last_row], x_unit=i >= last_row) for i, p in enumerate(model.panels)]
@@ -167,6 +167,7 @@ def report(
     return {
         **{name: getattr(model, name) for name in SHOWN},
         "groups": _groups(model, paper=paper),
+        "since": None if paper else model.since,
         "more": [(name, rows) for name, rows in model.groups if name in SECONDARY],
         "missing": [
             (r.title, r.reason.removeprefix("not measured: "))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from core.change import Change, parameter_changes
 from core.frames import Side
@@ -11,8 +11,11 @@ from core.norms import Norms, NormValue
 from server.report.change_words import SCORE_TERMS, ChangeWords, change_words, term_of
 from server.report.exports import write_csv
 from server.report.numbers import Numbers
+from server.report.table import Row
 from server.report.trends import figures
 from server.report.wording import TERMS, number, reason_words
+
+Group = tuple[str, tuple[Row, ...]]
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,18 @@ def compared_rows(before: Numbers, after: Numbers, norms: Norms | None = None) -
             ComparedRow(term.label, term.unit, term.group, c.side, old, new, change_words(c), reason, c)
         )
     return tuple(rows)
+
+
+def with_changes(groups: Sequence[Group], found: Sequence[Change]) -> tuple[Group, ...]:
+    """Rows of a session's table with their change since an earlier one, where both have a number."""
+    words: dict[str, list[ChangeWords]] = {}
+    for c in found:
+        if c.difference is not None:
+            words.setdefault(c.name, []).append(change_words(c))
+    return tuple(
+        (name, tuple(replace(row, change=tuple(words.get(row.name, ()))) for row in rows))
+        for name, rows in groups
+    )
 
 
 def comparison_csv(rows: Sequence[ComparedRow]) -> bytes:

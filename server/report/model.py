@@ -5,6 +5,7 @@ A pure function of stored results (law 10): under 50 ms for a 10 min session.
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Final, Literal
@@ -96,6 +97,14 @@ class StrideRow:
     excluded: str | None
 
 
+@dataclass(frozen=True)
+class Since:
+    """The visit before this one that its table is compared with."""
+
+    session_id: str
+    performed_on: dt.date
+
+
 @dataclass(frozen=True, eq=False)
 class ReportModel:
     """Everything a session page shows.
@@ -109,6 +118,7 @@ class ReportModel:
     groups : parameter rows under their headings. key_curve : the panel shown on the overview.
     norm_note : source, number and speed of the reference people, or why there is none.
     curve_notes : how to read the curves, in sentences: zero, offsets, confidence, what is drawn.
+    since : the visit that `change` of the rows refers to, None without an earlier one of this protocol.
     """
 
     problem: str | None
@@ -128,6 +138,7 @@ class ReportModel:
     estimator: EstimatorView | None = None
     profile: ProfileView | None = None
     limits: LimitsView | None = None
+    since: Since | None = None
 
     @property
     def key_curve(self) -> CurvePanel:
@@ -172,6 +183,7 @@ class ReportModel:
                 "estimator": None if self.estimator is None else asdict(self.estimator),
                 "profile": None if self.profile is None else _profile_json(self.profile),
                 "limits": None if self.limits is None else asdict(self.limits),
+                "since": None if self.since is None else asdict(self.since),
                 "provenance": self.provenance,
             }
         )

@@ -9,6 +9,7 @@ from typing import Final
 from core.norms.lookup import Norms
 from core.parameters.result import Parameter
 from core.parameters.symmetry import Symmetry, symmetries
+from server.report.change_words import ChangeWords
 from server.report.curves import range_svg
 from server.report.wording import TERMS, Term, difference_words, number, reason_words, symmetry_words
 
@@ -62,6 +63,7 @@ class Row:
     reason : words in place of all numbers, None if there is any.
     low_confidence : of an angle that the estimator's model gives; it has no norm.
     symmetry : left against right in numbers, None unless both sides have one.
+    change : since the visit before, of every side that has one; empty without such a visit.
     """
 
     name: str
@@ -87,6 +89,7 @@ class Row:
     def symmetry_words(self) -> str:
         """Ratio, index and angle of the two sides in words; empty where there is none."""
         return "" if self.symmetry is None else symmetry_words(self.symmetry)
+    change: tuple[ChangeWords, ...] = ()
 
     @property
     def z_words(self) -> str:

@@ -2,24 +2,45 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from server.report.behind import Behind, behind
 from server.report.bundle import Bundle
-from server.report.model import ReportModel, report_model
+from server.report.comparison import changes, with_changes
+from server.report.model import ReportModel, Since, report_model
 from server.services import analyses, reviews
+from server.services.comparisons import norms
 from server.services.errors import NotFound
+from server.services.histories import Analysed
 from server.services.patients import Patient
 from server.services.sessions import Session
 from server.storage.blobs import BlobStore
 
 
 def read(
-    blobs: BlobStore, found: analyses.Analysis, edits: reviews.Edits, patient: Patient, session: Session
+    blobs: BlobStore,
+    found: analyses.Analysis,
+    edits: reviews.Edits,
+    patient: Patient,
+    session: Session,
+    before: Analysed | None = None,
 ) -> tuple[Bundle, ReportModel]:
-    """Describe an analysis with its edits for this person on that day; raises IntegrityError."""
+    """Describe an analysis with its edits for this person on that day; raises IntegrityError.
+
+    Parameters
+    ----------
+    before : the visit that the table is compared with, None = none.
+    """
     bundle = reviews.bundle(blobs, found, edits)
     age = session.performed_on.year - patient.birth_year if patient.birth_year else None
     height = session.height_m if session.height_m is not None else patient.height_m
-    return bundle, report_model(bundle, age=age, sex=patient.sex, height_m=height)  # type: ignore[arg-type]
+    model = report_model(bundle, age=age, sex=patient.sex, height_m=height)  # type: ignore[arg-type]
+    if before is None:
+        return bundle, model
+    old, new = reviews.numbers(blobs, before.found, before.edits), reviews.numbers(blobs, found, edits)
+    changed = changes(old, new, norms(patient, session, new))
+    since = Since(before.session.id, before.session.performed_on)
+    return bundle, replace(model, groups=with_changes(model.groups, changed), since=since)
 
 
 def behind_number(
