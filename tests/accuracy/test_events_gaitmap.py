@@ -14,7 +14,7 @@ import pytest
 
 from core import calibration, events, fusion, timeline
 from core.events.result import EventKind, GaitEvents, Strides
-from core.frames import SIDES, Side
+from core.frames import SIDES, Floats, Side
 from tests.accuracy.event_scoring import Score, match
 from tests.accuracy.gaitmap import COPIES, RATE, recording_of, reference_strides, resampled
 from tests.accuracy.report import record
@@ -65,24 +65,53 @@ def test_both_mountings_of_the_same_sensors_give_the_same_contacts() -> None:
     assert np.allclose([e.time_s for e in aligned], [e.time_s for e in turned], atol=1e-3)
 
 
-def test_strides_agree_with_the_reference_strides() -> None:
+def stride_errors(name: str, rate_hz: float, side: Side) -> Floats:
+    """Stride time of every counted stride with both contacts in the reference, found − reference, s."""
+    _, strides = found(name, rate_hz)
+    errors = []
+    for s in strides.used(side):
+        start, end = (match([t], reference(side, "ic"), 0.05).errors for t in (s.start_s, s.end_s))
+        if len(start) and len(end):
+            errors.append(float(end[0] - start[0]))
+    return np.array(errors)
+
+
+@pytest.mark.parametrize("rate_hz", RATES)
+def test_stride_times_agree_within_ten_milliseconds(rate_hz: float) -> None:
     """Stride times, contact to contact, of the straight reference strides."""
+    for side in SIDES:
+        errors = stride_errors(COPIES[0], rate_hz, side)
+        assert len(errors) >= 21
+        assert abs(errors.mean()) <= 0.002
+        assert np.abs(errors).mean() <= 0.010
+        assert errors.std(ddof=1) <= 0.010
+
+
+def test_turning_strides_are_set_aside() -> None:
     _, strides = found(COPIES[0], RATE)
     for side in SIDES:
-        used = strides.used(side)
-        assert len(used) >= 21
-        errors = []
-        for s in used:
-            start, end = (match([t], reference(side, "ic"), 0.05).errors for t in (s.start_s, s.end_s))
-            if len(start) and len(end):
-                errors.append(float(end[0] - start[0]))
-        assert len(errors) >= 21
-        assert abs(np.mean(errors)) < 0.005
-        assert np.std(errors, ddof=1) < 0.015
+        assert len(strides.used(side)) >= 21
         turned = [
             s for s in strides.strides if s.side == side and s.excluded_reason in ("turn", "incomplete")
         ]
         assert 2 <= len(turned) <= 5, "one turn in the middle, one at the end"
+
+
+def test_write_down_the_stride_times() -> None:
+    rows = []
+    for rate_hz in RATES:
+        for side in SIDES:
+            e = 1e3 * stride_errors(COPIES[0], rate_hz, side)
+            figures = (f"{e.mean():+.1f}", f"{e.std(ddof=1):.1f}", f"{np.abs(e).mean():.1f}")
+            rows.append((f"{rate_hz:g}", side, str(len(e)), *figures, f"{np.abs(e).max():.0f}"))
+    record(
+        "Stride times on gaitmap_foot",
+        ("rate Hz", "foot", "strides", "mean ms", "sd ms", "mean |error| ms", "largest ms"),
+        rows,
+        "Counted strides against motion capture, contact to contact. Limits: |mean| ≤ 2 ms, sd and mean"
+        " |error| ≤ 10 ms. The mean of a walk is right to a fraction of a millisecond; its variability is"
+        " overstated by the sd given here.",
+    )
 
 
 def test_write_down_the_figures() -> None:
