@@ -156,7 +156,8 @@ def timeline(
     if latest is not None:
         context["numbers"] = session_views.numbers(blobs, latest, edits, context)
         context["lanes"] = [vars(lane) for lane in signals.lanes(blobs, latest)]
-        context["editable"] = reviews.take(blobs, latest).tracks is not None and who.may(Action.REVIEW)
+        context["fixed_because"] = reviews.take(blobs, latest).fixed_because
+        context["editable"] = context["fixed_because"] is None and who.may(Action.REVIEW)
     _opened(db, who, "session", sid)
     return _page(request, db, who, "timeline.html", "patients", **context)
 

@@ -91,6 +91,19 @@ class Take:
     bundle: Bundle
     tracks: Tracks | None
 
+    @property
+    def fixed_because(self) -> str | None:
+        """Why nothing of it can be edited, None where it can."""
+        if self.tracks is not None:
+            return None
+        stopped = next((n.message for n in self.bundle.warnings if n.severity == "error"), None)
+        if stopped is not None:
+            return f"The analysis stopped before events were looked for. {stopped}"
+        return (
+            "This analysis was made by an earlier version, which did not keep what an edit is measured on. "
+            "Run the analysis again."
+        )
+
 
 def edits_of(c: Connection, analysis_id: str) -> Edits:
     """The live edits of an analysis."""
@@ -259,14 +272,10 @@ def _append(
 
 
 def _measure(blobs: BlobStore, found: analyses.Analysis, edits: tuple[Edit, ...]) -> Measured:
-    known = take(blobs, found).tracks
-    if known is None:
-        raise Conflict(
-            "no_tracks",
-            "This analysis was made by an earlier version, which did not keep what an edit is measured on. "
-            "Run the analysis again.",
-        )
-    return measure(known, edits)
+    known = take(blobs, found)
+    if known.tracks is None:
+        raise Conflict("no_tracks", known.fixed_because or "")
+    return measure(known.tracks, edits)
 
 
 class _Kept(Generic[_Value]):

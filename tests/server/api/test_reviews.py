@@ -10,6 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
+from server.report.exports import analysis_files
 from server.report.tracks import NAME, tracks_parquet
 from server.services import patients, sessions
 from server.storage.tables import new_id
@@ -203,8 +204,25 @@ async def test_an_analysis_of_an_earlier_version_opens_but_cannot_be_edited(clin
     assert "Run the analysis again" in refused.json()["detail"]
     assert "knee_flexion" in {lane["name"] for lane in lanes}
     assert page.status_code == 200
-    assert "Run the analysis again to edit it" in page.text
+    assert "Run the analysis again" in page.text
     assert " editable" not in page.text
+
+
+async def test_an_analysis_that_stopped_early_says_why_and_shows_what_the_sensors_measured(
+    clinic: Clinic,
+) -> None:
+    path = _session(clinic, analysis_files(analysed.analysis(reached=False)))
+    async with clinic.client("clinician") as client:
+        page = await client.get(path.removeprefix(API) + "/timeline", headers={"Accept": "text/html"})
+        refused = await client.post(f"{path}/edits", json=move())
+        lanes = (await client.get(f"{path}/signals")).json()
+        raw = await client.get(f"{path}/signals/foot_l_gyr")
+        missing = await client.get(f"{path}/strides.csv")
+    assert "stopped before events were looked for. No rest found." in page.text
+    assert (refused.status_code, refused.json()["code"]) == (409, "no_tracks")
+    assert {lane["raw"] for lane in lanes} == {True}
+    assert raw.json()["high"]["z"]
+    assert missing.status_code == 404
 
 
 async def test_who_may_only_read_sees_the_timeline_without_tools(clinic: Clinic, path: str) -> None:

@@ -130,7 +130,7 @@ def test_strides_csv_carries_the_parameters_of_each_stride(files: Mapping[str, b
 
 def test_an_analysis_that_stopped_early_still_says_why() -> None:
     files = analysis_files(analysis(reached=False))
-    assert set(files) == {"analysis.json"}
+    assert set(files) == {"analysis.json", "signals.parquet"}
     bundle = load_bundle(files)
     assert bundle.angles is None
     assert bundle.calibration is None
