@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from dataclasses import dataclass
 
 from sqlalchemy import Connection
@@ -9,7 +10,7 @@ from sqlalchemy import Connection
 from core.norms import Norms, norms_for
 from server.report.comparison import ComparedRow, compared_rows
 from server.report.numbers import Numbers
-from server.services import analyses, patients, reviews, sessions
+from server.services import analyses, patients, programmes, reviews, sessions
 from server.services.errors import Conflict, ServiceError
 from server.services.histories import Analysed
 from server.services.patients import Patient
@@ -59,23 +60,31 @@ def pair(c: Connection, session_id: str, other_id: str) -> Pair:
     both = [_analysed(c, sid) for sid in (session_id, other_id)]
     if both[0].session.patient_id != both[1].session.patient_id:
         raise Conflict("other_patient", "These sessions belong to different patients.")
-    both.sort(key=lambda a: (a.session.performed_on, a.session.created_at))
+    both.sort(key=lambda a: _moment(a.session))
     return Pair(patients.get(c, both[0].session.patient_id), *both)
 
 
 def before(c: Connection, session: Session) -> Analysed | None:
-    """The analysed session of the same protocol that came last before this one."""
-    earlier = [
-        s
-        for s in sessions.of_patient(c, session.patient_id)
-        if s.protocol == session.protocol
-        and (s.performed_on, s.created_at) < (session.performed_on, session.created_at)
-    ]
-    for s in earlier:
+    """The analysed session of the same protocol that a session's own table is compared with.
+
+    It is the one that came last before it; for an assessment the assessment that did, so that a single
+    training does not stand for the course.
+    """
+    plans = programmes.of_patient(c, session.patient_id)
+    trainings = {v.session_id for plan in plans for v in plan.visits if v.kind == "training"}
+    for s in sessions.of_patient(c, session.patient_id):
+        if s.protocol != session.protocol or _moment(s) >= _moment(session):
+            continue
+        if s.id in trainings and session.id not in trainings:
+            continue
         found = analyses.latest(c, s.id)
         if found is not None:
             return Analysed(s, found, reviews.edits_of(c, found.id))
     return None
+
+
+def _moment(session: Session) -> tuple[dt.date, dt.datetime]:
+    return session.performed_on, session.created_at
 
 
 def rows(blobs: BlobStore, found: Pair) -> tuple[ComparedRow, ...]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import datetime as dt
 import io
+from typing import Any
 
 import pytest
 
-from server.services import patients, sessions
+from server.services import patients, programmes, sessions
 from server.storage.tables import new_id
 from tests.server import analysed
 from tests.server.clinic import Clinic
@@ -50,6 +51,44 @@ async def test_the_earlier_session_comes_first_in_either_order(clinic: Clinic) -
     assert len(list(csv.DictReader(io.StringIO(rows)))) == len(one["changes"])
     assert [p.status_code for p in pages] == [200, 200]
     assert 'class="pvl"' in pages[0].text
+
+
+def _since(report: dict[str, Any]) -> str | None:
+    return None if report["since"] is None else report["since"]["session_id"]
+
+
+async def test_the_report_of_a_visit_says_what_changed_since_the_one_before(clinic: Clinic) -> None:
+    patient = _patient(clinic)
+    first, belt = _session(clinic, patient, 0), _session(clinic, patient, 3, protocol="treadmill")
+    second = _session(clinic, patient, 9)
+    async with clinic.client("viewer") as client:
+        reports = [(await client.get(f"{API}/sessions/{s}/report")).json() for s in (first, belt, second)]
+        page = (await client.get(f"/sessions/{second}")).text
+    assert [_since(r) for r in reports] == [None, None, first]
+    row = next(r for r in reports[2]["parameters"] if r["name"] == "stance_pct")
+    assert [(w["side"], w["size"], w["mark"]) for w in row["change"]] == [
+        ("left", "0.0", ""),
+        ("right", "0.0", ""),
+    ]
+    assert f"/sessions/{second}/compare/{first}" in page
+
+
+async def test_an_assessment_is_compared_with_an_assessment_and_a_training_with_the_visit_before(
+    clinic: Clinic,
+) -> None:
+    patient = _patient(clinic)
+    pre, training, later = (_session(clinic, patient, days) for days in (0, 7, 9))
+    mid = _session(clinic, patient, 30)
+    with clinic.db.write() as c:
+        plan = programmes.start(c, None, patient, starts_on=dt.date(2026, 3, 9))
+        visits = {v.label: v.id for v in plan.visits}
+        for label, session in (("PRE", pre), ("T1", training), ("T2", later), ("MID", mid)):
+            programmes.change_visit(c, None, visits[label], {"session_id": session})
+    async with clinic.client("viewer") as client:
+        reports = [
+            (await client.get(f"{API}/sessions/{s}/report")).json() for s in (pre, training, later, mid)
+        ]
+    assert [_since(r) for r in reports] == [None, pre, training, pre]
 
 
 async def test_another_protocol_is_said_to_be_in_the_way(clinic: Clinic) -> None:
