@@ -100,7 +100,7 @@ def test_simulated_walk_is_analysed_and_agrees_with_its_truth(
     out, _ = analysed
     found = pq.read_table(out / "angles.parquet").to_pydict()
     truth = pq.read_table(simulated / "truth" / "angles.parquet").to_pydict()
-    assert set(found) == set(truth)
+    assert {name for name in found if not name.endswith("_heading_deg")} == set(truth)
     np.testing.assert_allclose(found["t_s"], np.asarray(truth["t_s"])[: len(found["t_s"])], atol=1e-9)
     for name in ("hip_flexion_l_deg", "knee_flexion_r_deg", "ankle_dorsiflexion_l_deg"):
         error = np.asarray(found[name], float) - np.asarray(truth[name], float)[: len(found[name])]
