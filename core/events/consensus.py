@@ -11,7 +11,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -21,7 +21,10 @@ from core.events.foot_pitch import FootPitchParams
 from core.events.gyro_peaks import LIMB, PRESETS, gyro_peak_events
 from core.events.result import EventKind, GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES, Side
-from core.fusion.orientations import Orientations
+
+if TYPE_CHECKING:
+    # the package brings numba, which readers of results do without
+    from core.fusion.orientations import Orientations
 
 SOURCE: Final = "consensus"
 KINDS: Final[tuple[EventKind, EventKind]] = ("ic", "tc")
