@@ -1,8 +1,8 @@
 """Steps of a sensor on hip, lower and upper back against the feet of the same person: qmt_fullbody.
 
 100 s of one person with 17 sensors: standing, sitting down and up, bowing, then 45 s of walking with two
-turns. The reference are the contacts of the foot-pitch rule on both feet: another signal of other sensors, not
-another measuring system. The recording was looked at only after the detector was finished.
+turns. The reference are the contacts of the foot-pitch rule on both feet: another signal of other sensors,
+not another measuring system. The recording was looked at only after the detector was finished.
 """
 
 from __future__ import annotations
