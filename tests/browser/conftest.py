@@ -211,12 +211,14 @@ class Filled:
 
     Parameters
     ----------
-    patient : with three visits. done : analysed. unread : the files are no recording. unmapped : uploaded,
-        not analysed. unusable : analysed with one sensor, so without strides. empty : nothing uploaded.
+    patient : with three visits and a programme. done, earlier : analysed, twice the same walk. unread : the
+        files are no recording. unmapped : uploaded, not analysed. unusable : analysed with one sensor, so
+        without strides. empty : nothing uploaded.
     """
 
     patient: str
     done: str
+    earlier: str
     unread: str
     unmapped: str
     unusable: str
@@ -243,6 +245,7 @@ def filled(running: RunningServer) -> Filled:
         for session in (done, earlier):
             filling.upload(client, session, files)
             assert filling.analyse(client, session, sensors)["state"] == "done"
+        filling.add(client, f"/patients/{patient}/programmes", starts_on="2026-10-26")
         unmapped = filling.add_session(client, patient, "Walk, with stick", performed_on="2026-11-20")
         filling.upload(client, unmapped, files)
         unread = filling.add_session(client, other, "Walk")
@@ -252,4 +255,4 @@ def filled(running: RunningServer) -> Filled:
         filling.upload(client, unusable, {name: content})
         filling.analyse(client, unusable, {next(iter(sensors)): "shank_l"})
         empty = filling.add_session(client, other, "Walk, later", performed_on="2026-11-21")
-    return Filled(patient, done, unread, unmapped, unusable, empty)
+    return Filled(patient, done, earlier, unread, unmapped, unusable, empty)

@@ -1,0 +1,103 @@
+"""Several visits: figures chosen over time, two visits compared, a programme planned and followed."""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser import filling
+from tests.browser.conftest import Filled, Opener, RunningServer
+
+
+def test_the_reader_chooses_the_figures_and_the_address_keeps_them(opened: Opener, filled: Filled) -> None:
+    page = opened(f"/patients/{filled.patient}")
+    page.get_by_role("link", name="All trends").click()
+    expect(page.get_by_role("heading", name="Cadence")).to_be_visible()
+    page.get_by_text("Choose figures").click()
+    page.get_by_label("Cadence").uncheck()
+    page.get_by_label("Swing time").check()
+    page.get_by_role("button", name="Show").click()
+    expect(page.get_by_role("heading", name="Swing time, left")).to_be_visible()
+    expect(page.get_by_role("heading", name="Cadence")).to_have_count(0)
+    assert "show=swing_time_s" in page.url
+    charts = page.locator(".trend-plot circle[class^=pl-]")
+    # two visits of the same walk: two points on each chart
+    assert charts.count() == 2 * page.locator(".trend-plot").count()
+    expect(page.locator("#table tbody tr")).to_have_count(page.locator(".trend-plot").count())
+
+
+def test_the_table_of_a_trend_can_be_saved(opened: Opener, filled: Filled) -> None:
+    page = opened(f"/patients/{filled.patient}/trends?show=stride_time_s")
+    with page.expect_download() as saved:
+        page.get_by_role("link", name="CSV").click()
+    lines = saved.value.path().read_text().splitlines()
+    assert lines[0].startswith("name,side,unit,date")
+    assert {line.split(",")[0] for line in lines[1:]} == {"stride_time_s"}
+    assert len(lines) == 1 + 2 * 2
+
+
+def test_two_visits_are_ticked_and_compared(opened: Opener, filled: Filled) -> None:
+    page = opened(f"/patients/{filled.patient}")
+    button = page.get_by_role("button", name="Compare two")
+    expect(button).to_be_disabled()
+    boxes = page.locator("input[name=visit]")
+    expect(boxes).to_have_count(2)
+    boxes.nth(0).check()
+    expect(button).to_be_disabled()
+    boxes.nth(1).check()
+    button.click()
+    page.wait_for_url(re.compile(r"/sessions/\w+/compare/\w+$"))
+    expect(page.locator("h1")).to_contain_text("21 Oct 2026 compared with 18 Nov 2026")
+    expect(page.get_by_role("heading", name="No real change")).to_be_visible()
+    assert page.locator(".chart.cycle .pvl").count() >= 9
+    expect(page.locator(".compared").first).to_contain_text("within measurement error")
+
+
+def test_the_overview_leads_to_the_comparison_with_the_visit_before(opened: Opener, filled: Filled) -> None:
+    page = opened(f"/sessions/{filled.done}")
+    page.get_by_role("link", name="Since 21 Oct 2026").first.click()
+    page.wait_for_url(re.compile(f"/sessions/{filled.done}/compare/{filled.earlier}$"))
+    page = opened(f"/sessions/{filled.earlier}")
+    expect(page.get_by_role("link", name=re.compile("^Since"))).to_have_count(0)
+
+
+@pytest.fixture(scope="module")
+def newcomer(running: RunningServer) -> tuple[str, str]:
+    """A patient with a visit today, and that visit."""
+    with running.client() as client:
+        patient = filling.add(client, "/patients", code="P-0099")["id"]
+        today = dt.datetime.now(dt.UTC).date().isoformat()
+        return patient, filling.add_session(client, patient, "First walk", performed_on=today)
+
+
+def test_a_programme_is_started_linked_to_its_visits_and_ended(
+    opened: Opener, newcomer: tuple[str, str]
+) -> None:
+    patient, session = newcomer
+    page = opened(f"/patients/{patient}")
+    page.get_by_role("link", name="Plan a programme").click()
+    page.get_by_role("button", name="Start programme").click()
+    today = dt.datetime.now(dt.UTC).date()
+    page.get_by_label("Day of the first training").fill(today.isoformat())
+    page.locator("dialog[open]").get_by_role("button", name="Start").click()
+    expect(page.get_by_role("heading", name="0 of 22 visits done, 1 missing, next T1")).to_be_visible()
+    page.get_by_role("button", name="Change T1", exact=True).click()
+    page.locator("dialog[open]").get_by_label("Session").select_option(session)
+    page.locator("dialog[open]").get_by_role("button", name="Save").click()
+    expect(page.get_by_role("heading", name="1 of 22 visits done, 1 missing, next T2")).to_be_visible()
+    page.goto(f"/patients/{patient}/sessions/new")
+    chosen = page.get_by_label("Visit of the programme").locator("option:checked")
+    expect(chosen).to_contain_text("T2, training")
+    page.get_by_role("button", name="Upload the recording").click()
+    page.wait_for_url(re.compile(r"/upload$"))
+    page.goto(f"/patients/{patient}")
+    expect(page.locator(".prog .wk.now .dots i.done")).to_have_count(2)
+    expect(page.locator(".visits")).to_contain_text("T1 · First walk")
+    page.get_by_role("link", name="Plan", exact=True).click()
+    page.get_by_role("button", name="End programme").click()
+    page.locator("dialog[open]").get_by_role("button", name="End programme").click()
+    page.wait_for_url(re.compile(rf"/patients/{patient}$"))
+    expect(page.locator(".prog")).to_have_count(0)
