@@ -69,7 +69,7 @@ def quality_box(bundle: Bundle) -> QualityBox:
     items = [
         *_counted(bundle),
         *_signals(bundle.quality),
-        *_calibration(bundle.calibration),
+        *_calibration(bundle.calibration, needed=not _trunk_steps(bundle)),
         *_estimator(bundle.estimator),
     ]
     return QualityBox(kind, word, tuple(items))
@@ -121,9 +121,10 @@ def _signals(quality: Mapping[str, Any]) -> list[QualityItem]:
     return items
 
 
-def _calibration(calibration: Mapping[str, Any] | None) -> list[QualityItem]:
+def _calibration(calibration: Mapping[str, Any] | None, *, needed: bool) -> list[QualityItem]:
     if calibration is None:
-        return [QualityItem("Calibration", "not reached", kind="bad")]
+        # steps of a trunk sensor are read from it as it sits
+        return [] if not needed else [QualityItem("Calibration", "not reached", kind="bad")]
     scores = [float(s["score"]) for s in calibration["segments"].values() if s.get("score") is not None]
     method = _METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
     value = f"{number(100 * min(scores))}" if scores else method

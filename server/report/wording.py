@@ -215,7 +215,7 @@ REASONS: Final[Mapping[str, str]] = {
     "no_terminal_stance": "not measured: the heel stays down until the other foot lands",
     "feet_not_adjacent": "not measured: the swinging foot does not pass the other",
     "tibia_not_vertical": "not measured: the shank does not pass the vertical in swing",
-    "not_reached": "not measured: the analysis stopped before this",
+    "not_reached": "not measured: this analysis has no joint angles",
 }
 """Reason code → words in place of a number."""
 
