@@ -18,6 +18,7 @@ from sqlalchemy import Connection, insert, select
 
 from core.edits import Edit, edit_of
 from core.measure import Measured, Tracks, measure
+from core.norms.controls import ControlSession
 from core.parameters.rows import Column
 from server import audit
 from server.report import signals, tracks
@@ -36,7 +37,7 @@ UNDO: Final = "undo"
 NOT_READ: Final = ("poses.parquet", signals.NAME)
 """Files that only the replay and the drawing of signals need."""
 
-TAKES_KEPT, RESULTS_KEPT, PARTS_KEPT, NUMBERS_KEPT = 3, 12, 24, 240
+TAKES_KEPT, RESULTS_KEPT, PARTS_KEPT, NUMBERS_KEPT, CONTROLS_KEPT = 3, 12, 24, 240, 500
 """Finished analyses, results of edits, signals of one sensor and numbers kept in memory: those at work. Ten
 minutes are some 20 MB, 1 MB, 2 MB and 50 kB."""
 
@@ -180,9 +181,16 @@ def kept(key: tuple[str, ...], make_value: Callable[[], _Value]) -> _Value:
     return value
 
 
+def control(
+    found: analyses.Analysis, edits: Edits, make_value: Callable[[], ControlSession]
+) -> ControlSession:
+    """What serves as reference of a finished analysis of a control."""
+    return _controls.get((found.id, edits.key), make_value)
+
+
 def forget() -> None:
     """Keep nothing in memory: what is erased on disk must not stay here."""
-    for memory in (_takes, _results, _numbers, _parts):
+    for memory in (_takes, _results, _numbers, _controls, _parts):
         memory.clear()
 
 
@@ -279,7 +287,7 @@ def _measure(blobs: BlobStore, found: analyses.Analysis, edits: tuple[Edit, ...]
 
 
 class _Kept(Generic[_Value]):
-    """The values used last, made at most once at a time."""
+    """The values used last."""
 
     def __init__(self, size: int) -> None:
         self._size = size
@@ -310,4 +318,5 @@ class _Kept(Generic[_Value]):
 _takes: _Kept[Take] = _Kept(TAKES_KEPT)
 _results: _Kept[Measured] = _Kept(RESULTS_KEPT)
 _numbers: _Kept[Numbers] = _Kept(NUMBERS_KEPT)
+_controls: _Kept[ControlSession] = _Kept(CONTROLS_KEPT)
 _parts: _Kept[Any] = _Kept(PARTS_KEPT)
