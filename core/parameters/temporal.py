@@ -90,7 +90,8 @@ def temporal(strides: Strides) -> tuple[Parameter, ...]:
             )
             if name == "step_time_s":
                 steps.extend(values)
-    parameters.append(_cadence(steps, strides))
+    reason = "opposite_foot_missing" if strides.used() else "no_strides"
+    parameters.append(cadence(summary("step_time_s", None, steps, "s", reason)))
     return tuple(parameters)
 
 
@@ -107,20 +108,18 @@ def _missing(name: str, used: Sequence[Stride]) -> str:
     return "no_double_support"
 
 
-def _cadence(steps: Sequence[float], strides: Strides) -> Parameter:
+def cadence(step: Parameter) -> Parameter:
     """60 / mean step time of both feet; its sd to first order, 60 sd / mean², and its interval inverted."""
-    if not steps:
-        reason = "opposite_foot_missing" if strides.used() else "no_strides"
-        return Parameter("cadence_spm", None, 0, None, None, "steps/min", reason)
-    step = summary("step_time_s", None, steps, "s")
-    mean, low, high = float(np.mean(steps)), step.ci_low, step.ci_high
+    named = replace(step, name="cadence_spm", unit="steps/min")
+    if step.mean is None:
+        return named
+    low, high = step.ci_low, step.ci_high
+    # two wildly different steps say nothing about how few a minute may have
+    known = low is not None and high is not None and low > 0.0
     return replace(
-        step,
-        name="cadence_spm",
-        unit="steps/min",
-        mean=60.0 / mean,
-        sd=None if step.sd is None else 60.0 * step.sd / mean**2,
-        # two wildly different steps say nothing about how few a minute may have
-        ci_low=None if high is None or low is None or low <= 0.0 else 60.0 / high,
-        ci_high=None if high is None or low is None or low <= 0.0 else 60.0 / low,
+        named,
+        mean=60.0 / step.mean,
+        sd=None if step.sd is None else 60.0 * step.sd / step.mean**2,
+        ci_low=60.0 / high if known and high is not None else None,
+        ci_high=60.0 / low if known and low is not None else None,
     )

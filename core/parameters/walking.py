@@ -11,6 +11,7 @@ from core.events.bouts import Bout
 from core.events.steps import EDGE_STEPS, Steps
 from core.events.turns import Turn
 from core.parameters.result import Parameter
+from core.parameters.temporal import cadence
 from core.parameters.variability import summary, unit_of
 from core.rest import Window
 
@@ -63,24 +64,7 @@ def step_parameters(steps: Steps) -> tuple[Parameter, ...]:
     reason = None if times else next((n.code for n in steps.notices), "no_strides")
     step = summary("step_time_s", None, times, "s", reason)
     n = len(steps.steps)
-    return (_cadence(step), step, Parameter("step_count", None, n, float(n), None, ""))
-
-
-def _cadence(step: Parameter) -> Parameter:
-    """60 / mean step time; its sd to first order, its interval inverted, as core/parameters/temporal.py."""
-    cadence = replace(step, name="cadence_spm", unit="steps/min", cv_pct=None)
-    if step.mean is None:
-        return cadence
-    low, high = step.ci_low, step.ci_high
-    known = low is not None and high is not None and low > 0.0
-    return replace(
-        cadence,
-        mean=60.0 / step.mean,
-        sd=None if step.sd is None else 60.0 * step.sd / step.mean**2,
-        cv_pct=step.cv_pct,
-        ci_low=60.0 / high if known and high is not None else None,
-        ci_high=60.0 / low if known and low is not None else None,
-    )
+    return (cadence(step), step, Parameter("step_count", None, n, float(n), None, ""))
 
 
 def _none(n: int, reason: str) -> str | None:
