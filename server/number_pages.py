@@ -33,6 +33,8 @@ def parameter(
         context = session_views.base(c, sid)
         found = analyses.shown(c, sid)
         edits = reviews.edits_of(c, found.id)
-    number = reports.behind_number(blobs, found, edits, context["patient"], context["session"], name)
+    number = reports.behind_number(
+        blobs, found, edits, context["patient"], context["session"], name, context["controls"]
+    )
     opened(db, who, "session", sid)
     return page(request, db, who, "parameter.html", "patients", number=number, **context)

@@ -24,6 +24,7 @@ Password = Annotated[str, StringConstraints(min_length=MIN_LENGTH, max_length=MA
 Height = Annotated[float, Field(ge=0.5, le=2.5, allow_inf_nan=False, description="m")]
 BirthYear = Annotated[int, Field(ge=1850, le=2200)]
 Sex = Literal["female", "male"]
+Side = Literal["left", "right"]
 HexId = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{32}$")]
 
 
@@ -143,6 +144,8 @@ class PatientNew(Request):
     sex: Sex | None = None
     birth_year: BirthYear | None = None
     height_m: Height | None = None
+    affected_side: Side | None = None
+    is_control: bool = False
     note: Note = None
 
 
@@ -160,6 +163,8 @@ class Patient(Response):
     sex: Sex | None
     birth_year: int | None
     height_m: float | None
+    affected_side: Side | None
+    is_control: bool
     note: str
     created_at: dt.datetime
     sessions: int

@@ -16,7 +16,7 @@ from server.report.model import ReportModel
 from server.report.panels import CurvePanel
 from server.report.table import Row
 from server.report.wording import ZERO_WORDS
-from server.services import analyses, patients, recordings, reports, reviews, sessions
+from server.services import analyses, controls, patients, recordings, reports, reviews, sessions
 from server.storage.blobs import BlobStore
 from web.words import day, seconds
 
@@ -84,10 +84,12 @@ FILE_WORDS: Final[Mapping[str, str]] = {
 def base(c: Connection, session_id: str) -> dict[str, Any]:
     """Session, patient, recording and the newest job: what every page of a session needs."""
     session = sessions.get(c, session_id)
+    patient = patients.get(c, session.patient_id)
     job = newest_job(c, session_id)
     return {
         "session": session,
-        "patient": patients.get(c, session.patient_id),
+        "patient": patient,
+        "controls": controls.visits(c, patient, session),
         "recording": recordings.current(c, session_id),
         "job": None if job is None else job_dict(job),
         "stages": list(STAGE_NAMES.items()),
@@ -159,7 +161,9 @@ def report(
 ) -> dict[str, Any]:
     """The report of an analysis with its charts drawn, for the page or for paper."""
     patient, session = context["patient"], context["session"]
-    bundle, model = reports.read(blobs, found, edits, patient, session, context.get("before"))
+    bundle, model = reports.read(
+        blobs, found, edits, patient, session, context.get("before"), context["controls"]
+    )
     last_row = len(model.panels) - COLUMNS
     heights = PAPER_HEIGHTS if paper else PAGE_HEIGHTS
     curves = [_chart(p, heights[i >= last_row], x_unit=i >= last_row) for i, p in enumerate(model.panels)]
@@ -193,7 +197,9 @@ def numbers(
     blobs: BlobStore, found: analyses.Analysis, edits: reviews.Edits, context: Mapping[str, Any]
 ) -> dict[str, Any]:
     """What of the report stands beside the timeline and changes with every edit."""
-    _, model = reports.read(blobs, found, edits, context["patient"], context["session"])
+    _, model = reports.read(
+        blobs, found, edits, context["patient"], context["session"], None, context["controls"]
+    )
     return {
         "groups": _groups(model, paper=False),
         "norm_note": model.norm_note,

@@ -15,7 +15,7 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.report.model import ReportModel
 from server.report.tables import curves_csv, parameters_csv
-from server.services import analyses, comparisons, patients, reports, reviews, sessions
+from server.services import analyses, comparisons, controls, patients, reports, reviews, sessions
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 
@@ -53,8 +53,9 @@ def read_parameter(
         patient = patients.get(c, session.patient_id)
         found = analyses.shown(c, session_id)
         edits = reviews.edits_of(c, found.id)
+        known = controls.visits(c, patient, session)
         audit.record(c, who, "parameter.opened", "session", session_id, {"parameter": name})
-    return reports.behind_number(blobs, found, edits, patient, session, name).to_json()
+    return reports.behind_number(blobs, found, edits, patient, session, name, known).to_json()
 
 
 @router.get("/curves.csv", response_class=Response, responses=_CSV)
@@ -70,5 +71,6 @@ def _opened(db: Database, blobs: BlobStore, who: Identity, session_id: str) -> R
         found = analyses.shown(c, session_id)
         edits = reviews.edits_of(c, found.id)
         before = comparisons.before(c, session)
+        known = controls.visits(c, patient, session)
         audit.record(c, who, "report.opened", "session", session_id, {"analysis_id": found.id})
-    return reports.read(blobs, found, edits, patient, session, before)[1]
+    return reports.read(blobs, found, edits, patient, session, before, known)[1]

@@ -16,6 +16,7 @@ from core.anatomical import anatomical_variables
 from core.errors import Notice
 from core.flags import flags
 from core.frames import SIDES, Floats, Side
+from core.norms.controls import ControlGroup
 from core.norms.lookup import Norms, norms_for
 from core.norms.values import ANGLES
 from core.parameters import cycle_curves
@@ -197,6 +198,8 @@ def report_model(
     sex: Sex | None = None,
     speed_mps: float | None = None,
     height_m: float | None = None,
+    affected: Side | None = None,
+    controls: ControlGroup | None = None,
 ) -> ReportModel:
     """Build the report of a finished analysis.
 
@@ -205,11 +208,15 @@ def report_model(
     age : years at the visit; without it curves are compared with all adults, timing with nobody.
     speed_mps : walking speed, None = the take's own; below 0.8 m/s no reference applies.
     height_m : makes the speed dimensionless, so that legs of any length find their reference.
+    affected : side, None = none or both. controls : the clinic's own, where no published norm compares.
     """
     if speed_mps is None:
         speed_mps = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
     norms = norms_for(age, sex, speed_mps, height_m)
-    rows = parameter_rows(bundle.parameters, norms, estimated_variables(bundle.estimator))
+    own = None if controls is None else controls.norms(speed_mps, height_m)
+    if own is not None:
+        norms = replace(norms, values={**own.values, **norms.values})
+    rows = parameter_rows(bundle.parameters, norms, estimated_variables(bundle.estimator), affected)
     curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
     panels = curve_panels(bundle, curves, norms)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
@@ -242,7 +249,7 @@ def report_model(
             for s in bundle.strides.strides
         ),
         duration_s=_duration(bundle),
-        norm_note=_norm_note(rows, panels, norms),
+        norm_note=" ".join(part for part in (_norm_note(rows, panels, norms), _own_note(controls)) if part),
         norm_source=next((p.norm.source for p in panels if p.norm is not None), None),
         curve_notes=_curve_notes(bundle, panels),
         angle_zero=None if angles is None else angles.zero,
@@ -251,7 +258,7 @@ def report_model(
         else {k: float(np.degrees(v)) for k, v in angles.zero_offset.items()},
         provenance=bundle.provenance,
         estimator=estimator_view(bundle.estimator),
-        limits=_limits(bundle, curves, height_m, age),
+        limits=_limits(bundle, curves, height_m, age, own),
         profile=None if curves is None else profile_view(_scores(bundle, curves, age)),
     )
 
@@ -262,7 +269,11 @@ def _scores(bundle: Bundle, curves: CycleCurves, age: float | None) -> Scores:
 
 
 def _limits(
-    bundle: Bundle, curves: CycleCurves | None, height_m: float | None, age: float | None
+    bundle: Bundle,
+    curves: CycleCurves | None,
+    height_m: float | None,
+    age: float | None,
+    own: Norms | None,
 ) -> LimitsView | None:
     """Estimated angles are not held against anything."""
     if not bundle.strides.used():
@@ -272,7 +283,7 @@ def _limits(
         measured = {v: c for v, c in curves.curves.items() if v not in unsure}
         curves = replace(curves, curves=measured)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
-    return limits_view(flags(curves, bundle.parameters, standing, height_m, age=age))
+    return limits_view(flags(curves, bundle.parameters, standing, height_m, own, age))
 
 
 def rounded(values: Floats | None) -> list[float] | None:
@@ -367,6 +378,16 @@ def _curve_notes(bundle: Bundle, panels: tuple[CurvePanel, ...]) -> tuple[str, .
             f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the take; means are of all."
         )
     return tuple(notes)
+
+
+def _own_note(controls: ControlGroup | None) -> str:
+    """Who the clinic's own controls are, or that they are too few."""
+    if controls is None:
+        return ""
+    if controls.reason is not None:
+        return f"Own controls who walk as fast: {controls.n}, too few to compare with."
+    small = ", a small group" if controls.note == "small_group" else ""
+    return f"Where no published norm compares: {controls.group}, {controls.n} people{small}."
 
 
 def _norm_notes(panels: tuple[CurvePanel, ...]) -> list[str]:

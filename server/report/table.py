@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from core.frames import Side
 from core.norms.lookup import Norms
 from core.parameters.result import Parameter
 from core.parameters.symmetry import Symmetry, symmetries
@@ -89,6 +90,7 @@ class Row:
     def symmetry_words(self) -> str:
         """Ratio, index and angle of the two sides in words; empty where there is none."""
         return "" if self.symmetry is None else symmetry_words(self.symmetry)
+
     change: tuple[ChangeWords, ...] = ()
 
     @property
@@ -113,11 +115,13 @@ def parameter_rows(
     parameters: Sequence[Parameter],
     norms: Norms = NOBODY,
     estimated: Collection[str] = (),
+    affected: Side | None = None,
 ) -> tuple[Row, ...]:
     """Rows in the order of the table; parameters without wording come last under their own name.
 
     Parameters
     ----------
+    affected : side that ratios are taken of, None = left over right.
     estimated : variables that no two sensors measure; what is derived from them has low confidence.
     """
     found: dict[str, dict[str | None, Parameter]] = {}
@@ -125,7 +129,7 @@ def parameter_rows(
         found.setdefault(p.name, {})[p.side] = p
     known = [name for name in TERMS if name in found]
     other = [name for name in found if name not in TERMS]
-    rows = (_row(name, found[name], norms) for name in (*known, *other))
+    rows = (_row(name, found[name], norms, affected) for name in (*known, *other))
     return tuple(_unsure(r) if any(r.name.startswith(f"{v}_") for v in estimated) else r for r in rows)
 
 
@@ -135,7 +139,7 @@ def grouped(rows: Sequence[Row]) -> tuple[tuple[str, tuple[Row, ...]], ...]:
     return tuple((name, tuple(r for r in rows if r.group == name)) for name in names)
 
 
-def _row(name: str, sides: Mapping[str | None, Parameter], norms: Norms) -> Row:
+def _row(name: str, sides: Mapping[str | None, Parameter], norms: Norms, affected: Side | None = None) -> Row:
     term, norm = TERMS.get(name) or _unknown(name, sides), norms.values.get(name)
     both, left, right = (_cell(sides.get(side), term, norms) for side in (None, "left", "right"))
     missing = both is None and left is None and right is None
@@ -159,7 +163,7 @@ def _row(name: str, sides: Mapping[str | None, Parameter], norms: Norms) -> Row:
         norm_n=None if shown is None else shown.n,
         norm_source=None if shown is None else shown.source,
         norm_note="" if norm is None else norm.note,
-        symmetry=next(iter(symmetries(tuple(sides.values()))), None),
+        symmetry=next(iter(symmetries(tuple(sides.values()), affected)), None),
     )
 
 

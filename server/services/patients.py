@@ -14,7 +14,7 @@ from server import audit
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.storage.tables import ACTIVE_STATES, job, new_id, now, patient, recording, session
 
-CHANGEABLE = frozenset({"code", "sex", "birth_year", "height_m", "note"})
+CHANGEABLE = frozenset({"code", "sex", "birth_year", "height_m", "affected_side", "is_control", "note"})
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,8 @@ class Patient:
     Parameters
     ----------
     code : the clinic's pseudonym, unique. sex : female, male or None. height_m : metres or None.
+    affected_side : left, right, or None for none or both. is_control : healthy, and agreed that these visits
+    serve as reference in this clinic.
     sessions : number of visits. last_visit : day of the newest, None without one.
     running : a job of one of the visits is queued or running.
     """
@@ -33,6 +35,8 @@ class Patient:
     sex: str | None
     birth_year: int | None
     height_m: float | None
+    affected_side: str | None
+    is_control: bool
     note: str
     created_at: dt.datetime
     sessions: int
@@ -48,11 +52,21 @@ def create(
     sex: str | None = None,
     birth_year: int | None = None,
     height_m: float | None = None,
+    affected_side: str | None = None,
+    is_control: bool = False,
     note: str = "",
 ) -> Patient:
     """Add a patient; raises Conflict code_taken, ServiceError bad_value."""
     patient_id = new_id()
-    values = {"code": code, "sex": sex, "birth_year": birth_year, "height_m": height_m, "note": note}
+    values = {
+        "code": code,
+        "sex": sex,
+        "birth_year": birth_year,
+        "height_m": height_m,
+        "affected_side": affected_side,
+        "is_control": is_control,
+        "note": note,
+    }
     with _explained(code):
         c.execute(insert(patient).values(id=patient_id, created_at=now(), **_checked(values)))
     audit.record(c, actor, "patient.created", "patient", patient_id)
@@ -150,5 +164,6 @@ class _explained:  # noqa: N801 - reads as a word: with _explained(code)
             ) from error
         raise ServiceError(
             "bad_value",
-            "Expected sex female, male or none, a year of birth from 1850 and a height of 0.5 to 2.5 m.",
+            "Expected sex female, male or none, a year of birth from 1850, a height of 0.5 to 2.5 m and an "
+            "affected side left, right or none.",
         ) from error

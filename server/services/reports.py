@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from server.report.behind import Behind, behind
 from server.report.bundle import Bundle
 from server.report.comparison import changes, with_changes
 from server.report.model import ReportModel, Since, report_model
-from server.services import analyses, reviews
+from server.services import analyses, controls, reviews
 from server.services.comparisons import norms
+from server.services.controls import ControlVisit
 from server.services.errors import NotFound
 from server.services.histories import Analysed
 from server.services.patients import Patient
@@ -24,17 +26,27 @@ def read(
     patient: Patient,
     session: Session,
     before: Analysed | None = None,
+    control_visits: Sequence[ControlVisit] = (),
 ) -> tuple[Bundle, ReportModel]:
     """Describe an analysis with its edits for this person on that day; raises IntegrityError.
 
     Parameters
     ----------
     before : the visit that the table is compared with, None = none.
+    control_visits : of the clinic's own controls.
     """
     bundle = reviews.bundle(blobs, found, edits)
     age = session.performed_on.year - patient.birth_year if patient.birth_year else None
     height = session.height_m if session.height_m is not None else patient.height_m
-    model = report_model(bundle, age=age, sex=patient.sex, height_m=height)  # type: ignore[arg-type]
+    speed = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
+    model = report_model(
+        bundle,
+        age=age,
+        sex=patient.sex,  # type: ignore[arg-type]
+        height_m=height,
+        affected=patient.affected_side,  # type: ignore[arg-type]
+        controls=controls.group(blobs, control_visits, speed),
+    )
     if before is None:
         return bundle, model
     old, new = reviews.numbers(blobs, before.found, before.edits), reviews.numbers(blobs, found, edits)
@@ -50,9 +62,10 @@ def behind_number(
     patient: Patient,
     session: Session,
     name: str,
+    control_visits: Sequence[ControlVisit] = (),
 ) -> Behind:
     """One parameter with the strides behind it; raises NotFound, IntegrityError."""
-    bundle, model = read(blobs, found, edits, patient, session)
+    bundle, model = read(blobs, found, edits, patient, session, control_visits=control_visits)
     row = next((r for _, rows in model.groups for r in rows if r.name == name), None)
     if row is None:
         raise NotFound("parameter", name)

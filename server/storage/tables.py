@@ -34,10 +34,12 @@ from sqlalchemy import (
     TypeDecorator,
     UniqueConstraint,
     event,
+    false,
     text,
 )
 
 SEXES = ("female", "male")
+SIDES = ("left", "right")
 ROLES = ("admin", "clinician", "assistant", "viewer")
 JOB_STATES = ("queued", "running", "done", "failed", "cancelled")
 ACTIVE_STATES = ("queued", "running")
@@ -113,9 +115,12 @@ patient = Table(
     Column("sex", String(8)),
     Column("birth_year", Integer),
     Column("height_m", Float),
+    Column("affected_side", String(8)),
+    Column("is_control", Boolean, nullable=False, server_default=false()),
     Column("note", Text, nullable=False),
     Column("created_at", Utc, nullable=False),
     _one_of("sex", SEXES),
+    _one_of("affected_side", SIDES),
     CheckConstraint("birth_year BETWEEN 1850 AND 2200", name="birth_year"),
     CheckConstraint("height_m BETWEEN 0.5 AND 2.5", name="height_m"),
 )

@@ -41,9 +41,9 @@ def schema(path: Path) -> set[tuple[str, str, tuple[str, ...]]]:
     query = "SELECT type, name, coalesce(sql, '') FROM sqlite_master WHERE name NOT LIKE '%alembic%'"
     with closing(sqlite3.connect(path)) as c:
         rows = c.execute(query).fetchall()
-    # the order of constraints inside a statement means nothing
+    # the order of constraints inside a statement means nothing, nor do quotes around a renamed table
     return {
-        (kind, name, tuple(sorted(s.strip().rstrip(",") for s in sql.splitlines())))
+        (kind, name, tuple(sorted(s.strip().rstrip(",") for s in sql.replace('"', "").splitlines())))
         for kind, name, sql in rows
     }
 

@@ -1,0 +1,75 @@
+"""The clinic's own controls: healthy people who agreed that their visits serve as reference."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from sqlalchemy import Connection, select
+
+from core.norms.controls import ControlGroup, ControlSession, control_group, mean_curves
+from core.parameters import cycle_curves
+from server.services import analyses, reviews, sessions
+from server.services.patients import Patient
+from server.services.sessions import Session
+from server.storage.blobs import BlobStore
+from server.storage.tables import patient
+from server.storage.tables import session as session_table
+
+NEAR_MPS: Final = 0.2
+"""Controls who walk within this of a person are their reference: speed matters more than age
+(spec/clinic.md §2); our choice of width, about one SD of comfortable speed."""
+
+
+@dataclass(frozen=True)
+class ControlVisit:
+    """An analysed visit of a control."""
+
+    person: str
+    sex: str | None
+    birth_year: int | None
+    performed_on: dt.date
+    found: analyses.Analysis
+    edits: reviews.Edits
+
+
+def visits(c: Connection, this: Patient, session: Session) -> tuple[ControlVisit, ...]:
+    """Visits of controls with the protocol of a session; nobody is a control of themselves."""
+    query = (
+        select(session_table.c.id, patient)
+        .join(patient, patient.c.id == session_table.c.patient_id)
+        .where(
+            patient.c.is_control,
+            patient.c.id != this.id,
+            session_table.c.protocol == session.protocol,
+        )
+        .order_by(session_table.c.id)
+    )
+    made = []
+    for row in c.execute(query).all():
+        found = analyses.latest(c, row[0])
+        if found is not None:
+            day = sessions.get(c, row[0]).performed_on
+            edits = reviews.edits_of(c, found.id)
+            made.append(ControlVisit(row.code, row.sex, row.birth_year, day, found, edits))
+    return tuple(made)
+
+
+def group(blobs: BlobStore, known: Sequence[ControlVisit], speed_mps: float | None) -> ControlGroup | None:
+    """The controls who walk as fast as a person; None without any control or without a speed."""
+    if not known or speed_mps is None:
+        return None
+    near = (round(speed_mps - NEAR_MPS, 2), round(speed_mps + NEAR_MPS, 2))
+    return control_group([_session(blobs, v) for v in known], speed_mps=near)
+
+
+def _session(blobs: BlobStore, visit: ControlVisit) -> ControlSession:
+    def read() -> ControlSession:
+        bundle = reviews.bundle(blobs, visit.found, visit.edits)
+        curves = {} if bundle.angles is None else mean_curves(cycle_curves(bundle.angles, bundle.strides))
+        age = None if visit.birth_year is None else float(visit.performed_on.year - visit.birth_year)
+        return ControlSession(visit.person, age, visit.sex, bundle.parameters, curves)  # type: ignore[arg-type]
+
+    return reviews.control(visit.found, visit.edits, read)
