@@ -93,7 +93,7 @@ def teaser(history: History) -> dict[str, Any] | None:
     if len(history.visits) < 2 or not there:
         return None
     name = min(there, key=TEASERS.index)
-    found = trends(history.visits, [name], history.norms, history.usual)
+    found = trends(history.visits, [name], history.norms, history.usual, history.patient.affected_side)
     return _shown(history, found, height=168)
 
 
@@ -101,7 +101,7 @@ def trends_view(history: History, chosen: Sequence[str]) -> dict[str, Any]:
     """The trends page: charts of the chosen figures, the choice, limits with sources, and the table."""
     there = names_in(history.visits)
     names = [n for n in there if n in chosen] or [n for n in PRIMARY if n in there]
-    found = trends(history.visits, names, history.norms, history.usual)
+    found = trends(history.visits, names, history.norms, history.usual, history.patient.affected_side)
     groups: dict[str, list[dict[str, Any]]] = {}
     for name in there:
         term = term_of(name)

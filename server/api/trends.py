@@ -90,7 +90,7 @@ def _opened(
     known = histories.history(blobs, patient, done, plans, protocol)
     there = names_in(known.visits)
     wanted = [n for n in names if n in there] if names else there
-    return known, trends(known.visits, wanted, known.norms, known.usual)
+    return known, trends(known.visits, wanted, known.norms, known.usual, known.patient.affected_side)
 
 
 def _trend(trend: Trend) -> dict[str, Any]:

@@ -53,11 +53,13 @@ def changes(
     return tuple(sorted(found, key=lambda c: order.get(c.name, len(order))))
 
 
-def compared_rows(before: Numbers, after: Numbers, norms: Norms | None = None) -> tuple[ComparedRow, ...]:
+def compared_rows(
+    before: Numbers, after: Numbers, norms: Norms | None = None, affected: Side | None = None
+) -> tuple[ComparedRow, ...]:
     """The table of a comparison."""
     reasons = {(p.name, p.side): p.reason for p in figures(after)}
     rows = []
-    for c in changes(before, after, norms):
+    for c in changes(before, after, norms, affected):
         term = term_of(c.name, c.unit)
         old, new = ("–" if value is None else number(value, term.digits) for value in (c.before, c.after))
         reason = reason_words(reasons.get((c.name, c.side))) if c.after is None else None

@@ -91,7 +91,8 @@ def rows(blobs: BlobStore, found: Pair) -> tuple[ComparedRow, ...]:
     """The table of a comparison; raises IntegrityError."""
     old = reviews.numbers(blobs, found.before.found, found.before.edits)
     new = reviews.numbers(blobs, found.after.found, found.after.edits)
-    return compared_rows(old, new, norms(found.patient, found.after.session, new))
+    known = norms(found.patient, found.after.session, new)
+    return compared_rows(old, new, known, found.patient.affected_side)
 
 
 def norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:

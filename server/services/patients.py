@@ -10,6 +10,7 @@ from typing import Any
 from sqlalchemy import Connection, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
+from core.frames import Side
 from server import audit
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.storage.tables import ACTIVE_STATES, job, new_id, now, patient, recording, session
@@ -35,7 +36,7 @@ class Patient:
     sex: str | None
     birth_year: int | None
     height_m: float | None
-    affected_side: str | None
+    affected_side: Side | None
     is_control: bool
     note: str
     created_at: dt.datetime
@@ -52,7 +53,7 @@ def create(
     sex: str | None = None,
     birth_year: int | None = None,
     height_m: float | None = None,
-    affected_side: str | None = None,
+    affected_side: Side | None = None,
     is_control: bool = False,
     note: str = "",
 ) -> Patient:

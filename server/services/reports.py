@@ -44,13 +44,13 @@ def read(
         age=age,
         sex=patient.sex,  # type: ignore[arg-type]
         height_m=height,
-        affected=patient.affected_side,  # type: ignore[arg-type]
+        affected=patient.affected_side,
         controls=controls.group(blobs, control_visits, speed),
     )
     if before is None:
         return bundle, model
     old, new = reviews.numbers(blobs, before.found, before.edits), reviews.numbers(blobs, found, edits)
-    changed = changes(old, new, norms(patient, session, new))
+    changed = changes(old, new, norms(patient, session, new), patient.affected_side)
     since = Since(before.session.id, before.session.performed_on)
     return bundle, replace(model, groups=with_changes(model.groups, changed), since=since)
 
