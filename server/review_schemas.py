@@ -38,12 +38,16 @@ class MadeEdit(Response):
 
 
 class Event(Response):
-    """A contact (ic) or foot-off (tc); its source is a detector, or "manual"."""
+    """A contact (ic) or foot-off (tc); its source is a detector, "consensus", or "manual".
+
+    `confidence` is the share of the detectors that found it, null when there was one.
+    """
 
     side: str
     kind: str
     time_s: float
     source: str
+    confidence: float | None
 
 
 class ReviewedStride(Response):

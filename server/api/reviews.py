@@ -128,7 +128,13 @@ def _review(blobs: BlobStore, found: analyses.Analysis, edits: reviews.Edits, st
         "version": edits.version,
         "edits": [{"seq": m.seq, "by": m.by, "at": m.at.isoformat(), **m.edit.to_json()} for m in edits.made],
         "events": [
-            {"side": e.side, "kind": e.kind, "time_s": round(e.time_s, 6), "source": e.source}
+            {
+                "side": e.side,
+                "kind": e.kind,
+                "time_s": round(e.time_s, 6),
+                "source": e.source,
+                "confidence": e.confidence,
+            }
             for e in bundle.events.events
         ],
         "strides": [

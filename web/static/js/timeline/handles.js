@@ -7,6 +7,11 @@ const APART_S = 0.051; // the server refuses less than 50 ms between two events 
 const STEP_S = 0.01;
 const WAIT_MS = 900;
 
+function origin(event) {
+  if (event.source === "manual") return ", placed by hand";
+  return event.confidence === null ? "" : `, found by ${Math.round(100 * event.confidence)} % of the detectors`;
+}
+
 export class EventHandles {
   constructor(host, side, { win, review, editable, onMove, onDelete, onPick }) {
     Object.assign(this, { host, side, win, review, editable, onMove, onDelete, onPick });
@@ -59,7 +64,8 @@ export class EventHandles {
     if (!handle) return;
     handle.style.left = `${100 * this.win.place(t)}%`;
     handle.setAttribute("aria-valuenow", t.toFixed(3));
-    handle.setAttribute("aria-valuetext", `${seconds(t, 3)} seconds${event.source === "manual" ? ", placed by hand" : ""}`);
+    handle.setAttribute("aria-valuetext", `${seconds(t, 3)} seconds${origin(event)}`);
+    handle.title = `${WORD[event.kind]}${origin(event)}`;
     handle.dataset.tip = `${seconds(t, 3)} s`;
   }
 
