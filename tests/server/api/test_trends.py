@@ -79,6 +79,18 @@ async def test_visits_of_another_protocol_are_asked_for(clinic: Clinic, patient:
             assert [v["session_id"] for v in answer["visits"]] == [expected]
 
 
+async def test_limits_are_those_of_the_affected_limb(clinic: Clinic, patient: str) -> None:
+    _add(clinic, patient, 0)
+    path = f"{API}/patients/{patient}"
+    async with clinic.client("clinician") as client:
+        unknown = (await client.get(f"{path}/trends?show=hip_flexion_rom_deg")).json()["trends"][0]["lines"]
+        assert (await client.patch(path, json={"affected_side": "left"})).status_code == 200
+        known = (await client.get(f"{path}/trends?show=hip_flexion_rom_deg")).json()["trends"][0]["lines"]
+    # Guzik 2021: MCID 5.81° of the affected, 2.86° of the unaffected hip; the larger where nobody knows
+    assert [line["mcid"] for line in unknown] == [5.81, 5.81]
+    assert [line["mcid"] for line in known] == [5.81, 2.86]
+
+
 async def test_the_table_has_a_row_for_every_figure_side_and_visit(clinic: Clinic, patient: str) -> None:
     _add(clinic, patient, 0)
     _add(clinic, patient, 7)
