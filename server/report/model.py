@@ -18,7 +18,6 @@ from core.flags import flags
 from core.frames import SIDES, Floats, Side
 from core.norms.controls import ControlGroup
 from core.norms.lookup import Norms, norms_for
-from core.norms.values import ANGLES
 from core.parameters import cycle_curves
 from core.parameters.result import CycleCurves
 from core.scores import Scores, scores
@@ -27,11 +26,12 @@ from server.report.columns import plain
 from server.report.estimator import EstimatorView, estimated_variables, estimator_view
 from server.report.level import level_rows
 from server.report.limits import LimitsView, limits_view
-from server.report.panels import DRAWN_STRIDES, CurvePanel, SideCurve, curve_panels
+from server.report.notes import curve_notes, norm_note
+from server.report.panels import CurvePanel, SideCurve, curve_panels
 from server.report.profile import ProfileView, profile_view
 from server.report.quality_box import QualityBox, quality_box
 from server.report.table import Row, grouped, parameter_rows
-from server.report.wording import NO_NORM, VARIABLES, ZERO_WORDS, excluded_words, number, place_words
+from server.report.wording import excluded_words, place_words
 
 Sex = Literal["female", "male"]
 
@@ -48,15 +48,8 @@ KEY_NUMBERS: Final = (
 SHOWN_LARGE: Final = 4
 """So many of them are shown, those that were measured."""
 
-SPEED: Final = "gait_speed_mps"
-
 KEY_CURVE: Final = "knee_flexion"
 
-_GROUPS: Final = {
-    "adult_21_84": "adults 21–84 years",
-    "adult_21_54": "adults 21–54 years",
-    "adult_55_84": "adults 55–84 years",
-}
 _KINDS: Final = {"error": "bad", "warning": "warn", "info": "info"}
 
 
@@ -249,9 +242,9 @@ def report_model(
             for s in bundle.strides.strides
         ),
         duration_s=_duration(bundle),
-        norm_note=" ".join(part for part in (_norm_note(rows, panels, norms), _own_note(controls)) if part),
+        norm_note=norm_note(rows, panels, norms, controls),
         norm_source=next((p.norm.source for p in panels if p.norm is not None), None),
-        curve_notes=_curve_notes(bundle, panels),
+        curve_notes=curve_notes(bundle, panels),
         angle_zero=None if angles is None else angles.zero,
         zero_offset_deg={}
         if angles is None
@@ -323,82 +316,6 @@ def _key_number(row: Row) -> KeyNumber:
         right="–" if row.right is None else row.right.text,
         words=", ".join(w for w in (row.difference, norm) if w),
     )
-
-
-def _norm_note(rows: tuple[Row, ...], panels: tuple[CurvePanel, ...], norms: Norms) -> str:
-    """Who the reference people are, or why there are none; always something."""
-    sentences = []
-    if norms.reason is not None:
-        sentences.append(NO_NORM.get(norms.reason, norms.reason))
-    band = next((p.norm for p in panels if p.norm is not None), None)
-    if band is not None:
-        who = _GROUPS.get(band.group, band.group)
-        sentences.append(
-            f"Norm: {band.n} {who}, overground at their comfortable 1.25 ± 0.16 m/s, mean ± 1 SD "
-            f"({band.source})."
-        )
-    if norms.timing_reason is not None and norms.timing_reason != norms.reason:
-        sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
-    elif shown := [
-        r for r in rows if r.norm is not None and r.name not in (*ANGLES, SPEED) and r.unit != "°"
-    ]:
-        sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
-    if any(r.name == SPEED and r.norm is not None for r in rows):
-        usual = norms.values[SPEED]
-        sentences.append(f"Gait speed: {_GROUPS.get(usual.group, usual.group)} ({usual.source}).")
-    return " ".join(sentences)
-
-
-def _curve_notes(bundle: Bundle, panels: tuple[CurvePanel, ...]) -> tuple[str, ...]:
-    if bundle.angles is None:
-        return ()
-    zero = ZERO_WORDS.get(bundle.angles.zero, bundle.angles.zero)
-    labels = {v.name: v.label.lower() for v in VARIABLES if v.plane == "sagittal"}
-    offsets = []
-    for name, value in bundle.angles.zero_offset.items():
-        base, _, suffix = name.rpartition("_")
-        side = {"l": " left", "r": " right"}.get(suffix)
-        label = labels.get(base if side else name)
-        if label is not None:
-            offsets.append(f"{label}{side or ''} {number(float(np.degrees(value)))}°")
-    about_zero = (
-        f"Angles are measured {zero}: the posture of the standing part is 0°. "
-        f"Subtracted: {', '.join(offsets)}. A person who stands bent gets curves shifted by that much."
-    )
-    view = estimator_view(bundle.estimator)
-    notes = [
-        about_zero,
-        *([view.estimated] if view is not None and view.estimated else []),
-        *_norm_notes(panels),
-    ]
-    drawn = max((len(c.strides) for p in panels for c in p.sides.values()), default=0)
-    most = max((c.n for p in panels for c in p.sides.values()), default=0)
-    if most > drawn:
-        notes.append(
-            f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the take; means are of all."
-        )
-    return tuple(notes)
-
-
-def _own_note(controls: ControlGroup | None) -> str:
-    """Who the clinic's own controls are, or that they are too few."""
-    if controls is None:
-        return ""
-    if controls.reason is not None:
-        return f"Own controls who walk as fast: {controls.n}, too few to compare with."
-    small = ", a small group" if controls.note == "small_group" else ""
-    return f"Where no published norm compares: {controls.group}, {controls.n} people{small}."
-
-
-def _norm_notes(panels: tuple[CurvePanel, ...]) -> list[str]:
-    """What must be said about the norm, once for all variables it concerns."""
-    concerned: dict[str, list[str]] = {}
-    for p in panels:
-        if p.norm_note and p.reason is None:
-            concerned.setdefault(p.norm_note, []).append(p.variable.label)
-    return [
-        f"{', '.join(labels).capitalize()}: {note[0].lower()}{note[1:]}" for note, labels in concerned.items()
-    ]
 
 
 def _profile_json(profile: ProfileView) -> dict[str, object]:

@@ -1,0 +1,104 @@
+"""What must be said beside tables and curves: who the norm's people are, what the zero is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from core.norms.controls import ControlGroup
+from core.norms.lookup import Norms
+from core.norms.values import ANGLES
+from server.report.bundle import Bundle
+from server.report.estimator import estimator_view
+from server.report.panels import DRAWN_STRIDES, CurvePanel
+from server.report.table import Row
+from server.report.wording import NO_NORM, VARIABLES, ZERO_WORDS, number
+
+SPEED: Final = "gait_speed_mps"
+
+_GROUPS: Final = {
+    "adult_21_84": "adults 21–84 years",
+    "adult_21_54": "adults 21–54 years",
+    "adult_55_84": "adults 55–84 years",
+}
+
+
+def norm_note(
+    rows: Sequence[Row], panels: Sequence[CurvePanel], norms: Norms, controls: ControlGroup | None = None
+) -> str:
+    """Who the reference people are, or why there are none; always something."""
+    sentences = []
+    if norms.reason is not None:
+        sentences.append(NO_NORM.get(norms.reason, norms.reason))
+    band = next((p.norm for p in panels if p.norm is not None), None)
+    if band is not None:
+        who = _GROUPS.get(band.group, band.group)
+        sentences.append(
+            f"Norm: {band.n} {who}, overground at their comfortable 1.25 ± 0.16 m/s, mean ± 1 SD "
+            f"({band.source})."
+        )
+    if norms.timing_reason is not None and norms.timing_reason != norms.reason:
+        sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
+    elif shown := [
+        r for r in rows if r.norm is not None and r.name not in (*ANGLES, SPEED) and r.unit != "°"
+    ]:
+        sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
+    if any(r.name == SPEED and r.norm is not None for r in rows):
+        usual = norms.values[SPEED]
+        sentences.append(f"Gait speed: {_GROUPS.get(usual.group, usual.group)} ({usual.source}).")
+    if controls is not None:
+        sentences.append(_own_note(controls))
+    return " ".join(sentences)
+
+
+def _own_note(controls: ControlGroup) -> str:
+    """Who the clinic's own controls are, or that they are too few."""
+    if controls.reason is not None:
+        return f"Own controls who walk as fast: {controls.n}, too few to compare with."
+    small = ", a small group" if controls.note == "small_group" else ""
+    return f"Where no published norm compares: {controls.group}, {controls.n} people{small}."
+
+
+def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]:
+    """How to read the curves, in sentences: zero, offsets, confidence, what is drawn."""
+    if bundle.angles is None:
+        return ()
+    zero = ZERO_WORDS.get(bundle.angles.zero, bundle.angles.zero)
+    labels = {v.name: v.label.lower() for v in VARIABLES if v.plane == "sagittal"}
+    offsets = []
+    for name, value in bundle.angles.zero_offset.items():
+        base, _, suffix = name.rpartition("_")
+        side = {"l": " left", "r": " right"}.get(suffix)
+        label = labels.get(base if side else name)
+        if label is not None:
+            offsets.append(f"{label}{side or ''} {number(float(np.degrees(value)))}°")
+    about_zero = (
+        f"Angles are measured {zero}: the posture of the standing part is 0°. "
+        f"Subtracted: {', '.join(offsets)}. A person who stands bent gets curves shifted by that much."
+    )
+    view = estimator_view(bundle.estimator)
+    notes = [
+        about_zero,
+        *([view.estimated] if view is not None and view.estimated else []),
+        *_norm_notes(panels),
+    ]
+    drawn = max((len(c.strides) for p in panels for c in p.sides.values()), default=0)
+    most = max((c.n for p in panels for c in p.sides.values()), default=0)
+    if most > drawn:
+        notes.append(
+            f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the take; means are of all."
+        )
+    return tuple(notes)
+
+
+def _norm_notes(panels: Sequence[CurvePanel]) -> list[str]:
+    """What must be said about the norm, once for all variables it concerns."""
+    concerned: dict[str, list[str]] = {}
+    for p in panels:
+        if p.norm_note and p.reason is None:
+            concerned.setdefault(p.norm_note, []).append(p.variable.label)
+    return [
+        f"{', '.join(labels).capitalize()}: {note[0].lower()}{note[1:]}" for note, labels in concerned.items()
+    ]
