@@ -22,7 +22,13 @@ from server.storage.tables import now
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
-Shown = Annotated[list[Annotated[str, Query(max_length=64)]], Query(alias="show", max_length=100)]
+Shown = Annotated[
+    list[Annotated[str, Query(max_length=64)]], Query(alias="show", max_length=100, default_factory=list)
+]
+
+Ticked = Annotated[
+    list[Annotated[str, Query(pattern=r"^[0-9a-f]{32}$")]], Query(max_length=100, default_factory=list)
+]
 
 
 @router.get("/patients/{pid}/trends")
@@ -32,7 +38,7 @@ def trends(
     blobs: Blobs,
     pid: Id,
     who: Reader,
-    show: Shown = [],  # noqa: B006 - FastAPI copies it
+    show: Shown,
     protocol: Protocol | None = None,
 ) -> Response:
     """Figures over the visits of a patient."""
@@ -46,12 +52,7 @@ def trends(
 
 
 @router.get("/patients/{pid}/compare")
-def choose(
-    db: Db,
-    pid: Id,
-    who: Reader,
-    visit: Annotated[list[Annotated[str, Query(pattern=r"^[0-9a-f]{32}$")]], Query(max_length=100)] = [],  # noqa: B006
-) -> Response:
+def choose(db: Db, pid: Id, who: Reader, visit: Ticked) -> Response:
     """Go on to the comparison of the two visits that were ticked, or back when they are not two."""
     with db.read() as c:
         patients.get(c, pid)

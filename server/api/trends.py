@@ -29,7 +29,12 @@ router = APIRouter(prefix="/patients/{patient_id}", tags=["trends"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
 Names = Annotated[
     list[Annotated[str, Query(max_length=64)]],
-    Query(alias="show", max_length=100, description="names of figures; none = all that were measured"),
+    Query(
+        alias="show",
+        max_length=100,
+        default_factory=list,
+        description="names of figures; none = all that were measured",
+    ),
 ]
 Walked = Annotated[
     Protocol | None, Query(description="visits of this protocol; none = that of the newest visit")
@@ -46,7 +51,7 @@ def read_trends(
     db: Db,
     blobs: Blobs,
     who: Reader,
-    show: Names = [],
+    show: Names,
     protocol: Walked = None,
 ) -> Response:
     """Values by visit with the norm, and the change since the first assessment against MDC and MCID."""
@@ -71,7 +76,7 @@ def read_trends_table(
     db: Db,
     blobs: Blobs,
     who: Reader,
-    show: Names = [],
+    show: Names,
     protocol: Walked = None,
 ) -> Response:
     """The same as a table: one row per figure, side and visit."""

@@ -11,7 +11,7 @@ from core.norms import Norms, norms_for
 from server.report.comparison import ComparedRow, compared_rows
 from server.report.numbers import Numbers
 from server.services import analyses, patients, programmes, reviews, sessions
-from server.services.errors import Conflict, ServiceError
+from server.services.errors import Conflict
 from server.services.histories import Analysed
 from server.services.patients import Patient
 from server.services.sessions import Session
@@ -53,10 +53,10 @@ def pair(c: Connection, session_id: str, other_id: str) -> Pair:
 
     Raises
     ------
-    NotFound: a session or its result. Conflict: other_patient. ServiceError bad_value: one and the same.
+    NotFound: a session or its result. Conflict: other_patient, same_session.
     """
     if session_id == other_id:
-        raise ServiceError("bad_value", "A session is compared with another one, not with itself.")
+        raise Conflict("same_session", "A session is compared with another one, not with itself.")
     both = [_analysed(c, sid) for sid in (session_id, other_id)]
     if both[0].session.patient_id != both[1].session.patient_id:
         raise Conflict("other_patient", "These sessions belong to different patients.")

@@ -106,7 +106,7 @@ async def test_sessions_of_two_people_or_one_session_are_not_compared(clinic: Cl
         same = await client.get(f"{API}/sessions/{one}/compare/{one}")
         page = await client.get(f"/sessions/{one}/compare/{two}")
     assert (foreign.status_code, foreign.json()["code"]) == (409, "other_patient")
-    assert (same.status_code, same.json()["code"]) == (422, "bad_value")
+    assert (same.status_code, same.json()["code"]) == (409, "same_session")
     assert page.status_code == 409
 
 
