@@ -10,6 +10,7 @@ from server.page_views import PROTOCOL_NAMES
 from server.report.change_words import change_words, term_of
 from server.report.comparison import ComparedRow
 from server.report.curves import cycle_svg
+from server.report.notes import GROUPS
 from server.report.panels import CurvePanel
 from server.report.trend_chart import Ahead, trend_svg
 from server.report.trends import PRIMARY, Line, Trend, Visit, names_in, trends
@@ -184,7 +185,9 @@ def _shown(history: History, found: Sequence[Trend], height: int) -> dict[str, A
     norms: dict[str, list[str]] = {}
     for t in found:
         if t.norm is not None:
-            norms.setdefault(f"{t.norm.group} ({t.norm.source})", []).append(t.term.label)
+            norms.setdefault(f"{GROUPS.get(t.norm.group, t.norm.group)} ({t.norm.source})", []).append(
+                t.term.label
+            )
     return {
         "figures": [_figure(t, line, history.visits, coming, height) for t, line in lines],
         "limits": [(", ".join(dict.fromkeys(labels)), s) for s, labels in sources.items()],

@@ -18,11 +18,12 @@ from server.report.wording import NO_NORM, VARIABLES, ZERO_WORDS, number
 
 SPEED: Final = "gait_speed_mps"
 
-_GROUPS: Final = {
+GROUPS: Final = {
     "adult_21_84": "adults 21–84 years",
     "adult_21_54": "adults 21–54 years",
     "adult_55_84": "adults 55–84 years",
 }
+"""Group of a reference → its people in words."""
 
 
 def norm_note(
@@ -34,7 +35,7 @@ def norm_note(
         sentences.append(NO_NORM.get(norms.reason, norms.reason))
     band = next((p.norm for p in panels if p.norm is not None), None)
     if band is not None:
-        who = _GROUPS.get(band.group, band.group)
+        who = GROUPS.get(band.group, band.group)
         sentences.append(
             f"Norm: {band.n} {who}, overground at their comfortable 1.25 ± 0.16 m/s, mean ± 1 SD "
             f"({band.source})."
@@ -47,7 +48,7 @@ def norm_note(
         sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
     if any(r.name == SPEED and r.norm is not None for r in rows):
         usual = norms.values[SPEED]
-        sentences.append(f"Gait speed: {_GROUPS.get(usual.group, usual.group)} ({usual.source}).")
+        sentences.append(f"Gait speed: {GROUPS.get(usual.group, usual.group)} ({usual.source}).")
     if controls is not None:
         sentences.append(_own_note(controls))
     return " ".join(sentences)

@@ -81,8 +81,8 @@ def trend_svg(
         plot.level("mcid", base - line.mcid)
         plot.level("mcid", base + line.mcid)
     plot.days()
-    plot.points(line, trend.term.digits)
     plot.labels(line)
+    plot.points(line, trend.term.digits)
     title = f"{trend.term.label}{'' if line.side is None else f', {line.side}'}"
     return (
         '<div class="chart trend-plot">'
@@ -172,14 +172,17 @@ class _Plot:
             self._text(x, y, number(p.value, digits), "strong halo", "middle", dy=-11)
 
     def labels(self, line: Line) -> None:
-        """Name the band and the limit at the right end, on the side of the band where there is more room."""
+        """Name band and limit where nothing is measured yet, else in the middle, away from the two values."""
         base = line.points[line.base].value
+        last = max(v.performed_on for v in self._visits)
+        free = self._alone or any(a.day > last for a in self._ahead)
+        x, anchor, dx = ("100%", "end", -4) if free else ("50%", "middle", 0)
         if line.mdc is not None:
             y = self._px(base - line.mdc)
-            self._text("100%", y, "within measurement error (MDC)", "words halo", "end", dx=-4, dy=-5)
-        if line.mcid is not None and (line.mdc is None or line.mcid != line.mdc):
+            self._text(x, y, "within measurement error (MDC)", "words halo", anchor, dx=dx, dy=-5)
+        if line.mcid is not None and line.mcid != line.mdc:
             y = self._px(base + line.mcid)
-            self._text("100%", y, "MCID", "words halo", "end", dx=-4, dy=-4)
+            self._text(x, y, "MCID", "words halo", anchor, dx=dx, dy=-4)
 
     def svg(self) -> str:
         return (
