@@ -218,7 +218,7 @@ def test_zooming_and_moving_keep_all_lanes_and_the_table_together(timeline: Page
     for _ in range(4):
         timeline.locator("[data-zoom='0.5']").click()
     assert timeline.locator(".ev").count() > 4
-    timeline.wait_for_function("document.querySelectorAll('[data-list] tr').length < 16")
+    timeline.wait_for_function("() => document.querySelectorAll('[data-list] tr').length < 16")
     timeline.keyboard.press(".")
     assert span.inner_text() != first
 

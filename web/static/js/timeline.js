@@ -2,7 +2,10 @@
 // what depends on it is drawn again from the answer.
 import { showProblem } from "./api.js";
 import { clock } from "./clock.js";
+import { ticks } from "./timeline/axis.js";
+import { askEvent, askReason } from "./timeline/dialogs.js";
 import { WORD, h, seconds } from "./timeline/dom.js";
+import { drag, follow, wheel } from "./timeline/gestures.js";
 import { EventHandles } from "./timeline/handles.js";
 import { SignalLane } from "./timeline/lane.js";
 import { editRows, strideBox, strideRows } from "./timeline/panel.js";
@@ -47,7 +50,7 @@ class TakeTimeline extends HTMLElement {
     this.over.show(0, this.win.duration);
     this.brush = h("i", { class: "tl-brush", "aria-hidden": "true" });
     this.find("overview").append(this.brush);
-    this.follow(this.find("overview"), (share) => {
+    follow(this.find("overview"), (share) => {
       const t = share * this.win.duration;
       this.win.set(t - this.win.span / 2, t + this.win.span / 2);
     });
@@ -61,7 +64,7 @@ class TakeTimeline extends HTMLElement {
       blocks: new StrideBlocks(host, { sides: [host.dataset.side], onPick: pick }),
       handles: new EventHandles(host, host.dataset.side, shared),
     }));
-    for (const host of this.querySelectorAll("[data-side]")) this.drag(host, () => {});
+    for (const host of this.querySelectorAll("[data-side]")) drag(host, this.win, () => {});
   }
 
   prepareLanes() {
@@ -75,7 +78,7 @@ class TakeTimeline extends HTMLElement {
       const open = (l) => this.attempt(async () => { await lane.open(l); this.ticked(); });
       choice.addEventListener("change", () => open(known.find((l) => l.name === choice.value)));
       open(wanted);
-      this.drag(host, (e) => clock.set(this.timeAt(e, host)));
+      drag(host, this.win, (t) => clock.set(t));
       return lane;
     });
   }
@@ -87,15 +90,11 @@ class TakeTimeline extends HTMLElement {
     this.find("whole").addEventListener("click", () => this.win.whole());
     this.find("undo")?.addEventListener("click", () => this.undo());
     this.find("add")?.addEventListener("click", () => this.askEvent());
-    grid.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
+    grid.addEventListener("wheel", (e) => wheel(e, this.win), { passive: false });
     new ResizeObserver(() => this.moved()).observe(grid);
     document.addEventListener("keydown", (e) => this.key(e));
     this.find("figure").addEventListener("click", () => this.showFigure());
     if (remembered()) this.showFigure();
-    document.querySelector("[data-leave-out]")?.addEventListener("submit", (e) => this.leaveOut(e));
-    document.querySelector("[data-add-event]")?.addEventListener("submit", (e) => this.add(e));
-    const [why, words] = [document.getElementById("why"), document.getElementById("words")];
-    words?.addEventListener("input", () => words.value && (why.value = ""));
   }
 
   // The figure draws in this page's own thread, so it comes when asked for, and from then on each time.
@@ -110,62 +109,8 @@ class TakeTimeline extends HTMLElement {
 
   // ---- time
 
-  timeAt(e, host) {
-    const box = host.getBoundingClientRect();
-    return this.win.start + ((e.clientX - box.left) / box.width) * this.win.span;
-  }
-
   anchor() {
     return clock.t > this.win.start && clock.t < this.win.end ? clock.t : undefined;
-  }
-
-  wheel(e) {
-    const plot = e.target.closest(".tl-plot");
-    if (!plot) return;
-    const sideways = Math.abs(e.deltaX) > Math.abs(e.deltaY) || e.shiftKey;
-    if (!e.ctrlKey && !sideways) return; // the page scrolls
-    e.preventDefault();
-    if (e.ctrlKey) this.win.zoom(Math.exp(e.deltaY / 300), this.timeAt(e, plot));
-    else this.win.pan(((e.deltaX || e.deltaY) / plot.clientWidth) * this.win.span);
-  }
-
-  // A drag moves the window, two fingers zoom; a click that is neither goes to who asked.
-  drag(host, onClick) {
-    const fingers = new Map();
-    let moved = false;
-    host.addEventListener("pointerdown", (e) => {
-      if (e.button !== 0) return;
-      fingers.set(e.pointerId, e.clientX);
-      moved = fingers.size > 1;
-    });
-    host.addEventListener("pointermove", (e) => {
-      if (!fingers.has(e.pointerId)) return;
-      const by = e.clientX - fingers.get(e.pointerId);
-      if (!moved && Math.abs(by) < 4) return;
-      if (!moved || !host.hasPointerCapture(e.pointerId)) host.setPointerCapture(e.pointerId); // not before: it would take the click
-      moved = true;
-      if (fingers.size === 1) this.win.pan((-by / host.clientWidth) * this.win.span);
-      else {
-        const other = [...fingers].find(([id]) => id !== e.pointerId)[1];
-        const [was, is] = [Math.abs(fingers.get(e.pointerId) - other), Math.abs(e.clientX - other)];
-        if (is > 10) this.win.zoom(was / is, this.timeAt({ clientX: (e.clientX + other) / 2 }, host));
-      }
-      fingers.set(e.pointerId, e.clientX);
-    });
-    const end = (e) => {
-      if (fingers.delete(e.pointerId) && !moved && e.type === "pointerup") onClick(e);
-    };
-    for (const name of ["pointerup", "pointercancel", "pointerleave"]) host.addEventListener(name, end);
-  }
-
-  follow(host, act) {
-    const go = (e) => act((e.clientX - host.getBoundingClientRect().left) / host.clientWidth);
-    host.addEventListener("pointerdown", (e) => {
-      if (e.button !== 0) return;
-      host.setPointerCapture(e.pointerId);
-      go(e);
-    });
-    host.addEventListener("pointermove", (e) => host.hasPointerCapture(e.pointerId) && go(e));
   }
 
   key(e) {
@@ -197,23 +142,10 @@ class TakeTimeline extends HTMLElement {
     this.brush.style.left = `${(100 * win.start) / win.duration}%`;
     this.brush.style.width = `${(100 * win.span) / win.duration}%`;
     this.find("span").textContent = `${seconds(win.start, 1)} to ${seconds(win.end, 1)} s of ${seconds(win.duration, 1)} s`;
-    this.axis();
+    this.find("axis").replaceChildren(...ticks(win, this.find("axis").clientWidth));
     this.cursor();
     clearTimeout(this.listing);
     this.listing = setTimeout(() => this.list(), 60);
-  }
-
-  axis() {
-    const { win } = this;
-    const most = Math.max(3, Math.floor(this.find("axis").clientWidth / 70));
-    const step = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600].find((s) => win.span / s <= most) ?? 1200;
-    const ticks = [];
-    for (let i = Math.ceil(win.start / step - 1e-9); i * step <= win.end + 1e-9; i++) {
-      const tick = h("span", {}, `${seconds(i * step, step < 0.1 ? 2 : step < 1 ? 1 : 0)}\u2009s`);
-      tick.style.left = `${100 * win.place(i * step)}%`;
-      ticks.push(tick);
-    }
-    this.find("axis").replaceChildren(...ticks);
   }
 
   cursor() {
@@ -300,20 +232,7 @@ class TakeTimeline extends HTMLElement {
   }
 
   askReason(stride) {
-    this.asked = stride;
-    const dialog = document.getElementById("leave-out");
-    dialog.querySelector("[data-which]").textContent = `The ${stride.side} stride from ${seconds(stride.start_s)} to ${seconds(stride.end_s)} s no longer counts in any number. Undo brings it back.`;
-    dialog.querySelector("form").reset();
-    dialog.showModal();
-  }
-
-  leaveOut(e) {
-    e.preventDefault();
-    const { why, words } = e.target.elements;
-    const reason = words.value.trim() || why.value;
-    if (!reason) return words.focus();
-    e.target.closest("dialog").close();
-    this.change({ kind: "exclude_stride", side: this.asked.side, time_s: middle(this.asked), reason }, `The ${this.asked.side} stride is left out.`);
+    askReason(stride, (reason) => this.change({ kind: "exclude_stride", side: stride.side, time_s: middle(stride), reason }, `The ${stride.side} stride is left out.`));
   }
 
   count(stride) {
@@ -322,20 +241,9 @@ class TakeTimeline extends HTMLElement {
 
   askEvent(side = clock.stride?.side ?? "left", time = clock.t) {
     if (!this.editable) return;
-    const dialog = document.getElementById("add-event");
-    const form = dialog.querySelector("form");
     const before = this.review.events.filter((e) => e.side === side && e.time_s < time).at(-1);
-    form.elements.side.value = side;
-    form.elements.event.value = before?.kind === "ic" ? "tc" : "ic";
-    form.elements.time_s.value = time.toFixed(3);
-    dialog.showModal();
-  }
-
-  add(e) {
-    e.preventDefault();
-    const { side, event, time_s } = e.target.elements;
-    e.target.closest("dialog").close();
-    this.change({ kind: "add_event", side: side.value, event: event.value, time_s: Number(time_s.value) }, `${WORD[event.value]} added.`);
+    const event = before?.kind === "ic" ? "tc" : "ic"; // the two take turns
+    askEvent({ side, event, time_s: time }, (edit) => this.change({ kind: "add_event", ...edit }, `${WORD[edit.event]} added.`));
   }
 
   move(event, to) {
