@@ -154,6 +154,8 @@ def comparison_view(blobs: BlobStore, found: Pair) -> dict[str, Any]:
         "limits": [(", ".join(dict.fromkeys(titles)), s) for s, titles in sources.items()],
         "real": judged,
         "cautions": found.cautions,
+        "replay": new.replay,
+        "figure": all("poses.parquet" in a.found.files for a in (found.before, found.after)),
         "used": {"before": old.used, "after": new.used},
         "norm_source": new.norm_source,
         "norm_note": new.norm_note,

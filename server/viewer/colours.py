@@ -26,6 +26,9 @@ TINTS: Final[Mapping[bool, Mapping[Tint, Rgb]]] = {
 }
 """Dark → colours of the parts; the leg pairs are --left and --right of the page's tokens.css."""
 
+GHOST: Final[Mapping[bool, Rgb]] = {False: (0x5B, 0x7C, 0x99), True: (0x8F, 0xAE, 0xC8)}
+"""Dark → colour of another visit, the grey-blue of its curves; legs are told by where they are."""
+
 BACKGROUND: Final[Mapping[bool, Rgb]] = {False: (0xF9, 0xFA, 0xFB), True: (0x16, 0x1C, 0x22)}
 """Dark → colour behind the figure."""
 

@@ -13,12 +13,16 @@ import viser
 from numpy.typing import NDArray
 
 from core.frames import Floats
-from server.viewer.colours import BACKGROUND, FLOOR, TINTS, linear
+from server.viewer.colours import BACKGROUND, FLOOR, GHOST, TINTS, linear
+from server.viewer.ghost import Ghost
 from server.viewer.ground import Ground
 from server.viewer.motion import Batch, Motion
 
 _FOV_RAD = np.deg2rad(31.0)
 _FLOOR_M = 60.0
+_PALE = 0.5
+"""Opacity of another visit."""
+
 _FAINT = 0.35
 """Opacity of a part that no sensor supports."""
 
@@ -59,6 +63,11 @@ class Figure:
         self._batches = [
             (b, _add_batch(scene, f"/room/{name}", b)) for name, b in motion.batches.items() if b.tint
         ]
+        self._ghost_batches: list[tuple[Batch, viser.BatchedMeshHandle]] = []
+        if motion.ghost is not None:
+            self._ghost_node = scene.add_frame("/room/ghost", show_axes=False)
+            self._ghost_batches = _add_ghost(scene, motion.ghost)
+        self._ghost_shown = True
         self._ground = Ground(scene, "/room", motion)
         self._letters = {
             side: scene.add_label(
@@ -92,6 +101,7 @@ class Figure:
                 if valid:
                     handle.batched_positions = batch.position[i]
                     handle.batched_wxyzs = batch.wxyz[i]
+            self._pose_ghost(i, valid=valid)
             for side, letter in self._letters.items():
                 letter.visible = valid and self._follow
                 letter.position = m.toes[side][i]
@@ -104,6 +114,8 @@ class Figure:
         """Change all colours to the theme of the page around."""
         for batch, handle in self._batches:
             handle.batched_colors = _colours(batch, dark)
+        for _, handle in self._ghost_batches:
+            handle.batched_colors = np.array(linear(GHOST[dark]), np.uint8)
         self._ground.set_dark(dark)
         self._server.scene.set_background_image(np.full((2, 2, 3), BACKGROUND[dark], np.uint8), format="png")
         self._grid.cell_color, self._grid.section_color = FLOOR[dark]
@@ -121,6 +133,27 @@ class Figure:
         for client in self._server.get_clients().values():
             client.camera.position, client.camera.look_at = shot.eye, shot.at
         self.pose(self._t_s)
+
+    def set_ghost(self, visible: bool) -> None:
+        """Show or hide the other visit, where there is one."""
+        self._ghost_shown = visible
+        self.pose(self._t_s)
+
+    def _pose_ghost(self, i: int, *, valid: bool) -> None:
+        ghost = self._motion.ghost
+        if ghost is None:
+            return
+        j = int(ghost.frames[i])
+        visible = valid and self._ghost_shown and j >= 0
+        for batch, handle in self._ghost_batches:
+            handle.visible = visible
+            if visible:
+                handle.batched_positions = batch.position[j]
+                handle.batched_wxyzs = batch.wxyz[j]
+        if visible:
+            half = float(ghost.turn[i]) / 2
+            self._ghost_node.wxyz = (float(np.cos(half)), 0.0, 0.0, float(np.sin(half)))
+            self._ghost_node.position = (float(ghost.place[i, 0]), float(ghost.place[i, 1]), 0.0)
 
     def set_ground(self, visible: bool) -> None:
         """Show or hide footprints and trails."""
@@ -156,6 +189,30 @@ def _turned(heading: float) -> Floats:
 
 def _colours(batch: Batch, dark: bool) -> NDArray[np.uint8]:
     return np.array([linear(TINTS[dark][tint]) for tint in batch.tint], np.uint8)
+
+
+def _add_ghost(scene: viser.SceneApi, ghost: Ghost) -> list[tuple[Batch, viser.BatchedMeshHandle]]:
+    """The other visit, pale and without a shadow, on a node of its own."""
+    return [
+        (
+            batch,
+            scene.add_batched_meshes_simple(
+                f"/room/ghost/{name}",
+                *batch.mesh,
+                batch.wxyz[0],
+                batch.position[0],
+                batched_scales=batch.scale,
+                batched_colors=linear(GHOST[False]),
+                opacity=_PALE,
+                lod="off",
+                cast_shadow=False,
+                receive_shadow=False,
+                visible=False,
+            ),
+        )
+        for name, batch in ghost.motion.batches.items()
+        if batch.tint
+    ]
 
 
 def _add_batch(scene: viser.SceneApi, name: str, batch: Batch) -> viser.BatchedMeshHandle:

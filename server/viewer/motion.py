@@ -19,6 +19,7 @@ from core.errors import ParameterError
 from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from server.viewer import shapes
 from server.viewer.colours import Tint
+from server.viewer.ghost import Ghost
 from server.viewer.steps import Prints, Single, Trail, prints, sole, trail
 
 FRAME_RATE = 50.0
@@ -70,7 +71,7 @@ class Motion:
     toes : side → (m, 3) where the letter of that side is written.
     prints, trails : side → where that foot rested, and its way; no trails unless `placed`.
     placed : positions are estimates of where the person was in the room, not only for the eye.
-    facing : heading in rad at the first valid frame.
+    facing : heading in rad at the first valid frame. ghost : another visit laid over it, None without.
     """
 
     t_s: Floats
@@ -83,6 +84,7 @@ class Motion:
     placed: bool
     facing: float
     body: BodyModel
+    ghost: Ghost | None = None
 
     @property
     def duration_s(self) -> float:

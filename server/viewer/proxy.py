@@ -20,12 +20,14 @@ import functools
 import json
 import math
 from collections.abc import AsyncIterator, Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import viser
 from fastapi import APIRouter, FastAPI, Query, Request, WebSocket
 from fastapi.responses import HTMLResponse
+from sqlalchemy import Connection
 from starlette.websockets import WebSocketDisconnect
 from websockets.exceptions import WebSocketException
 
@@ -35,8 +37,11 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.problems import Problem, as_problem
 from server.report.bundle import read_poses
-from server.services import analyses
+from server.services import analyses, comparisons, reviews, sessions
+from server.services.histories import Analysed
+from server.storage.blobs import BlobStore
 from server.viewer.figure import Figure
+from server.viewer.ghost import ghost_of
 from server.viewer.motion import Motion, prepare
 from server.viewer.pipe import POLICY_VIOLATION, Activity, carry, subprotocols_of, until_over, upstream
 from server.viewer.views import View, Views
@@ -60,6 +65,7 @@ _SWITCHES: Mapping[str, Callable[[Figure, bool], None]] = {
     "dark": Figure.set_dark,
     "follow": Figure.set_follow,
     "ground": Figure.set_ground,
+    "ghost": Figure.set_ghost,
 }
 
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -121,12 +127,17 @@ async def _say_gone(ws: WebSocket) -> None:
 
 @router.websocket("/sessions/{sid}/replay")
 async def replay(
-    ws: WebSocket, sid: str, who: Reader, tab: Annotated[str, Query(max_length=64)] = "", dark: bool = False
+    ws: WebSocket,
+    sid: str,
+    who: Reader,
+    tab: Annotated[str, Query(max_length=64)] = "",
+    dark: bool = False,
+    ghost: Annotated[str | None, Query(max_length=64)] = None,
 ) -> None:
-    """Open the view of this browser tab and let the page move its cursor."""
+    """Open the view of this browser tab and let the page move its cursor; `ghost` = another visit over it."""
     await ws.accept()
     try:
-        view = await _open(ws, sid, who, tab, dark)
+        view = await _open(ws, sid, who, tab, dark, ghost)
     except (Problem, SagittalError) as error:
         problem = as_problem(error)
         await ws.send_json({"error": {"code": problem.code, "detail": problem.detail}})
@@ -157,21 +168,46 @@ async def replay(
                 await ws.close(POLICY_VIOLATION, "not_signed_in")
 
 
-async def _open(ws: WebSocket, sid: str, who: Identity, tab: str, dark: bool) -> View:
+async def _open(ws: WebSocket, sid: str, who: Identity, tab: str, dark: bool, other: str | None) -> View:
     db, blobs = ws.app.state.db, ws.app.state.blobs
 
-    def latest() -> analyses.Analysis | None:
+    def latest() -> tuple[Analysed | None, Analysed | None]:
         with db.read() as c:
-            return analyses.latest(c, sid)
+            this = _replayable(c, sid)
+            if this is None or other is None:
+                return this, None
+            comparisons.pair(c, sid, other)  # refuses a visit of somebody else
+            return this, _replayable(c, other)
 
-    found = await asyncio.to_thread(latest)
-    if found is None or "poses.parquet" not in found.files:
+    this, before = await asyncio.to_thread(latest)
+    if this is None:
         raise Problem(404, "no_poses", "There is nothing to replay: no analysis has reached the poses yet.")
 
     def load() -> Motion:
-        return prepare(read_poses(analyses.file_bytes(blobs, found, "poses.parquet")))
+        motion = _motion(blobs, this)
+        if before is None:
+            return motion
+        mine, theirs = (reviews.bundle(blobs, a.found, a.edits).strides for a in (this, before))
+        return replace(motion, ghost=ghost_of(motion, mine, _motion(blobs, before), theirs))
 
-    return await _views(ws).open(who.login_id, tab, found.id, load, dark)
+    shown = this.found.id if before is None else f"{_state(this)} over {_state(before)}"
+    return await _views(ws).open(who.login_id, tab, shown, load, dark)
+
+
+def _replayable(c: Connection, sid: str) -> Analysed | None:
+    found = analyses.latest(c, sid)
+    if found is None or "poses.parquet" not in found.files:
+        return None
+    return Analysed(sessions.get(c, sid), found, reviews.edits_of(c, found.id))
+
+
+def _state(a: Analysed) -> str:
+    """A ghost follows the strides, so it follows their edits."""
+    return f"{a.found.id} {a.edits.key}"
+
+
+def _motion(blobs: BlobStore, a: Analysed) -> Motion:
+    return prepare(read_poses(analyses.file_bytes(blobs, a.found, "poses.parquet")))
 
 
 async def _follow(ws: WebSocket, view: View, activity: Activity) -> None:

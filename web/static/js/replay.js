@@ -47,6 +47,7 @@ class GaitView extends HTMLElement {
   connect() {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const query = new URLSearchParams({ tab: tabId(), dark: isDark() });
+    if (this.dataset.ghost) query.set("ghost", this.dataset.ghost);
     this.socket = new WebSocket(`${scheme}://${location.host}${this.getAttribute("replay")}?${query}`);
     this.socket.onmessage = (e) => this.receive(JSON.parse(e.data));
     this.socket.onclose = (e) => {

@@ -1,0 +1,85 @@
+"""The same person at another visit, laid over the figure: at the same phase of a stride, in the same place.
+
+Two walks share no time. Each stride of the figure that counts gets a stride of the other visit, in their
+order and from the beginning again when they run out; between its contacts time runs with the phase. Where the
+figure is in no such stride there is no ghost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.events.result import Stride, Strides
+from core.frames import SIDES, Floats
+
+if TYPE_CHECKING:
+    from server.viewer.motion import Motion
+
+SPAN_S: Final = 1.0
+"""The way of the person over this time says where the walk goes: about a stride, so that sway does not."""
+
+STANDS_M: Final = 0.15
+"""A shorter way in that time has no direction; on a treadmill the facing of the beginning stands for it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """Another motion, matched frame by frame.
+
+    Parameters
+    ----------
+    frames : (m,) frame of `motion` for each frame of the figure, −1 where there is none.
+    turn : (m,) rad about the vertical, and place : (m, 2) m, that bring it to where the figure is.
+    """
+
+    motion: Motion
+    frames: NDArray[np.int64]
+    turn: Floats
+    place: Floats
+
+
+def ghost_of(figure: Motion, strides: Strides, other: Motion, other_strides: Strides) -> Ghost | None:
+    """Match another visit to a figure; None when no side has strides that count in both."""
+    for side in SIDES:
+        mine = [s for s in strides.strides if s.side == side and s.excluded_reason is None]
+        theirs = [s for s in other_strides.strides if s.side == side and s.excluded_reason is None]
+        if mine and theirs:
+            frames = _frames(figure.t_s, mine, other.t_s, theirs)
+            there = np.maximum(frames, 0)
+            frames[~other.valid[there]] = -1
+            turn = heading(figure) - heading(other)[there]
+            root = other.root[there].astype(np.float64)
+            c, s = np.cos(turn), np.sin(turn)
+            moved = np.stack((c * root[:, 0] - s * root[:, 1], s * root[:, 0] + c * root[:, 1]), axis=1)
+            return Ghost(other, frames, turn, figure.root - moved)
+    return None
+
+
+def heading(motion: Motion) -> Floats:
+    """Direction of the walk in rad at each frame, from the way of the root."""
+    step = float(motion.t_s[1] - motion.t_s[0]) if len(motion.t_s) > 1 else SPAN_S
+    half = max(1, round(SPAN_S / 2 / step))
+    i = np.arange(len(motion.t_s))
+    way = motion.root[np.minimum(i + half, len(i) - 1)] - motion.root[np.maximum(i - half, 0)]
+    far = np.hypot(way[:, 0], way[:, 1]) >= STANDS_M
+    return np.where(far, np.arctan2(way[:, 1], way[:, 0]), motion.facing).astype(np.float64)
+
+
+def _frames(
+    t_s: Floats, mine: Sequence[Stride], other_t_s: Floats, theirs: Sequence[Stride]
+) -> NDArray[np.int64]:
+    frames = np.full(len(t_s), -1, np.int64)
+    for k, stride in enumerate(mine):
+        like = theirs[k % len(theirs)]
+        inside = np.flatnonzero((t_s >= stride.start_s) & (t_s < stride.end_s))
+        phase = (t_s[inside] - stride.start_s) / (stride.end_s - stride.start_s)
+        wanted = like.start_s + phase * (like.end_s - like.start_s)
+        after = np.clip(np.searchsorted(other_t_s, wanted), 1, len(other_t_s) - 1)
+        nearer = wanted - other_t_s[after - 1] < other_t_s[after] - wanted
+        frames[inside] = after - nearer
+    return frames
