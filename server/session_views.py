@@ -10,6 +10,7 @@ from urllib.parse import quote
 from sqlalchemy import Connection
 
 from server.page_views import PROTOCOL_NAMES, SEGMENT_NAMES, job_dict, newest_job, who_words
+from server.report import level
 from server.report.curves import cycle_svg, strip_svg
 from server.report.estimator import CHOICES, EstimatorView, estimator_view
 from server.report.model import ReportModel
@@ -40,6 +41,9 @@ SECONDARY: Final = (
     "Support in seconds",
 )
 """Groups for those who look closer: folded on the page, not on paper."""
+
+NOT_ON_PAPER: Final = ("swing_pct", "swing_time_s", "turning_angle_deg")
+"""What the rest of a stride leaves, and what a straight walk has none of."""
 
 SHOWN: Final = (
     "problem",
@@ -217,13 +221,18 @@ def _groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[Row, ..
 
     On paper only what was measured has a row; `missing` says the rest in one line.
     """
-    if all(row.reason for _, rows in model.groups for row in rows):
-        return []
     groups = [(name, rows) for name, rows in model.groups if name not in SECONDARY]
+    if all(row.reason for _, rows in groups for row in rows):
+        return []
     if not paper:
         return groups
-    measured = ((name, tuple(r for r in rows if r.reason is None)) for name, rows in groups)
-    return [(name, rows) for name, rows in measured if rows]
+    # a level from the anatomical zero says more than the same one from standing
+    known = {level.from_standing(r.name) for name, rows in groups if name == level.GROUP for r in rows}
+    left_out = {*NOT_ON_PAPER, *known}
+    short = (
+        (name, tuple(r for r in rows if r.reason is None and r.name not in left_out)) for name, rows in groups
+    )
+    return [(name, rows) for name, rows in short if rows]
 
 
 def _why_empty(model: ReportModel) -> str:

@@ -12,12 +12,16 @@ from core.frames import SIDES, Side
 from core.parameters.rows import Column
 from server.report.columns import plain
 from server.report.definitions import DEFINITIONS
+from server.report.level import from_standing
 from server.report.table import Row
 from server.report.wording import TERMS, excluded_words, number
 
 HEIGHT: Final = 220
 TOP, BOTTOM = 12, 24
 """Chart and its margins, px."""
+
+STANDING: Final = "from the person's own standing"
+"""Words of definitions that do not hold for an anatomical angle."""
 
 TICKS: Final = 5
 CSS: Final[dict[Side, tuple[str, float]]] = {"left": ("dl", 5.2), "right": ("dr", 4.6)}
@@ -84,7 +88,10 @@ def behind(row: Row, strides: Strides, column: Column | None, duration_s: float)
         )
         for i, (s, v) in enumerate(zip(strides.strides, column, strict=True))
     )  # fmt: skip
-    return Behind(row, DEFINITIONS.get(row.name, ""), values, _chart(row, values, duration_s))
+    definition = DEFINITIONS.get(from_standing(row.name) or row.name, "")
+    if from_standing(row.name) is not None:
+        definition = definition.replace(STANDING, "from the anatomical zero")
+    return Behind(row, definition, values, _chart(row, values, duration_s))
 
 
 def _chart(row: Row, values: Sequence[StrideValue], duration_s: float) -> str:

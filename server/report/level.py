@@ -4,13 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+from typing import Final
 
 from core.anatomical import anatomical_parameters
+from core.events.result import Strides
+from core.frames import SIDES, SUFFIX
 from core.norms import Norms
 from core.parameters.result import CycleCurves
+from core.parameters.rows import Column
+from core.standing import JOINTS, PELVIS
 from server.report.table import Row, parameter_rows
 
 GROUP = "Angles from the anatomical zero"
+
+
+_SUFFIX: Final = "_anatomical_deg"
+
+
+def from_standing(name: str) -> str | None:
+    """Name of the same figure from standing; None for any other row."""
+    return f"{name.removesuffix(_SUFFIX)}_deg" if name.endswith(_SUFFIX) else None
+
+
+def level_column(
+    name: str, strides: Strides, columns: Mapping[str, Column], standing_deg: Mapping[str, float]
+) -> Column | None:
+    """The figure of every stride from the anatomical zero: that from standing plus what was read."""
+    column = columns.get(from_standing(name) or "")
+    if column is None:
+        return None
+    variable = next((v for v in (*PELVIS, *JOINTS) if name.startswith(f"{v}_")), "")
+    read = {s: standing_deg.get(variable if variable in PELVIS else f"{variable}_{SUFFIX[s]}") for s in SIDES}
+    return tuple(
+        None if v is None or (zero := read[s.side]) is None else v + zero
+        for s, v in zip(strides.strides, column, strict=True)
+    )
 
 
 def level_rows(
@@ -28,6 +56,4 @@ def level_rows(
     """
     measured = replace(curves, curves={v: c for v, c in curves.curves.items() if v not in estimated})
     rows = parameter_rows(anatomical_parameters(measured, standing_deg), norms)
-    return tuple(
-        replace(row, name=f"{row.name.removesuffix('_deg')}_anatomical_deg", group=GROUP) for row in rows
-    )
+    return tuple(replace(row, name=f"{row.name.removesuffix('_deg')}{_SUFFIX}", group=GROUP) for row in rows)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from server.report.behind import Behind, behind
 from server.report.bundle import Bundle
 from server.report.comparison import changes, with_changes
+from server.report.level import level_column
 from server.report.model import ReportModel, Since, report_model
 from server.services import analyses, controls, reviews
 from server.services.comparisons import norms
@@ -70,4 +71,6 @@ def behind_number(
     if row is None:
         raise NotFound("parameter", name)
     columns = reviews.columns(blobs, found, edits)
-    return behind(row, bundle.strides, columns.get(name), model.duration_s)
+    standing = {} if bundle.angles is None else bundle.angles.standing_deg
+    column = columns.get(name) or level_column(name, bundle.strides, columns, standing)
+    return behind(row, bundle.strides, column, model.duration_s)

@@ -83,8 +83,8 @@ def test_another_mapping_runs_the_analysis_again(
     with running.client() as client:
         filling.wait(client, client.get("/api/v1/jobs").json()[0]["id"])
     # the page hears of the end by itself and loads the new results
-    expect(page.locator("gait-view")).to_be_visible()
-    expect(page.locator("job-progress")).to_have_count(0)
+    expect(page.locator("job-progress")).to_have_count(0, timeout=30_000)
+    expect(page.locator("gait-view")).to_be_visible(timeout=30_000)
     page.wait_for_load_state("networkidle")
     page.goto(f"/sessions/{session}/data")
     expect(page.get_by_role("heading", name="Earlier analyses")).to_be_visible()

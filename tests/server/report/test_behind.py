@@ -8,6 +8,7 @@ from server.report.behind import behind
 from server.report.bundle import read_columns
 from server.report.definitions import DEFINITIONS
 from server.report.exports import strides_csv
+from server.report.level import level_column
 from server.report.model import report_model
 from server.report.wording import TERMS
 from tests.server import walk
@@ -49,3 +50,14 @@ def test_columns_come_back_from_the_stride_table() -> None:
     column = tuple(None if i == 2 else float(i) for i in range(len(strides.strides)))
     back = read_columns(strides_csv(strides, {"stride_length_m": column}))
     assert back == {"stride_length_m": column}
+
+
+def test_an_anatomical_angle_opens_to_its_strides_shifted_by_the_goniometer(make_bundle: MakeBundle) -> None:
+    strides = make_bundle().strides
+    column = tuple(float(i) for i in range(len(strides.strides)))
+    columns = {"knee_flexion_ic_deg": column}
+    found = level_column("knee_flexion_ic_anatomical_deg", strides, columns, {"knee_flexion_l": 8.0})
+    assert found is not None
+    for s, was, now in zip(strides.strides, column, found, strict=True):
+        assert now == (was + 8.0 if s.side == "left" else None)
+    assert level_column("cadence_spm", strides, columns, {}) is None
