@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from math import degrees, hypot, inf
 from typing import TYPE_CHECKING
 
-from core.frames import Segment
+from core.frames import Segment, Side
 from server.jobs.table import TableQueue
 from server.services import analyses, patients, recordings, sessions
 from server.settings import Settings, load_settings
@@ -39,6 +39,7 @@ class Person:
     birth_year: int
     height_m: float
     note: str
+    affected_side: Side | None = None
 
 
 @dataclass(frozen=True)
@@ -62,12 +63,14 @@ class Visit:
 
 
 VOLUNTEER = Person("REF-004", "female", 1989, 1.70, "Simulated. Healthy volunteer, no complaints.")
-STROKE = Person("NR-2107", "male", 1961, 1.76, "Simulated. Left hemiparesis, walks without an aid.")
-KNEE = Person("OR-1188", "female", 1974, 1.66, "Simulated. Left knee replaced, little flexion in swing.")
-NERVE = Person("NR-2133", "male", 1983, 1.81, "Simulated. Left peroneal palsy, drop foot.")
+STROKE = Person("NR-2107", "male", 1961, 1.76, "Simulated. Left hemiparesis, walks without an aid.", "left")
+KNEE = Person(
+    "OR-1188", "female", 1974, 1.66, "Simulated. Left knee replaced, little flexion in swing.", "left"
+)
+NERVE = Person("NR-2133", "male", 1983, 1.81, "Simulated. Left peroneal palsy, drop foot.", "left")
 PARKINSON = Person("NR-2090", "male", 1953, 1.72, "Simulated. Parkinson's disease, short quick steps.")
 CROUCH = Person("PD-0412", "female", 2009, 1.58, "Simulated. Bilateral cerebral palsy, crouch gait.")
-HIP = Person("OR-1203", "male", 1966, 1.79, "Simulated. Pain in the left hip, waiting for surgery.")
+HIP = Person("OR-1203", "male", 1966, 1.79, "Simulated. Pain in the left hip, waiting for surgery.", "left")
 FALLS = Person("GE-0317", "female", 1943, 1.62, "Simulated. Two falls in the last year.")
 
 VISITS = (
