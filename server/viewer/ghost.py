@@ -44,20 +44,25 @@ class Ghost:
 
 
 def ghost_of(figure: Motion, strides: Strides, other: Motion, other_strides: Strides) -> Ghost | None:
-    """Match another visit to a figure; None when no side has strides that count in both."""
+    """Match another visit to a figure; None when no side has strides that count in both.
+
+    Strides of the left lead; those of the right fill in where the left has none, as at the ends of a walk.
+    """
+    frames = np.full(len(figure.t_s), -1, np.int64)
     for side in SIDES:
         mine = [s for s in strides.strides if s.side == side and s.excluded_reason is None]
         theirs = [s for s in other_strides.strides if s.side == side and s.excluded_reason is None]
         if mine and theirs:
-            frames = _frames(figure.t_s, mine, other.t_s, theirs)
-            there = np.maximum(frames, 0)
-            frames[~other.valid[there]] = -1
-            turn = heading(figure) - heading(other)[there]
-            root = other.root[there].astype(np.float64)
-            c, s = np.cos(turn), np.sin(turn)
-            moved = np.stack((c * root[:, 0] - s * root[:, 1], s * root[:, 0] + c * root[:, 1]), axis=1)
-            return Ghost(other, frames, turn, figure.root - moved)
-    return None
+            frames = np.where(frames < 0, _frames(figure.t_s, mine, other.t_s, theirs), frames)
+    there = np.maximum(frames, 0)
+    frames[~other.valid[there]] = -1
+    if not (frames >= 0).any():
+        return None
+    turn = heading(figure) - heading(other)[there]
+    root = other.root[there].astype(np.float64)
+    c, s = np.cos(turn), np.sin(turn)
+    moved = np.stack((c * root[:, 0] - s * root[:, 1], s * root[:, 0] + c * root[:, 1]), axis=1)
+    return Ghost(other, frames, turn, figure.root - moved)
 
 
 def heading(motion: Motion) -> Floats:

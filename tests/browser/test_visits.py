@@ -6,7 +6,7 @@ import datetime as dt
 import re
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, WebSocket, expect
 
 from tests.browser import filling
 from tests.browser.conftest import Filled, Opener, RunningServer
@@ -106,21 +106,25 @@ def test_a_programme_is_started_linked_to_its_visits_and_ended(
 def test_the_visit_before_walks_as_a_ghost_with_the_figure(
     opened: Opener, filled: Filled, solid: Browser
 ) -> None:
-    page = opened(f"/sessions/{filled.done}/compare/{filled.earlier}", browser=solid)
+    page = opened("/patients", browser=solid)
+    told: list[str] = []
+    asked: list[str] = []
+
+    def listen(socket: WebSocket) -> None:
+        asked.append(socket.url)
+        socket.on("framesent", lambda sent: told.append(str(sent)))
+
+    page.on("websocket", listen)
+    page.goto(f"/sessions/{filled.done}/compare/{filled.earlier}")
     page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
     page.frame_locator("gait-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
+    assert any(f"/sessions/{filled.done}/replay" in a and f"ghost={filled.earlier}" in a for a in asked)
     switch = page.get_by_role("button", name="Visit of 21 Oct 2026")
     expect(switch).to_have_attribute("aria-pressed", "true")
-    view = page.locator("gait-view")
-    page.wait_for_timeout(1500)
-    both = view.screenshot()
     switch.click()
     expect(switch).to_have_attribute("aria-pressed", "false")
-    page.wait_for_timeout(1000)
-    assert view.screenshot() != both
+    assert [t for t in told if "ghost" in t] == ['{"ghost":true}', '{"ghost":false}']
     # one cursor for the figure and all charts
     chart = page.locator("[data-variable=knee_flexion]")
-    box = chart.bounding_box()
-    assert box is not None
-    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    expect(chart.locator("line.cursor")).not_to_have_attribute("x1", "0")
+    chart.hover()
+    expect(chart.locator("line.cursor")).to_have_attribute("x1", re.compile(r"^[45]\d\d"))

@@ -11,7 +11,7 @@ import viser
 
 from core import rotation
 from core.body.poses import Poses
-from core.frames import SIDES
+from core.frames import SIDES, Side
 from server.viewer.colours import GHOST, linear
 from server.viewer.figure import Figure
 from server.viewer.ghost import Ghost, ghost_of, heading
@@ -38,9 +38,9 @@ def ghost(motion: Motion) -> Ghost:
     return made
 
 
-def counted(duration_s: float) -> list[tuple[float, float]]:
-    left = [s for s in walk.strides(duration_s).strides if s.side == "left" and s.excluded_reason is None]
-    return [(s.start_s, s.end_s) for s in left]
+def counted(duration_s: float, side: Side = "left") -> list[tuple[float, float]]:
+    mine = [s for s in walk.strides(duration_s).strides if s.side == side and s.excluded_reason is None]
+    return [(s.start_s, s.end_s) for s in mine]
 
 
 def test_both_are_at_the_same_phase_in_every_stride_that_counts(motion: Motion, ghost: Ghost) -> None:
@@ -58,7 +58,7 @@ def test_both_are_at_the_same_phase_in_every_stride_that_counts(motion: Motion, 
 
 def test_outside_the_strides_that_count_there_is_no_ghost(motion: Motion, ghost: Ghost) -> None:
     inside = np.zeros(len(motion.t_s), bool)
-    for start, end in counted(12.0):
+    for start, end in counted(12.0) + counted(12.0, "right"):
         inside |= (motion.t_s >= start) & (motion.t_s < end)
     np.testing.assert_array_equal(ghost.frames >= 0, inside)
 
