@@ -33,6 +33,7 @@ PAGES: dict[str, Address] = {
     "session-empty": lambda f: f"/sessions/{f.empty}",
     "session-failed": lambda f: f"/sessions/{f.unusable}",
     "timeline": lambda f: f"/sessions/{f.done}/timeline",
+    "parameter": lambda f: f"/sessions/{f.done}/parameters/step_length_m",
     "kinematics": lambda f: f"/sessions/{f.done}/kinematics",
     "data": lambda f: f"/sessions/{f.done}/data",
     "print": lambda f: f"/sessions/{f.done}/print",

@@ -1,0 +1,26 @@
+"""From a number to its strides, and from a stride to its signals and figure."""
+
+from __future__ import annotations
+
+import re
+
+from playwright.sync_api import expect
+
+from tests.browser.conftest import Filled, Opener
+
+
+def test_a_number_opens_to_its_strides_and_a_stride_to_its_moment(opened: Opener, filled: Filled) -> None:
+    page = opened(f"/sessions/{filled.done}")
+    page.locator(".params").get_by_role("link", name="Stride time").click()
+    page.wait_for_url(re.compile(r"/parameters/stride_time_s$"))
+    expect(page.locator("main")).to_contain_text("From a contact of the foot to its next.")
+    expect(page.locator("main")).to_contain_text("95 % CI")
+    rows = page.locator("table tbody tr")
+    counted = [float(r) for r in page.locator("tr:has-text('yes') td:nth-child(4)").all_inner_texts()]
+    assert rows.count() > len(counted) > 40, "strides that are left out stand there too"
+    assert all(0.9 < value < 1.3 for value in counted)
+    marks = page.locator(".chart.behind circle")
+    assert marks.count() == rows.count()
+    page.get_by_role("link", name="Signals and figure").nth(10).click()
+    page.wait_for_url(re.compile(r"/timeline#t=\d+\.\d+$"))
+    expect(page.locator("[data-stride-box]")).to_contain_text("Contact")
