@@ -46,7 +46,7 @@ def trends(
         patient = patients.get(c, pid)
         done, plans = histories.read(c, patient)
     history = histories.history(blobs, patient, done, plans, protocol)
-    opened(db, who, "trends", pid)
+    opened(db, who, "patient", pid)
     view = visit_views.trends_view(history, show)
     return page(request, db, who, "trends.html", "patients", patient=patient, trends=view)
 
@@ -82,7 +82,7 @@ def programme(
         plans = programmes.of_patient(c, pid)
         linked = {v.session_id for plan in plans for v in plan.visits}
         free = [s for s in sessions.of_patient(c, pid) if s.id not in linked]
-    opened(db, who, "programme", pid)
+    opened(db, who, "patient", pid)
     return page(
         request, db, who, "programme.html", "patients",
         patient=patient,
