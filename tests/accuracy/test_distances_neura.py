@@ -16,7 +16,7 @@ import pytest
 from core.body.feet import FootTracks
 from core.frames import SIDES, SUFFIX, Side
 from core.parameters import gait_parameters, spatial_rows
-from core.parameters.spatial import Row
+from core.parameters.rows import Row
 from core.pipeline import Analysis, analyse
 from tests.accuracy.report import record
 from tests.data import data_folder
