@@ -35,6 +35,7 @@ class Settings:
     max_file_bytes, max_set_bytes, max_files : limits of one upload and of one recording's upload set.
     min_free_bytes : uploads are refused below this free disk space.
     workers : worker processes started by `sagittal serve`; each keeps one warm child.
+    live_workers : processes that estimate live takes; each carries many, 0 = takes are recorded only.
     lease_s : a worker that has not renewed its job for so long is taken for dead; renewed every third of it.
     job_timeout_s : longest run of one job.
     child_memory_bytes : address space of the computing child (RLIMIT_AS; libraries alone map 1 GB), 0 = none.
@@ -53,6 +54,7 @@ class Settings:
     max_files: int = 200
     min_free_bytes: int = 200 * MB
     workers: int = 1
+    live_workers: int = 1
     lease_s: float = 15.0
     job_timeout_s: float = 1800.0
     child_memory_bytes: int = 8000 * MB
@@ -63,7 +65,8 @@ class Settings:
 
     def __post_init__(self) -> None:
         _require(0 <= self.port <= 65535, "port", self.port, "0 to 65535 (0 = any free port)")
-        _require(self.workers >= 0, "workers", self.workers, "0 or more")
+        for name in ("workers", "live_workers"):
+            _require(getattr(self, name) >= 0, name, getattr(self, name), "0 or more")
         for name in ("lease_s", "job_timeout_s", "idle_minutes", "absolute_hours"):
             _require(getattr(self, name) > 0, name, getattr(self, name), "more than 0")
         for name in ("max_file_bytes", "max_set_bytes", "max_files"):
@@ -95,6 +98,11 @@ class Settings:
     def blobs(self) -> Path:
         """Folder of the content-addressed files."""
         return self.data_dir / "blobs"
+
+    @property
+    def live(self) -> Path:
+        """Folder of the logs of live takes that have not become recordings yet."""
+        return self.data_dir / "live"
 
     @property
     def cache(self) -> Path:

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 
 from server import audit, schemas
-from server.api.context import Blobs, Db, Id
+from server.api.context import Blobs, Config, Db, Id
 from server.api.documents import refusals
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -68,10 +68,11 @@ def delete_patient(
     confirm: Annotated[str, Query(max_length=64, description="the patient's code, as confirmation")],
     db: Db,
     blobs: Blobs,
+    settings: Config,
     who: Annotated[Identity, require(Action.DELETE_PATIENT)],
 ) -> None:
     """Remove a patient with every session, recording and result, for ever; only the audit rows stay."""
-    erasure.erase_patient(db, blobs, who, patient_id, confirm=confirm)
+    erasure.erase_patient(db, blobs, settings.live, who, patient_id, confirm=confirm)
 
 
 @router.get("/{patient_id}/sessions", response_model=list[schemas.Session])

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter
 
 from server import audit, schemas
-from server.api.context import Blobs, Db, Id, Queue
+from server.api.context import Blobs, Config, Db, Id, Queue
 from server.api.documents import refusals
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -44,10 +44,14 @@ def change_session(
 
 @router.delete("", status_code=204)
 def delete_session(
-    session_id: Id, db: Db, blobs: Blobs, who: Annotated[Identity, require(Action.WRITE_SESSION)]
+    session_id: Id,
+    db: Db,
+    blobs: Blobs,
+    settings: Config,
+    who: Annotated[Identity, require(Action.WRITE_SESSION)],
 ) -> None:
     """Remove a session with its recordings and results, for ever; only the audit rows stay."""
-    erasure.erase_session(db, blobs, who, session_id)
+    erasure.erase_session(db, blobs, settings.live, who, session_id)
 
 
 @router.get("/recording", response_model=schemas.Recording)

@@ -35,13 +35,28 @@ class Action(StrEnum):
     READ_RESULT = "read_result"
     REVIEW = "review"
     """Changes events and decides which strides count."""
+    RUN_LIVE = "run_live"
+    """Opens a live take, looks at it and gives feedback."""
+    PAIR = "pair"
+    """Joins a tablet by the code on the therapist's screen; the code is the door."""
+    STREAM = "stream"
+    """Sends the samples of one take; the take's token in the first message is the door."""
     READ_JOB = "read_job"
     CANCEL_JOB = "cancel_job"
     MANAGE_USERS = "manage_users"
     READ_AUDIT = "read_audit"
 
 
-PUBLIC: frozenset[Action] = frozenset({Action.SIGN_IN, Action.SET_UP, Action.CHECK_HEALTH, Action.LOAD_ASSET})
+PUBLIC: frozenset[Action] = frozenset(
+    {
+        Action.SIGN_IN,
+        Action.SET_UP,
+        Action.CHECK_HEALTH,
+        Action.LOAD_ASSET,
+        Action.PAIR,
+        Action.STREAM,
+    }
+)
 """Actions that need no sign-in; all others do."""
 
 _ALL = frozenset(Role)
@@ -63,6 +78,7 @@ POLICY: dict[Action, frozenset[Role]] = {
     Action.ANALYSE: _CLINICAL,
     Action.READ_RESULT: _READERS,
     Action.REVIEW: _CLINICAL,
+    Action.RUN_LIVE: _CLINICAL,
     Action.READ_JOB: _ALL,
     Action.CANCEL_JOB: _UPLOADERS,
     Action.MANAGE_USERS: _ADMIN,

@@ -5,7 +5,9 @@ Nothing is deleted by cascade (RESTRICT everywhere): clinical rows leave only th
 patient ─< session ─< recording ─< recording_file          user ─< login_session, one_time_token
                           └──< analysis ─< analysis_file    audit (append-only, refers to nothing)
         │                 └──< job ─── analysis ─< edit (append-only, undo is a row too)
-        └──< programme ─< planned_visit ─── session (at most one each)
+        ├──< programme ─< planned_visit ─── session (at most one each)
+        └──< prescription ─< live_take >── session, recording (the one it became)
+                                 └──< live_event (append-only)
 """
 
 from __future__ import annotations
@@ -45,6 +47,24 @@ JOB_STATES = ("queued", "running", "done", "failed", "cancelled")
 ACTIVE_STATES = ("queued", "running")
 TOKEN_PURPOSES = ("set_up", "sign_in")
 VISIT_KINDS = ("assessment", "training")
+TAKE_STATES = ("pairing", "open", "streaming", "finished", "closed")
+OPEN_TAKE_STATES = ("pairing", "open", "streaming")
+LIVE_EVENT_KINDS = (
+    "start",
+    "stop",
+    "mark",
+    "undo_mark",
+    "feedback",
+    "level",
+    "pause",
+    "redo_calibration",
+    "ghost",
+    "prescription",
+    "calibration",
+    "cue",
+    "guard",
+    "notice",
+)
 EDIT_KINDS = ("move_event", "add_event", "delete_event", "exclude_stride", "include_stride", "undo")
 
 
@@ -299,6 +319,63 @@ planned_visit = Table(
     UniqueConstraint("programme_id", "position"),
 )
 
+prescription = Table(
+    "prescription",
+    metadata,
+    _id(),
+    _ref("patient_id", "patient"),
+    Column("content", Json, nullable=False),  # core.feedback.Prescription
+    Column("created_at", Utc, nullable=False),
+    _ref("created_by", "user", nullable=True, index=False),
+    Column("ended_at", Utc),  # None: in force
+)
+
+live_take = Table(
+    "live_take",
+    metadata,
+    _id(),
+    _ref("session_id", "session"),
+    Column("state", String(16), nullable=False),
+    Column("code_sha256", String(64), unique=True),  # of the pairing code; None once it was used
+    Column("code_expires_at", Utc),
+    Column("token_sha256", String(64), unique=True),  # of the tablet's token; None once the take is over
+    Column("token_expires_at", Utc),
+    _ref("opened_by", "user", nullable=True, index=False),
+    _ref("prescription_id", "prescription", nullable=True, index=False),  # the one in force at its start
+    Column("source", String(32)),  # what the tablet said it streams
+    Column("count", Integer),  # batches at the end
+    Column("sha256", String(64)),  # of all payloads, as the tablet said at the end
+    _ref("recording_id", "recording", nullable=True, index=False),  # None: not stored yet, or nothing came
+    Column("problem", String(64)),  # code of what was wrong at the end
+    Column("created_at", Utc, nullable=False),
+    Column("finished_at", Utc),
+    _one_of("state", TAKE_STATES),
+    CheckConstraint("(state IN ('finished', 'closed')) = (finished_at IS NOT NULL)", name="finished"),
+)
+
+_OPEN_TAKE = text("state IN ('pairing', 'open', 'streaming')")
+Index(
+    "uq_live_take_open",
+    live_take.c.session_id,
+    unique=True,
+    sqlite_where=_OPEN_TAKE,
+    postgresql_where=_OPEN_TAKE,
+)
+
+live_event = Table(
+    "live_event",
+    metadata,
+    Column("seq", Integer, primary_key=True, autoincrement=True),
+    _ref("take_id", "live_take"),
+    Column("kind", String(16), nullable=False),
+    Column("t_s", Float),  # on the take's axis; None before its first sample
+    Column("content", Json, nullable=False),
+    _ref("user_id", "user", nullable=True, index=False),  # None: the estimator
+    Column("at", Utc, nullable=False),
+    _one_of("kind", LIVE_EVENT_KINDS),
+    sqlite_autoincrement=True,
+)
+
 audit = Table(
     "audit",
     metadata,
@@ -329,3 +406,10 @@ EDIT_TRIGGER = (
     "BEGIN SELECT RAISE(ABORT, 'edits are append-only'); END"
 )
 event.listen(edit, "after_create", DDL(EDIT_TRIGGER).execute_if(dialect="sqlite"))  # type: ignore[no-untyped-call]
+
+LIVE_EVENT_TRIGGER = (
+    "CREATE TRIGGER live_event_no_update BEFORE UPDATE ON live_event "
+    "BEGIN SELECT RAISE(ABORT, 'live events are append-only'); END"
+)
+_append_only = DDL(LIVE_EVENT_TRIGGER).execute_if(dialect="sqlite")  # type: ignore[no-untyped-call]
+event.listen(live_event, "after_create", _append_only)

@@ -306,9 +306,13 @@ def test_erasing_a_patient_needs_the_code_and_leaves_only_the_trail(clinic: Clin
     claim = clinic.queue.claim("w", (recordings.INSPECT,))
     assert claim is not None
     with pytest.raises(Conflict) as caught:
-        erasure.erase_patient(clinic.db, clinic.blobs, clinic.who, patient_id, confirm="P-2")
+        erasure.erase_patient(
+            clinic.db, clinic.blobs, clinic.settings.live, clinic.who, patient_id, confirm="P-2"
+        )
     assert caught.value.code == "not_confirmed"
-    erasure.erase_patient(clinic.db, clinic.blobs, clinic.who, patient_id, confirm="P-1")
+    erasure.erase_patient(
+        clinic.db, clinic.blobs, clinic.settings.live, clinic.who, patient_id, confirm="P-1"
+    )
     assert {f.space for f in clinic.blobs.files()} == {other_id}
     assert not clinic.queue.finish(claim, lambda c: None)  # its worker finds the fence closed
     with clinic.db.read() as c:
@@ -336,7 +340,9 @@ def test_no_byte_of_an_erased_patient_is_left_in_the_data_folder(clinic: Clinic)
         return {str(p.name) for p in files if b"CANARY" in p.read_bytes()}
 
     assert found()
-    erasure.erase_patient(clinic.db, clinic.blobs, clinic.who, patient_id, confirm="CANARY-CODE")
+    erasure.erase_patient(
+        clinic.db, clinic.blobs, clinic.settings.live, clinic.who, patient_id, confirm="CANARY-CODE"
+    )
     assert found() == set()
 
 
@@ -346,7 +352,7 @@ def test_erasing_a_session_keeps_the_files_another_one_shares(clinic: Clinic) ->
     clinic.upload(one, "a", b"shared")
     clinic.upload(one, "b", b"own")
     clinic.upload(two, "a", b"shared")
-    erasure.erase_session(clinic.db, clinic.blobs, clinic.who, one)
+    erasure.erase_session(clinic.db, clinic.blobs, clinic.settings.live, clinic.who, one)
     assert [f.path.read_bytes() for f in clinic.blobs.files()] == [b"shared"]
     assert checks.check(clinic.db, clinic.blobs) == []
 

@@ -141,10 +141,10 @@ def test_erasing_a_session_opens_its_visit_again_and_erasing_the_patient_leaves_
     with db.write() as c:
         made = programmes.start(c, None, patient, starts_on=MONDAY)
         programmes.change_visit(c, None, made.visits[1].id, {"session_id": session})
-    erasure.erase_session(db, blobs, None, session)
+    erasure.erase_session(db, blobs, tmp_path / "live", None, session)
     with db.read() as c:
         assert programmes.get(c, made.id).count("done") == 0
-    erasure.erase_patient(db, blobs, None, patient, confirm="P-1")
+    erasure.erase_patient(db, blobs, tmp_path / "live", None, patient, confirm="P-1")
     with db.read() as c:
         assert c.execute(select(planned_visit)).first() is None
 
