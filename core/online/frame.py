@@ -1,0 +1,155 @@
+"""What the live chain says: a frame after every push, a stride at every initial contact.
+
+Everything here is plain values on the axis of core/online/axis.py: seconds from the first sample of the take,
+SI units and radians, names as in core.angles and core.parameters. Nothing imports numba.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+import numpy as np
+
+from core.errors import Notice
+from core.events.result import GaitEvent, StrideFlag
+from core.frames import Floats, Segment, Side
+
+Stage = Literal["waiting", "stand", "walk", "running"]
+"""waiting: samples of some sensor are missing; stand, walk: calibration; running: everything there is."""
+
+Method = Literal["erkf", "l7s_3i", "l7s_2i", "none"]
+"""Estimator of the figure; none: the worn sensors allow no figure while they stream."""
+
+NOT_YET: Final = "not_yet"
+"""Reason of a value that a later `LiveStride` of the same stride will have."""
+
+
+@dataclass(frozen=True)
+class SegmentCheck:
+    """Calibration of one sensor.
+
+    Parameters
+    ----------
+    still : at rest now. method, score : as in `SegmentCalibration`; None before the walk was looked at.
+    """
+
+    segment: Segment
+    still: bool
+    method: str | None = None
+    score: float | None = None
+    notices: tuple[Notice, ...] = ()
+
+
+@dataclass(frozen=True)
+class CalibrationView:
+    """How far calibration has come.
+
+    Parameters
+    ----------
+    stood_s, walked_s, steps : so far, of the attempt that is going on.
+    ok : True once it holds; False after an attempt that failed, `problem` says why.
+    """
+
+    stood_s: float
+    walked_s: float
+    steps: int
+    checks: tuple[SegmentCheck, ...]
+    ok: bool | None = None
+    problem: Notice | None = None
+
+
+@dataclass(frozen=True)
+class SensorHealth:
+    """One sensor over the last seconds (core/online/health.py).
+
+    Parameters
+    ----------
+    rate_hz : as measured. lost_share, saturated_share : 0 to 1. silent_s : since its last sample, by the
+        other streams' clocks. still : at rest now.
+    """
+
+    id: str
+    segment: Segment | None
+    rate_hz: float
+    lost_share: float
+    saturated_share: float
+    silent_s: float
+    still: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Trail:
+    """Angles since the frame before: t_s (m,), names (k), values (m, k) in rad, NaN where lost."""
+
+    t_s: Floats
+    names: tuple[str, ...]
+    values: Floats
+
+
+EMPTY_TRAIL: Final = Trail(np.zeros(0), (), np.zeros((0, 0)))
+
+
+@dataclass(frozen=True, eq=False)
+class LiveStride:
+    """One cycle of a foot, told as soon as its second contact is known.
+
+    Distances need the rest of the foot after that contact: where a reason is `not_yet`, the same stride (same
+    `n`) is told once more when they are known, at the latest with the foot's next contact, and is then
+    `complete`. Values that were there do not change.
+
+    Parameters
+    ----------
+    n : running number over both feet, from 0. detected_s : last sample that was needed.
+    values : parameters of a stride as in the stride table (core.parameters: temporal, spatial, stance,
+        phases, kinematic), None where undefined. reasons : why, for every None.
+    curves : variable → (101,) rad over the cycle, as `cycle_curves`; only those known throughout.
+    turn_rad : heading change of the foot, left positive. flags : those that need no later stride; "first" of
+        a bout and "near_turn" after a turn among them. counted : no flag.
+    """
+
+    n: int
+    side: Side
+    start_s: float
+    foot_off_s: float | None
+    end_s: float
+    detected_s: float
+    values: Mapping[str, float | None]
+    reasons: Mapping[str, str]
+    curves: Mapping[str, Floats]
+    turn_rad: float | None
+    flags: tuple[StrideFlag, ...]
+    counted: bool
+    complete: bool
+
+
+@dataclass(frozen=True, eq=False)
+class LiveFrame:
+    """State after the last sample that a push brought to the axis.
+
+    Parameters
+    ----------
+    t_s : of that sample; 0 before the first. seq : of the batch that was pushed.
+    calibration : None until all sensors stream.
+    q : segment → (4,) segment to W. p : segment → (3,) m, as `Poses`. valid : all segments of the figure are
+        measured. contact : side → on the floor, as far as events are known.
+    angles : name → rad, NaN where lost, at the last sample. trail : the same since the frame before.
+    events, strides, notices : new since the frame before.
+    """
+
+    t_s: float
+    seq: int
+    stage: Stage
+    health: tuple[SensorHealth, ...] = ()
+    calibration: CalibrationView | None = None
+    method: Method = "none"
+    q: Mapping[Segment, Floats] = field(default_factory=dict)
+    p: Mapping[Segment, Floats] = field(default_factory=dict)
+    valid: bool = False
+    contact: Mapping[Side, bool] = field(default_factory=dict)
+    angles: Mapping[str, float] = field(default_factory=dict)
+    trail: Trail = EMPTY_TRAIL
+    events: tuple[GaitEvent, ...] = ()
+    strides: tuple[LiveStride, ...] = ()
+    notices: tuple[Notice, ...] = ()
