@@ -1,0 +1,98 @@
+// <target-strip>: the last 20 strides against the target zone. In the zone = disc, near = triangle, away = square;
+// without a target left = disc, right = ring. A petrol tick below marks a stride with feedback.
+import { Plot, label, trace } from "./plot.js";
+import { number } from "./words.js";
+
+export const SHOWN = 20;
+const EDGE = { left: 44, right: 64, top: 10, bottom: 42 };
+const MARK = 6.5;
+
+class TargetStrip extends Plot {
+  // rows: [{value, kind: in|near|away|left|right|none, cued}] oldest first; zone: [low, high] | null
+  show(rows, zone, digits) {
+    Object.assign(this, { rows, zone, digits });
+    this.ask();
+  }
+
+  range() {
+    const values = this.rows.map((r) => r.value).filter((v) => v !== null);
+    const all = [...values, ...(this.zone ?? [])].filter(Number.isFinite);
+    if (!all.length) return null;
+    const [low, high] = [Math.min(...all), Math.max(...all)];
+    const least = 4 * 10 ** -this.digits; // never so close that rounding shows as walking
+    const room = Math.max(0.25 * (high - low), (least - (high - low)) / 2, least / 4);
+    return [low - room, high + room];
+  }
+
+  draw(g, { width, height, colour }) {
+    const w = width - EDGE.left - EDGE.right, h = height - EDGE.top - EDGE.bottom;
+    const range = this.rows && this.range();
+    const X = (i) => EDGE.left + ((i + 0.5) / SHOWN) * w;
+    if (!range) return;
+    const Y = (v) => EDGE.top + ((range[1] - v) / (range[1] - range[0])) * h;
+    this.target(g, Y, w, colour);
+    const step = nice((range[1] - range[0]) / 4);
+    g.lineWidth = 1;
+    for (let v = Math.ceil(range[0] / step) * step; v <= range[1]; v += step) {
+      g.strokeStyle = colour.grid;
+      if (!this.zone || v < this.zone[0] || v > this.zone[1]) trace(g, [[EDGE.left, Y(v)], [EDGE.left + w, Y(v)]]);
+      const digits = Math.max(this.digits, step < 0.1 ? 2 : step < 1 ? 1 : 0);
+      label(g, number(v, Math.min(digits, 3)), EDGE.left - 7, Y(v) + 4, { colour: colour.axis, align: "right" });
+    }
+    const first = SHOWN - this.rows.length;
+    const tick = EDGE.top + h + 10;
+    this.rows.forEach((row, i) => {
+      if (row.value !== null) mark(g, row.kind, X(first + i), Y(row.value), colour);
+      if (row.cued) {
+        g.strokeStyle = colour.accent;
+        g.lineWidth = 4;
+        trace(g, [[X(first + i) - 7, tick], [X(first + i) + 7, tick]]);
+      }
+    });
+    const under = EDGE.top + h + 30;
+    for (const [i, text] of [[0, `${SHOWN} ago`], [5, "15"], [10, "10"], [15, "5"], [SHOWN - 1, "now"]])
+      label(g, text, X(i), under, { colour: colour.axis, align: "center" });
+    if (this.rows.some((r) => r.cued)) label(g, "feedback", EDGE.left + w + 8, tick + 4, { colour: colour.axis });
+  }
+
+  target(g, Y, w, colour) {
+    if (!this.zone) return;
+    const [low, high] = this.zone;
+    g.fillStyle = colour.target;
+    g.fillRect(EDGE.left, Y(high), w, Y(low) - Y(high));
+    g.strokeStyle = colour["target-line"];
+    g.lineWidth = 1.25;
+    for (const v of [low, high]) trace(g, [[EDGE.left, Y(v)], [EDGE.left + w, Y(v)]]);
+    label(g, "target", EDGE.left + w + 8, Y((low + high) / 2) + 4, { colour: colour.ink, bold: true });
+  }
+}
+
+function nice(step) {
+  const power = 10 ** Math.floor(Math.log10(step));
+  return power * [1, 2, 5, 10].find((n) => n * power >= step - 1e-12);
+}
+
+export function mark(g, kind, x, y, colour, r = MARK) {
+  g.beginPath();
+  g.lineWidth = 2;
+  if (kind === "near") {
+    g.moveTo(x, y - r - 1);
+    g.lineTo(x + r + 1, y + r - 0.5);
+    g.lineTo(x - r - 1, y + r - 0.5);
+    g.closePath();
+    g.fillStyle = colour.surface;
+    g.strokeStyle = colour.warn;
+  } else if (kind === "away") {
+    g.rect(x - r + 0.5, y - r + 0.5, 2 * r - 1, 2 * r - 1);
+    g.fillStyle = colour.surface;
+    g.strokeStyle = colour.bad;
+  } else {
+    g.arc(x, y, kind === "right" ? r - 1 : r, 0, 2 * Math.PI);
+    g.fillStyle = { in: colour.ok, left: colour.left, right: colour.surface }[kind] ?? colour["ink-3"];
+    g.strokeStyle = { in: colour.ok, left: colour.left, right: colour.right }[kind] ?? colour["ink-3"];
+  }
+  g.fill();
+  g.stroke();
+}
+
+customElements.define("target-strip", TargetStrip);
