@@ -1,0 +1,331 @@
+"""Batches of the live protocol and the log of a take: `sagittal.live.v1` as bytes (docs/live-protocol.md).
+
+A batch is what one device clock sampled in a row. The log is the file mark and records
+(u32 length, u32 crc32, body) with body[0] = H hello, B batch as received, F finish. It is written while the
+take runs and is itself the recording afterwards; everything live is a function of its records in order.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Literal, NamedTuple
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.errors import InputError
+from core.formats.json_tree import no_constant, unique
+from core.formats.live_hello import (
+    PROTOCOL,
+    Clock,
+    Hello,
+    SensorInfo,
+    Source,
+    StreamInfo,
+    hello_json,
+    hello_of,
+    parse_hello,
+)
+
+__all__ = [
+    "FILE_MARK",
+    "MOST_FRAME_BYTES",
+    "PROTOCOL",
+    "Batch",
+    "Clock",
+    "Finish",
+    "Header",
+    "Hello",
+    "Record",
+    "SensorInfo",
+    "Source",
+    "StreamInfo",
+    "batch_of_json",
+    "check_fits",
+    "decode_batch",
+    "encode_batch",
+    "finish_json",
+    "hello_json",
+    "hello_of",
+    "parse_finish",
+    "parse_hello",
+    "payload",
+    "peek",
+    "record",
+    "scan",
+    "scan_records",
+]
+
+MAGIC: Final = 0x314C4753
+"""The bytes "SGL1"."""
+CHANNELS: Final = 9
+"""acc, gyr, mag, three axes each; NaN = not measured."""
+HAS_OFFSETS: Final = 1
+MOST_SAMPLES: Final = 1000
+MOST_FRAME_BYTES: Final = 1 << 20
+LATEST_US: Final = 1 << 53
+"""Clocks must fit the whole numbers of JavaScript; 285 years."""
+
+FILE_MARK: Final = b"SAGLIVE1\n"
+KINDS: Final = b"HBF"
+
+_HEAD: Final = struct.Struct("<IHHHHQQQ")
+_CRC: Final = struct.Struct("<I")
+_RECORD: Final = struct.Struct("<II")
+
+Buffer = bytes | bytearray | memoryview
+Kind = Literal["H", "B", "F"]
+
+
+class Header(NamedTuple):
+    """What stands before the samples of a batch; times in µs of the device's and of the sender's clock."""
+
+    flags: int
+    n_imu: int
+    n_samples: int
+    stream: int
+    seq: int
+    t0_us: int
+    sent_us: int
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Samples of one stream in a row.
+
+    Parameters
+    ----------
+    seq : one sequence per take over all streams. t0_us : device clock of the first sample.
+    sent_us : the sender's monotonic clock when it was sent first.
+    samples : (n, k, 9) float32, acc m/s², gyr rad/s, mag, of the stream's k sensors; NaN = not measured.
+    offsets_us : (n,) uint32 from t0, None = evenly by the stream's rate.
+    """
+
+    stream: int
+    seq: int
+    t0_us: int
+    sent_us: int
+    samples: NDArray[np.float32]
+    offsets_us: NDArray[np.uint32] | None = None
+
+
+@dataclass(frozen=True)
+class Finish:
+    """The sender's last word: number of batches, and sha256 over the payloads in order of seq."""
+
+    count: int
+    sha256: str
+
+
+class Record(NamedTuple):
+    """One record of a log: its kind, what follows the kind's letter, and where it ends in the data."""
+
+    kind: Kind
+    body: bytes
+    end: int
+
+
+def encode_batch(batch: Batch) -> bytes:
+    """A batch as the frame that is sent.
+
+    Raises
+    ------
+    InputError `batch_shape`, `batch_time`, as `peek` would.
+    """
+    samples = np.ascontiguousarray(batch.samples, "<f4")
+    if samples.ndim != 3 or samples.shape[2] != CHANNELS:
+        raise InputError("batch_shape", f"Samples have shape {samples.shape}; expected (n, sensors, 9).")
+    n, k = samples.shape[:2]
+    offsets = b""
+    if batch.offsets_us is not None:
+        if batch.offsets_us.shape != (n,):
+            raise InputError("batch_shape", f"{batch.offsets_us.shape} offsets for {n} samples.")
+        offsets = np.ascontiguousarray(batch.offsets_us, "<u4").tobytes()
+    flags = HAS_OFFSETS if batch.offsets_us is not None else 0
+    _check(Header(flags, k, n, batch.stream, batch.seq, batch.t0_us, batch.sent_us))
+    head = _HEAD.pack(MAGIC, flags, k, n, batch.stream, batch.seq, batch.t0_us, batch.sent_us)
+    body = b"".join((head, samples.tobytes(), offsets))
+    return body + _CRC.pack(crc32(body))
+
+
+def peek(frame: Buffer) -> Header:
+    """Check a frame's mark, shape and checksum and give its header; the samples are not looked at.
+
+    Raises
+    ------
+    InputError `batch_magic`, `batch_shape`, `batch_time`, `batch_checksum`.
+    """
+    if len(frame) < _HEAD.size + _CRC.size:
+        raise InputError("batch_shape", f"A frame of {len(frame)} bytes is shorter than the header.")
+    magic, *rest = _HEAD.unpack_from(frame)
+    if magic != MAGIC:
+        raise InputError(
+            "batch_magic", f"The frame starts with {magic:#010x}; expected {MAGIC:#010x} (SGL1)."
+        )
+    header = Header(*rest)
+    expected = _check(header)
+    if len(frame) != expected:
+        raise InputError(
+            "batch_shape",
+            f"Batch {header.seq} has {len(frame)} bytes; {header.n_samples} samples of {header.n_imu} "
+            f"sensors make {expected}.",
+        )
+    (crc,) = _CRC.unpack_from(frame, expected - _CRC.size)
+    if crc32(memoryview(frame)[: -_CRC.size]) != crc:
+        raise InputError("batch_checksum", f"Batch {header.seq} was damaged on its way; send it again.")
+    return header
+
+
+def _check(header: Header) -> int:
+    """Length of a frame with this header, or why there is none."""
+    if header.flags & ~HAS_OFFSETS or not 1 <= header.n_samples <= MOST_SAMPLES or header.n_imu < 1:
+        raise InputError(
+            "batch_shape",
+            f"Batch {header.seq}: flags {header.flags}, {header.n_samples} samples, {header.n_imu} sensors; "
+            f"expected flags 0 or 1, 1 to {MOST_SAMPLES} samples, 1 sensor or more.",
+        )
+    per_sample = 4 * CHANNELS * header.n_imu + (4 if header.flags else 0)
+    length = _HEAD.size + header.n_samples * per_sample + _CRC.size
+    if length > MOST_FRAME_BYTES:
+        raise InputError("batch_shape", f"Batch {header.seq} has {length} bytes, at most {MOST_FRAME_BYTES}.")
+    if max(header.seq, header.t0_us, header.sent_us) >= LATEST_US:
+        raise InputError("batch_time", f"Batch {header.seq}: a clock or seq is beyond 2^53.")
+    return length
+
+
+def check_fits(header: Header, hello: Hello) -> StreamInfo:
+    """The stream that a batch belongs to.
+
+    Raises
+    ------
+    InputError `batch_stream` for an unknown one, `batch_shape` when the number of sensors differs.
+    """
+    info = hello.stream(header.stream)
+    if header.n_imu != len(info.sensors):
+        raise InputError(
+            "batch_shape",
+            f"Batch {header.seq} has {header.n_imu} sensors; stream {header.stream} has {len(info.sensors)}.",
+        )
+    return info
+
+
+def decode_batch(frame: Buffer, header: Header | None = None) -> Batch:
+    """The batch in a frame; its arrays look into the frame's memory.
+
+    Parameters
+    ----------
+    header : of `peek`, when the frame is checked already.
+
+    Raises
+    ------
+    InputError of `peek`.
+    """
+    h = header or peek(frame)
+    count = h.n_samples * h.n_imu * CHANNELS
+    samples = np.frombuffer(frame, "<f4", count, _HEAD.size).reshape(h.n_samples, h.n_imu, CHANNELS)
+    offsets = np.frombuffer(frame, "<u4", h.n_samples, _HEAD.size + 4 * count) if h.flags else None
+    return Batch(h.stream, h.seq, h.t0_us, h.sent_us, samples, offsets)
+
+
+def payload(frame: Buffer, header: Header) -> memoryview:
+    """The bytes of the samples, which the finish hash is taken over."""
+    return memoryview(frame)[_HEAD.size : _HEAD.size + 4 * header.n_samples * header.n_imu * CHANNELS]
+
+
+def batch_of_json(root: Mapping[str, object]) -> Batch:
+    """A batch that came as JSON: {"type": "batch", "stream", "seq", "t0_us", "sent_us", "samples"}.
+
+    `samples` is n lists of one list of 9 numbers per sensor, null = not measured; `offsets_us` may follow.
+
+    Raises
+    ------
+    InputError `batch_shape`, `batch_time`.
+    """
+    numbers = [root.get(name) for name in ("stream", "seq", "t0_us", "sent_us")]
+    if not all(isinstance(x, int) and not isinstance(x, bool) and x >= 0 for x in numbers):
+        raise InputError("batch_shape", "stream, seq, t0_us and sent_us must be whole numbers from 0.")
+    stream, seq, t0_us, sent_us = (int(str(x)) for x in numbers)
+    if stream >= 1 << 16:
+        raise InputError("batch_shape", f"Stream {stream} is above 65535.")
+    try:
+        with np.errstate(over="ignore"):
+            samples = np.array(root.get("samples"), np.float64).astype(np.float32)
+        given = root.get("offsets_us")
+        offsets = None if given is None else np.array(given, np.uint32)
+    except (TypeError, ValueError, OverflowError) as e:
+        raise InputError("batch_shape", f"Samples or offsets of batch {seq} are not numbers: {e}.") from e
+    batch = Batch(stream, seq, t0_us, sent_us, samples, offsets)
+    encode_batch(batch)  # the one place that knows what a frame can hold
+    return batch
+
+
+def parse_finish(data: bytes | str) -> Finish:
+    """Read {"type": "finish", "count", "sha256"}.
+
+    Raises
+    ------
+    InputError `finish_bad`.
+    """
+    try:
+        root = json.loads(data, parse_constant=no_constant, object_pairs_hook=unique)
+    except (ValueError, RecursionError) as e:
+        raise InputError("finish_bad", f"The finish is not valid JSON: {e}.") from e
+    count = root.get("count") if isinstance(root, dict) else None
+    digest = root.get("sha256") if isinstance(root, dict) else None
+    if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count < LATEST_US:
+        raise InputError("finish_bad", "The finish has no count; expected the number of batches.")
+    if not isinstance(digest, str) or len(digest) != 64 or set(digest) - set("0123456789abcdef"):
+        raise InputError("finish_bad", "The finish has no sha256; expected 64 hexadecimal digits.")
+    return Finish(count, digest)
+
+
+def finish_json(finish: Finish) -> bytes:
+    """What the tablet sends and the log stores."""
+    return json.dumps(
+        {"type": "finish", "count": finish.count, "sha256": finish.sha256}, separators=(",", ":")
+    ).encode()
+
+
+def record(kind: Kind, body: Buffer) -> bytes:
+    """One record of the log."""
+    whole = b"".join((kind.encode(), body))
+    return _RECORD.pack(len(whole), crc32(whole)) + whole
+
+
+def scan(data: Buffer, start: int = 0) -> tuple[list[Record], int]:
+    """The whole records of a log and how many bytes of the data they and what is before them take.
+
+    Parameters
+    ----------
+    start : 0 = the file mark, any other = where a record begins.
+
+    Returns
+    -------
+    What follows the length is torn or damaged; 0 when not even the file mark is whole.
+    """
+    if start == 0:
+        if bytes(data[: len(FILE_MARK)]) != FILE_MARK:
+            return [], 0
+        start = len(FILE_MARK)
+    return scan_records(data, start)
+
+
+def scan_records(data: Buffer, start: int = 0) -> tuple[list[Record], int]:
+    """As `scan` for data that begins with a record at `start`, such as the new end of a log."""
+    view, found = memoryview(data), []
+    while len(view) - start >= _RECORD.size:
+        length, crc = _RECORD.unpack_from(view, start)
+        first = start + _RECORD.size
+        if not 1 <= length <= MOST_FRAME_BYTES + 1 or length > len(view) - first:
+            break
+        body = view[first : first + length]
+        if body[0] not in KINDS or crc32(body) != crc:
+            break
+        start = first + length
+        kind: Kind = chr(body[0])  # type: ignore[assignment]
+        found.append(Record(kind, bytes(body[1:]), start))
+    return found, start
