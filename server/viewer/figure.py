@@ -16,7 +16,8 @@ from core.frames import Floats
 from server.viewer.colours import BACKGROUND, FLOOR, GHOST, TINTS, linear
 from server.viewer.ghost import Ghost
 from server.viewer.ground import Ground
-from server.viewer.motion import Batch, Motion
+from server.viewer.layout import Batch
+from server.viewer.motion import Motion
 
 _FOV_RAD = np.deg2rad(31.0)
 _FLOOR_M = 60.0

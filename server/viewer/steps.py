@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core import rotation
-from core.body.model import BodyModel
 from core.frames import Bools, Floats
 
 PIECE_M = 0.05
@@ -57,12 +56,7 @@ class Prints:
     wxyz: Single
 
 
-def sole(p: Floats, q: Floats, body: BodyModel) -> Floats:
-    """Middle (n, 3) of the sole, m, from the ankle (n, 3) and the foot's orientation (n, 4)."""
-    return p + rotation.rotate(q, np.array([0.25 * body.foot, -body.ankle_height, 0.0]))
-
-
-def trail(t_s: Floats, valid: Bools, path: Floats) -> Trail:
+def trail(t_s: Floats, valid: Bools, path: Floats | Single) -> Trail:
     """Lay a path (n, 3) out in pieces; where samples are not valid there is a gap."""
     stride = np.linalg.norm(np.diff(path, axis=0), axis=1)
     gone = np.concatenate(([0.0], np.cumsum(np.where(valid[1:] & valid[:-1], stride, 0.0))))
@@ -76,7 +70,7 @@ def trail(t_s: Floats, valid: Bools, path: Floats) -> Trail:
     return Trail(t_s[kept[1:]][whole], np.stack((points[:-1], points[1:]), axis=1)[whole])
 
 
-def prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats, q: Floats) -> Prints:
+def prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats | Single, q: Floats) -> Prints:
     """One print for every time the foot rested on the floor, at its slowest moment.
 
     A contact is searched for several rests, since a step in it may have been missed, and has one at least.

@@ -1,0 +1,219 @@
+"""Which copies of which mesh a figure is made of, and where each sits on its segment.
+
+The same few rigid parts whatever the time: laid out for a whole take or for one moment alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final, Literal
+
+import numpy as np
+
+from core import rotation
+from core.body.model import BodyModel
+from core.body.tree import PRESETS
+from core.frames import FOOT, R_NEUTRAL, SEGMENTS, SHANK, SIDES, THIGH, Floats, Segment, Side
+from server.viewer import shapes
+from server.viewer.colours import Tint
+from server.viewer.steps import Single
+
+_WORN: Mapping[str, tuple[Segment, ...]] = {"l7s_3i": PRESETS["feet_pelvis3"], "l7s_2i": PRESETS["feet2"]}
+"""Method → segments whose sensors it uses, where it gives poses of others too."""
+
+# Stature fractions of Winter (Biomechanics and Motor Control of Human Movement, fig 4.1) for the parts that
+# carry no sensor and are drawn for orientation only; stature itself is thigh / 0.245.
+_THIGH_FRACTION = 0.245
+_SHOULDER_ABOVE_HIP = 0.288
+_HEAD_ABOVE_HIP = 0.395
+_HEAD_RADIUS = 0.060
+
+_STAYS: Final = np.array([1.0, 0.0, 0.0, 0.0])
+_DOWN: Final = rotation.about(0, np.pi / 2)
+"""Mesh +z → segment −y, towards the distal joint."""
+
+_UP: Final = rotation.about(0, -np.pi / 2)
+_NEUTRAL: Final = rotation.from_matrix(R_NEUTRAL)
+
+_BLOCK: Final = 512
+"""Frames placed at a time: what is being worked on stays in the processor's cache."""
+
+Name = Literal["bones", "shoes", "balls", "toes", "soles"]
+"""Meshes by name, and two points of each foot: where its letter is written, the middle of its sole."""
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One copy of a mesh, or a point.
+
+    Parameters
+    ----------
+    segment : carries it; `trunk` : hangs on the upright trunk over that segment instead.
+    turn : (4,) and at : m, in the segment's axes.
+    """
+
+    name: Name
+    segment: Segment
+    scale: Vector
+    tint: Tint
+    turn: Floats
+    at: Vector
+    trunk: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Copies of one mesh, k of them in each of m frames.
+
+    Parameters
+    ----------
+    wxyz : (m, k, 4). position : (m, k, 3) m, world. scale : (k, 3). tint : k colour roles.
+    measured : k, False where no sensor supports the part and the estimator alone says where it is.
+    """
+
+    mesh: shapes.Mesh
+    wxyz: Single
+    position: Single
+    scale: Single
+    tint: tuple[Tint, ...]
+    measured: tuple[bool, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A figure in m frames.
+
+    Parameters
+    ----------
+    batches : name → copies of one mesh. toes, soles : side → (m, 3) m, world.
+    """
+
+    batches: Mapping[str, Batch]
+    toes: Mapping[Side, Single]
+    soles: Mapping[Side, Single]
+
+
+class Layout:
+    """The parts of a figure.
+
+    Parameters
+    ----------
+    segments : those with a pose. method : the estimator's, says which of them carry a sensor.
+    """
+
+    def __init__(self, segments: Sequence[Segment], body: BodyModel, method: str) -> None:
+        self.segments = tuple(s for s in SEGMENTS if s in segments)
+        self._parts = _parts(self.segments, body)
+        worn = _WORN.get(method, self.segments)
+        # the trunk is one carrier more, behind the segments
+        self._carrier = np.array(
+            [len(self.segments) if x.trunk else self.segments.index(x.segment) for x in self._parts], np.intp
+        )
+        turn, at = (np.array([getattr(x, f) for x in self._parts]) for f in ("turn", "at"))
+        self._turned = np.flatnonzero((turn != _STAYS).any(axis=-1))
+        self._moved = np.flatnonzero(at.any(axis=-1))
+        self._turn, self._at = turn[self._turned][:, None], at[self._moved][:, None]
+        self._meshes = {"bones": shapes.bone(), "shoes": _shoe(body), "balls": shapes.ball()}
+        names: list[str] = [x.name for x in self._parts]
+        ends = {
+            name: max((k + 1 for k, x in enumerate(names) if x == name), default=0) for name in self._meshes
+        }
+        self._rows = {name: slice(ends[name] - names.count(name), ends[name]) for name in ends}
+        self._look = {
+            name: (
+                np.array([x.scale for x in self._parts[rows]], np.float32).reshape(-1, 3),
+                tuple(x.tint for x in self._parts[rows]),
+                tuple(x.segment in worn for x in self._parts[rows]),
+            )
+            for name, rows in self._rows.items()
+        }
+        self._points: dict[str, dict[Side, int]] = {
+            name: {
+                side: k
+                for side in SIDES
+                for k, x in enumerate(self._parts)
+                if (x.name, x.tint) == (name, side)
+            }
+            for name in ("toes", "soles")
+        }
+
+    def place(self, q: Mapping[Segment, Floats], p: Mapping[Segment, Floats]) -> Placed:
+        """Place all parts; q (m, 4) and p (m, 3) of every segment of this layout."""
+        turn, at = [q[s] for s in self.segments], [p[s] for s in self.segments]
+        if "pelvis" in self.segments:
+            turn.append(_trunk(q))
+            at.append(p["pelvis"])
+        frames = len(at[0])
+        wxyz = np.empty((frames, len(self._parts), 4), np.float32)
+        position = np.empty((frames, len(self._parts), 3), np.float32)
+        for start in range(0, frames, _BLOCK):
+            block = slice(start, start + _BLOCK)
+            held = np.array([x[block] for x in turn])[self._carrier]
+            moved = np.array([x[block] for x in at])[self._carrier]
+            moved[self._moved] += rotation.rotate(held[self._moved], self._at)
+            held[self._turned] = rotation.multiply(held[self._turned], self._turn)
+            wxyz[block], position[block] = held.swapaxes(0, 1), moved.swapaxes(0, 1)
+        return Placed(
+            {
+                name: Batch(self._meshes[name], wxyz[:, rows], position[:, rows], *self._look[name])
+                for name, rows in self._rows.items()
+            },
+            *({side: position[:, k] for side, k in self._points[name].items()} for name in ("toes", "soles")),
+        )
+
+
+def _parts(segments: Sequence[Segment], body: BodyModel) -> list[Part]:
+    stature = body.thigh / _THIGH_FRACTION
+    parts: list[Part] = []
+
+    def add(
+        name: Name,
+        segment: Segment,
+        scale: Vector = (1.0, 1.0, 1.0),
+        tint: Tint = "joint",
+        turn: Floats = _STAYS,
+        at: Vector = (0.0, 0.0, 0.0),
+        trunk: bool = False,
+    ) -> None:
+        if segment in segments:
+            parts.append(Part(name, segment, scale, tint, turn, at, trunk))
+
+    for side in SIDES:
+        add("bones", THIGH[side], (0.058, 0.058, body.thigh), side, _DOWN)
+        add("bones", SHANK[side], (0.045, 0.045, body.shank), side, _DOWN)
+    # the cones' axes are segment x, z, y: depth, width, length
+    shoulders = (0.0, _SHOULDER_ABOVE_HIP * stature, 0.0)
+    length, neck = (
+        (_SHOULDER_ABOVE_HIP - 0.03) * stature,
+        (_HEAD_ABOVE_HIP - _SHOULDER_ABOVE_HIP) * stature,
+    )
+    add("bones", "pelvis", (0.075, 0.115, length), "body", _DOWN, shoulders, trunk=True)
+    add("bones", "pelvis", (0.042, 0.042, neck), "body", _UP, shoulders, trunk=True)
+    for side in SIDES:
+        add("shoes", FOOT[side], tint=side)
+    for side in SIDES:
+        for segment, r in ((THIGH[side], 0.065), (SHANK[side], 0.054), (FOOT[side], 0.040)):
+            add("balls", segment, (r, r, r))
+    add("balls", "pelvis", (0.075, 0.075, body.hip_width / 2 + 0.02), "body")
+    r, head = _HEAD_RADIUS * stature, (0.01, _HEAD_ABOVE_HIP * stature, 0.0)
+    add("balls", "pelvis", (r * 0.92, r * 1.15, r * 0.82), "body", at=head, trunk=True)
+    for side in SIDES:
+        add("toes", FOOT[side], tint=side, at=(0.75 * body.foot + 0.05, -0.5 * body.ankle_height, 0.0))
+        add("soles", FOOT[side], tint=side, at=(0.25 * body.foot, -body.ankle_height, 0.0))
+    return parts
+
+
+def _trunk(q: Mapping[Segment, Floats]) -> Floats:
+    """Orientation of the chest; without a sensor there, upright and facing as the pelvis does."""
+    if "chest" in q:
+        return q["chest"]
+    return rotation.multiply(rotation.about(2, rotation.yaw(q["pelvis"])), _NEUTRAL)
+
+
+@lru_cache(maxsize=32)
+def _shoe(body: BodyModel) -> shapes.Mesh:
+    return shapes.shoe(body.foot, body.ankle_height)
