@@ -1,0 +1,177 @@
+"""What the engine says of a stride, and where the training stands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Final, Literal, get_args
+
+from core.feedback.fields import Fields
+from core.frames import SIDES, Side
+
+Zone = Literal["in", "near_low", "near_high", "low", "high"]
+"""in = green; near_* = yellow, one level width beside it; low, high = red."""
+
+WhyNot = Literal[
+    "baseline", "retention", "off", "paused", "stale", "stopped", "probe", "faded", "positive_only",
+    "bandwidth",
+]  # fmt: skip
+"""Why a stride has no feedback. baseline, retention: the block a visit begins with; probe: a block without
+feedback inside the training; positive_only, bandwidth: strides like this one are not shown."""
+
+Phase = Literal["baseline", "retention", "training", "probe", "stopped"]
+Stop = Literal["max_strides", "max_minutes", "gps_rise"]
+
+ZONES: Final[tuple[Zone, ...]] = get_args(Zone)
+WHY_NOT: Final[tuple[WhyNot, ...]] = get_args(WhyNot)
+
+
+@dataclass(frozen=True)
+class Tone:
+    """A sound whose pitch (Hz) and level (0 to 1) grow with the error (core/feedback/zones.py)."""
+
+    pitch: float
+    level: float
+
+
+@dataclass(frozen=True)
+class Cue:
+    """One counted stride of a trained side, shown to the person or not.
+
+    Parameters
+    ----------
+    n, side : of the stride; start_s, t_s : its two contacts, on the axis of the take.
+    value : in the unit of the parameter. error_sd : above (+) or below the target, in its sd.
+    zone, level, zone_low, zone_high : the zone in the unit of the parameter at the level of this stride.
+    shown : it got feedback, with a `tone` if the record asks for sound and it lies outside the zone; else
+        `why_not` says why.
+    block : number of the probe block it belongs to, from 1; None outside.
+    share_in_zone_last20 : of the training strides at this level, at most the last window (20); None without.
+    """
+
+    n: int
+    side: Side
+    start_s: float
+    t_s: float
+    value: float
+    error_sd: float
+    zone: Zone
+    shown: bool
+    why_not: WhyNot | None
+    level: int
+    zone_low: float
+    zone_high: float
+    tone: Tone | None = None
+    block: int | None = None
+    share_in_zone_last20: float | None = None
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values; `from_json` reads them back."""
+        return asdict(self)
+
+    @staticmethod
+    def from_json(data: Mapping[str, object]) -> Cue:
+        """Read what `to_json` wrote; raises ParameterError bad_prescription."""
+        f = Fields("cue", data)
+        tone = None
+        if data.get("tone") is not None:
+            t = f.part("tone")
+            tone = Tone(t.number("pitch", 0.0, 0.0, 1e5), t.number("level", 0.0, 0.0, 1.0))
+        return Cue(
+            n=f.whole("n", 0, 0, 10**9),
+            side=f.choice("side", SIDES),
+            start_s=f.number("start_s", 0.0, -1e9, 1e9),
+            t_s=f.number("t_s", 0.0, -1e9, 1e9),
+            value=f.number("value", 0.0, -1e9, 1e9),
+            error_sd=f.number("error_sd", 0.0, -1e12, 1e12),
+            zone=f.choice("zone", ZONES),
+            shown=f.flag("shown", False),
+            why_not=f.choice("why_not", (*WHY_NOT, None), None),
+            level=f.whole("level", 0, 0, 10**6),
+            zone_low=f.number("zone_low", 0.0, -1e12, 1e12),
+            zone_high=f.number("zone_high", 0.0, -1e12, 1e12),
+            tone=tone,
+            block=f.whole_or_none("block", None, 1, 10**9),
+            share_in_zone_last20=f.number_or_none("share_in_zone_last20", None, 0.0, 1.0),
+        )
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Strides of one kind: number, values, share in the zone; None without strides (sd: fewer than two)."""
+
+    n: int = 0
+    mean: float | None = None
+    sd: float | None = None
+    in_zone: float | None = None
+
+
+@dataclass(frozen=True)
+class SideEffect:
+    """Something beside the target since the take began, or why it is not known.
+
+    Parameters
+    ----------
+    change : last strides minus the first ones. limit, source : what it is held against. beyond : it is.
+    reason : "too_few_strides", "joint_missing", "both_sides_trained", "no_limit"; None.
+    """
+
+    change: float | None = None
+    limit: float | None = None
+    source: str | None = None
+    beyond: bool = False
+    reason: str | None = "too_few_strides"
+
+
+@dataclass(frozen=True)
+class GuardState:
+    """Side effects on the other side and on the sagittal profile."""
+
+    other: SideEffect = field(default_factory=SideEffect)
+    gps: SideEffect = field(default_factory=SideEffect)
+
+    @property
+    def state(self) -> Literal["ok", "watch", "unknown"]:
+        """watch: one of them is beyond its limit; unknown: neither can be judged yet."""
+        if self.other.beyond or self.gps.beyond:
+            return "watch"
+        known = [e for e in (self.other, self.gps) if e.reason is None]
+        return "ok" if known else "unknown"
+
+
+@dataclass(frozen=True)
+class FeedbackState:
+    """Where the training stands after the last stride.
+
+    Parameters
+    ----------
+    strides : counted ones of the trained side. share_pct : of the training strides that get feedback now.
+    next_probe : training strides until the next probe block, block_left : strides left of the block without
+        feedback that is going on; None where there is none. window_n : strides behind `in_zone`.
+    with_feedback, without_feedback : of the training, blocks included; strides when it was switched off count
+        as without.
+    """
+
+    on: bool
+    paused: bool
+    stale: bool
+    stopped: Stop | None
+    phase: Phase
+    level: int
+    zone_low: float
+    zone_high: float
+    strides: int
+    share_pct: int
+    next_probe: int | None
+    block_left: int | None
+    in_zone: float | None
+    window_n: int
+    with_feedback: Summary
+    without_feedback: Summary
+    guard: GuardState
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values."""
+        data = asdict(self)
+        data["guard"]["state"] = self.guard.state
+        return data

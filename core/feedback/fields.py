@@ -1,0 +1,123 @@
+"""Reading a record field by field: what is left out has its default, what is not understood is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf, isfinite
+from typing import Any, Final, TypeVar
+
+from core.errors import ParameterError
+
+Name = TypeVar("Name")
+
+CODE: Final = "bad_prescription"
+
+_MISSING: Final = object()
+
+
+class Fields:
+    """The fields of one object of a record.
+
+    Every reader returns the default where the field is absent, and raises ParameterError bad_prescription
+    with what was expected and what was found; `done` refuses fields nobody read.
+    """
+
+    def __init__(self, path: str, data: object) -> None:
+        if not isinstance(data, Mapping):
+            raise ParameterError(CODE, f"{path} is {data!r}. Expected an object with named fields.")
+        self._path = path
+        self._data: Mapping[Any, object] = data
+        self._read: set[str] = set()
+
+    def part(self, name: str) -> Fields:
+        """An object inside this one; absent = all its defaults."""
+        found = self._take(name, {})
+        return Fields(name if self._path == "prescription" else f"{self._path}.{name}", found)
+
+    def number(self, name: str, default: float, least: float, most: float) -> float:
+        """A finite number within limits."""
+        return self._number(name, self._take(name, default), least, most)
+
+    def number_or_none(
+        self, name: str, default: float | None, least: float = -inf, most: float = inf
+    ) -> float | None:
+        """The same, or null."""
+        found = self._take(name, default)
+        return None if found is None else self._number(name, found, least, most)
+
+    def whole(self, name: str, default: int, least: int, most: int) -> int:
+        """A whole number within limits."""
+        return self._whole(name, self._take(name, default), least, most)
+
+    def whole_or_none(self, name: str, default: int | None, least: int, most: int) -> int | None:
+        """The same, or null."""
+        found = self._take(name, default)
+        return None if found is None else self._whole(name, found, least, most)
+
+    def flag(self, name: str, default: bool) -> bool:
+        """True or false."""
+        found = self._take(name, default)
+        if not isinstance(found, bool):
+            raise self._wrong(name, found, "true or false")
+        return found
+
+    def choice(self, name: str, allowed: Sequence[Name], default: object = _MISSING) -> Name:
+        """One of the allowed values."""
+        found = self._take(name, default)
+        for value in allowed:
+            if found == value and type(found) is type(value):
+                return value
+        words = ", ".join("null" if a is None else str(a) for a in allowed)
+        raise self._wrong(name, None if found is _MISSING else found, f"one of {words}")
+
+    def choices(self, name: str, allowed: Sequence[Name], default: Sequence[Name]) -> tuple[Name, ...]:
+        """At least one of the allowed values."""
+        found = self._take(name, default)
+        if isinstance(found, list | tuple) and found and all(x in allowed for x in found):
+            return tuple(found)
+        raise self._wrong(name, found, f"a list of at least one of {', '.join(map(str, allowed))}")
+
+    def percents(self, name: str, default: tuple[int, ...]) -> tuple[int, ...]:
+        """A list of shares in whole percent."""
+        found = self._take(name, default)
+        if isinstance(found, list | tuple) and 1 <= len(found) <= 20:
+            numbers = [x for x in found if isinstance(x, int) and not isinstance(x, bool) and 0 <= x <= 100]
+            if len(numbers) == len(found):
+                return tuple(numbers)
+        raise self._wrong(name, found, "a list of 1 to 20 whole percents from 0 to 100")
+
+    def text(self, name: str, default: str | None) -> str | None:
+        """A line of text."""
+        found = self._take(name, default)
+        if found is None or (isinstance(found, str) and len(found) <= 500):
+            return found
+        raise self._wrong(name, found, "text of at most 500 characters")
+
+    def done(self) -> None:
+        """Refuse what nobody asked for: a misspelt field must not be silently ignored."""
+        unknown = sorted(str(k) for k in self._data.keys() - self._read)
+        if unknown:
+            raise ParameterError(
+                CODE, f"{self._path} has {', '.join(unknown)}. Expected only {', '.join(sorted(self._read))}."
+            )
+
+    def _number(self, name: str, found: object, least: float, most: float) -> float:
+        if isinstance(found, bool) or not isinstance(found, int | float) or not isfinite(found):
+            raise self._wrong(name, found, "a number")
+        if not least <= found <= most:
+            raise self._wrong(name, found, f"a number from {least:g} to {most:g}")
+        return float(found)
+
+    def _whole(self, name: str, found: object, least: int, most: int) -> int:
+        if isinstance(found, float) and found.is_integer():
+            found = int(found)
+        if isinstance(found, bool) or not isinstance(found, int) or not least <= found <= most:
+            raise self._wrong(name, found, f"a whole number from {least} to {most}")
+        return found
+
+    def _take(self, name: str, default: object) -> Any:
+        self._read.add(name)
+        return self._data.get(name, default)
+
+    def _wrong(self, name: str, found: object, expected: str) -> ParameterError:
+        return ParameterError(CODE, f"{self._path}.{name} is {found!r}. Expected {expected}.")

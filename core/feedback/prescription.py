@@ -1,0 +1,327 @@
+"""What is trained and how: one parameter, its target, when feedback is given, how hard, when to stop.
+
+One parameter at a time (Schließmann et al. 2018, spec/clinic.md §4); target, mode, schedule and dose are
+fields of the record because reviews find that studies differ in them (Spencer et al. 2021, field.md §1n).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from math import isfinite
+from typing import Final, Literal, get_args
+
+from core.errors import ParameterError
+from core.feedback.fields import Fields
+from core.frames import SIDES, Side
+from core.parameters.kinematic import FIGURES, FOOT_PITCH
+from core.parameters.temporal import NAMES as TEMPORAL
+
+DISTANCES: Final = (
+    "gait_speed_mps", "stride_length_m", "step_length_m", "step_width_m", "circumduction_m",
+    "max_heel_clearance_m", "min_toe_clearance_m", "toe_out_deg",
+)  # fmt: skip
+PARAMETERS: Final[tuple[str, ...]] = (*DISTANCES, *TEMPORAL, *FIGURES, *FOOT_PITCH)
+"""Parameters of a single stride that can be trained."""
+
+TargetSource = Literal["norm", "own_better_side", "own_baseline", "manual"]
+Mode = Literal["bar", "zone", "tone", "tick"]
+ScheduleKind = Literal["every", "fading"]
+Towards = Literal["low", "high"]
+
+SOURCES: Final[tuple[TargetSource, ...]] = get_args(TargetSource)
+MODES: Final[tuple[Mode, ...]] = get_args(Mode)
+KINDS: Final[tuple[ScheduleKind, ...]] = get_args(ScheduleKind)
+
+LEVELS: Final = 20
+"""Easiest level there is. Our choice: nobody starts further off, and a rule must end somewhere."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where the value should be.
+
+    Parameters
+    ----------
+    source : norm = healthy people at this person's speed; own_better_side, own_baseline = the person's other
+        or same side in an earlier session; manual = entered.
+    mean, sd : in the unit of the parameter; None until a take resolves them. A level is as wide as `sd`.
+    words : who or what is behind them, as printed. session_id : the session they are taken from.
+    """
+
+    source: TargetSource = "norm"
+    mean: float | None = None
+    sd: float | None = None
+    words: str = ""
+    session_id: str | None = None
+
+    @property
+    def resolved(self) -> bool:
+        """Mean and sd are known."""
+        return self.mean is not None and self.sd is not None
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Which strides get feedback.
+
+    Parameters
+    ----------
+    kind : every stride, or fading: the share goes down step by step.
+    shares_pct, strides_per_share : the steps and how many training strides each lasts; the last one stays.
+        100 → 50 → 0 % as in spec/clinic.md §4; the length is our choice.
+    probe_every, probe_strides : after so many training strides, so many without feedback; None = no probes.
+        Errors return at once when feedback goes (Roemmich et al. 2016): only probes show what was learnt.
+    retention_strides : without feedback at the start of a visit that follows a training of the same.
+    """
+
+    kind: ScheduleKind = "fading"
+    shares_pct: tuple[int, ...] = (100, 50, 0)
+    strides_per_share: int = 60
+    probe_every: int | None = 40
+    probe_strides: int = 10
+    retention_strides: int = 20
+
+
+@dataclass(frozen=True)
+class Progression:
+    """How hard it is, and when that changes (Schließmann et al. 2018, spec/clinic.md §4).
+
+    Parameters
+    ----------
+    automatic : levels follow the rule; else only the therapist changes them.
+    window : strides at one level that a decision needs. share : of them in the zone, above it is made harder.
+    away_share : of them beyond the yellow zone on the worse side, above it is made easier; the source says
+        "too many", half is our choice.
+    sd_per_level : width of a level in sd of the target. start_level : None = from the baseline.
+    worse : side of the target the person is on; None = from the baseline.
+    """
+
+    automatic: bool = True
+    window: int = 20
+    share: float = 0.7
+    away_share: float = 0.5
+    sd_per_level: float = 1.0
+    start_level: int | None = None
+    worse: Towards | None = None
+
+
+@dataclass(frozen=True)
+class StopRule:
+    """When feedback ends by itself.
+
+    Parameters
+    ----------
+    max_strides : counted strides of the take. max_minutes : since its first stride; 15 is the dose of a visit
+        in Schließmann et al. 2018, 5 × 2 to 3 minutes. gps_rise_deg : rise of `gps_sagittal` since the start.
+    """
+
+    max_strides: int | None = None
+    max_minutes: float | None = 15.0
+    gps_rise_deg: float | None = 3.2
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Side effects that are looked for while training (Legrand et al. 2025, spec/field.md §1n: feedback on
+    stance time cost 7.9 points of the GDI).
+
+    Parameters
+    ----------
+    other_change : of the same parameter on the other side; None = its MDC, where a source has one, else two
+        sd of the strides it began with. gps_rise_deg : of `gps_sagittal`; 1.6° is the MCID of the GPS (Baker
+        et al. 2012, children), twice that stops.
+    """
+
+    other_change: float | None = None
+    gps_rise_deg: float | None = 1.6
+
+
+@dataclass(frozen=True)
+class Prescription:
+    """Feedback on one parameter of one side.
+
+    Parameters
+    ----------
+    side : None = strides of both. band_sd : half width of the zone at level 0, in sd of the target.
+    modes : how it is shown. positive_only : only strides in the zone get a cue (Heel2Toe); bandwidth : only
+        strides outside of it do. Not both.
+    """
+
+    parameter: str
+    side: Side | None
+    target: Target
+    band_sd: float = 1.0
+    modes: tuple[Mode, ...] = ("bar",)
+    positive_only: bool = False
+    bandwidth: bool = False
+    schedule: Schedule = field(default_factory=Schedule)
+    progression: Progression = field(default_factory=Progression)
+    stop_rule: StopRule = field(default_factory=StopRule)
+    guard: Guard = field(default_factory=Guard)
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values; `from_json` reads them back."""
+        return asdict(self)
+
+    @staticmethod
+    def from_json(data: Mapping[str, object]) -> Prescription:
+        """Read and check a record; what is left out has its default.
+
+        Raises
+        ------
+        ParameterError
+            bad_prescription: what was expected of which field, what was found.
+        """
+        return _prescription(data)
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """What is known of the person before the take.
+
+    Parameters
+    ----------
+    mean, sd, n : the parameter on the trained side in an earlier session; None without one.
+    session_id : that session.
+    last_level : where the last training with this very record ended; None without one.
+    other_mdc, other_mdc_source : limit of change of the other side, None where no source has one.
+    after_training : an earlier visit trained the same, so this one begins with its retention block.
+    """
+
+    mean: float | None = None
+    sd: float | None = None
+    n: int = 0
+    session_id: str | None = None
+    last_level: int | None = None
+    other_mdc: float | None = None
+    other_mdc_source: str | None = None
+    after_training: bool = False
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values; `from_json` reads them back."""
+        return asdict(self)
+
+    @staticmethod
+    def from_json(data: Mapping[str, object]) -> Baseline:
+        """Read what `to_json` wrote; raises ParameterError bad_prescription."""
+        f = Fields("baseline", data)
+        baseline = Baseline(
+            f.number_or_none("mean", None),
+            f.number_or_none("sd", None, 0.0),
+            f.whole("n", 0, 0, 10**9),
+            f.text("session_id", None),
+            f.whole_or_none("last_level", None, 0, LEVELS),
+            f.number_or_none("other_mdc", None, 0.0),
+            f.text("other_mdc_source", None),
+            f.flag("after_training", False),
+        )
+        f.done()
+        return baseline
+
+
+def _prescription(data: Mapping[str, object]) -> Prescription:
+    f = Fields("prescription", data)
+    target = _target(f.part("target"))
+    parameter = f.choice("parameter", PARAMETERS)
+    side = f.choice("side", (*SIDES, None), None)
+    modes = tuple(dict.fromkeys(f.choices("modes", MODES, ("bar",))))
+    made = Prescription(
+        parameter,
+        side,
+        target,
+        f.number("band_sd", 1.0, 0.1, 5.0),
+        modes,
+        f.flag("positive_only", False),
+        f.flag("bandwidth", False),
+        _schedule(f.part("schedule")),
+        _progression(f.part("progression")),
+        _stop_rule(f.part("stop_rule")),
+        _guard(f.part("guard")),
+    )
+    f.done()
+    if made.positive_only and made.bandwidth:
+        raise _refused(
+            "positive_only and bandwidth are both on, and leave no stride to show. Expected at most one."
+        )
+    if side is None and target.source == "own_better_side":
+        raise _refused(
+            "target.source is own_better_side while both sides are trained. Expected side left or right, or "
+            "another source."
+        )
+    return made
+
+
+def _target(f: Fields) -> Target:
+    source = f.choice("source", SOURCES, "norm")
+    mean, sd = f.number_or_none("mean", None), f.number_or_none("sd", None)
+    target = Target(source, mean, sd, f.text("words", "") or "", f.text("session_id", None))
+    f.done()
+    if (mean is None) != (sd is None) or (source == "manual" and mean is None):
+        raise _refused(f"target.mean is {mean} and target.sd {sd}. Expected both numbers, or neither.")
+    if sd is not None and not (isfinite(sd) and sd > 0.0):
+        raise _refused(f"target.sd is {sd:g}. Expected more than 0: it is the width of a level.")
+    return target
+
+
+def _schedule(f: Fields) -> Schedule:
+    d = Schedule()
+    found = Schedule(
+        f.choice("kind", KINDS, d.kind),
+        f.percents("shares_pct", d.shares_pct),
+        f.whole("strides_per_share", d.strides_per_share, 1, 10_000),
+        f.whole_or_none("probe_every", d.probe_every, 1, 10_000),
+        f.whole("probe_strides", d.probe_strides, 1, 1000),
+        f.whole("retention_strides", d.retention_strides, 0, 1000),
+    )
+    f.done()
+    if list(found.shares_pct) != sorted(found.shares_pct, reverse=True):
+        raise _refused(
+            f"schedule.shares_pct is {list(found.shares_pct)}. Expected no share above the one before."
+        )
+    return found
+
+
+def _progression(f: Fields) -> Progression:
+    d = Progression()
+    found = Progression(
+        f.flag("automatic", d.automatic),
+        f.whole("window", d.window, 5, 200),
+        f.number("share", d.share, 0.05, 0.99),
+        f.number("away_share", d.away_share, 0.05, 0.99),
+        f.number("sd_per_level", d.sd_per_level, 0.05, 5.0),
+        f.whole_or_none("start_level", None, 0, LEVELS),
+        f.choice("worse", ("low", "high", None), None),
+    )
+    f.done()
+    if found.share + found.away_share < 1.0:
+        raise _refused(
+            f"progression.share is {found.share:g} and away_share {found.away_share:g}: the same strides "
+            "could ask for harder and easier. Expected a sum of at least 1."
+        )
+    return found
+
+
+def _stop_rule(f: Fields) -> StopRule:
+    d = StopRule()
+    found = StopRule(
+        f.whole_or_none("max_strides", d.max_strides, 1, 100_000),
+        f.number_or_none("max_minutes", d.max_minutes, 0.5, 240.0),
+        f.number_or_none("gps_rise_deg", d.gps_rise_deg, 0.1, 60.0),
+    )
+    f.done()
+    return found
+
+
+def _guard(f: Fields) -> Guard:
+    d = Guard()
+    found = Guard(
+        f.number_or_none("other_change", d.other_change, 0.0),
+        f.number_or_none("gps_rise_deg", d.gps_rise_deg, 0.1, 60.0),
+    )
+    f.done()
+    return found
+
+
+def _refused(message: str) -> ParameterError:
+    return ParameterError("bad_prescription", message)
