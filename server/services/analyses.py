@@ -143,7 +143,7 @@ def submit(
         no_files. NotFound: the session.
     """
     this = recordings.require_current(c, session_id)
-    manifest = _completed(c, session_id, this.manifest)
+    manifest = completed(c, session_id, this.manifest)
     chosen = dict(config or {})
     params = {**recordings.job_inputs(this), "manifest": manifest, "config": chosen}
     key = f"{this.id}:{recordings.ANALYSE}:{_digest(params)}:{CODE_VERSION}"
@@ -240,7 +240,8 @@ def _analysis(c: Connection, row: Any) -> Analysis:
     return Analysis(**row._asdict(), files={f.name: Blob(f.sha256, f.size) for f in files})
 
 
-def _completed(c: Connection, session_id: str, manifest: Mapping[str, Any] | None) -> dict[str, Any]:
+def completed(c: Connection, session_id: str, manifest: Mapping[str, Any] | None) -> dict[str, Any]:
+    """A manifest with height and protocol of the session (or the patient) where it leaves them open."""
     said = dict(manifest or {})
     row = c.execute(
         select(session.c.protocol, session.c.height_m, patient.c.height_m.label("usual_height_m"))

@@ -338,7 +338,7 @@ live_take = Table(
     Column("state", String(16), nullable=False),
     Column("code_sha256", String(64), unique=True),  # of the pairing code; None once it was used
     Column("code_expires_at", Utc),
-    Column("token_sha256", String(64), unique=True),  # of the tablet's token; None once the take is over
+    Column("token_sha256", String(64), unique=True),  # of the tablet's token, which opens this take only
     Column("token_expires_at", Utc),
     _ref("opened_by", "user", nullable=True, index=False),
     _ref("prescription_id", "prescription", nullable=True, index=False),  # the one in force at its start

@@ -1,0 +1,164 @@
+"""The log of a take that is over becomes a recording of its session, byte for byte, and is analysed.
+
+Every step may be the last before a crash; `repair` takes them again at the start of the server.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, insert, select, update
+
+from server import audit
+from server.jobs.queue import JobQueue
+from server.services import analyses, live, recordings
+from server.services.errors import NotFound
+from server.settings import Settings
+from server.storage import fs, segments
+from server.storage.blobs import Blob, BlobStore
+from server.storage.db import Database
+from server.storage.tables import OPEN_TAKE_STATES, live_take, new_id, now, recording, recording_file, user
+
+log = logging.getLogger(__name__)
+
+CHUNK_BYTES = 1_000_000
+
+
+@dataclass(frozen=True)
+class _Opener:
+    """The person who opened the take, on whose behalf it is stored and analysed."""
+
+    user_id: str
+    name: str
+
+
+def log_path(folder: Path, take_id: str) -> Path:
+    """Where the log of a take is while it has not become a recording."""
+    return folder / f"{take_id}.log"
+
+
+def file_name(take: live.Take) -> str:
+    """Name of the recording's only file."""
+    return f"live-{take.created_at:%Y%m%dT%H%M%SZ}.sagittal-live"
+
+
+def store(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue, take_id: str) -> str | None:
+    """Make the log of a take that is over its session's newest recording; done already is fine.
+
+    Returns
+    -------
+    The recording's id; None when no sample ever came (then the log goes) or the session has been erased.
+    """
+    path = log_path(settings.live, take_id)
+    try:
+        with db.read() as c:
+            take = live.get(c, take_id)
+        if take.is_open:
+            raise RuntimeError(f"live take {take_id} is still {take.state}")
+        if take.recording_id is None and path.is_file():
+            hello = _hello_of_data(path)
+            if hello is not None:
+                blob = _copy(blobs, take.patient_id, path)
+                with db.write() as c:
+                    take = _publish(c, blobs, queue, take_id, blob, hello)
+    except NotFound:
+        take = None
+    fs.remove_file(path)
+    return take.recording_id if take is not None else None
+
+
+def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) -> list[str]:
+    """Finish what a crash left: store the logs of takes that are over, remove logs that belong to nothing.
+
+    Returns
+    -------
+    Ids of the takes that are still open and have a log.
+    """
+    fs.make_folder(settings.live)
+    waiting = []
+    for path in sorted(settings.live.glob("*.log")):
+        with db.read() as c:
+            state = c.execute(select(live_take.c.state).where(live_take.c.id == path.stem)).scalar()
+        if state in OPEN_TAKE_STATES:
+            waiting.append(path.stem)
+            continue
+        try:
+            store(db, blobs, settings, queue, path.stem)
+        except Exception:
+            # one take that cannot be stored must not keep the clinic closed; its log stays for the next start
+            log.exception("live take %s could not be stored", path.stem)
+    return waiting
+
+
+def _copy(blobs: BlobStore, space: str, path: Path) -> Blob:
+    # no limit: these bytes were acknowledged
+    with blobs.receive(space) as receiver:
+        for chunk in _chunks(path):
+            receiver.write(chunk)
+        return receiver.keep()
+
+
+def _chunks(path: Path) -> Iterator[bytes]:
+    with path.open("rb") as file:
+        while chunk := file.read(CHUNK_BYTES):
+            yield chunk
+
+
+def _hello_of_data(path: Path) -> bytes | None:
+    """The hello of a log with at least one batch, else None."""
+    hello = None
+    for _, found in segments.records(path):
+        if found.kind == "H":
+            hello = found.body
+        elif found.kind == "B":
+            return hello
+    return None
+
+
+def _publish(
+    c: Connection, blobs: BlobStore, queue: JobQueue, take_id: str, blob: Blob, hello: bytes
+) -> live.Take:
+    take = live.get(c, take_id)
+    if take.recording_id is not None:
+        return take
+    blobs.require(take.patient_id, blob.sha256)
+    recording_id, at = new_id(), now()
+    manifest = analyses.completed(c, take.session_id, {"sensors": _sensors(hello)})
+    # alone in its set: files that were uploaded to this session before are another take
+    c.execute(
+        insert(recording).values(
+            id=recording_id, session_id=take.session_id, manifest=manifest, created_at=at
+        )
+    )
+    c.execute(
+        insert(recording_file).values(
+            recording_id=recording_id,
+            name=file_name(take),
+            size=blob.size,
+            sha256=blob.sha256,
+            added_at=at,
+        )
+    )
+    c.execute(update(live_take).where(live_take.c.id == take_id).values(recording_id=recording_id))
+    actor = _opener(c, take)
+    detail = {"session_id": take.session_id, "take_id": take_id, "sha256": blob.sha256, "size": blob.size}
+    audit.record(c, actor, "recording.file_added", "recording", recording_id, detail)
+    recordings.inspect(c, queue, actor, take.session_id)
+    analyses.submit(c, queue, actor, take.session_id)
+    return live.get(c, take_id)
+
+
+def _sensors(hello: bytes) -> dict[str, Any]:
+    """Device → segment, as the tablet declared them."""
+    from core.formats.live_log import parse_hello
+
+    return {sensor.id: sensor.segment for stream in parse_hello(hello).streams for sensor in stream.sensors}
+
+
+def _opener(c: Connection, take: live.Take) -> _Opener | None:
+    row = c.execute(select(user.c.id, user.c.name).where(user.c.id == take.opened_by)).first()
+    return None if row is None else _Opener(row.id, row.name)
