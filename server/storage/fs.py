@@ -32,6 +32,10 @@ class System:
         """Wait until the content (of a folder: its names) is on the disk."""
         os.fsync(fd)
 
+    def truncate(self, fd: int, size: int) -> None:
+        """Cut a file to its first `size` bytes."""
+        os.ftruncate(fd, size)
+
     def close(self, fd: int) -> None:
         """Close a descriptor."""
         os.close(fd)
@@ -126,6 +130,54 @@ class Incoming:
         finally:
             if not self._kept:
                 system.unlink(self.path)
+
+
+class Growing:
+    """A file that only grows at its end; its first `size` bytes are whole appends.
+
+    Parameters
+    ----------
+    path : must exist. size : bytes to go on after; what lies behind them is cut off at the first append.
+    """
+
+    def __init__(self, path: Path, size: int) -> None:
+        self.size = size
+        self._reach: int | None = None  # how far the file may reach; None = not known
+        self._fd: int | None = system.open(path, os.O_WRONLY | os.O_APPEND)
+
+    def append(self, data: bytes) -> None:
+        """Write behind the last append; not on the disk before `sync`. After an OSError nothing was added."""
+        fd = self._descriptor()
+        if self._reach != self.size:  # a torn append may be there, from before a crash or a full disk
+            self.cut(self.size)
+        self._reach = None
+        rest = memoryview(data)
+        while rest:
+            rest = rest[system.write(fd, rest) :]
+        self.size += len(data)
+        self._reach = self.size
+
+    def sync(self) -> None:
+        """Wait until all appends survive a power cut."""
+        system.fsync(self._descriptor())
+
+    def cut(self, size: int) -> None:
+        """Forget everything behind the first `size` bytes."""
+        self._reach = None
+        self.size = size
+        system.truncate(self._descriptor(), size)
+        self._reach = size
+
+    def close(self) -> None:
+        """Let go of the file; closing twice is fine."""
+        if self._fd is not None:
+            fd, self._fd = self._fd, None
+            system.close(fd)
+
+    def _descriptor(self) -> int:
+        if self._fd is None:
+            raise ValueError("The file is already closed.")
+        return self._fd
 
 
 def write_file(path: Path, content: bytes) -> None:

@@ -1,0 +1,214 @@
+"""The rules of one take's stream as a state machine: no socket, no clock, no disk.
+
+seq below the next one → a duplicate, ignored · the next one → kept · above → closed, the tablet resumes.
+Acknowledged is only what `synced` has been told of.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from core.errors import InputError
+from core.formats.live_log import (
+    Batch,
+    Finish,
+    Header,
+    Hello,
+    Kind,
+    Record,
+    check_fits,
+    encode_batch,
+    finish_json,
+    parse_finish,
+    parse_hello,
+    payload,
+    peek,
+)
+from server.live import protocol
+from server.live.protocol import MOST_UNACKED, Close, ProtocolError
+
+MISMATCH = "finish_mismatch"
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a take has ended; it takes no more batches.
+
+    Parameters
+    ----------
+    count : batches in the log. sha256 : over their payloads in order of seq.
+    problem : None, or finish_mismatch: the tablet counted or hashed otherwise; the take is kept all the same.
+    """
+
+    count: int
+    sha256: str
+    problem: str | None = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What to do with one message.
+
+    Parameters
+    ----------
+    say : text message to send at once, None = nothing. close : then close so, with `reason`.
+    keep : record for the log. battery : to show, not to store.
+    ended : the end that the tablet asks for is on the disk already; tell it which recording.
+    """
+
+    say: str | None = None
+    close: Close | None = None
+    reason: str = ""
+    keep: tuple[Kind, bytes] | None = None
+    battery: Mapping[str, float] | None = None
+    ended: Ended | None = None
+
+
+NOTHING = Answer()
+
+
+def refusal(error: ProtocolError) -> Answer:
+    """Say why and close."""
+    return Answer(protocol.error(error.code, error.message), error.close, error.code)
+
+
+class Intake:
+    """What is known of one take: its hello, how far it is, and whether it has ended.
+
+    `hello` is None until it is replayed or greeted.
+    """
+
+    def __init__(self) -> None:
+        self.hello: Hello | None = None
+        self.next_seq = 0
+        self.durable = 0
+        self._hash = hashlib.sha256()
+        self._said: Finish | None = None  # the end, as the tablet or this side said it
+        self._base = 0  # batches that were there when the log was opened
+        self._end_durable = False
+
+    @property
+    def ended(self) -> Ended | None:
+        """The end, once it is durable."""
+        return self._ended() if self._end_durable else None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether an end was said, durable or not."""
+        return self._said is not None
+
+    def replay(self, record: Record) -> None:
+        """Learn from a record of the log, all of which is durable.
+
+        Raises
+        ------
+        InputError `live_log_order` when it is no log of ours.
+        """
+        if (self.hello is None) != (record.kind == "H") or self._said is not None:
+            raise InputError("live_log_order", f"The log has a record '{record.kind}' out of its order.")
+        if record.kind == "H":
+            self.hello = parse_hello(record.body)
+        elif record.kind == "B":
+            header = peek(record.body)
+            if header.seq != self.next_seq:
+                raise InputError("live_log_order", f"Batch {header.seq} follows {self.next_seq - 1}.")
+            self._take(record.body, header)
+            self.durable = self._base = self.next_seq
+        else:
+            self._said = parse_finish(record.body)
+            self._end_durable = True
+
+    def greet(self, hello: Hello) -> Answer:
+        """Answer a hello; a tablet that comes back must describe the same sensors."""
+        if self.hello is None:
+            self.hello = hello
+        if hello != self.hello:
+            return refusal(
+                ProtocolError(
+                    "hello_changed",
+                    "The hello differs from the one this take began with; end the take and begin a new one "
+                    "to record with other sensors.",
+                )
+            )
+        return Answer(protocol.welcome(self.next_seq))
+
+    def offer(self, message: bytes | str) -> Answer:
+        """Answer one message of a greeted tablet; what is to be kept is in the answer."""
+        try:
+            if isinstance(message, bytes):
+                protocol.check_size(message)
+                return self._batch(message)
+            match protocol.parse(message):
+                case Hello() as hello:
+                    return self.greet(hello)
+                case Batch() as batch:
+                    return self._batch(encode_batch(batch))
+                case Finish() as finish:
+                    return self._finish(finish)
+                case battery:
+                    return Answer(battery=battery.percent)
+        except ProtocolError as error:
+            return refusal(error)
+        except InputError as error:
+            return refusal(ProtocolError(error.code, error.message))
+
+    def end(self) -> Answer:
+        """End the take from this side, with what has come so far."""
+        if self._said is not None:
+            return Answer(ended=self.ended)
+        return self._keep_end(Finish(self.next_seq, self._hash.hexdigest()))
+
+    def synced(self, records: int) -> None:
+        """The first `records` records kept since the take was opened are durable."""
+        self.durable = min(self._base + records, self.next_seq)
+        self._end_durable = self._end_durable or self._base + records > self.next_seq
+
+    def _batch(self, frame: bytes) -> Answer:
+        header = peek(frame)
+        if self.hello is None:
+            raise ProtocolError("hello_missing", "A batch came before the hello.")
+        check_fits(header, self.hello)
+        if header.seq < self.next_seq:
+            return Answer(protocol.ack(self.durable))
+        if self._said is not None:
+            raise ProtocolError("take_ended", "The take has ended; it takes no more batches.", Close.ENDED)
+        if header.seq > self.next_seq:
+            raise ProtocolError(
+                "gap", f"Batch {header.seq} came, {self.next_seq} is next; connect again.", Close.GAP
+            )
+        if self.next_seq - self.durable >= MOST_UNACKED:
+            raise ProtocolError(
+                "too_many_unacked",
+                f"{MOST_UNACKED} batches are not acknowledged yet; wait at {protocol.MAX_UNACKED}.",
+                Close.TOO_MANY,
+            )
+        self._take(frame, header)
+        return Answer(keep=("B", frame))
+
+    def _take(self, frame: bytes, header: Header) -> None:
+        self._hash.update(payload(frame, header))
+        self.next_seq += 1
+
+    def _finish(self, finish: Finish) -> Answer:
+        if self._said is not None:
+            return Answer(ended=self.ended)
+        if finish.count > self.next_seq:
+            return Answer(
+                protocol.error(
+                    MISMATCH,
+                    f"The tablet counts {finish.count} batches, {self.next_seq} have come; send the rest and "
+                    "finish again.",
+                    next_seq=self.next_seq,
+                )
+            )
+        return self._keep_end(finish)
+
+    def _keep_end(self, finish: Finish) -> Answer:
+        self._said = finish
+        return Answer(keep=("F", finish_json(finish)))
+
+    def _ended(self) -> Ended:
+        own = Finish(self.next_seq, self._hash.hexdigest())
+        return Ended(own.count, own.sha256, None if self._said == own else MISMATCH)

@@ -1,0 +1,162 @@
+"""What tablet and server say to each other on a live socket, beside the batches (docs/live-protocol.md).
+
+Parsing answers every malformed message with a code; nothing here knows of sockets, clocks or disks.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Final, Literal
+
+from core.errors import InputError
+from core.formats.json_tree import no_constant, unique
+from core.formats.live_log import (
+    MOST_FRAME_BYTES,
+    Batch,
+    Finish,
+    Hello,
+    batch_of_json,
+    hello_of,
+    parse_finish,
+)
+
+MAX_UNACKED: Final = 64
+"""Batches a tablet may have sent beyond the last acknowledgement; then it waits."""
+MOST_UNACKED: Final = 2 * MAX_UNACKED
+"""One that has sent so many does not listen to acknowledgements and is closed."""
+HELLO_WITHIN_S: Final = 10.0
+"""Time a socket has to say hello."""
+MOST_MESSAGE_BYTES: Final = MOST_FRAME_BYTES
+
+
+class Close(IntEnum):
+    """Why a live socket is closed; below 4000 the codes of RFC 6455, 4000 + an HTTP status where one fits."""
+
+    DONE = 1000
+    GOING_AWAY = 1001
+    TOO_BIG = 1009
+    MALFORMED = 4400
+    UNAUTHORISED = 4401
+    NO_HELLO = 4408
+    GAP = 4409
+    ENDED = 4410
+    REPLACED = 4412
+    TOO_MANY = 4429
+    STORAGE = 4507
+
+
+FINAL: Final = frozenset({Close.TOO_BIG, Close.MALFORMED, Close.UNAUTHORISED, Close.ENDED, Close.REPLACED})
+"""A client that is closed so does not come back with the same messages; after any other it resumes."""
+
+
+class ProtocolError(InputError):
+    """A message that is not taken: `code` and `message` say why, `close` is how the socket is closed."""
+
+    def __init__(self, code: str, message: str, close: Close = Close.MALFORMED) -> None:
+        super().__init__(code, message)
+        self.close = close
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.code, self.message, self.close)
+
+
+@dataclass(frozen=True)
+class Battery:
+    """Charge by sensor id, 0 to 100 %."""
+
+    percent: Mapping[str, float]
+
+
+Said = Hello | Batch | Finish | Battery
+"""A text message of the tablet."""
+
+
+def parse(text: str) -> Said:
+    """Read a text message.
+
+    Raises
+    ------
+    ProtocolError
+        message_too_big, message_bad_json, message_unknown, battery_bad, and the codes of hello, batch and
+        finish (core/formats/live_log.py, live_hello.py).
+    """
+    check_size(text)
+    try:
+        root = json.loads(text, parse_constant=no_constant, object_pairs_hook=unique)
+    except (ValueError, RecursionError) as error:
+        raise ProtocolError("message_bad_json", f"The message is not valid JSON: {error}.") from None
+    kind = root.get("type") if isinstance(root, dict) else None
+    try:
+        match kind:
+            case "hello":
+                return hello_of(root)
+            case "batch":
+                return batch_of_json(root)
+            case "finish":
+                return parse_finish(text)
+            case "battery":
+                return _battery(root)
+    except InputError as error:
+        raise ProtocolError(error.code, error.message) from None
+    shown = repr(kind)[:40]
+    raise ProtocolError(
+        "message_unknown", f"The message's type is {shown}; expected hello, batch, finish or battery."
+    )
+
+
+def check_size(message: bytes | str) -> None:
+    """Refuse a message above 1 MiB.
+
+    Raises
+    ------
+    ProtocolError `message_too_big`.
+    """
+    if len(message) > MOST_MESSAGE_BYTES:
+        raise ProtocolError(
+            "message_too_big",
+            f"A message of {len(message)} bytes came, at most {MOST_MESSAGE_BYTES} are taken; "
+            "send fewer samples in a batch.",
+            Close.TOO_BIG,
+        )
+
+
+def _battery(root: Mapping[str, Any]) -> Battery:
+    sensors = root.get("sensors")
+    if not isinstance(sensors, dict) or len(sensors) > 64:
+        raise InputError("battery_bad", "A battery message has no `sensors`; expected {id: percent}.")
+    for name, value in sensors.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 100:
+            raise InputError("battery_bad", f"The battery of {name:.40} is {value!r:.40}; expected 0 to 100.")
+    return Battery({name: float(value) for name, value in sensors.items()})
+
+
+def welcome(next_seq: int) -> str:
+    """Answer to hello: go on with this batch."""
+    return _text("welcome", next_seq=next_seq, max_unacked=MAX_UNACKED)
+
+
+def ack(below: int) -> str:
+    """All batches below this one are on the disk."""
+    return _text("ack", ack=below)
+
+
+def error(code: str, detail: str, **more: object) -> str:
+    """Something was refused."""
+    return _text("error", code=code, detail=detail, **more)
+
+
+def command(name: Literal["start", "stop"]) -> str:
+    """What the therapist asks of the tablet."""
+    return _text("command", command=name)
+
+
+def finished(recording: str) -> str:
+    """The take is a recording now."""
+    return _text("finished", recording=recording)
+
+
+def _text(kind: str, **values: object) -> str:
+    return json.dumps({"type": kind, **values}, ensure_ascii=False, separators=(",", ":"))

@@ -1,0 +1,221 @@
+"""One take on its way to the disk: what the socket's route needs, and nothing that could make it wait.
+
+Used on the event loop. `offer` checks a message, queues it for the committer's thread and returns; the
+listener is called back on the loop when it can be read, when it is durable, and when the disk refuses.
+
+    committer = Committer(); committer.start()             # one per server
+    recorder = await open_recorder(path, hello, committer, listener)
+    answer = recorder.greet(hello)                         # of every connection: welcome, or hello_changed
+    answer = recorder.offer(message)                       # of every message, str or bytes
+    await recorder.close()                                 # at shut-down, or when the take is over
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+from pathlib import Path
+from typing import Protocol
+
+from core.formats.live_log import Hello, hello_json, record
+from server.live.committer import Committer, Lane, Post
+from server.live.intake import Answer, Ended, Intake, refusal
+from server.live.protocol import Close, ProtocolError
+from server.storage import segments
+
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
+
+
+class Listener(Protocol):
+    """Who is told what happens to a take; all calls come on the event loop and must not block it."""
+
+    def grown(self, size: int) -> None:
+        """The log has `size` bytes of whole records now; readers of the file may go so far.
+
+        After a failure of the disk it can be less than before: what had not been synced was cut off, and
+        whoever has read beyond `size` starts anew.
+        """
+
+    def acknowledged(self, below: int) -> None:
+        """All batches below this one survive a power cut: tell the tablet (`protocol.ack`)."""
+
+    def ended(self, end: Ended) -> None:
+        """The end is durable and the log file complete."""
+
+    def failed(self, error: ProtocolError) -> None:
+        """The disk refuses (storage_full, storage_failed): say so and close with `error.close`.
+
+        The tablet keeps what is not acknowledged and comes back; `reopen` before greeting it.
+        """
+
+
+class Recorder:
+    """One take's log with its rules.
+
+    Made by `open_recorder` or `restore`.
+
+    Parameters
+    ----------
+    intake : what the log holds. log : open for appending. post : `loop.call_soon_threadsafe`.
+    """
+
+    def __init__(
+        self, intake: Intake, log: segments.TakeLog, committer: Committer, listener: Listener, post: Post
+    ) -> None:
+        if intake.hello is None:
+            raise ValueError("A recorder needs a take that has been greeted.")
+        self.path = log.path
+        self.hello = intake.hello
+        self._intake = intake
+        self._lane = Lane(log, self, post)
+        self._committer = committer
+        self._listener = listener
+        self._size = log.size
+        self._failure: ProtocolError | None = None
+
+    @property
+    def next_seq(self) -> int:
+        """The batch that comes next: so many have been taken."""
+        return self._intake.next_seq
+
+    @property
+    def durable(self) -> int:
+        """So many batches survive a power cut."""
+        return self._intake.durable
+
+    @property
+    def size(self) -> int:
+        """Bytes of the log that can be read."""
+        return self._size
+
+    @property
+    def end(self) -> Ended | None:
+        """How the take ended, once that is durable."""
+        return self._intake.ended
+
+    @property
+    def failure(self) -> ProtocolError | None:
+        """Why nothing is taken until `reopen`, None = all is well."""
+        return self._failure
+
+    def greet(self, hello: Hello) -> Answer:
+        """Answer the hello of a connection, the first or a later one."""
+        return refusal(self._failure) if self._failure else self._intake.greet(hello)
+
+    def offer(self, message: bytes | str) -> Answer:
+        """Answer one message; never waits, never raises for what a tablet can send."""
+        if self._failure:
+            return refusal(self._failure)
+        return self._kept(self._intake.offer(message))
+
+    def finish(self) -> Answer:
+        """End the take from this side; `Listener.ended` follows, or the answer says it is there already."""
+        if self._failure:
+            return refusal(self._failure)
+        return self._kept(self._intake.end())
+
+    async def reopen(self) -> None:
+        """Go back to what is durable after a failure of the disk.
+
+        Raises
+        ------
+        ProtocolError storage_full, storage_failed: the disk still refuses.
+        """
+        try:
+            self._intake = await asyncio.to_thread(self._restart)
+        except OSError as error:
+            self._failure = _refused(error)
+            raise self._failure from error
+        self._failure = None
+        self.written(self._lane.log.size)
+
+    async def close(self) -> None:
+        """Write and sync what has been taken and let go of the file."""
+        await asyncio.to_thread(self._lane.close)
+
+    def written(self, size: int) -> None:
+        """Called by the lane."""
+        self._size = size
+        self._listener.grown(size)
+
+    def synced(self, records: int) -> None:
+        """Called by the lane."""
+        before, was_over = self._intake.durable, self._intake.ended
+        self._intake.synced(records)
+        if self._intake.durable > before:
+            self._listener.acknowledged(self._intake.durable)
+        if self._intake.ended and not was_over:
+            self._listener.ended(self._intake.ended)
+
+    def broke(self, error: OSError) -> None:
+        """Called by the lane."""
+        self._failure = _refused(error)
+        self._listener.failed(self._failure)
+
+    def _kept(self, answer: Answer) -> Answer:
+        if answer.keep is not None:
+            kind, body = answer.keep
+            self._lane.put(record(kind, body))
+            self._committer.wake(self._lane)
+        return answer
+
+    def _restart(self) -> Intake:
+        self._lane.mend()
+        intake = Intake()
+        for _, one in segments.records(self.path):
+            intake.replay(one)
+        return intake
+
+
+async def open_recorder(
+    path: Path, hello: Hello | None, committer: Committer, listener: Listener
+) -> Recorder:
+    """Open the take at `path`, or begin it with this hello.
+
+    Raises
+    ------
+    ProtocolError
+        storage_full, storage_failed; take_empty: there is no log and no hello to begin one with.
+    InputError
+        live_log_order, live_log_damaged: the file is no log of ours; it is left as it is.
+    """
+    post = asyncio.get_running_loop().call_soon_threadsafe
+    try:
+        intake, log = await asyncio.to_thread(restore, path, hello)
+    except OSError as error:
+        raise _refused(error) from error
+    return Recorder(intake, log, committer, listener, post)
+
+
+def restore(path: Path, hello: Hello | None) -> tuple[Intake, segments.TakeLog]:
+    """What a log holds, and the log open for appending; blocks.
+
+    Raises
+    ------
+    OSError, ProtocolError `take_empty`, InputError `live_log_order`, `live_log_damaged`.
+    """
+    intake = Intake()
+    if path.exists():
+        log = segments.recover(path, intake.replay)
+        if log is not None:
+            return intake, log
+    if hello is None:
+        raise ProtocolError("take_empty", "Nothing has been streamed into this take.", Close.ENDED)
+    intake.greet(hello)
+    return intake, segments.create(path, hello_json(hello))
+
+
+def _refused(error: OSError) -> ProtocolError:
+    if error.errno in FULL:
+        return ProtocolError(
+            "storage_full",
+            "The server's disk is full; nothing is acknowledged until there is room. The tablet keeps its "
+            "batches and tries again.",
+            Close.STORAGE,
+        )
+    return ProtocolError(
+        "storage_failed",
+        f"The server's disk refuses ({error.strerror}); nothing is acknowledged until it works. The tablet "
+        "keeps its batches and tries again.",
+        Close.STORAGE,
+    )
