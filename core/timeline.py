@@ -210,7 +210,7 @@ def _on_axis(s: ImuStream, axis: Floats, rate: float, params: TimelineParams) ->
             sensor=s.device_id,
         )
     t = s.t_s[good]
-    place = _Place.find(t, axis, s.rate_hz, rate, params)
+    place = Place.find(t, axis, s.rate_hz, rate, params)
     return SensorSignals(
         device_id=s.device_id,
         acc=place.values(s.acc[good]),
@@ -228,11 +228,11 @@ def _magnetometer(s: ImuStream, axis: Floats, rate: float, params: TimelineParam
     good = complete(s.mag)
     if np.count_nonzero(good) < 0.5 * len(good):
         return None
-    return _Place.find(s.t_s[good], axis, s.rate_hz, rate, params).values(s.mag[good])
+    return Place.find(s.t_s[good], axis, s.rate_hz, rate, params).values(s.mag[good])
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
+class Place:
     """Where the axis lies between the good samples of a sensor.
 
     Parameters
@@ -246,7 +246,7 @@ class _Place:
     filled: Bools
 
     @classmethod
-    def find(cls, t: Floats, axis: Floats, own_rate: float, rate: float, params: TimelineParams) -> _Place:
+    def find(cls, t: Floats, axis: Floats, own_rate: float, rate: float, params: TimelineParams) -> Place:
         """Find it for good-sample times t (m,), strictly increasing."""
         slack = params.on_grid / rate
         before = np.searchsorted(t, axis + slack, side="right") - 1

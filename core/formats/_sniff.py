@@ -6,10 +6,10 @@ import json
 from itertools import pairwise
 from typing import Literal
 
-from core.formats import mapping_xml, parquet, text, xsens
+from core.formats import live_reader, mapping_xml, parquet, text, xsens
 from core.formats.manifest import is_manifest
 
-Kind = Literal["xsens", "parquet", "manifest", "mapping", "table", "known", "empty", "other"]
+Kind = Literal["xsens", "parquet", "live", "manifest", "mapping", "table", "known", "empty", "other"]
 """known = a sensor format we recognise but do not read; other = neither signals nor manifest."""
 
 _MAGIC = {
@@ -40,6 +40,8 @@ def sniff(data: bytes) -> tuple[Kind, str]:
         return "empty", "an empty file"
     if parquet.looks_like(data):
         return "parquet", "Parquet"
+    if live_reader.looks_like(data):
+        return "live", "a live take"
     for magic, name in _MAGIC.items():
         if data.startswith(magic):
             return "known", name

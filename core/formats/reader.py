@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from core.errors import ArchiveError, FormatError, InputError, ManifestError, Notice
-from core.formats import _sniff, mapping_xml, parquet, table, text, xsens
+from core.formats import _sniff, live_reader, mapping_xml, parquet, table, text, xsens
 from core.formats.aliases import segment_named
 from core.formats.archive import ArchiveLimits, expand
 from core.formats.draft import Draft, finish
@@ -15,7 +15,7 @@ from core.formats.source import SourceFile, sha256
 from core.frames import Segment
 from core.recording import Recording, Subject
 
-FORMATS = "Xsens MT Manager text, CSV or TSV with a manifest, Sagittal Parquet"
+FORMATS = "Xsens MT Manager text, CSV or TSV with a manifest, Sagittal Parquet, Sagittal live log"
 _SHOWN = 5
 
 
@@ -88,7 +88,7 @@ def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload
 def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> None:
     """Read one file; a file that cannot be read is remembered, it does not stop the others."""
     raw = member.read()
-    data = raw if parquet.looks_like(raw) else text.to_utf8(raw)
+    data = raw if parquet.looks_like(raw) or live_reader.looks_like(raw) else text.to_utf8(raw)
     spec = manifest.source_of(member.name) if manifest else None
     kind, what = _sniff.sniff(data)
     if any(member.name == name for name, _ in upload.manifests):
@@ -99,6 +99,8 @@ def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> Non
             upload.drafts.append(xsens.read(data, member.name, spec))
         elif kind == "parquet":
             upload.stored.append(parquet.read_recording(data, member.name))
+        elif kind == "live":
+            upload.stored.append(live_reader.read_live_log(data, member.name))
         elif kind == "mapping":
             upload.mapping |= mapping_xml.read(data, member.name)
         elif spec and spec.columns and kind != "empty" and text.is_text(data):
@@ -150,7 +152,7 @@ def _stored(upload: _Upload) -> Recording:
         raise FormatError(
             "several_recordings",
             f"{len(upload.stored)} stored recordings and {len(upload.drafts)} other sensor files were given; "
-            "a Parquet recording is a whole take, upload it alone.",
+            "a Parquet recording or a live log is a whole take, upload it alone.",
         )
     return upload.stored[0]
 

@@ -1,0 +1,78 @@
+"""One time for the streams of a live take: the same rule while it runs and when its log is read.
+
+Streams on the shared clock tick together. A stream on its own clock says nothing about when its samples were
+taken but when they were sent: the smallest (sent − sampled) of its first second is taken for the way every
+sample goes, as the least delayed batch bounds it best. What the way itself takes (some 10 ms by Bluetooth)
+stays in, equally in all streams of a kind.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.formats.live_hello import Hello
+from core.formats.live_log import Batch
+
+SETTLING_US: Final = 1_000_000
+"""Samples of a clock by which it is aligned."""
+
+Micros = NDArray[np.int64]
+
+
+def sample_times_us(batch: Batch, rate_hz: float) -> Micros:
+    """Device clock (n,) of a batch's samples: by its offsets, else evenly by the stream's rate."""
+    if batch.offsets_us is not None:
+        return batch.t0_us + batch.offsets_us.astype(np.int64)
+    steps: Micros = np.rint(np.arange(len(batch.samples)) * (1e6 / rate_hz)).astype(np.int64)
+    return batch.t0_us + steps
+
+
+@dataclass
+class _Group:
+    """Streams on one clock: time of the first sample, smallest delay so far, whether it is final."""
+
+    first_us: int | None = None
+    offset_us: int | None = None
+    settled: bool = False
+
+
+class LiveClock:
+    """Offsets from each stream's device clock to the common one; fed with the batches in order.
+
+    With a single clock there is nothing to align and the offset is 0.
+    """
+
+    def __init__(self, hello: Hello) -> None:
+        shared = _Group()
+        self._groups = {s.stream: shared if s.clock == "shared" else _Group() for s in hello.streams}
+        self.single = len({id(g) for g in self._groups.values()}) == 1
+
+    def push(self, stream: int, first_us: int, last_us: int, sent_us: int) -> None:
+        """Note when a batch was sampled, first and last sample, and when it was sent."""
+        group = self._groups[stream]
+        if group.settled:
+            return
+        if group.first_us is None:
+            group.first_us = first_us
+        age = last_us - group.first_us
+        if group.offset_us is None:
+            group.offset_us = sent_us - last_us
+        elif age <= SETTLING_US:
+            group.offset_us = min(group.offset_us, sent_us - last_us)
+        group.settled = age >= SETTLING_US
+
+    def offset_us(self, stream: int, *, final: bool = True) -> int | None:
+        """What to add to a stream's device clock; None before its first second is over.
+
+        Parameters
+        ----------
+        final : False = what the batches so far say, for a stream that ended within its first second.
+        """
+        if self.single:
+            return 0
+        group = self._groups[stream]
+        return group.offset_us if group.settled or not final else None

@@ -1,0 +1,232 @@
+"""The log of a live take → Recording: what was acknowledged is what is read, and what is odd is said."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from core.errors import FormatError, InputError, Notice
+from core.formats.draft import MOST_OUT_OF_ORDER, signal_digest
+from core.formats.live_clock import LiveClock, Micros, sample_times_us
+from core.formats.live_log import (
+    FILE_MARK,
+    Batch,
+    Finish,
+    Hello,
+    Record,
+    SensorInfo,
+    StreamInfo,
+    check_fits,
+    decode_batch,
+    parse_finish,
+    parse_hello,
+    payload,
+    peek,
+    scan,
+)
+from core.frames import Floats
+from core.recording import ImuStream, Recording
+
+
+def looks_like(data: bytes) -> bool:
+    """Tell a live log by its mark."""
+    return data.startswith(FILE_MARK)
+
+
+@dataclass
+class _Taken:
+    """What the records say."""
+
+    hello: Hello
+    batches: list[Batch] = field(default_factory=list)
+    digest: str = ""
+    finish: Finish | None = None
+    notices: list[Notice] = field(default_factory=list)
+
+
+def read_live_log(data: bytes, source: str) -> Recording:
+    """Read a live take from its log.
+
+    Parameters
+    ----------
+    data : the file, possibly with a torn end. source : its name.
+
+    Returns
+    -------
+    Recording with one stream per sensor on the common clock, segments from the hello. `t_s` is 0 at the first
+    sample of the first batch.
+
+    Raises
+    ------
+    FormatError
+        bad_live_log (damaged before the first sample), empty (no sample).
+    """
+    records, length = scan(data)
+    taken = _taken(records, source)
+    if length < len(data):
+        taken.notices.append(
+            Notice(
+                "live_log_torn",
+                f"The last {len(data) - length} bytes of {source} are incomplete or damaged and were left "
+                f"out; {len(taken.batches)} batches before them are whole.",
+            )
+        )
+    if not taken.batches:
+        raise FormatError("empty", f"{source} holds a live take without a sample.")
+    _compare_finish(taken, source)
+    streams, rest = _streams(taken, source)
+    return Recording(
+        streams=streams,
+        segments={x.id: x.segment for x in taken.hello.sensors if x.id in streams},
+        notices=(*taken.notices, *rest),
+    )
+
+
+def _taken(records: Sequence[Record], source: str) -> _Taken:
+    """Decode the records up to the first that does not follow."""
+    if not records or records[0].kind != "H":
+        raise FormatError(
+            "bad_live_log", f"{source} is damaged at its beginning; there is no hello to read it by."
+        )
+    try:
+        taken = _Taken(parse_hello(records[0].body))
+    except InputError as e:
+        raise FormatError("bad_live_log", f"{source}: {e.message}") from e
+    digest, number = hashlib.sha256(), 0
+    try:
+        for r in records[1:]:
+            number += 1
+            if r.kind == "F":
+                taken.finish = parse_finish(r.body)
+                continue
+            header = peek(r.body)
+            check_fits(header, taken.hello)
+            if r.kind == "H" or header.seq != len(taken.batches):
+                raise InputError("batch_shape", f"batch {header.seq} follows {len(taken.batches) - 1}")
+            digest.update(payload(r.body, header))
+            taken.batches.append(decode_batch(r.body, header))
+    except InputError as e:
+        message = f"Record {number} of {source} does not belong there ({e.message}); the rest was left out."
+        taken.notices.append(Notice("live_log_torn", message))
+    taken.digest = digest.hexdigest()
+    return taken
+
+
+def _compare_finish(taken: _Taken, source: str) -> None:
+    if taken.finish is None:
+        message = (
+            f"{source} ends without a finish: the sender never said that this is all. "
+            f"{len(taken.batches)} batches were received."
+        )
+        taken.notices.append(Notice("live_unfinished", message))
+    elif taken.finish.count != len(taken.batches):
+        message = f"The sender counted {taken.finish.count} batches, {source} holds {len(taken.batches)}."
+        taken.notices.append(Notice("live_count_mismatch", message))
+    elif taken.finish.sha256 != taken.digest:
+        message = (
+            f"The samples in {source} are not those the sender hashed (sha256 {taken.digest[:12]}…, sent "
+            f"{taken.finish.sha256[:12]}…). Every batch passed its own checksum; look at the sender."
+        )
+        taken.notices.append(Notice("live_hash_mismatch", message))
+
+
+def _streams(taken: _Taken, source: str) -> tuple[dict[str, ImuStream], list[Notice]]:
+    """Streams by sensor, in the order of the hello, and what is to be said of them."""
+    clock = LiveClock(taken.hello)
+    by_number: dict[int, list[Batch]] = {}
+    times: dict[int, list[Micros]] = {}
+    rate = {s.stream: s.rate_hz for s in taken.hello.streams}
+    for batch in taken.batches:
+        t = sample_times_us(batch, rate[batch.stream])
+        clock.push(batch.stream, int(t[0]), int(t[-1]), batch.sent_us)
+        by_number.setdefault(batch.stream, []).append(batch)
+        times.setdefault(batch.stream, []).append(t)
+    first = taken.batches[0]
+    origin = first.t0_us + (clock.offset_us(first.stream, final=False) or 0)
+    streams: dict[str, ImuStream] = {}
+    notices: list[Notice] = []
+    for info in taken.hello.streams:
+        if info.stream not in times:
+            notices.append(_missing(info.sensors))
+            continue
+        offset = clock.offset_us(info.stream, final=False) or 0
+        t_us, samples, odd = _in_order(np.concatenate(times[info.stream]), by_number[info.stream], info)
+        t_s = np.asarray((t_us + (offset - origin)) * 1e-6, np.float64)
+        notices += odd
+        for i, sensor in enumerate(info.sensors):
+            stream = _stream(info, sensor, t_s, samples[:, i], source)
+            if stream is None:
+                notices.append(_missing((sensor,)))
+            else:
+                streams[sensor.id] = stream
+    if not clock.single:
+        own = ", ".join(x.id for s in taken.hello.streams if s.clock == "own" for x in s.sensors)
+        message = (
+            f"{own}: each has a clock of its own, aligned by when its batches were sent in the first second. "
+            "Times between sensors are uncertain by how much the radio delays vary, some 10 ms."
+        )
+        notices.append(Notice("clocks_aligned", message, severity="info"))
+    return streams, notices
+
+
+def _missing(sensors: Sequence[SensorInfo]) -> Notice:
+    names = ", ".join(x.id for x in sensors)
+    message = f"No sample of {names} was received; results that need it are left out."
+    return Notice("sensor_missing", message, sensors[0].id)
+
+
+def _in_order(
+    t_us: Micros, batches: Sequence[Batch], info: StreamInfo
+) -> tuple[Micros, Floats, list[Notice]]:
+    """Samples (n, k, 9) whose time is above all before; the others are left out and counted."""
+    samples: Floats = np.concatenate([b.samples for b in batches]).astype(np.float64)
+    ahead = np.maximum.accumulate(t_us)
+    rising = np.concatenate(([True], t_us[1:] > ahead[:-1]))
+    lost = int(np.count_nonzero(~rising))
+    if not lost:
+        return t_us, samples, []
+    severity = "warning" if lost <= MOST_OUT_OF_ORDER * len(t_us) else "error"
+    message = (
+        f"{lost} of {len(t_us)} samples of stream {info.stream} repeat or run backwards in time and were "
+        "left out; the sensor's clock jumped."
+    )
+    notice = Notice("out_of_order", message, info.sensors[0].id, severity=severity)  # type: ignore[arg-type]
+    return t_us[rising], samples[rising], [notice]
+
+
+def _stream(info: StreamInfo, sensor: SensorInfo, t_s: Floats, x: Floats, source: str) -> ImuStream | None:
+    """One sensor, None without a sample; what was sent as infinite is missing and counted."""
+    infinite = int(np.count_nonzero(np.isinf(x).any(axis=1)))
+    x[np.isinf(x)] = np.nan
+    missing = int(np.count_nonzero(np.isnan(x[:, :6]).any(axis=1))) - infinite
+    acc, gyr, mag = (np.ascontiguousarray(x[:, k : k + 3]) for k in (0, 3, 6))
+    has_gyr, has_mag = (bool(np.isfinite(a).all(axis=1).any()) for a in (gyr, mag))
+    if not np.isfinite(x[:, : 6 if has_gyr else 3]).all(axis=1).any():
+        return None
+    notices = []
+    if infinite:
+        message = f"{infinite} samples of {sensor.id} were sent as infinite and count as lost."
+        notices.append(Notice("not_finite", message, sensor.id))
+    if has_gyr and missing > 0:
+        message = f"{missing} of {len(x)} samples of {sensor.id} were sent as not measured."
+        notices.append(Notice("samples_missing", message, sensor.id, severity="info"))
+    if not has_gyr:
+        message = f"{sensor.id} sent no angular rate; it cannot be used for orientations."
+        notices.append(Notice("missing_gyro", message, sensor.id))
+    shown_gyr, shown_mag = gyr if has_gyr else None, mag if has_mag else None
+    return ImuStream(
+        device_id=sensor.id,
+        source=source,
+        t_s=t_s.copy(),
+        acc=acc,
+        gyr=shown_gyr,
+        mag=shown_mag,
+        quat=None,
+        rate_hz=info.rate_hz,
+        clock="device",
+        digest=signal_digest(acc, shown_gyr, shown_mag),
+        notices=tuple(notices),
+    )
