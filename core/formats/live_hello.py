@@ -221,8 +221,9 @@ def _list(node: Mapping[str, Any], key: str, path: str, most: int) -> list[objec
 
 def _text(node: Mapping[str, Any], key: str, path: str) -> str:
     value = node.get(key)
-    if not isinstance(value, str) or not value.strip() or len(value) > LONGEST_TEXT:
-        raise _wrong(path, value, f"a text of 1 to {LONGEST_TEXT} characters")
+    # isprintable: neither line breaks nor lone surrogates, which JSON can carry and UTF-8 cannot
+    if not isinstance(value, str) or not value.strip() or len(value) > LONGEST_TEXT or not value.isprintable():
+        raise _wrong(path, value, f"a text of 1 to {LONGEST_TEXT} printable characters")
     return value
 
 
