@@ -222,7 +222,8 @@ def _list(node: Mapping[str, Any], key: str, path: str, most: int) -> list[objec
 def _text(node: Mapping[str, Any], key: str, path: str) -> str:
     value = node.get(key)
     # isprintable: neither line breaks nor lone surrogates, which JSON can carry and UTF-8 cannot
-    if not isinstance(value, str) or not value.strip() or len(value) > LONGEST_TEXT or not value.isprintable():
+    plain = isinstance(value, str) and value.isprintable() and bool(value.strip())
+    if not isinstance(value, str) or not plain or len(value) > LONGEST_TEXT:
         raise _wrong(path, value, f"a text of 1 to {LONGEST_TEXT} printable characters")
     return value
 
