@@ -1,10 +1,47 @@
-"""Batches of several device clocks → ONE uniform axis, sample by sample, as core/timeline.py lays out a file."""
+"""Batches of several device clocks → ONE uniform axis, sample by sample.
+
+The rules are those of core/timeline.py: highest rate, common start, samples on the axis copied, others
+interpolated, holes of up to 0.1 s filled. A point is given out once every stream has what it needs for it, so
+on a clean take the axis equals that of the finished file bit for bit. What a file needs no rule for: a stream
+that falls silent is passed over, its sensors are invalid until it returns.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
-from core.frames import Bools, Floats
+import numpy as np
+
+from core.errors import Notice, SignalError
+from core.formats.live_clock import LiveClock, sample_times_us
+from core.formats.live_log import Batch, Hello
+from core.frames import Bools, Floats, Segment
+from core.online.line import Line
+from core.timeline import TimelineParams
+
+
+@dataclass(frozen=True)
+class AxisParams:
+    """Limits of the live axis.
+
+    Parameters
+    ----------
+    silent_s : a stream overdue by so much, by the sender's clock, is passed over; longer than any hole that
+        is interpolated, shorter than the 0.5 s after which the patient is told that the picture stands still.
+    wait_s : for streams that are not heard from the beginning. Own clocks need one second to be aligned.
+    behind_s : a stream further behind the others than any radio holds samples back is passed over too.
+    jump_s : a clock may be ahead of what the sender's clock shows by so much. longest_s : longest pause of a
+        stream. Beyond either a batch is left out, so that no number in it makes the axis endless.
+    All are our choice.
+    """
+
+    timeline: TimelineParams = field(default_factory=TimelineParams)
+    silent_s: float = 0.3
+    wait_s: float = 3.0
+    behind_s: float = 5.0
+    jump_s: float = 10.0
+    longest_s: float = 600.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,3 +66,154 @@ class UniformBlock:
 
     def __len__(self) -> int:
         return len(self.t_s)
+
+
+class OnlineAxis:
+    """The axis of a live take: a pure function of its batches in order.
+
+    Parameters
+    ----------
+    hello : its streams; only sensors with a segment are laid on the axis.
+
+    Raises
+    ------
+    SignalError `no_mapping`, `sample_rate_too_low`, as `synchronise`.
+    """
+
+    def __init__(self, hello: Hello, params: AxisParams | None = None) -> None:
+        self.params = params or AxisParams()
+        self._clock = LiveClock(hello)
+        self._rates = {s.stream: s.rate_hz for s in hello.streams}
+        self._lines: dict[int, Line] = {}
+        slot = 0
+        for info in hello.streams:
+            line = Line(info, slot, self.params.timeline)
+            if line.width:
+                self._lines[info.stream] = line
+                slot += line.width
+        self.segments: tuple[Segment, ...] = tuple(x.segment for x in hello.sensors if x.segment is not None)
+        """Worn segments in the order of the block's columns."""
+        self.rate_hz = _rate(list(self._lines.values()), hello, self.params.timeline)
+        self._origin: tuple[int, int] | None = None  # stream and device time of the very first sample
+        self._origin_us = 0
+        self._start_s: float | None = None
+        self._next = 0
+        self._sent: tuple[int, int] | None = None  # smallest and largest sending time so far, µs
+        self._told: dict[tuple[str, int], Notice] = {}
+        self._fresh: list[Notice] = []
+
+    @property
+    def length(self) -> int:
+        """Samples of the axis so far."""
+        return self._next
+
+    def push(self, batch: Batch) -> UniformBlock | None:
+        """Take the next batch; the samples of the axis that are now known, None when none is."""
+        rate = self._rates[batch.stream]
+        t_us = sample_times_us(batch, rate)
+        self._clock.push(batch.stream, int(t_us[0]), int(t_us[-1]), batch.sent_us)
+        earliest, latest = self._sent or (batch.sent_us, batch.sent_us)
+        self._sent = min(earliest, batch.sent_us), max(latest, batch.sent_us)
+        if self._origin is None:
+            self._origin = batch.stream, int(t_us[0])
+        line = self._lines.get(batch.stream)
+        if line is not None:
+            if self._jumps(line, int(t_us[0]), batch.sent_us):
+                return None
+            if line.hold(t_us, batch):
+                self._tell(
+                    "out_of_order", line, "sent samples that run backwards in time; they are left out."
+                )
+        if self._start_s is None and not self._begin():
+            return None
+        for x in self._lines.values():
+            if x.held and (offset := self._clock.offset_us(x.stream)) is not None:
+                x.place(offset - self._origin_us)
+        return self._emit()
+
+    def notices(self) -> tuple[Notice, ...]:
+        """What is new to be said since the last call."""
+        fresh, self._fresh = tuple(self._fresh), []
+        return fresh
+
+    def _begin(self) -> bool:
+        """Fix origin and start once all streams are there, or those that came in time; False before that."""
+        assert self._sent is not None  # noqa: S101 - set before the first call
+        assert self._origin is not None  # noqa: S101
+        heard = [x for x in self._lines.values() if x.held and self._clock.offset_us(x.stream) is not None]
+        late = self._sent[1] - self._sent[0] > self.params.wait_s * 1e6
+        stream, first_us = self._origin
+        offset = self._clock.offset_us(stream, final=not late)
+        if not heard or offset is None or (len(heard) < len(self._lines) and not late):
+            return False
+        self._origin_us = first_us + offset
+        for x in self._lines.values():
+            if x not in heard:
+                self._tell("sensor_missing", x, "sent nothing so far; the take goes on without it.")
+        starts = [x.first_us() + (self._clock.offset_us(x.stream) or 0) - self._origin_us for x in heard]
+        self._start_s = float(max(starts) * 1e-6)
+        return True
+
+    def _emit(self) -> UniformBlock | None:
+        """Lay what is known on the axis."""
+        assert self._start_s is not None  # noqa: S101 - set before the first call
+        assert self._sent is not None  # noqa: S101
+        p = self.params
+        furthest = max(x.last_s for x in self._lines.values())
+        live = [
+            x
+            for x in self._lines.values()
+            if x.overdue_s(self._sent[1]) <= p.silent_s and furthest - x.last_s <= p.behind_s
+        ]
+        if not live:
+            return None
+        until = min(x.known_until() for x in live)
+        # a little less than `on_grid`, so that rounding never gives out a point that its sample is not on
+        past = int(np.floor((until - self._start_s) * self.rate_hz + 0.9 * p.timeline.on_grid)) + 1
+        if past <= self._next:
+            return None
+        first, count = self._next, past - self._next
+        index = np.arange(first, past)
+        axis = self._start_s + index / self.rate_hz
+        n = len(self.segments)
+        acc, gyr = np.empty((count, n, 3)), np.empty((count, n, 3))
+        valid, filled = np.empty((count, n), np.bool_), np.empty((count, n), np.bool_)
+        for x in self._lines.values():
+            x.lay(axis, self.rate_hz, acc, gyr, valid, filled)
+        self._next = past
+        return UniformBlock(first, index / self.rate_hz, acc, gyr, valid, filled)
+
+    def _jumps(self, line: Line, first_us: int, sent_us: int) -> bool:
+        """Tell whether a batch is too far ahead of its stream to be believed."""
+        ahead_s = line.ahead_s(first_us)
+        allowed = max(0.0, line.overdue_s(sent_us)) + self.params.jump_s
+        stretch = self.params.timeline.max_stretch * line.samples / line.rate_hz + self.params.longest_s
+        if ahead_s <= min(allowed, self.params.longest_s) and line.whole_s(first_us) <= stretch:
+            return False
+        self._tell("clock_jump", line, "has a clock that jumps; batches beyond the jump are left out.")
+        return True
+
+    def _tell(self, code: str, line: Line, what: str) -> None:
+        """Say something of a stream once."""
+        if (code, line.stream) in self._told:
+            return
+        notice = Notice(code, f"{', '.join(line.ids)} {what}", line.ids[0], self._next / self.rate_hz)
+        self._told[code, line.stream] = notice
+        self._fresh.append(notice)
+
+
+def _rate(lines: Sequence[Line], hello: Hello, params: TimelineParams) -> float:
+    if not lines:
+        named = ", ".join(x.id for x in hello.sensors)
+        raise SignalError(
+            "no_mapping", f"No sensor is worn on a segment; say which one is where (sensors: {named})."
+        )
+    slowest = min(lines, key=lambda x: x.rate_hz)
+    if slowest.rate_hz < params.min_rate_hz:
+        raise SignalError(
+            "sample_rate_too_low",
+            f"Sensor {slowest.ids[0]} sends {slowest.rate_hz:g} Hz; at least {params.min_rate_hz:g} Hz are "
+            "needed to find foot contacts. Set it to 60 Hz or more.",
+            sensor=slowest.ids[0],
+        )
+    return max(x.rate_hz for x in lines)
