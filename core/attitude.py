@@ -60,7 +60,7 @@ class AttitudeState:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _advance(
+def attitude_kernel(
     gyr: Floats,
     acc: Floats,
     valid: Bools,
@@ -159,7 +159,7 @@ def advance(
     gyr, acc = np.ascontiguousarray(gyr, np.float64), np.ascontiguousarray(acc, np.float64)
     x = np.array([*state.q, *state.rate, state.age_s, state.lost_s], np.float64)
     out = np.empty((len(gyr), 4))
-    _advance(
+    attitude_kernel(
         gyr, acc, np.ascontiguousarray(valid), 1.0 / rate_hz, rest_norm, params.kp, params.relearn_s, x, out
     )
     if not np.isfinite(x[:7]).all():

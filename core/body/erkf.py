@@ -166,8 +166,8 @@ def run_block(
     broke = forward(
         x, P, before, dx, refused,
         np.ascontiguousarray(inputs.step_s), np.ascontiguousarray(inputs.acc),
-        np.ascontiguousarray(inputs.gyr), flags, heading, _links(tree, params), _noise(params, rate), record,
-        out, sd, residual, hit,
+        np.ascontiguousarray(inputs.gyr), flags, heading, links_of(tree, params), noise_of(params, rate),
+        record, out, sd, residual, hit,
     )  # fmt: skip
     if broke >= 0 or not _positive(P):
         at = broke if broke >= 0 else T - 1
@@ -201,7 +201,9 @@ def new_record(tree: ImuTree, params: ErkfParams, samples: int) -> Record:
     )
 
 
-def _noise(params: ErkfParams, rate_hz: float) -> Noise:
+def noise_of(params: ErkfParams, rate_hz: float) -> Noise:
+    """The kernel's scalars at a rate."""
+
     def on(value: float | None) -> float:
         return -1.0 if value is None else float(value)
 
@@ -225,7 +227,8 @@ def _noise(params: ErkfParams, rate_hz: float) -> Noise:
     )
 
 
-def _links(tree: ImuTree, params: ErkfParams) -> Links:
+def links_of(tree: ImuTree, params: ErkfParams) -> Links:
+    """The tree as the kernel takes it."""
     J = len(tree.joints)
     lever, axis = np.zeros((J, 2, 3)), np.zeros((J, 2, 3))
     for k, j in enumerate(tree.joints):

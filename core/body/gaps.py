@@ -45,19 +45,17 @@ def bridged(tree: ImuTree, acc: Floats, gyr: Floats, valid: Bools, rate_hz: floa
                 continue
             up = _up(held_acc[:, i], start, start + 1, rate_hz)[0]
             acc[begin:stop, i], gyr[begin:stop, i] = GRAVITY * up, 0.0
-            for j in _guides(tree, i):
+            for j in guides(tree, i):
                 turn = np.sum(held_gyr[begin:stop, j] * _up(held_acc[:, j], begin, stop, rate_hz), axis=1)
                 there = valid[begin:stop, j]
                 gyr[begin:stop, i][there] = turn[there, None] * up
-            carrier = _carrier(tree, i)
-            if carrier is not None:
-                k = begin + np.flatnonzero(valid[begin:stop, carrier])
+            above = carrier(tree, i)
+            if above is not None:
+                k = begin + np.flatnonzero(valid[begin:stop, above])
                 # in neutral standing the axes of all segments are parallel
-                along = multiply(conjugate(tree.q_mount[i]), tree.q_mount[carrier])
-                acc[k, i], gyr[k, i] = (
-                    rotate(along, held_acc[k, carrier]),
-                    rotate(along, held_gyr[k, carrier]),
-                )
+                along = multiply(conjugate(tree.q_mount[i]), tree.q_mount[above])
+                acc[k, i] = rotate(along, held_acc[k, above])
+                gyr[k, i] = rotate(along, held_gyr[k, above])
     return acc, gyr
 
 
@@ -75,7 +73,7 @@ def _gaps(valid: Bools) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def _guides(tree: ImuTree, i: int) -> list[int]:
+def guides(tree: ImuTree, i: int) -> list[int]:
     """Sensors that turn as one does on the whole, the best last: what it hangs on up to the trunk.
 
     The nearer to the trunk, the less it tilts, and the better its rate about its mean vertical is the
@@ -89,7 +87,7 @@ def _guides(tree: ImuTree, i: int) -> list[int]:
     return found or [j.distal for j in tree.joints if j.proximal == i]
 
 
-def _carrier(tree: ImuTree, i: int) -> int | None:
+def carrier(tree: ImuTree, i: int) -> int | None:
     """What the end of a limb hangs on; None for all others."""
     ends = [(j.proximal, j.distal) for j in tree.joints if i in (j.proximal, j.distal)]
     return ends[0][0] if len(ends) == 1 and ends[0][1] == i else None

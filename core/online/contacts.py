@@ -1,0 +1,130 @@
+"""Orientation of single sensors and the contacts of the feet, told in the push in which they are known.
+
+The same filter and rule as offline (core/attitude.py, core/events/foot_pitch.py), run forward only from
+standing: the foot's pitch needs neither heading nor the other sensors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from core.attitude import AttitudeParams, attitude_kernel
+from core.calibration.result import SegmentCalibration
+from core.errors import SignalError
+from core.events.detection import KINDS, SOURCE
+from core.events.foot_pitch import FootPitchParams, FootPitchState, push
+from core.events.result import GaitEvent
+from core.frames import FOOT, R_NEUTRAL, SIDES, Bools, Floats, Segment, Side
+from core.rotation import from_matrix
+
+
+class Known(NamedTuple):
+    """A contact and the sample, counted from the start of the chain, at which it is known."""
+
+    at: int
+    event: GaitEvent
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _turn(acc, gyr, valid, which, bias, norm, mount, dt, kp, relearn_s, state, out):  # type: ignore[no-untyped-def]
+    """Advance the filters of some sensors: `out` (T, f, 4) segment to W, `state` (f, 9) in place."""
+    T = acc.shape[0]
+    f, w, ok, q = np.empty((T, 3)), np.empty((T, 3)), np.empty(T, np.bool_), np.empty((T, 4))
+    for s in range(which.shape[0]):
+        i = which[s]
+        for k in range(T):
+            ok[k] = valid[k, i]
+            for c in range(3):
+                f[k, c], w[k, c] = acc[k, i, c], gyr[k, i, c] - bias[s, c]
+        attitude_kernel(w, f, ok, dt, norm[s], kp, relearn_s, state[s], q)
+        m = mount[s]
+        for k in range(T):
+            a, b, c, d = q[k]
+            # q ⊗ mount*
+            out[k, s, 0] = a * m[0] + b * m[1] + c * m[2] + d * m[3]
+            out[k, s, 1] = -a * m[1] + b * m[0] - c * m[3] + d * m[2]
+            out[k, s, 2] = -a * m[2] + b * m[3] + c * m[0] - d * m[1]
+            out[k, s, 3] = -a * m[3] - b * m[2] + c * m[1] + d * m[0]
+
+
+class Attitudes:
+    """Tilt and turn of some sensors by themselves, from standing on; blocks do not matter.
+
+    Parameters
+    ----------
+    which : of the chain's sensors. mounted : how these sit.
+    """
+
+    def __init__(
+        self,
+        which: Sequence[int],
+        mounted: Sequence[SegmentCalibration],
+        rate_hz: float,
+        params: AttitudeParams | None = None,
+    ) -> None:
+        params = params or AttitudeParams()
+        self._which = np.array(which, np.int64)
+        self._bias = np.array([m.gyro_bias for m in mounted], np.float64).reshape(-1, 3)
+        self._norm = np.array([m.rest_norm for m in mounted], np.float64)
+        self._mount = np.array([from_matrix(m.R_segment_sensor) for m in mounted]).reshape(-1, 4)
+        self._scalars = 1.0 / rate_hz, params.kp, params.relearn_s
+        self._state = np.zeros((len(which), 9))
+        for x, m in zip(self._state, mounted, strict=True):
+            x[:4], x[7] = from_matrix(R_NEUTRAL @ m.R_segment_sensor), np.inf
+
+    def push(self, acc: Floats, gyr: Floats, valid: Bools) -> Floats:
+        """Segments to W (T, f, 4) from signals as measured (T, n, 3)."""
+        out = np.empty((len(acc), len(self._which), 4))
+        _turn(
+            acc, gyr, valid, self._which, self._bias, self._norm, self._mount, *self._scalars, self._state,
+            out,
+        )  # fmt: skip
+        return out
+
+
+class Contacts:
+    """Initial and terminal contacts of the feet that carry a sensor.
+
+    Raises
+    ------
+    SignalError `sample_rate_too_low`.
+    """
+
+    def __init__(
+        self, feet: Sequence[Segment], rate_hz: float, params: FootPitchParams | None = None
+    ) -> None:
+        params = params or FootPitchParams()
+        if rate_hz < params.min_rate_hz:
+            raise SignalError(
+                "sample_rate_too_low",
+                f"Gait events need at least {params.min_rate_hz:g} Hz, the sensors send {rate_hz:g} Hz.",
+            )
+        self.sides: tuple[Side, ...] = tuple(s for f in feet for s in SIDES if FOOT[s] == f)
+        self._rules = [FootPitchState.start(rate_hz, params) for _ in self.sides]
+        self._rate_hz = rate_hz
+
+    def push(self, q: Floats, valid: Bools, first_s: float) -> list[Known]:
+        """Contacts that these samples make known, in the order in which they become known.
+
+        Parameters
+        ----------
+        q : (T, feet, 4) foot to W. valid : (T, feet). first_s : time of the chain's first sample.
+        """
+        found = []
+        for i, (side, rule) in enumerate(zip(self.sides, self._rules, strict=True)):
+            # the sine of the pitch, as `pitch_signal`
+            s = 2.0 * (q[:, i, 1] * q[:, i, 3] - q[:, i, 0] * q[:, i, 2])
+            for kind, index, known, offset in zip(*push(rule, s, valid[:, i]), strict=True):
+                event = GaitEvent(
+                    time_s=first_s + (int(index) + float(offset)) / self._rate_hz,
+                    side=side,
+                    kind=KINDS[kind],
+                    source=SOURCE,
+                    detected_s=first_s + int(known) / self._rate_hz,
+                )
+                found.append(Known(int(known), event))
+        return sorted(found, key=lambda x: (x.at, x.event.side))

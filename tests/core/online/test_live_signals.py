@@ -1,0 +1,128 @@
+"""The parts before the chain: bridging, stillness, angles, contacts in a stream are those of the whole
+take."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core.angles import joint_angles
+from core.body import BodyModel
+from core.body.gaps import bridged
+from core.body.still import AT_REST, FOOT_STILL, still_samples
+from core.body.tree import PRESETS, person_tree
+from core.frames import GRAVITY, Bools, Floats
+from core.fusion.orientations import Orientations
+from core.online.bridge import Bridge
+from core.online.joints import LiveAngles
+from core.online.still import Stillness
+
+SEGMENTS = PRESETS["lower_body7"]
+RATE = 100.0
+TREE = person_tree(BodyModel.from_height(1.7), {s: np.eye(3) for s in SEGMENTS}, SEGMENTS)
+
+
+def moving(n: int = 900, seed: int = 3) -> tuple[Floats, Floats]:
+    """Signals of seven sensors that stand for a second and then swing."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(n)[:, None, None] / RATE
+    phase = rng.uniform(0.0, 6.0, (1, 7, 3))
+    size = np.clip(t - 1.0, 0.0, 1.0)
+    acc = size * 3.0 * np.sin(6.0 * t + phase) + np.array([0.0, GRAVITY, 0.0])
+    return acc, size * 2.0 * np.sin(5.0 * t + phase)
+
+
+def holes(n: int) -> Bools:
+    """A foot lost for 2 s, in it its shank, a thigh for 0.2 s, the pelvis for 1.5 s with the other thigh."""
+    valid = np.ones((n, 7), bool)
+    for i, start, stop in ((3, 300, 500), (2, 350, 460), (4, 200, 220), (0, 600, 750), (4, 640, 700)):
+        valid[start:stop, i] = False
+    return valid
+
+
+def in_blocks(n: int, seed: int) -> list[slice]:
+    edges = np.unique(np.random.default_rng(seed).integers(0, n, 60))
+    return [slice(int(a), int(b)) for a, b in zip([0, *edges], [*edges, n], strict=True) if b > a]
+
+
+def test_a_live_gap_is_bridged_as_a_stored_one() -> None:
+    acc, gyr = moving()
+    valid = holes(len(acc))
+    live = Bridge(TREE, np.zeros((7, 3)), np.zeros((7, 3)), RATE).push(acc, gyr, valid)
+    stored = bridged(TREE, acc, gyr, valid, RATE)
+    for ours, theirs in zip(live, stored, strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_blocks_of_any_size_give_the_same_bits(seed: int) -> None:
+    acc, gyr = moving(seed=seed)
+    valid, noise = holes(len(acc)), np.full((7, 3), 0.01)
+    whole, pieces = (Bridge(TREE, noise, noise, RATE) for _ in range(2))
+    still, parts = Stillness(7, RATE), Stillness(7, RATE)
+    a, w = whole.push(acc, gyr, valid)
+    rests = still.push(a, w, valid)
+    for k in in_blocks(len(acc), seed):
+        b, v = pieces.push(acc[k], gyr[k], valid[k])
+        assert np.array_equal(b, a[k])
+        assert np.array_equal(v, w[k])
+        assert np.array_equal(parts.push(b, v, valid[k]), rests[k])
+
+
+def test_a_sensor_that_was_never_heard_stands_upright() -> None:
+    acc, gyr = moving()
+    valid = np.ones((len(acc), 7), bool)
+    valid[:, 5] = False
+    f, w = Bridge(TREE, np.zeros((7, 3)), np.zeros((7, 3)), RATE).push(acc, gyr, valid)
+    assert np.isfinite(f).all()
+    assert np.isfinite(w).all()
+
+
+def test_live_stillness_trails_and_never_looks_ahead() -> None:
+    """Behind the offline rule by less than its window, and no later at the end of a rest than 40 ms."""
+    n = 600
+    acc = np.tile([0.0, GRAVITY, 0.0], (n, 1, 1))
+    gyr = np.zeros((n, 1, 3))
+    gyr[:100], gyr[300:500] = 3.0, 3.0
+    valid = np.ones((n, 1), bool)
+    stands, rests = Stillness(1, RATE).push(acc, gyr, valid)[:, 0].T
+    assert np.flatnonzero(stands)[0] == 102
+    assert not stands[300:500].any()
+    assert stands[102:300].all()
+    assert np.flatnonzero(rests)[0] == 129
+    for rule, live in ((FOOT_STILL, stands), (AT_REST, rests)):
+        stored = still_samples(acc[:, 0], gyr[:, 0], valid[:, 0], RATE, rule)
+        assert not (stored & ~live)[130:].any() or rule is AT_REST
+        assert abs(int(stored.sum()) - int(live.sum())) < 2 * rule.window_s * RATE + 1
+
+
+def test_compiled_angles_are_those_of_the_angle_module() -> None:
+    rng = np.random.default_rng(1)
+    q = rng.normal(size=(400, 7, 4))
+    q /= np.linalg.norm(q, axis=2, keepdims=True)
+    known = rng.random((400, 7)) > 0.1
+    stored = joint_angles(
+        Orientations(
+            np.arange(400) / RATE,
+            RATE,
+            {s: q[:, i] for i, s in enumerate(SEGMENTS)},
+            {s: known[:, i] for i, s in enumerate(SEGMENTS)},
+            "",
+        ),
+        (0.0, 1.0),
+    )
+    angles = LiveAngles.of(SEGMENTS)
+    assert set(angles.names) == set(stored.angles)
+    live = angles(q, known, np.array([stored.zero_offset[name] for name in angles.names]))
+    for i, name in enumerate(angles.names):
+        off = (live[:, i] - stored.angles[name] + np.pi) % (2 * np.pi) - np.pi
+        np.testing.assert_allclose(off[np.isfinite(off)], 0.0, atol=1e-12)
+        assert np.array_equal(np.isnan(live[:, i]), np.isnan(stored.angles[name]))
+
+
+@pytest.mark.parametrize("worn", [("pelvis", "foot_l", "foot_r"), ("shank_l", "foot_l"), ("foot_r",)])
+def test_angles_are_those_between_worn_neighbours(worn: tuple[str, ...]) -> None:
+    names = LiveAngles.of(worn).names  # type: ignore[arg-type]
+    assert ("pelvis_tilt" in names) == ("pelvis" in worn)
+    assert ("ankle_dorsiflexion_l" in names) == ("shank_l" in worn)
+    assert not any(name.startswith(("hip", "knee")) for name in names)
