@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from core.feedback.baseline import Baseline
 from core.feedback.cue import Cue, FeedbackState, GuardState, SideEffect, Summary, Tone
+from core.feedback.engine import Command, FeedbackEngine
 from core.feedback.prescription import (
     PARAMETERS,
-    Baseline,
     Guard,
     Prescription,
     Progression,
@@ -13,11 +14,17 @@ from core.feedback.prescription import (
     StopRule,
     Target,
 )
+from core.feedback.stride import StrideLike
+from core.feedback.summary import AnalysedStride, FeedbackSplit, split
 
 __all__ = [
     "PARAMETERS",
+    "AnalysedStride",
     "Baseline",
+    "Command",
     "Cue",
+    "FeedbackEngine",
+    "FeedbackSplit",
     "FeedbackState",
     "Guard",
     "GuardState",
@@ -26,7 +33,9 @@ __all__ = [
     "Schedule",
     "SideEffect",
     "StopRule",
+    "StrideLike",
     "Summary",
     "Target",
     "Tone",
+    "split",
 ]

@@ -65,6 +65,11 @@ class Cue:
     block: int | None = None
     share_in_zone_last20: float | None = None
 
+    @property
+    def with_feedback(self) -> bool:
+        """The person was told: where only good, or only bad strides are shown, silence tells as well."""
+        return self.shown or self.why_not in {"positive_only", "bandwidth"}
+
     def to_json(self) -> dict[str, object]:
         """Plain values; `from_json` reads them back."""
         return asdict(self)

@@ -176,50 +176,6 @@ class Prescription:
         return _prescription(data)
 
 
-@dataclass(frozen=True)
-class Baseline:
-    """What is known of the person before the take.
-
-    Parameters
-    ----------
-    mean, sd, n : the parameter on the trained side in an earlier session; None without one.
-    session_id : that session.
-    last_level : where the last training with this very record ended; None without one.
-    other_mdc, other_mdc_source : limit of change of the other side, None where no source has one.
-    after_training : an earlier visit trained the same, so this one begins with its retention block.
-    """
-
-    mean: float | None = None
-    sd: float | None = None
-    n: int = 0
-    session_id: str | None = None
-    last_level: int | None = None
-    other_mdc: float | None = None
-    other_mdc_source: str | None = None
-    after_training: bool = False
-
-    def to_json(self) -> dict[str, object]:
-        """Plain values; `from_json` reads them back."""
-        return asdict(self)
-
-    @staticmethod
-    def from_json(data: Mapping[str, object]) -> Baseline:
-        """Read what `to_json` wrote; raises ParameterError bad_prescription."""
-        f = Fields("baseline", data)
-        baseline = Baseline(
-            f.number_or_none("mean", None),
-            f.number_or_none("sd", None, 0.0),
-            f.whole("n", 0, 0, 10**9),
-            f.text("session_id", None),
-            f.whole_or_none("last_level", None, 0, LEVELS),
-            f.number_or_none("other_mdc", None, 0.0),
-            f.text("other_mdc_source", None),
-            f.flag("after_training", False),
-        )
-        f.done()
-        return baseline
-
-
 def _prescription(data: Mapping[str, object]) -> Prescription:
     f = Fields("prescription", data)
     target = _target(f.part("target"))

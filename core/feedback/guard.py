@@ -1,0 +1,120 @@
+"""Side effects while training: the other side, and the sagittal profile of both legs.
+
+The target parameter decides which others follow, also for the worse (spec/clinic.md §4; Legrand et al. 2025).
+Compared are the last strides with the first ones of the take, of which nothing was fed back yet or hardly.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from statistics import fmean, stdev
+from typing import Final, Generic, TypeVar
+
+import numpy as np
+
+from core.feedback.baseline import Baseline
+from core.feedback.cue import GuardState, SideEffect
+from core.feedback.prescription import Prescription
+from core.frames import SIDES, Floats, Side
+from core.norms.adults import adult_reference
+from core.norms.profile import SAGITTAL, gvs, overall_profile
+
+T = TypeVar("T")
+
+FIRST: Final = 10
+"""Strides of a side that are its reference (our choice: what a corridor gives)."""
+
+LAST: Final = 20
+"""Strides of a side that are compared with it, at least `FIRST` (the window of the progression rule)."""
+
+SPREAD: Final = 2.0
+"""Where no source has a limit, more than so many sd of the first strides is watched (our choice)."""
+
+GPS_SOURCE: Final = "set in the prescription; 1.6° is the MCID of the GPS, Baker et al. 2012, children"
+
+
+class GuardWatch:
+    """Collects counted strides of both sides and judges what changed; keeps `FIRST` + `LAST` of each side."""
+
+    def __init__(self, prescription: Prescription, baseline: Baseline) -> None:
+        self._side = prescription.side
+        self._guard = prescription.guard
+        self._baseline = baseline
+        self._values: dict[Side, _Ends[float]] = {side: _Ends() for side in SIDES}
+        self._curves: dict[Side, _Ends[Floats]] = {side: _Ends() for side in SIDES}
+        self._state = GuardState()
+
+    @property
+    def state(self) -> GuardState:
+        """As of the last stride."""
+        return self._state
+
+    def see(self, side: Side, value: float, curves: Mapping[str, Floats]) -> None:
+        """Take in a counted stride: its value of the parameter and its curves (101,) in rad."""
+        self._values[side].append(value)
+        if all(v in curves for v in SAGITTAL):
+            self._curves[side].append(np.stack([np.degrees(curves[v]) for v in SAGITTAL]))
+        self._state = GuardState(self._other(), self._gps())
+
+    def _other(self) -> SideEffect:
+        if self._side is None:
+            return SideEffect(reason="both_sides_trained")
+        ends = self._values["right" if self._side == "left" else "left"]
+        if not ends.known:
+            return SideEffect()
+        change = fmean(ends.last) - fmean(ends.first)
+        if self._guard.other_change is not None:
+            limit, source = self._guard.other_change, "set in the prescription"
+        elif self._baseline.other_mdc is not None:
+            limit, source = self._baseline.other_mdc, self._baseline.other_mdc_source or ""
+        else:
+            limit, source = SPREAD * stdev(ends.first), f"{SPREAD:g} SD of the first {FIRST} strides"
+        return SideEffect(change, limit, source, abs(change) > limit, None)
+
+    def _gps(self) -> SideEffect:
+        limit = self._guard.gps_rise_deg
+        if any(not ends.known for ends in self._curves.values()):
+            seen = any(len(e.first) for e in self._values.values())
+            lacks = seen and not any(len(e.first) for e in self._curves.values())
+            return SideEffect(reason="joint_missing" if lacks else "too_few_strides")
+        first = _gps_sagittal({s: np.mean(e.first, axis=0) for s, e in self._curves.items()})
+        last = _gps_sagittal({s: np.mean(e.last, axis=0) for s, e in self._curves.items()})
+        rise = last - first
+        if limit is None:
+            return SideEffect(rise, None, None, False, "no_limit")
+        return SideEffect(rise, limit, GPS_SOURCE, rise > limit, None)
+
+
+class _Ends(Generic[T]):
+    """The first strides, and the last of those after them."""
+
+    def __init__(self) -> None:
+        self.first: list[T] = []
+        self.last: deque[T] = deque(maxlen=LAST)
+
+    @property
+    def known(self) -> bool:
+        """Enough of both to compare."""
+        return len(self.last) >= FIRST
+
+    def append(self, value: T) -> None:
+        if len(self.first) < FIRST:
+            self.first.append(value)
+        else:
+            self.last.append(value)
+
+
+def _gps_sagittal(means: Mapping[Side, Floats]) -> float:
+    """Sagittal profile of the mean curves (3, 101) in degrees of both sides, shape without level: standing is
+    the only zero a live angle has."""
+    reference = adult_reference().mean_deg
+    found = {
+        side: {
+            v: float(gvs(row, reference[v], "offset_removed")) for v, row in zip(SAGITTAL, rows, strict=True)
+        }
+        for side, rows in means.items()
+    }
+    profile = overall_profile(found, SAGITTAL)
+    assert profile is not None  # noqa: S101 - all of SAGITTAL of both sides are there
+    return profile

@@ -1,0 +1,93 @@
+"""How hard it is now, and the rule that changes it (Schließmann et al. 2018, spec/clinic.md §4)."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+from statistics import fmean
+
+from core.feedback.baseline import Baseline
+from core.feedback.cue import Zone
+from core.feedback.prescription import LEVELS, Progression
+from core.feedback.zones import Zones
+
+
+class Ladder:
+    """The level of one take, and the strides at it that the rule looks at.
+
+    It begins where the last training with this record ended, else at the level of the record, else at the
+    hardest one whose zone holds what the person usually does: before this visit, or in its first strides.
+    """
+
+    def __init__(self, zones: Zones, rule: Progression, baseline: Baseline) -> None:
+        self.zones = zones
+        self._rule = rule
+        self._recent: deque[Zone] = deque(maxlen=rule.window)
+        if baseline.mean is not None:
+            self._know_side(baseline.mean)
+        start = rule.start_level if baseline.last_level is None else baseline.last_level
+        if start is None and baseline.mean is not None:
+            start = zones.start_level(baseline.mean)
+        self.level = start or 0
+        self._begun = start is not None
+
+    @property
+    def known(self) -> bool:
+        """Something has said where to begin, and on which side of the target the person is."""
+        return self._begun and self.zones.worse is not None
+
+    @property
+    def window_n(self) -> int:
+        """Strides at this level, at most the window."""
+        return len(self._recent)
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Zone of this level, in the unit of the parameter."""
+        return self.zones.limits(self.level)
+
+    def zone(self, value: float) -> Zone:
+        """Where a value lies at this level."""
+        return self.zones.zone(value, self.level)
+
+    def share(self, zone: Zone) -> float | None:
+        """Share of the strides at this level that lay in a zone; None without any."""
+        return sum(z == zone for z in self._recent) / len(self._recent) if self._recent else None
+
+    def see(self, zone: Zone) -> None:
+        """Take in a training stride."""
+        self._recent.append(zone)
+
+    def open(self, values: Sequence[float]) -> None:
+        """End of the strides a visit begins with: they say what nothing else has said."""
+        usual = fmean(values)
+        self._know_side(usual)
+        if not self._begun:
+            self.level, self._begun = self.zones.start_level(usual), True
+
+    def move(self, steps: int) -> None:
+        """A person makes it easier (+) or harder (−)."""
+        self._begun = True
+        self._set(self.level + steps)
+
+    def follow_rule(self) -> None:
+        """Harder or easier, if the last strides say so; then a new window begins."""
+        if not self._rule.automatic or len(self._recent) < self._rule.window:
+            return
+        worse = self.zones.worse
+        if (self.share("in") or 0.0) > self._rule.share:
+            self._set(self.level - 1)
+        elif worse is not None and (self.share(worse) or 0.0) > self._rule.away_share:
+            # beyond the other side an easier level would change nothing
+            self._set(self.level + 1)
+
+    def _know_side(self, usual: float) -> None:
+        if self.zones.worse is None:
+            self.zones = replace(self.zones, worse=self.zones.side_of(usual))
+
+    def _set(self, level: int) -> None:
+        level = min(max(level, 0), LEVELS)
+        if level != self.level:
+            self.level = level
+            self._recent.clear()

@@ -1,0 +1,192 @@
+"""After the take: strides with and without feedback apart, probe blocks, the course of the level, retention.
+
+Cues were given on live values; what is summed up here are the strides of the finished analysis, each with the
+cue that starts when it does. Errors return at once when feedback goes (Roemmich et al. 2016), so the strides
+without it are the ones that say what was learnt.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from core.feedback.cue import Cue, Summary, WhyNot
+from core.feedback.tally import Tally
+from core.frames import SIDES, Side
+
+TOLERANCE_S: Final = 0.1
+"""A cue and a stride of the same foot that begin within this are the same stride."""
+
+END: Final = 20
+"""Training strides at the end of a visit that the next retention block is held against: its own length."""
+
+Kind = Literal["with", "without", "baseline", "retention", "probe", "faded", "off", "stopped"]
+WITHOUT: Final[tuple[Kind, ...]] = ("probe", "faded", "off", "stopped")
+"""What strides without feedback are made of; off = switched off, paused or stale."""
+
+_KINDS: Final[Mapping[WhyNot, Kind]] = {
+    "baseline": "baseline",
+    "retention": "retention",
+    "off": "off",
+    "paused": "off",
+    "stale": "off",
+    "stopped": "stopped",
+    "probe": "probe",
+    "faded": "faded",
+    "positive_only": "with",
+    "bandwidth": "with",
+}
+
+
+@dataclass(frozen=True)
+class AnalysedStride:
+    """A stride of the finished analysis; value None where it was not measured."""
+
+    side: Side
+    start_s: float
+    value: float | None
+    counted: bool
+
+
+@dataclass(frozen=True)
+class MatchedStride:
+    """A stride with the cue it got; `value` is that of the analysis, `inside` its zone's."""
+
+    cue: Cue
+    value: float
+    inside: bool
+
+
+@dataclass(frozen=True)
+class ProbeBlock:
+    """A block without feedback, and the training strides right before it, as many."""
+
+    number: int
+    start_s: float
+    probe: Summary
+    before: Summary
+
+
+@dataclass(frozen=True)
+class LevelStep:
+    """From this stride on the level was this."""
+
+    n: int
+    t_s: float
+    level: int
+
+
+@dataclass(frozen=True)
+class FeedbackSplit:
+    """Strides of the trained side after a take.
+
+    Parameters
+    ----------
+    strides : matched and counted, in order. kinds : "with", "without" and its parts, and the opening block.
+    probes : in order. levels : where it began, and every change. end : last training strides.
+    unmatched : cues without a stride in the analysis. left_out : cues of strides that do not count there.
+    live_difference : mean and sd of live minus final value: what the person was told against what was.
+    """
+
+    strides: tuple[MatchedStride, ...]
+    kinds: Mapping[Kind, Summary]
+    probes: tuple[ProbeBlock, ...]
+    levels: tuple[LevelStep, ...]
+    end: Summary
+    unmatched: int
+    left_out: int
+    live_difference: Summary
+
+
+def split(strides: Sequence[AnalysedStride], cues: Sequence[Cue]) -> FeedbackSplit:
+    """Put every cue to its stride and sum up.
+
+    Parameters
+    ----------
+    strides : of the analysis, counted or not. cues : of the take, in order; of a stride told twice the first.
+    """
+    matched: list[MatchedStride] = []
+    unmatched = left_out = 0
+    starts = {side: _Starts(s for s in strides if s.side == side) for side in SIDES}
+    once = {cue.n: cue for cue in reversed(cues)}
+    for cue in sorted(once.values(), key=lambda c: c.start_s):
+        stride = starts[cue.side].take(cue.start_s)
+        if stride is None:
+            unmatched += 1
+        elif not stride.counted or stride.value is None:
+            left_out += 1
+        else:
+            inside = cue.zone_low <= stride.value <= cue.zone_high
+            matched.append(MatchedStride(cue, stride.value, inside))
+    kinds: dict[Kind, list[MatchedStride]] = {}
+    for m in matched:
+        kind = kind_of(m.cue)
+        kinds.setdefault(kind, []).append(m)
+        if kind in WITHOUT:
+            kinds.setdefault("without", []).append(m)
+    difference = Tally()
+    for m in matched:
+        difference.add(m.cue.value - m.value, False)
+    return FeedbackSplit(
+        strides=tuple(matched),
+        kinds={kind: summary(found) for kind, found in kinds.items()},
+        probes=_probes(matched),
+        levels=_levels(matched),
+        end=summary([m for m in matched if kind_of(m.cue) in {"with", "faded"}][-END:]),
+        unmatched=unmatched,
+        left_out=left_out,
+        live_difference=difference.summary,
+    )
+
+
+def kind_of(cue: Cue) -> Kind:
+    """Which kind of stride this was."""
+    return "with" if cue.with_feedback or cue.why_not is None else _KINDS[cue.why_not]
+
+
+def summary(strides: Iterable[MatchedStride]) -> Summary:
+    """Number, mean, sd and share in the zone."""
+    tally = Tally()
+    for m in strides:
+        tally.add(m.value, m.inside)
+    return tally.summary
+
+
+class _Starts:
+    """Strides of one side by when they begin, each taken once."""
+
+    def __init__(self, strides: Iterable[AnalysedStride]) -> None:
+        self._strides = sorted(strides, key=lambda s: s.start_s)
+        self._starts = [s.start_s for s in self._strides]
+        self._taken: set[int] = set()
+
+    def take(self, start_s: float) -> AnalysedStride | None:
+        first = bisect_left(self._starts, start_s - TOLERANCE_S)
+        last = bisect_right(self._starts, start_s + TOLERANCE_S)
+        free = [i for i in range(first, last) if i not in self._taken]
+        if not free:
+            return None
+        found = min(free, key=lambda i: abs(self._starts[i] - start_s))
+        self._taken.add(found)
+        return self._strides[found]
+
+
+def _probes(matched: Sequence[MatchedStride]) -> tuple[ProbeBlock, ...]:
+    blocks: list[ProbeBlock] = []
+    for number in sorted({m.cue.block for m in matched if m.cue.block is not None}):
+        own = [i for i, m in enumerate(matched) if m.cue.block == number]
+        before = [m for m in matched[: own[0]] if kind_of(m.cue) in {"with", "faded"}][-len(own) :]
+        probe = [matched[i] for i in own]
+        blocks.append(ProbeBlock(number, probe[0].cue.start_s, summary(probe), summary(before)))
+    return tuple(blocks)
+
+
+def _levels(matched: Sequence[MatchedStride]) -> tuple[LevelStep, ...]:
+    steps: list[LevelStep] = []
+    for m in matched:
+        opening = m.cue.why_not in {"baseline", "retention"}
+        if not opening and (not steps or steps[-1].level != m.cue.level):
+            steps.append(LevelStep(m.cue.n, m.cue.start_s, m.cue.level))
+    return tuple(steps)

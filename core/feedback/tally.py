@@ -1,0 +1,33 @@
+"""Running mean, sd and share in the zone of strides, without keeping them."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from core.feedback.cue import Summary
+
+
+class Tally:
+    """Counts strides one by one (Welford 1962: mean and squares in one pass)."""
+
+    def __init__(self) -> None:
+        self._n = 0
+        self._mean = 0.0
+        self._squares = 0.0
+        self._inside = 0
+
+    def add(self, value: float, inside: bool) -> None:
+        """One more stride."""
+        self._n += 1
+        self._inside += inside
+        away = value - self._mean
+        self._mean += away / self._n
+        self._squares += away * (value - self._mean)
+
+    @property
+    def summary(self) -> Summary:
+        """So far; sd with n − 1."""
+        if self._n == 0:
+            return Summary()
+        sd = None if self._n == 1 else sqrt(self._squares / (self._n - 1))
+        return Summary(self._n, self._mean, sd, self._inside / self._n)
