@@ -132,7 +132,9 @@ class Intake:
                     "to record with other sensors.",
                 )
             )
-        return Answer(protocol.welcome(self.next_seq))
+        # not `next_seq`: whoever takes a welcome for an acknowledgement must not be wrong; what is sent
+        # twice for it is a duplicate
+        return Answer(protocol.welcome(self.durable))
 
     def offer(self, message: bytes | str) -> Answer:
         """Answer one message of a greeted tablet; what is to be kept is in the answer."""

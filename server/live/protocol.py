@@ -134,7 +134,7 @@ def _battery(root: Mapping[str, Any]) -> Battery:
 
 
 def welcome(next_seq: int) -> str:
-    """Answer to hello: go on with this batch."""
+    """Answer to hello: all batches below are on the disk, go on with this one."""
     return _text("welcome", next_seq=next_seq, max_unacked=MAX_UNACKED)
 
 

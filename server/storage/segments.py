@@ -100,8 +100,12 @@ def recover(path: Path, see: Callable[[Record], None]) -> TakeLog | None:
     log = TakeLog(path, size)
     # also when nothing is cut: what a killed process wrote may still be in memory only, and the sender is
     # about to be told that it is kept
-    log.back()
-    fs.sync_folder(path.parent)
+    try:
+        log.back()
+        fs.sync_folder(path.parent)
+    except OSError:
+        log.close()
+        raise
     return log
 
 

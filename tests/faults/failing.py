@@ -32,6 +32,10 @@ class FailingSystem(fs.System):
         self._count()
         super().fsync(fd)
 
+    def truncate(self, fd: int, size: int) -> None:
+        self._count()
+        super().truncate(fd, size)
+
     def replace(self, source: Path, target: Path) -> None:
         self._count()
         super().replace(source, target)

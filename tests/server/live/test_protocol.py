@@ -58,6 +58,14 @@ def test_the_same_hello_with_another_token_resumes() -> None:
     assert said(greeted(5).greet(again))["next_seq"] == 5
 
 
+def test_a_welcome_promises_only_what_is_durable() -> None:
+    intake = greeted(3)
+    intake.offer(frame(3))
+    assert said(intake.greet(HELLO))["next_seq"] == 3
+    assert said(intake.offer(frame(3))) == {"type": "ack", "ack": 3}
+    assert intake.offer(frame(4)).keep is not None
+
+
 @pytest.mark.parametrize("changed", ["take", "rate", "segment", "sensor"])
 def test_a_changed_hello_is_refused(changed: str) -> None:
     root = json.loads(hello_json(HELLO))

@@ -1,0 +1,225 @@
+"""Protocol and resume as a machine: tablet, dying server and full disk against a small model."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import json
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from server.live.committer import Committer
+from server.live.intake import Answer, Ended
+from server.live.protocol import MOST_UNACKED, Close, ProtocolError
+from server.live.recorder import Recorder, restore
+from server.storage import fs
+from tests.faults.failing import FailingSystem
+from tests.live_takes import HELLO, digest, finish_text, frame, stored
+
+LENGTH = 12
+FRAMES = [frame(i, n=2) for i in range(LENGTH)]
+
+
+class Tablet:
+    """The model: what a tablet knows. It keeps every batch until it is acknowledged."""
+
+    def __init__(self) -> None:
+        self.at = 0  # the batch it sends next
+        self.reached = 0  # batches ever sent
+        self.acked = 0  # batches the server has promised to keep
+        self.online = False
+        self.end: Ended | None = None
+
+    def welcomed(self, next_seq: int) -> None:
+        assert self.acked <= next_seq <= self.reached, "the server lost what it had acknowledged"
+        self.at, self.online = next_seq, True
+        self.acked = next_seq
+
+    def heard(self, below: int) -> None:
+        assert below <= self.reached
+        self.acked = max(self.acked, below)
+
+    def lost(self) -> None:
+        self.online = False
+
+
+class Stream(RuleBasedStateMachine):
+    """Every way a take can go; the committer's thread is stepped by hand."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.folder = Path(tempfile.mkdtemp())
+        self.path = self.folder / "live" / "t.log"
+        self.tablet = Tablet()
+        self.recorder: Recorder | None = None
+        self.sure = 0  # bytes of the log that a power cut leaves
+
+    def teardown(self) -> None:
+        fs.system = fs.System()
+        self.die()
+        shutil.rmtree(self.folder)
+
+    # what the recorder tells
+
+    def grown(self, size: int) -> None:
+        assert self.path.stat().st_size == size
+
+    def acknowledged(self, below: int) -> None:
+        self.sure = self.path.stat().st_size
+        self.tablet.heard(below)
+
+    def ended(self, end: Ended) -> None:
+        self.sure = self.path.stat().st_size
+        self.tablet.end = end
+
+    def failed(self, error: ProtocolError) -> None:
+        assert error.close is Close.STORAGE
+        self.tablet.lost()
+
+    # what happens
+
+    @initialize()
+    def begin(self) -> None:
+        self.connect()
+
+    @precondition(lambda self: not self.tablet.online)
+    @rule()
+    def connect(self) -> None:
+        if self.recorder is None:
+            self.committer = Committer()
+            self.recorder = Recorder(*restore(self.path, HELLO), self.committer, self, lambda f, x: f(x))
+            self.sure = self.path.stat().st_size
+        elif self.recorder.failure:
+            asyncio.run(self.recorder.reopen())
+        self.tablet.welcomed(self.said(self.recorder.greet(HELLO))["next_seq"])
+
+    @precondition(lambda self: self.tablet.online and self.tablet.at < LENGTH)
+    @rule(number=st.integers(1, 5))
+    def send(self, number: int) -> None:
+        for one in FRAMES[self.tablet.at : self.tablet.at + number]:
+            answer = self.offer(one)
+            assert answer.close is (Close.ENDED if self.over else None)
+            if answer.close is None:
+                self.tablet.at += 1
+                self.tablet.reached = max(self.tablet.reached, self.tablet.at)
+
+    @precondition(lambda self: self.tablet.online and self.tablet.at > 0)
+    @rule(data=st.data())
+    def duplicate(self, data: st.DataObject) -> None:
+        answer = self.offer(FRAMES[data.draw(st.integers(0, self.tablet.at - 1))])
+        assert self.said(answer) == {"type": "ack", "ack": self.recorder_.durable}
+        assert answer.close is None
+
+    @precondition(lambda self: self.tablet.online and self.recorder_.next_seq < LENGTH - 1)
+    @rule(data=st.data())
+    def skip(self, data: st.DataObject) -> None:
+        answer = self.offer(FRAMES[data.draw(st.integers(self.recorder_.next_seq + 1, LENGTH - 1))])
+        assert answer.close is (Close.ENDED if self.over else Close.GAP)
+
+    @precondition(lambda self: self.tablet.online and self.tablet.at < LENGTH)
+    @rule(at=st.integers(0, len(FRAMES[0]) - 1), bit=st.integers(0, 7))
+    def corrupt(self, at: int, bit: int) -> None:
+        whole = bytearray(FRAMES[self.tablet.at])
+        whole[at % len(whole)] ^= 1 << bit
+        assert self.offer(bytes(whole)).close is Close.MALFORMED
+
+    @precondition(lambda self: self.tablet.online)
+    @rule()
+    def finish(self) -> None:
+        answer = self.offer(finish_text(FRAMES))
+        assert answer.close is None
+        if self.recorder_.next_seq < LENGTH:
+            assert self.said(answer)["next_seq"] == self.recorder_.next_seq
+        elif answer.ended:
+            assert answer.ended == self.tablet.end
+
+    @rule()
+    def write(self) -> None:
+        self.step(self.committer.write)
+
+    @rule()
+    def sync(self) -> None:
+        self.step(self.committer.write, self.committer.sync)
+
+    @precondition(lambda self: self.recorder is not None and not self.recorder.failure)
+    @rule(call=st.integers(1, 3), number=st.sampled_from([errno.ENOSPC, errno.EIO]))
+    def refuse(self, call: int, number: int) -> None:
+        fs.system = FailingSystem(call, number)
+        self.step(self.committer.write, self.committer.sync, self.committer.write, self.committer.sync)
+        fs.system = fs.System()
+
+    @rule()
+    def drop(self) -> None:
+        self.tablet.lost()
+
+    @rule()
+    def kill(self) -> None:
+        self.die()
+
+    @rule(share=st.floats(0.0, 1.0), zeros=st.integers(0, 40))
+    def power_cut(self, share: float, zeros: int) -> None:
+        self.die()
+        whole = self.path.read_bytes()
+        left = self.sure + round(share * (len(whole) - self.sure))
+        self.path.write_bytes(whole[:left] + bytes(min(zeros, len(whole) - left)))
+
+    # what always holds
+
+    @invariant()
+    def the_log_is_a_prefix_of_what_was_sent_and_holds_what_was_acknowledged(self) -> None:
+        if not self.path.exists():
+            return
+        kept = stored(self.path)
+        assert kept == FRAMES[: len(kept)]
+        assert self.tablet.acked <= len(kept) <= self.tablet.reached
+        end = self.tablet.end
+        if end is not None:
+            assert (end.count, end.sha256, end.problem) == (LENGTH, digest(FRAMES), None)
+            assert kept == FRAMES
+
+    # in words of the rules above
+
+    @property
+    def over(self) -> bool:
+        return self.recorder_._intake.is_over
+
+    @property
+    def recorder_(self) -> Recorder:
+        assert self.recorder is not None
+        return self.recorder
+
+    def offer(self, message: bytes | str) -> Answer:
+        answer = self.recorder_.offer(message)
+        if answer.close is not None:
+            assert self.said(answer)["type"] == "error"
+            self.tablet.lost()
+        return answer
+
+    def step(self, *steps: Any) -> None:
+        if self.recorder is not None:
+            for one in steps:
+                one()
+
+    def said(self, answer: Answer) -> dict[str, Any]:
+        assert answer.say is not None
+        return dict(json.loads(answer.say))
+
+    def die(self) -> None:
+        if self.recorder is not None:
+            self.recorder._lane.log.close()
+        self.recorder = None
+        self.tablet.lost()
+
+
+Stream.TestCase.settings = settings(max_examples=120, stateful_step_count=40, deadline=None)
+TestStream = Stream.TestCase
+
+
+def test_the_model_fits_the_limits_of_the_protocol() -> None:
+    assert LENGTH < MOST_UNACKED

@@ -1,0 +1,157 @@
+"""The log of a take: what any damage leaves, and what reading costs."""
+
+from __future__ import annotations
+
+import tracemalloc
+from pathlib import Path
+
+import pytest
+
+from core.errors import InputError
+from core.formats.live_log import FILE_MARK, Record, hello_json, record
+from server.storage import segments
+from tests.live_takes import HELLO, frame, stored
+
+FRAMES = [frame(i) for i in range(4)]
+HEAD = FILE_MARK + record("H", hello_json(HELLO))
+PIECES = [record("B", f) for f in FRAMES] + [record("F", b"{}")]
+WHOLE = HEAD + b"".join(PIECES)
+
+
+def ends() -> list[int]:
+    found = [len(HEAD)]
+    for piece in PIECES:
+        found.append(found[-1] + len(piece))
+    return found
+
+
+def recovered(path: Path) -> tuple[segments.TakeLog | None, list[Record]]:
+    seen: list[Record] = []
+    log = segments.recover(path, seen.append)
+    if log is not None:
+        log.close()
+    return log, seen
+
+
+def test_a_log_is_read_as_it_was_written(tmp_path: Path) -> None:
+    path = tmp_path / "live" / "t.log"
+    log = segments.create(path, hello_json(HELLO))
+    for piece in PIECES:
+        log.append(piece)
+    log.sync()
+    log.close()
+    assert path.read_bytes() == WHOLE
+    assert log.size == len(WHOLE)
+    assert stored(path) == FRAMES
+
+
+def test_a_log_cut_at_any_byte_recovers_its_longest_valid_prefix(tmp_path: Path) -> None:
+    path = tmp_path / "t.log"
+    whole_at = ends()
+    for cut in range(len(WHOLE) + 1):
+        path.write_bytes(WHOLE[:cut])
+        log, seen = recovered(path)
+        kept = max((e for e in whole_at if e <= cut), default=None)
+        if kept is None:
+            assert (log, seen, path.read_bytes()) == (None, [], WHOLE[:cut])
+        else:
+            assert log is not None
+            assert (log.size, path.read_bytes()) == (kept, WHOLE[:kept])
+            assert len(seen) == whole_at.index(kept) + 1
+
+
+def test_a_log_with_any_byte_changed_recovers_what_is_before_it(tmp_path: Path) -> None:
+    path = tmp_path / "t.log"
+    whole_at = ends()
+    for at in range(len(HEAD), len(WHOLE)):
+        path.write_bytes(WHOLE[:at] + bytes([WHOLE[at] ^ 0x10]) + WHOLE[at + 1 :])
+        recovered(path)
+        assert path.read_bytes() == WHOLE[: max(e for e in whole_at if e <= at)]
+
+
+def test_zeros_behind_the_last_record_are_cut_off(tmp_path: Path) -> None:
+    path = tmp_path / "t.log"
+    path.write_bytes(WHOLE + bytes(5000))
+    recovered(path)
+    assert path.read_bytes() == WHOLE
+
+
+def test_a_recovered_log_goes_on_where_it_ended(tmp_path: Path) -> None:
+    path = tmp_path / "t.log"
+    path.write_bytes(HEAD + PIECES[0] + PIECES[1][:-1])
+    log = segments.recover(path, lambda _: None)
+    assert log is not None
+    log.append(PIECES[1])
+    log.sync()
+    log.close()
+    assert path.read_bytes() == HEAD + PIECES[0] + PIECES[1]
+
+
+def test_going_back_cuts_off_what_was_not_synced(tmp_path: Path) -> None:
+    path = tmp_path / "t.log"
+    log = segments.create(path, hello_json(HELLO))
+    log.append(PIECES[0])
+    log.sync()
+    log.append(PIECES[1])
+    log.back()
+    assert (log.size, path.read_bytes()) == (len(HEAD) + len(PIECES[0]), HEAD + PIECES[0])
+    log.append(PIECES[1])
+    log.close()
+    assert path.read_bytes() == HEAD + PIECES[0] + PIECES[1]
+
+
+@pytest.mark.parametrize("there", [b"", WHOLE[:4], HEAD[:-1]])
+def test_a_torn_beginning_is_begun_again(tmp_path: Path, there: bytes) -> None:
+    path = tmp_path / "t.log"
+    path.write_bytes(there)
+    segments.create(path, hello_json(HELLO)).close()
+    assert path.read_bytes() == HEAD
+
+
+@pytest.mark.parametrize("there", [b"something else", HEAD[:30] + b"?" + HEAD[31:] + PIECES[0], WHOLE])
+def test_a_file_that_is_there_is_never_written_over(tmp_path: Path, there: bytes) -> None:
+    path = tmp_path / "t.log"
+    path.write_bytes(there)
+    with pytest.raises(InputError) as refused:
+        segments.create(path, hello_json(HELLO))
+    assert refused.value.code == "live_log_damaged"
+    assert path.read_bytes() == there
+
+
+def test_reading_can_go_on_where_it_stopped_while_the_log_grows(tmp_path: Path) -> None:
+    path = tmp_path / "t.log"
+    path.write_bytes(HEAD + PIECES[0] + PIECES[1][:7])
+    first = list(segments.records(path))
+    assert [one.kind for _, one in first] == ["H", "B"]
+    path.write_bytes(WHOLE)
+    assert [one.body for _, one in segments.records(path, first[-1][0])] == [*FRAMES[1:], b"{}"]
+
+
+def test_a_big_log_is_read_in_little_memory(tmp_path: Path) -> None:
+    path = tmp_path / "t.log"
+    piece = record("B", bytes(900_000))
+    with path.open("wb") as file:
+        file.write(HEAD)
+        for _ in range(60):
+            file.write(piece)
+        file.write(piece[:-1])
+    tracemalloc.start()
+    try:
+        number = sum(1 for _ in segments.records(path))
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert number == 61
+    assert peak < 6 * segments.CHUNK < path.stat().st_size / 2
+
+
+def test_a_log_damaged_early_is_not_read_to_its_end(tmp_path: Path) -> None:
+    path = tmp_path / "t.log"
+    path.write_bytes(HEAD + b"\xff" * 20_000_000)
+    tracemalloc.start()
+    try:
+        assert len(list(segments.records(path))) == 1
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 3 * segments.CHUNK
