@@ -1,0 +1,329 @@
+"""The live axis: the file's axis bit for bit where the take is clean, and an answer to all that is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from time import perf_counter
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from core.errors import Notice, SignalError
+from core.formats import SourceFile, read_recording
+from core.formats.live_log import Batch, SensorInfo, StreamInfo
+from core.frames import Bools, Floats, Segment
+from core.online.axis import OnlineAxis, UniformBlock
+from core.recording import UniformRecording
+from core.timeline import synchronise
+from tests.live import Device, LiveTake, Samples, send, shared
+from tests.walks import neura_recording
+
+FEET: tuple[Segment, ...] = ("foot_l", "foot_r")
+
+
+def laid(take: LiveTake) -> tuple[UniformBlock, tuple[Notice, ...], OnlineAxis]:
+    """All blocks of a take as one."""
+    axis = OnlineAxis(take.hello)
+    blocks = [block for b in take.batches if (block := axis.push(b)) is not None]
+    expected = 0
+    for block in blocks:
+        assert block.first == expected
+        assert len(block) > 0
+        expected += len(block)
+    assert axis.length == expected
+    whole = UniformBlock(
+        0,
+        *(
+            np.concatenate([getattr(b, name) for b in blocks])
+            for name in ("t_s", "acc", "gyr", "valid", "interpolated")
+        ),
+    )
+    assert np.isfinite(whole.acc).all()
+    assert np.isfinite(whole.gyr).all()
+    return whole, axis.notices(), axis
+
+
+def of_file(take: LiveTake) -> UniformRecording:
+    return synchronise(read_recording([SourceFile.of_bytes("take.sagittal-live", take.log())]))
+
+
+def assert_equal_bits(block: UniformBlock, segments: tuple[Segment, ...], file: UniformRecording) -> None:
+    """A prefix of the file's axis may be missing at the end, nothing else."""
+    n = len(block)
+    assert len(file.t_s) - n <= 1
+    assert np.array_equal(block.t_s, file.t_s[:n])
+    for i, segment in enumerate(segments):
+        signals = file.sensors[segment]
+        for name in ("acc", "gyr", "valid", "interpolated"):
+            ours: Floats | Bools = getattr(block, name)[:, i]
+            assert np.array_equal(ours, getattr(signals, name)[:n]), (segment, name)
+
+
+def signal(t_s: Floats, width: int, seed: int) -> Samples:
+    """Smooth acc and gyr (n, width, 9), no magnetometer."""
+    rng = np.random.default_rng(seed)
+    f, phase = rng.uniform(0.3, 3.0, (width, 6)), rng.uniform(0, 6.0, (width, 6))
+    out = np.full((len(t_s), width, 9), np.nan, np.float32)
+    out[:, :, :6] = np.sin(2 * np.pi * f * t_s[:, None, None] + phase)
+    return out
+
+
+def device(
+    number: int, rate: float, segments: tuple[Segment, ...], seconds: float = 20.0, start_s: float = 1.0
+) -> Device:
+    """A clean shared clock."""
+    t = start_s + np.arange(round(seconds * rate)) / rate
+    sensors = tuple(SensorInfo(f"{s}-id", s) for s in segments)
+    info = StreamInfo(number, rate, "shared", sensors)
+    return Device(info, np.rint(1e6 * t).astype(np.int64), signal(t, len(segments), number))
+
+
+def own(d: Device, ahead_us: int, drift: float = 1.0, delay_us: int = 20_000) -> Device:
+    """The same device on a clock of its own."""
+    t_us: NDArray[np.int64] = np.rint(d.t_us * drift).astype(np.int64) + ahead_us
+    return replace(
+        d, info=replace(d.info, clock="own"), t_us=t_us, ahead_us=ahead_us, drift=drift, delay_us=delay_us
+    )
+
+
+def without(d: Device, rows: slice) -> Device:
+    """A device that sent nothing for a while."""
+    keep = np.ones(len(d.t_us), np.bool_)
+    keep[rows] = False
+    return replace(d, t_us=d.t_us[keep], samples=d.samples[keep])
+
+
+@cache
+def neura() -> LiveTake:
+    return send([shared(neura_recording())])
+
+
+def test_the_axis_of_neura_walk_is_that_of_its_file_bit_for_bit() -> None:
+    take = neura()
+    block, notices, axis = laid(take)
+    assert_equal_bits(block, axis.segments, of_file(take))
+    assert len(block) == len(synchronise(neura_recording()).t_s)
+    assert notices == ()
+
+
+def test_the_signals_of_neura_walk_are_those_of_the_vendors_export() -> None:
+    block, _, axis = laid(neura())
+    exported = synchronise(neura_recording())
+    for i, segment in enumerate(axis.segments):
+        assert np.array_equal(block.acc[:, i], exported.sensors[segment].acc.astype(np.float32))
+        assert np.array_equal(block.gyr[:, i], exported.sensors[segment].gyr.astype(np.float32))
+
+
+@pytest.mark.parametrize("n", [1, 3, 10, 100, 1000])
+def test_however_the_samples_are_cut_into_batches_the_bits_are_the_same(n: int) -> None:
+    whole, _, _ = laid(neura())
+    cut, _, _ = laid(neura().cut(n))
+    for name in ("t_s", "acc", "gyr", "valid", "interpolated"):
+        assert getattr(cut, name).tobytes() == getattr(whole, name).tobytes()
+
+
+@pytest.mark.parametrize("n", [1, 7, 20])
+def test_streams_of_unequal_rates_meet_on_the_faster_one(n: int) -> None:
+    take = send([device(0, 100.0, ("pelvis", "shank_l")), device(4, 60.0, FEET, start_s=1.007)], n)
+    block, _, axis = laid(take)
+    assert axis.rate_hz == 100.0
+    assert axis.segments == ("pelvis", "shank_l", "foot_l", "foot_r")
+    assert_equal_bits(block, axis.segments, of_file(take))
+    assert block.valid.all()
+
+
+def test_lost_packets_are_filled_up_to_a_tenth_of_a_second_and_lost_beyond() -> None:
+    clean = device(0, 100.0, FEET)
+    samples = clean.samples.copy()
+    samples[300:309, 0, :6] = np.nan
+    samples[500:530, 0, :6] = np.nan
+    samples[700, 1, 4] = np.inf
+    take = send([replace(clean, samples=samples)])
+    block, _, axis = laid(take)
+    assert_equal_bits(block, axis.segments, of_file(take))
+    assert block.valid[300:309, 0].all()
+    assert block.interpolated[300:309, 0].all()
+    assert not block.valid[500:530, 0].any()
+    assert np.array_equal(block.acc[500:530, 0], np.tile(block.acc[499, 0], (30, 1)))
+    assert block.valid[:, 1].all()
+    assert block.interpolated[700, 1]
+
+
+@pytest.mark.parametrize("missing", [5, 9, 10, 11, 12, 40])
+def test_a_hole_in_the_whole_stream_is_as_in_the_file(missing: int) -> None:
+    take = send([without(device(0, 100.0, FEET), slice(400, 400 + missing))])
+    block, _, axis = laid(take)
+    assert_equal_bits(block, axis.segments, of_file(take))
+    assert block.valid.all() == (missing <= 10)
+
+
+def test_jittering_samples_are_interpolated_as_in_the_file() -> None:
+    clean = device(0, 100.0, FEET)
+    jitter = np.random.default_rng(1).integers(-3000, 3000, len(clean.t_us))
+    take = send([replace(clean, t_us=clean.t_us + jitter, jitter=True)])
+    block, _, axis = laid(take)
+    assert_equal_bits(block, axis.segments, of_file(take))
+    assert block.valid.mean() > 0.99
+    again, _, _ = laid(take.cut(4))
+    assert again.acc.tobytes() == block.acc.tobytes()
+
+
+def test_own_clocks_are_laid_over_each_other_by_when_they_were_sent() -> None:
+    left, right = device(0, 60.0, ("foot_l",)), device(1, 60.0, ("foot_r",))
+    right = replace(right, samples=-left.samples)
+    take = send([own(left, 7_000_000_000), own(right, 40_000_000)])
+    block, _, axis = laid(take)
+    assert_equal_bits(block, axis.segments, of_file(take))
+    assert np.abs(block.acc[:, 0] + block.acc[:, 1]).max() < 1e-3
+    assert block.valid.all()
+
+
+def test_an_own_clock_that_is_delayed_more_is_off_by_the_difference_of_the_least_delays() -> None:
+    left, right = device(0, 60.0, ("foot_l",)), device(1, 60.0, ("foot_r",))
+    take = send([own(left, 5_000_000, delay_us=20_000), own(right, 0, delay_us=45_000)])
+    file = read_recording([SourceFile.of_bytes("x", take.log())])
+    first = {d: s.t_s[0] for d, s in file.streams.items()}
+    assert first["foot_r-id"] - first["foot_l-id"] == pytest.approx(0.025, abs=2e-6)
+    assert [n.code for n in file.notices] == ["clocks_aligned"]
+
+
+def test_an_own_clock_that_drifts_stays_within_its_drift() -> None:
+    left, right = device(0, 100.0, ("foot_l",), 60.0), device(1, 100.0, ("foot_r",), 60.0)
+    right = replace(right, samples=-left.samples)
+    take = send([own(left, 0), own(right, 3_000_000, drift=1 + 50e-6)])
+    block, _, axis = laid(take)
+    assert_equal_bits(block, axis.segments, of_file(take))
+    slope = np.abs(np.gradient(block.acc[:, 0], 0.01, axis=0)).max()
+    apart = np.abs(block.acc[:, 0] + block.acc[:, 1]).max() / slope
+    assert 1e-3 < apart < 50e-6 * 60.0 + 1e-3
+
+
+def test_a_silent_stream_is_passed_over_and_returns() -> None:
+    quiet = without(device(1, 100.0, ("foot_r",)), slice(600, 900))
+    take = send([device(0, 100.0, ("foot_l",)), quiet])
+    axis = OnlineAxis(take.hello)
+    reached = []
+    for b in take.batches:
+        axis.push(b)
+        sample = round((b.t0_us * 1e-6 - 1.0) * 100) + len(b.samples)
+        reached.append(sample - axis.length)
+    assert max(reached) <= 50, "never more than the silence and a batch behind"
+    block, _, _ = laid(take)
+    file = of_file(take).sensors
+    assert np.array_equal(block.acc[:, 0], file["foot_l"].acc)
+    # its first batch after the silence comes when the axis is past it already
+    same = np.r_[0:900, 910:2000]
+    assert np.array_equal(block.acc[same, 1], file["foot_r"].acc[same])
+    assert np.array_equal(block.valid[same, 1], file["foot_r"].valid[same])
+    assert not block.valid[600:900, 1].any()
+
+
+def test_long_batches_are_not_taken_for_silence() -> None:
+    first, second = device(0, 100.0, ("foot_l",)), device(1, 100.0, ("foot_r",), start_s=1.25)
+    take = send([first, second], 50)
+    block, _, axis = laid(take)
+    assert_equal_bits(block, axis.segments, of_file(take))
+    assert block.valid.all()
+
+
+def test_a_stream_that_never_comes_is_waited_for_three_seconds() -> None:
+    first, second = device(0, 100.0, ("foot_l",)), device(1, 100.0, ("foot_r",))
+    take = send([first, second])
+    alone = LiveTake(take.hello, tuple(b for b in take.batches if b.stream == 0))
+    block, notices, _ = laid(alone)
+    assert [n.code for n in notices] == ["sensor_missing"]
+    assert len(block) == 2000, "what was held back is not lost"
+    assert block.valid[:, 0].all()
+    assert not block.valid[:, 1].any()
+
+
+def test_a_stream_that_comes_late_joins() -> None:
+    late = device(1, 100.0, ("foot_r",), 12.0, start_s=9.0)
+    block, _, _ = laid(send([device(0, 100.0, ("foot_l",)), late]))
+    assert not block.valid[:800, 1].any()
+    assert block.valid[811:, 1].all()
+
+
+def test_samples_that_run_backwards_are_left_out_as_in_the_file() -> None:
+    clean = device(0, 100.0, FEET)
+    t_us = clean.t_us.copy()
+    t_us[1000:] -= 50_000
+    take = send([replace(clean, t_us=t_us)])
+    block, notices, axis = laid(take)
+    assert_equal_bits(block, axis.segments, of_file(take))
+    assert [n.code for n in notices] == ["out_of_order"]
+
+
+@pytest.mark.parametrize("ahead_us", [700_000_000, 1 << 50])
+def test_a_clock_that_jumps_does_not_make_the_axis_endless(ahead_us: int) -> None:
+    take = send([device(0, 100.0, FEET)])
+    mad = [replace(b, t0_us=b.t0_us + ahead_us) if b.seq == 100 else b for b in take.batches]
+    block, notices, _ = laid(LiveTake(take.hello, tuple(mad)))
+    assert len(block) == 2000
+    assert [n.code for n in notices] == ["clock_jump"]
+    assert not block.valid[1001:1009].any() or block.interpolated[1001:1009].all()
+
+
+def test_a_sender_that_slept_leaves_a_gap() -> None:
+    clean = device(0, 100.0, FEET)
+    t_us = clean.t_us.copy()
+    t_us[1000:] += 120_000_000
+    block, notices, _ = laid(send([replace(clean, t_us=t_us)]))
+    assert len(block) == 14_000
+    assert not block.valid[1000:13_000].any()
+    assert block.valid[13_000:].all()
+    assert notices == ()
+
+
+def test_no_clock_makes_more_samples_than_a_file_could_be_analysed_with() -> None:
+    clean = device(0, 100.0, FEET, 2.0)
+    axis = OnlineAxis(send([clean]).hello)
+    made = 0
+    for k in range(60):
+        at = k * 599_000_000
+        block = axis.push(Batch(0, k, at, at, clean.samples[:1]))
+        made += 0 if block is None else len(block)
+    assert made < 20 * 60 + 60_000
+
+
+def test_a_shared_clock_that_is_not_does_not_stop_the_others() -> None:
+    first, second = device(0, 100.0, ("foot_l",)), device(1, 100.0, ("foot_r",))
+    behind = replace(second, t_us=second.t_us + 900_000_000, ahead_us=900_000_000)
+    block, _, _ = laid(send([first, behind]))
+    assert len(block) > 1000
+
+
+def test_only_worn_sensors_are_on_the_axis() -> None:
+    d = device(0, 100.0, ("pelvis", "foot_l", "foot_r"))
+    sensors = (d.info.sensors[0], replace(d.info.sensors[1], segment=None), d.info.sensors[2])
+    take = send([replace(d, info=replace(d.info, sensors=sensors))])
+    block, _, axis = laid(take)
+    assert axis.segments == ("pelvis", "foot_r")
+    assert_equal_bits(block, axis.segments, of_file(take))
+    assert np.array_equal(block.acc[:, 1], d.samples[:, 2, :3].astype(np.float64))
+
+
+def test_takes_that_can_have_no_axis_are_refused_with_the_reason() -> None:
+    d = device(0, 100.0, ("foot_l",))
+    unworn = replace(d.info, sensors=(SensorInfo("a", None),))
+    with pytest.raises(SignalError) as none:
+        OnlineAxis(send([replace(d, info=unworn)]).hello)
+    assert none.value.code == "no_mapping"
+    with pytest.raises(SignalError) as slow:
+        OnlineAxis(send([device(0, 30.0, FEET)]).hello)
+    assert slow.value.code == "sample_rate_too_low"
+
+
+def test_a_push_of_seven_sensors_costs_less_than_a_sixth_of_a_millisecond() -> None:
+    d = device(0, 100.0, ("pelvis", "thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r"))
+    take = send([d])
+    spent = []
+    for _ in range(5):
+        axis = OnlineAxis(take.hello)
+        start = perf_counter()
+        for b in take.batches:
+            axis.push(b)
+        spent.append((perf_counter() - start) / len(take.batches))
+    assert min(spent) < 0.15e-3
