@@ -10,7 +10,7 @@ STATES = "'pairing', 'open', 'streaming', 'finished', 'closed'"
 OPEN = sa.text("state IN ('pairing', 'open', 'streaming')")
 KINDS = (
     "'start', 'stop', 'mark', 'undo_mark', 'feedback', 'level', 'pause', 'redo_calibration', 'ghost', "
-    "'prescription', 'calibration', 'cue', 'guard', 'notice'"
+    "'prescription', 'stale', 'calibration', 'cue', 'guard', 'notice'"
 )
 
 

@@ -60,6 +60,7 @@ LIVE_EVENT_KINDS = (
     "redo_calibration",
     "ghost",
     "prescription",
+    "stale",
     "calibration",
     "cue",
     "guard",
