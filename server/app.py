@@ -16,7 +16,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 import web
-from server import number_pages, pages, problems, visit_pages
+from server import capture_pages, live_pages, number_pages, pages, problems, visit_pages
 from server.api import (
     analyses,
     audit_log,
@@ -131,6 +131,8 @@ def create_app(settings: Settings) -> FastAPI:
         pages.router,
         visit_pages.router,
         number_pages.router,
+        capture_pages.router,
+        live_pages.router,
         proxy.router,
     ):
         app.include_router(router)

@@ -1,0 +1,82 @@
+// The list of sensors: where each is worn, how fast it sends, its battery and its state; a tap says where it is worn.
+const sideOf = (segment) => (segment?.endsWith("_l") ? "l" : segment?.endsWith("_r") ? "r" : "");
+
+export class SensorList {
+  constructor(root, { onplaced }) {
+    this.list = root.querySelector("[data-list]");
+    this.template = root.querySelector("[data-row]").content;
+    this.shapes = root.querySelector("[data-shapes]").content;
+    this.dialog = root.querySelector("[data-places]");
+    this.onplaced = onplaced;
+    this.names = Object.fromEntries([...this.dialog.querySelectorAll(".place")].map((b) => [b.value, b.firstChild.textContent.trim()]));
+    this.dialog.addEventListener("close", () => this.placed(this.dialog.returnValue));
+  }
+
+  // Part and side apart, as "Thigh" and L; the names of the server begin with the side.
+  words(segment) {
+    if (!segment) return "Not placed";
+    const name = this.names[segment].replace(/^(Left|Right) /, "");
+    return name[0].toUpperCase() + name.slice(1);
+  }
+
+  shape(kind) {
+    return this.shapes.querySelector(`[data-shape=${kind}]`).firstElementChild.cloneNode(true);
+  }
+
+  draw(rows, { fixed }) {
+    while (this.list.children.length > rows.length) this.list.lastElementChild.remove();
+    while (this.list.children.length < rows.length) this.list.append(this.template.cloneNode(true));
+    rows.forEach(({ sensor, health }, i) => this.row(this.list.children[i], i + 1, sensor, health, fixed));
+  }
+
+  row(li, number, sensor, health, fixed) {
+    const part = (name) => li.querySelector(`[data-${name}]`);
+    const side = sideOf(sensor.segment);
+    li.className = sensor.segment ? health.kind : "unused";
+    li.dataset.sensor = sensor.id;
+    set(part("place"), String(number));
+    set(part("segment"), this.words(sensor.segment));
+    part("side").hidden = !side;
+    part("side").className = `lr ${side}`;
+    set(part("side"), side.toUpperCase());
+    const name = sensor.label && sensor.label !== sensor.id ? `${sensor.label}, ${sensor.id}` : sensor.id;
+    set(part("id"), [name, health.note].filter(Boolean).join(", "));
+    set(part("rate"), `${Math.round(health.rateHz)} Hz`);
+    for (const button of [part("place"), part("place-too")]) {
+      button.disabled = fixed;
+      button.setAttribute("aria-label", `Sensor ${sensor.id}: ${sensor.segment ? this.names[sensor.segment] : "not placed"}. Change`);
+      button.onclick = () => this.ask(sensor);
+    }
+    const known = sensor.battery !== null && sensor.battery !== undefined;
+    part("bat").hidden = part("batn").hidden = !known;
+    if (known) {
+      part("bat").setAttribute("aria-label", `Battery ${sensor.battery} percent`);
+      part("bat").firstElementChild.style.width = `${sensor.battery}%`;
+      set(part("batn"), `${sensor.battery} %`);
+    }
+    const state = sensor.segment ? health : { kind: "none", text: "Not used" };
+    if (part("state").dataset.shown !== state.kind + state.text) {
+      part("state").dataset.shown = state.kind + state.text;
+      part("state").className = `state ${state.kind}`;
+      part("state").replaceChildren(this.shape(state.kind), state.text);
+    }
+  }
+
+  ask(sensor) {
+    this.asked = sensor;
+    this.dialog.querySelector("[data-which]").textContent = `Sensor ${sensor.id}${sensor.label && sensor.label !== sensor.id ? `, ${sensor.label}` : ""}`;
+    for (const b of this.dialog.querySelectorAll(".place")) b.setAttribute("aria-pressed", b.value === sensor.segment);
+    this.dialog.returnValue = "";
+    this.dialog.showModal();
+  }
+
+  placed(value) {
+    if (value && this.asked) this.onplaced(this.asked, value === "none" ? null : value);
+    this.asked = null;
+  }
+}
+
+// The list is drawn again every half second; what has not changed is left alone for screen readers.
+function set(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}

@@ -1,0 +1,136 @@
+// What <capture-page> shows of its state; decides nothing.
+import { grouped } from "./pairing.js";
+import { POSES } from "./sources/axes.js";
+import { SensorList } from "./sensors.js";
+import * as words from "./words.js";
+
+const ADD = { dot: "Add sensor", replay: "Other files" };
+
+export class View {
+  constructor(root, { onplaced }) {
+    this.root = root;
+    this.part = (name) => root.querySelector(`[data-${name}]`);
+    this.list = new SensorList(root, { onplaced });
+    this.staged = [...root.querySelectorAll("[data-on]")];
+  }
+
+  unavailable(kind, why) {
+    const button = this.root.querySelector(`[data-source=${kind}]`);
+    button.disabled = true;
+    button.querySelector("[data-why]").textContent = why;
+  }
+
+  draw(m) {
+    for (const element of this.staged) element.hidden = !element.dataset.on.split(" ").includes(m.state);
+    this.badge(m);
+    this.pairing(m);
+    this.sensors(m);
+    this.saying(m);
+    this.note(m.problem ?? this.trouble(m));
+    this.button(m);
+  }
+
+  badge({ link, state }) {
+    const shown = state === "pairing" || state === "prepare" || state === "done" ? null : link;
+    const key = shown ? shown.kind + shown.text : "";
+    if (this.part("link").dataset.shown === key) return;
+    this.part("link").dataset.shown = key;
+    this.part("link").className = shown ? `badge ${shown.kind}` : "";
+    this.part("link").replaceChildren(...(shown ? [this.list.shape(shown.kind), shown.text] : []));
+  }
+
+  pairing({ record }) {
+    if (!record) return;
+    const [a, b] = grouped(record.code ?? "");
+    this.part("code").setAttribute("aria-label", [...a].join(" ") + ", " + [...b].join(" "));
+    if (this.part("code").textContent !== a + b) {
+      this.part("code").replaceChildren(...[a, b].map((text) => Object.assign(document.createElement("span"), { textContent: text })));
+    }
+    set(this.part("paired"), `Paired with ${record.patient_code}`);
+    set(this.part("session-title"), record.session_title);
+  }
+
+  sensors({ state, source, rows, ready, paused }) {
+    const prepare = state === "prepare";
+    const kind = source?.kind;
+    this.part("sources").hidden = !prepare || Boolean(source);
+    this.part("other").hidden = !prepare || !source;
+    this.part("add").hidden = !prepare || !(kind in ADD);
+    this.part("end").hidden = !paused || state !== "running";
+    set(this.part("add-word"), ADD[kind] ?? "");
+    const worn = rows.filter(({ sensor }) => sensor.segment).length;
+    const copies = source?.copies?.length ? `, ${source.copies.length} ${source.copies.length === 1 ? "copy" : "copies"} left out` : "";
+    set(this.part("sum"), !source ? "Where do they come from?" : prepare ? `${ready.length} of ${rows.length} ready${copies}` : `${worn} recorded`);
+    this.list.draw(prepare ? rows : rows.filter(({ sensor }) => sensor.segment), { fixed: !prepare });
+    this.axes(source, prepare);
+  }
+
+  // The self-test of the device's own axes.
+  axes(source, prepare) {
+    this.part("axes").hidden = !prepare || source?.kind !== "device_motion";
+    if (this.part("axes").hidden) return;
+    const { test, axes } = source;
+    if (axes) {
+      set(this.part("axes-say"), "The axes of this device are checked");
+      set(this.part("axes-more"), `Turning it agreed with gravity within ${axes.errorDeg.toFixed(0)}°. This is remembered until the browser changes.`);
+    } else if (test.problem) {
+      set(this.part("axes-say"), "The check did not work");
+      set(this.part("axes-more"), test.problem);
+    } else {
+      set(this.part("axes-say"), `${test.still.length + 1} of ${POSES.length}: ${test.pose.words}`);
+      set(this.part("axes-more"), "Hold it still for a second. Browsers disagree about the axes, so they are measured once.");
+    }
+    this.part("axes-again").hidden = !axes && !test.problem;
+  }
+
+  saying({ state, stage, elapsedS, heldS, paused }) {
+    const say = state === "sending"
+      ? { icon: "upload", title: "Sending the rest", more: heldS > 0.05 ? `${heldS.toFixed(1)} s are still on this tablet. Keep this page open.` : "The server closes the recording." }
+      : paused ? { icon: "info", title: "Recording stands still", more: "Connect the same sensors again to go on." } : words.instruction(stage, elapsedS);
+    set(this.part("say"), say.title);
+    set(this.part("say-more"), say.more);
+    this.part("say-icon").setAttribute("href", `#i-${say.icon}`);
+    set(this.part("elapsed"), state === "running" && !paused ? words.clock(elapsedS) : "");
+  }
+
+  // The first thing that is wrong, where nothing else was said.
+  trouble({ state, rows, link, linkSays, source }) {
+    if (state !== "prepare" && state !== "running") return null;
+    if (link?.kind === "bad" && linkSays) return { title: "The server cannot take data now", detail: `${linkSays.detail} It is kept here and sent later.` };
+    if (source?.kind === "device_motion" && !source.axes) return null;
+    const at = rows.findIndex(({ sensor, health }) => sensor.segment && health.kind === "bad");
+    if (at < 0) return null;
+    const { sensor, health } = rows[at];
+    return words.sensorProblem(at + 1, this.list.names[sensor.segment].toLowerCase(), sensor, health, state === "running");
+  }
+
+  note(problem) {
+    this.part("error").hidden = !problem;
+    set(this.part("title"), problem?.title ?? "");
+    set(this.part("detail"), problem?.detail ?? "");
+  }
+
+  button({ state, source, ready, rows, paused, room }) {
+    const go = this.part("go");
+    const n = ready.length;
+    const start = n ? `Start with ${n} sensor${n === 1 ? "" : "s"}` : source ? (rows.length ? this.reason(source) : "Add a sensor") : "Choose where sensors come from";
+    const word = {
+      loading: "One moment", pairing: "Enter the code", prepare: start, sending: "Sending", done: "Start another",
+      running: paused ? "Connect the sensors again" : "Stop",
+    }[state];
+    set(this.part("go-word"), word);
+    go.disabled = state === "loading" || state === "pairing" || state === "sending" || (state === "prepare" && !n);
+    go.classList.toggle("stop", state === "running" && !paused);
+    const keeps = `Nothing is lost if the network drops: ${words.hours(room)}.`;
+    set(this.part("hint"), { prepare: `Stand still for 5 seconds after the tone. ${keeps}`, running: keeps, sending: keeps }[state] ?? "");
+  }
+
+  reason(source) {
+    if (source.kind === "device_motion" && !source.axes) return "Check its axes first";
+    return "Say where the sensors are worn";
+  }
+}
+
+function set(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
