@@ -18,10 +18,10 @@ class StrideChart extends Plot {
     this.done = { left: [], right: [] };
   }
 
-  // variable: {name, label, range, tick, up, down, norm: {mean, sd}|null}
-  show(variable) {
+  // variable: {name, label, range, ticks, up, down, norm: {mean, sd}|null}
+  show(variable, other = true) {
     this.variable = variable;
-    this.samples = { left: [], right: [] };
+    if (other) this.samples = { left: [], right: [] };
     this.ask();
   }
 
@@ -52,7 +52,9 @@ class StrideChart extends Plot {
   stride(message) {
     const { side } = message;
     this.lasts[side] = message.end_s - message.start_s;
-    this.done[side].push(message);
+    const same = this.done[side].findIndex((s) => s.n === message.n); // told again when all of it is known
+    if (same >= 0) this.done[side][same] = message;
+    else this.done[side].push(message);
     if (this.done[side].length > THIN) this.done[side].shift();
     this.ask();
   }
@@ -84,7 +86,7 @@ class StrideChart extends Plot {
   scale(g, X, Y, { colour, h, v }) {
     if (v.norm) this.band(g, X, Y, v.norm, colour);
     g.lineWidth = 1;
-    for (let a = Math.ceil(v.range[0] / v.tick) * v.tick; a <= v.range[1]; a += v.tick) {
+    for (const a of v.ticks) {
       g.strokeStyle = a === 0 ? colour.zero : colour.grid;
       trace(g, [[X(0), Y(a)], [X(100), Y(a)]]);
       label(g, `${number(a)}°`, X(0) - 7, Y(a) + 4, { colour: colour.axis, align: "right" });

@@ -1,0 +1,42 @@
+// What came of the take: saved, being analysed, or nothing arrived. Leads to the session when the analysis is done.
+import { request } from "../api.js";
+import { say } from "./words.js";
+
+export class After {
+  constructor(root, session) {
+    this.root = root;
+    this.session = session;
+  }
+
+  async show(state) {
+    const empty = !state.count;
+    const part = state.state === "closed";
+    say(this.root.querySelector("[data-over-title]"), empty ? "Nothing was recorded" : "Recording is saved");
+    say(this.root.querySelector("[data-over-words]"), empty ? "No data came before the end."
+      : part ? "It was ended here with what had arrived. Analysis is running; the session page opens when it is done."
+      : "Analysis is running; the session page opens when it is done.");
+    this.root.querySelector("[data-do=again]").hidden = !empty;
+    if (!empty && !this.following) await this.follow();
+  }
+
+  // The newest job of this session; when it is done already the session page has the result.
+  async follow() {
+    this.following = true;
+    const jobs = await request("GET", "/api/v1/jobs?limit=20").catch(() => []);
+    const mine = jobs.find((j) => j.session_id === this.session && j.kind === "analyse");
+    if (!mine) return setTimeout(() => this.follow(), 1000); // the log is being stored
+    const to = `/sessions/${this.session}`;
+    if (["done", "failed"].includes(mine.state)) return location.assign(to);
+    const progress = document.createElement("job-progress");
+    for (const [k, v] of Object.entries({ job: mine.id, since: mine.created_at, done: to, failed: to })) progress.setAttribute(k, v);
+    progress.className = "stack g2";
+    const words = document.createElement("p"), bar = document.createElement("progress");
+    words.className = "small mut";
+    words.dataset.message = "";
+    words.setAttribute("role", "status");
+    bar.max = 1;
+    bar.setAttribute("aria-label", "Progress");
+    progress.append(words, bar);
+    this.root.querySelector("[data-over-job]").replaceChildren(progress);
+  }
+}

@@ -1,0 +1,89 @@
+// <live-calibration>: stand, then walk; what is waited for, how still each sensor is, what its axes came out as.
+import { cell, segmentCell, setState, shape, stateOf } from "./shapes.js";
+import { capital, number, say } from "./words.js";
+
+const STAND_S = 3; // core/online/calibrating.py: quiet for so long
+const STEPS = 8; // straight steps, or
+const WALK_S = 12; // seconds of walking
+
+const SAYS = {
+  waiting: "Waiting until every sensor sends data.",
+  stand: "Please stand still, feet as in walking, and look ahead.",
+  walk: "Now walk straight on at a comfortable pace.",
+};
+
+class LiveCalibration extends HTMLElement {
+  connectedCallback() {
+    this.body = this.querySelector("tbody");
+    this.rows = new Map();
+  }
+
+  show(stage, view, health, names) {
+    const problem = view?.problem ?? null;
+    say(this.querySelector("[data-say]"), SAYS[stage] ?? "Calibrated.");
+    const stood = view?.stood_s ?? 0, walked = view?.walked_s ?? 0, steps = view?.steps ?? 0;
+    this.step("stand", stage === "stand" ? "run" : stage === "waiting" ? "none" : "ok", Math.min(1, stood / STAND_S),
+      stage === "stand" ? `${number(Math.min(stood, STAND_S), 1)} of ${STAND_S} seconds` : `${STAND_S} seconds, feet as in walking`);
+    this.step("walk", stage === "walk" ? "run" : "none", Math.max(Math.min(1, steps / STEPS), Math.min(1, walked / WALK_S)),
+      stage === "walk" ? `${steps} of ${STEPS} steps, ${number(walked)} s` : `${STEPS} steps`);
+    const checks = new Map((view?.checks ?? []).map((c) => [c.segment, c]));
+    const used = health.filter((h) => h.segment);
+    if ([...this.rows.keys()].join() !== used.map((h) => h.id).join()) this.build(used, names);
+    for (const h of used) this.row(h, checks.get(h.segment));
+    this.notes(problem, [...checks.values()].flatMap((c) => (c.notices ?? []).map((n) => ({ ...n, of: names[c.segment] }))));
+  }
+
+  step(name, kind, fraction, words) {
+    const item = this.querySelector(`[data-step=${name}]`);
+    setState(item.querySelector("[data-state]"), kind, "");
+    item.querySelector("progress").value = kind === "ok" ? 1 : fraction;
+    say(item.querySelector("[data-words]"), words);
+  }
+
+  build(health, names) {
+    this.rows.clear();
+    this.body.replaceChildren(...health.map((h) => {
+      const tr = document.createElement("tr");
+      const now = stateOf("none", ""), axes = stateOf("none", "not yet");
+      const [a, b] = [cell(""), cell("")];
+      a.append(now);
+      b.append(axes);
+      tr.append(segmentCell(h.segment, names[h.segment] ?? h.segment), a, b);
+      this.rows.set(h.id, { now, axes });
+      return tr;
+    }));
+  }
+
+  row(h, check) {
+    const { now, axes } = this.rows.get(h.id);
+    const still = check?.still ?? h.still;
+    if (h.state === "bad") setState(now, "bad", h.words || "no data");
+    else if (still === undefined || still === null) setState(now, "none", "–");
+    else setState(now, still ? "ok" : "run", still ? "still" : "moving");
+    if (check?.score === null || check?.score === undefined) setState(axes, "none", "not yet");
+    else {
+      const troubled = (check.notices ?? []).some((n) => n.severity === "bad" || n.severity === "warn");
+      setState(axes, troubled ? "warn" : "ok", `${Math.round(100 * check.score)}\u2009%`);
+    }
+  }
+
+  notes(problem, notices) {
+    const wanted = [...(problem ? [{ severity: "warn", message: problem.message, title: "Calibration starts again" }] : []), ...notices];
+    const box = this.querySelector("[data-cal-notes]");
+    const key = JSON.stringify(wanted);
+    if (box.dataset.key === key) return;
+    box.dataset.key = key;
+    box.replaceChildren(...wanted.map((n) => {
+      const note = document.createElement("div");
+      note.className = `note ${n.severity === "bad" ? "bad" : n.severity === "info" ? "" : "warn"}`;
+      const title = document.createElement("b");
+      title.textContent = n.title ?? n.of ?? "";
+      const text = document.createElement("p");
+      text.textContent = capital(n.message ?? n.text ?? "");
+      note.append(shape(n.severity === "bad" ? "bad" : "warn"), title, text);
+      return note;
+    }));
+  }
+}
+
+customElements.define("live-calibration", LiveCalibration);

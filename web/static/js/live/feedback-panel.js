@@ -1,0 +1,77 @@
+// <live-feedback>: level, schedule, next probe, with against without feedback, side effects; all in words.
+import { setState } from "./shapes.js";
+import { number, say, withUnit } from "./words.js";
+
+const STOPS = { max_strides: "The number of strides is reached.", max_minutes: "The time is over.", gps_rise: "The walk as a whole changed too much." };
+const NOT_JUDGED = { too_few_strides: "too few strides yet", joint_missing: "not measured", both_sides_trained: "both are trained", no_limit: "no limit known" };
+
+class LiveFeedback extends HTMLElement {
+  // prescription: content of the record | null; term: {label, unit, digits}
+  given(prescription, term) {
+    this.prescription = prescription;
+    this.term = term;
+    this.querySelector("[data-given]").hidden = !prescription;
+    this.querySelector("[data-on-line]").hidden = !prescription;
+    this.querySelector("[data-none]").hidden = Boolean(prescription);
+    const other = { left: "Right side", right: "Left side" }[prescription?.side] ?? "Side effects";
+    say(this.querySelector("[data-guard-side]"), other);
+  }
+
+  show(state) {
+    if (!this.prescription) return;
+    const put = (name, text) => say(this.querySelector(`[data-${name}]`), text);
+    const on = this.querySelector("input.switch");
+    on.checked = state.on;
+    put("on-word", state.on ? "On" : "Off");
+    put("level", number(state.level));
+    put("schedule", this.schedule(state));
+    put("probe", this.probe(state));
+    put("with", this.summary(state.with_feedback));
+    put("without", this.summary(state.without_feedback));
+    this.guard(state.guard);
+    const stopped = this.querySelector("[data-stopped]");
+    stopped.hidden = !state.stopped;
+    if (state.stopped) say(stopped, `Feedback has ended. ${STOPS[state.stopped] ?? ""}`);
+  }
+
+  schedule(state) {
+    if (state.paused) return "paused";
+    if (state.phase === "baseline") return "first strides, without";
+    if (state.phase === "retention") return "retention test, without";
+    const kind = this.prescription.schedule?.kind;
+    if (kind === "every" || state.share_pct === 100) return "every stride";
+    return `${kind === "fading" ? "fading, " : ""}${number(state.share_pct)}\u2009% of strides`;
+  }
+
+  probe(state) {
+    if (state.block_left) return `now, ${state.block_left} strides left`;
+    if (state.next_probe === null || state.next_probe === undefined) return "none";
+    return state.next_probe === 1 ? "in 1 stride" : `in ${state.next_probe} strides`;
+  }
+
+  summary(s) {
+    return s && s.n ? `${withUnit(s.mean, this.term)} (${s.n})` : "–";
+  }
+
+  guard(guard) {
+    const out = this.querySelector("[data-guard]");
+    if (!guard) return;
+    let state = out.firstElementChild;
+    if (!state) out.replaceChildren((state = document.createElement("span")));
+    if (guard.other?.beyond) setState(state, "warn", `changed by ${withUnit(guard.other.change, this.term)}`);
+    else if (guard.gps?.beyond) setState(state, "warn", `walk changed, GPS +${number(guard.gps.change, 1)}°`);
+    else if (guard.state === "ok") setState(state, "ok", "no side effect");
+    else setState(state, "none", NOT_JUDGED[guard.other?.reason] ?? "not known yet");
+  }
+
+  // How close the next level is: "In the zone more than 14 of 20: level 3 comes next."
+  next(state) {
+    const p = this.prescription?.progression;
+    if (!p?.automatic || state.phase !== "training" || state.in_zone === null) return "";
+    const needed = Math.floor(p.share * p.window + 1e-9);
+    if (state.window_n < p.window) return `A decision on the level needs ${p.window} strides; ${state.window_n} so far.`;
+    return state.level > 0 ? `More than ${needed} of ${p.window} in the zone: the next level follows.` : "The hardest level.";
+  }
+}
+
+customElements.define("live-feedback", LiveFeedback);

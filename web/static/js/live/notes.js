@@ -1,0 +1,71 @@
+// The line of notes under the head: the tablet is lost, the server is lost, something was refused, the take was told of.
+import { shape } from "./shapes.js";
+
+const NOTICE_MS = 12000;
+
+export class Notes {
+  constructor(box) {
+    this.box = box;
+    this.shown = new Map();
+  }
+
+  put(key, kind, title, text, action) {
+    const same = this.shown.get(key);
+    if (same?.dataset.said === title + text) return same;
+    this.take(key);
+    const note = document.createElement("div");
+    note.className = `note ${kind}`;
+    note.dataset.said = title + text;
+    note.dataset.note = key;
+    const b = document.createElement("b"), p = document.createElement("p");
+    b.textContent = title;
+    p.textContent = text;
+    note.append(shape(kind === "" ? "none" : kind), b, p);
+    if (action) {
+      const acts = document.createElement("span"), button = document.createElement("button");
+      acts.className = "acts";
+      button.className = "btn sm";
+      button.type = "button";
+      button.dataset.do = action.do;
+      button.textContent = action.word;
+      acts.append(button);
+      note.append(acts);
+    }
+    this.shown.set(key, note);
+    this.box.append(note);
+    return note;
+  }
+
+  take(key) {
+    this.shown.get(key)?.remove();
+    this.shown.delete(key);
+  }
+
+  tablet(state) {
+    if (state.state === "streaming" && state.tablet !== "connected")
+      this.put("tablet", "warn", "The tablet is not connected.", "It goes on recording and keeps everything; what is missing comes when it is back. Nothing is lost.", { do: "close", word: "End without the tablet" });
+    else this.take("tablet");
+  }
+
+  // STOP without a tablet: the person decides, because what the tablet still holds would stay there.
+  withoutTablet() {
+    this.put("tablet", "warn", "The tablet cannot hear STOP now.", "Press STOP on the tablet, or end here with what has arrived; the rest stays on the tablet.", { do: "close", word: "End without the tablet" });
+  }
+
+  line(line) {
+    if (line === "lost") this.put("line", "bad", "No connection to the server.", "The tablet goes on recording. This page comes back by itself.");
+    else if (line === "refused") this.put("line", "bad", "You are signed out.", "Sign in again to see the walk; the recording goes on.");
+    else this.take("line");
+  }
+
+  problem(problem) {
+    const note = this.put("problem", "bad", problem.title || "That did not work", problem.detail);
+    setTimeout(() => this.shown.get("problem") === note && this.take("problem"), NOTICE_MS);
+  }
+
+  notice({ severity, text, code }) {
+    const key = `notice:${code ?? text}`;
+    const note = this.put(key, severity === "bad" ? "bad" : severity === "warn" ? "warn" : "", "", text);
+    setTimeout(() => this.shown.get(key) === note && this.take(key), NOTICE_MS);
+  }
+}

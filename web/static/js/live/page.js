@@ -1,0 +1,195 @@
+// <live-page>: the therapist's screen. What the feed says goes to the parts; what is pressed goes to the server.
+import "../progress.js";
+import "./sensors.js";
+import "./calibration.js";
+import "./feedback-panel.js";
+import "./stride-chart.js";
+import { Feed } from "./feed.js";
+import { Commands } from "./commands.js";
+import { Pairing } from "./pairing.js";
+import { Screen } from "./screen.js";
+import { StripCard } from "./strip-card.js";
+import { Top } from "./top.js";
+import { After } from "./after.js";
+import { Notes } from "./notes.js";
+import { clock, number, say } from "./words.js";
+
+const data = JSON.parse(document.getElementById("live-data").textContent);
+const OVER = new Set(["finished", "closed"]);
+const SPOKEN_MS = 5000; // live values are read out at most so often (DESIGN.md §9)
+
+class LivePage extends HTMLElement {
+  connectedCallback() {
+    const api = `/api/v1/sessions/${data.session}/live`;
+    const part = (name) => this.querySelector(`[data-part=${name}]`);
+    this.parts = Object.fromEntries([...this.querySelectorAll("[data-part]")].map((p) => [p.dataset.part, p]));
+    this.feed = new Feed(`/sessions/${data.session}/live/feed`);
+    this.notes = new Notes(this.querySelector("[data-notes]"));
+    this.commands = new Commands(api, (problem) => this.notes.problem(problem));
+    this.pairing = new Pairing(part("pair"), api);
+    this.top = new Top(this);
+    this.strip = new StripCard(this.querySelector(".l-strip"), data, this.feed);
+    this.after = new After(part("over"), data.session);
+    this.screen = new Screen(this, data.session);
+    this.chart = this.querySelector("stride-chart");
+    this.sensors = this.querySelector("live-sensors");
+    this.calibration = this.querySelector("live-calibration");
+    this.feedback = this.querySelector("live-feedback");
+    this.figure = this.querySelector("live-view");
+    this.feedback.given(data.prescription, data.terms[data.prescription?.parameter]);
+    this.pick("knee_flexion");
+    this.listen();
+    this.press();
+    this.feed.open();
+    setInterval(() => this.speak(), SPOKEN_MS);
+  }
+
+  listen() {
+    const on = (type, act) => this.feed.addEventListener(type, (e) => act(e.detail));
+    on("state", (state) => this.state(state));
+    on("frame", (frame) => this.frame(frame));
+    on("stride", (stride) => { this.chart.stride(stride); this.strip.changed(); this.norm(); });
+    on("cue", () => this.strip.changed());
+    on("feedback", (state) => { this.feedback.show(state); this.top.paused(state); this.strip.state(state, this.feedback.next(state)); });
+    on("notice", (notice) => this.notes.notice(notice));
+    on("fresh", (fresh) => this.fresh(fresh));
+    on("line", (line) => this.notes.line(line));
+  }
+
+  // One part at a time: pairing, calibration, the walk, what came of it.
+  view(name) {
+    if (this.dataset.view === name) return;
+    this.dataset.view = name;
+    for (const [key, part] of Object.entries(this.parts)) part.hidden = key !== name;
+    if (name === "calibrate" || name === "run") this.parts[name].querySelector("[data-slot=sensors]").append(this.sensors);
+    this.querySelector("[data-bar]").hidden = name !== "run";
+  }
+
+  state(state) {
+    this.top.state(state);
+    this.notes.tablet(state);
+    if (OVER.has(state.state)) {
+      this.view("over");
+      this.after.show(state);
+    } else if (state.state === "streaming") this.view(this.feed.frame?.stage === "running" ? "run" : "calibrate");
+    else {
+      this.view("pair");
+      this.pairing.state(state);
+    }
+  }
+
+  frame(frame) {
+    if (this.feed.state?.state === "streaming") this.view(frame.stage === "running" ? "run" : "calibrate");
+    if (this.stage === "running" && frame.stage !== "running") this.again();
+    this.stage = frame.stage;
+    const health = (frame.health ?? []).map((h) => ({ ...h, still: h.still ?? null }));
+    this.sensors.show(health, data.segments);
+    if (frame.stage === "running") this.chart.frame(frame);
+    else this.calibration.show(frame.stage, frame.calibration, health, data.segments);
+    this.top.frame(frame);
+    this.screen.frame(frame);
+  }
+
+  // Calibrated anew: what was drawn belongs to the old axes.
+  again() {
+    this.chart.clear();
+    this.feed.strides.length = this.feed.cues.length = 0;
+    this.strip.changed();
+  }
+
+  // Stale: both charts are covered and the figure is grey, so that nobody reads the past as now.
+  fresh(fresh) {
+    const cover = this.querySelector("[data-cover]");
+    const stale = fresh === false;
+    cover.hidden = !stale;
+    this.figure.classList.toggle("stale", stale);
+    if (!stale) return clearInterval(this.staleClock);
+    const words = this.querySelector("[data-cover-words]");
+    const tell = () => {
+      const lost = this.feed.line !== "open" ? "The line to the server is lost. " : this.feed.state?.tablet === "lost" ? "The tablet does not answer. " : "";
+      say(words, `${lost}The last data came ${number(this.feed.age / 1000, 1)} s ago; feedback waits. The tablet keeps what it measures.`);
+    };
+    clearInterval(this.staleClock);
+    tell();
+    this.staleClock = setInterval(tell, 500);
+  }
+
+  pick(name) {
+    const variable = data.variables.find((v) => v.name === name);
+    for (const b of this.querySelectorAll("[data-joint]")) b.ariaPressed = String(b.dataset.joint === name);
+    say(this.querySelector("[data-variable]"), variable.label);
+    this.variable = variable;
+    this.norm();
+  }
+
+  // No adult norm below 0.8 m/s: no band, and the page says so (DESIGN.md §6 rule 7).
+  norm() {
+    const speeds = this.feed.strides.slice(-10).map((s) => s.values?.[data.slow.parameter]).filter((v) => v !== null && v !== undefined);
+    const slow = speeds.length > 2 && speeds.reduce((a, b) => a + b, 0) / speeds.length < data.slow.below_mps;
+    say(this.querySelector("[data-norm-note]"), slow ? data.slow.words : data.norm_note);
+    if (this.shown === this.variable && this.slow === slow) return;
+    const changed = this.shown !== this.variable;
+    [this.shown, this.slow] = [this.variable, slow];
+    this.chart.show(slow ? { ...this.variable, norm: null } : this.variable, changed);
+  }
+
+  press() {
+    const acts = {
+      open: () => this.pairing.open(),
+      again: () => { this.view("pair"); this.pairing.open(); },
+      code: () => this.pairing.renew(),
+      start: () => this.commands.send("start"),
+      stop: () => this.stop(),
+      close: () => this.commands.close(),
+      redo: () => this.commands.send("redo_calibration"),
+      pause: (b) => this.commands.send("pause", b.ariaPressed !== "true"),
+      feedback: (b) => this.commands.send("feedback", b.checked),
+      easier: () => this.commands.send("level", 1),
+      harder: () => this.commands.send("level", -1),
+      mark: () => this.mark(),
+      undo: () => this.commands.send("undo_mark"),
+      sound: () => this.screen.sound(),
+      screen: () => this.screen.open(),
+      table: (b) => this.strip.table(b),
+    };
+    this.addEventListener("click", (e) => {
+      const button = e.target.closest("[data-do]");
+      if (button) acts[button.dataset.do](button);
+      const joint = e.target.closest("[data-joint]");
+      if (joint) this.pick(joint.dataset.joint);
+      const ghost = e.target.closest("[data-ghost]");
+      if (ghost) this.ghost(ghost);
+    });
+  }
+
+  ghost(button) {
+    for (const b of this.querySelectorAll("[data-ghost]")) b.ariaPressed = String(b === button);
+    this.commands.send("ghost", button.dataset.ghost);
+  }
+
+  // STOP acts at once; without the tablet the take is ended with what has arrived.
+  stop() {
+    if (this.feed.state?.tablet === "connected") this.commands.send("stop");
+    else this.notes.withoutTablet();
+  }
+
+  // The moment is the press, not when the words are written.
+  mark() {
+    const dialog = this.querySelector("#mark-dialog"), input = dialog.querySelector("input");
+    const t = this.feed.frame?.t ?? null;
+    say(dialog.querySelector("[data-mark-time]"), clock(t));
+    input.value = "";
+    dialog.returnValue = "";
+    dialog.onclose = () => { if (dialog.returnValue === "mark") this.commands.send("mark", { text: input.value.trim(), t_s: t }); };
+    dialog.showModal();
+  }
+
+  speak() {
+    if (this.dataset.view !== "run") return;
+    const delay = this.feed.frame?.delay_ms;
+    const words = [this.feed.fresh === false ? "Paused, no new data" : "", this.querySelector("[data-in-zone]").textContent, delay === undefined || delay === null ? "" : `delay ${Math.round(delay)} milliseconds`];
+    say(this.querySelector("[data-spoken]"), words.filter(Boolean).join(", "));
+  }
+}
+
+customElements.define("live-page", LivePage);

@@ -1,0 +1,26 @@
+// One bar: long steps on top. The ball is where the last step was, the zone is where it should be.
+const TOP = 60, BOTTOM = 420, CENTRE = 178, HALF = 66; // the drawing's own units
+
+export class Bar {
+  constructor(scene, { side, lengths, words }) {
+    this.ball = scene.querySelector("[data-ball]");
+    scene.querySelector("[data-feet]").toggleAttribute("hidden", !lengths);
+    if (!lengths) ["up", "down"].forEach((way, i) => (scene.querySelector(`[data-guide=${way}]`).textContent = words[i]));
+    // a left sole is a right one mirrored; the foot that steps is the trained one
+    for (const g of scene.querySelectorAll(".pict")) {
+      const own = g.classList.contains("own"), left = own === (side !== "right");
+      g.classList.add(own ? (left ? "l" : "r") : "plain");
+      g.setAttribute("transform", g.getAttribute("transform").replace("scale(.6)", left ? "scale(.6)" : "scale(-.6 .6)"));
+    }
+  }
+
+  // error in widths of the zone's half, up is more
+  show(error, kind) {
+    const y = Math.min(BOTTOM, Math.max(TOP, CENTRE - HALF * error));
+    this.ball.setAttribute("transform", `translate(450 ${y})`);
+    this.ball.setAttribute("class", kind);
+  }
+
+  dim() { this.ball.setAttribute("class", "hidden"); }
+  contact() {}
+}

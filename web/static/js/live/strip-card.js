@@ -1,0 +1,62 @@
+// The card of the last 20 strides: which parameter, the strip, how many in the zone, left against right, the table.
+import "./strip.js";
+import { SHOWN } from "./strip.js";
+import { fill, rowsOf } from "./strides-table.js";
+import { asymmetry, mean, say } from "./words.js";
+
+export class StripCard {
+  constructor(root, data, feed) {
+    Object.assign(this, { root, data, feed });
+    this.strip = root.querySelector("target-strip");
+    this.choice = root.querySelector("[data-strip-of]");
+    this.parameter = data.prescription?.parameter ?? data.choices[0];
+    if (!data.prescription) this.offer();
+    this.what();
+  }
+
+  offer() {
+    for (const name of this.data.choices) this.choice.add(new Option(this.data.terms[name].label, name));
+    this.choice.hidden = false;
+    this.choice.addEventListener("change", () => { this.parameter = this.choice.value; this.what(); this.changed(); });
+  }
+
+  get term() { return this.data.terms[this.parameter]; }
+
+  what() {
+    const side = this.data.prescription?.side;
+    const unit = this.term?.unit ? `, ${this.term.unit}` : "";
+    say(this.root.querySelector("[data-strip-what]"), this.data.prescription ? `${this.term?.label.toLowerCase() ?? this.parameter}${side ? `, ${side}` : ""}${unit}` : "");
+    this.changed();
+  }
+
+  state(state, next) {
+    this.now = state;
+    say(this.root.querySelector("[data-strip-words]"), next);
+    this.changed();
+  }
+
+  zone(rows) {
+    const cue = rows.findLast((r) => r.cue)?.cue;
+    const from = this.now?.zone_low !== undefined && this.now?.zone_low !== null ? this.now : cue;
+    return from ? [from.zone_low, from.zone_high] : null;
+  }
+
+  changed() {
+    const rows = rowsOf(this.feed, this.parameter, this.data.prescription);
+    this.strip.show(rows, this.data.prescription ? this.zone(rows) : null, this.term?.digits ?? 2);
+    const judged = rows.filter((r) => r.cue), inside = judged.filter((r) => r.kind === "in").length;
+    say(this.root.querySelector("[data-in-zone]"), judged.length ? `${inside} of ${judged.length} in zone` : "");
+    const of = (side) => mean(this.feed.strides.filter((s) => s.counted && s.side === side).slice(-SHOWN / 2).map((s) => s.values?.[this.parameter]));
+    say(this.root.querySelector("[data-asymmetry]"), asymmetry(of("left"), of("right"), this.term) ?? "");
+    if (!this.root.querySelector("#strides-table").hidden) fill(this.root.querySelector("tbody"), rows, this.term);
+    this.rows = rows;
+  }
+
+  table(button) {
+    const shown = button.ariaPressed !== "true";
+    button.ariaPressed = String(shown);
+    this.root.querySelector("#strides-table").hidden = !shown;
+    this.strip.hidden = shown;
+    this.changed();
+  }
+}

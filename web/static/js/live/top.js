@@ -1,0 +1,49 @@
+// The bar on top and the one below: recording time, delay, Start, STOP, pause, the last mark.
+import { STALE_MS } from "./feed.js";
+import { setState } from "./shapes.js";
+import { clock, number, say } from "./words.js";
+
+// Sample to screen. Within a tenth of a second it feels at once (Card, Robertson & Mackinlay 1991, CHI: 0.1 s); from
+// STALE_MS on it is stale.
+const AT_ONCE_MS = 100;
+
+export class Top {
+  constructor(page) {
+    this.page = page;
+    this.at = (name) => page.querySelector(`[data-${name}]`);
+    this.button = (name) => page.querySelector(`[data-do=${name}]`);
+    setInterval(() => this.tick(), 500);
+  }
+
+  state(state) {
+    const running = state.state === "streaming";
+    this.now = running ? { elapsed: state.elapsed_s ?? 0, at: performance.now() } : null;
+    this.at("rec").hidden = !running;
+    say(this.at("rec-word"), state.tablet === "connected" ? "Recording" : "On the tablet");
+    this.at("delay").hidden = !running;
+    this.button("start").hidden = !(state.state === "open" && state.tablet === "connected");
+    this.button("stop").hidden = !running;
+    const marks = state.marks ?? [], last = marks.at(-1);
+    this.button("undo").disabled = !last;
+    say(this.at("last-mark"), last ? `Last mark: ${last.text ? `“${last.text}”, ` : ""}${clock(last.t_s)}` : "");
+    this.tick();
+  }
+
+  frame(frame) {
+    const ms = frame.delay_ms ?? null;
+    say(this.at("delay-ms"), ms === null ? "–" : `${number(ms)}\u2009ms`);
+    const kind = ms === null ? "none" : ms <= AT_ONCE_MS ? "ok" : ms <= STALE_MS ? "warn" : "bad";
+    setState(this.at("delay-state"), kind, { none: "", ok: "good", warn: "slow", bad: "late" }[kind]);
+  }
+
+  paused(feedback) {
+    const button = this.button("pause");
+    button.ariaPressed = String(Boolean(feedback.paused));
+    say(this.at("pause-word"), feedback.paused ? "Resume feedback" : "Pause feedback");
+    button.querySelector("use").setAttribute("href", feedback.paused ? "#i-play" : "#i-pause");
+  }
+
+  tick() {
+    if (this.now) say(this.at("elapsed"), clock(this.now.elapsed + (performance.now() - this.now.at) / 1000));
+  }
+}
