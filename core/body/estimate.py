@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from math import degrees, radians
 from typing import Final, get_args
 
 import numpy as np
@@ -22,7 +21,7 @@ from core.body.erkf_health import erkf_health, erkf_notices
 from core.body.erkf_poses import figure, foot_tracks, refined, run_erkf
 from core.body.erkf_start import start_state
 from core.body.feet import FootTracks
-from core.body.headings import WARN, agreed, findings
+from core.body.headings import agreed, findings, told
 from core.body.kinematics import forward_kinematics
 from core.body.l7s import free_acceleration, l7s_poses
 from core.body.l7s_filter import L7sParams
@@ -33,12 +32,9 @@ from core.body.smoother import smooth
 from core.body.still import FOOT_STILL, still_samples
 from core.body.tree import PRESETS, person_tree
 from core.calibration.result import CalibratedRecording
-from core.errors import EstimationError, Notice, ParameterError, Severity
+from core.errors import EstimationError, Notice, ParameterError
 from core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
 from core.fusion.orientations import Orientations
-
-TELL_HEADING: Final = radians(10.0)
-"""A forward axis off by more is told: beyond what soft tissue does to the joints' own view of it."""
 
 ON_A_BELT: Final = (
     "On a treadmill a foot on the belt does not rest in the room, as the estimator takes it to. Positions "
@@ -199,7 +195,7 @@ class _Take:
         poses = replace(
             poses,
             health=(*health, *findings(errors)),
-            notices=(*poses.notices, *erkf_notices(run, health), *_corrected(errors)),
+            notices=(*poses.notices, *erkf_notices(run, health), *told(errors)),
             diagnostics={"heading_error_rad": errors},
         )
         return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body))
@@ -238,20 +234,6 @@ class _Take:
             notices=(*made.poses.notices, *erkf_notices(run, health)),
         )
         return replace(made, poses=poses, feet=foot_tracks(run, refined(run, self.orientations), self.body))
-
-
-def _corrected(errors: Mapping[Segment, float]) -> tuple[Notice, ...]:
-    off = [s for s in errors if abs(errors[s]) > TELL_HEADING]
-    if not off:
-        return ()
-    worst = max(off, key=lambda s: abs(errors[s]))
-    message = (
-        f"The joints show that calibration took the wrong way for forward at {', '.join(off)}, by up to "
-        f"{degrees(abs(errors[worst])):.0f}° ({worst}); it was turned. Frontal and transverse angles there "
-        "are less certain."
-    )
-    severity: Severity = "warning" if abs(errors[worst]) > WARN else "info"
-    return (Notice("heading_corrected", message, sensor=worst, severity=severity),)
 
 
 def _without(orientations: Orientations, failed: Collection[Segment]) -> Orientations:

@@ -23,6 +23,7 @@ from core.body.model import BodyModel
 from core.body.smoother import smooth
 from core.body.tree import person_tree
 from core.calibration.result import CalibratedRecording
+from core.errors import Notice, Severity
 from core.frames import Segment
 from core.fusion.orientations import Orientations
 from core.rest import samples
@@ -41,6 +42,9 @@ WARN: Final = radians(15.0)
 BAD: Final = radians(60.0)
 """A start this far off need not come back (spec/real-data.md §0.4), and no mounting is taken so wrongly: two
 sensors are exchanged, or one was turned during the take."""
+
+TELL: Final = radians(10.0)
+"""A forward axis off by more is told: beyond what soft tissue does to the joints' own view of it."""
 
 SETTLED: Final = radians(5.0)
 """A pass that turns nothing further is the last: what remains is below half a degree."""
@@ -75,6 +79,21 @@ def findings(total: Mapping[Segment, float]) -> tuple[Finding, ...]:
         Finding("forward_axis_turned_deg", s, degrees(abs(x)), warn=degrees(WARN), bad=degrees(BAD))
         for s, x in total.items()
     )
+
+
+def told(total: Mapping[Segment, float]) -> tuple[Notice, ...]:
+    """What the reader must know of what `agreed` had to turn: `heading_corrected`."""
+    off = [s for s in total if abs(total[s]) > TELL]
+    if not off:
+        return ()
+    worst = max(off, key=lambda s: abs(total[s]))
+    message = (
+        f"The joints show that calibration took the wrong way for forward at {', '.join(off)}, by up to "
+        f"{degrees(abs(total[worst])):.0f}° ({worst}); it was turned. Frontal and transverse angles there "
+        "are less certain."
+    )
+    severity: Severity = "warning" if abs(total[worst]) > WARN else "info"
+    return (Notice("heading_corrected", message, sensor=worst, severity=severity),)
 
 
 def heading_errors(

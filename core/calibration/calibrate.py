@@ -99,7 +99,13 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
             notices.append(Notice(error.code, error.message, sensor=s))
     for f in found.values():
         notices += f.notices
-    notices += _few_steps(found, standing, q, walk)
+    steps = _straight_steps(found, standing, q, walk)
+    if steps is not None and steps < FEW_STEPS:
+        message = (
+            f"Calibration saw about {steps} straight steps, {FEW_STEPS} or more are good; walk further "
+            "straight."
+        )
+        notices.append(Notice("few_steps", message))
     if facing:
         notices.append(
             Notice(
@@ -118,6 +124,7 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
         method=params.method,
         notices=tuple(notices),
         diagnostics={s: {"method": f.method, "score": f.score, **f.facts} for s, f in found.items()},
+        straight_steps=steps,
     )
     return CalibratedRecording(recording, calibration)
 
@@ -185,25 +192,19 @@ def _mounted(standing: Standing, found: Anterior) -> SegmentCalibration:
     )
 
 
-def _few_steps(
+def _straight_steps(
     found: Mapping[Segment, Anterior],
     standing: Mapping[Segment, Standing],
     q: Mapping[Segment, Floats],
     walk: Walk,
-) -> list[Notice]:
-    """Say so when the direction rests on fewer than eight steps: twice the swings of one leg sensor."""
+) -> int | None:
+    """Steps that the direction rests on: twice the swings of one leg sensor."""
     leg = next((s for s in found if s not in TRUNK), None)
     if leg is None or not walk.parts:
-        return []
+        return None
     up = rotate(conjugate(q[leg]), np.array([0.0, 0.0, 1.0]))
     R = about_vertical(-found[leg].angle) @ vertical_frame(standing[leg].up)
-    steps = 2 * _swings(sagittal_angle(up, R), walk.mask)
-    if steps >= FEW_STEPS:
-        return []
-    message = (
-        f"Calibration saw about {steps} straight steps, {FEW_STEPS} or more are good; walk further straight."
-    )
-    return [Notice("few_steps", message)]
+    return 2 * _swings(sagittal_angle(up, R), walk.mask)
 
 
 def _swings(angle: Floats, walking: Bools) -> int:

@@ -40,6 +40,7 @@ class Calibration:
     rest, walking : windows that were used; `walking` may be several straight parts.
     zero : window whose mean joint angles are subtracted (`angle_zero: standing`).
     turning : (n,) mask on the uniform axis, True while turning.
+    straight_steps : in `walking`, about; None without a leg sensor or a walk.
     """
 
     segments: Mapping[Segment, SegmentCalibration]
@@ -50,6 +51,7 @@ class Calibration:
     method: str
     notices: tuple[Notice, ...] = ()
     diagnostics: Mapping[str, object] = field(default_factory=dict)
+    straight_steps: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
