@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import tracemalloc
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 
 from core.errors import InputError
 from core.formats.live_log import FILE_MARK, Record, hello_json, record
-from server.storage import segments
+from server.storage import fs, segments
 from tests.live_takes import HELLO, frame, stored
 
 FRAMES = [frame(i) for i in range(4)]
@@ -98,6 +99,27 @@ def test_going_back_cuts_off_what_was_not_synced(tmp_path: Path) -> None:
     log.append(PIECES[1])
     log.close()
     assert path.read_bytes() == HEAD + PIECES[0] + PIECES[1]
+
+
+def test_an_append_that_was_torn_is_cut_off_before_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Torn(fs.System):
+        def write(self, fd: int, data: bytes | memoryview) -> int:
+            if len(data) < len(PIECES[0]):
+                raise OSError(errno.ENOSPC, "full")
+            return super().write(fd, data[: len(data) // 2])
+
+    path = tmp_path / "t.log"
+    log = segments.create(path, hello_json(HELLO))
+    monkeypatch.setattr(fs, "system", Torn())
+    with pytest.raises(OSError, match="full"):
+        log.append(PIECES[0])
+    assert log.size == len(HEAD) < path.stat().st_size
+    monkeypatch.setattr(fs, "system", fs.System())
+    log.append(PIECES[1])
+    log.close()
+    assert path.read_bytes() == HEAD + PIECES[1]
 
 
 @pytest.mark.parametrize("there", [b"", WHOLE[:4], HEAD[:-1]])
