@@ -1,8 +1,9 @@
-"""What the live pages start with, as plain values: curves' scales and norms, terms, prescription, addresses."""
+"""What the live pages start with, as plain values: scales and norms of curves, terms, prescription."""
 
 from __future__ import annotations
 
 from typing import Any, Final
+from urllib.parse import urlsplit
 
 from sqlalchemy import Connection, select
 
@@ -28,6 +29,8 @@ UNPRESCRIBED: Final = (
 )
 """What the strip of strides offers to watch when nothing is prescribed."""
 
+LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
+
 GAIT_SPEED: Final = "gait_speed_mps"
 
 
@@ -47,6 +50,7 @@ def live_view(c: Connection, session: Session, patient: Patient, *, capture: str
         note = f"Norm: {source.n} {who}, mean ± 1 SD. Angles {ZERO_WORDS['standing']}; compare shapes."
     return {
         "capture": capture,
+        "only_here": urlsplit(capture).hostname in LOOPBACK,
         "protocol": PROTOCOL_NAMES.get(session.protocol, session.protocol),
         "joints": [(v.name, JOINTS[v.name]) for v in shown],
         "given": given,

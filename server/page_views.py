@@ -12,7 +12,7 @@ from server.auth.roles import Role
 from server.jobs.queue import JobView
 from server.report.exports import parameter_row
 from server.report.wording import TERMS
-from server.services import analyses, jobs, reviews, sessions
+from server.services import analyses, jobs, live, reviews, sessions
 from server.services.patients import Patient
 from server.storage.blobs import BlobStore
 from server.storage.tables import ACTIVE_STATES, job, patient
@@ -94,13 +94,13 @@ def patient_view(p: Patient) -> dict[str, Any]:
 def patient_rows(c: Connection, found: Sequence[Patient]) -> list[dict[str, Any]]:
     """Rows of the patients list, each with the state of its latest visit."""
     rows = []
+    streaming = {take.patient_id: take.session_id for take in live.streaming(c)}
     for p in found:
         visits = sessions.of_patient(c, p.id)
         running = _running(c, [v.id for v in visits]) if p.running else None
         last = status(visits[0].state) if visits else {"kind": "none", "text": "No session yet"}
-        rows.append(
-            patient_view(p) | {"visits": p.sessions, "last": p.last_visit, "job": running, "status": last}
-        )
+        row = {"visits": p.sessions, "last": p.last_visit, "job": running, "status": last}
+        rows.append(patient_view(p) | row | {"live": streaming.get(p.id)})
     follow_few([row["job"] for row in rows])
     return rows
 
@@ -118,13 +118,15 @@ def running_jobs(c: Connection) -> int:
 def visits(c: Connection, blobs: BlobStore, patient_id: str, *, results: bool) -> list[dict[str, Any]]:
     """The visits of a patient, newest first, with the key parameters of each visit's latest analysis."""
     rows = []
+    streaming = {take.session_id for take in live.streaming(c)}
     for s in sessions.of_patient(c, patient_id):
         latest = analyses.latest(c, s.id) if results else None
         cells, strides = key_cells(_parameters(c, blobs, latest) if latest else [])
         rows.append(
             {
                 **vars(s),
-                "href": f"/sessions/{s.id}" + ("/upload" if s.state in {"empty", "uploaded"} else ""),
+                "href": f"/sessions/{s.id}{_page_of(s, live=s.id in streaming)}",
+                "live": s.id in streaming,
                 "protocol_name": PROTOCOL_NAMES.get(s.protocol, s.protocol),
                 "cells": cells,
                 "strides": strides,
@@ -134,6 +136,13 @@ def visits(c: Connection, blobs: BlobStore, patient_id: str, *, results: bool) -
         )
     follow_few([row["job"] for row in rows])
     return rows
+
+
+def _page_of(s: sessions.Session, *, live: bool) -> str:
+    """The page of a session on which there is something to do."""
+    if live:
+        return "/live"
+    return "/upload" if s.state in {"empty", "uploaded"} else ""
 
 
 def _parameters(c: Connection, blobs: BlobStore, found: analyses.Analysis) -> Sequence[Mapping[str, Any]]:

@@ -17,7 +17,7 @@ from server.report.model import ReportModel
 from server.report.panels import CurvePanel
 from server.report.table import Row
 from server.report.wording import ZERO_WORDS
-from server.services import analyses, controls, patients, recordings, reports, reviews, sessions
+from server.services import analyses, controls, live, patients, recordings, reports, reviews, sessions
 from server.storage.blobs import BlobStore
 from web.words import day, seconds
 
@@ -90,6 +90,7 @@ def base(c: Connection, session_id: str) -> dict[str, Any]:
     session = sessions.get(c, session_id)
     patient = patients.get(c, session.patient_id)
     job = newest_job(c, session_id)
+    take = live.current(c, session_id)
     return {
         "session": session,
         "patient": patient,
@@ -97,6 +98,7 @@ def base(c: Connection, session_id: str) -> dict[str, Any]:
         "recording": recordings.current(c, session_id),
         "job": None if job is None else job_dict(job),
         "stages": list(STAGE_NAMES.items()),
+        "live_now": take.state if take is not None and take.is_open else None,
         "report": None,
     }
 

@@ -1,6 +1,6 @@
 """Live takes: opened for a session, joined to a tablet by a code, ended; the log then becomes a recording.
 
-    pairing ──code──> open ──first hello──> streaming ──finish──> finished
+    pairing ──code──> open ──first batch──> streaming ──finish──> finished
        └───────────────┴───────── close ────────┴────────────────> closed
 
 The order at the end is what survives a crash: first the take is over (row), then the log is a stored file,
@@ -52,7 +52,7 @@ class Take:
     Parameters
     ----------
     state : pairing (waits for a tablet), open (paired), streaming (samples are coming or came), finished (the
-        tablet ended it), closed (ended here). source : what the tablet streams, None before its first hello.
+        tablet ended it), closed (ended here). source : what the tablet streams, None before its first.
     count, sha256 : batches and the tablet's digest of their payloads, at the end.
     recording_id : what the take became; None while it runs and when nothing came.
     problem : code of what was wrong at the end, finish_mismatch.
@@ -187,7 +187,7 @@ def by_token(c: Connection, take_id: str, token: str) -> Take | None:
 
 
 def started(c: Connection, take_id: str, source: str, prescription_id: str | None) -> Take:
-    """Note the first hello."""
+    """Note the first samples and what they are used for."""
     c.execute(
         update(live_take)
         .where(live_take.c.id == take_id, live_take.c.state.in_(("pairing", "open")))
@@ -251,8 +251,8 @@ def require_open(c: Connection, session_id: str) -> Take:
     return this
 
 
-def running(c: Connection) -> list[Take]:
-    """All open takes that a tablet has spoken to."""
+def streaming(c: Connection) -> list[Take]:
+    """All takes into which samples come now."""
     rows = c.execute(_QUERY.where(live_take.c.state == "streaming").order_by(live_take.c.created_at))
     return [Take(**row._asdict()) for row in rows]
 

@@ -32,7 +32,8 @@ function same(form) {
 // "/sessions/{id}" is filled from the answer, so a form can lead to what it made.
 const fill = (pattern, data) => pattern.replace(/\{(\w+)\}/g, (_, k) => encodeURIComponent(data[k]));
 
-async function send(form) {
+// A form with two ways on has them on its buttons.
+async function send(form, then = form.dataset.then) {
   const [method, path] = form.dataset.api.split(" ");
   const note = form.querySelector(".form-error");
   const buttons = form.querySelectorAll("button");
@@ -40,7 +41,6 @@ async function send(form) {
   form.setAttribute("aria-busy", "true");
   try {
     const data = await request(method, path, method === "DELETE" ? undefined : values(form));
-    const then = form.dataset.then;
     if (then === "reload" || !then) location.reload();
     else location.assign(fill(then, data));
   } catch (problem) {
@@ -55,7 +55,7 @@ document.addEventListener("submit", (e) => {
   const form = e.target;
   if (!form.dataset.api) return;
   e.preventDefault();
-  if (same(form)) send(form);
+  if (same(form)) send(form, e.submitter?.dataset.then ?? form.dataset.then);
 });
 document.addEventListener("input", (e) => e.target.matches("[data-same]") && e.target.setCustomValidity(""));
 

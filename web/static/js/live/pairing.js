@@ -2,6 +2,8 @@
 import { request, showProblem } from "../api.js";
 import { code as grouped, clock, say } from "./words.js";
 
+const TAKEN = new Set(["pairing", "open"]);
+
 export class Pairing {
   constructor(root, api) {
     this.root = root;
@@ -34,6 +36,7 @@ export class Pairing {
 
   // What the feed says of a take that does not stream yet.
   state(state) {
+    if (!TAKEN.has(state.state)) return this.show(null);
     this.show({ code: null });
     const paired = state.state === "open";
     say(this.root.querySelector("[data-waiting]"), paired ? "The tablet is paired. Choose the sensors there and press Start." : "Waiting for the tablet");

@@ -1,5 +1,7 @@
 // One bar: long steps on top. The ball is where the last step was, the zone is where it should be.
-const TOP = 60, BOTTOM = 420, CENTRE = 178, HALF = 66; // the drawing's own units
+const TOP = 60, BOTTOM = 420, CENTRE = 178; // the drawing's own units
+// In the zone the ball lies wholly inside, out of it wholly outside: nobody has to judge an edge.
+const INSIDE = 10, BESIDE = 112, STEP = 44;
 
 export class Bar {
   constructor(scene, { side, lengths, words }) {
@@ -16,7 +18,8 @@ export class Bar {
 
   // error in widths of the zone's half, up is more
   show(error, kind) {
-    const y = Math.min(BOTTOM, Math.max(TOP, CENTRE - HALF * error));
+    const off = kind === "in" ? INSIDE * error : Math.sign(error) * (BESIDE + STEP * Math.max(0, Math.abs(error) - 1));
+    const y = Math.min(BOTTOM, Math.max(TOP, CENTRE - off));
     this.ball.setAttribute("transform", `translate(450 ${y})`);
     this.ball.setAttribute("class", kind);
   }

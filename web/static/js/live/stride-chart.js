@@ -5,7 +5,7 @@ import { SHORT, number, say } from "./words.js";
 const SIDES = ["left", "right"];
 const THIN = 3; // last strides drawn thin, of each side
 const THIN_ALPHA = 0.5;
-const EDGE = { left: 34, right: 8, top: 20, bottom: 34 };
+const EDGE = { left: 34, right: 14, top: 20, bottom: 34 };
 const TICKS = [0, 20, 40, 60, 80, 100];
 const KEEP_S = 3; // of samples behind now: longer than any stride we draw
 

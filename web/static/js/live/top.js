@@ -25,7 +25,8 @@ export class Top {
     this.button("stop").hidden = !running;
     const marks = state.marks ?? [], last = marks.at(-1);
     this.button("undo").disabled = !last;
-    say(this.at("last-mark"), last ? `Last mark: ${last.text ? `“${last.text}”, ` : ""}${clock(last.t_s)}` : "");
+    const text = last?.value?.text, at = last?.value?.t_s ?? last?.t_s;
+    say(this.at("last-mark"), last ? `Last mark: ${text ? `“${text}”, ` : ""}${clock(at)}` : "");
     this.tick();
   }
 
