@@ -24,7 +24,9 @@ from server.api import (
     files,
     health,
     jobs,
+    live,
     patients,
+    prescriptions,
     programmes,
     reports,
     reviews,
@@ -46,6 +48,9 @@ from server.auth.sessions import Logins
 from server.auth.throttle import Throttle
 from server.jobs.feed import JobFeed
 from server.jobs.table import TableQueue
+from server.live import feed as live_feed
+from server.live import tablet
+from server.live.hub import Hub
 from server.services.provenance import CODE_VERSION
 from server.settings import Settings
 from server.storage.blobs import BlobStore
@@ -105,6 +110,7 @@ def create_app(settings: Settings) -> FastAPI:
     for part in (
         sign_in,
         patients,
+        prescriptions,
         programmes,
         sessions,
         files,
@@ -113,11 +119,13 @@ def create_app(settings: Settings) -> FastAPI:
         reviews,
         trends,
         comparisons,
+        live,
         jobs,
         users,
         audit_log,
     ):
         api.include_router(part.router)
+    api.include_router(tablet.router)
 
     @api.get("/openapi.json", include_in_schema=False)
     def document(who: Annotated[Identity, require(Action.READ_API)]) -> dict[str, Any]:
@@ -133,6 +141,7 @@ def create_app(settings: Settings) -> FastAPI:
         number_pages.router,
         capture_pages.router,
         live_pages.router,
+        live_feed.router,
         proxy.router,
     ):
         app.include_router(router)
@@ -154,8 +163,11 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     app.state.logins = Logins(
         db, dt.timedelta(minutes=settings.idle_minutes), dt.timedelta(hours=settings.absolute_hours)
     )
+    app.state.hub = Hub(settings, db, app.state.blobs, app.state.queue)
+    await app.state.hub.start()
     try:
         yield
     finally:
+        await app.state.hub.stop()
         app.state.feed.close()
         db.close()

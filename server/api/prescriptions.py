@@ -1,0 +1,85 @@
+"""Prescriptions of biofeedback, the targets they may have, and what came of them in a session."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+
+from core.feedback import PARAMETERS
+from core.feedback.prescription import SOURCES
+from server import feedback_schemas as schemas
+from server.api.context import Blobs, Db, Id
+from server.api.documents import refusals
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.problems import Problem
+from server.report.feedback_words import prescription_words
+from server.schemas import Side
+from server.services import patients, prescriptions, targets
+from server.services.prescriptions import Written
+
+router = APIRouter(tags=["feedback"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+Therapist = Annotated[Identity, require(Action.RUN_LIVE)]
+
+
+@router.get("/patients/{patient_id}/prescriptions", response_model=list[schemas.Prescription])
+def list_prescriptions(patient_id: Id, db: Db, who: Reader) -> list[dict[str, Any]]:
+    """The patient's prescriptions, the newest first; one that has not ended is in force."""
+    with db.read() as c:
+        patients.get(c, patient_id)
+        return [_shown(w) for w in prescriptions.of_patient(c, patient_id)]
+
+
+@router.post("/patients/{patient_id}/prescriptions", status_code=201, response_model=schemas.Prescription)
+def write_prescription(
+    patient_id: Id, body: schemas.PrescriptionNew, db: Db, blobs: Blobs, who: Therapist
+) -> dict[str, Any]:
+    """Prescribe feedback; the prescription in force ends."""
+    with db.write() as c:
+        return _shown(prescriptions.write(c, blobs, who, patient_id, body.model_dump(exclude_unset=True)))
+
+
+@router.post(
+    "/prescriptions/{prescription_id}/end", response_model=schemas.Prescription, responses=refusals(409)
+)
+def end_prescription(prescription_id: Id, db: Db, who: Therapist) -> dict[str, Any]:
+    """End a prescription; the record stays."""
+    with db.write() as c:
+        return _shown(prescriptions.end(c, who, prescription_id))
+
+
+@router.get("/patients/{patient_id}/targets", response_model=list[schemas.TargetOffer])
+def read_targets(
+    patient_id: Id,
+    db: Db,
+    blobs: Blobs,
+    who: Reader,
+    parameter: Annotated[str, Query(max_length=64, description="one that a prescription can train")],
+    side: Annotated[Side | None, Query(description="that is trained; none = both")] = None,
+) -> list[dict[str, Any]]:
+    """What each source gives as target of a parameter for this person, or why it gives nothing."""
+    if parameter not in PARAMETERS:
+        raise Problem(
+            422, "bad_value", f"'{parameter}' cannot be trained; expected one of {', '.join(PARAMETERS)}."
+        )
+    with db.read() as c:
+        walk = targets.last_walk(c, blobs, patients.get(c, patient_id))
+    offers = [(source, targets.offer(walk, source, parameter, side)) for source in SOURCES]
+    return [
+        {
+            "source": source,
+            "mean": None if o.target is None else o.target.mean,
+            "sd": None if o.target is None else o.target.sd,
+            "words": None if o.target is None else o.target.words,
+            "reason": o.reason,
+        }
+        for source, o in offers
+    ]
+
+
+def _shown(written: Written) -> dict[str, Any]:
+    said = [f"{label}: {text}" for label, text in prescription_words(written.content)]
+    return {**vars(written), "content": written.content.to_json(), "words": said}

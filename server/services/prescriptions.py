@@ -1,0 +1,243 @@
+"""Prescriptions of biofeedback: written, replaced, ended, and made ready for a live take.
+
+A record never changes: to change it ends it and writes another, so that every take and its cues point to what
+was in force. One is in force at a time; one parameter is trained (spec/clinic.md §4).
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from sqlalchemy import Connection, insert, select, update
+
+from core.change import detectable
+from core.change.limits import Limb
+from core.feedback import Baseline, Cue, Prescription
+from server import audit
+from server.services import patients, sessions, targets
+from server.services.errors import Conflict, NotFound, ServiceError
+from server.services.patients import Patient
+from server.services.targets import Walk
+from server.storage.blobs import BlobStore
+from server.storage.tables import live_event, live_take, new_id, now, prescription, session, user
+
+
+@dataclass(frozen=True)
+class Written:
+    """A prescription of a patient.
+
+    Parameters
+    ----------
+    content : what is trained, its target in numbers as of that day. by : who wrote it, None = the program.
+    ended_at : None while in force.
+    """
+
+    id: str
+    patient_id: str
+    content: Prescription
+    created_at: dt.datetime
+    by: str | None
+    ended_at: dt.datetime | None
+
+
+def write(
+    c: Connection,
+    blobs: BlobStore,
+    actor: audit.Actor | None,
+    patient_id: str,
+    content: Mapping[str, object],
+) -> Written:
+    """Prescribe feedback; what was in force ends.
+
+    Raises
+    ------
+    NotFound: the patient. ParameterError bad_prescription: a field is not as expected. ServiceError
+    no_target: its source gives no numbers for this person; the sentence says why.
+    """
+    patient = patients.get(c, patient_id)
+    asked = Prescription.from_json(content)
+    made = _with_target(c, blobs, patient, asked)
+    before = in_force(c, patient_id)
+    if before is not None:
+        _end(c, actor, before)
+    written_id = new_id()
+    c.execute(
+        insert(prescription).values(
+            id=written_id,
+            patient_id=patient_id,
+            content=made.to_json(),
+            created_at=now(),
+            created_by=actor.user_id if actor else None,
+        )
+    )
+    audit.record(c, actor, "prescription.written", "patient", patient_id, _said(written_id, made))
+    return get(c, written_id)
+
+
+def end(c: Connection, actor: audit.Actor | None, prescription_id: str) -> Written:
+    """End a prescription; raises NotFound, Conflict prescription_ended."""
+    this = get(c, prescription_id)
+    if this.ended_at is not None:
+        raise Conflict("prescription_ended", "This prescription has ended already; write a new one instead.")
+    _end(c, actor, this)
+    return get(c, prescription_id)
+
+
+def get(c: Connection, prescription_id: str) -> Written:
+    """One prescription; raises NotFound."""
+    row = c.execute(_QUERY.where(prescription.c.id == prescription_id)).first()
+    if row is None:
+        raise NotFound("prescription", prescription_id)
+    return _written(row)
+
+
+def of_patient(c: Connection, patient_id: str) -> list[Written]:
+    """All prescriptions of a patient, the newest first."""
+    query = _QUERY.where(prescription.c.patient_id == patient_id)
+    rows = c.execute(query.order_by(prescription.c.created_at.desc(), prescription.c.id))
+    return [_written(row) for row in rows]
+
+
+def in_force(c: Connection, patient_id: str) -> Written | None:
+    """The prescription that holds now, None without one."""
+    return next((w for w in of_patient(c, patient_id) if w.ended_at is None), None)
+
+
+def for_take(c: Connection, blobs: BlobStore, session_id: str) -> tuple[Prescription, Baseline] | None:
+    """What a live take of this session trains, its target in numbers; None where nothing is prescribed.
+
+    A norm follows the person's speed: it is looked up for the last walk before this session. Where that gives
+    none, and for every other source, the numbers of the day of writing hold.
+    """
+    this = sessions.get(c, session_id)
+    written = in_force(c, this.patient_id)
+    if written is None:
+        return None
+    patient = patients.get(c, this.patient_id)
+    walk = targets.last_walk(c, blobs, patient, before=this)
+    content = written.content
+    if content.target.source == "norm":
+        fresh = targets.offer(walk, "norm", content.parameter, content.side).target
+        content = content if fresh is None else replace(content, target=fresh)
+    return content, _baseline(c, written, patient, walk, session_id)
+
+
+def cues(c: Connection, take_ids: Sequence[str]) -> list[Cue]:
+    """The cues of these takes in the order they were given."""
+    query = (
+        select(live_event.c.content)
+        .where(live_event.c.kind == "cue", live_event.c.take_id.in_(take_ids))
+        .order_by(live_event.c.seq)
+    )
+    return [Cue.from_json(content) for content in c.execute(query).scalars()]
+
+
+@dataclass(frozen=True)
+class Training:
+    """A live take with feedback."""
+
+    take_id: str
+    session_id: str
+    performed_on: dt.date
+    prescription_id: str
+    content: Prescription
+
+
+def trainings(c: Connection, patient_id: str) -> list[Training]:
+    """All live takes of a patient that gave cues, the oldest first."""
+    gave = select(live_event.c.seq).where(live_event.c.take_id == live_take.c.id, live_event.c.kind == "cue")
+    query = (
+        select(
+            live_take.c.id,
+            live_take.c.session_id,
+            session.c.performed_on,
+            prescription.c.id,
+            prescription.c.content,
+        )
+        .join(session, session.c.id == live_take.c.session_id)
+        .join(prescription, prescription.c.id == live_take.c.prescription_id)
+        .where(session.c.patient_id == patient_id, gave.exists())
+        .order_by(session.c.performed_on, live_take.c.created_at, live_take.c.id)
+    )
+    return [Training(*row[:4], Prescription.from_json(row[4])) for row in c.execute(query)]
+
+
+def same_training(a: Prescription, b: Prescription) -> bool:
+    """Whether what was trained is the same: a new schedule ends a record, not the training."""
+    return (a.parameter, a.side) == (b.parameter, b.side)
+
+
+def _with_target(c: Connection, blobs: BlobStore, patient: Patient, asked: Prescription) -> Prescription:
+    source = asked.target.source
+    if source == "manual":
+        return replace(asked, target=replace(asked.target, words="entered", session_id=None))
+    chosen = None if source == "norm" else asked.target.session_id
+    walk = targets.last_walk(c, blobs, patient, session_id=chosen)
+    found = targets.offer(walk, source, asked.parameter, asked.side)
+    if found.target is None:
+        raise ServiceError("no_target", found.reason or "")
+    return replace(asked, target=replace(found.target, source=source))
+
+
+def _baseline(
+    c: Connection, written: Written, patient: Patient, walk: Walk | None, session_id: str
+) -> Baseline:
+    content = written.content
+    given = trainings(c, patient.id)
+    alike = [t for t in given if same_training(t.content, content)]
+    today = any(t.session_id == session_id for t in alike)
+    baseline = Baseline(
+        last_level=_last_level(c, [t for t in given if t.prescription_id == written.id]),
+        # the block opens the visit, not its later takes
+        after_training=bool(alike) and not today,
+    )
+    if walk is None:
+        return baseline
+    usual = targets.usual(walk, content.parameter, content.side)
+    if usual is not None:
+        baseline = replace(baseline, mean=usual.mean, sd=usual.sd, n=usual.n, session_id=walk.session.id)
+    if content.side is None:
+        return baseline
+    other = targets.other(content.side)
+    there = targets.usual(walk, content.parameter, other)
+    if there is None or there.mean is None:
+        return baseline
+    limb: Limb | None = None
+    if patient.affected_side is not None:
+        limb = "affected" if other == patient.affected_side else "unaffected"
+    mdc = detectable(content.parameter, there.mean, limb)
+    if mdc is None:
+        return baseline
+    return replace(baseline, other_mdc=mdc.value, other_mdc_source=f"MDC, {mdc.source}")
+
+
+def _last_level(c: Connection, own: Sequence[Training]) -> int | None:
+    """Level of the last cue of the training proper; a block a visit opens with may have none yet."""
+    for training in reversed(own):
+        given = [q for q in cues(c, [training.take_id]) if q.why_not not in {"baseline", "retention"}]
+        if given:
+            return given[-1].level
+    return None
+
+
+def _end(c: Connection, actor: audit.Actor | None, this: Written) -> None:
+    c.execute(update(prescription).where(prescription.c.id == this.id).values(ended_at=now()))
+    audit.record(c, actor, "prescription.ended", "patient", this.patient_id, _said(this.id, this.content))
+
+
+def _said(written_id: str, content: Prescription) -> dict[str, object]:
+    return {"prescription_id": written_id, "parameter": content.parameter, "side": content.side}
+
+
+_QUERY = select(prescription, user.c.display_name.label("by")).join(
+    user, user.c.id == prescription.c.created_by, isouter=True
+)
+
+
+def _written(row: Any) -> Written:
+    return Written(
+        row.id, row.patient_id, Prescription.from_json(row.content), row.created_at, row.by, row.ended_at
+    )

@@ -1,0 +1,172 @@
+"""Targets of biofeedback in numbers: the norm at a person's speed, the other side, their own baseline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Final
+
+from sqlalchemy import Connection
+
+from core.feedback import Target
+from core.feedback.prescription import TargetSource
+from core.frames import SIDES, Side
+from core.norms import Norms, NormValue
+from core.norms.values import ANGLES
+from core.parameters.result import Parameter
+from server.report.notes import GROUPS
+from server.report.numbers import Numbers
+from server.report.wording import NO_NORM
+from server.services import comparisons, controls, histories, reviews
+from server.services.patients import Patient
+from server.services.sessions import Session
+from server.storage.blobs import BlobStore
+
+FEWEST: Final = 5
+"""Strides below which a person's own mean and SD are no target (our choice)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """An analysed session of a person with what it is compared with."""
+
+    session: Session
+    numbers: Numbers
+    norms: Norms
+    own_controls: Norms | None
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What a source gives, or a sentence that says why it gives nothing."""
+
+    target: Target | None
+    reason: str | None = None
+
+
+def last_walk(
+    c: Connection,
+    blobs: BlobStore,
+    patient: Patient,
+    before: Session | None = None,
+    session_id: str | None = None,
+) -> Walk | None:
+    """The newest analysed session of a person; None without one.
+
+    Parameters
+    ----------
+    before : only sessions of its protocol on its day or earlier, itself not. session_id : only this one.
+    """
+    found = [
+        a
+        for a in histories.analysed(c, patient.id)
+        if a.session.protocol in {"walk", "treadmill"}
+        and session_id in {None, a.session.id}
+        and (before is None or _earlier(a.session, before))
+    ]
+    if not found:
+        return None
+    last = found[-1]
+    numbers = reviews.numbers(blobs, last.found, last.edits)
+    speed = _mean(numbers, "gait_speed_mps", None)
+    group = controls.group(
+        blobs, controls.visits(c, patient, last.session), None if speed is None else speed.mean
+    )
+    return Walk(
+        last.session,
+        numbers,
+        comparisons.norms(patient, last.session, numbers),
+        None if group is None or speed is None else group.norms(speed.mean),
+    )
+
+
+def offer(walk: Walk | None, source: TargetSource, parameter: str, side: Side | None) -> Offer:
+    """What a source gives as target of a parameter, from a person's last walk.
+
+    Parameters
+    ----------
+    side : that is to be trained, None = both.
+    """
+    if source == "manual":
+        return Offer(None, "Enter mean and SD.")
+    if walk is None:
+        return Offer(None, "No walk of this person is analysed yet. Analyse one first, or enter a target.")
+    if source == "norm":
+        return _norm(walk, parameter)
+    if source == "own_baseline":
+        return _own(walk, parameter, side)
+    if side is None:
+        return Offer(None, "Both sides are trained. Choose the one that is, the other is then the target.")
+    return _own(walk, parameter, other(side))
+
+
+def other(side: Side) -> Side:
+    """The opposite side."""
+    return "right" if side == "left" else "left"
+
+
+def usual(walk: Walk, parameter: str, side: Side | None) -> Parameter | None:
+    """What a person did in a walk: of a side, or of both together; None where it was not measured."""
+    found = _mean(walk.numbers, parameter, side) or _mean(walk.numbers, parameter, None)
+    if found is not None or side is not None:
+        return found
+    sides = [p for s in SIDES if (p := _mean(walk.numbers, parameter, s)) is not None]
+    return _together(sides) if sides else None
+
+
+def _norm(walk: Walk, parameter: str) -> Offer:
+    norms = walk.norms
+    own = None if walk.own_controls is None else walk.own_controls.values.get(parameter)
+    values = [norms.expected.get(parameter), norms.values.get(parameter), own]
+    found = next((v for v in values if v is not None and v.comparable and v.sd > 0.0), None)
+    if found is not None:
+        return Offer(Target("norm", found.mean, found.sd, _words(found), walk.session.id))
+    reason = norms.reason if parameter in ANGLES else norms.timing_reason
+    if reason is not None:
+        said = NO_NORM.get(reason, reason)
+    else:
+        there = next((v for v in values if v is not None), None)
+        said = "There is no norm of this parameter." if there is None else there.note
+    return Offer(None, f"{said} Choose another source, or enter a target.")
+
+
+def _own(walk: Walk, parameter: str, side: Side | None) -> Offer:
+    found = usual(walk, parameter, side)
+    where = "both sides" if side is None else f"{side} side"
+    if found is None or found.mean is None or not found.sd or found.n < FEWEST:
+        n = 0 if found is None else found.n
+        return Offer(
+            None,
+            f"The {where} has {n} strides with this parameter on {walk.session.performed_on}; expected at "
+            f"least {FEWEST} that differ. Choose another source, or enter a target.",
+        )
+    words = f"{where}, {found.n} strides on {walk.session.performed_on}"
+    source: TargetSource = "own_baseline"
+    return Offer(Target(source, found.mean, found.sd, words, walk.session.id))
+
+
+def _words(value: NormValue) -> str:
+    group = GROUPS.get(value.group, value.group)
+    people = "" if value.n is None else f", n = {value.n}"
+    return f"{group}{people} ({value.source})"
+
+
+def _mean(numbers: Numbers, name: str, side: Side | None) -> Parameter | None:
+    return next(
+        (p for p in numbers.parameters if (p.name, p.side) == (name, side) and p.mean is not None), None
+    )
+
+
+def _together(sides: list[Parameter]) -> Parameter:
+    """Strides of all sides as one: mean, and sd about it."""
+    n = sum(p.n for p in sides)
+    mean = sum(p.n * (p.mean or 0.0) for p in sides) / n
+    squares = sum((p.n - 1) * (p.sd or 0.0) ** 2 + p.n * ((p.mean or 0.0) - mean) ** 2 for p in sides)
+    first = sides[0]
+    return Parameter(first.name, None, n, mean, sqrt(squares / (n - 1)) if n > 1 else None, first.unit)
+
+
+def _earlier(a: Session, b: Session) -> bool:
+    if a.id == b.id or a.protocol != b.protocol:
+        return False
+    return (a.performed_on, a.created_at) < (b.performed_on, b.created_at)
