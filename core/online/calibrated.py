@@ -1,16 +1,40 @@
-"""What live calibration gives to the chain behind it."""
+"""The offline calibration on the samples of a live attempt, and what it gives to the chain behind it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
+from core.body import nominal_body
+from core.body.apart import legs_apart
+from core.body.choice import WHOLE, possible
+from core.body.erkf_params import ErkfParams
+from core.body.estimate import warm as warm_erkf
+from core.body.headings import agreed, told
 from core.body.model import BodyModel
+from core.calibration import CalibrationParams
 from core.calibration.result import CalibratedRecording
-from core.errors import Notice
+from core.errors import EstimationError, Notice
 from core.frames import Segment
+from core.fusion import MahonyParams, estimate
+from core.fusion import warm as warm_attitude
 from core.fusion.orientations import Orientations
 from core.online.frame import SegmentCheck
+from core.recording import UniformRecording
+
+
+@dataclass(frozen=True)
+class MountingParams:
+    """Parameters of the stages that find how the sensors sit: those of the offline pipeline.
+
+    Parameters
+    ----------
+    erkf : of the filter that the forward axes are made to agree with, as `PoseParams.erkf`.
+    """
+
+    calibration: CalibrationParams = field(default_factory=CalibrationParams)
+    fusion: MahonyParams = field(default_factory=MahonyParams)
+    erkf: ErkfParams = field(default_factory=ErkfParams.people)
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +43,7 @@ class LiveCalibration:
 
     Parameters
     ----------
-    calibrated : samples of the calibrated segments from `first` on, t_s from 0; its windows are in that time.
+    calibrated : samples of the working segments from `first` on, t_s from 0; its windows are in that time.
         Mountings are final: legs apart, forward axes agreed with the joints where the ErKF runs.
     orientations : of these samples, both ways (not causal); for comparison, not to go on from.
     first, past : on the live axis, index of the recording's first sample and the one after its last. The
@@ -38,3 +62,74 @@ class LiveCalibration:
     checks: tuple[SegmentCheck, ...]
     notices: tuple[Notice, ...]
     ok: bool
+
+
+def finished(
+    calibrated: CalibratedRecording, first: int, worn: Sequence[Segment], params: MountingParams
+) -> LiveCalibration:
+    """What follows the calibration proper offline, too: legs apart, forward axes that agree.
+
+    Parameters
+    ----------
+    calibrated : as `core.calibration.calibrate` gives it. worn : all segments, also those
+        without samples.
+
+    Raises
+    ------
+    EstimationError of `core.fusion.estimate`.
+    """
+    recording = calibrated.recording
+    subject = recording.subject
+    body, assumed = nominal_body(subject.height_m, subject.standing_width_m, subject.shoe)
+    calibrated, orientations = legs_apart(calibrated, estimate(calibrated, params.fusion), body)
+    notices = [*calibrated.calibration.notices, *assumed]
+    turned: dict[Segment, float] = {}
+    if possible(calibrated.calibration.segments)[:1] == ("erkf",):
+        try:
+            calibrated, orientations, turned = agreed(calibrated, orientations, body, WHOLE, params.erkf)
+            notices += told(turned)
+        except EstimationError as error:
+            notices.append(Notice(error.code, error.message, error.sensor))
+    notices += _missing(recording, worn)
+    checks = tuple(_check(s, calibrated, notices) for s in worn)
+    return LiveCalibration(
+        calibrated=calibrated,
+        orientations=orientations,
+        first=first,
+        past=first + len(recording.t_s),
+        body=body,
+        turned=turned,
+        checks=checks,
+        notices=tuple(notices),
+        ok=all(c.method is not None and all(n.severity == "info" for n in c.notices) for c in checks),
+    )
+
+
+def _missing(recording: UniformRecording, worn: Sequence[Segment]) -> list[Notice]:
+    return [
+        Notice(
+            "sensor_missing",
+            f"The {s} sensor sent nothing while the others stood; the take goes on without it. Connect it "
+            "and calibrate again.",
+            sensor=s,
+        )
+        for s in worn
+        if s not in recording.sensors
+    ]
+
+
+def _check(segment: Segment, calibrated: CalibratedRecording, notices: Sequence[Notice]) -> SegmentCheck:
+    mounted = calibrated.calibration.segments.get(segment)
+    own = tuple(n for n in notices if n.sensor == segment)
+    if mounted is None:
+        return SegmentCheck(segment, False, notices=own)
+    return SegmentCheck(segment, False, mounted.method, mounted.score, own)
+
+
+def warm() -> None:
+    """Load and compile all that a calibration needs, so that the first one does not take a second longer."""
+    import scipy.ndimage
+    import scipy.signal  # noqa: F401
+
+    warm_attitude()
+    warm_erkf()

@@ -1,0 +1,212 @@
+"""Calibration while the samples come: stand, walk, and the offline calibration as soon as there is enough.
+
+All is judged at fixed samples of the axis, every half second, so that it is a function of the samples and not
+of the blocks they came in. Standing and walking are told apart by the offline rules (core/rest.py,
+core/calibration/walking.py); that enough was walked is said by the offline calibration itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+
+from core.calibration import calibrate
+from core.calibration.calibrate import FEW_STEPS
+from core.calibration.walking import moving_mask
+from core.errors import Notice, SagittalError
+from core.frames import Segment
+from core.online.attempt import Attempt, Wearer
+from core.online.axis import UniformBlock
+from core.online.calibrated import LiveCalibration, MountingParams, finished
+from core.online.frame import CalibrationView, SegmentCheck, Stage
+from core.recording import UniformRecording
+from core.rest import quietness, windows_of
+
+
+@dataclass(frozen=True)
+class CalibratingParams:
+    """When the stages end.
+
+    Parameters
+    ----------
+    tick_s : time between judgements.
+    wait_s : after it the attempt goes on without a sensor that sends nothing (our choice).
+    stand_s : standing that is asked for (clinic practice, spec/fusion.md §2: 3 to 5 s). looked_s : of the
+        last samples in which it is looked for; quietness is judged against the quietest second in them.
+    steps, walk_s : straight steps that are enough, or else time walked, as in small rooms.
+    first_look_s : walking before the calibration is tried for the first time: two strides.
+    kept_s : samples kept while nobody walks: a standing and its beginning.
+    longest_s : an attempt that is not done by then starts anew (our choice).
+    """
+
+    mounting: MountingParams = field(default_factory=MountingParams)
+    tick_s: float = 0.5
+    wait_s: float = 10.0
+    stand_s: float = 3.0
+    looked_s: float = 10.0
+    steps: int = FEW_STEPS
+    walk_s: float = 12.0
+    first_look_s: float = 2.5
+    kept_s: float = 15.0
+    longest_s: float = 120.0
+
+
+NOT_LOOKED: Final = CalibrationView(0.0, 0.0, 0, ())
+
+
+class LiveCalibrator:
+    """The stages of live calibration.
+
+    Parameters
+    ----------
+    wearer : segments in the order of the blocks' columns, rate, subject, protocol, mounting.
+    """
+
+    def __init__(self, wearer: Wearer, params: CalibratingParams | None = None) -> None:
+        self.wearer = wearer
+        self.params = params or CalibratingParams()
+        self.stage: Stage = "waiting"
+        self.view = NOT_LOOKED
+        self._tick = max(1, round(self.params.tick_s * wearer.rate_hz))
+        self._length = 0
+        self._begun = 0
+        self._attempt = Attempt(wearer, 0)
+        self._working: tuple[Segment, ...] = ()
+
+    def push(self, block: UniformBlock) -> LiveCalibration | None:
+        """Take the next samples; the calibration, once, when they complete it.
+
+        Samples of the block from the calibration's `past` on are not in it.
+        """
+        start = 0
+        while start < len(block):
+            stop = min(len(block), start + self._tick - self._length % self._tick)
+            self._length += stop - start
+            if self.stage != "running":
+                self._attempt.append(block, start, stop)
+                if self._length % self._tick == 0 and (found := self._judge()) is not None:
+                    self._length += len(block) - stop
+                    return found
+            start = stop
+        return None
+
+    def redo(self) -> None:
+        """Begin anew with the next sample."""
+        self._restart(None)
+        self.view = NOT_LOOKED
+
+    def _restart(self, problem: Notice | None) -> None:
+        self.stage = "waiting"
+        self._begun = self._length
+        self._attempt = Attempt(self.wearer, self._length)
+        if problem is not None:
+            self.stage = "stand"
+            self.view = replace(self.view, ok=False, problem=problem)
+
+    def _judge(self) -> LiveCalibration | None:
+        if self.stage in ("waiting", "stand"):
+            self._look_for_standing()
+            return None
+        return self._look_for_walk()
+
+    def _look_for_standing(self) -> None:
+        """Waiting or standing: is every sensor there, and for how long have all been still?"""
+        p, rate = self.params, self.wearer.rate_hz
+        self._attempt.keep_last(round(p.looked_s * rate))
+        there = self._there()
+        complete = len(there) == len(self.wearer.segments)
+        patient = self._length - self._begun >= p.wait_s * rate
+        self.stage = "stand" if there and (complete or patient) else "waiting"
+        seen = _stillness(self._attempt.recording(there), p.mounting)
+        self.view = replace(self.view, stood_s=seen.stood_s, walked_s=0.0, steps=0, checks=self._checks(seen))
+        if self.stage == "stand" and seen.stood_s >= p.stand_s:
+            self.stage, self._working = "walk", there
+            self.view = replace(self.view, ok=None, problem=None)
+
+    def _there(self) -> tuple[Segment, ...]:
+        """Segments whose sensor was there for most of the last second."""
+        share = self._attempt.valid(round(self.wearer.rate_hz)).mean(axis=0)
+        return tuple(s for s, x in zip(self.wearer.segments, share, strict=True) if x > 0.5)
+
+    def _look_for_walk(self) -> LiveCalibration | None:
+        """Standing is there: has enough been walked since?"""
+        p, rate = self.params, self.wearer.rate_hz
+        recording = self._attempt.recording(self._working)
+        seen = _stillness(_last(recording, p.kept_s), p.mounting)
+        walked = float(np.count_nonzero(moving_mask(recording, p.mounting.calibration.walking)) / rate)
+        stood = self.view.stood_s if walked and not seen.stood_s else seen.stood_s
+        self.view = replace(self.view, stood_s=stood, walked_s=walked, checks=self._checks(seen))
+        if not walked:
+            self._attempt.keep_last(round(p.kept_s * rate))
+            if seen.longest_s < p.stand_s:
+                self.stage = "stand"
+            return None
+        found = self._calibration(recording) if walked >= p.first_look_s else None
+        if found is None and self.stage == "walk" and len(self._attempt) >= p.longest_s * rate:
+            message = (
+                f"Only {walked:.0f} s were walked in {p.longest_s:.0f} s, {p.walk_s:.0f} s or {p.steps} "
+                "straight steps are needed. Stand still again, then walk straight ahead."
+            )
+            self._restart(Notice("walk_too_short", message))
+        return found
+
+    def _calibration(self, recording: UniformRecording) -> LiveCalibration | None:
+        """The calibration if it can be had and rests on enough; a walk that gives none begins anew."""
+        p = self.params
+        enough = self.view.walked_s >= p.walk_s
+        try:
+            calibrated = calibrate(recording, p.mounting.calibration)
+            steps = calibrated.calibration.straight_steps or 0
+            self.view = replace(self.view, steps=steps)
+            if not enough and steps < p.steps:
+                return None
+            found = finished(calibrated, self._attempt.first, self.wearer.segments, p.mounting)
+        except SagittalError as error:
+            if enough:
+                self._restart(Notice(error.code, error.message, error.sensor))
+            return None
+        self.stage = "running"
+        self._attempt = Attempt(self.wearer, self._length)
+        self.view = replace(self.view, checks=found.checks, ok=found.ok, problem=None)
+        return found
+
+    def _checks(self, seen: _Stillness) -> tuple[SegmentCheck, ...]:
+        return tuple(SegmentCheck(s, s in seen.still) for s in self.wearer.segments)
+
+
+@dataclass(frozen=True)
+class _Stillness:
+    """Segments that are still now, how long all have been by now, and the longest rest of all."""
+
+    still: frozenset[Segment]
+    stood_s: float
+    longest_s: float
+
+
+def _stillness(recording: UniformRecording, params: MountingParams) -> _Stillness:
+    """By the rules of core/rest.py; the last second decides on now."""
+    rest, rate, n = params.calibration.rest, recording.rate_hz, len(recording.t_s)
+    quiet = {s: quietness(x, rate, rest).quiet for s, x in recording.sensors.items()}
+    if not quiet or not n:
+        return _Stillness(frozenset(), 0.0, 0.0)
+    windows = windows_of(np.logical_and.reduce(list(quiet.values())), rate, rest)
+    lasting = [b - a for a, b in windows if round(b * rate) >= n]
+    return _Stillness(
+        frozenset(s for s, x in quiet.items() if x[-1]),
+        lasting[-1] if lasting else 0.0,
+        max((b - a for a, b in windows), default=0.0),
+    )
+
+
+def _last(recording: UniformRecording, seconds: float) -> UniformRecording:
+    """The last seconds of a recording."""
+    part = slice(-round(seconds * recording.rate_hz), None)
+    sensors = {
+        s: replace(
+            x, acc=x.acc[part], gyr=x.gyr[part], valid=x.valid[part], interpolated=x.interpolated[part]
+        )
+        for s, x in recording.sensors.items()
+    }
+    return replace(recording, t_s=recording.t_s[part], sensors=sensors)
