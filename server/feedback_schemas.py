@@ -21,6 +21,9 @@ class TargetNew(Request):
     source: Source = "norm"
     mean: Number | None = None
     sd: Number | None = None
+    words: str = Field(
+        default="", max_length=500, description="written anew, so that a record can be sent back"
+    )
     session_id: HexId | None = Field(default=None, description="of own_*; null = the newest analysed walk")
 
 

@@ -1,0 +1,52 @@
+"""Prescriptions and live takes with cues in a test's clinic, without a tablet."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+from typing import Any
+
+from core.feedback import Cue
+from server.services import live, patients, sessions
+from server.storage.tables import new_id
+from tests.server import analysed
+from tests.server.clinic import Clinic
+
+DAY = dt.date(2026, 3, 2)
+
+
+def person(clinic: Clinic, **changes: Any) -> str:
+    """A patient whose left side is affected."""
+    known: dict[str, Any] = {
+        "height_m": 1.75,
+        "birth_year": 1960,
+        "sex": "male",
+        "affected_side": "left",
+    } | changes
+    with clinic.db.write() as c:
+        return patients.create(c, None, code=f"P-{new_id()[:8]}", **known).id
+
+
+def visit(clinic: Clinic, patient: str, days: int) -> str:
+    """A session without anything in it."""
+    with clinic.db.write() as c:
+        return sessions.create(c, None, patient, performed_on=DAY + dt.timedelta(days=days)).id
+
+
+def walked(clinic: Clinic, patient: str, days: int, duration_s: float = 24.0) -> str:
+    """A session with a finished analysis of the kinematic walk."""
+    session = visit(clinic, patient, days)
+    analysed.finish(clinic, patient, session, analysed.files(duration_s))
+    return session
+
+
+def take(clinic: Clinic, session: str, prescription: str | None, cues: Sequence[Cue]) -> str:
+    """A live take of a session that gave these cues and has ended; nothing of it is a recording."""
+    with clinic.db.write() as c:
+        made, code = live.open_take(c, None, session)
+        live.pair(c, code)
+        live.started(c, made.id, "replay", prescription)
+        for cue in cues:
+            live.add_event(c, None, made.id, "cue", cue.t_s, {"type": "cue", **cue.to_json()})
+        live.end(c, None, made.id, "finished", count=1)
+    return made.id
