@@ -5,6 +5,7 @@ import { PROTOCOL } from "../live/wire.js";
 const PAUSES_S = [0.25, 0.5, 1, 2, 4, 8];
 const SILENCE_MS = 4000; // a network that is gone is noticed by missing acknowledgements, long before the browser says so
 const READ_AT_ONCE = 32;
+const LATE_S = 1; // signal made while the end was on its way is no loss
 // Closed so, trying again would fail the same way.
 const FINAL = { 1009: "refused", 4400: "refused", 4401: "token", 4410: "ended", 4412: "replaced" };
 
@@ -64,8 +65,9 @@ export class Link {
       this.outbox.acknowledge(message.ack);
       this.pump();
     } else if (message.type === "finished") {
-      this.recording = message.recording;
-      this.end("finished");
+      // ended on the clinic's screen while this tablet still held something
+      if (this.outbox.heldS > LATE_S) this.problem = { code: "ended", detail: "" };
+      this.end(this.problem ? "refused" : "finished");
     } else if (message.type === "error") {
       this.said = { code: message.code, detail: message.detail };
       if (message.code === "finish_mismatch") this.resend(message);

@@ -1,4 +1,6 @@
 // The list of sensors: where each is worn, how fast it sends, its battery and its state; a tap says where it is worn.
+const NEAR = 0.03;
+
 const sideOf = (segment) => (segment?.endsWith("_l") ? "l" : segment?.endsWith("_r") ? "r" : "");
 
 export class SensorList {
@@ -41,7 +43,9 @@ export class SensorList {
     set(part("side"), side.toUpperCase());
     const name = sensor.label && sensor.label !== sensor.id ? `${sensor.label}, ${sensor.id}` : sensor.id;
     set(part("id"), [name, health.note].filter(Boolean).join(", "));
-    set(part("rate"), `${Math.round(health.rateHz)} Hz`);
+    // counted over two seconds a rate is good to a batch: nearer than that it is the one the sensor says
+    const rate = Math.abs(health.rateHz - sensor.rateHz) < NEAR * sensor.rateHz ? sensor.rateHz : health.rateHz;
+    set(part("rate"), `${Math.round(rate)} Hz`);
     for (const button of [part("place"), part("place-too")]) {
       button.disabled = fixed;
       button.setAttribute("aria-label", `Sensor ${sensor.id}: ${sensor.segment ? this.names[sensor.segment] : "not placed"}. Change`);

@@ -13,7 +13,7 @@ const STILL_SPREAD = 0.35; // m/s² over the still time
 const ALONG = 0.92; // share of gravity on the pose's axis, about 23°
 const FITS_DEG = 15, OTHERS_DEG = 30; // the right reading must fit, and every other one must not
 const TURN_DEG = 45;
-const MOST_TURNING = 4 * Math.PI; // rad in one quarter turn; degrees read as radians give far more
+const MOST_TURNING = 3.5; // rad on the way of a quarter turn: three quarters the other way would end the same
 
 const length = (v) => Math.hypot(...v);
 const mean = (rows, key) => [0, 1, 2].map((i) => rows.reduce((sum, row) => sum + row[key][i], 0) / rows.length);
@@ -71,7 +71,8 @@ export class AxesTest {
     const found = [...readings()].map((reading) => ({ ...reading, error: this.misfit(reading, rest) })).sort((a, b) => a.error - b.error);
     const [best, next] = found;
     if (best.error > FITS_DEG || next.error < OTHERS_DEG) {
-      return this.fail(`The turns do not fit gravity (${best.error.toFixed(0)}° off). Turn the device a quarter at a time, without haste.`);
+      const off = best.error <= 180 ? ` (${best.error.toFixed(0)}° off)` : "";
+      return this.fail(`The turns do not fit gravity${off}. Turn the device straight from one way to the next, without haste.`);
     }
     this.result = { accSign: signs[0], order: best.order, signs: best.signs, scale: best.scale, errorDeg: best.error };
     return true;
