@@ -11,6 +11,7 @@ from server.auth.sessions import Logins
 from server.auth.throttle import Throttle
 from server.jobs.feed import JobFeed
 from server.jobs.queue import JobQueue
+from server.live.hub import Hub
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -44,11 +45,16 @@ def _feed(connection: HTTPConnection) -> JobFeed:
     return cast("JobFeed", connection.app.state.feed)
 
 
+def _hub(connection: HTTPConnection) -> Hub:
+    return cast("Hub", connection.app.state.hub)
+
+
 Config = Annotated[Settings, Depends(_settings)]
 Db = Annotated[Database, Depends(_db)]
 Blobs = Annotated[BlobStore, Depends(_blobs)]
 Queue = Annotated[JobQueue, Depends(_queue)]
 Feed = Annotated[JobFeed, Depends(_feed)]
+LiveHub = Annotated[Hub, Depends(_hub)]
 OpenLogins = Annotated[Logins, Depends(_logins)]
 Failures = Annotated[Throttle, Depends(_throttle)]
 

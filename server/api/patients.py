@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 
 from server import audit, schemas
-from server.api.context import Blobs, Config, Db, Id
+from server.api.context import Blobs, Config, Db, Id, LiveHub
 from server.api.documents import refusals
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -69,9 +69,16 @@ def delete_patient(
     db: Db,
     blobs: Blobs,
     settings: Config,
+    hub: LiveHub,
     who: Annotated[Identity, require(Action.DELETE_PATIENT)],
 ) -> None:
     """Remove a patient with every session, recording and result, for ever; only the audit rows stay."""
+    with db.read() as c:
+        if confirm.strip() == patients.get(c, patient_id).code:
+            visits = [visit.id for visit in sessions.of_patient(c, patient_id)]
+        else:
+            visits = []
+    hub.drop_from_thread(visits)
     erasure.erase_patient(db, blobs, settings.live, who, patient_id, confirm=confirm)
 
 

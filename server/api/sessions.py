@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter
 
 from server import audit, schemas
-from server.api.context import Blobs, Config, Db, Id, Queue
+from server.api.context import Blobs, Config, Db, Id, LiveHub, Queue
 from server.api.documents import refusals
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -48,9 +48,11 @@ def delete_session(
     db: Db,
     blobs: Blobs,
     settings: Config,
+    hub: LiveHub,
     who: Annotated[Identity, require(Action.WRITE_SESSION)],
 ) -> None:
     """Remove a session with its recordings and results, for ever; only the audit rows stay."""
+    hub.drop_from_thread([session_id])
     erasure.erase_session(db, blobs, settings.live, who, session_id)
 
 

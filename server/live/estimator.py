@@ -1,0 +1,145 @@
+"""An estimator process: follows many takes, holds no connection to the database, ends with its parent.
+
+Started by server/live/pool.py as `python -m server.live.estimator <socket> <parent pid>`.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import resource
+import signal
+import sys
+import time
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+
+from server.jobs.lifeline import die_with, when_parent_ends
+from server.live import follower
+from server.live.follower import Follower
+from server.live.messages import (
+    Begin,
+    Broken,
+    Charge,
+    Command,
+    End,
+    Grow,
+    Order,
+    Ready,
+    Report,
+    decode_order,
+    encode,
+)
+from server.settings import load_settings
+
+log = logging.getLogger("server.live.estimator")
+
+
+class Estimator:
+    """The takes of this process; one that throws is given up, the others go on."""
+
+    def __init__(self, say: Callable[[Report], None]) -> None:
+        self._say = say
+        self._takes: dict[str, Follower] = {}
+
+    @property
+    def has_work(self) -> bool:
+        """Whether some log is longer than what was read."""
+        return any(take.has_work for take in self._takes.values())
+
+    @property
+    def due_at(self) -> float | None:
+        """When the next picture is due."""
+        return min((due for t in self._takes.values() if (due := t.due_at) is not None), default=None)
+
+    def obey(self, order: Order) -> None:
+        """Take one order; about a take that was given up there is nothing to do."""
+        match order:
+            case Begin():
+                self._drop(order.take)
+                self._guarded(order.take, lambda: self._begin(order))
+            case Grow():
+                for take, size in order.sizes.items():
+                    if take in self._takes:
+                        self._takes[take].grow(size, order.at)
+            case Command() if order.take in self._takes:
+                self._guarded(order.take, lambda: self._takes[order.take].command(order))
+            case Charge() if order.take in self._takes:
+                self._takes[order.take].charge(order.percent)
+            case End():
+                self._drop(order.take)
+
+    def work(self) -> None:
+        """Let every take read once and show what is due."""
+        for name, take in list(self._takes.items()):
+            if take.has_work:
+                self._guarded(name, take.step)
+        self.show()
+
+    def show(self) -> None:
+        """Send the pictures that are due."""
+        for name, take in list(self._takes.items()):
+            self._guarded(name, take.show)
+
+    def _begin(self, order: Begin) -> None:
+        self._takes[order.take] = Follower(order, self._say)
+
+    def _drop(self, take: str) -> None:
+        found = self._takes.pop(take, None)
+        if found is not None:
+            found.close()
+
+    def _guarded(self, take: str, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except (BrokenPipeError, ConnectionError):
+            raise
+        except Exception as error:
+            log.exception("the estimate of live take %s failed", take)
+            self._drop(take)
+            said = follower.broken(error)
+            self._say(Broken(take, said.code, said.message))
+
+
+def main() -> None:
+    """Follow takes until the web process closes the socket."""
+    line = Connection(int(sys.argv[1]))
+    die_with(int(sys.argv[2]))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the web process ends us
+    when_parent_ends(lambda: os._exit(1))
+    logging.basicConfig(level=logging.INFO)
+    settings = load_settings()
+    if settings.child_memory_bytes:
+        resource.setrlimit(resource.RLIMIT_AS, (settings.child_memory_bytes,) * 2)
+    warm()
+    line.send_bytes(encode(Ready()))
+    try:
+        follow(line)
+    except (EOFError, BrokenPipeError, ConnectionError):
+        return
+
+
+def follow(line: Connection) -> None:
+    """Read orders and logs in turn; raises EOFError when the other side has gone."""
+    estimator = Estimator(lambda report: line.send_bytes(encode(report)))
+    while True:
+        wait: float | None = 0.0
+        if not estimator.has_work:
+            due = estimator.due_at
+            wait = None if due is None else max(0.0, due - time.monotonic())
+        # all orders that are there first: what has come meanwhile is read in one go
+        while line.poll(wait):
+            estimator.obey(decode_order(line.recv_bytes()))
+            wait = 0.0
+        estimator.work()
+
+
+def warm() -> None:
+    """Compile the kernels or load them from the cache, before a patient stands there."""
+    from core.online import warm as warm_online
+
+    warm_online()
+
+
+if __name__ == "__main__":
+    main()

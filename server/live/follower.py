@@ -1,0 +1,280 @@
+"""One take in an estimator process: reads its log from the start, estimates, gives feedback, tells.
+
+All of it but the pictures' timing is a function of the log and the commands, batch by batch in their order: a
+process that takes over from a dead one says the same strides and cues again, with the same numbers.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from core.errors import Notice
+from core.events.result import GaitEvent
+from core.feedback import Baseline, Prescription
+from core.feedback.engine import COMMANDS, FeedbackEngine
+from core.formats.live_log import Batch, Hello, Record, decode_batch, parse_hello, scan, scan_records
+from core.frames import SIDES, Protocol, Side
+from core.online import Online
+from core.online.frame import LiveFrame, LiveStride, Trail
+from core.recording import Subject
+from server.live import wire
+from server.live.messages import STALE_S, Begin, Command, Item, Kind, Picture, Report, Standing
+
+CHUNK_BYTES: Final = 1 << 17
+"""Read and estimated in one turn: some seconds; a take that catches up lets the others through."""
+EVERY_S: Final = 1 / 30
+"""Pictures are sent no more often (viewer.md §5)."""
+DRIFT: Final = 1e-4
+"""Clocks run apart by less than this (100 ppm): the fastest path may become so much longer."""
+PICTURE_TRAILS: Final = 400
+"""Pieces of angles kept for the next picture while a take catches up: older ones no chart shows any more."""
+
+
+class Follower:
+    """A take.
+
+    Parameters
+    ----------
+    say : sends one report. clock : monotonic seconds, the same clock as the web process's.
+    """
+
+    def __init__(
+        self, begin: Begin, say: Callable[[Report], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.take = begin.take
+        self._begin = begin
+        self._say = say
+        self._clock = clock
+        self._file = Path(begin.path).open("rb")  # noqa: SIM115 - closed by `close`
+        self._read = 0
+        self._size = begin.size
+        self._arrived: deque[tuple[int, float]] = deque()
+        self._commands: deque[Command] = deque(begin.commands)
+        self._online: Online | None = None
+        self._hello: Hello | None = None
+        self._engine = _engine(begin)
+        self._battery: Mapping[str, float] = {}
+        self._said: Counter[Kind] = Counter()
+        self._next_seq = 0
+        self._stage = "waiting"
+        self._guard = "unknown"
+        self._standing = b""
+        self._phase = _Phase()
+        self._delays = _Delays()
+        self._late = False
+        self._last: LiveFrame | None = None
+        self._trail: deque[Trail] = deque(maxlen=PICTURE_TRAILS)
+        self._sent_at = -1.0
+
+    @property
+    def has_work(self) -> bool:
+        """Whether the log is longer than what was read."""
+        return self._read < self._size
+
+    @property
+    def due_at(self) -> float | None:
+        """When the next picture is to be sent; None = nothing new to show."""
+        return None if self._last is None else self._sent_at + EVERY_S
+
+    def grow(self, size: int, at: float) -> None:
+        """The log has `size` bytes since `at`."""
+        self._size = size
+        self._arrived.append((size, at))
+
+    def command(self, command: Command) -> None:
+        """Carry out a command before the batch it names."""
+        self._commands.append(command)
+        self._obey()
+
+    def charge(self, percent: Mapping[str, float]) -> None:
+        """Show the battery of some sensors."""
+        self._battery = {**self._battery, **percent}
+
+    def step(self) -> None:
+        """Read and estimate the next part of the log."""
+        self._file.seek(self._read)
+        data = self._file.read(min(CHUNK_BYTES, self._size - self._read))
+        found, used = scan(data) if self._read == 0 else scan_records(data)
+        if not used and len(data) >= CHUNK_BYTES:  # a record longer than a chunk
+            data += self._file.read(self._size - self._read - len(data))
+            found, used = scan(data) if self._read == 0 else scan_records(data)
+        if not used:
+            raise ValueError(f"the log cannot be read from byte {self._read} on")
+        start = self._read
+        for record in found:
+            self._use(record, start + record.end)
+        self._read = start + used
+
+    def show(self) -> None:
+        """Send a picture of the newest frame, if it is time."""
+        due, now = self.due_at, self._clock()
+        if due is None or now < due or self._last is None:
+            return
+        frame = self._last
+        body = wire.frame(frame, self._trail, self._battery, self._phase.at(frame.t_s))
+        delay = None if self._late else self._delays.now(now)
+        self._say(
+            Picture(self.take, frame.t_s, frame.seq, frame.stage, body, delay, self._read, wire.pose(frame))
+        )
+        self._last = None
+        self._trail.clear()
+        self._sent_at = now
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()
+
+    def _use(self, record: Record, end: int) -> None:
+        if record.kind == "H":
+            self._hello = parse_hello(record.body)
+            self._online = Online(
+                self._hello,
+                Subject(height_m=self._begin.height_m),
+                _protocol(self._begin.protocol),
+            )
+            self._obey()
+        elif record.kind == "B" and self._online is not None and self._hello is not None:
+            batch = decode_batch(record.body)
+            self._note_arrival(batch, end)
+            self._obey()
+            frame = self._online.push(batch)
+            self._next_seq = batch.seq + 1
+            if frame is not None:
+                self._tell(frame)
+            self._obey()
+
+    def _obey(self) -> None:
+        """Carry out the commands whose batch is the next one."""
+        while self._online is not None and self._commands and self._commands[0].before <= self._next_seq:
+            command = self._commands.popleft()
+            if command.name == "redo_calibration":
+                self._online.command("redo_calibration")
+                self._stage = "waiting"
+            elif command.name in COMMANDS and self._engine is not None:
+                self._engine.command(command.name, command.value)  # type: ignore[arg-type]
+                self._tell_standing()
+
+    def _tell(self, frame: LiveFrame) -> None:
+        for event in frame.events:
+            self._phase.see(event)
+        for stride in frame.strides:
+            self._phase.measure(stride)
+            self._item("stride", stride.detected_s, wire.stride(stride))
+        self._coach(frame)
+        for notice in frame.notices:
+            self._item("notice", notice.t_s, wire.notice(notice))
+        if frame.stage == "running" and self._stage != "running":
+            self._item("calibration", frame.t_s, wire.calibrated(frame))
+        self._stage = frame.stage
+        self._last = frame
+        self._trail.append(frame.trail)
+
+    def _coach(self, frame: LiveFrame) -> None:
+        if self._engine is None:
+            return
+        for stride in frame.strides:
+            cue = self._engine.push(stride, frame.t_s)
+            if cue is not None:
+                self._item("cue", cue.t_s, wire.cue(cue))
+        if frame.strides or not self._standing:
+            self._tell_standing()
+
+    def _tell_standing(self) -> None:
+        if self._engine is None:
+            return
+        state = self._engine.state
+        if state.guard.state != self._guard:
+            self._guard = state.guard.state
+            self._item("guard", None if self._last is None else self._last.t_s, wire.feedback(state))
+        body = wire.encode(wire.feedback(state))
+        if body != self._standing:
+            self._standing = body
+            self._say(Standing(self.take, body))
+
+    def _item(self, kind: Kind, t_s: float | None, content: dict[str, Any]) -> None:
+        if self._late:
+            content["late"] = True
+        self._say(Item(self.take, kind, self._said[kind], t_s, wire.encode(content), self._late))
+        self._said[kind] += 1
+
+    def _note_arrival(self, batch: Batch, end: int) -> None:
+        """Find out whether this batch is fresh; what was in the log before we came is not."""
+        if end <= self._begin.size:
+            self._late = True
+            return
+        while len(self._arrived) > 1 and self._arrived[0][0] < end:
+            self._arrived.popleft()
+        if self._arrived and self._hello is not None:
+            rate = self._hello.stream(batch.stream).rate_hz
+            self._delays.arrived(batch, rate, self._arrived[0][1])
+        self._late = (self._delays.now(self._clock()) or 0.0) > STALE_S
+
+
+class _Delays:
+    """How long ago the last sample was due: since the fastest way here that was seen, per device clock."""
+
+    def __init__(self) -> None:
+        self._fastest: dict[int, tuple[float, float]] = {}
+        self._due: float | None = None
+
+    def arrived(self, batch: Batch, rate_hz: float, at: float) -> None:
+        n = len(batch.samples)
+        last = (n - 1) / rate_hz if batch.offsets_us is None else float(batch.offsets_us[-1]) * 1e-6
+        sampled = batch.t0_us * 1e-6 + last
+        way = at - sampled
+        before, when = self._fastest.get(batch.stream, (way, at))
+        fastest = min(way, before + DRIFT * (at - when))
+        self._fastest[batch.stream] = (fastest, at)
+        self._due = sampled + fastest
+
+    def now(self, now: float) -> float | None:
+        return None if self._due is None else max(0.0, now - self._due)
+
+
+class _Phase:
+    """Where in its cycle each foot is, by its last contact and the length of its last stride."""
+
+    def __init__(self) -> None:
+        self._contact: dict[Side, float] = {}
+        self._length: dict[Side, float] = {}
+
+    def see(self, event: GaitEvent) -> None:
+        if event.kind == "ic":
+            self._contact[event.side] = event.time_s
+
+    def measure(self, stride: LiveStride) -> None:
+        self._length[stride.side] = stride.end_s - stride.start_s
+
+    def at(self, t_s: float) -> dict[Side, float | None]:
+        found: dict[Side, float | None] = {}
+        for side in SIDES:
+            contact, length = self._contact.get(side), self._length.get(side)
+            share = None if contact is None or not length else 100.0 * (t_s - contact) / length
+            # half a cycle too late: the person has stopped
+            found[side] = None if share is None or not 0.0 <= share <= 150.0 else min(share, 100.0)
+        return found
+
+
+def _engine(begin: Begin) -> FeedbackEngine | None:
+    if begin.prescription is None:
+        return None
+    baseline = None if begin.baseline is None else Baseline.from_json(begin.baseline)
+    return FeedbackEngine(Prescription.from_json(begin.prescription), baseline)
+
+
+def _protocol(name: str) -> Protocol:
+    return name  # type: ignore[return-value]  # the database holds only known ones
+
+
+def broken(error: Exception) -> Notice:
+    """What is said of a take whose estimate threw."""
+    return Notice(
+        "live_estimate_failed",
+        "The live estimate of this take stopped on an error of the program; the take itself is recorded and "
+        "will be analysed at its end. The server's log has the details; please report it.",
+        severity="error",
+    )

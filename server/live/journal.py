@@ -1,0 +1,80 @@
+"""Writes what the estimator tells (cues, calibrations, notices) into the database, a group a second.
+
+One thread for all takes: every transaction waits for the disk, and nothing that streams may wait for it.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Mapping
+from typing import Any, Final
+
+from sqlalchemy import insert, select
+from sqlalchemy.exc import SQLAlchemyError
+
+from server.storage.db import Database
+from server.storage.tables import live_event, live_take, now
+
+log = logging.getLogger(__name__)
+
+INTERVAL_S: Final = 0.5
+"""Rows wait so long for others; with the transaction itself they are written within a second."""
+
+
+class Journal:
+    """The thread and the rows on their way to the table `live_event`."""
+
+    def __init__(self, db: Database, interval_s: float = INTERVAL_S) -> None:
+        self._db = db
+        self._interval_s = interval_s
+        self._rows: list[dict[str, Any]] = []
+        self._guard = threading.Lock()
+        self._work = threading.Event()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="live-journal", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Write what is there and end."""
+        self._stop.set()
+        self._work.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self.write()
+
+    def add(self, take_id: str, kind: str, t_s: float | None, content: Mapping[str, Any]) -> None:
+        """Have a row written; returns at once."""
+        row = {"take_id": take_id, "kind": kind, "t_s": t_s, "content": dict(content), "at": now()}
+        with self._guard:
+            self._rows.append(row)
+        self._work.set()
+
+    def write(self) -> None:
+        """Write all rows in one transaction; those of takes that were erased meanwhile go."""
+        with self._guard:
+            rows, self._rows = self._rows, []
+        if not rows:
+            return
+        try:
+            with self._db.write() as c:
+                wanted = {row["take_id"] for row in rows}
+                there = set(c.execute(select(live_take.c.id).where(live_take.c.id.in_(wanted))).scalars())
+                kept = [row for row in rows if row["take_id"] in there]
+                if kept:
+                    c.execute(insert(live_event), kept)
+        except SQLAlchemyError:
+            log.exception("%d live events are not written yet", len(rows))
+            with self._guard:
+                self._rows = rows + self._rows
+            self._work.set()
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            self._work.wait()
+            self._stop.wait(self._interval_s)
+            self._work.clear()
+            self.write()

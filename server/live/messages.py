@@ -1,0 +1,135 @@
+"""What web process and estimator process say to each other: MessagePack over a socket pair, not pickle.
+
+The samples are not among it: the estimator reads them from the take's log, whose new length it is told.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, Literal
+
+import msgspec
+
+STALE_S: Final = 0.5
+"""Data older than this are not fed back (experience.md, Biofeedback)."""
+
+Kind = Literal["stride", "cue", "calibration", "guard", "notice"]
+
+
+class Command(msgspec.Struct, frozen=True, tag=True):
+    """Web to estimator: a therapist's command, valid from the batch `before` on, in a replay too."""
+
+    take: str
+    before: int
+    name: str
+    value: Any = None
+
+
+class Begin(msgspec.Struct, frozen=True, tag=True):
+    """Web to estimator: follow this take from the start of its log.
+
+    Parameters
+    ----------
+    size : bytes of the log that were there before; what comes out of them is late.
+    prescription, baseline : JSON of core.feedback, None = no feedback. commands : given so far.
+    """
+
+    take: str
+    path: str
+    size: int
+    height_m: float | None
+    protocol: str
+    prescription: dict[str, Any] | None
+    baseline: dict[str, Any] | None
+    commands: list[Command]
+
+
+class Grow(msgspec.Struct, frozen=True, tag=True):
+    """Web to estimator: logs have so many bytes now; `at` = monotonic time of the newest."""
+
+    sizes: dict[str, int]
+    at: float
+
+
+class Charge(msgspec.Struct, frozen=True, tag=True):
+    """Web to estimator: battery of sensors in percent, to be shown."""
+
+    take: str
+    percent: dict[str, float]
+
+
+class End(msgspec.Struct, frozen=True, tag=True):
+    """Web to estimator: forget this take."""
+
+    take: str
+
+
+class Ready(msgspec.Struct, frozen=True, tag=True):
+    """Estimator to web: everything is imported and compiled."""
+
+
+class Pose(msgspec.Struct, frozen=True, tag=True):
+    """The figure at one moment: float32 q (n, 4) and p (n, 3) of the named segments, as `LiveFrame`."""
+
+    segments: list[str]
+    q: bytes
+    p: bytes
+    valid: bool
+    contact: dict[str, bool]
+
+
+class Picture(msgspec.Struct, frozen=True, tag=True):
+    """Estimator to web: the newest state of a take; an older one that was not sent yet is worth nothing.
+
+    Parameters
+    ----------
+    t_s, seq, stage : as `LiveFrame`. body : JSON object for the browsers, without its closing brace.
+    delay_s : from when its last sample was due to when this was said. size : bytes of the log it has seen.
+    """
+
+    take: str
+    t_s: float
+    seq: int
+    stage: str
+    body: bytes
+    delay_s: float | None
+    size: int
+    pose: Pose | None
+
+
+class Item(msgspec.Struct, frozen=True, tag=True):
+    """Estimator to web: something that happens once, the `k`th of its kind; a replay says it again.
+
+    Parameters
+    ----------
+    body : JSON object for the browsers. late : it came out of samples that are no longer fresh.
+    """
+
+    take: str
+    kind: Kind
+    k: int
+    t_s: float | None
+    body: bytes
+    late: bool
+
+
+class Standing(msgspec.Struct, frozen=True, tag=True):
+    """Estimator to web: where the feedback stands, JSON for the browsers."""
+
+    take: str
+    body: bytes
+
+
+class Broken(msgspec.Struct, frozen=True, tag=True):
+    """Estimator to web: this take cannot be estimated any further; it is recorded all the same."""
+
+    take: str
+    code: str
+    message: str
+
+
+Order = Begin | Grow | Command | Charge | End
+Report = Ready | Picture | Item | Standing | Broken
+
+encode = msgspec.msgpack.encode
+decode_order = msgspec.msgpack.Decoder(Order).decode
+decode_report = msgspec.msgpack.Decoder(Report).decode

@@ -1,0 +1,185 @@
+"""The tablet's socket: `WS /api/v1/live`, protocol sagittal.live.v1 (docs/live-protocol.md).
+
+Its door is the take's token in the first message; no cookie is looked at.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import deque
+from typing import Final
+
+from fastapi import APIRouter, WebSocket
+from starlette.websockets import WebSocketDisconnect
+
+from core.errors import InputError
+from core.formats.live_log import PROTOCOL, Hello
+from server.auth.access import require
+from server.auth.roles import Action
+from server.live import protocol
+from server.live.hub import Hub
+from server.live.intake import Answer
+from server.live.protocol import HELLO_WITHIN_S, Close, ProtocolError
+from server.live.take import LiveTake
+from server.services import live
+
+router = APIRouter(include_in_schema=False)
+
+UNREAD: Final = 256
+"""Messages a tablet may leave unread, acknowledgements not counted; it has gone then."""
+
+
+class Tablet:
+    """What is on its way to one tablet; acknowledgements replace each other."""
+
+    def __init__(self, ws: WebSocket) -> None:
+        self._ws = ws
+        self._texts: deque[str] = deque(maxlen=UNREAD)
+        self._ack: int | None = None
+        self._closing: tuple[int, str] | None = None
+        self._wake = asyncio.Event()
+
+    def say(self, text: str) -> None:
+        """Send a message, soon."""
+        self._texts.append(text)
+        self._wake.set()
+
+    def ack(self, below: int) -> None:
+        """Acknowledge, soon."""
+        self._ack = below
+        self._wake.set()
+
+    def shut(self, code: int, reason: str) -> None:
+        """Send what is left and close."""
+        self._closing = self._closing or (code, reason)
+        self._wake.set()
+
+    async def send(self) -> None:
+        """Send until closed."""
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            below, self._ack = self._ack, None
+            if below is not None:
+                await self._ws.send_text(protocol.ack(below))
+            while self._texts:
+                await self._ws.send_text(self._texts.popleft())
+            if self._closing is not None:
+                await self._ws.close(*self._closing)
+                return
+
+
+@router.websocket("/live", dependencies=[require(Action.STREAM)])
+async def stream(ws: WebSocket) -> None:
+    """Take the samples of one take."""
+    offered = ws.scope.get("subprotocols", [])
+    await ws.accept(subprotocol=PROTOCOL if PROTOCOL in offered else None)
+    hub: Hub = ws.app.state.hub
+    tablet = Tablet(ws)
+    sending = asyncio.create_task(tablet.send())
+    try:
+        take = await _greeted(ws, hub, tablet)
+        if take is None:
+            await sending
+            return
+        receiving = asyncio.create_task(_receive(ws, take, tablet))
+        try:
+            await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            hub.detach(take, tablet)
+            receiving.cancel()
+            await asyncio.gather(receiving, return_exceptions=True)
+    except WebSocketDisconnect:
+        pass
+    finally:
+        if not sending.done():
+            sending.cancel()
+        # the tablet may be gone already
+        await asyncio.gather(sending, return_exceptions=True)
+
+
+async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> LiveTake | None:
+    """The take that the first message opens; None after a refusal, which is on its way then."""
+    try:
+        async with asyncio.timeout(HELLO_WITHIN_S):
+            message = await _message(ws)
+        if message is None:
+            raise WebSocketDisconnect
+        said = protocol.parse(message) if isinstance(message, str) else None
+        if not isinstance(said, Hello):
+            raise ProtocolError("hello_missing", "The first message must be a hello.")
+        row = await asyncio.to_thread(hub.admit, said.take, said.token)
+        if row is None:
+            raise ProtocolError(
+                "token_not_valid",
+                "The token is not valid for this take, or has expired; pair with a new code.",
+                Close.UNAUTHORISED,
+            )
+        if not row.is_open:
+            _say_over(tablet, row)
+            return None
+        take = await hub.enter(row, said)
+    except TimeoutError:
+        _refuse(tablet, ProtocolError("no_hello", "No hello came in time; connect again.", Close.NO_HELLO))
+    except ProtocolError as error:
+        _refuse(tablet, error)
+    except InputError as error:
+        _refuse(tablet, ProtocolError(error.code, error.message))
+    else:
+        answer = take.recorder.greet(said)
+        _heed(tablet, take, answer)
+        if answer.close is None:
+            hub.attach(take, tablet)
+            return take
+    return None
+
+
+async def _receive(ws: WebSocket, take: LiveTake, tablet: Tablet) -> None:
+    while True:
+        message = await _message(ws)
+        if message is None:
+            return
+        answer = take.offer(message)
+        _heed(tablet, take, answer)
+        if answer.close is not None:
+            # what still comes is not answered any more; the sender closes
+            with contextlib.suppress(WebSocketDisconnect):
+                while await _message(ws) is not None:
+                    pass
+            return
+
+
+def _heed(tablet: Tablet, take: LiveTake, answer: Answer) -> None:
+    """Do what the rules say of a message."""
+    if answer.say is not None:
+        tablet.say(answer.say)
+    if answer.battery is not None:
+        take.charge(answer.battery)
+    if answer.ended is not None and take.recording_id is not None:
+        tablet.say(protocol.finished(take.recording_id))
+    if answer.close is not None:
+        tablet.shut(answer.close, answer.reason)
+
+
+def _say_over(tablet: Tablet, row: live.Take) -> None:
+    """Tell a tablet that comes back to a take that is over what became of it."""
+    if row.recording_id is not None:
+        tablet.say(protocol.finished(row.recording_id))
+        tablet.shut(Close.DONE if row.state == "finished" else Close.ENDED, "take_ended")
+    else:
+        _refuse(tablet, ProtocolError("take_ended", "This take is over.", Close.ENDED))
+
+
+def _refuse(tablet: Tablet, error: ProtocolError) -> None:
+    tablet.say(protocol.error(error.code, error.message))
+    tablet.shut(error.close, error.code)
+
+
+async def _message(ws: WebSocket) -> str | bytes | None:
+    """The next message, None when the tablet has gone."""
+    event = await ws.receive()
+    if event["type"] == "websocket.disconnect":
+        return None
+    data = event.get("bytes")
+    return data if data is not None else event.get("text") or ""

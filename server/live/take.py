@@ -1,0 +1,238 @@
+"""One open take in the web process: its recorder, its tablet, what the therapist did, what browsers are told.
+
+Lives on the event loop; everything that waits for disk or database is the hub's.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+import msgspec
+
+from server.live.intake import Answer, Ended
+from server.live.messages import STALE_S, Begin, Charge, Command, Item, Picture
+from server.live.protocol import ProtocolError
+from server.live.recorder import Recorder
+from server.live.room import Room
+from server.services.live import LiveEvent, Take
+from server.services.live_training import Training
+
+if TYPE_CHECKING:
+    from server.live.hub import Hub
+
+STEERING: Final = frozenset({"feedback", "level", "pause", "stale", "redo_calibration"})
+"""Commands that change what the estimator says; each holds from a batch on."""
+TOLD: Final = frozenset({"cue", "calibration", "guard", "notice"})
+"""Kinds of items that become events."""
+
+
+class Line(Protocol):
+    """The way to a tablet (server/live/tablet.py)."""
+
+    def say(self, text: str) -> None:
+        """Send a message."""
+
+    def ack(self, below: int) -> None:
+        """Acknowledge all batches below this one."""
+
+    def shut(self, code: int, reason: str) -> None:
+        """Close."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A moment the therapist marked."""
+
+    t_s: float | None
+    value: Any = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {"t_s": self.t_s, "value": self.value}
+
+
+@dataclass
+class Steered:
+    """What people (and silence) did in a take so far, as its events say."""
+
+    commands: list[Command] = field(default_factory=list)
+    marks: list[Mark] = field(default_factory=list)
+    ghost: Any = None
+    stale: bool = False
+
+    def see(self, take_id: str, kind: str, t_s: float | None, content: Mapping[str, Any]) -> None:
+        """Take in one event."""
+        value = content.get("value")
+        if kind in STEERING:
+            self.commands.append(Command(take_id, int(content["before"]), kind, value))
+        if kind == "stale":
+            self.stale = bool(value)
+        elif kind == "ghost":
+            self.ghost = value
+        elif kind == "mark":
+            self.marks.append(Mark(t_s, value))
+        elif kind == "undo_mark" and self.marks:
+            self.marks.pop()
+
+
+class LiveTake:
+    """A take that a tablet has spoken to.
+
+    Parameters
+    ----------
+    row : as stored when it was entered. earlier : its events so far, after a restart of the server.
+    """
+
+    recorder: Recorder
+
+    def __init__(
+        self, hub: Hub, row: Take, room: Room, training: Training, earlier: Iterable[LiveEvent]
+    ) -> None:
+        self.id = row.id
+        self.session_id = row.session_id
+        self.state = row.state
+        self.source = row.source
+        self.room = room
+        self.training = training
+        self.tablet: Line | None = None
+        self.over = asyncio.Event()
+        self.recording_id: str | None = None
+        self.estimate = "ok"
+        self.t_s: float | None = None
+        self._hub = hub
+        self._seen: Counter[str] = Counter()
+        self.steered = Steered()
+        for event in earlier:
+            self.steered.see(self.id, event.kind, event.t_s, event.content)
+            if event.kind in TOLD:
+                self._seen[event.kind] += 1
+        self._grown_at = time.monotonic()
+        self._size = 0
+
+    # the socket
+
+    def offer(self, message: bytes | str) -> Answer:
+        """Hand a message to the recorder; never waits."""
+        answer = self.recorder.offer(message)
+        if answer.keep is not None and self.state != "streaming" and answer.keep[0] == "B":
+            self.state = "streaming"
+            self._hub.note_started(self)
+        return answer
+
+    def charge(self, percent: Mapping[str, float]) -> None:
+        """Show the battery."""
+        self._hub.pool.send(Charge(self.id, dict(percent)))
+
+    # the recorder's listener
+
+    def grown(self, size: int) -> None:
+        """The log can be read so far; if it was longer before, what was read of it is read again."""
+        self._grown_at = time.monotonic()
+        before, self._size = self._size, size
+        if size < before:
+            self._hub.pool.follow(self.id)
+        else:
+            self._hub.pool.grow(self.id, size)
+
+    def acknowledged(self, below: int) -> None:
+        """Batches are on the disk."""
+        if self.tablet is not None:
+            self.tablet.ack(below)
+
+    def ended(self, end: Ended) -> None:
+        """The end is on the disk."""
+        self._hub.note_ended(self, end)
+
+    def failed(self, error: ProtocolError) -> None:
+        """The disk refuses."""
+        if self.tablet is not None:
+            self.tablet.shut(error.close, error.code)
+
+    # the estimator
+
+    def begin(self) -> Begin:
+        """The order to follow this take from its start."""
+        t = self.training
+        return Begin(
+            self.id,
+            str(self.recorder.path),
+            self.recorder.size,
+            t.height_m,
+            t.protocol,
+            None if t.prescription is None else dict(t.prescription),
+            None if t.baseline is None else dict(t.baseline),
+            list(self.steered.commands),
+        )
+
+    def steer(self, name: str, value: Any) -> dict[str, Any]:
+        """Give a command from the next batch on and return the content of its event."""
+        content: dict[str, Any] = {"value": value}
+        if name in STEERING:
+            content["before"] = self.recorder.next_seq
+        self.steered.see(self.id, name, self.t_s, content)
+        if name in STEERING:
+            self._hub.pool.send(self.steered.commands[-1])
+        return content
+
+    def show(self, picture: Picture) -> None:
+        """Pass a picture on."""
+        self.t_s = picture.t_s
+        stale = picture.delay_s is None or picture.delay_s > STALE_S
+        delay = b"null" if picture.delay_s is None else b"%d" % round(1000.0 * picture.delay_s)
+        tail = b',"delay_ms":%s,"stale":%s}' % (delay, b"true" if stale else b"false")
+        self.room.say("frame", picture.body + tail)
+        self.room.show(picture)
+        if not stale:
+            self.mind_silence(False)
+
+    def tell(self, item: Item) -> None:
+        """Pass on what happens once; what a new process says again is known already."""
+        if item.kind == "stride":
+            self.room.keep_stride(item.k, item.body)
+        elif item.kind == "cue":
+            self.room.keep_cue(item.k, item.body)
+        if item.k < self._seen[item.kind]:
+            return
+        self._seen[item.kind] = item.k + 1
+        if item.kind in ("stride", "cue", "notice"):
+            self.room.say(item.kind, item.body)
+        if item.kind in TOLD:
+            content = msgspec.json.decode(item.body)
+            for name in ("type", "late"):
+                content.pop(name, None)
+            self._hub.journal.add(self.id, item.kind, item.t_s, content)
+
+    def look(self, now: float) -> None:
+        """Notice silence."""
+        if self.state == "streaming" and now - self._grown_at > STALE_S:
+            self.mind_silence(True)
+
+    def mind_silence(self, stale: bool) -> None:
+        """Feedback pauses while data are stale; where it did is kept, so that a replay pauses there too."""
+        if stale != self.steered.stale:
+            content = self.steer("stale", stale)
+            if self.training.prescription is not None:
+                self._hub.journal.add(self.id, "stale", self.t_s, content)
+
+    def standing(self) -> dict[str, Any]:
+        """The state for the browsers."""
+        return {
+            "type": "state",
+            "take": self.id,
+            "state": self.state,
+            "tablet": "connected" if self.tablet is not None else "lost",
+            "source": self.source,
+            "count": self.recorder.next_seq,
+            "elapsed_s": None if self.t_s is None else round(self.t_s),
+            "marks": [mark.to_json() for mark in self.steered.marks],
+            "ghost": self.steered.ghost,
+            "stale": self.steered.stale,
+            "estimate": self.estimate,
+            "recording": self.recording_id,
+            "problem": None,
+        }

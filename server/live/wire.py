@@ -1,0 +1,203 @@
+"""What browsers get: live frames, strides, cues and notices as JSON, angles in degrees, undefined is null.
+
+Runs in the estimator process; the web process passes the bytes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from math import isfinite, pi
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+
+from core.errors import Notice
+from core.feedback import Cue, FeedbackState
+from core.frames import SIDES, SUFFIX, Side
+from core.online.frame import CalibrationView, LiveFrame, LiveStride, SensorHealth, Trail
+from server.live.messages import STALE_S, Pose
+
+LOST_WARN, LOST_BAD = 0.01, 0.20
+"""Shares of lost samples, as the report judges a whole take (core/quality/assessment.py)."""
+SATURATED_WARN: Final = 0.001
+"""Share of samples at range, as there (spec/fusion.md §9)."""
+BATTERY_WARN_PCT: Final = 15.0
+"""Our choice: a DOT streams 6 h, so there is about an hour left."""
+CURVE_POINTS: Final = 51
+"""Every second of the 101 points of a cycle: a chart on a tablet shows no more."""
+
+_SEVERITY: Final = {"info": "info", "warning": "warn", "error": "bad"}
+_DEGREES: Final = 180.0 / pi
+
+encode = msgspec.json.encode
+
+
+def frame(
+    shown: LiveFrame, trail: Iterable[Trail], battery: Mapping[str, float], phase: Mapping[Side, float | None]
+) -> bytes:
+    """A frame with the angles since the last one that was sent, without the closing brace.
+
+    Parameters
+    ----------
+    trail : of this frame and those before it that were not sent.
+    phase : per side the share of the running cycle, 0 to 100, None where unknown.
+    """
+    body = {
+        "type": "frame",
+        "t": _number(shown.t_s, 3),
+        "stage": shown.stage,
+        "calibration": _calibration(shown.calibration),
+        "method": shown.method,
+        "angles_deg": {name: _number(value * _DEGREES, 2) for name, value in shown.angles.items()},
+        "trace": _trace(trail),
+        "phase": {SUFFIX[side]: _number(phase.get(side), 1) for side in SIDES},
+        "contact": {SUFFIX[side]: bool(shown.contact.get(side, False)) for side in SIDES},
+        "health": [_health(row, battery.get(row.id)) for row in shown.health],
+    }
+    return encode(body)[:-1]
+
+
+def pose(shown: LiveFrame) -> Pose | None:
+    """The figure of a frame, None while there is none."""
+    segments = [name for name in shown.q if name in shown.p]
+    if not segments:
+        return None
+    return Pose(
+        list(segments),
+        np.array([shown.q[s] for s in segments], np.float32).tobytes(),
+        np.array([shown.p[s] for s in segments], np.float32).tobytes(),
+        shown.valid,
+        {side: bool(on) for side, on in shown.contact.items()},
+    )
+
+
+def stride(told: LiveStride) -> dict[str, Any]:
+    """A stride; it comes again under the same `n` when values that were `not_yet` are known."""
+    duration = told.end_s - told.start_s
+    off = None if told.foot_off_s is None else 100.0 * (told.foot_off_s - told.start_s) / duration
+    return {
+        "type": "stride",
+        "n": told.n,
+        "side": told.side,
+        "start_s": _number(told.start_s, 4),
+        "end_s": _number(told.end_s, 4),
+        "foot_off_pct": _number(off, 2),
+        "values": {name: _number(value, 5) for name, value in told.values.items()},
+        "reasons": dict(told.reasons),
+        "curves_deg": {name: _curve(values) for name, values in told.curves.items()},
+        "flags": list(told.flags),
+        "counted": told.counted,
+        "complete": told.complete,
+    }
+
+
+def cue(given: Cue) -> dict[str, Any]:
+    """A cue."""
+    return {"type": "cue", **given.to_json()}
+
+
+def feedback(state: FeedbackState) -> dict[str, Any]:
+    """Where the feedback stands."""
+    return {"type": "feedback", **state.to_json()}
+
+
+def calibrated(shown: LiveFrame) -> dict[str, Any]:
+    """That calibration has come to an end, and how."""
+    return {"type": "calibration", "method": shown.method, "calibration": _calibration(shown.calibration)}
+
+
+def notice(given: Notice) -> dict[str, Any]:
+    """A notice in the words of the pages."""
+    return {"type": "notice", **_notice(given)}
+
+
+def _notice(given: Notice) -> dict[str, Any]:
+    return {
+        "severity": _SEVERITY[given.severity],
+        "text": given.message,
+        "message": given.message,
+        "code": given.code,
+        "sensor": given.sensor,
+        "t_s": _number(given.t_s, 3),
+    }
+
+
+def _calibration(view: CalibrationView | None) -> dict[str, Any] | None:
+    if view is None:
+        return None
+    return {
+        "stood_s": _number(view.stood_s, 2),
+        "walked_s": _number(view.walked_s, 2),
+        "steps": view.steps,
+        "ok": view.ok,
+        "problem": None if view.problem is None else _notice(view.problem),
+        "checks": [
+            {
+                "segment": check.segment,
+                "still": check.still,
+                "method": check.method,
+                "score": _number(check.score, 3),
+                "notices": [_notice(n) for n in check.notices],
+            }
+            for check in view.checks
+        ],
+    }
+
+
+def _health(row: SensorHealth, battery_pct: float | None) -> dict[str, Any]:
+    state, words = _judged(row, battery_pct)
+    return {
+        "id": row.id,
+        "segment": row.segment,
+        "rate_hz": _number(row.rate_hz, 1),
+        "lost_pct": _number(100.0 * row.lost_share, 2),
+        "saturated_pct": _number(100.0 * row.saturated_share, 2),
+        "silent_s": _number(row.silent_s, 2),
+        "still": row.still,
+        "battery_pct": _number(battery_pct, 0),
+        "state": state,
+        "words": words,
+    }
+
+
+def _judged(row: SensorHealth, battery_pct: float | None) -> tuple[str, str]:
+    """Worst first: state and words of a sensor; no words while all is well."""
+    if row.segment is None:
+        return "none", "not used"
+    if row.silent_s > STALE_S:
+        return "bad", f"silent for {row.silent_s:.0f} s" if row.silent_s >= 1.0 else "silent"
+    if row.lost_share > LOST_BAD:
+        return "bad", f"{100.0 * row.lost_share:.0f} % lost"
+    if row.lost_share > LOST_WARN:
+        return "warn", f"{100.0 * row.lost_share:.0f} % lost"
+    if row.saturated_share > SATURATED_WARN:
+        return "warn", "at its range"
+    if battery_pct is not None and battery_pct < BATTERY_WARN_PCT:
+        return "warn", "battery low"
+    return "ok", ""
+
+
+def _trace(trail: Iterable[Trail]) -> dict[str, list[float | None]]:
+    pieces = [piece for piece in trail if len(piece.t_s)]
+    if not pieces:
+        return {"t": []}
+    # a new calibration may change the names: what was before is another curve
+    names = pieces[-1].names
+    pieces = [piece for piece in pieces if piece.names == names]
+    values = np.concatenate([piece.values for piece in pieces]) * _DEGREES
+    columns = {name: _numbers(values[:, i], 2) for i, name in enumerate(names)}
+    return {"t": _numbers(np.concatenate([piece.t_s for piece in pieces]), 3), **columns}
+
+
+def _curve(values: Any) -> list[float | None]:
+    step = (len(values) - 1) // (CURVE_POINTS - 1)
+    return _numbers(np.asarray(values)[::step] * _DEGREES, 2)
+
+
+def _numbers(values: Any, digits: int) -> list[float | None]:
+    return [v if isfinite(v) else None for v in np.round(values, digits).tolist()]
+
+
+def _number(value: float | None, digits: int) -> float | None:
+    return None if value is None or not isfinite(value) else round(float(value), digits)

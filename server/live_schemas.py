@@ -1,0 +1,101 @@
+"""What goes over the wire about live takes; the feed's messages are in docs/api.md."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, StringConstraints
+
+from server.schemas import HexId, Request, Response
+
+
+class OpenedTake(Response):
+    """A take that waits for a tablet, and its code; the code is told this once."""
+
+    id: str
+    session_id: str
+    state: str
+    code: str = Field(description="six characters, to be shown in two groups of three")
+    expires_at: dt.datetime
+
+
+class LiveTake(Response):
+    """A live take.
+
+    `state` is pairing, open (a tablet has joined), streaming, finished (by the tablet) or closed (here);
+    `problem` finish_mismatch: the tablet counted or hashed otherwise at the end.
+    """
+
+    id: str
+    session_id: str
+    state: str
+    source: str | None
+    count: int | None = Field(description="batches, at the end")
+    recording_id: str | None = Field(description="what the take became, null until then")
+    problem: str | None
+    code_expires_at: dt.datetime | None
+    created_at: dt.datetime
+    finished_at: dt.datetime | None
+
+
+class Mark(Response):
+    """A moment the therapist marked."""
+
+    t_s: float | None
+    value: str | None
+
+
+class LiveState(Response):
+    """Where a session's newest take stands: the feed's `state` message."""
+
+    type: Literal["state"]
+    take: str | None = Field(description="null: there was none yet")
+    state: str = Field(description="none, pairing, open, streaming, finished or closed")
+    tablet: str = Field(description="connected, lost, or none (has not joined, or the take is over)")
+    source: str | None
+    count: int | None = Field(description="batches so far")
+    elapsed_s: float | None
+    marks: list[Mark]
+    ghost: str | None
+    stale: bool
+    estimate: str = Field(description="ok or failed")
+    recording: str | None
+    problem: str | None
+
+
+class Pairing(Request):
+    """The code on the therapist's screen, in any case, spaces and hyphens do not count."""
+
+    code: Annotated[str, StringConstraints(min_length=1, max_length=40)]
+
+
+class Paired(Response):
+    """What the tablet needs to stream; the token opens this take only, for twelve hours."""
+
+    token: str
+    take: HexId
+    session_title: str
+    patient_code: str
+    socket: str
+
+
+class LiveCommand(Request):
+    """A command; feedback and pause take true or false, level steps (+ easier), mark and ghost a text."""
+
+    command: Literal[
+        "start", "stop", "mark", "undo_mark", "feedback", "level", "pause", "redo_calibration", "ghost"
+    ]
+    value: bool | int | Annotated[str, StringConstraints(max_length=200)] | None = None
+
+
+class LiveEvent(Response):
+    """Something that happened in a take: a command, a cue, a calibration, a notice."""
+
+    seq: int
+    take_id: str
+    kind: str
+    t_s: float | None
+    content: dict[str, Any]
+    by: str | None
+    at: dt.datetime
