@@ -84,9 +84,10 @@ def finished(
     calibrated, orientations = legs_apart(calibrated, estimate(calibrated, params.fusion), body)
     notices = [*calibrated.calibration.notices, *assumed]
     turned: dict[Segment, float] = {}
-    if possible(calibrated.calibration.segments)[:1] == ("erkf",):
+    linked = tuple(s for s in WHOLE if s in calibrated.calibration.segments)
+    if possible(linked)[:1] == ("erkf",):
         try:
-            calibrated, orientations, turned = agreed(calibrated, orientations, body, WHOLE, params.erkf)
+            calibrated, orientations, turned = agreed(calibrated, orientations, body, linked, params.erkf)
             notices += told(turned)
         except EstimationError as error:
             notices.append(Notice(error.code, error.message, error.sensor))

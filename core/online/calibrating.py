@@ -74,6 +74,7 @@ class LiveCalibrator:
         self._begun = 0
         self._attempt = Attempt(wearer, 0)
         self._working: tuple[Segment, ...] = ()
+        self._walked = 0.0
 
     def push(self, block: UniformBlock) -> LiveCalibration | None:
         """Take the next samples; the calibration, once, when they complete it.
@@ -122,7 +123,9 @@ class LiveCalibrator:
         seen = _stillness(self._attempt.recording(there), p.mounting)
         self.view = replace(self.view, stood_s=seen.stood_s, walked_s=0.0, steps=0, checks=self._checks(seen))
         if self.stage == "stand" and seen.stood_s >= p.stand_s:
-            self.stage, self._working = "walk", there
+            self.stage, self._working, self._walked = "walk", there, 0.0
+            # what was before this standing is of no attempt, walking least of all
+            self._attempt.keep_last(round(seen.stood_s * rate))
             self.view = replace(self.view, ok=None, problem=None)
 
     def _there(self) -> tuple[Segment, ...]:
@@ -137,13 +140,14 @@ class LiveCalibrator:
         seen = _stillness(_last(recording, p.kept_s), p.mounting)
         walked = float(np.count_nonzero(moving_mask(recording, p.mounting.calibration.walking)) / rate)
         stood = self.view.stood_s if walked and not seen.stood_s else seen.stood_s
+        self._walked, before = walked, self._walked
         self.view = replace(self.view, stood_s=stood, walked_s=walked, checks=self._checks(seen))
         if not walked:
             self._attempt.keep_last(round(p.kept_s * rate))
             if seen.longest_s < p.stand_s:
                 self.stage = "stand"
             return None
-        found = self._calibration(recording) if walked >= p.first_look_s else None
+        found = self._calibration(recording) if walked >= p.first_look_s and walked > before else None
         if found is None and self.stage == "walk" and len(self._attempt) >= p.longest_s * rate:
             message = (
                 f"Only {walked:.0f} s were walked in {p.longest_s:.0f} s, {p.walk_s:.0f} s or {p.steps} "
