@@ -49,7 +49,7 @@ def stride_list(
     plain = [
         stride
         for side in SIDES
-        for stride in flagged(_side_strides(side, events, orientations, turning, params), params)
+        for stride in flagged(side_strides(side, events, orientations, turning, params), params)
     ]
     plain.sort(key=lambda s: (s.start_s, s.side))
     listed, yielding = decided(plain, params)
@@ -58,14 +58,14 @@ def stride_list(
     return Strides(tuple(listed), tuple(notices))
 
 
-def _side_strides(
+def side_strides(
     side: Side,
     events: GaitEvents,
     orientations: Oriented,
     turning: Bools | None,
     params: StrideParams,
 ) -> list[Stride]:
-    """Cycles of one foot with every reason that needs no neighbours."""
+    """Cycles of one foot with every reason that needs no neighbours; arguments as of `stride_list`."""
     other: Side = "right" if side == "left" else "left"
     contacts, leavings = events.times(side, "ic"), events.times(side, "tc")
     other_contacts, other_leavings = events.times(other, "ic"), events.times(other, "tc")

@@ -107,12 +107,12 @@ class Contacts:
         self._rules = [FootPitchState.start(rate_hz, params) for _ in self.sides]
         self._rate_hz = rate_hz
 
-    def push(self, q: Floats, valid: Bools, first_s: float) -> list[Known]:
+    def push(self, q: Floats, valid: Bools, first: int) -> list[Known]:
         """Contacts that these samples make known, in the order in which they become known.
 
         Parameters
         ----------
-        q : (T, feet, 4) foot to W. valid : (T, feet). first_s : time of the chain's first sample.
+        q : (T, feet, 4) foot to W. valid : (T, feet). first : the chain's first sample on the axis.
         """
         found = []
         for i, (side, rule) in enumerate(zip(self.sides, self._rules, strict=True)):
@@ -120,11 +120,11 @@ class Contacts:
             s = 2.0 * (q[:, i, 1] * q[:, i, 3] - q[:, i, 0] * q[:, i, 2])
             for kind, index, known, offset in zip(*push(rule, s, valid[:, i]), strict=True):
                 event = GaitEvent(
-                    time_s=first_s + (int(index) + float(offset)) / self._rate_hz,
+                    time_s=(first + int(index) + float(offset)) / self._rate_hz,
                     side=side,
                     kind=KINDS[kind],
                     source=SOURCE,
-                    detected_s=first_s + int(known) / self._rate_hz,
+                    detected_s=(first + int(known)) / self._rate_hz,
                 )
                 found.append(Known(int(known), event))
         return sorted(found, key=lambda x: (x.at, x.event.side))

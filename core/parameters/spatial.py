@@ -92,6 +92,13 @@ def spatial_rows(strides: Strides, feet: FootTracks | None, surface: Surface = G
     return tuple(_row(s, feet, paths) for s in strides.strides)
 
 
+def spatial_row(stride: Stride, strides: Strides, feet: FootTracks | None, surface: Surface = GROUND) -> Row:
+    """The figures of one stride of a list, as `spatial_rows` gives them."""
+    if surface.protocol == "treadmill":
+        return _on_belt(stride, surface.belt_speed_mps)
+    return _row(stride, feet, None if feet is None else _paths(strides, feet))
+
+
 def per_stride_spatial(rows: Sequence[Row]) -> dict[str, Column]:
     """Columns of the stride table, one entry per stride."""
     return row_columns(rows, NAMES)

@@ -86,7 +86,7 @@ def temporal(strides: Strides) -> tuple[Parameter, ...]:
         for name, column in temporal_values(used).items():
             values = column[~np.isnan(column)].tolist()
             parameters.append(
-                summary(name, side, values, unit_of(name), None if values else _missing(name, used))
+                summary(name, side, values, unit_of(name), None if values else missing(name, used))
             )
             if name == "step_time_s":
                 steps.extend(values)
@@ -95,8 +95,8 @@ def temporal(strides: Strides) -> tuple[Parameter, ...]:
     return tuple(parameters)
 
 
-def _missing(name: str, used: Sequence[Stride]) -> str:
-    """Why a parameter has no value on a side."""
+def missing(name: str, used: Sequence[Stride]) -> str:
+    """Why a parameter has no value over these strides of a side."""
     if not used:
         return "no_strides"
     if name.startswith(("stance", "swing")):

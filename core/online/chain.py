@@ -1,0 +1,271 @@
+"""The chain behind calibration: samples in, body, angles, contacts and strides out.
+
+It starts where the person stood still, goes through what was recorded since and on with every new sample.
+Every part keeps its own state, so that any division of the samples into blocks gives the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+
+from core.attitude import AttitudeParams
+from core.body.choice import WHOLE, possible
+from core.body.erkf import ErkfParams
+from core.body.erkf_poses import refined, run_erkf
+from core.body.l7s_filter import L7sParams
+from core.errors import EstimationError, Notice
+from core.events.flags import StrideParams
+from core.events.foot_pitch import FootPitchParams
+from core.events.result import GaitEvent
+from core.frames import R_NEUTRAL, Bools, Floats, Segment, Side
+from core.online.body import Estimator, Filtered, FootPaths, Placed, Raw, worn_feet
+from core.online.calibrated import LiveCalibration
+from core.online.contacts import Attitudes, Contacts
+from core.online.erkf import live_params
+from core.online.frame import LiveStride
+from core.online.history import MOST, History
+from core.online.joints import LiveAngles
+from core.online.linked import Linked, Unlinked
+from core.online.sparse import Sparse
+from core.online.strides import LiveStrides, Setup
+from core.parameters.spatial import Surface
+from core.rest import samples
+from core.rotation import from_matrix
+
+NOT_LIVE: Final = (
+    "The sensors that are worn ({}) show no figure while they stream: for one, wear both feet, or the pelvis "
+    "and a whole leg. All is recorded and can be analysed afterwards."
+)
+BROKEN: Final = (
+    "The live filter lost its footing and shows no figure any more; recording goes on. Stand still and "
+    "calibrate again; check which sensor is on which segment."
+)
+COURSES: Final[tuple[Segment, ...]] = ("pelvis", "foot_l", "foot_r")
+"""Segments whose orientation parameters of a stride want."""
+
+
+@dataclass(frozen=True)
+class ChainParams:
+    """Parameters of the live chain."""
+
+    erkf: ErkfParams = field(default_factory=live_params)
+    l7s: L7sParams = field(default_factory=L7sParams)
+    attitude: AttitudeParams = field(default_factory=AttitudeParams)
+    events: FootPitchParams = field(default_factory=FootPitchParams)
+    strides: StrideParams = field(default_factory=StrideParams)
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a block gave: the body, angles (T, names) in rad, the rest in order of being known."""
+
+    placed: Placed
+    angles: Floats
+    events: tuple[GaitEvent, ...]
+    strides: tuple[LiveStride, ...]
+    notices: tuple[Notice, ...]
+
+
+class Chain:
+    """Everything behind calibration.
+
+    Parameters
+    ----------
+    calibration : its samples are gone through at once (`caught_up`).
+    columns : segments of the axis' columns, of which the calibrated ones are used.
+    first : its first sample on the axis, where standing begins.
+    surface : what is walked on.
+
+    Raises
+    ------
+    EstimationError, SignalError when not even contacts can be told.
+    """
+
+    def __init__(
+        self,
+        calibration: LiveCalibration,
+        columns: Sequence[Segment],
+        surface: Surface | None = None,
+        params: ChainParams | None = None,
+    ) -> None:
+        self.params = params or ChainParams()
+        calibrated = calibration.calibrated
+        rate = self.rate_hz = calibrated.recording.rate_hz
+        mounted = calibrated.calibration.segments
+        self.segments = tuple(s for s in columns if s in mounted)
+        self._columns = np.array([columns.index(s) for s in self.segments], np.int64)
+        zero = samples(calibrated.calibration.zero, rate)
+        self.first = calibration.first + zero.start
+        self._notices: list[Notice] = []
+        self.estimator = self._choose(calibration, zero.start)
+        feet = worn_feet(self.segments)
+        turned = tuple(dict.fromkeys((*feet, *self.estimator.attitudes)))
+        index = [self.segments.index(s) for s in turned]
+        self._turned = turned
+        self._attitudes = Attitudes(index, [mounted[s] for s in turned], rate, self.params.attitude)
+        self._contacts = Contacts(feet, rate, self.params.events)
+        self._feet = np.array([self.segments.index(f) for f in feet], np.int64)
+        self._courses = tuple(s for s in COURSES if s in self.segments)
+        self._angles = LiveAngles.of(self.estimator.segments)
+        self._pelvis = LiveAngles.of(("pelvis",)) if "pelvis" in self._courses else None
+        self._zero: Floats | None = None
+        self._told_broken = False
+        self.contact: dict[Side, bool] = dict.fromkeys(self._contacts.sides, True)
+        self._strides = LiveStrides(
+            Setup(
+                first=self.first,
+                rate_hz=rate,
+                angles=self._angles.names,
+                courses=self._courses,
+                feet=self._contacts.sides,
+                linked=self.estimator.linked,
+                source=self.estimator.source,
+                body=calibration.body,
+                surface=surface or Surface(calibrated.recording.protocol),
+            ),
+            self.params.strides,
+        )
+        self.history = self._new_history()
+        self._count = 0
+        self.caught_up = self._catch_up(calibration, zero)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the angles."""
+        return self._angles.names
+
+    def push(self, acc: Floats, gyr: Floats, valid: Bools) -> Outcome:
+        """The next samples (T, columns, …) of the axis."""
+        k = self._columns
+        return self._advance(acc[:, k], gyr[:, k], valid[:, k])
+
+    def _choose(self, calibration: LiveCalibration, at: int) -> Estimator:
+        """The estimator that the calibrated sensors allow, best first as offline."""
+        calibrated, body, rate = calibration.calibrated, calibration.body, self.rate_hz
+        mounted = calibrated.calibration.segments
+        column = {s: i for i, s in enumerate(self.segments)}
+        level = from_matrix(R_NEUTRAL)
+
+        def filtered(segments: Sequence[Segment], q: Mapping[Segment, Floats]) -> Filtered:
+            start = np.stack([q.get(s, level) for s in segments])
+            return Filtered(segments, column, mounted, body, rate, self.params.erkf, start)
+
+        best = next(iter(possible(self.segments)), None)
+        if best == "erkf":
+            worn = tuple(s for s in WHOLE if s in column)
+            return Linked(
+                worn, filtered(worn, self._standing(calibration, worn, at)), body.ankle_height, rate
+            )
+        worn_f = worn_feet(self.segments)
+        feet = FootPaths(filtered(worn_f, {})) if worn_f else None
+        if best in ("l7s_3i", "l7s_2i") and feet is not None:
+            return Sparse(column, mounted, body, rate, feet, self.params.l7s)
+        message = NOT_LIVE.format(", ".join(self.segments))
+        self._notices.append(Notice("no_live_figure", message, severity="info"))
+        return Unlinked(self.segments, feet)
+
+    def _standing(
+        self, calibration: LiveCalibration, worn: Sequence[Segment], at: int
+    ) -> Mapping[Segment, Floats]:
+        """How the segments stood by all that was walked since; empty = all facing ahead."""
+        coarse = replace(ErkfParams.people(), states=9)
+        try:
+            run = run_erkf(calibration.calibrated, calibration.orientations, calibration.body, worn, coarse)
+        except EstimationError as error:
+            self._notices.append(Notice(error.code, error.message, error.sensor))
+            return {}
+        return {s: q[at] for s, q in refined(run, calibration.orientations).q.items()}
+
+    def _new_history(self) -> History:
+        feet = len(self._contacts.sides)
+        return History(
+            self.rate_hz,
+            {
+                "angles": (len(self.names),),
+                "course": (len(self._courses), 4),
+                "feet_p": (feet, 3),
+                "feet_q": (feet, 4),
+            },
+            {"course_valid": (len(self._courses),), "feet_still": (feet,), "feet_valid": (feet,)},
+        )
+
+    def _catch_up(self, calibration: LiveCalibration, zero: slice) -> Outcome:
+        """Through the standing window as one block, then through what was walked."""
+        signals = calibration.calibrated.recording.sensors
+        acc = np.stack([signals[s].acc for s in self.segments], axis=1)
+        gyr = np.stack([signals[s].gyr for s in self.segments], axis=1)
+        valid = np.stack([signals[s].valid for s in self.segments], axis=1)
+        found = [self._advance(acc[zero], gyr[zero], valid[zero])]
+        for start in range(zero.stop, len(acc), MOST):
+            k = slice(start, start + MOST)
+            found.append(self._advance(acc[k], gyr[k], valid[k]))
+        return _joined(found)
+
+    def _advance(self, acc: Floats, gyr: Floats, valid: Bools) -> Outcome:
+        if len(acc) > MOST and self._count:
+            parts = [slice(k, k + MOST) for k in range(0, len(acc), MOST)]
+            return _joined([self._advance(acc[k], gyr[k], valid[k]) for k in parts])
+        acc, gyr = np.ascontiguousarray(acc), np.ascontiguousarray(gyr)
+        valid = np.ascontiguousarray(valid)
+        q = self._attitudes.push(acc, gyr, valid)
+        turned = {s: q[:, i] for i, s in enumerate(self._turned)}
+        placed = self.estimator.push(Raw(acc, gyr, valid, turned))
+        angles = self._measure(placed, turned, valid)
+        known = self._contacts.push(q[:, : len(self._feet)], valid[:, self._feet], self.first)
+        self._remember(placed, turned, valid, angles)
+        self._count += len(acc)
+        for x in known:
+            self.contact[x.event.side] = x.event.kind == "ic"
+        if self.estimator.broken and not self._told_broken:
+            self._told_broken = True
+            self._notices.append(Notice("live_figure_lost", BROKEN))
+        notices, self._notices = tuple(self._notices), []
+        strides = tuple(self._strides.push(known, self.history))
+        return Outcome(placed, angles, tuple(x.event for x in known), strides, notices)
+
+    def _measure(self, placed: Placed, turned: Mapping[Segment, Floats], valid: Bools) -> Floats:
+        """Angles (T, names) over those of standing; the first block is the standing."""
+        angles = self._angles(placed.q, placed.known, self._zero)
+        if self._pelvis is not None and "pelvis" in turned:
+            # a pelvis that carries a sensor tilts as that says, not as a model of the legs wants it
+            here = self.segments.index("pelvis")
+            zero = None if self._zero is None else np.ascontiguousarray(self._zero[:2])
+            angles[:, :2] = self._pelvis(turned["pelvis"][:, None], valid[:, here, None], zero)
+        if self._zero is None:
+            finite = np.where(np.isfinite(angles), angles, 0.0)
+            n = np.isfinite(angles)
+            self._zero = np.arctan2((np.sin(finite) * n).sum(axis=0), (np.cos(finite) * n).sum(axis=0))
+            angles = (angles - self._zero + np.pi) % (2.0 * np.pi) - np.pi
+        return angles
+
+    def _remember(
+        self, placed: Placed, turned: Mapping[Segment, Floats], valid: Bools, angles: Floats
+    ) -> None:
+        index = {s: i for i, s in enumerate(self.estimator.segments)}
+        course = np.empty((len(angles), len(self._courses), 4))
+        course_valid = np.empty(course.shape[:2], np.bool_)
+        for i, s in enumerate(self._courses):
+            course[:, i] = turned[s] if s in self.estimator.attitudes else placed.q[:, index[s]]
+            course_valid[:, i] = valid[:, self.segments.index(s)] & np.isfinite(course[:, i, 0])
+        rows = {
+            "angles": angles, "course": course, "course_valid": course_valid, "feet_p": placed.paths.p,
+            "feet_q": placed.paths.q, "feet_still": placed.paths.still, "feet_valid": placed.paths.valid,
+        }  # fmt: skip
+        for start in range(0, len(angles), MOST):
+            self.history.append({name: x[start : start + MOST] for name, x in rows.items()})
+
+
+def _joined(found: Sequence[Outcome]) -> Outcome:
+    """Outcomes of blocks that follow each other as one."""
+    last = found[-1]
+    return Outcome(
+        placed=last.placed,
+        angles=np.concatenate([x.angles for x in found]),
+        events=tuple(e for x in found for e in x.events),
+        strides=tuple(s for x in found for s in x.strides),
+        notices=tuple(n for x in found for n in x.notices),
+    )

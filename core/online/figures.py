@@ -1,0 +1,89 @@
+"""Every figure of one stride, by the definitions of the whole take (core/parameters), on a window of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, isnan
+
+import numpy as np
+
+from core.angles import JointAngles
+from core.body.feet import FootTracks
+from core.events.result import Stride, Strides
+from core.frames import Bools, Floats, Segment
+from core.online.frame import NOT_YET
+from core.parameters.kinematic import (
+    FIGURES,
+    FOOT_PITCH,
+    cycle_curves,
+    foot_pitch,
+    stride_figures,
+    turning_angle,
+)
+from core.parameters.phases import phase_rows
+from core.parameters.rows import Value
+from core.parameters.spatial import NAMES as SPATIAL
+from core.parameters.spatial import Surface, spatial_row
+from core.parameters.stance import foot_pitches, stances
+from core.parameters.temporal import missing, temporal_values
+
+
+@dataclass(frozen=True, eq=False)
+class Span:
+    """Part of a take that holds a stride, `Oriented` of pelvis and feet.
+
+    Parameters
+    ----------
+    t_s : (n,). q, valid : segment → (n, 4), (n,). angles, feet : on the same axis.
+    """
+
+    t_s: Floats
+    q: Mapping[Segment, Floats]
+    valid: Mapping[Segment, Bools]
+    angles: JointAngles
+    feet: FootTracks | None
+
+
+Figures = tuple[dict[str, Value], dict[str, Floats]]
+"""Value or reason by name; curve (101,) rad by variable."""
+
+
+def early_figures(stride: Stride, span: Span, surface: Surface) -> Figures:
+    """All that is known when the contact that ends the stride is; of distances what a belt tells."""
+    one = Strides((stride,))
+    found: dict[str, Value] = {}
+    for name, column in temporal_values((stride,)).items():
+        value = float(column[0])
+        found[name] = missing(name, (stride,)) if isnan(value) else value
+    pitch = foot_pitches(span)
+    flat = stances(one, span.t_s, pitch)
+    curves = cycle_curves(span.angles, one)
+    found |= flat.rows[0]
+    found |= phase_rows(one, flat, span.angles, pitch, span.feet)[0]
+    worn = dict.fromkeys(FIGURES, "joint_missing") | dict.fromkeys(FOOT_PITCH, "no_foot_sensor")
+    found |= worn | {"turning_angle_deg": "gap"}
+    read = {**stride_figures(curves), **turning_angle(one), **foot_pitch(span, one, pitch)}
+    for name, sides in read.items():
+        values = sides.get(stride.side)
+        if values is not None and len(values):
+            value = float(values[0])
+            reason = "no_terminal_contact" if name == FOOT_PITCH[1] and stride.tc_s is None else "gap"
+            found[name] = value if isfinite(value) else reason
+    if surface.protocol == "treadmill" or span.feet is None or stride.side not in span.feet.p:
+        found |= spatial_row(stride, one, span.feet, surface)
+    else:
+        found |= dict.fromkeys(SPATIAL, NOT_YET)
+    rows = {name: sides[stride.side][0] for name, sides in curves.curves.items() if stride.side in sides}
+    return found, {name: row for name, row in rows.items() if bool(np.isfinite(row).all())}
+
+
+def distances(stride: Stride, context: Sequence[Stride], span: Span, surface: Surface) -> dict[str, Value]:
+    """Figures between the flats, once both feet have left the floor again.
+
+    Parameters
+    ----------
+    context : the strides around it, itself included, in order of time.
+    """
+    row = spatial_row(stride, Strides(tuple(context)), span.feet, surface)
+    return {name: "gap" if isinstance(v, float) and isnan(v) else v for name, v in row.items()}

@@ -1,0 +1,104 @@
+"""How every sensor does: rate, losses, saturation and silence over the last seconds, by its batches."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from core.formats.live_log import Batch, Hello, StreamInfo
+from core.frames import Segment
+from core.online.frame import SensorHealth
+
+OVER_S: Final = 5.0
+"""Shares are of so long: a hole shows for as long as a person needs to see it."""
+
+FULL: Final = 0.995
+"""A component beyond this share of its range is at its end."""
+
+
+@dataclass
+class _Piece:
+    """What a batch of one stream held: device time it begins and ends at, counts by sensor."""
+
+    start_us: int
+    end_us: int
+    samples: int
+    measured: tuple[int, ...]
+    full: tuple[int, ...]
+
+
+class _StreamHealth:
+    """The last seconds of one stream."""
+
+    def __init__(self, info: StreamInfo) -> None:
+        self.info = info
+        self._limit = np.array(
+            [[x.acc_range or np.inf] * 3 + [x.gyr_range or np.inf] * 3 for x in info.sensors], np.float64
+        )
+        self._pieces: deque[_Piece] = deque()
+        self.sent_us: int | None = None
+
+    def push(self, batch: Batch) -> None:
+        """Take a batch."""
+        self.sent_us = batch.sent_us
+        x = batch.samples[:, :, :6]
+        n = len(x)
+        step_us = round(1e6 / self.info.rate_hz)
+        last_us = (n - 1) * step_us if batch.offsets_us is None else int(batch.offsets_us[-1])
+        # a sum is not a number where any part of it is not
+        measured = np.isfinite(x.sum(axis=2)).sum(axis=0)
+        full = (np.abs(x) >= FULL * self._limit).any(axis=2).sum(axis=0)
+        end_us = batch.t0_us + last_us + step_us
+        self._pieces.append(_Piece(batch.t0_us, end_us, n, tuple(measured.tolist()), tuple(full.tolist())))
+        while end_us - self._pieces[0].end_us > OVER_S * 1e6:
+            self._pieces.popleft()
+
+    def of(self, i: int, silent_s: float, still: bool) -> SensorHealth:
+        """Health of the i-th sensor."""
+        sensor = self.info.sensors[i]
+        if not self._pieces:
+            return SensorHealth(sensor.id, sensor.segment, 0.0, 1.0, 0.0, silent_s, still)
+        span_s = max(1e-6 * (self._pieces[-1].end_us - self._pieces[0].start_us), 1e-6)
+        measured = sum(p.measured[i] for p in self._pieces)
+        full = sum(p.full[i] for p in self._pieces)
+        return SensorHealth(
+            id=sensor.id,
+            segment=sensor.segment,
+            rate_hz=measured / span_s,
+            lost_share=min(1.0, max(0.0, 1.0 - measured / max(1.0, span_s * self.info.rate_hz))),
+            saturated_share=full / max(1, measured),
+            silent_s=silent_s,
+            still=still,
+        )
+
+
+class Health:
+    """All sensors of a take, those without a segment too."""
+
+    def __init__(self, hello: Hello) -> None:
+        self._streams = {info.stream: _StreamHealth(info) for info in hello.streams}
+        self._begun_us: int | None = None
+        self._now_us = 0
+
+    def push(self, batch: Batch) -> None:
+        """Take a batch of a known stream."""
+        self._streams[batch.stream].push(batch)
+        if self._begun_us is None:
+            self._begun_us = batch.sent_us
+        self._now_us = max(self._now_us, batch.sent_us)
+
+    def now(self, still: Collection[Segment]) -> tuple[SensorHealth, ...]:
+        """Every sensor in the order of the hello; `still` : segments at rest."""
+        found = []
+        for stream in self._streams.values():
+            since = stream.sent_us if stream.sent_us is not None else self._begun_us
+            silent_s = 0.0 if since is None else 1e-6 * (self._now_us - since)
+            found += [
+                stream.of(i, silent_s, sensor.segment in still)
+                for i, sensor in enumerate(stream.info.sensors)
+            ]
+        return tuple(found)

@@ -1,0 +1,97 @@
+"""The live figure of a chain of sensors by the ErKF, and what can be told without any figure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numba
+import numpy as np
+
+from core.frames import FOOT, SHANK, SIDES, THIGH, Segment
+from core.online.body import Filtered, FootPaths, Paths, Placed, Raw, worn_feet
+from core.online.frame import Method
+
+LEVEL_S: Final = 0.1
+"""The figure is let down or lifted to the floor of the foot that rests within about so long: for the eye."""
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _level(p, feet, still, valid, ankle, share, floor):  # type: ignore[no-untyped-def]
+    """Take the floor's height, as the resting feet see it, off a figure p (T, n, 3) in place."""
+    for k in range(p.shape[0]):
+        seen, count = 0.0, 0
+        for f in range(feet.shape[0]):
+            if still[k, f] and valid[k, f]:
+                seen += p[k, feet[f], 2] - ankle
+                count += 1
+        if count:
+            floor[0] += share * (seen / count - floor[0])
+        for i in range(p.shape[1]):
+            p[k, i, 2] -= floor[0]
+
+
+class Linked:
+    """Pelvis and legs that hang together."""
+
+    method: Method = "erkf"
+    attitudes: tuple[Segment, ...] = ()
+
+    def __init__(
+        self, segments: Sequence[Segment], filtered: Filtered, ankle_height: float, rate_hz: float
+    ) -> None:
+        self.segments = tuple(segments)
+        tree = filtered.tree
+        self._filtered, self._ankle = filtered, ankle_height
+        feet = worn_feet(segments)
+        self._feet = np.array([self.segments.index(f) for f in feet], np.int64)
+        legs = [s for s in SIDES if {THIGH[s], SHANK[s], FOOT[s]} <= set(segments)]
+        shown: list[Segment] = ["pelvis", *(x for s in legs for x in (THIGH[s], SHANK[s], FOOT[s]))]
+        self._shown = np.array([self.segments.index(s) for s in shown], np.int64)
+        self.linked = len(feet) == 2 and not (set(self._feet.tolist()) & set(tree.roots()))
+        self.source = "erkf_live" if self.linked else "erkf_feet_live"
+        self._share, self._floor = min(1.0, 1.0 / (LEVEL_S * rate_hz)), np.zeros(1)
+
+    @property
+    def broken(self) -> bool:
+        """The filter gave up."""
+        return self._filtered.broken
+
+    def push(self, raw: Raw) -> Placed:
+        """The next samples; the first block is the whole standing window."""
+        signals, q, p = self._filtered.push(raw)
+        known = signals.valid & np.isfinite(q[:, :, 0])
+        still = np.ascontiguousarray(signals.still[:, self._feet, 0])
+        paths = Paths(p[:, self._feet], q[:, self._feet], still, known[:, self._feet])
+        _level(p, self._feet, still, paths.valid, self._ankle, self._share, self._floor)
+        return Placed(q, p, known, np.asarray(known[:, self._shown].all(axis=1)), paths)
+
+
+class Unlinked:
+    """Sensors that make no figure: each by itself, and the paths of the feet among them."""
+
+    method: Method = "none"
+    linked = False
+    source = "erkf_feet_live"
+
+    def __init__(self, segments: Sequence[Segment], feet: FootPaths | None) -> None:
+        self.segments = self.attitudes = tuple(segments)
+        self._feet = feet
+
+    @property
+    def broken(self) -> bool:
+        """The filter of the feet gave up."""
+        return self._feet is not None and self._feet.broken
+
+    def push(self, raw: Raw) -> Placed:
+        """The next samples; the first block is the whole standing window."""
+        T = len(raw.valid)
+        q = np.stack([raw.turned[s] for s in self.segments], axis=1)
+        paths = no_paths(T) if self._feet is None else self._feet.push(raw)
+        return Placed(q, np.full((*q.shape[:2], 3), np.nan), raw.valid, np.zeros(T, np.bool_), paths)
+
+
+def no_paths(samples: int) -> Paths:
+    """Of a set without feet."""
+    none = np.zeros((samples, 0), np.bool_)
+    return Paths(np.zeros((samples, 0, 3)), np.zeros((samples, 0, 4)), none, none)

@@ -1,0 +1,177 @@
+"""One live take: batches in, frames out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from core.body.model import NOMINAL_HEIGHT_M, BodyModel
+from core.body.tree import PRESETS
+from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
+from core.errors import Notice, SagittalError
+from core.formats.live_log import Batch, Hello
+from core.frames import GRAVITY, R_NEUTRAL, Protocol, Segment
+from core.fusion.orientations import Orientations
+from core.online.attempt import Wearer
+from core.online.axis import AxisParams, OnlineAxis, UniformBlock
+from core.online.calibrated import LiveCalibration
+from core.online.calibrating import CalibratingParams, LiveCalibrator
+from core.online.chain import Chain, ChainParams, Outcome
+from core.online.frame import EMPTY_TRAIL, LiveFrame, Trail
+from core.online.health import Health
+from core.online.still import Stillness
+from core.parameters.spatial import Surface
+from core.recording import SensorSignals, Subject, UniformRecording, check_belt
+from core.rotation import from_matrix
+
+
+@dataclass(frozen=True)
+class OnlineParams:
+    """Parameters of every stage."""
+
+    axis: AxisParams = field(default_factory=AxisParams)
+    calibrating: CalibratingParams = field(default_factory=CalibratingParams)
+    chain: ChainParams = field(default_factory=ChainParams)
+
+
+class Online:
+    """A take as it comes: a pure function of its batches and commands in order.
+
+    Parameters
+    ----------
+    hello : its streams. subject : height, standing width, shoe. protocol : what is walked on and done.
+    mounting : segment → declared mounting. belt_speed_mps : of a treadmill, None = not entered.
+
+    Raises
+    ------
+    SignalError `no_mapping`, `sample_rate_too_low`. ParameterError of `check_belt`.
+    """
+
+    def __init__(
+        self,
+        hello: Hello,
+        subject: Subject | None = None,
+        protocol: Protocol = "walk",
+        params: OnlineParams | None = None,
+        *,
+        mounting: Mapping[str, str] | None = None,
+        belt_speed_mps: float | None = None,
+    ) -> None:
+        check_belt(belt_speed_mps, protocol)
+        self.params = params or OnlineParams()
+        self._axis = OnlineAxis(hello, self.params.axis)
+        self._surface = Surface(protocol, belt_speed_mps)
+        self._calibrating = LiveCalibrator(
+            Wearer(self._axis.segments, self._axis.rate_hz, subject or Subject(), protocol, mounting or {}),
+            self.params.calibrating,
+        )
+        self._health = Health(hello)
+        self._still = Stillness(len(self._axis.segments), self._axis.rate_hz)
+        self.chain: Chain | None = None
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """Worn segments in the order of the axis' columns."""
+        return self._axis.segments
+
+    def push(self, batch: Batch) -> LiveFrame | None:
+        """Take the next batch of the log; the state after the samples it completes, None when it does not."""
+        self._health.push(batch)
+        block = self._axis.push(batch)
+        if block is None:
+            return None
+        rests = self._still.push(block.acc, block.gyr, block.valid)[-1, :, 1]
+        notices = list(self._axis.notices())
+        outcomes: list[Outcome] = []
+        start = 0
+        if self.chain is None:
+            start = len(block)
+            found = self._calibrating.push(block)
+            if found is not None:
+                notices += found.notices
+                start = found.past - block.first
+                outcomes += self._begin(found, notices)
+        if self.chain is not None and start < len(block):
+            outcomes.append(self.chain.push(block.acc[start:], block.gyr[start:], block.valid[start:]))
+        frame = LiveFrame(
+            t_s=float(block.t_s[-1]),
+            seq=batch.seq,
+            stage=self._calibrating.stage,
+            health=self._health.now([s for s, x in zip(self.segments, rests, strict=True) if x]),
+            calibration=self._calibrating.view,
+            notices=tuple(notices),
+        )
+        return frame if self.chain is None or not outcomes else _told(frame, block, self.chain, outcomes)
+
+    def command(self, name: str) -> None:
+        """Do what the therapist asks for, from the next sample on: "redo_calibration"; nothing else."""
+        if name == "redo_calibration":
+            self.chain = None
+            self._calibrating.redo()
+
+    def _begin(self, found: LiveCalibration, notices: list[Notice]) -> list[Outcome]:
+        """Start the chain and catch up; a calibration that no chain can run on is begun anew."""
+        try:
+            self.chain = Chain(found, self.segments, self._surface, self.params.chain)
+        except SagittalError as error:
+            notices.append(Notice(error.code, error.message, error.sensor))
+            self._calibrating.redo()
+            return []
+        return [self.chain.caught_up]
+
+
+def _told(frame: LiveFrame, block: UniformBlock, chain: Chain, outcomes: Sequence[Outcome]) -> LiveFrame:
+    """The frame with what the chain says after the block's last sample."""
+    placed, angles = outcomes[-1].placed, outcomes[-1].angles
+    here = min(len(angles), len(block))
+    q, p, known = placed.q[-1], placed.p[-1], placed.known[-1]
+    segments = chain.estimator.segments
+    return replace(
+        frame,
+        method=chain.estimator.method,
+        q={s: q[i] for i, s in enumerate(segments) if known[i]},
+        p={s: p[i] for i, s in enumerate(segments) if known[i] and np.isfinite(p[i, 0])},
+        valid=bool(placed.whole[-1]),
+        contact=dict(chain.contact),
+        angles=dict(zip(chain.names, angles[-1].tolist(), strict=True)),
+        trail=Trail(block.t_s[-here:], chain.names, angles[-here:]) if here else EMPTY_TRAIL,
+        events=tuple(e for x in outcomes for e in x.events),
+        strides=tuple(s for x in outcomes for s in x.strides),
+        notices=(*frame.notices, *(n for x in outcomes for n in x.notices)),
+    )
+
+
+def warm() -> None:
+    """Compile or load every kernel of the chain, so that the first take does not wait for it."""
+    for worn in (PRESETS["lower_body7"], PRESETS["feet_pelvis3"], PRESETS["feet2"]):
+        chain = Chain(_standing(worn), worn)
+        acc = np.tile([0.0, GRAVITY, 0.0], (10, len(worn), 1))
+        chain.push(acc, np.zeros_like(acc), np.ones(acc.shape[:2], np.bool_))
+
+
+def _standing(worn: tuple[Segment, ...], samples: int = 150, rate_hz: float = 100.0) -> LiveCalibration:
+    """A calibration of somebody who only stands, sensors along the segments' axes."""
+    acc = np.tile([0.0, GRAVITY, 0.0], (samples, 1))
+    here = np.ones(samples, np.bool_)
+    sensors = {s: SensorSignals(s, acc.copy(), np.zeros_like(acc), None, here.copy(), ~here) for s in worn}
+    t_s = np.arange(samples) / rate_hz
+    zero = (0.0, samples / rate_hz)
+    recording = UniformRecording(t_s, rate_hz, sensors, Subject(), "walk", {})
+    mounted = {s: SegmentCalibration(np.eye(3), np.zeros(3), GRAVITY, "declared", 1.0) for s in worn}
+    calibration = Calibration(mounted, (zero,), (), zero, ~here, "declared")
+    upright = np.tile(from_matrix(R_NEUTRAL), (samples, 1))
+    return LiveCalibration(
+        calibrated=CalibratedRecording(recording, calibration),
+        orientations=Orientations(
+            t_s, rate_hz, dict.fromkeys(worn, upright), dict.fromkeys(worn, here), "declared"
+        ),
+        first=0,
+        past=samples,
+        body=BodyModel.from_height(NOMINAL_HEIGHT_M),
+        turned={},
+        checks=(),
+        notices=(),
+        ok=True,
+    )

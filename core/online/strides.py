@@ -1,0 +1,231 @@
+"""Contacts → live strides: each told when its second contact is known, and again when its distances are.
+
+The stride list of a whole take asks the neighbours of a stride whether it counts; here only those before it
+can be asked (core/events/flags.py says which flags those are: all but "last" and "non_periodic").
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import floor
+from typing import Final
+
+import numpy as np
+
+from core.angles import JointAngles, headings
+from core.body.feet import FootTracks
+from core.body.model import BodyModel
+from core.events.flags import StrideParams, flagged
+from core.events.result import GaitEvent, GaitEvents, Stride, StrideFlag
+from core.events.strides import side_strides
+from core.frames import Floats, Segment, Side
+from core.fusion.orientations import Orientations
+from core.online.contacts import Known
+from core.online.figures import Span, distances, early_figures
+from core.online.frame import LiveStride
+from core.online.history import History
+from core.parameters.flats import OTHER
+from core.parameters.rows import Value
+from core.parameters.spatial import NAMES as SPATIAL
+from core.parameters.spatial import Surface
+
+REMEMBERED: Final = 20
+"""Strides of a foot that the next one is compared with: those of the therapist's strip."""
+
+EVENTS: Final = 16
+"""Contacts of both feet that are kept: those of four strides."""
+
+LATER: Final[frozenset[StrideFlag]] = frozenset(("last", "non_periodic"))
+"""Flags that only a later stride, or none, can give."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What the columns of the history mean.
+
+    Parameters
+    ----------
+    first : sample 0 on the axis. angles : names of the angle columns. courses : pelvis and feet with a
+        sensor. feet : sides whose path is kept.
+    """
+
+    first: int
+    rate_hz: float
+    angles: tuple[str, ...]
+    courses: tuple[Segment, ...]
+    feet: tuple[Side, ...]
+    linked: bool
+    source: str
+    body: BodyModel
+    surface: Surface
+
+
+@dataclass
+class _Pending:
+    """A stride whose distances are not known yet, and the sample at which they are given up waiting for."""
+
+    told: LiveStride
+    stride: Stride
+    until: int
+
+
+class LiveStrides:
+    """The strides of a live take, in the order in which they become known."""
+
+    def __init__(self, setup: Setup, params: StrideParams | None = None) -> None:
+        self._setup, self._params = setup, params or StrideParams()
+        self._events: deque[GaitEvent] = deque(maxlen=EVENTS)
+        self._recent: dict[Side, deque[Stride]] = {s: deque(maxlen=REMEMBERED) for s in OTHER}
+        self._pending: list[_Pending] = []
+        self._count = 0
+
+    def push(self, known: Iterable[Known], history: History) -> list[LiveStride]:
+        """Strides that the contacts known since the last call, or the mere time since then, complete."""
+        told: list[LiveStride] = []
+        for at, event in known:
+            told += self._given_up(at, history)
+            self._events.append(event)
+            told += self._completed(at, history)
+            if event.kind == "ic":
+                told += self._landed(at, event, history)
+        return told + self._given_up(history.length - 1, history)
+
+    def _landed(self, at: int, event: GaitEvent, history: History) -> list[LiveStride]:
+        """The stride that this contact ends, if it began within reach."""
+        own = [e.time_s for e in self._events if e.side == event.side and e.kind == "ic"]
+        if len(own) < 2:
+            return []
+        first, past = self._sample(own[-2]) - 1, at + 1
+        if not history.reaches(first, past):
+            return []
+        span = self._span(first, past, history)
+        inside = tuple(e for e in self._events if e.time_s >= own[-2] or e.side != event.side)
+        stride = side_strides(event.side, GaitEvents(inside), span, None, self._params)[-1]
+        recent = self._recent[event.side]
+        if recent and recent[-1].end_s != stride.start_s:
+            recent.clear()
+        recent.append(stride)
+        flags = tuple(f for f in flagged(tuple(recent), self._params)[-1].flags if f not in LATER)
+        found, curves = early_figures(stride, span, self._setup.surface)
+        values, reasons = _split(found)
+        final = self._setup.surface.protocol == "treadmill" or event.side not in self._setup.feet
+        told = LiveStride(
+            n=self._count,
+            side=event.side,
+            start_s=stride.start_s,
+            foot_off_s=stride.tc_s,
+            end_s=stride.end_s,
+            detected_s=event.detected_s,
+            values=values,
+            reasons=reasons,
+            curves=curves,
+            turn_rad=stride.turn_rad,
+            flags=flags,
+            counted=not flags,
+            complete=final,
+        )
+        self._count += 1
+        if not final:
+            wait = round(self._params.max_s * self._setup.rate_hz)
+            self._pending.append(_Pending(told, stride, self._sample(stride.end_s) + wait))
+        return [told]
+
+    def _completed(self, at: int, history: History) -> list[LiveStride]:
+        ready = [p for p in self._pending if self._left_again(p.stride)]
+        self._pending = [p for p in self._pending if p not in ready]
+        return [self._complete(p, at, history) for p in ready]
+
+    def _given_up(self, at: int, history: History) -> list[LiveStride]:
+        """Those nobody steps on after: a stop. Each at its own sample, whatever the blocks are."""
+        ready = sorted((p for p in self._pending if p.until <= at), key=lambda p: p.until)
+        self._pending = [p for p in self._pending if p.until > at]
+        return [self._complete(p, p.until, history) for p in ready]
+
+    def _complete(self, pending: _Pending, at: int, history: History) -> LiveStride:
+        context = self._context()
+        first = self._sample(pending.stride.start_s) - 1
+        found: dict[str, Value] = dict.fromkeys(SPATIAL, "gap")
+        if history.reaches(first, at + 1):
+            span = self._span(first, at + 1, history)
+            found = distances(pending.stride, context, span, self._setup.surface)
+        told, (values, reasons) = pending.told, _split(found)
+        return replace(
+            told,
+            detected_s=(self._setup.first + at) / self._setup.rate_hz,
+            values={**told.values, **values},
+            reasons={k: v for k, v in told.reasons.items() if k not in found} | reasons,
+            complete=True,
+        )
+
+    def _left_again(self, stride: Stride) -> bool:
+        """Both feet that the distances rest on have been lifted, or landed again, since their flats."""
+
+        def moved(side: Side, since: float) -> bool:
+            return any(e.side == side and e.time_s > since for e in self._events)
+
+        other, landed = OTHER[stride.side], stride.opposite_ic_s
+        return moved(stride.side, stride.end_s) and (
+            landed is None or other not in self._setup.feet or moved(other, landed)
+        )
+
+    def _context(self) -> list[Stride]:
+        """Recent strides of both feet, and what is known of those that have begun."""
+        found = []
+        for side in self._setup.feet:
+            contacts = [e.time_s for e in self._events if e.side == side and e.kind == "ic"]
+            leavings = [e.time_s for e in self._events if e.side == side and e.kind == "tc"]
+            for start, end in pairwise(contacts):
+                off = next((t for t in leavings if start < t < end), None)
+                landings = [
+                    e.time_s
+                    for e in self._events
+                    if e.side != side and e.kind == "ic" and start < e.time_s < end
+                ]
+                opposite = landings[0] if len(landings) == 1 else None
+                found.append(Stride(side, start, off, end, opposite_ic_s=opposite))
+            off = next((t for t in leavings if contacts and t > contacts[-1]), None)
+            if off is not None:
+                found.append(Stride(side, contacts[-1], off, off))
+        return sorted(found, key=lambda s: (s.start_s, s.side))
+
+    def _sample(self, time_s: float) -> int:
+        return floor(time_s * self._setup.rate_hz + 1e-6) - self._setup.first
+
+    def _span(self, first: int, past: int, history: History) -> Span:
+        """Samples first … past − 1 as the functions of a whole take want them."""
+        x = self._setup
+        t_s = np.arange(x.first + first, x.first + past) / x.rate_hz
+        q, valid = history.floats("course", first, past), history.bools("course_valid", first, past)
+        by_segment: Mapping[Segment, Floats] = {s: q[:, i] for i, s in enumerate(x.courses)}
+        take = Orientations(
+            t_s, x.rate_hz, by_segment, {s: valid[:, i] for i, s in enumerate(x.courses)}, "live"
+        )
+        columns = history.floats("angles", first, past)
+        angles = JointAngles(
+            t_s, {name: columns[:, i] for i, name in enumerate(x.angles)}, {}, headings=headings(take)
+        )
+        feet = None
+        if x.feet:
+            p, turned = history.floats("feet_p", first, past), history.floats("feet_q", first, past)
+            still, known = history.bools("feet_still", first, past), history.bools("feet_valid", first, past)
+            feet = FootTracks(
+                t_s=t_s,
+                rate_hz=x.rate_hz,
+                p={s: p[:, i] for i, s in enumerate(x.feet)},
+                q={s: turned[:, i] for i, s in enumerate(x.feet)},
+                still={s: still[:, i] for i, s in enumerate(x.feet)},
+                valid={s: known[:, i] for i, s in enumerate(x.feet)},
+                linked=x.linked,
+                source=x.source,
+                body=x.body,
+            )
+        return Span(t_s, take.q, take.valid, angles, feet)
+
+
+def _split(found: Mapping[str, Value]) -> tuple[dict[str, float | None], dict[str, str]]:
+    """Values, None where there is a reason; and the reasons."""
+    values = {name: v if isinstance(v, float) else None for name, v in found.items()}
+    return values, {name: v for name, v in found.items() if isinstance(v, str)}

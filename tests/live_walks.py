@@ -1,0 +1,61 @@
+"""Recordings as a tablet would have sent them, and what the live chain says to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from core.formats.live_log import Batch, Hello, SensorInfo, StreamInfo
+from core.frames import Bools, Floats, Segment
+from core.online import LiveFrame, Online
+from core.recording import UniformRecording
+
+
+def hello_of(recording: UniformRecording) -> Hello:
+    """All sensors of a recording as one stream."""
+    sensors = tuple(SensorInfo(s, s, 160.0, 35.0) for s in recording.sensors)
+    return Hello("take", "replay", (StreamInfo(0, recording.rate_hz, "shared", sensors),))
+
+
+def samples_of(recording: UniformRecording) -> Floats:
+    """(n, k, 9) as measured: NaN where a sensor was lost."""
+    parts = []
+    for x in recording.sensors.values():
+        six = np.concatenate((x.acc, x.gyr, np.full((len(x.acc), 3), np.nan)), axis=1)
+        six[~x.valid] = np.nan
+        parts.append(six)
+    return np.stack(parts, axis=1)
+
+
+def batches(recording: UniformRecording, sizes: int | Sequence[int] = 10) -> Iterator[Batch]:
+    """The recording in batches of one size, or of these in turn, each sent when its last sample is there."""
+    x = samples_of(recording).astype(np.float32)
+    turn = [sizes] if isinstance(sizes, int) else list(sizes)
+    first = seq = 0
+    while first < len(x):
+        past = min(len(x), first + turn[seq % len(turn)])
+        t0, sent = (round(1e6 * k / recording.rate_hz) for k in (first, past - 1))
+        offsets = np.round(1e6 * np.arange(first, past) / recording.rate_hz).astype(np.int64) - t0
+        yield Batch(0, seq, t0, sent, x[first:past], offsets.astype(np.uint32))
+        first, seq = past, seq + 1
+
+
+def live(recording: UniformRecording, sizes: int | Sequence[int] = 10) -> tuple[Online, list[LiveFrame]]:
+    """A take from its first batch to its last."""
+    online = Online(hello_of(recording), recording.subject, recording.protocol)
+    frames = [f for b in batches(recording, sizes) if (f := online.push(b)) is not None]
+    return online, frames
+
+
+def trails(frames: Sequence[LiveFrame]) -> tuple[Floats, dict[str, Floats]]:
+    """Times and angles of all frames in a row."""
+    told = [f.trail for f in frames if f.trail.names]
+    t = np.concatenate([x.t_s for x in told])
+    values = np.concatenate([x.values for x in told])
+    return t, {name: values[:, i] for i, name in enumerate(told[0].names)}
+
+
+def only_valid(recording: UniformRecording, segment: Segment) -> Bools:
+    """When a sensor was there."""
+    return recording.sensors[segment].valid
