@@ -1,0 +1,46 @@
+"""Batches of a layout as nodes of a viser scene."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from server.viewer.colours import GHOST, TINTS, linear
+from server.viewer.layout import Batch
+
+PALE: Final = 0.5
+"""Opacity of another visit and of a reference."""
+
+FAINT: Final = 0.35
+"""Opacity of a part that no sensor supports."""
+
+
+def add_batch(
+    scene: viser.SceneApi, name: str, batch: Batch, *, ghost: bool = False
+) -> viser.BatchedMeshHandle:
+    """Draw the first frame of a batch; with `ghost` the second one too, pale, in the same node."""
+    frames = 2 if ghost else 1
+    opacity = np.where(batch.measured, 1.0, FAINT).astype(np.float32)
+    if ghost:
+        opacity = np.append(opacity, np.full(len(opacity), PALE, np.float32))
+    return scene.add_batched_meshes_simple(
+        name,
+        *batch.mesh,
+        batch.wxyz[:frames].reshape(-1, 4),
+        batch.position[:frames].reshape(-1, 3),
+        batched_scales=np.tile(batch.scale, (frames, 1)),
+        batched_colors=colours(batch, dark=False, ghost=ghost),
+        batched_opacities=None if (opacity == 1.0).all() else opacity,
+        lod="off",
+        receive_shadow=False,
+    )
+
+
+def colours(batch: Batch, dark: bool, *, ghost: bool = False, grey: bool = False) -> NDArray[np.uint8]:
+    """Colours (k, 3), with a ghost (2k, 3), as viser takes them; `grey`: the sides have lost theirs."""
+    tints = ["body" if grey and tint in ("left", "right") else tint for tint in batch.tint]
+    own = [linear(TINTS[dark][tint]) for tint in tints]
+    return np.array(own + [linear(GHOST[dark])] * (len(own) * ghost), np.uint8)

@@ -1,0 +1,129 @@
+"""A walk made of curves over the gait cycle, on the body of the person: the norm, or one's own better side.
+
+Both legs follow the same curves, each at its own phase. Everything that does not depend on the moment is laid
+out once, so that a moment is a look-up, one rotation and the floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from core import rotation
+from core.angles import SIGNS
+from core.body.kinematics import leg_points, sole_points
+from core.body.model import BodyModel
+from core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Floats, Segment, Side
+from core.posture import leg_orientations, pelvis_orientation
+
+SAGITTAL: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
+"""Without these there is no walk to show."""
+
+SEGMENTS: Final[tuple[Segment, ...]] = (
+    "pelvis",
+    *(s for side in SIDES for s in (THIGH[side], SHANK[side], FOOT[side])),
+)
+_POINTS: Final = 5
+"""Of a leg: hip, knee, ankle, heel, ball."""
+
+Phases = Mapping[Side, float | None]
+
+
+class ReferenceWalk:
+    """Poses of a reference at any phase.
+
+    Parameters
+    ----------
+    curves : variable → (n,) rad over the cycle, signs as in the curves of core.parameters; the sagittal ones
+        must be there, another that is missing is 0. A pelvis rotation is about the heading.
+    lead : the side whose cycle the pelvis follows.
+    """
+
+    def __init__(self, curves: Mapping[str, Floats], body: BodyModel, lead: Side = "left") -> None:
+        self.lead: Side = lead
+        self._last = len(curves[SAGITTAL[0]]) - 1
+        pelvis = np.broadcast_to(pelvis_orientation(curves, lead), (self._last + 1, 4))
+        upright: dict[Segment, Floats] = {"pelvis": np.array([1.0, 0.0, 0.0, 0.0])}
+        turn, points = [], []
+        for side in SIDES:
+            leg = leg_orientations(curves, side)
+            hip, knee, ankle = leg_points({**upright, **leg}, body, side)
+            sole = [ankle + rotation.rotate(leg[FOOT[side]], np.array(x)) for x in sole_points(body)]
+            turn.append(np.stack([leg[s] for s in (THIGH[side], SHANK[side], FOOT[side])], axis=1))
+            points.append(np.stack(np.broadcast_arrays(hip, knee, ankle, *sole), axis=1))
+        self._pelvis, self._turn, self._points = pelvis, turn, points
+
+    def at(self, phases: Phases, place: Floats, heading: float) -> tuple[Floats, Floats] | None:
+        """Orientations (7, 4) and positions (7, 3) in m of `SEGMENTS`, the lower sole on the floor.
+
+        Parameters
+        ----------
+        phases : side → 0 to 1; where one is not known, half a cycle from the other. None when neither is.
+        place : (2,) m, where the pelvis is. heading : rad, where the walk goes.
+        """
+        rows = {side: _row(phases, side, self._last) for side in SIDES}
+        lead = rows[self.lead]
+        if lead is None:
+            return None
+        pelvis = rotation.multiply(rotation.about(2, heading), self._pelvis[lead])
+        legs = [(self._turn[k], self._points[k], rows[side]) for k, side in enumerate(SIDES)]
+        turn = rotation.multiply(pelvis, np.concatenate([turn[row] for turn, _, row in legs]))
+        points = rotation.rotate(pelvis, np.concatenate([points[row] for _, points, row in legs]))
+        p = np.empty((len(SEGMENTS), 3))
+        p[0] = 0.0
+        p[1:4], p[4:7] = points[:3], points[_POINTS : _POINTS + 3]
+        p += (*place, -points[:, 2].min())
+        return np.concatenate((pelvis[np.newaxis], turn)), p
+
+
+def _row(phases: Phases, side: Side, last: int) -> int | None:
+    own = phases.get(side)
+    if own is None:
+        other = phases.get("right" if side == "left" else "left")
+        if other is None:
+            return None
+        own = (other + 0.5) % 1.0
+    return round(last * min(max(own, 0.0), 1.0))
+
+
+def mirrored(curves: Mapping[str, Floats], zero: Mapping[str, float], side: Side) -> dict[str, Floats]:
+    """Mean curves of a side with its standing angles put back, so that both legs can follow them.
+
+    Parameters
+    ----------
+    curves : variable → (n,) rad from standing. zero : angle → rad at standing, as `JointAngles.zero_offset`.
+    """
+    own = 1.0 if side == "right" else -1.0
+    found = {name: x for name, x in curves.items() if name == "pelvis_rotation"}
+    if "pelvis_tilt" in curves:
+        found["pelvis_tilt"] = curves["pelvis_tilt"] + zero.get("pelvis_tilt", 0.0)
+    if "pelvis_obliquity" in curves:
+        found["pelvis_obliquity"] = curves["pelvis_obliquity"] + own * zero.get("pelvis_obliquity", 0.0)
+    for name in (name for rows in SIGNS.values() for name, _, _ in rows):
+        if name in curves:
+            found[name] = curves[name] + zero.get(f"{name}_{SUFFIX[side]}", 0.0)
+    return found
+
+
+def better_side(curves: Mapping[Side, Mapping[str, Floats]], norm: Mapping[str, Floats]) -> Side | None:
+    """The side whose sagittal curves are more like the norm's in shape, their means removed; rad.
+
+    The mean of root mean squares as in `gps_sagittal`, levels left out since ours are from standing. None
+    without both sides and the norm; then there is nothing to choose by.
+    """
+    found: dict[Side, float] = {
+        side: sum(_unlike(own[name], norm[name]) for name in SAGITTAL)
+        for side, own in curves.items()
+        if all(name in own and name in norm for name in SAGITTAL)
+    }
+    if len(found) < len(SIDES):
+        return None
+    return "left" if found["left"] <= found["right"] else "right"
+
+
+def _unlike(a: Floats, b: Floats) -> float:
+    x = np.linspace(0.0, 1.0, len(a))
+    other = np.interp(x, np.linspace(0.0, 1.0, len(b)), b)
+    return float(np.std(a - other))

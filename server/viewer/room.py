@@ -1,0 +1,95 @@
+"""The room around a figure in a viser scene: floor, light, background, and where it is looked at from.
+
+Everything that has a place in the room hangs on one node. To follow the person is to move that node, not the
+camera, so that the hand on the camera and the view that follows never fight.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from core.frames import Floats
+from server.viewer.colours import BACKGROUND, FLOOR
+
+ROOM: Final = "/room"
+"""Name of the node that everything hangs on."""
+
+FOV_RAD: Final = float(np.deg2rad(31.0))
+FLOOR_M: Final = 60.0
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A place to look from, in m: at, eye in the scene; fade, section are end and lines of the floor."""
+
+    at: Vector
+    eye: Vector
+    fade: float
+    section: float
+
+
+class Room:
+    """An empty room in a viser server of its own.
+
+    Parameters
+    ----------
+    floor_m : length of the floor. middle : (2,) m, its middle.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, floor_m: float = FLOOR_M, middle: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
+        self._server = server
+        scene = server.scene
+        scene.set_up_direction("+z")
+        scene.world_axes.visible = False
+        scene.configure_default_lights(True, cast_shadow=True)
+        self._node = scene.add_frame(ROOM, show_axes=False)
+        self._grid = scene.add_grid(
+            f"{ROOM}/floor", floor_m, floor_m, shadow_opacity=0.2, position=(*middle, 0.0)
+        )
+        server.initial_camera.fov = FOV_RAD
+
+    def bring(self, place: NDArray[np.floating]) -> None:
+        """Bring a place (2,) of the floor, m, to where the camera looks."""
+        x, y = place.tolist()
+        self._node.position = (-x, -y, 0.0)
+
+    def look(self, shot: Shot) -> None:
+        """Look from there, now and whoever comes later."""
+        self._grid.fade_distance = shot.fade
+        self._grid.section_size, self._grid.cell_size = shot.section, shot.section / 5
+        initial = self._server.initial_camera
+        initial.position, initial.look_at = shot.eye, shot.at
+        for client in self._server.get_clients().values():
+            client.camera.position, client.camera.look_at = shot.eye, shot.at
+
+    def set_dark(self, dark: bool) -> None:
+        """Change to the theme of the page around."""
+        self._server.scene.set_background_image(np.full((2, 2, 3), BACKGROUND[dark], np.uint8), format="png")
+        self._grid.cell_color, self._grid.section_color = FLOOR[dark]
+        self._server.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
+
+
+def near(size: float, facing: float) -> Shot:
+    """From the right and slightly from ahead, the whole person in the picture.
+
+    Parameters
+    ----------
+    size : leg length relative to 0.9 m. facing : heading, rad.
+    """
+    x, y, z = size * (turned(facing) @ np.array([1.9, -3.4, 1.75]))
+    return Shot((0.0, 0.0, 0.86 * size), (float(x), float(y), float(z)), fade=12.0, section=1.0)
+
+
+def turned(heading: float) -> Floats:
+    """Rotation matrix about the vertical."""
+    c, s = np.cos(heading), np.sin(heading)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
