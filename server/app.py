@@ -16,7 +16,15 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 import web
-from server import capture_pages, live_pages, number_pages, pages, problems, visit_pages
+from server import (
+    capture_pages,
+    live_pages,
+    number_pages,
+    pages,
+    prescription_pages,
+    problems,
+    visit_pages,
+)
 from server.api import (
     analyses,
     audit_log,
@@ -139,6 +147,7 @@ def create_app(settings: Settings) -> FastAPI:
         pages.router,
         visit_pages.router,
         number_pages.router,
+        prescription_pages.router,
         capture_pages.router,
         live_pages.router,
         live_feed.router,

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
-from server import audit, page_views, session_views, upload_views, visit_views
+from server import audit, page_views, prescription_views, session_views, upload_views, visit_views
 from server.api.context import Blobs, Db, Id
 from server.auth import accounts, one_time
 from server.auth.access import require
@@ -21,6 +21,7 @@ from server.services import (
     comparisons,
     histories,
     patients,
+    prescriptions,
     programmes,
     recordings,
     reviews,
@@ -84,6 +85,7 @@ def patient_page(
         patient = patients.get(c, pid)
         visits = page_views.visits(c, blobs, pid, results=who.may(Action.READ_RESULT))
         done, plans = histories.read(c, patient)
+        written = prescriptions.of_patient(c, pid) if who.may(Action.READ_RESULT) else []
     _opened(db, who, "patient", pid)
     trend = None
     if who.may(Action.READ_RESULT):
@@ -93,7 +95,7 @@ def patient_page(
         patient=page_views.patient_view(patient), visits=visits, keys=page_views.KEY_PARAMETERS,
         programme=visit_views.programme_view(plans[0], now().date()) if plans else None,
         planned={v.session_id: v.label for plan in plans for v in plan.visits if v.session_id},
-        trend=trend, comparable=len(done) > 1,
+        trend=trend, comparable=len(done) > 1, feedback=prescription_views.card(written),
     )  # fmt: skip
 
 

@@ -1,0 +1,108 @@
+// The form of a feedback prescription: targets of this person as one chooses, and one JSON record at the end.
+import { request, showProblem } from "./api.js";
+
+const form = document.getElementById("prescription");
+const base = `/api/v1/patients/${form.dataset.patient}`;
+const option = () => form.elements.parameter.selectedOptions[0];
+const checked = (name) => form.querySelector(`input[name="${name}"]:checked`);
+
+const READ = {
+  int: (v) => parseInt(v, 10),
+  float: (v) => parseFloat(v.replace(",", ".")),
+  percent: (v) => parseFloat(v.replace(",", ".")) / 100,
+  list: (v) => v.match(/\d+/g).map(Number),
+};
+
+function record() {
+  const body = { modes: [] };
+  for (const el of form.elements) {
+    if (!el.name || el.disabled || el.name === "told" || (el.type === "radio" && !el.checked)) continue;
+    if (el.name === "modes") {
+      if (el.checked) body.modes.push(el.value);
+      continue;
+    }
+    const value = el.type === "checkbox" ? el.checked : el.value.trim() === "" ? null : (READ[el.dataset.type] || String)(el.value);
+    const [first, second] = el.name.split(".");
+    if (second) (body[first] ??= {})[second] = value;
+    else body[first] = value;
+  }
+  const told = form.elements.told.value;
+  if (told) body[told] = true;
+  if (body.target.source !== "manual") body.target = { source: body.target.source };
+  return body;
+}
+
+// What is hidden is not part of the record: the server has the defaults.
+function arrange() {
+  const unit = option().dataset.unit;
+  for (const el of form.querySelectorAll("[data-unit]:not(option)")) el.textContent = unit || "no unit";
+  show("[data-manual]", checked("target.source")?.value === "manual");
+  show("[data-fading]", form.elements["schedule.kind"].value === "fading");
+  show("[data-rule]", form.elements["progression.automatic"].checked);
+  show("[data-other]", checked("side").value !== "");
+}
+
+function show(selector, on) {
+  const part = form.querySelector(selector);
+  part.hidden = !on;
+  for (const el of part.querySelectorAll("input")) el.disabled = !on;
+}
+
+let asked = 0;
+async function offer() {
+  const turn = ++asked;
+  const side = checked("side").value;
+  const query = new URLSearchParams({ parameter: option().value, ...(side && { side }) });
+  let offers;
+  try {
+    offers = await request("GET", `${base}/targets?${query}`);
+  } catch (problem) {
+    return showProblem(form.querySelector(".form-error"), problem);
+  }
+  if (turn !== asked) return; // something else was chosen meanwhile
+  for (const found of offers) fill(found);
+  const chosen = checked("target.source");
+  if (!chosen || chosen.disabled) form.querySelector('input[name="target.source"]:not(:disabled)').checked = true;
+  arrange();
+}
+
+function fill({ source, mean, sd, words, reason }) {
+  if (source === "manual") return;
+  const tile = form.querySelector(`[data-source="${source}"]`);
+  tile.querySelector("input").disabled = mean === null;
+  tile.querySelector("[data-value]").textContent = mean === null ? "" : quantity(mean, sd);
+  tile.querySelector("[data-words]").textContent = words ?? reason;
+}
+
+function quantity(mean, sd) {
+  const { unit, digits } = option().dataset;
+  const fine = Number(digits) + (sd < 5 * 10 ** -digits ? 1 : 0);
+  const text = `${mean.toFixed(fine)} ± ${sd.toFixed(fine)}`.replace("-", "−");
+  return unit === "°" ? `${text}°` : unit ? `${text}\u202f${unit}` : text;
+}
+
+form.addEventListener("change", (e) => {
+  if (e.target.name === "parameter" || e.target.name === "side") offer();
+  arrange();
+});
+
+form.addEventListener("submit", async (e) => {
+  e.preventDefault();
+  const modes = form.querySelectorAll('input[name="modes"]');
+  modes[0].setCustomValidity([...modes].some((m) => m.checked) ? "" : "Choose at least one.");
+  const hiddenRule = form.querySelector("[data-rule]");
+  if (!form.checkValidity() && hiddenRule.querySelector(":invalid")) hiddenRule.open = true;
+  if (!form.reportValidity()) return;
+  const button = form.querySelector("button.primary");
+  button.disabled = true;
+  try {
+    await request("POST", `${base}/prescriptions`, record());
+    location.assign(`/patients/${form.dataset.patient}`);
+  } catch (problem) {
+    button.disabled = false;
+    showProblem(form.querySelector(".form-error"), problem);
+  }
+});
+
+arrange();
+offer();
