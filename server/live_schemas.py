@@ -87,6 +87,9 @@ class LiveCommand(Request):
         "start", "stop", "mark", "undo_mark", "feedback", "level", "pause", "redo_calibration", "ghost"
     ]
     value: bool | int | Annotated[str, StringConstraints(max_length=200)] | None = None
+    t_s: float | None = Field(
+        None, ge=0, description="of a mark: the moment meant, in the time of the frames; null: the newest"
+    )
 
 
 class LiveEvent(Response):

@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection
 
 from core.norms import norms_for
 from core.norms.speed import SLOW_MPS
 from server.page_views import PROTOCOL_NAMES, SEGMENT_NAMES
 from server.report.notes import GROUPS
 from server.report.wording import NO_NORM, TERMS, VARIABLES, ZERO_WORDS, Variable
+from server.services import prescriptions
 from server.services.patients import Patient
 from server.services.sessions import Session
-from server.storage.tables import prescription
 
 JOINTS: Final = {"hip_flexion": "Hip", "knee_flexion": "Knee", "ankle_dorsiflexion": "Ankle"}
 """Variables of the current stride → the word on the button; the sagittal plane, which live is sure of."""
@@ -53,11 +53,10 @@ def live_view(c: Connection, session: Session, patient: Patient, *, capture: str
         "only_here": urlsplit(capture).hostname in LOOPBACK,
         "protocol": PROTOCOL_NAMES.get(session.protocol, session.protocol),
         "joints": [(v.name, JOINTS[v.name]) for v in shown],
-        "given": given,
-        "term": None if given is None else TERMS.get(given["parameter"]),
         "norm_note": note,
         "live": {
             "session": session.id,
+            "patient": patient.id,
             "variables": [_variable(v, bands.get(v.name)) for v in shown],
             "norm_note": note,
             "slow": {
@@ -78,6 +77,7 @@ def patient_view(c: Connection, session: Session) -> dict[str, Any]:
     return {
         "live": {
             "session": session.id,
+            "patient": session.patient_id,
             "prescription": _prescribed(c, session.patient_id),
             "terms": _terms(),
         }
@@ -85,12 +85,9 @@ def patient_view(c: Connection, session: Session) -> dict[str, Any]:
 
 
 def _prescribed(c: Connection, patient_id: str) -> dict[str, Any] | None:
-    """Content of the prescription in force, None without one."""
-    query = select(prescription.c.content).where(
-        prescription.c.patient_id == patient_id, prescription.c.ended_at.is_(None)
-    )
-    content: dict[str, Any] | None = c.execute(query.order_by(prescription.c.created_at.desc())).scalar()
-    return content
+    """What the prescription in force says, None without one."""
+    written = prescriptions.in_force(c, patient_id)
+    return None if written is None else written.content.to_json()
 
 
 def _variable(v: Variable, band: Any) -> dict[str, Any]:

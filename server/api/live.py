@@ -68,7 +68,7 @@ async def give_command(
     session_id: Id, body: schemas.LiveCommand, hub: LiveHub, who: Therapist
 ) -> dict[str, Any]:
     """Carry a command out; it is kept with its time and who gave it."""
-    return await hub.command(who, session_id, body.command, body.value)
+    return await hub.command(who, session_id, body.command, body.value, body.t_s)
 
 
 @router.post("/sessions/{session_id}/live/close", response_model=schemas.LiveTake, responses=refusals(409))

@@ -139,9 +139,14 @@ class Hub:
     # the therapist
 
     async def command(
-        self, actor: audit.Actor | None, session_id: str, name: str, value: Any
+        self, actor: audit.Actor | None, session_id: str, name: str, value: Any, at_s: float | None = None
     ) -> dict[str, Any]:
-        """Carry a command out, keep it, and return the state; raises Conflict, ServiceError bad_value."""
+        """Carry a command out, keep it, and return the state; raises Conflict, ServiceError bad_value.
+
+        Parameters
+        ----------
+        at_s : the moment a mark means, which is before its words are written; never after the newest sample.
+        """
         row = await asyncio.to_thread(self._open_row, session_id)
         take = self._takes.get(row.id)
         if take is None:
@@ -156,7 +161,9 @@ class Hub:
         if name == "undo_mark" and not take.steered.marks:
             raise Conflict("no_mark", "There is no mark to undo.")
         t_s = take.t_s
-        content = take.steer(name, value)
+        if name == "mark" and at_s is not None and t_s is not None:
+            t_s = min(at_s, t_s)
+        content = take.steer(name, value, t_s)
         await asyncio.to_thread(self._keep_command, actor, take.id, name, t_s, content)
         self.tell_state(take)
         return take.standing()
@@ -318,10 +325,11 @@ class Hub:
             with contextlib.suppress(NotFound):
                 await asyncio.to_thread(self._end, actor, take.id, state, end)
             await self._let_go(take)
+            take.problem = end.problem
             take.recording_id = await self._store(take.id)
             if take.tablet is not None:
                 if take.recording_id is not None:
-                    take.tablet.say(protocol.finished(take.recording_id))
+                    take.tablet.say(protocol.finished(take.recording_id, take.problem))
                 if by_us or take.recording_id is None:
                     take.tablet.shut(Close.ENDED, "take_ended")
             with contextlib.suppress(NotFound):

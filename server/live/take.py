@@ -102,6 +102,7 @@ class LiveTake:
         self.tablet: Line | None = None
         self.over = asyncio.Event()
         self.recording_id: str | None = None
+        self.problem: str | None = None
         self.estimate = "ok"
         self.t_s: float | None = None
         self._hub = hub
@@ -169,12 +170,12 @@ class LiveTake:
             list(self.steered.commands),
         )
 
-    def steer(self, name: str, value: Any) -> dict[str, Any]:
-        """Give a command from the next batch on and return the content of its event."""
+    def steer(self, name: str, value: Any, t_s: float | None) -> dict[str, Any]:
+        """Give a command from the next batch on and return the content of its event, which is at `t_s`."""
         content: dict[str, Any] = {"value": value}
         if name in STEERING:
             content["before"] = self.recorder.next_seq
-        self.steered.see(self.id, name, self.t_s, content)
+        self.steered.see(self.id, name, t_s, content)
         if name in STEERING:
             self._hub.pool.send(self.steered.commands[-1])
         return content
@@ -215,7 +216,7 @@ class LiveTake:
     def mind_silence(self, stale: bool) -> None:
         """Feedback pauses while data are stale; where it did is kept, so that a replay pauses there too."""
         if stale != self.steered.stale:
-            content = self.steer("stale", stale)
+            content = self.steer("stale", stale, self.t_s)
             if self.training.prescription is not None:
                 self._hub.journal.add(self.id, "stale", self.t_s, content)
 
@@ -234,5 +235,5 @@ class LiveTake:
             "stale": self.steered.stale,
             "estimate": self.estimate,
             "recording": self.recording_id,
-            "problem": None,
+            "problem": self.problem,
         }

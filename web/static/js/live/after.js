@@ -8,14 +8,16 @@ export class After {
     this.session = session;
   }
 
-  async show(state) {
+  // watched: the take ran while this page was open; else its session has been there for a while.
+  async show(state, watched) {
     const empty = !state.count;
     const part = state.state === "closed";
     say(this.root.querySelector("[data-over-title]"), empty ? "Nothing was recorded" : "Recording is saved");
     say(this.root.querySelector("[data-over-words]"), empty ? "No data came before the end."
       : part ? "It was ended here with what had arrived. Analysis is running; the session page opens when it is done."
       : "Analysis is running; the session page opens when it is done.");
-    this.root.querySelector("[data-do=again]").hidden = !empty;
+    this.root.querySelector("[data-do=again]").hidden = watched && !empty;
+    if (!watched && !empty) return say(this.root.querySelector("[data-over-words]"), "This session has its recording. Another one takes its place.");
     if (!empty && !this.following) await this.follow();
   }
 

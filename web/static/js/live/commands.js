@@ -8,8 +8,9 @@ export class Commands {
     this.last = Promise.resolve();
   }
 
-  send(command, value) {
-    return this.#post(`${this.api}/commands`, value === undefined ? { command } : { command, value });
+  // t: the moment a mark means, in the time of the frames.
+  send(command, value = null, t = null) {
+    return this.#post(`${this.api}/commands`, { command, value, t_s: t });
   }
 
   // Ends the take with what has arrived, when the tablet cannot.

@@ -10,7 +10,7 @@ class LiveFeedback extends HTMLElement {
   given(prescription, term) {
     this.prescription = prescription;
     this.term = term;
-    this.querySelector("[data-given]").hidden = !prescription;
+    this.querySelector("[data-has]").hidden = !prescription;
     this.querySelector("[data-on-line]").hidden = !prescription;
     this.querySelector("[data-none]").hidden = Boolean(prescription);
     const other = { left: "Right side", right: "Left side" }[prescription?.side] ?? "Side effects";

@@ -5,6 +5,7 @@ import "./calibration.js";
 import "./feedback-panel.js";
 import "./stride-chart.js";
 import { Feed } from "./feed.js";
+import { whenOther } from "./given.js";
 import { Commands } from "./commands.js";
 import { Pairing } from "./pairing.js";
 import { Screen } from "./screen.js";
@@ -36,12 +37,18 @@ class LivePage extends HTMLElement {
     this.calibration = this.querySelector("live-calibration");
     this.feedback = this.querySelector("live-feedback");
     this.figure = this.querySelector("live-view");
-    this.feedback.given(data.prescription, data.terms[data.prescription?.parameter]);
+    this.given();
     this.pick("knee_flexion");
     this.listen();
     this.press();
     this.feed.open();
     setInterval(() => this.speak(), SPOKEN_MS);
+  }
+
+  given() {
+    this.feedback.given(data.prescription, data.terms[data.prescription?.parameter]);
+    this.strip.given();
+    this.top.given(data.prescription, data.terms);
   }
 
   listen() {
@@ -70,8 +77,13 @@ class LivePage extends HTMLElement {
     this.notes.tablet(state);
     if (OVER.has(state.state)) {
       this.view("over");
-      this.after.show(state);
-    } else if (state.state === "streaming") this.view(this.feed.frame?.stage === "running" ? "run" : "calibrate");
+      this.after.show(state, this.watched === state.take);
+      return;
+    }
+    if (this.watched === undefined || (state.state === "streaming" && this.before !== "streaming")) whenOther(data, () => this.given());
+    this.before = state.state;
+    this.watched = state.take;
+    if (state.state === "streaming") this.view(this.feed.frame?.stage === "running" ? "run" : "calibrate");
     else {
       this.view("pair");
       this.pairing.state(state);
@@ -180,8 +192,10 @@ class LivePage extends HTMLElement {
     say(dialog.querySelector("[data-mark-time]"), clock(t));
     input.value = "";
     dialog.returnValue = "";
-    dialog.onclose = () => { if (dialog.returnValue === "mark") this.commands.send("mark", { text: input.value.trim(), t_s: t }); };
-    dialog.showModal();
+    dialog.onclose = () => { if (dialog.returnValue === "mark") this.commands.send("mark", input.value.trim() || null, t); };
+    dialog.onkeydown = (e) => { if (e.key === "Escape") dialog.close(); };
+    dialog.show(); // not modal: STOP stays within reach
+    input.focus();
   }
 
   speak() {

@@ -7,12 +7,12 @@ export class Bar {
   constructor(scene, { side, lengths, words }) {
     this.ball = scene.querySelector("[data-ball]");
     scene.querySelector("[data-feet]").toggleAttribute("hidden", !lengths);
-    if (!lengths) ["up", "down"].forEach((way, i) => (scene.querySelector(`[data-guide=${way}]`).textContent = words[i]));
-    // a left sole is a right one mirrored; the foot that steps is the trained one
+    ["up", "down"].forEach((way, i) => (scene.querySelector(`[data-guide=${way}]`).textContent = lengths ? "" : words[i]));
+    // a right sole is a left one mirrored; the foot that steps is the trained one
     for (const g of scene.querySelectorAll(".pict")) {
       const own = g.classList.contains("own"), left = own === (side !== "right");
-      g.classList.add(own ? (left ? "l" : "r") : "plain");
-      g.setAttribute("transform", g.getAttribute("transform").replace("scale(.6)", left ? "scale(.6)" : "scale(-.6 .6)"));
+      g.setAttribute("class", `pict ${own ? "own" : "other"}${own && side ? ` ${side[0]}` : ""}`);
+      g.setAttribute("transform", g.getAttribute("transform").replace(/scale\([^)]*\)/, left ? "scale(.6)" : "scale(-.6 .6)"));
     }
   }
 

@@ -1,5 +1,6 @@
 // <patient-screen>: one target, one picture, no numbers. It says what to do, sounds, and pauses when data are old.
 import { Feed } from "./feed.js";
+import { whenOther } from "./given.js";
 import { Bar } from "./patient-bar.js";
 import { Path } from "./patient-path.js";
 import { HELD, LENGTHS, ends, wayTo, what } from "./patient-words.js";
@@ -14,9 +15,6 @@ const ALIVE_MS = 1000;
 
 class PatientScreen extends HTMLElement {
   connectedCallback() {
-    this.given = data.prescription;
-    this.term = data.terms[this.given?.parameter];
-    this.modes = new Set(this.given?.modes ?? []);
     this.sound = new Sound();
     this.contacts = { l: null, r: null };
     this.picture();
@@ -28,12 +26,21 @@ class PatientScreen extends HTMLElement {
     const on = (type, act) => this.feed.addEventListener(type, (e) => act(e.detail));
     on("frame", (frame) => this.frame(frame));
     on("cue", (cue) => this.cue(cue));
+    on("state", (state) => {
+      if (state.state === "streaming" && this.before !== "streaming") whenOther(data, () => this.picture());
+      this.before = state.state;
+    });
     for (const type of ["state", "feedback", "fresh", "line"]) on(type, () => this.hold());
     this.feed.open();
     this.hold();
   }
 
   picture() {
+    this.given = data.prescription;
+    this.term = data.terms[this.given?.parameter];
+    this.modes = new Set(this.given?.modes ?? []);
+    for (const scene of this.querySelectorAll("[data-scene]")) scene.setAttribute("hidden", "");
+    this.scene = null;
     if (!this.given) return;
     const { side, parameter } = this.given;
     const name = this.modes.has("zone") && LENGTHS.has(parameter) ? "path" : "bar";

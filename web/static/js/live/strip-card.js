@@ -9,15 +9,16 @@ export class StripCard {
     Object.assign(this, { root, data, feed });
     this.strip = root.querySelector("target-strip");
     this.choice = root.querySelector("[data-strip-of]");
-    this.parameter = data.prescription?.parameter ?? data.choices[0];
-    if (!data.prescription) this.offer();
-    this.what();
+    for (const name of data.choices) this.choice.add(new Option(data.terms[name].label, name));
+    this.choice.addEventListener("change", () => { this.parameter = this.choice.value; this.what(); this.changed(); });
   }
 
-  offer() {
-    for (const name of this.data.choices) this.choice.add(new Option(this.data.terms[name].label, name));
-    this.choice.hidden = false;
-    this.choice.addEventListener("change", () => { this.parameter = this.choice.value; this.what(); this.changed(); });
+  // The prescribed parameter; without one the therapist chooses what to watch.
+  given() {
+    const given = this.data.prescription;
+    this.parameter = given?.parameter ?? this.choice.value;
+    this.choice.hidden = Boolean(given);
+    this.what();
   }
 
   get term() { return this.data.terms[this.parameter]; }

@@ -15,6 +15,12 @@ export class Top {
     setInterval(() => this.tick(), 500);
   }
 
+  // What is trained, under the name of the visit.
+  given(prescription, terms) {
+    const term = terms[prescription?.parameter];
+    say(this.at("given"), prescription ? ` · ${(term?.label ?? prescription.parameter).toLowerCase()}${prescription.side ? `, ${prescription.side}` : ""}` : "");
+  }
+
   state(state) {
     const running = state.state === "streaming";
     this.now = running ? { elapsed: state.elapsed_s ?? 0, at: performance.now() } : null;
@@ -25,8 +31,7 @@ export class Top {
     this.button("stop").hidden = !running;
     const marks = state.marks ?? [], last = marks.at(-1);
     this.button("undo").disabled = !last;
-    const text = last?.value?.text, at = last?.value?.t_s ?? last?.t_s;
-    say(this.at("last-mark"), last ? `Last mark: ${text ? `“${text}”, ` : ""}${clock(at)}` : "");
+    say(this.at("last-mark"), last ? `Last mark: ${last.value ? `“${last.value}”, ` : ""}${clock(last.t_s)}` : "");
     this.tick();
   }
 

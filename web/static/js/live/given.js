@@ -1,0 +1,12 @@
+// What is prescribed may change while a page waits; with its first sample a take keeps what is in force then.
+import { request } from "../api.js";
+
+// Calls `changed` with the prescription in force when it is another than the page was made with.
+export async function whenOther(data, changed) {
+  const all = await request("GET", `/api/v1/patients/${data.patient}/prescriptions`).catch(() => null);
+  if (!all) return;
+  const now = all.find((p) => p.ended_at === null)?.content ?? null;
+  if (JSON.stringify(now) === JSON.stringify(data.prescription)) return;
+  data.prescription = now;
+  changed();
+}
