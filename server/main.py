@@ -63,6 +63,17 @@ def _parser() -> argparse.ArgumentParser:
         help="auto, erkf, l7s_3i, l7s_2i, stance_foot_anchor (docs/estimators.md)",
     )
     p.add_argument("--config", type=Path, help='JSON: parameters by stage, {"poses": {"estimator": "erkf"}}')
+    p = add("replay", "Stream a recording to a server as a tablet would (docs/live-protocol.md).")
+    p.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of one take")
+    p.add_argument("--to", required=True, metavar="URL", help="address of the server, http://host:port")
+    p.add_argument("--code", required=True, help="the code that the session's live page shows")
+    p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")
+    p.add_argument("--speed", type=float, default=1.0, help="1 = as recorded (default), 0 = at once")
+    p.add_argument(
+        "--drop", type=float, default=0.0, metavar="P", help="cut the connection, chance per batch"
+    )
+    p.add_argument("--jitter", type=float, default=0.0, metavar="MS", help="delay batches by up to this")
+    p.add_argument("--batch", type=int, default=10, metavar="N", help="samples in a batch (default 10)")
     p = add("simulate", "Write a simulated recording and its exact truth.")
     p.add_argument("--out", type=Path, required=True, help="folder for recording and truth")
     p.add_argument(

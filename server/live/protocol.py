@@ -153,9 +153,9 @@ def command(name: Literal["start", "stop"]) -> str:
     return _text("command", command=name)
 
 
-def finished(recording: str) -> str:
-    """The take is a recording now."""
-    return _text("finished", recording=recording)
+def finished(recording: str, problem: str | None = None) -> str:
+    """The take is a recording now; `problem` (finish_mismatch): it was kept although the end did not fit."""
+    return _text("finished", recording=recording, **({"problem": problem} if problem else {}))
 
 
 def _text(kind: str, **values: object) -> str:

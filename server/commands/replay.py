@@ -1,0 +1,115 @@
+"""`sagittal replay`: a recording streamed to a server as a tablet would, with troubles made on purpose."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from core.errors import InputError, SagittalError
+from server.commands.analyse import source_files
+
+if TYPE_CHECKING:
+    from core.recording import Recording
+    from server.live.client import Report
+    from server.live.playback import Due
+
+
+def replay(
+    paths: Sequence[Path],
+    to: str,
+    code: str,
+    manifest: Path | None = None,
+    speed: float = 1.0,
+    drop: float = 0.0,
+    jitter: float = 0.0,
+    batch: int = 10,
+) -> int:
+    """Pair by code and stream files, folders or zips of one take.
+
+    Parameters
+    ----------
+    speed : 1 = as it was recorded, 0 = as fast as it goes. batch : samples in a batch.
+    drop : probability per batch that the connection is cut. jitter : longest delay of a batch in ms.
+
+    Returns
+    -------
+    0 when everything is acknowledged and the take is finished, 1 when not.
+    """
+    from server.live.client import Faults, stream
+    from server.live.pairing import pair
+    from server.live.playback import cut, hello_of, paced
+
+    try:
+        _check(speed, drop, jitter)
+        recording = _read(paths, manifest)
+        batches = cut(recording, batch)
+        pairing = pair(to, code)
+        hello = hello_of(recording, pairing.take)
+        _say(
+            f"Streaming {len(hello.sensors)} sensors, {batches[-1].at_s:.1f} s in {len(batches)} batches, to "
+            f"{pairing.session_title or 'the session'} of patient {pairing.patient_code}."
+        )
+        if not any(sensor.segment for sensor in hello.sensors):
+            _say("No sensor is assigned to a segment, so nothing can be estimated live; give a --manifest.")
+        report = asyncio.run(
+            stream(
+                pairing.socket,
+                pairing.token,
+                hello,
+                paced(batches, speed),
+                faults=Faults(drop, jitter / 1000.0),
+                hear=_heard,
+            )
+        )
+    except SagittalError as error:
+        sys.stderr.write(f"Not replayed ({error.code}): {error.message}\n")
+        return 1
+    _say(_summary(report, batches))
+    return 0 if report.problem is None else 1
+
+
+def _check(speed: float, drop: float, jitter: float) -> None:
+    for name, value, ok, expected in (
+        ("--speed", speed, 0.0 <= speed < float("inf"), "0 or more"),
+        ("--drop", drop, 0.0 <= drop < 1.0, "0 to below 1"),
+        ("--jitter", jitter, 0.0 <= jitter < float("inf"), "0 or more milliseconds"),
+    ):
+        if not ok:
+            raise InputError("bad_option", f"{name} is {value:g}; expected {expected}.")
+
+
+def _read(paths: Sequence[Path], manifest: Path | None) -> Recording:
+    from core.formats import parse_manifest, read_recording
+
+    declared = None
+    if manifest is not None:
+        try:
+            declared = parse_manifest(manifest.read_bytes())
+        except OSError as error:
+            raise InputError("file_not_found", f"{manifest} cannot be read: {error}.") from error
+    return read_recording(list(source_files(paths)), declared)
+
+
+def _heard(message: Mapping[str, Any]) -> None:
+    if message.get("type") == "command":
+        _say(f"The therapist asks: {message.get('command')}.")
+
+
+def _summary(report: Report, batches: Sequence[Due]) -> str:
+    half, most = (1000.0 * report.ack_quantile(share) for share in (0.5, 0.99))
+    text = (
+        f"{report.sent} of {len(batches)} batches acknowledged, half within {half:.0f} ms, 99 % within "
+        f"{most:.0f} ms; {report.resent} sent again after {report.reconnects} reconnections.\n"
+        f"Finished as recording {report.recording}, sha256 {report.sha256[:12]}…."
+    )
+    if report.problem:
+        text += f"\nThe server kept the take but found its end wrong ({report.problem})."
+    return text
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()

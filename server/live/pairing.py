@@ -1,0 +1,66 @@
+"""The short code of a take → a token for its stream, as the tablet's page does it."""
+
+from __future__ import annotations
+
+import json
+import urllib.error
+import urllib.request
+from dataclasses import dataclass
+from urllib.parse import urlsplit, urlunsplit
+
+from server.live.client import LiveError
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """What a code opens: `socket` is a whole ws:// or wss:// address."""
+
+    token: str
+    take: str
+    session_title: str
+    patient_code: str
+    socket: str
+
+
+def pair(address: str, code: str) -> Pairing:
+    """Pair with the server at an http:// or https:// address.
+
+    Raises
+    ------
+    LiveError
+        bad_address, unreachable, or the server's code (code_not_valid, too_many_attempts …).
+    """
+    parts = urlsplit(address if "//" in address else f"http://{address}")
+    if parts.scheme not in {"http", "https"} or not parts.netloc:
+        raise LiveError("bad_address", f"'{address}' is no address of a server; give http://host:port.")
+    base = urlunsplit((parts.scheme, parts.netloc, "", "", ""))
+    request = urllib.request.Request(  # noqa: S310 - the scheme is checked above
+        f"{base}/api/v1/live/pairings",
+        data=json.dumps({"code": code}).encode(),
+        headers={"Content-Type": "application/json"},
+    )
+    # no proxy of the environment: a server on loopback is not its business
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    try:
+        with opener.open(request, timeout=20) as answer:
+            said = json.loads(answer.read())
+    except urllib.error.HTTPError as refused:
+        raise _refusal(refused) from None
+    except (OSError, ValueError) as error:
+        raise LiveError("unreachable", f"{base} cannot be reached: {error}.") from None
+    scheme = "wss" if parts.scheme == "https" else "ws"
+    return Pairing(
+        token=said["token"],
+        take=said["take"],
+        session_title=said.get("session_title") or "",
+        patient_code=said.get("patient_code") or "",
+        socket=urlunsplit((scheme, parts.netloc, said["socket"], "", "")),
+    )
+
+
+def _refusal(refused: urllib.error.HTTPError) -> LiveError:
+    try:
+        problem = json.loads(refused.read())
+        return LiveError(str(problem["code"]), str(problem["detail"]))
+    except (ValueError, KeyError, TypeError):
+        return LiveError("unreachable", f"The server answered HTTP {refused.code}; is it Sagittal?")
