@@ -4,6 +4,7 @@ import { RateMeter } from "./rate.js";
 
 const TICK_MS = 20;
 const BATCH_S = 0.05;
+const ROUNDING_US = 1;
 const JITTER_US = 60; // times off the rate's grid by more travel with each sample
 
 export class Replay {
@@ -51,8 +52,8 @@ export class Replay {
   // lastUs: per stream the last sample already given, after a reload.
   start(onBatch, lastUs = {}) {
     for (const [stream, play] of this.playing.entries()) {
-      const last = lastUs[stream] ?? -1;
-      while (play.row < play.track.tUs.length && play.track.tUs[play.row] <= last + 1) play.row++;
+      const last = lastUs[stream] ?? -Infinity;
+      while (play.row < play.track.tUs.length && play.track.tUs[play.row] <= last + ROUNDING_US) play.row++;
     }
     const next = this.playing.filter((p) => p.row < p.track.tUs.length).map((p) => p.track.tUs[p.row] + (p.track.lagUs ?? 0));
     this.zeroUs = Math.min(...next);

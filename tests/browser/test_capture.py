@@ -1,0 +1,359 @@
+"""The tablet's page in real Chromium against the real server: pair, stream, lose the network, reload, end."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from core.formats import SourceFile, read_recording
+from core.formats.live_log import decode_batch, parse_finish, peek, scan
+from core.formats.live_log import payload as payload_of
+from tests.browser import filling
+from tests.browser.conftest import RunningServer
+from tests.browser.design import layout_faults, text_faults
+from tests.browser.network import Network
+from tests.browser.test_upload import SEGMENTS
+from tests.data import data_folder
+
+SIZES = ((810, 1080), (1280, 800), (1024, 768), (360, 740))
+RECORDED_S = 25.03
+
+
+class Clinic:
+    """A session with a live take, by the interface the therapist's page uses."""
+
+    def __init__(self, client: httpx.Client, session: str) -> None:
+        self.client = client
+        self.session = session
+        self.code: str = self.post("/live")["code"]
+
+    def post(self, path: str, **body: Any) -> Any:
+        return filling.add(self.client, f"/sessions/{self.session}{path}", **body)
+
+    def take(self) -> Any:
+        answer = self.client.get(f"/api/v1/sessions/{self.session}/live")
+        return answer.raise_for_status().json()
+
+    def log(self, server: RunningServer) -> bytes:
+        """The recording's file as it is stored."""
+        found = self.client.get(f"/api/v1/sessions/{self.session}/recording").raise_for_status().json()
+        (file,) = found["files"]
+        (path,) = (p for p in (server.folder / "blobs").rglob(f"*{file['sha256']}") if p.is_file())
+        return path.read_bytes()
+
+
+@pytest.fixture
+def clinic(running: RunningServer, request: pytest.FixtureRequest) -> Iterator[Clinic]:
+    with running.client() as client:
+        code = f"CAP-{hashlib.sha256(request.node.name.encode()).hexdigest()[:8]}"
+        patient = filling.add(client, "/patients", code=code, height_m=1.75)["id"]
+        made = Clinic(client, filling.add_session(client, patient, "Walk, 10 m overground"))
+        yield made
+        if made.take()["state"] in {"pairing", "open", "streaming"}:
+            made.post("/live/close")
+
+
+@pytest.fixture
+def network(running: RunningServer) -> Iterator[Network]:
+    network = Network(running.url)
+    yield network
+    network.close()
+
+
+@contextmanager
+def tablet(browser: Browser, url: str, **more: Any) -> Iterator[Page]:
+    """The capture page on a new tablet; a script error or a refused style fails the test."""
+    context = browser.new_context(
+        base_url=url, viewport={"width": 810, "height": 1080}, accept_downloads=True, **more
+    )
+    page = context.new_page()
+    said: list[str] = []
+    page.on("pageerror", lambda e: said.append(str(e)))
+    page.on("console", lambda m: said.append(m.text) if "Content Security" in m.text else None)
+    page.goto("/capture")
+    yield page
+    context.close()
+    assert not said, said
+
+
+def pair(page: Page, code: str) -> None:
+    page.get_by_label("Pairing code").press_sequentially(code.lower())
+    expect(page.locator("[data-paired]")).to_be_visible()
+    expect(page.locator("[data-paired]")).to_contain_text("Paired with CAP-")
+
+
+def walk_files() -> list[tuple[str, bytes]]:
+    folder = data_folder("neura_walk", "rawimu")
+    return [(p.name, p.read_bytes()) for p in sorted(folder.glob("*.txt"))]
+
+
+def choose(page: Page, files: list[tuple[str, bytes]]) -> None:
+    page.locator("[data-files]").set_input_files(
+        [{"name": n, "mimeType": "text/plain", "buffer": c} for n, c in files]
+    )
+
+
+def place(page: Page, segments: dict[str, str]) -> None:
+    for device, segment in segments.items():
+        page.locator(f"li[data-sensor='{device}'] [data-place]").click()
+        page.locator(f"dialog[open] button[value={segment}]").click()
+
+
+def start(page: Page) -> None:
+    page.locator("[data-go]").click()
+    expect(page.locator("[data-link]")).to_have_text("Connected", timeout=10_000)
+
+
+def until(page: Page, condition: str, timeout_s: float = 20) -> None:
+    page.wait_for_function(
+        f"() => {{ const page = document.querySelector('capture-page'); return {condition}; }}",
+        timeout=timeout_s * 1000,
+    )
+
+
+def expected_samples() -> dict[str, np.ndarray[Any, np.dtype[np.float32]]]:
+    files = [SourceFile(n, len(c), lambda c=c: c) for n, c in walk_files()]  # type: ignore[misc]
+    streams = read_recording(files, None).streams
+    return {
+        device: np.hstack([streams[device].acc, streams[device].gyr, streams[device].mag]).astype(np.float32)  # type: ignore[list-item]
+        for device in SEGMENTS
+    }
+
+
+def test_a_walk_played_on_the_tablet_is_the_recording_though_network_and_page_went_away(
+    flat: Browser, running: RunningServer, clinic: Clinic, network: Network
+) -> None:
+    with tablet(flat, network.url) as page:
+        pair(page, clinic.code)
+        choose(page, walk_files())
+        expect(page.locator("[data-sum]")).to_contain_text("2 copies left out")
+        place(page, SEGMENTS)
+        expect(page.locator("[data-go]")).to_have_text("Start with 7 sensors")
+        began = time.monotonic()
+        start(page)
+        expect(page.locator("[data-say]")).to_have_text("Stand still")
+        until(page, "page.outbox.acked > 60")
+        assert clinic.take()["state"] == "streaming"
+
+        network.cut()
+        page.wait_for_timeout(1500)
+        expect(page.locator("[data-link]")).to_contain_text(re.compile(r"Keeping \d\.\d s here"))
+        page.wait_for_timeout(3500)
+        # recording goes on without the network
+        until(page, "page.outbox.made - page.outbox.acked > 80", 0.1)
+        network.mend()
+        until(page, "page.outbox.made - page.outbox.acked < 10")
+
+        network.cut()
+        page.wait_for_timeout(1000)
+        network.mend()
+        page.reload()
+        expect(page.locator("[data-go]")).to_have_text("Stop")
+        expect(page.locator("[data-link]")).to_have_text("Connected", timeout=10_000)
+
+        expect(page.locator("[data-done]")).to_have_text("Recording is on the server", timeout=60_000)
+        took = time.monotonic() - began
+        assert took > RECORDED_S, "at the speed it was recorded"
+        assert took < RECORDED_S + 15
+        assert page.evaluate("async () => (await indexedDB.databases()).length") == 1
+    take = clinic.take()
+    assert take["state"] == "finished"
+    assert take["problem"] is None
+
+    log = clinic.log(running)
+    records, length = scan(log)
+    assert length == len(log)
+    frames = [r.body for r in records if r.kind == "B"]
+    headers = [peek(f) for f in frames]
+    assert [h.seq for h in headers] == list(range(len(frames)))
+    end = parse_finish(records[-1].body)
+    assert end.count == len(frames)
+    digest = hashlib.sha256()
+    for frame, header in zip(frames, headers, strict=True):
+        digest.update(payload_of(frame, header))
+    assert digest.hexdigest() == end.sha256
+
+    samples = np.concatenate([decode_batch(f).samples for f in frames])
+    expected = expected_samples()
+    order = sorted(SEGMENTS)
+    assert len(samples) == len(expected[order[0]])
+    for i, device in enumerate(order):
+        np.testing.assert_array_equal(samples[:, i], expected[device])
+    starts = np.array([h.t0_us for h in headers])
+    counts = np.cumsum([0, *(h.n_samples for h in headers)])[:-1]
+    np.testing.assert_array_equal(starts, counts * 10_000)
+
+
+def test_a_network_that_only_goes_silent_is_noticed_and_nothing_is_lost(
+    flat: Browser, running: RunningServer, clinic: Clinic, network: Network
+) -> None:
+    with tablet(flat, network.url) as page:
+        pair(page, clinic.code)
+        choose(page, walk_files())
+        place(page, {"00B40C55": "foot_l", "00B40C48": "foot_r"})
+        start(page)
+        until(page, "page.outbox.acked > 20")
+        network.freeze()
+        expect(page.locator("[data-link]")).to_contain_text("Keeping", timeout=8_000)
+        network.mend()
+        expect(page.locator("[data-link]")).to_have_text("Connected", timeout=12_000)
+        page.locator("[data-go]").click()
+        expect(page.locator("[data-done]")).to_have_text("Recording is on the server", timeout=20_000)
+    records, _ = scan(clinic.log(running))
+    samples = np.concatenate([decode_batch(r.body).samples for r in records if r.kind == "B"])
+    expected = expected_samples()
+    np.testing.assert_array_equal(samples[:, 0], expected["00B40C48"][: len(samples)])
+    np.testing.assert_array_equal(samples[:, 1], expected["00B40C55"][: len(samples)])
+    assert len(samples) > 500
+
+
+def test_a_wrong_code_is_refused_in_words_and_the_next_one_is_taken(
+    flat: Browser, running: RunningServer, clinic: Clinic
+) -> None:
+    with tablet(flat, running.url) as page:
+        for key in "222222":
+            page.get_by_role("button", name=key, exact=True).click()
+        expect(page.get_by_role("alert")).to_be_visible()
+        expect(page.locator("[data-go]")).to_be_disabled()
+        pair(page, clinic.code)
+        expect(page.get_by_role("alert")).to_be_hidden()
+        expect(page.locator("[data-session-title]")).to_have_text("Walk, 10 m overground")
+        assert page.locator("[data-code]").inner_text().split() == [clinic.code[:3], clinic.code[3:]]
+
+
+def test_the_therapist_ends_the_take_and_the_tablet_says_so(
+    flat: Browser, running: RunningServer, clinic: Clinic
+) -> None:
+    with tablet(flat, running.url) as page:
+        pair(page, clinic.code)
+        choose(page, walk_files())
+        place(page, {"00B40C55": "foot_l"})
+        start(page)
+        until(page, "page.outbox.acked > 5")
+        clinic.post("/live/commands", command="stop")
+        expect(page.locator("[data-done]")).to_have_text("Recording is on the server", timeout=20_000)
+        page.locator("[data-go]").click()
+        expect(page.get_by_label("Pairing code")).to_be_focused()
+    assert clinic.take()["state"] == "finished"
+
+
+def test_what_is_left_when_the_take_was_closed_can_be_saved(
+    flat: Browser, clinic: Clinic, network: Network
+) -> None:
+    with tablet(flat, network.url) as page:
+        pair(page, clinic.code)
+        choose(page, walk_files())
+        place(page, {"00B40C55": "foot_l"})
+        start(page)
+        until(page, "page.outbox.acked > 20")
+        network.cut()
+        page.wait_for_timeout(2500)
+        clinic.post("/live/close")
+        network.mend()
+        expect(page.get_by_role("alert")).to_contain_text("ended on the clinic's screen", timeout=15_000)
+        with page.expect_download() as saving:
+            page.get_by_role("button", name="Save what is left").click()
+        rest = saving.value.path().read_bytes()
+        page.get_by_role("button", name="Delete it").first.click()
+        page.locator("dialog[open]").get_by_role("button", name="Delete it").click()
+        expect(page.get_by_label("Pairing code")).to_be_visible()
+    records, length = scan(rest)
+    assert length == len(rest)
+    stored = [peek(r.body).seq for r in records if r.kind == "B"]
+    assert stored == list(range(stored[0], stored[0] + len(stored)))
+    assert len(stored) > 30
+
+
+def test_a_tablet_keeps_its_pairing_and_its_mapping_over_a_reload(
+    flat: Browser, running: RunningServer, clinic: Clinic
+) -> None:
+    with tablet(flat, running.url) as page:
+        pair(page, clinic.code)
+        choose(page, walk_files())
+        place(page, SEGMENTS)
+        start(page)
+        until(page, "page.outbox.acked > 5")
+        page.locator("[data-go]").click()
+        expect(page.locator("[data-done]")).to_be_visible(timeout=20_000)
+        again = clinic.post("/live")["code"]
+        page.locator("[data-go]").click()
+        pair(page, again)
+        page.reload()
+        expect(page.locator("[data-paired]")).to_contain_text("Paired with CAP-")
+        choose(page, walk_files())
+        expect(page.locator("[data-go]")).to_have_text("Start with 7 sensors")
+
+
+def test_a_second_tab_stays_away(flat: Browser, running: RunningServer) -> None:
+    with tablet(flat, running.url) as page:
+        expect(page.get_by_label("Pairing code")).to_be_visible()
+        other = page.context.new_page()
+        other.goto("/capture")
+        expect(other.get_by_role("alert")).to_contain_text("another tab")
+
+
+def test_every_state_of_the_page_obeys_the_design_system(
+    flat: Browser, running: RunningServer, clinic: Clinic
+) -> None:
+    faults: list[str] = []
+
+    def check(page: Page, name: str) -> None:
+        for width, height in SIZES:
+            page.set_viewport_size({"width": width, "height": height})
+            for scheme in ("light", "dark"):
+                page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+                page.wait_for_timeout(30)
+                found = layout_faults(page) | text_faults(page)
+                faults.extend([f"{name} {width} {scheme}: {found}"] if found else [])
+                small = page.evaluate(
+                    "() => [...document.querySelectorAll('button, input')]"
+                    ".filter((e) => e.offsetHeight && e.offsetHeight < 56).map((e) => e.outerHTML)"
+                )
+                assert not small, f"{name}: under 56 px: {small}"
+        page.set_viewport_size({"width": 810, "height": 1080})
+
+    with tablet(flat, running.url) as page:
+        expect(page.get_by_label("Pairing code")).to_be_visible()
+        check(page, "pairing")
+        pair(page, clinic.code)
+        check(page, "sources")
+        choose(page, walk_files())
+        expect(page.locator("li[data-sensor]")).to_have_count(9)
+        check(page, "sensors")
+        place(page, SEGMENTS)
+        page.locator("li[data-sensor='00B40C44'] [data-place]").click()
+        check(page, "places")
+        page.keyboard.press("Escape")
+        start(page)
+        check(page, "running")
+        page.locator("[data-go]").click()
+        expect(page.locator("[data-done]")).to_be_visible(timeout=20_000)
+        check(page, "done")
+    assert not faults, "\n".join(faults)
+
+
+def test_the_whole_page_works_by_keyboard(flat: Browser, running: RunningServer, clinic: Clinic) -> None:
+    with tablet(flat, running.url) as page:
+        expect(page.get_by_label("Pairing code")).to_be_focused()
+        page.keyboard.type(clinic.code)
+        expect(page.locator("[data-paired]")).to_be_visible()
+        choose(page, walk_files())
+        page.locator("li[data-sensor='00B40B91'] [data-place]").focus()
+        page.keyboard.press("Enter")
+        page.locator("dialog[open] button[value=pelvis]").focus()
+        page.keyboard.press("Enter")
+        expect(page.locator("li[data-sensor='00B40B91'] [data-segment]")).to_have_text("Pelvis")
+        page.locator("[data-go]").focus()
+        page.keyboard.press("Space")
+        expect(page.locator("[data-go]")).to_have_text("Stop")
+        page.keyboard.press("Space")
+        expect(page.locator("[data-done]")).to_be_visible(timeout=20_000)
