@@ -121,3 +121,21 @@ def send(devices: Sequence[Device], n: int = 10, take: str = "take") -> LiveTake
     sent.sort(key=lambda x: x[:2])
     hello = Hello(take, "replay", tuple(d.info for d in devices))
     return LiveTake(hello, tuple(replace(b, seq=k) for k, (_, _, b) in enumerate(sent)))
+
+
+SENSORS = (SensorInfo("A1", "foot_l", 160.0, 35.0), SensorInfo("ö 2", None))
+SMALL_HELLO = Hello("take-1", "dot", (StreamInfo(3, 100.0, "shared", SENSORS),))
+
+
+def small_batch(seq: int = 0, n: int = 5, offsets: bool = False) -> Batch:
+    """Noise of two sensors without magnetometer."""
+    samples = np.random.default_rng(1 + seq).normal(size=(n, 2, 9)).astype(np.float32)
+    samples[:, :, 6:] = np.nan
+    at = 1_000_000 + seq * n * 10_000
+    steps = np.arange(n, dtype=np.uint32) * np.uint32(10_000) if offsets else None
+    return Batch(3, seq, at, at + 70_000, samples, steps)
+
+
+def small(n: int = 3) -> LiveTake:
+    """n small batches."""
+    return LiveTake(SMALL_HELLO, tuple(small_batch(i) for i in range(n)))
