@@ -20,8 +20,8 @@ def normalise(q: Floats) -> Floats:
 
 def multiply(p: Floats, q: Floats) -> Floats:
     """Hamilton product p ⊗ q of (..., 4) arrays, broadcasting."""
-    pw, px, py, pz = np.moveaxis(np.asarray(p, np.float64), -1, 0)
-    qw, qx, qy, qz = np.moveaxis(np.asarray(q, np.float64), -1, 0)
+    pw, px, py, pz = _components(np.asarray(p, np.float64))
+    qw, qx, qy, qz = _components(np.asarray(q, np.float64))
     return np.stack(
         (
             pw * qw - px * qx - py * qy - pz * qz,
@@ -42,13 +42,13 @@ def rotate(q: Floats, v: Floats) -> Floats:
     """Rotate vectors (..., 3) by unit quaternions (..., 4), broadcasting."""
     q = np.asarray(q, np.float64)
     u, w = q[..., 1:], q[..., :1]
-    t = 2.0 * np.cross(u, v)
-    return np.asarray(v + w * t + np.cross(u, t))
+    t = 2.0 * _cross(u, np.asarray(v))
+    return np.asarray(v + w * t + _cross(u, t))
 
 
 def to_matrix(q: Floats) -> Floats:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
-    w, x, y, z = np.moveaxis(np.asarray(q, np.float64), -1, 0)
+    w, x, y, z = _components(np.asarray(q, np.float64))
     rows = (
         np.stack((1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)), axis=-1),
         np.stack((2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)), axis=-1),
@@ -134,3 +134,15 @@ def yaw(q: Floats) -> Floats:
     """Heading (...) in rad of the body's x axis in the world's floor plane, from x towards y."""
     x = rotate(q, np.array([1.0, 0.0, 0.0]))
     return np.asarray(np.arctan2(x[..., 1], x[..., 0]))
+
+
+def _components(x: Floats) -> tuple[Floats, ...]:
+    """Views of the last axis; np.moveaxis takes longer than the arithmetic of a single quaternion."""
+    return tuple(x[..., k] for k in range(x.shape[-1]))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Cross product, broadcasting; the sums of np.cross, which takes ten times as long for one vector."""
+    ax, ay, az = _components(a)
+    bx, by, bz = _components(b)
+    return np.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), axis=-1)
