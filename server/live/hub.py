@@ -128,6 +128,7 @@ class Hub:
         if take.tablet is not None:
             take.tablet.shut(Close.REPLACED, "replaced")
         take.tablet = tablet
+        take.tell_stage()
         self.tell_state(take)
 
     def detach(self, take: LiveTake, tablet: Line) -> None:

@@ -153,6 +153,11 @@ def command(name: Literal["start", "stop"]) -> str:
     return _text("command", command=name)
 
 
+def state(stage: str) -> str:
+    """Where the estimation stands (waiting, stand, walk, running), for the tablet's instructions."""
+    return _text("state", stage=stage)
+
+
 def finished(recording: str, problem: str | None = None) -> str:
     """The take is a recording now; `problem` (finish_mismatch): it was kept although the end did not fit."""
     return _text("finished", recording=recording, **({"problem": problem} if problem else {}))

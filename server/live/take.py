@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import msgspec
 
+from server.live import protocol
 from server.live.intake import Answer, Ended
 from server.live.messages import STALE_S, Begin, Charge, Command, Item, Picture
 from server.live.protocol import ProtocolError
@@ -105,6 +106,7 @@ class LiveTake:
         self.problem: str | None = None
         self.estimate = "ok"
         self.t_s: float | None = None
+        self.stage: str | None = None
         self._hub = hub
         self._seen: Counter[str] = Counter()
         self.steered = Steered()
@@ -183,6 +185,9 @@ class LiveTake:
     def show(self, picture: Picture) -> None:
         """Pass a picture on."""
         self.t_s = picture.t_s
+        if picture.stage != self.stage:
+            self.stage = picture.stage
+            self.tell_stage()
         stale = picture.delay_s is None or picture.delay_s > STALE_S
         delay = b"null" if picture.delay_s is None else b"%d" % round(1000.0 * picture.delay_s)
         tail = b',"delay_ms":%s,"stale":%s}' % (delay, b"true" if stale else b"false")
@@ -190,6 +195,11 @@ class LiveTake:
         self.room.show(picture)
         if not stale:
             self.mind_silence(False)
+
+    def tell_stage(self) -> None:
+        """Tell the tablet where the estimation stands."""
+        if self.tablet is not None and self.stage is not None:
+            self.tablet.say(protocol.state(self.stage))
 
     def tell(self, item: Item) -> None:
         """Pass on what happens once; what a new process says again is known already."""
