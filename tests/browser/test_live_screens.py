@@ -1,0 +1,368 @@
+"""The live pages told by a feed: states, charts, words, sound; what of them depends on no sensor."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import httpx
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser import feed, filling
+from tests.browser.conftest import RunningServer
+from tests.browser.design import layout_faults, text_faults
+from tests.browser.feed import Told
+
+Opener = Callable[..., Told]
+
+HEARD = """() => {
+  window.heard = [];
+  const start = OscillatorNode.prototype.start;
+  OscillatorNode.prototype.start = function (...at) {
+    window.heard.push(Math.round(this.frequency.value));
+    return start.apply(this, at);
+  };
+}"""
+"""Notes the pitch of every sound that is really started."""
+
+PIXELS = """([tag, token]) => {
+  const canvas = document.querySelector(`${tag} canvas`), g = canvas.getContext('2d');
+  const probe = document.createElement('canvas').getContext('2d');
+  probe.fillStyle = getComputedStyle(document.documentElement).getPropertyValue(`--${token}`);
+  probe.fillRect(0, 0, 1, 1);
+  const [r, gr, b] = probe.getImageData(0, 0, 1, 1).data;
+  const d = g.getImageData(0, 0, canvas.width, canvas.height).data;
+  let n = 0;
+  for (let i = 0; i < d.length; i += 4) {
+    const off = Math.abs(d[i] - r) + Math.abs(d[i + 1] - gr) + Math.abs(d[i + 2] - b);
+    n += off < 12 && d[i + 3] > 200 ? 1 : 0;
+  }
+  return n;
+}"""
+"""Pixels of a canvas in the colour of a token."""
+
+
+@pytest.fixture(scope="module")
+def trained(running: RunningServer) -> tuple[str, str, str]:
+    """Sessions: step length with bar and sound; the same as a path, right; nothing prescribed."""
+    made = []
+    with running.client() as client:
+        for code, side, modes in (
+            ("P-0060", "left", ["bar", "tone", "tick"]),
+            ("P-0061", "right", ["zone"]),
+            ("P-0062", None, None),
+        ):
+            patient = filling.add(client, "/patients", code=code, sex="male", birth_year=1968, height_m=1.76)[
+                "id"
+            ]
+            if modes is not None:
+                prescribe(client, patient, side=side, modes=modes)
+            made.append(filling.add_session(client, patient, "Training 10"))
+    return made[0], made[1], made[2]
+
+
+def prescribe(client: httpx.Client, patient_id: str, **changed: Any) -> None:
+    """Step length with a manual target."""
+    record = {
+        "parameter": "step_length_m",
+        "side": "left",
+        "target": {"source": "manual", "mean": feed.TARGET, "sd": feed.SD},
+        **changed,
+    }
+    filling.add(client, f"/patients/{patient_id}/prescriptions", **record)
+
+
+@pytest.fixture
+def told(flat: Browser, running: RunningServer, cookies: list[dict[str, str]]) -> Iterator[Opener]:
+    """Opens a page whose feed the test speaks; a script error fails the test at its end."""
+    contexts, errors = [], []
+
+    def open_(path: str, *, width: int = 1280, height: int = 800, scheme: str = "light") -> Told:
+        context = flat.new_context(
+            base_url=running.url, viewport={"width": width, "height": height}, color_scheme=scheme,  # type: ignore[arg-type]
+            reduced_motion="reduce",
+        )  # fmt: skip
+        contexts.append(context)
+        context.add_cookies(cookies)  # type: ignore[arg-type]
+        context.add_init_script(f"({HEARD})()")
+        page = context.new_page()
+        page.on("pageerror", lambda e: errors.append(str(e)))
+        this = Told.of(page)
+        page.goto(path)
+        page.wait_for_function("() => true")
+        _until(lambda: bool(this.routes), page)
+        return this
+
+    yield open_
+    for context in contexts:
+        context.close()
+    assert not errors, errors
+
+
+def test_the_strip_draws_zones_as_shapes_and_a_table_says_the_same(
+    told: Opener, trained: tuple[str, str, str]
+) -> None:
+    page = _therapist(told, trained[0])
+    for token in ("target", "ok", "warn", "bad", "accent"):
+        assert page.evaluate(PIXELS, ["target-strip", token]) > 20, token
+    expect(page.locator("[data-in-zone]")).to_have_text("2 of 4 in zone")
+    expect(page.locator("[data-asymmetry]")).to_have_text(re.compile("left shorter by 0.0"))
+    page.get_by_role("button", name="Table").click()
+    rows = page.locator("#strides-table tbody tr")
+    expect(rows).to_have_count(4)
+    expect(rows.first).to_contain_text("just below")
+    expect(rows.nth(1)).to_contain_text("no, faded out")
+
+
+def test_the_current_stride_grows_over_the_norm_and_follows_the_joint(
+    told: Opener, trained: tuple[str, str, str]
+) -> None:
+    this = told(f"/sessions/{trained[0]}/live")
+    this.walk([0.53], ["in"])
+    page = this.page
+    drawn = []
+    for i in range(20):
+        this.say(feed.frame(112.02 + 0.03 * i))
+        drawn.append(page.evaluate(PIXELS, ["stride-chart", "left"]))
+    assert drawn[-1] > drawn[0]
+    assert page.evaluate(PIXELS, ["stride-chart", "norm"]) > 1000
+    before = page.locator("stride-chart").screenshot()
+    page.get_by_role("button", name="Hip").click()
+    page.wait_for_timeout(100)
+    assert page.locator("stride-chart").screenshot() != before
+    expect(page.locator("[data-variable]")).to_have_text("Hip flexion")
+
+
+def test_charts_follow_the_theme(told: Opener, trained: tuple[str, str, str]) -> None:
+    page = _therapist(told, trained[0])
+    light = page.evaluate(PIXELS, ["stride-chart", "norm"])
+    page.emulate_media(color_scheme="dark")
+    page.wait_for_timeout(150)
+    assert light > 1000
+    assert page.evaluate(PIXELS, ["stride-chart", "norm"]) > 1000
+
+
+def test_a_slow_walk_has_no_norm_and_says_so(told: Opener, trained: tuple[str, str, str]) -> None:
+    this = told(f"/sessions/{trained[2]}/live")
+    this.say(feed.state(), *(feed.stride(n, "left", 0.4, speed=0.5) for n in range(4)), feed.frame(10.0))
+    expect(this.page.locator("[data-norm-note]")).to_contain_text("No speed-matched norm")
+    assert this.page.evaluate(PIXELS, ["stride-chart", "norm"]) < 100
+
+
+def test_old_data_cover_the_charts_until_new_ones_come(told: Opener, trained: tuple[str, str, str]) -> None:
+    this = told(f"/sessions/{trained[0]}/live")
+    this.walk([0.53], ["in"])
+    cover = this.page.locator("[data-cover]")
+    expect(cover).to_be_hidden()
+    expect(cover).to_be_visible(timeout=1500)
+    expect(this.page.locator("stride-chart canvas")).to_be_hidden()
+    this.say(feed.frame(101.0))
+    expect(cover).to_be_hidden()
+    this.say(feed.frame(101.1, stale=True))
+    expect(cover).to_be_visible()
+
+
+def test_a_lost_tablet_is_said_and_stop_asks_before_leaving_data_there(
+    told: Opener, trained: tuple[str, str, str]
+) -> None:
+    this = told(f"/sessions/{trained[0]}/live")
+    this.say(feed.state(tablet="lost"), feed.frame(10.0))
+    page = this.page
+    expect(page.locator("[data-note=tablet]")).to_contain_text("Nothing is lost")
+    page.get_by_role("button", name="STOP").click()
+    expect(page.locator("[data-note=tablet]")).to_contain_text("the rest stays on the tablet")
+    this.say(feed.state())
+    expect(page.locator("[data-note=tablet]")).to_have_count(0)
+
+
+def test_stop_stays_within_reach_while_a_mark_is_written(told: Opener, trained: tuple[str, str, str]) -> None:
+    page = _therapist(told, trained[0])
+    page.get_by_role("button", name="Mark", exact=True).click()
+    expect(page.get_by_label("What happened")).to_be_focused()
+    stop = page.get_by_role("button", name="STOP")
+    box = stop.bounding_box()
+    assert box is not None
+    assert box["height"] >= 56
+    assert box["x"] + box["width"] > 1280 - 32
+    stop.click(trial=True)
+    page.keyboard.press("Escape")
+    expect(page.locator("#mark-dialog")).to_be_hidden()
+
+
+@pytest.mark.parametrize(("stage", "words"), [("stand", "stand still"), ("walk", "walk straight on")])
+def test_calibration_says_what_is_waited_for(
+    stage: Any, words: str, told: Opener, trained: tuple[str, str, str]
+) -> None:
+    this = told(f"/sessions/{trained[0]}/live")
+    this.say(feed.state(), feed.frame(2.0, stage))
+    expect(this.page.locator("live-calibration [data-say]")).to_contain_text(words)
+    expect(this.page.locator(".checks tbody tr")).to_have_count(7)
+    expect(this.page.locator(".checks tbody")).to_contain_text("still" if stage == "stand" else "moving")
+    expect(this.page.locator("live-sensors")).to_contain_text("3 % lost")
+    expect(this.page.locator("live-sensors")).to_contain_text("battery low")
+
+
+def test_a_code_is_shown_in_two_groups_and_a_second_page_asks_for_a_new_one(
+    flat: Browser, running: RunningServer, cookies: list[dict[str, str]]
+) -> None:
+    with running.client() as client:
+        patient = filling.add(client, "/patients", code="P-0063")["id"]
+        session = filling.add_session(client, patient, "Walk")
+    context = flat.new_context(base_url=running.url)
+    context.add_cookies(cookies)  # type: ignore[arg-type]
+    page = context.new_page()
+    page.goto(f"/sessions/{session}")
+    page.get_by_role("link", name="Record live").click()
+    page.get_by_role("button", name="Open for the tablet").click()
+    expect(page.locator("[data-code]")).to_have_text(re.compile(r"^[2-9A-Z]{3} [2-9A-Z]{3}$"))
+    expect(page.locator("[data-code-left]")).to_have_text(re.compile("Valid for 09:"))
+    first = page.locator("[data-code]").text_content()
+    other = context.new_page()
+    other.goto(f"/sessions/{session}/live")
+    expect(other.locator("[data-code-left]")).to_contain_text("Ask for a new one")
+    other.get_by_role("button", name="New code").click()
+    expect(other.locator("[data-code]")).to_have_text(re.compile(r"^[2-9A-Z]{3} [2-9A-Z]{3}$"))
+    assert other.locator("[data-code]").text_content() != first
+    context.close()
+
+
+def test_the_patient_sees_no_number_and_reads_the_way_to_the_zone(
+    told: Opener, trained: tuple[str, str, str]
+) -> None:
+    this = _patient(told, trained[0])
+    this.say(feed.cue(0, 0.53, "in"))
+    message = this.page.locator("[data-message]")
+    expect(message).to_have_text("Good step")
+    this.say(feed.cue(2, 0.49, "near_low"))
+    expect(message).to_have_text("A little longer")
+    this.say(feed.cue(4, 0.62, "high"))
+    expect(message).to_have_text("Shorter")
+    assert not re.search(r"\d", this.page.locator("patient-screen").inner_text())
+    kinds = [m.get_attribute("class") for m in this.page.locator("[data-last] svg").all()]
+    assert kinds == ["in", "near", "away"]
+    sizes = this.page.evaluate(
+        "() => [...document.querySelectorAll('patient-screen :is(span, b, p, button, label)')]"
+        ".filter(e => e.checkVisibility() && e.innerText?.trim())"
+        ".map(e => parseFloat(getComputedStyle(e).fontSize))"
+    )
+    assert min(sizes) >= 32
+
+
+def test_sound_follows_the_error_and_the_contacts_after_one_tap(
+    told: Opener, trained: tuple[str, str, str]
+) -> None:
+    this = _patient(told, trained[0], sound=True)
+    page = this.page
+    this.say(feed.frame(100.1, contact="r"), feed.cue(2, 0.47, "low"))
+    this.say(feed.frame(100.2, contact="rl"), feed.frame(100.3, contact="l"), feed.frame(100.4, contact="lr"))
+    assert page.evaluate("heard") == [240, 880, 660]
+    this.say(feed.frame(100.5, contact="l"), feed.cue(4, 0.53, "in"))
+    assert len(page.evaluate("heard")) == 3
+    this.say(feed.feedback(paused=True), feed.frame(100.6, contact="lr"))
+    assert len(page.evaluate("heard")) == 3
+
+
+def test_a_stride_without_feedback_dims_everything(told: Opener, trained: tuple[str, str, str]) -> None:
+    this = _patient(told, trained[0])
+    this.say(feed.cue(0, 0.53, "in"), feed.cue(2, 0.45, "low", "probe"))
+    expect(this.page.locator("patient-screen")).to_have_attribute("data-faded", "")
+    expect(this.page.locator("[data-message]")).to_have_text("On your own")
+    assert this.page.locator("[data-last] svg").count() == 1
+    this.say(feed.frame(100.4), feed.cue(4, 0.53, "in"))
+    assert this.page.locator("patient-screen").get_attribute("data-faded") is None
+
+
+def test_the_patient_screen_pauses_when_data_are_old(told: Opener, trained: tuple[str, str, str]) -> None:
+    this = _patient(told, trained[0])
+    pause = this.page.locator("[data-pause]")
+    expect(pause).to_be_hidden()
+    expect(pause).to_be_visible(timeout=1500)
+    expect(pause).to_contain_text("Short pause")
+    this.say(feed.cue(2, 0.53, "in"))
+    assert this.page.locator("[data-last] svg").count() == 0
+    this.say(feed.frame(101.0))
+    expect(pause).to_be_hidden()
+
+
+def test_the_picture_moves_aside_for_neglect_and_stays_so(
+    told: Opener, trained: tuple[str, str, str]
+) -> None:
+    this = told(f"/sessions/{trained[1]}/live/patient")
+    page = this.page
+    page.get_by_role("button", name="Picture right").click()
+    page.get_by_role("button", name="Without sound").click()
+    this.say(feed.state(), feed.feedback(), feed.frame(100.0))
+    expect(page.locator("patient-screen")).to_have_attribute("data-picture", "path")
+    expect(page.locator("[data-what]")).to_have_text("Right step")
+    middle = page.locator("[data-scene=path] .road").bounding_box()
+    assert middle is not None
+    assert middle["x"] + middle["width"] / 2 > 640 + 100
+    page.reload()
+    expect(page.locator("patient-screen")).to_have_attribute("data-side", "right")
+
+
+def test_the_therapist_switches_the_sound_of_the_patient_screen(
+    told: Opener, trained: tuple[str, str, str]
+) -> None:
+    this = told(f"/sessions/{trained[0]}/live")
+    this.walk([0.53], ["in"])
+    page = this.page
+    button = page.locator("[data-do=sound]")
+    expect(button).to_be_disabled()
+    with page.context.expect_page() as opened:
+        page.get_by_role("button", name="Patient screen").click()
+    screen = opened.value
+    screen.get_by_role("button", name="With sound").click()
+    expect(button).to_have_text("Sound on")
+    button.click()
+    expect(button).to_have_text("Sound off")
+    expect(screen.locator("[data-settings] use")).to_have_attribute("href", "#i-mute")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [(1280, 800), (1024, 768), (810, 1080), (360, 740)])
+def test_every_state_obeys_the_design_system(
+    size: tuple[int, int], scheme: str, told: Opener, trained: tuple[str, str, str]
+) -> None:
+    width, height = size
+    this = told(f"/sessions/{trained[0]}/live", width=width, height=height, scheme=scheme)
+    faults = {}
+    this.say(feed.state("pairing", "none"))
+    faults["pair"] = _faults(this.page)
+    this.say(feed.state(), feed.frame(1.0, "stand"))
+    faults["stand"] = _faults(this.page)
+    this.walk([0.53, 0.49], ["in", "near_low"])
+    faults["run"] = _faults(this.page)
+    this.page.wait_for_timeout(600)
+    faults["stale"] = _faults(this.page)
+    screen = _patient(told, trained[0], width=width, height=height, scheme=scheme)
+    screen.say(feed.cue(0, 0.49, "near_low"))
+    faults["patient"] = _faults(screen.page)
+    assert not {k: v for k, v in faults.items() if v}
+
+
+def _faults(page: Page) -> dict[str, Any]:
+    return {**layout_faults(page), **text_faults(page)}
+
+
+def _therapist(told: Opener, session: str) -> Page:
+    this = told(f"/sessions/{session}/live")
+    this.walk([0.53, 0.45, 0.52, 0.495], ["in", "low", "in", "near_low"])
+    return this.page
+
+
+def _patient(told: Opener, session: str, *, sound: bool = False, **size: Any) -> Told:
+    this = told(f"/sessions/{session}/live/patient", **size)
+    this.page.get_by_role("button", name="With sound" if sound else "Without sound").click()
+    this.say(feed.state(), feed.feedback(), feed.frame(100.0, contact="r"))
+    return this
+
+
+def _until(done: Callable[[], bool], page: Page) -> None:
+    for _ in range(100):
+        if done():
+            return
+        page.wait_for_timeout(20)
+    raise AssertionError("the page did not open its feed")
