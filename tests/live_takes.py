@@ -17,6 +17,7 @@ from core.formats.live_log import (
     finish_json,
     payload,
     peek,
+    scan,
 )
 from server.live.intake import Ended
 from server.live.protocol import ProtocolError
@@ -58,6 +59,13 @@ def finish_text(frames: list[bytes]) -> str:
 def stored(path: Path) -> list[bytes]:
     """The batches of a log, as they came."""
     return [one.body for _, one in segments.records(path) if one.kind == "B"]
+
+
+def kept_in(log: bytes) -> list[bytes]:
+    """The batches of a whole log in memory."""
+    found, used = scan(log)
+    assert used == len(log)
+    return [one.body for one in found if one.kind == "B"]
 
 
 class Heard:

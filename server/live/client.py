@@ -91,6 +91,7 @@ async def stream(
     patience_s: float = 60.0,
     hear: Callable[[Mapping[str, Any]], None] = lambda _: None,
     seed: int | None = None,
+    report: Report | None = None,
 ) -> Report:
     """Stream a take and finish it.
 
@@ -99,13 +100,21 @@ async def stream(
     url : of the socket, ws:// or wss://. frames : encoded batches, seq from 0; their pace is the sender's.
     patience_s : longest time without an acknowledgement while there is something to acknowledge.
     hear : called with the server's commands and states. seed : of the faults.
+    report : filled while it streams, for those who watch.
 
     Raises
     ------
     LiveError
         the server's code, or one of ours.
     """
-    sender = _Sender(hello_json(hello, token).decode(), faults or Faults(), hear, random.Random(seed))  # noqa: S311
+    chance = random.Random(seed)  # noqa: S311 - of faults, not of secrets
+    sender = _Sender(
+        hello_json(hello, token).decode(),
+        faults or Faults(),
+        hear,
+        chance,
+        Report() if report is None else report,
+    )
     producing = sender.start(frames)
     try:
         await _until_finished(sender, url, patience_s)
@@ -167,9 +176,14 @@ class _Sender:
     """Batches not acknowledged yet, and where in them this connection is."""
 
     def __init__(
-        self, hello: str, faults: Faults, hear: Callable[[Mapping[str, Any]], None], chance: random.Random
+        self,
+        hello: str,
+        faults: Faults,
+        hear: Callable[[Mapping[str, Any]], None],
+        chance: random.Random,
+        report: Report,
     ) -> None:
-        self.report = Report()
+        self.report = report
         self.finished = False
         self.said = ""
         self.progress = 0
