@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from server.viewer.batches import PALE, add_batch, colours
+from server.viewer.batches import PALE, add_batch, colours, put
 from server.viewer.colours import GHOST, linear
 from server.viewer.ghost import Ghost
 from server.viewer.ground import Ground
@@ -67,8 +67,7 @@ class Figure:
             for batch, handle in self._batches:
                 handle.visible = valid
                 if valid:
-                    handle.batched_positions = batch.position[i]
-                    handle.batched_wxyzs = batch.wxyz[i]
+                    put(handle, batch.wxyz[i], batch.position[i])
             self._pose_ghost(i, valid=valid)
             for side, letter in self._letters.items():
                 letter.visible = valid and self._follow
@@ -109,8 +108,7 @@ class Figure:
         for batch, handle in self._ghost_batches:
             handle.visible = visible
             if visible:
-                handle.batched_positions = batch.position[j]
-                handle.batched_wxyzs = batch.wxyz[j]
+                put(handle, batch.wxyz[j], batch.position[j])
         if visible:
             half = float(ghost.turn[i]) / 2
             self._ghost_node.wxyz = (float(np.cos(half)), 0.0, 0.0, float(np.sin(half)))

@@ -63,10 +63,15 @@ class ReferenceWalk:
         phases : side → 0 to 1; where one is not known, half a cycle from the other. None when neither is.
         place : (2,) m, where the pelvis is. heading : rad, where the walk goes.
         """
-        rows = {side: _row(phases, side, self._last) for side in SIDES}
-        lead = rows[self.lead]
-        if lead is None:
+        left, right = (_row(phases, side, self._last) for side in SIDES)
+        if left is None or right is None:
             return None
+        return self.pose(left, right, place, heading)
+
+    def pose(self, left: int, right: int, place: Floats, heading: float) -> tuple[Floats, Floats]:
+        """As `at`, by the rows of the curves that the legs are at."""
+        rows: dict[Side, int] = {"left": left, "right": right}
+        lead = rows[self.lead]
         pelvis = rotation.multiply(rotation.about(2, heading), self._pelvis[lead])
         legs = [(self._turn[k], self._points[k], rows[side]) for k, side in enumerate(SIDES)]
         turn = rotation.multiply(pelvis, np.concatenate([turn[row] for turn, _, row in legs]))
@@ -76,6 +81,11 @@ class ReferenceWalk:
         p[1:4], p[4:7] = points[:3], points[_POINTS : _POINTS + 3]
         p += (*place, -points[:, 2].min())
         return np.concatenate((pelvis[np.newaxis], turn)), p
+
+
+def standing(body: BodyModel) -> tuple[Floats, Floats]:
+    """Orientations and positions of `SEGMENTS` of somebody who stands at the origin and looks along x."""
+    return ReferenceWalk({name: np.zeros(1) for name in SAGITTAL}, body).pose(0, 0, np.zeros(2), 0.0)
 
 
 def _row(phases: Phases, side: Side, last: int) -> int | None:

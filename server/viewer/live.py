@@ -1,0 +1,154 @@
+"""A figure that is shown as its poses come: the same batches as the replay, one moment at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+import viser
+
+from core import rotation
+from core.body.model import BodyModel
+from core.frames import FOOT, SIDES, Floats, Segment
+from server.viewer.batches import add_batch, colours, put
+from server.viewer.layout import Batch, Layout, Placed
+from server.viewer.live_floor import LiveFloor
+from server.viewer.live_path import GAP_S, LivePath
+from server.viewer.moment import Moment
+from server.viewer.reference import SEGMENTS, ReferenceWalk, standing
+from server.viewer.room import ROOM, Room, near
+
+_AXIS: Final = np.array([1.0, 0.0, 0.0])
+_BURIED: Final = np.array([0.0, 0.0, -100.0])
+"""Where a ghost is that has no phase."""
+
+
+class LiveFigure:
+    """One person in one viser server, standing and grey until poses come.
+
+    Parameters
+    ----------
+    server : a viser server of its own.
+    """
+
+    def __init__(self, server: viser.ViserServer, body: BodyModel, dark: bool = False) -> None:
+        self._server, self._body, self._dark = server, body, dark
+        self._room = Room(server)
+        self._floor = LiveFloor(server.scene, body.foot)
+        self._path = LivePath()
+        self._reference: ReferenceWalk | None = None
+        self._layout: Layout | None = None
+        self._key: tuple[object, ...] = ()
+        self._drawn: list[tuple[str, Batch, viser.BatchedMeshHandle]] = []
+        self._grey = True
+        self._t_s: float | None = None
+        self._room.set_dark(dark)
+        self._floor.set_dark(dark)
+        size = (body.thigh + body.shank + body.ankle_height) / 0.9
+        self._room.look(near(size, 0.0))
+        self.wait()
+
+    @property
+    def is_grey(self) -> bool:
+        """What is shown is not now."""
+        return self._grey
+
+    def wait(self) -> None:
+        """Stand and wait for poses."""
+        if self._key == ("standing",):
+            return
+        q, p = ({s: x[k : k + 1] for k, s in enumerate(SEGMENTS)} for x in standing(self._body))
+        self._floor.clear()
+        self._path, self._t_s = LivePath(), None
+        self._draw(Layout(SEGMENTS, self._body, ""), q, p, ("standing",))
+        self._room.bring(np.zeros(2))
+        self._set_grey(True)
+        self._server.flush()
+
+    def show(self, moment: Moment) -> None:
+        """Show a moment and send it at once; one that is not valid leaves the figure as it was, grey."""
+        if self._t_s is not None and not 0.0 <= moment.t_s - self._t_s <= GAP_S:
+            self._floor.clear()
+        self._t_s = moment.t_s
+        if not moment.valid:
+            self._floor.lose()
+            self._set_grey(True)
+            self._server.flush()
+            return
+        with self._server.atomic():
+            self._show(moment)
+            self._set_grey(False)
+        self._server.flush()
+
+    def set_stale(self) -> None:
+        """Nothing has come for a while: the figure stays, grey, until the next moment."""
+        if not self._grey:
+            self._set_grey(True)
+            self._server.flush()
+
+    def set_reference(self, walk: ReferenceWalk | None) -> None:
+        """Show a walk pale in the same place at the same share of the cycle, None = none."""
+        self._reference = walk
+
+    def _show(self, moment: Moment) -> None:
+        lead: Segment = "pelvis" if "pelvis" in moment.q else next(iter(moment.q))
+        place = moment.p[lead]
+        x = rotation.rotate(moment.q[lead], _AXIS)
+        root, heading = self._path.push(moment.t_s, place[:2], float(np.arctan2(x[1], x[0])))
+        q = {s: a[np.newaxis] for s, a in moment.q.items()}
+        p = {s: a[np.newaxis] for s, a in moment.p.items()}
+        ghost = self._reference is not None and all(s in q for s in SEGMENTS)
+        if ghost and self._reference is not None:
+            # the ghost is one frame more of the same layout
+            other = self._reference.at(moment.phase, place[:2], heading)
+            for k, s in enumerate(SEGMENTS):
+                at = (moment.q[s], _BURIED) if other is None else (other[0][k], other[1][k])
+                q[s], p[s] = np.array([moment.q[s], at[0]]), np.array([moment.p[s], at[1]])
+            for s in q.keys() - set(SEGMENTS):
+                # a trunk that only the person has hangs on the ghost's pelvis as on the person's
+                q[s], p[s] = np.array([moment.q[s]] * 2), np.array([moment.p[s], p["pelvis"][1]])
+        key = (tuple(moment.q), moment.method, ghost)
+        if key != self._key or self._layout is None:
+            layout = Layout(tuple(moment.q), self._body, moment.method)
+            placed = self._draw(layout, q, p, key)
+        else:
+            placed = self._layout.place(q, p)
+            for name, _, handle in self._drawn:
+                batch = placed.batches[name]
+                put(handle, batch.wxyz.reshape(-1, 4), batch.position.reshape(-1, 3))
+        for side in SIDES:
+            if side in placed.soles:
+                sole, foot = placed.soles[side][0], moment.q[FOOT[side]]
+                self._floor.push(moment.t_s, side, sole, foot, moment.contact.get(side))
+        self._floor.send(moment.t_s)
+        self._room.bring(root)
+
+    def _draw(
+        self,
+        layout: Layout,
+        q: Mapping[Segment, Floats],
+        p: Mapping[Segment, Floats],
+        key: tuple[object, ...],
+    ) -> Placed:
+        """Draw other parts than before."""
+        for _, _, handle in self._drawn:
+            handle.remove()
+        placed = layout.place(q, p)
+        self._layout, self._key = layout, key
+        self._drawn = [
+            (name, batch, add_batch(self._server.scene, f"{ROOM}/{name}", batch, ghost=len(batch.wxyz) > 1))
+            for name, batch in placed.batches.items()
+            if batch.tint
+        ]
+        self._paint()
+        return placed
+
+    def _set_grey(self, grey: bool) -> None:
+        if grey != self._grey:
+            self._grey = grey
+            self._paint()
+
+    def _paint(self) -> None:
+        for _, batch, handle in self._drawn:
+            handle.batched_colors = colours(batch, self._dark, ghost=len(batch.wxyz) > 1, grey=self._grey)

@@ -1,0 +1,210 @@
+"""What a live walk leaves on the floor: the last footprints with a letter, the last seconds of the trails.
+
+The rules are those of server/viewer/steps.py, applied as the frames come.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Final
+
+import numpy as np
+import viser
+
+from core import rotation
+from core.frames import SIDES, Floats, Side
+from server.viewer import shapes
+from server.viewer.batches import put
+from server.viewer.colours import TINTS, linear
+from server.viewer.room import ROOM
+from server.viewer.steps import CLEAR_M, PIECE_M, REST_MPS, SAME_M, Single
+
+TRAIL_S: Final = 6.0
+"""Seconds of way that are shown."""
+PIECES: Final = 192
+"""Pieces of a trail at most: 6 s at 1.6 m/s; of who is faster the oldest go sooner."""
+PRINTS: Final = 8
+"""Footprints per side: about the same seconds."""
+EVERY_S: Final = 0.1
+"""Trails are sent no more often."""
+REST_S: Final = 0.1
+"""The foot's speed is taken over this."""
+
+_GONE: Final = np.array([0.0, 0.0, -100.0], np.float32)
+_PIXELS, _OPACITY = 1.6, 0.6
+
+
+class LiveFloor:
+    """Prints, letters and trails in one scene.
+
+    Parameters
+    ----------
+    foot : length of the foot, m.
+    """
+
+    def __init__(self, scene: viser.SceneApi, foot: float) -> None:
+        self._trails = {side: _Trail() for side in SIDES}
+        self._steps = {side: _Steps(scene, side, foot) for side in SIDES}
+        self._line = scene.add_line_segments(
+            f"{ROOM}/trails",
+            self._points(0.0),
+            (0, 0, 0),
+            thickness=_PIXELS,
+            thickness_units="screen",
+        )
+        self._sent_s = 0.0
+
+    def clear(self) -> None:
+        """Another walk."""
+        for side in SIDES:
+            self._trails[side] = _Trail()
+            self._steps[side].clear()
+        self._line.points = self._points(0.0)
+        self._sent_s = 0.0
+
+    def push(self, t_s: float, side: Side, sole: Floats, q: Floats, contact: bool | None) -> None:
+        """Take in where the middle of a sole (3,) is and how the foot (4,) is turned."""
+        self._trails[side].push(t_s, sole)
+        if contact is not None:
+            self._steps[side].push(t_s, sole, q, contact)
+
+    def lose(self) -> None:
+        """Samples are missing: a trail has a gap, a contact is over."""
+        for side in SIDES:
+            self._trails[side].lose()
+            self._steps[side].lose()
+
+    def send(self, t_s: float) -> None:
+        """Show the trails, if it is time."""
+        if t_s - self._sent_s >= EVERY_S:
+            self._sent_s = t_s
+            self._line.points = self._points(t_s)
+
+    def set_dark(self, dark: bool) -> None:
+        """Change the colours to the theme of the page around."""
+        for side in SIDES:
+            self._steps[side].node.batched_colors = np.array(linear(TINTS[dark][side]), np.uint8)
+        rows = [np.full((PIECES, 2, 3), TINTS[dark][side], np.uint8) for side in SIDES]
+        self._line.colors = np.concatenate(rows)
+
+    def _points(self, t_s: float) -> Single:
+        return np.concatenate([self._trails[side].pieces(t_s - TRAIL_S) for side in SIDES])
+
+
+class _Trail:
+    """Pieces of a way, of a fixed number; those that are not there have no length."""
+
+    def __init__(self) -> None:
+        self._t_s = np.full(PIECES, -np.inf)
+        self._pieces = np.zeros((PIECES, 2, 3), np.float32)
+        self._next = 0
+        self._last: Single | None = None
+
+    def push(self, t_s: float, sole: Floats) -> None:
+        at = sole.astype(np.float32)
+        at[2] = max(at[2], CLEAR_M)
+        if self._last is None:
+            self._last = at
+        elif ((at - self._last) ** 2).sum() >= PIECE_M**2:
+            self._t_s[self._next] = t_s
+            self._pieces[self._next] = self._last, at
+            self._next = (self._next + 1) % PIECES
+            self._last = at
+
+    def lose(self) -> None:
+        self._last = None
+
+    def pieces(self, since_s: float) -> Single:
+        return np.where((self._t_s >= since_s)[:, None, None], self._pieces, _GONE)
+
+
+class _Steps:
+    """Where one foot rested: shown when it first does, put right when the contact ends."""
+
+    def __init__(self, scene: viser.SceneApi, side: Side, foot: float) -> None:
+        self._position = np.zeros((PRINTS, 3), np.float32)
+        self._wxyz = np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (PRINTS, 1))
+        self._scale = np.zeros(PRINTS, np.float32)
+        self._reach = 0.5 * foot + 0.05
+        self.node = scene.add_batched_meshes_simple(
+            f"{ROOM}/prints_{side}",
+            *shapes.footprint(foot, side),
+            self._wxyz,
+            self._position,
+            batched_scales=self._scale,
+            batched_colors=linear(TINTS[False][side]),
+            opacity=_OPACITY,
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self._letter = scene.add_label(
+            f"{ROOM}/letter_{side}",
+            side[0].upper(),
+            font_screen_scale=1.3,
+            anchor="center-left",
+            visible=False,
+        )
+        self._next = 0
+        self._shown: int | None = None
+        self._slowest = np.inf
+        self._rest: tuple[Floats, float] = (np.zeros(3), 0.0)
+        self._before: deque[tuple[float, Floats]] = deque()
+
+    def clear(self) -> None:
+        self._scale[:] = 0.0
+        self.node.batched_scales = self._scale
+        self._letter.visible = False
+        self._next = 0
+        self.lose()
+
+    def lose(self) -> None:
+        self._lift()
+        self._before.clear()
+
+    def push(self, t_s: float, sole: Floats, q: Floats, contact: bool) -> None:
+        self._before.append((t_s, sole))
+        while len(self._before) > 1 and self._before[1][0] <= t_s - REST_S:
+            self._before.popleft()
+        if not contact:
+            self._lift()
+            return
+        since, was = self._before[0]
+        if t_s - since < 0.5 * REST_S:
+            return
+        speed = float(np.linalg.norm(sole - was)) / (t_s - since)
+        if speed < self._slowest:
+            self._slowest = speed
+            self._rest = sole, float(rotation.yaw(q))
+            if speed < REST_MPS and self._shown is None:
+                self._print()
+
+    def _print(self) -> None:
+        """Show the foot where it rests; restless feet move their last print."""
+        last = (self._next - 1) % PRINTS
+        place = self._rest[0]
+        again = self._scale[last] > 0 and np.hypot(*(self._position[last] - place)[:2]) <= SAME_M
+        self._shown = last if again else self._next
+        if not again:
+            self._next = (self._next + 1) % PRINTS
+        self._put(self._shown)
+
+    def _lift(self) -> None:
+        """The contact is over: the print goes to the slowest moment of it."""
+        if self._shown is not None:
+            self._put(self._shown)
+        elif np.isfinite(self._slowest):
+            self._print()  # it never rested: its slowest moment is all there is
+        self._shown, self._slowest = None, np.inf
+
+    def _put(self, k: int) -> None:
+        place, turn = self._rest
+        self._position[k] = (place[0], place[1], CLEAR_M)
+        self._wxyz[k] = rotation.about(2, turn)
+        put(self.node, self._wxyz, self._position)
+        if self._scale[k] == 0.0:
+            self._scale[k] = 1.0
+            self.node.batched_scales = self._scale
+        ahead = self._reach * np.array([np.cos(turn), np.sin(turn)])
+        self._letter.position = (*(place[:2] + ahead).tolist(), 2 * CLEAR_M)
+        self._letter.visible = True

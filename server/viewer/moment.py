@@ -1,0 +1,29 @@
+"""One moment of a live figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from core.frames import Floats, Segment, Side
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """Poses at one time of a take.
+
+    Parameters
+    ----------
+    t_s : s on the take's axis. q : segment → (4,) segment to W. p : segment → (3,) m, as `Poses`.
+    valid : all segments of the figure are measured. contact : side → on the floor; a side that is not known
+        is missing. method : of the estimator, as `Poses.method`.
+    phase : side → 0 to 1 of the running cycle, None where unknown.
+    """
+
+    t_s: float
+    q: Mapping[Segment, Floats]
+    p: Mapping[Segment, Floats]
+    valid: bool
+    method: str
+    contact: Mapping[Side, bool] = field(default_factory=dict)
+    phase: Mapping[Side, float | None] = field(default_factory=dict)
