@@ -89,7 +89,7 @@ def offline(name: str) -> CalibratedRecording:
 
 
 def apart(a: Calibration, b: Calibration) -> dict[Segment, tuple[float, float]]:
-    """Segment → degrees between two calibrations: of the forward axis about the long one, of the long axis."""
+    """Segment → degrees between two calibrations: of the forward axis, of the long axis."""
     out: dict[Segment, tuple[float, float]] = {}
     for s in SEGMENTS:
         turn = np.degrees(log(from_matrix(a.segments[s].R_segment_sensor @ b.segments[s].R_segment_sensor.T)))
@@ -147,7 +147,7 @@ def test_write_down_the_figures() -> None:
             "told",
         ],
         rows,
-        "Axes from one standing and the first steps, against those of the whole take offline; where all are off "
-        "alike, only the way ahead is. Limits, of the "
+        "Axes from one standing and the first steps, against those of the whole take offline; where all are "
+        "off alike, only the way ahead is. Limits, of the "
         f"five walks above the virtual patients: forward < {LIMIT_DEG:g}°, up < 1°, told good.",
     )
