@@ -79,8 +79,12 @@ class LiveCalibrator:
     def push(self, block: UniformBlock) -> LiveCalibration | None:
         """Take the next samples; the calibration, once, when they complete it.
 
-        Samples of the block from the calibration's `past` on are not in it.
+        Samples of the block from the calibration's `past` on are not in it. Blocks may be left out while it
+        runs; a new attempt begins with the next that is pushed.
         """
+        if block.first != self._length:
+            self._length = self._begun = block.first
+            self._attempt = Attempt(self.wearer, block.first)
         start = 0
         while start < len(block):
             stop = min(len(block), start + self._tick - self._length % self._tick)
@@ -94,7 +98,7 @@ class LiveCalibrator:
         return None
 
     def redo(self) -> None:
-        """Begin anew with the next sample."""
+        """Begin anew with the next sample that is pushed."""
         self._restart(None)
         self.view = NOT_LOOKED
 

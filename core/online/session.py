@@ -17,6 +17,7 @@ from core.fusion.orientations import Orientations
 from core.online.attempt import Wearer
 from core.online.axis import AxisParams, OnlineAxis, UniformBlock
 from core.online.calibrated import LiveCalibration
+from core.online.calibrated import warm as warm_calibration
 from core.online.calibrating import CalibratingParams, LiveCalibrator
 from core.online.chain import Chain, ChainParams, Outcome
 from core.online.frame import EMPTY_TRAIL, LiveFrame, Trail
@@ -145,6 +146,7 @@ def _told(frame: LiveFrame, block: UniformBlock, chain: Chain, outcomes: Sequenc
 
 def warm() -> None:
     """Compile or load every kernel of the chain, so that the first take does not wait for it."""
+    warm_calibration()
     for worn in (PRESETS["lower_body7"], PRESETS["feet_pelvis3"], PRESETS["feet2"]):
         chain = Chain(_standing(worn), worn)
         acc = np.tile([0.0, GRAVITY, 0.0], (10, len(worn), 1))

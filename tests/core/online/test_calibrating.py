@@ -182,6 +182,21 @@ def test_redo_begins_anew_with_the_next_sample() -> None:
     assert second.calibrated.recording.t_s[0] == 0.0
 
 
+def test_blocks_need_not_be_pushed_while_it_runs() -> None:
+    first = walked().found[0]
+    calibrator = LiveCalibrator(wearer(walk()))
+    again: list[LiveCalibration] = []
+    for block in blocks(joined(walk(), walk()), 50):
+        if block.first == 3000:
+            assert calibrator.stage == "running"
+            calibrator.redo()
+        if calibrator.stage != "running" and (found := calibrator.push(block)) is not None:
+            again.append(found)
+    assert [(x.first, x.past) for x in again] == [(0, first.past), (3000, 3000 + first.past)]
+    mounts = [x.calibrated.calibration.segments["shank_r"].R_segment_sensor for x in again]
+    assert np.array_equal(mounts[0], mounts[1])
+
+
 def test_a_person_may_stand_for_long_and_only_the_last_of_it_is_kept() -> None:
     recording, _ = scripted((Stand(60.0), Straight(14.0, 0.6, 0.55), Stand(2.0)))
     found = run(recording).found[0]
