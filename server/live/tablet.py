@@ -157,7 +157,7 @@ def _heed(tablet: Tablet, take: LiveTake, answer: Answer) -> None:
     if answer.battery is not None:
         take.charge(answer.battery)
     if answer.ended is not None and take.recording_id is not None:
-        tablet.say(protocol.finished(take.recording_id))
+        tablet.say(protocol.finished(take.recording_id, take.problem))
     if answer.close is not None:
         tablet.shut(answer.close, answer.reason)
 
@@ -165,7 +165,7 @@ def _heed(tablet: Tablet, take: LiveTake, answer: Answer) -> None:
 def _say_over(tablet: Tablet, row: live.Take) -> None:
     """Tell a tablet that comes back to a take that is over what became of it."""
     if row.recording_id is not None:
-        tablet.say(protocol.finished(row.recording_id))
+        tablet.say(protocol.finished(row.recording_id, row.problem))
         tablet.shut(Close.DONE if row.state == "finished" else Close.ENDED, "take_ended")
     else:
         _refuse(tablet, ProtocolError("take_ended", "This take is over.", Close.ENDED))
