@@ -7,6 +7,7 @@ function values(form) {
   const body = {};
   for (const el of form.elements) {
     if (!el.name || el.disabled || "skip" in el.dataset) continue;
+    if (el.type === "radio" && !el.checked) continue;
     if (el.type === "checkbox") body[el.name] = el.checked;
     else if (el.value === "" && el.name.includes(".")) continue;
     else if (el.value === "" && !el.required) body[el.name] = "keepEmpty" in el.dataset ? "" : null;
