@@ -33,6 +33,10 @@ def demo(port: int | None) -> int:
         )
         helpers: list[subprocess.Popen[bytes]] = []
 
+        def start(*module: str) -> None:
+            command = [sys.executable, "-m", *module]
+            helpers.append(subprocess.Popen(command, env=environment(settings)))  # noqa: S603 - our own
+
         def announce(address: str) -> None:
             with closing(Database(settings.database)) as db, db.write() as c:
                 person = accounts.create(
@@ -42,12 +46,10 @@ def demo(port: int | None) -> int:
             say(f"Open {address}/sign-in/{token}")
             say("(signs you in once; everything is simulated and is removed when you stop with Ctrl-C)")
             # simulating takes seconds of computing: never in the web process
-            helpers.append(
-                subprocess.Popen(
-                    [sys.executable, "-m", "server.services.demo_clinic"], env=environment(settings)
-                )
-            )
+            start("server.services.demo_clinic")
             _report(settings.database)
+            start("server.services.demo_live", address)
+            say("One of the patients is walking live now: the first in the list of patients.")
 
         try:
             return run(settings, announce)

@@ -1,0 +1,93 @@
+"""The patient of `sagittal demo` who walks live: a training with feedback, streamed as a tablet would.
+
+Run as a module with the server's address, after the visits are analysed; the walk is simulated, the stream is
+not: code, socket, acknowledgements and finish are those of any tablet.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import closing
+from math import pi
+from typing import TYPE_CHECKING, Any, Final
+
+from server.live.client import stream
+from server.live.pairing import pair
+from server.live.playback import Due, cut, hello_of, paced
+from server.services import live, patients, prescriptions, sessions
+from server.services.demo_clinic import STROKE
+from server.settings import Settings, load_settings
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from server.storage.tables import now
+
+if TYPE_CHECKING:
+    from core.simulate import Simulation
+
+TITLE: Final = "Gait training with feedback, live"
+LAPS: Final = 10
+GROWTH: Final = 0.025
+"""Each lap's steps are longer by so much of the first: he learns."""
+PER_BATCH: Final = 5
+
+PRESCRIPTION: Final[Mapping[str, object]] = {
+    "parameter": "stride_length_m",
+    "side": "left",
+    "target": {"source": "manual", "mean": 1.2, "sd": 0.05},
+    "modes": ["bar", "tone", "tick"],
+    "schedule": {"kind": "fading", "strides_per_share": 60, "probe_every": 30, "probe_strides": 6},
+}
+
+
+def training(seed: int = 5) -> Simulation:
+    """Laps of a corridor for about eight minutes, the steps longer from lap to lap."""
+    from core.simulate import PATIENTS, Arc, Script, Stand, Straight, simulate
+    from core.simulate.script import scaled
+    from core.simulate.scripts import ON_SKIN
+
+    man = PATIENTS["hemi_mild"]
+    walker = man.walker.scaled_to(STROKE.height_m)
+    turn_m, turn_s = 0.8 * man.step_m, 1.05 * man.step_s
+    laps: list[Straight | Arc] = []
+    for lap in range(LAPS):
+        length = man.step_m * (1.0 + GROWTH * lap)
+        for way in (pi, -pi):
+            laps += [Straight(16.0, length, man.step_s), Arc(1.2, way, turn_m, turn_s)]
+    script: Script = (Stand(8.0), *laps, Stand(5.0))
+    return simulate(scaled(script, walker.scale), walker, seed, ON_SKIN)
+
+
+def open_take(settings: Settings) -> str:
+    """A session of the patient with an open take; returns its code."""
+    with closing(Database(settings.database)) as db, db.write() as c:
+        patient = next(p for p in patients.listing(c) if p.code == STROKE.code)
+        if prescriptions.in_force(c, patient.id) is None:
+            prescriptions.write(c, BlobStore(settings.blobs), None, patient.id, PRESCRIPTION)
+        session = sessions.create(c, None, patient.id, title=TITLE, performed_on=now().date(), note="")
+        return live.open_take(c, None, session.id)[1]
+
+
+async def walk(address: str, code: str, made: Simulation, speed: float = 1.0) -> None:
+    """Stream the walk until its end or until the therapist stops it."""
+    pairing = pair(address, code)
+    stopped = asyncio.Event()
+
+    def hear(message: Mapping[str, Any]) -> None:
+        if message.get("type") == "command" and message.get("command") == "stop":
+            stopped.set()
+
+    frames = _until(stopped, cut(made.recording, PER_BATCH), speed)
+    await stream(pairing.socket, pairing.token, hello_of(made.recording, pairing.take), frames, hear=hear)
+
+
+async def _until(stopped: asyncio.Event, batches: Sequence[Due], speed: float) -> AsyncIterator[bytes]:
+    async for frame in paced(batches, speed):
+        if stopped.is_set():
+            return
+        yield frame
+
+
+if __name__ == "__main__":
+    asyncio.run(walk(sys.argv[1], open_take(load_settings()), training()))
