@@ -52,13 +52,16 @@ export async function roomHours(bytesPerSecond) {
   }
 }
 
+const RELOAD_MS = 1500; // the page before a reload may hold it for a moment
+
 // True when no other tab of this tablet has the page; it stays so until this tab closes.
 export function alone() {
   if (!navigator.locks) return Promise.resolve(true);
   return new Promise((answer) => {
-    navigator.locks.request("sagittal-capture", { ifAvailable: true }, (held) => {
-      answer(held !== null);
-      return held ? new Promise(() => {}) : undefined;
-    });
+    const held = () => {
+      answer(true);
+      return new Promise(() => {});
+    };
+    navigator.locks.request("sagittal-capture", { signal: AbortSignal.timeout(RELOAD_MS) }, held).catch(() => answer(false));
   });
 }

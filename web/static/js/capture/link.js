@@ -65,6 +65,7 @@ export class Link {
       this.outbox.acknowledge(message.ack);
       this.pump();
     } else if (message.type === "finished") {
+      this.marked = Boolean(message.problem); // kept although count or hash did not fit
       // ended on the clinic's screen while this tablet still held something
       if (this.outbox.heldS > LATE_S) this.problem = { code: "ended", detail: "" };
       this.end(this.problem ? "refused" : "finished");

@@ -2,38 +2,38 @@
 import { PROTOCOL, logParts } from "../live/wire.js";
 import { alone, roomHours, stayAwake, tone } from "./device.js";
 import { Link } from "./link.js";
-import { remember, suggest } from "./mapping.js";
+import { remember } from "./mapping.js";
 import { Outbox } from "./outbox.js";
 import { codeForm } from "./pairing.js";
-import { DeviceMotion, whyNot as whyNoMotion } from "./sources/device_motion.js";
-import { Dot, whyNot as whyNoDot } from "./sources/dot.js";
-import { Replay } from "./sources/replay.js";
+import { whyNot as whyNoMotion } from "./sources/device_motion.js";
+import { whyNot as whyNoDot } from "./sources/dot.js";
 import { View } from "./view.js";
 import * as words from "./words.js";
+import { Worn } from "./worn.js";
 
 const DRAW_MS = 500;
-const SOURCES = { dot: Dot, device_motion: DeviceMotion, replay: Replay };
-const BYTES_PER_SAMPLE = 36;
+const BYTES_PER_S = 7 * 100 * 36; // seven sensors at 100 Hz, nine float32 each
 
 class CapturePage extends HTMLElement {
   async connectedCallback() {
     this.$ = (name) => this.querySelector(`[data-${name}]`);
     this.$("host").textContent = location.host;
-    this.view = new View(this, { onplaced: (sensor, segment) => this.place(sensor, segment) });
-    codeForm(this.$("code-form"), { onpaired: (paired) => this.paired(paired), onproblem: (p) => this.say({ title: p.title, detail: p.detail }) });
+    this.worn = new Worn({ onchange: () => this.draw(), onend: () => this.stop(), onbattery: (sensors) => this.link?.tellBattery(sensors) });
+    this.view = new View(this, { onplaced: (sensor, segment) => this.worn.place(sensor, segment) });
+    codeForm(this.$("code-form"), { onpaired: (paired) => this.guarded(() => this.paired(paired)), onproblem: (p) => this.say({ title: p.title, detail: p.detail }) });
     const on = (name, act) => this.$(name).addEventListener("click", () => this.guarded(act));
     on("go", () => this.go());
     on("change", () => this.change());
-    on("add", () => this.add());
-    on("other", () => this.leaveSource());
+    on("add", () => this.choose(this.worn.kind));
+    on("other", () => this.worn.leave());
     on("end", () => this.stop());
-    on("axes-again", () => this.source.check());
+    on("axes-again", () => this.worn.source.check());
     on("save", () => this.saveRest());
     on("give-up", () => this.giveUp());
     for (const b of this.querySelectorAll("[data-source]")) b.addEventListener("click", () => this.guarded(() => this.choose(b.dataset.source)));
     this.$("files").addEventListener("change", (e) => this.guarded(() => this.read([...e.target.files])));
     for (const [kind, why] of [["dot", whyNoDot()], ["device_motion", whyNoMotion()]]) if (why) this.view.unavailable(kind, why);
-    this.room = await roomHours(7 * 100 * BYTES_PER_SAMPLE);
+    this.room = await roomHours(BYTES_PER_S);
     if (!(await alone())) return this.say({ title: "This page is open in another tab", detail: "Go on there, or close it and reload this one." });
     setInterval(() => this.draw(), DRAW_MS);
     await this.guarded(() => this.wake());
@@ -41,7 +41,11 @@ class CapturePage extends HTMLElement {
 
   // After a reload: whatever was not finished goes on.
   async wake() {
-    this.outbox = await Outbox.unfinished();
+    try {
+      this.outbox = await Outbox.unfinished();
+    } catch (error) {
+      return this.say(words.storageProblem(error));
+    }
     if (!this.outbox) return this.enter("pairing");
     const { hello, stopped, kind, source } = this.outbox.record;
     this.watchStorage();
@@ -50,35 +54,16 @@ class CapturePage extends HTMLElement {
     if (stopped) return this.enter("sending");
     this.enter("running");
     if (kind !== "replay") return this.interrupted(kind);
-    this.source = this.made("replay");
-    await this.source.choose(source.files);
-    this.restore(hello);
+    await this.worn.read(source.files);
+    this.worn.restore(hello);
     this.run();
-  }
-
-  made(kind) {
-    return new SOURCES[kind]({ onchange: () => this.changed(), onend: () => this.stop(), onbattery: (sensors) => this.link?.tellBattery(sensors) });
   }
 
   // A page needs a tap before it may use Bluetooth or motion again.
   interrupted(kind) {
     this.paused = true;
-    this.source = this.made(kind);
+    this.worn.take(kind);
     this.say({ title: "This page was loaded again", detail: "Everything up to then is safe. Connect the sensors again and go on, or stop here." });
-  }
-
-  // Sensors, order and rates as the hello has them: the server takes no other.
-  restore(hello) {
-    const all = hello.streams.flatMap((s) => s.sensors.map((x) => ({ ...x, rateHz: s.rate_hz })));
-    const place = (sensor) => (all.findIndex((x) => x.id === sensor.id) + all.length + 1) % (all.length + 1);
-    if (this.source.kind !== "replay") this.source.sensors.sort((a, b) => place(a) - place(b));
-    for (const sensor of this.source.sensors) {
-      const known = all.find((x) => x.id === sensor.id);
-      sensor.segment = known?.segment ?? null;
-      if (known && this.source.kind !== "replay") sensor.rateHz = known.rateHz;
-    }
-    const streams = this.source.streams(Object.fromEntries(all.map((x) => [x.id, x.segment])));
-    if (JSON.stringify(streams) !== JSON.stringify(hello.streams)) throw new Error("These are not the sensors this recording began with. Connect the same ones, or stop here.");
   }
 
   async paired({ code, ...paired }) {
@@ -102,68 +87,31 @@ class CapturePage extends HTMLElement {
 
   async choose(kind) {
     if (kind === "replay") return this.$("files").click();
-    this.source = this.made(kind);
-    await this.add();
-  }
-
-  async add() {
-    if (this.source?.kind === "replay") return this.$("files").click();
-    try {
-      await this.source.add();
-    } finally {
-      if (!this.source.sensors.length && !this.paused) this.source = null;
-      this.changed();
-    }
+    this.say(null);
+    await this.worn.add(kind);
     if (this.paused) this.goOn();
   }
 
   async read(files) {
     this.$("files").value = "";
     if (!files.length) return;
-    const source = this.source ?? this.made("replay");
-    await source.choose(files);
-    this.source = source;
-    this.changed();
-  }
-
-  async leaveSource() {
-    await this.source.close();
-    this.source = null;
     this.say(null);
-    this.changed();
+    await this.worn.read(files);
   }
-
-  changed() {
-    if (this.source) suggest(this.source.sensors);
-    this.draw();
-  }
-
-  // A segment carries one sensor: it leaves the one that had it.
-  place(sensor, segment) {
-    for (const other of this.source.sensors) if (segment && other.segment === segment) other.segment = null;
-    sensor.segment = segment;
-    this.draw();
-  }
-
-  rows() {
-    return (this.source?.sensors ?? []).map((sensor) => ({ sensor, health: this.source.health(sensor) }));
-  }
-
-  ready() { return this.rows().filter(({ sensor, health }) => sensor.segment && (health.kind === "ok" || (health.kind === "warn" && health.text !== "Check"))); }
 
   async go() {
     const { state } = this.dataset;
     if (state === "done") return this.enter("pairing");
-    if (state === "running") return this.paused ? this.add() : this.stop();
+    if (state === "running") return this.paused ? this.choose(this.worn.kind) : this.stop();
     if (state === "prepare") return this.start();
   }
 
   async start() {
-    const segments = Object.fromEntries(this.ready().map(({ sensor }) => [sensor.id, sensor.segment]));
-    const { take } = this.outbox.record;
+    const { source } = this.worn;
+    const segments = Object.fromEntries(this.worn.ready().map((sensor) => [sensor.id, sensor.segment]));
     remember(segments);
-    const hello = { type: "hello", protocol: PROTOCOL, take, source: this.source.kind, streams: this.source.streams(segments) };
-    await this.outbox.note({ hello, kind: this.source.kind, source: this.source.saved() });
+    const hello = { type: "hello", protocol: PROTOCOL, take: this.outbox.record.take, source: source.kind, streams: source.streams(segments) };
+    await this.outbox.note({ hello, kind: source.kind, source: source.saved() });
     this.say(null);
     this.connect();
     this.enter("running");
@@ -172,25 +120,26 @@ class CapturePage extends HTMLElement {
   }
 
   run() {
-    this.paused = false;
-    this.began = performance.now() - this.outbox.record.spanS * 1000;
     const { outbox } = this;
-    this.source.start((batch, rateHz) => outbox.add({ ...batch, sentUs: (performance.timeOrigin + performance.now()) * 1000 }, rateHz), outbox.record.lastUs);
+    this.paused = false;
+    this.began = performance.now() - outbox.record.spanS * 1000;
+    const keep = (batch, rateHz) => outbox.add({ ...batch, sentUs: (performance.timeOrigin + performance.now()) * 1000 }, rateHz);
+    this.worn.source.start(keep, outbox.record.lastUs);
     this.draw();
   }
 
-  // The sensors of an interrupted take, as they come back.
+  // The sensors of an interrupted take come back one by one.
   goOn() {
     const { hello } = this.outbox.record;
-    const here = new Set(this.source.sensors.map((s) => s.id));
+    const here = new Set(this.worn.sensors.map((s) => s.id));
     if (!hello.streams.every((s) => s.sensors.every((x) => here.has(x.id)))) return;
-    this.restore(hello);
-    this.say(null);
+    this.worn.restore(hello);
     this.run();
   }
 
   async stop() {
-    this.source?.stop();
+    if (this.dataset.state !== "running") return;
+    this.worn.source?.stop();
     this.enter("sending");
     await this.outbox.note({ stopped: true });
     this.link.pump();
@@ -210,7 +159,7 @@ class CapturePage extends HTMLElement {
   }
 
   told(message) {
-    if (message.type === "command" && message.command === "stop" && this.dataset.state === "running") this.stop();
+    if (message.type === "command" && message.command === "stop") this.guarded(() => this.stop());
     if (message.type !== "state" || message.stage === this.stage) return;
     this.stage = message.stage;
     if (this.stage === "walk") tone();
@@ -218,12 +167,12 @@ class CapturePage extends HTMLElement {
   }
 
   async finished() {
-    this.source?.stop();
-    const { seq } = this.outbox.record;
+    this.worn.source?.stop();
+    const said = words.ending(this.outbox.made, this.link.marked);
     await this.outbox.forget();
     this.outbox = this.link = null;
-    this.$("done").textContent = seq ? "Recording is on the server" : "Nothing was recorded";
-    this.$("done-more").textContent = seq ? "It is being analysed; the result is on the session's page. Another recording needs a new code." : "No sensor had sent anything. Another recording needs a new code.";
+    this.$("done").textContent = said.title;
+    this.$("done-more").textContent = said.more;
     this.say(null);
     this.enter("done");
   }
@@ -234,10 +183,11 @@ class CapturePage extends HTMLElement {
       this.enter("pairing"); // the sensors go on into the outbox meanwhile
       return this.say(words.linkProblem(problem, this.outbox.heldS));
     }
-    this.source?.stop();
+    this.worn.source?.stop();
     const rest = this.outbox.made > this.outbox.acked;
     this.say(words.linkProblem(problem, this.outbox.heldS), rest);
-    if (!rest) this.outbox.forget().then(() => { this.outbox = this.link = null; this.enter("pairing"); });
+    this.enter("stuck");
+    if (!rest) this.drop({ silent: true });
   }
 
   async saveRest() {
@@ -251,8 +201,7 @@ class CapturePage extends HTMLElement {
   }
 
   async giveUp() {
-    if (!(await this.sure("Delete what is on this tablet?", `${this.outbox.heldS.toFixed(1)} s of the recording are not on the server and cannot be brought back.`, "Delete it"))) return;
-    await this.drop();
+    if (await this.view.sure("Delete what is on this tablet?", `${this.outbox.heldS.toFixed(1)} s of the recording are not on the server and cannot be brought back.`, "Delete it")) await this.drop();
   }
 
   async change() {
@@ -260,22 +209,13 @@ class CapturePage extends HTMLElement {
     await this.drop();
   }
 
-  async drop() {
+  // Let go of the take.
+  async drop({ silent = false } = {}) {
     this.link?.end("refused");
     await this.outbox.forget();
     this.outbox = this.link = null;
-    this.say(null);
+    if (!silent) this.say(null);
     this.enter("pairing");
-  }
-
-  sure(title, text, yes) {
-    const dialog = this.$("sure");
-    this.$("sure-title").textContent = title;
-    this.$("sure-text").textContent = text;
-    this.$("sure-yes").textContent = yes;
-    dialog.returnValue = "";
-    dialog.showModal();
-    return new Promise((ok) => dialog.addEventListener("close", () => ok(dialog.returnValue === "yes"), { once: true }));
   }
 
   async guarded(act) {
@@ -292,7 +232,7 @@ class CapturePage extends HTMLElement {
       state: this.dataset.state, problem: this.problem, paused: this.paused, stage: this.stage, room: this.room,
       record: this.outbox?.record, heldS: this.outbox?.heldS ?? 0, link: this.link?.words(), linkSays: this.link?.said,
       elapsedS: this.began === undefined ? 0 : (performance.now() - this.began) / 1000,
-      source: this.source, rows: this.rows(), ready: this.ready(),
+      source: this.worn.source, rows: this.worn.rows(), ready: this.worn.ready(),
     });
   }
 

@@ -20,6 +20,17 @@ export class View {
     button.querySelector("[data-why]").textContent = why;
   }
 
+  // Ask before something is lost; true = yes.
+  sure(title, text, yes) {
+    const dialog = this.part("sure");
+    set(this.part("sure-title"), title);
+    set(this.part("sure-text"), text);
+    set(this.part("sure-yes"), yes);
+    dialog.returnValue = "";
+    dialog.showModal();
+    return new Promise((ok) => dialog.addEventListener("close", () => ok(dialog.returnValue === "yes"), { once: true }));
+  }
+
   draw(m) {
     for (const element of this.staged) element.hidden = !element.dataset.on.split(" ").includes(m.state);
     this.badge(m);
@@ -31,7 +42,7 @@ export class View {
   }
 
   badge({ link, state }) {
-    const shown = state === "pairing" || state === "prepare" || state === "done" ? null : link;
+    const shown = state === "running" || state === "sending" ? link : null;
     const key = shown ? shown.kind + shown.text : "";
     if (this.part("link").dataset.shown === key) return;
     this.part("link").dataset.shown = key;
@@ -115,11 +126,11 @@ export class View {
     const n = ready.length;
     const start = n ? `Start with ${n} sensor${n === 1 ? "" : "s"}` : source ? (rows.length ? this.reason(source) : "Add a sensor") : "Choose where sensors come from";
     const word = {
-      loading: "One moment", pairing: "Enter the code", prepare: start, sending: "Sending", done: "Start another",
+      loading: "One moment", stuck: "Save or delete what is left", pairing: "Enter the code", prepare: start, sending: "Sending", done: "Start another",
       running: paused ? "Connect the sensors again" : "Stop",
     }[state];
     set(this.part("go-word"), word);
-    go.disabled = state === "loading" || state === "pairing" || state === "sending" || (state === "prepare" && !n);
+    go.disabled = state === "loading" || state === "stuck" || state === "pairing" || state === "sending" || (state === "prepare" && !n);
     go.classList.toggle("stop", state === "running" && !paused);
     const keeps = `Nothing is lost if the network drops: ${words.hours(room)}.`;
     set(this.part("hint"), { prepare: `Stand still for 5 seconds after the tone. ${keeps}`, running: keeps, sending: keeps }[state] ?? "");

@@ -12,6 +12,13 @@ export function instruction(stage, elapsedS) {
   }
 }
 
+// When the take is over: `marked` = count or hash differed, and it was kept all the same.
+export function ending(batches, marked) {
+  if (!batches) return { title: "Nothing was recorded", more: "No sensor had sent anything. Another recording needs a new code." };
+  if (marked) return { title: "Recording is on the server, with a mark", more: "Tablet and server did not count the same. Look at the recording on the session's page before you rely on it." };
+  return { title: "Recording is on the server", more: "It is being analysed; the result is on the session's page. Another recording needs a new code." };
+}
+
 // Why the socket ended for good.
 export function linkProblem({ code, detail }, heldS) {
   const left = heldS > 0.05 ? ` ${heldS.toFixed(1)} s are still on this tablet only.` : "";
