@@ -64,7 +64,7 @@ from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.migrate import upgrade
-from server.viewer import proxy
+from server.viewer import live_proxy, proxy
 
 STATIC = Path(web.__file__).parent / "static"
 
@@ -152,6 +152,7 @@ def create_app(settings: Settings) -> FastAPI:
         live_pages.router,
         live_feed.router,
         proxy.router,
+        live_proxy.router,
     ):
         app.include_router(router)
     app.mount("/static", Assets(directory=STATIC), name="static")

@@ -87,6 +87,11 @@ class Room:
         """Keep the `k`th cue for those who come later."""
         _keep(self._cues, k, body, SHOWN)
 
+    @property
+    def strides(self) -> tuple[bytes, ...]:
+        """What was told of the last strides, in order."""
+        return tuple(self._strides[k] for k in sorted(self._strides))
+
     def show(self, picture: Picture) -> None:
         """Hand on the figure."""
         self.picture = picture

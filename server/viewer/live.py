@@ -66,8 +66,13 @@ class LiveFigure:
         self._set_grey(True)
         self._server.flush()
 
-    def show(self, moment: Moment) -> None:
-        """Show a moment and send it at once; one that is not valid leaves the figure as it was, grey."""
+    def show(self, moment: Moment, *, late: bool = False) -> None:
+        """Show a moment and send it at once; one that is not valid leaves the figure as it was, grey.
+
+        Parameters
+        ----------
+        late : it is over already; shown in grey.
+        """
         if self._t_s is not None and not 0.0 <= moment.t_s - self._t_s <= GAP_S:
             self._floor.clear()
         self._t_s = moment.t_s
@@ -78,7 +83,7 @@ class LiveFigure:
             return
         with self._server.atomic():
             self._show(moment)
-            self._set_grey(False)
+            self._set_grey(late)
         self._server.flush()
 
     def set_stale(self) -> None:

@@ -94,7 +94,7 @@ def client_page() -> str:
 @router.get("/views/{view_id}/", response_class=HTMLResponse)
 def page(view_id: str, who: Reader, request: Request) -> HTMLResponse:
     """The document of the 3D view."""
-    if _views(request).find(view_id, who.login_id) is None:
+    if _views(request).find(view_id, who.login_id, who.role) is None:
         raise Problem(404, "view_not_found", "This 3D view has ended. Reload the session page.")
     return HTMLResponse(
         client_page(), headers={"Content-Security-Policy": CONTENT_POLICY, "Cache-Control": "no-store"}
@@ -104,7 +104,7 @@ def page(view_id: str, who: Reader, request: Request) -> HTMLResponse:
 @router.websocket("/views/{view_id}")
 async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
     """Carry viser's messages."""
-    view = _views(ws).find(view_id, who.login_id)
+    view = _views(ws).find(view_id, who.login_id, who.role)
     if view is None:
         await _say_gone(ws)
         return
@@ -168,7 +168,9 @@ async def replay(
                 await ws.close(POLICY_VIOLATION, "not_signed_in")
 
 
-async def _open(ws: WebSocket, sid: str, who: Identity, tab: str, dark: bool, other: str | None) -> View:
+async def _open(
+    ws: WebSocket, sid: str, who: Identity, tab: str, dark: bool, other: str | None
+) -> View[Figure]:
     db, blobs = ws.app.state.db, ws.app.state.blobs
 
     def latest() -> tuple[Analysed | None, Analysed | None]:
@@ -210,7 +212,7 @@ def _motion(blobs: BlobStore, a: Analysed) -> Motion:
     return prepare(read_poses(analyses.file_bytes(blobs, a.found, "poses.parquet")))
 
 
-async def _follow(ws: WebSocket, view: View, activity: Activity) -> None:
+async def _follow(ws: WebSocket, view: View[Figure], activity: Activity) -> None:
     """Pose the figure at every {"t"} and answer with what is shown."""
     while True:
         try:
@@ -221,7 +223,7 @@ async def _follow(ws: WebSocket, view: View, activity: Activity) -> None:
         await activity.seen()
 
 
-def _act(view: View, text: str) -> dict[str, Any]:
+def _act(view: View[Figure], text: str) -> dict[str, Any]:
     try:
         message = json.loads(text)
     except ValueError:

@@ -1,7 +1,8 @@
 """The open 3D views: one viser server each, on loopback, stopped when nobody has looked for a while.
 
 Separate server objects keep patients apart by structure: nothing is ever drawn into a shared scene. A view
-belongs to the sign-in that opened it. One web process only: the registry lives in memory.
+of a replay belongs to the sign-in that opened it; that of a live session is shared by all who may look at it.
+One web process only: the registry lives in memory.
 """
 
 from __future__ import annotations
@@ -13,13 +14,16 @@ import time
 import weakref
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
 
 import rich
 import viser
 from viser._messages import ShareUrlRequest
 
 from core.errors import EstimationError
+from server.auth.roles import Action, Role, may
 from server.viewer.figure import Figure
+from server.viewer.live import LiveFigure
 from server.viewer.motion import Motion
 
 IDLE_S = 30.0
@@ -30,25 +34,29 @@ MAX_VIEWS = 48
 """Open views at most, about 15 MB each for a 10 min walk if all show different ones."""
 
 Key = tuple[str, ...]
+Drawn = TypeVar("Drawn", Figure, LiveFigure)
 
 
 @dataclass(eq=False)
-class View:
+class View(Generic[Drawn]):
     """One figure in one viser server.
 
     Parameters
     ----------
-    id : unguessable, part of the address. key : what is shown, to whom. login_id : who may look.
-    viewers : open connections. left_at : monotonic time since when there are none.
+    id : unguessable, part of the address. key : what is shown, to whom. login_id : who may look, None = all
+    whose role allows `action`. viewers : open connections. left_at : monotonic time since when there are
+    none. let_go : called once at its end.
     """
 
     id: str
     key: Key
-    login_id: str
+    login_id: str | None
+    action: Action
     server: viser.ViserServer
-    figure: Figure
+    figure: Drawn
     viewers: int = 0
     left_at: float = field(default_factory=time.monotonic)
+    let_go: Callable[[], None] | None = None
 
     @property
     def port(self) -> int:
@@ -71,21 +79,23 @@ class Views:
 
     def __init__(self, idle_s: float = IDLE_S, limit: int = MAX_VIEWS) -> None:
         self._idle_s, self._limit = idle_s, limit
-        self._views: dict[str, View] = {}
+        self._views: dict[str, View[Any]] = {}
         self._motions: weakref.WeakValueDictionary[str, Motion] = weakref.WeakValueDictionary()
         self._opening = asyncio.Lock()
 
     def __len__(self) -> int:
         return len(self._views)
 
-    def find(self, view_id: str, login_id: str) -> View | None:
-        """Return a view to the sign-in that opened it, None to everybody else."""
+    def find(self, view_id: str, login_id: str, role: Role) -> View[Any] | None:
+        """Return a view to those who may look at it, None to everybody else."""
         view = self._views.get(view_id)
-        return view if view is not None and view.login_id == login_id else None
+        if view is None or view.login_id not in (None, login_id) or not may(role, view.action):
+            return None
+        return view
 
     async def open(
         self, login_id: str, tab: str, source: str, load: Callable[[], Motion], dark: bool = False
-    ) -> View:
+    ) -> View[Figure]:
         """Return the view of one browser tab on one source, made at need.
 
         Parameters
@@ -97,20 +107,42 @@ class Views:
         EstimationError
             `too_many_views` when the limit is reached and every view is being watched.
         """
-        key = (login_id, tab, source)
         async with self._opening:
-            for view in self._views.values():
-                if view.key == key:
-                    view.left_at = time.monotonic()
-                    return view
+            view = self._known((login_id, tab, source))
+            if view is not None:
+                return view
             await self._make_room()
             motion = self._motions.get(source)
             if motion is None:
                 motion = await asyncio.to_thread(load)
                 self._motions[source] = motion
-            server, figure = await asyncio.to_thread(_start, motion, dark)
-            view = View(secrets.token_hex(16), key, login_id, server, figure)
-            self._views[view.id] = view
+            server, figure = await asyncio.to_thread(_start, lambda server: Figure(server, motion, dark))
+            return self._add((login_id, tab, source), login_id, Action.READ_RESULT, server, figure)
+
+    async def open_live(
+        self,
+        key: Key,
+        draw: Callable[[viser.ViserServer], LiveFigure],
+        attend: Callable[[View[LiveFigure]], None],
+    ) -> View[LiveFigure]:
+        """Return the shared view of a live session, made at need.
+
+        Parameters
+        ----------
+        draw : makes its figure; called in a thread. attend : told of a new view, on the event loop.
+
+        Raises
+        ------
+        EstimationError
+            `too_many_views`, as `open`.
+        """
+        async with self._opening:
+            view = self._known(key)
+            if view is None:
+                await self._make_room()
+                server, figure = await asyncio.to_thread(_start, draw)
+                view = self._add(key, None, Action.RUN_LIVE, server, figure)
+                attend(view)
             return view
 
     async def sweep(self) -> None:
@@ -141,6 +173,25 @@ class Views:
             await asyncio.sleep(SWEEP_S)
             await self.sweep()
 
+    def _known(self, key: Key) -> View[Any] | None:
+        for view in self._views.values():
+            if view.key == key:
+                view.left_at = time.monotonic()
+                return view
+        return None
+
+    def _add(
+        self,
+        key: Key,
+        login_id: str | None,
+        action: Action,
+        server: viser.ViserServer,
+        figure: Drawn,
+    ) -> View[Drawn]:
+        view = View(secrets.token_hex(16), key, login_id, action, server, figure)
+        self._views[view.id] = view
+        return view
+
     async def _make_room(self) -> None:
         if len(self._views) < self._limit:
             return
@@ -152,16 +203,18 @@ class Views:
             )
         await self._stop(min(unwatched, key=lambda v: v.left_at))
 
-    async def _stop(self, view: View) -> None:
+    async def _stop(self, view: View[Any]) -> None:
         self._views.pop(view.id, None)
+        if view.let_go is not None:
+            view.let_go()
         await asyncio.to_thread(view.server.stop)
 
 
-def _start(motion: Motion, dark: bool) -> tuple[viser.ViserServer, Figure]:
+def _start(draw: Callable[[viser.ViserServer], Drawn]) -> tuple[viser.ViserServer, Drawn]:
     """Start a viser server on a free loopback port and draw the figure in it."""
     # viser prints a banner per server even when told not to be verbose
     rich.get_console().quiet = True
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     # a client could ask for a public tunnel through a third party; the proxy drops the request, this one too
     server._websock_server.unregister_handler(ShareUrlRequest)  # noqa: SLF001
-    return server, Figure(server, motion, dark)
+    return server, draw(server)

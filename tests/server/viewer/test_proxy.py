@@ -14,6 +14,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.typing import Subprotocol
 
+from server.auth.identity import Identity
+from server.auth.roles import Role
 from server.viewer import pipe
 from server.viewer.views import View, Views
 from tests.server.viewer.conftest import Ward
@@ -145,7 +147,7 @@ async def test_a_view_of_somebody_else_is_not_there(ward: Ward) -> None:
 async def test_a_view_whose_viser_has_died_is_gone_too(ward: Ward) -> None:
     headers = ward.cookie()
     async with replaying(ward, headers, tab="dying") as (_, opened):
-        view = views_of(ward).find(str(opened["view"]), _login_of(ward, headers))
+        view = views_of(ward).find(str(opened["view"]), *_login_of(ward, headers))
         assert view is not None
         await asyncio.to_thread(view.server.stop)
         async with piped(ward, headers, opened["view"]) as ws:
@@ -193,7 +195,7 @@ def test_only_camera_messages_pass_upward() -> None:
 async def test_a_forged_request_to_share_never_reaches_viser(ward: Ward) -> None:
     headers = ward.cookie()
     async with replaying(ward, headers) as (_, opened):
-        view = views_of(ward).find(str(opened["view"]), _login_of(ward, headers))
+        view = views_of(ward).find(str(opened["view"]), *_login_of(ward, headers))
         assert isinstance(view, View)
         seen: list[str] = []
         handle = view.server._websock_server._handle_incoming_message
@@ -230,7 +232,6 @@ def _camera() -> dict[str, object]:
     }
 
 
-def _login_of(ward: Ward, headers: dict[str, str]) -> str:
-    who = ward.clinic.app.state.logins.find(headers["Cookie"].removeprefix("sid="))
-    login_id: str = who.login_id
-    return login_id
+def _login_of(ward: Ward, headers: dict[str, str]) -> tuple[str, Role]:
+    who: Identity = ward.clinic.app.state.logins.find(headers["Cookie"].removeprefix("sid="))
+    return who.login_id, who.role

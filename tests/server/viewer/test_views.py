@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from core.errors import EstimationError
+from server.auth.roles import Role
 from server.viewer.motion import Motion
 from server.viewer.views import Views
 
@@ -29,9 +30,9 @@ async def test_same_tab_shares_and_other_sign_in_does_not(motion: Motion) -> Non
         assert await views.open("login-1", "tab", "analysis", load) is mine
         theirs = await views.open("login-2", "tab", "analysis", load)
         assert theirs.server is not mine.server
-        assert views.find(mine.id, "login-1") is mine
-        assert views.find(mine.id, "login-2") is None
-        assert views.find("unknown", "login-1") is None
+        assert views.find(mine.id, "login-1", Role.VIEWER) is mine
+        assert views.find(mine.id, "login-2", Role.ADMIN) is None
+        assert views.find("unknown", "login-1", Role.ADMIN) is None
         assert loads == [1]
 
 
@@ -57,7 +58,7 @@ async def test_at_the_limit_the_longest_unwatched_view_gives_way(motion: Motion)
         first = await views.open("login", "1", "analysis", lambda: motion)
         second = await views.open("login", "2", "analysis", lambda: motion)
         third = await views.open("login", "3", "analysis", lambda: motion)
-        assert views.find(first.id, "login") is None
+        assert views.find(first.id, "login", Role.ADMIN) is None
         with second.watched(), third.watched(), pytest.raises(EstimationError) as refused:
             await views.open("login", "4", "analysis", lambda: motion)
         assert refused.value.code == "too_many_views"

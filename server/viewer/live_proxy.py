@@ -1,0 +1,92 @@
+"""The way to the 3D figure of a live session.
+
+    GET /sessions/{sid}/live/figure?dark=…   for an iframe; leads on to the view's own page /views/<id>/
+
+The view is shared by all who may run live sessions, one per theme, and is made again after it was stopped: to
+load the iframe anew is all a page has to do after its line was cut.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import ExitStack
+from typing import Annotated, cast
+
+import numpy as np
+import viser
+from fastapi import APIRouter, Request
+from fastapi.responses import RedirectResponse
+
+from core.body.kinematics import nominal_body
+from core.body.model import BodyModel
+from core.frames import Floats, Side
+from core.norms import adult_kinematics
+from server.api.context import Db, Id
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.live.hub import Hub
+from server.services import patients, sessions
+from server.storage.db import Database
+from server.viewer.live import LiveFigure
+from server.viewer.live_reference import LiveReference
+from server.viewer.live_watch import LiveWatch
+from server.viewer.views import View, Views
+
+router = APIRouter(include_in_schema=False)
+
+
+@router.get("/sessions/{sid}/live/figure")
+async def figure(
+    request: Request, db: Db, sid: Id, who: Annotated[Identity, require(Action.RUN_LIVE)], dark: bool = False
+) -> RedirectResponse:
+    """Open the live figure of a session."""
+    body, norm = await asyncio.to_thread(_person, db, sid)
+    hub: Hub = request.app.state.hub
+    views: Views = request.app.state.views
+
+    def draw(server: viser.ViserServer) -> LiveFigure:
+        return LiveFigure(server, body, dark)
+
+    def attend(view: View[LiveFigure]) -> None:
+        _attend(view, hub, sid, LiveReference(body, norm, lambda: _trained(hub, sid)))
+
+    view = await views.open_live(("live", sid, "dark" if dark else "light"), draw, attend)
+    return RedirectResponse(f"/views/{view.id}/", 303, {"Cache-Control": "no-store"})
+
+
+def _person(db: Database, sid: str) -> tuple[BodyModel, dict[str, Floats]]:
+    """Body and norm curves in rad of who walks; raises NotFound."""
+    with db.read() as c:
+        session = sessions.get(c, sid)
+        patient = patients.get(c, session.patient_id)
+    height = session.height_m if session.height_m is not None else patient.height_m
+    age = session.performed_on.year - patient.birth_year if patient.birth_year else None
+    norm = adult_kinematics(age)
+    return nominal_body(height)[0], {name: np.radians(b.mean_deg) for name, b in norm.bands.items()}
+
+
+def _attend(view: View[LiveFigure], hub: Hub, sid: str, reference: LiveReference) -> None:
+    """Connect a new view with the session's pictures until it ends."""
+    room = hub.room(sid)
+
+    def ghost() -> object:
+        take = hub.take_of(sid)
+        return None if take is None else take.steered.ghost
+
+    watch = LiveWatch(
+        view.figure, reference, ghost=ghost, strides=lambda: room.strides, watched=lambda: view.viewers > 0
+    )
+    until = ExitStack()
+    until.callback(hub.leave, sid)
+    until.enter_context(room.watching(watch.see))
+    clock = asyncio.create_task(watch.run())
+    until.callback(clock.cancel)
+    view.let_go = until.close
+
+
+def _trained(hub: Hub, sid: str) -> Side | None:
+    """The side of the prescription in force."""
+    take = hub.take_of(sid)
+    side = None if take is None or take.training.prescription is None else take.training.prescription["side"]
+    return cast("Side", side) if side in ("left", "right") else None

@@ -1,0 +1,124 @@
+"""Which walk stands beside a live figure: the norm, or the mean of the person's own better side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Final
+
+import msgspec
+import numpy as np
+
+from core.angles import SIGNS, cardan_zxy, joints, pelvis_angles
+from core.body.model import BodyModel
+from core.frames import SIDES, SUFFIX, Floats, Side
+from core.norms.speed import SLOW_MPS
+from core.rotation import conjugate, multiply
+from server.viewer.moment import Moment
+from server.viewer.reference import SAGITTAL, ReferenceWalk, better_side, mirrored
+
+MEAN_OF: Final = 5
+"""Strides of a side whose mean is shown: enough to be the person's walk, few enough to be the present one."""
+SPEED_OF, SPEED_FROM = 10, 3
+"""Strides over which walking is judged too slow for a norm, and how many it takes: as on the page."""
+
+
+class Told(msgspec.Struct, frozen=True):
+    """What of a stride for the browsers (server/live/wire.py) is used here."""
+
+    n: int
+    side: Side
+    counted: bool
+    values: dict[str, float | None]
+    curves_deg: dict[str, list[float | None]]
+
+
+_told = msgspec.json.Decoder(Told).decode
+
+
+class LiveReference:
+    """The reference of one person.
+
+    Parameters
+    ----------
+    norm : variable → (n,) rad over the cycle, empty where no norm fits the person.
+    trained : the side that is prescribed for, if one is; then the other one is the better.
+    """
+
+    def __init__(
+        self, body: BodyModel, norm: Mapping[str, Floats], trained: Callable[[], Side | None]
+    ) -> None:
+        self._body, self._trained = body, trained
+        self._norm = norm if all(name in norm for name in SAGITTAL) else {}
+        self._walks: dict[str, ReferenceWalk | None] = {}
+        self._strides: dict[int, Told] = {}
+        self._last: bytes = b""
+
+    def find(
+        self, choice: object, strides: tuple[bytes, ...], zero: Callable[[], Mapping[str, float]]
+    ) -> ReferenceWalk | None:
+        """The walk of a choice "norm" or "better" ("own"); None for any other, or where there is none.
+
+        Parameters
+        ----------
+        strides : the last ones as told to the browsers, in order; one may be told twice.
+        zero : angle → rad at standing, asked for when strides are averaged.
+        """
+        newest = strides[-1] if strides else b""
+        if newest is not self._last:
+            self._last = newest
+            self._strides = {told.n: told for told in map(_told, strides)}
+            self._walks.clear()
+        key = str(choice)
+        if key not in self._walks:
+            self._walks[key] = self._walk(key, zero)
+        return self._walks[key]
+
+    def _walk(self, choice: str, zero: Callable[[], Mapping[str, float]]) -> ReferenceWalk | None:
+        if choice == "norm":
+            return ReferenceWalk(self._norm, self._body) if self._norm and not self._slow() else None
+        if choice not in ("better", "own"):
+            return None
+        means = {side: mean_curves(s for s in self._strides.values() if s.side == side) for side in SIDES}
+        trained = self._trained()
+        side = _other(trained) if trained is not None else better_side(means, self._norm)
+        if side is None or not all(name in means[side] for name in SAGITTAL):
+            return None
+        return ReferenceWalk(mirrored(means[side], zero(), side), self._body, lead=side)
+
+    def _slow(self) -> bool:
+        """No adult norm is of people so slow."""
+        told = list(self._strides.values())[-SPEED_OF:]
+        speeds = [v for s in told if (v := s.values.get("gait_speed_mps")) is not None]
+        return len(speeds) >= SPEED_FROM and float(np.mean(speeds)) < SLOW_MPS
+
+
+def mean_curves(strides: Iterable[Told]) -> dict[str, Floats]:
+    """Mean curves in rad over the last counted strides; a variable that one of them lacks is left out."""
+    last = [s.curves_deg for s in strides if s.counted][-MEAN_OF:]
+    if not last:
+        return {}
+    shared = set.intersection(*(set(curves) for curves in last))
+    found = {name: np.array([curves[name] for curves in last], np.float64).mean(axis=0) for name in shared}
+    return {name: np.radians(mean) for name, mean in found.items() if np.isfinite(mean).all()}
+
+
+def standing_angles(moment: Moment, angles_deg: Mapping[str, float | None]) -> dict[str, float]:
+    """Raw angles at standing in rad: what core.angles reads from the poses without the live angles there."""
+    raw: dict[str, float] = {}
+    if "pelvis" in moment.q:
+        tilt, obliquity = pelvis_angles(moment.q["pelvis"])
+        raw |= {"pelvis_tilt": float(tilt), "pelvis_obliquity": float(obliquity)}
+    for side in SIDES:
+        for joint, proximal, distal in joints(side):
+            if proximal in moment.q and distal in moment.q:
+                abc = cardan_zxy(multiply(conjugate(moment.q[proximal]), moment.q[distal])).tolist()
+                for (name, right, left), x in zip(SIGNS[joint], abc, strict=True):
+                    raw[f"{name}_{SUFFIX[side]}"] = (right if side == "right" else left) * x
+    found = {
+        name: x - np.radians(now) for name, x in raw.items() if (now := angles_deg.get(name)) is not None
+    }
+    return {name: float((x + np.pi) % (2 * np.pi) - np.pi) for name, x in found.items()}
+
+
+def _other(side: Side) -> Side:
+    return "right" if side == "left" else "left"

@@ -1,0 +1,120 @@
+"""Shows what the estimator says of a session in one live figure, while somebody looks.
+
+Pictures are shown as they come, newest wins; from one that is half a second old on the figure is grey.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import Final, cast
+
+import msgspec
+import numpy as np
+
+from core.frames import SIDES, SUFFIX, Segment, Side
+from server.live.messages import STALE_S, Picture, Pose
+from server.viewer.live import LiveFigure
+from server.viewer.live_reference import LiveReference, standing_angles
+from server.viewer.moment import Moment
+
+TICK_S: Final = 0.1
+"""How often silence is looked for."""
+
+
+class Shown(msgspec.Struct, frozen=True):
+    """What of a frame for the browsers (server/live/wire.py) is used here."""
+
+    method: str
+    phase: dict[str, float | None]
+    angles_deg: dict[str, float | None]
+
+
+_shown = msgspec.json.Decoder(Shown).decode
+
+
+class LiveWatch:
+    """The way from a session's pictures to one figure; on the event loop.
+
+    Parameters
+    ----------
+    ghost : what the therapist has chosen now. strides : the last ones as told to the browsers.
+    watched : somebody looks.
+    """
+
+    def __init__(
+        self,
+        figure: LiveFigure,
+        reference: LiveReference,
+        *,
+        ghost: Callable[[], object],
+        strides: Callable[[], tuple[bytes, ...]],
+        watched: Callable[[], bool],
+    ) -> None:
+        self._figure, self._reference = figure, reference
+        self._ghost, self._strides, self._watched = ghost, strides, watched
+        self._newest: Picture | None = None
+        self._at = -np.inf
+        self._is_shown = True
+        self._take: str | None = None
+
+    def see(self, picture: Picture) -> None:
+        """Take in the newest picture and show it if somebody looks."""
+        self._newest, self._at, self._is_shown = picture, time.monotonic(), False
+        if self._watched():
+            self._show(picture)
+
+    async def run(self) -> None:
+        """Notice silence, and somebody who begins to look, until cancelled."""
+        while True:
+            await asyncio.sleep(TICK_S)
+            self.look()
+
+    def look(self) -> None:
+        """Grey what is no longer now; show what came while nobody looked."""
+        if self._newest is None or not self._watched():
+            return
+        if not self._is_shown:
+            self._show(self._newest)
+        if time.monotonic() - self._at > STALE_S:
+            self._figure.set_stale()
+
+    def _show(self, picture: Picture) -> None:
+        self._is_shown = True
+        if picture.take != self._take:
+            self._take = picture.take
+            self._figure.wait()
+        if picture.pose is None:
+            if picture.stage == "running":
+                self._figure.set_stale()
+            else:
+                self._figure.wait()
+            return
+        # the body lacks its closing brace (messages.Picture)
+        shown = _shown(picture.body + b"}")
+        moment = moment_of(picture, picture.pose, shown)
+        self._figure.set_reference(
+            self._reference.find(
+                self._ghost(), self._strides(), lambda: standing_angles(moment, shown.angles_deg)
+            )
+        )
+        late = picture.delay_s is None or picture.delay_s > STALE_S
+        self._figure.show(moment, late=late)
+
+
+def moment_of(picture: Picture, pose: Pose, shown: Shown) -> Moment:
+    """Poses and phases of a picture."""
+    segments = [cast("Segment", s) for s in pose.segments]
+    q = np.frombuffer(pose.q, np.float32).reshape(-1, 4).astype(np.float64)
+    p = np.frombuffer(pose.p, np.float32).reshape(-1, 3).astype(np.float64)
+    phase = {side: shown.phase.get(SUFFIX[side]) for side in SIDES}
+    return Moment(
+        t_s=picture.t_s,
+        q=dict(zip(segments, q, strict=True)),
+        p=dict(zip(segments, p, strict=True)),
+        valid=pose.valid,
+        method=shown.method,
+        contact={cast("Side", side): on for side, on in pose.contact.items()},
+        phase={side: None if x is None else x / 100.0 for side, x in phase.items()},
+    )
