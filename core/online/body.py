@@ -150,8 +150,9 @@ class Filtered:
 
     def push(self, raw: Raw) -> tuple[Signals, Floats, Floats]:
         """Signals as filtered; orientation (T, n, 4) and origin (T, n, 3) of the segments."""
-        valid = raw.valid[:, self._columns]
-        acc, gyr = self._bridge.push(raw.acc[:, self._columns], raw.gyr[:, self._columns], valid)
+        # `take` lays its result out in order; an index would not, and another layout is another kernel
+        k, valid = self._columns, raw.valid.take(self._columns, axis=1)
+        acc, gyr = self._bridge.push(raw.acc.take(k, axis=1), raw.gyr.take(k, axis=1), valid)
         signals = Signals(acc, gyr, valid, self._still.push(acc, gyr, valid))
         if self._filter is None:
             self._filter = LiveErkf(self.tree, self._params, self._rate_hz, signals, self._start)

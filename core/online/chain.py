@@ -100,6 +100,7 @@ class Chain:
         self._columns = np.array([columns.index(s) for s in self.segments], np.int64)
         zero = samples(calibrated.calibration.zero, rate)
         self.first = calibration.first + zero.start
+        self.body = calibration.body
         self._notices: list[Notice] = []
         self.estimator = self._choose(calibration, zero.start)
         feet = worn_feet(self.segments)
@@ -141,7 +142,7 @@ class Chain:
     def push(self, acc: Floats, gyr: Floats, valid: Bools) -> Outcome:
         """The next samples (T, columns, …) of the axis."""
         k = self._columns
-        return self._advance(acc[:, k], gyr[:, k], valid[:, k])
+        return self._advance(acc.take(k, axis=1), gyr.take(k, axis=1), valid.take(k, axis=1))
 
     def _choose(self, calibration: LiveCalibration, at: int) -> Estimator:
         """The estimator that the calibrated sensors allow, best first as offline."""
@@ -209,8 +210,6 @@ class Chain:
         if len(acc) > MOST and self._count:
             parts = [slice(k, k + MOST) for k in range(0, len(acc), MOST)]
             return _joined([self._advance(acc[k], gyr[k], valid[k]) for k in parts])
-        acc, gyr = np.ascontiguousarray(acc), np.ascontiguousarray(gyr)
-        valid = np.ascontiguousarray(valid)
         q = self._attitudes.push(acc, gyr, valid)
         turned = {s: q[:, i] for i, s in enumerate(self._turned)}
         placed = self.estimator.push(Raw(acc, gyr, valid, turned))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, isnan
+from typing import Final
 
 import numpy as np
 
@@ -41,9 +42,11 @@ class Span:
     t_s: Floats
     q: Mapping[Segment, Floats]
     valid: Mapping[Segment, Bools]
-    angles: JointAngles
+    angles: JointAngles | None
     feet: FootTracks | None
 
+
+NO_ANGLES: Final = JointAngles(np.zeros(2), {}, {})
 
 Figures = tuple[dict[str, Value], dict[str, Floats]]
 """Value or reason by name; curve (101,) rad by variable."""
@@ -58,7 +61,7 @@ def early_figures(stride: Stride, span: Span, surface: Surface) -> Figures:
         found[name] = missing(name, (stride,)) if isnan(value) else value
     pitch = foot_pitches(span)
     flat = stances(one, span.t_s, pitch)
-    curves = cycle_curves(span.angles, one)
+    curves = cycle_curves(span.angles or NO_ANGLES, one)
     found |= flat.rows[0]
     found |= phase_rows(one, flat, span.angles, pitch, span.feet)[0]
     worn = dict.fromkeys(FIGURES, "joint_missing") | dict.fromkeys(FOOT_PITCH, "no_foot_sensor")

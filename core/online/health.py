@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.formats.live_log import Batch, Hello, StreamInfo
 from core.frames import Segment
@@ -20,15 +21,13 @@ FULL: Final = 0.995
 """A component beyond this share of its range is at its end."""
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class _Piece:
-    """What a batch of one stream held: device time it begins and ends at, counts by sensor."""
+    """A batch: device times it begins and ends at, counts (k, 2) of what was measured and at its end."""
 
     start_us: int
     end_us: int
-    samples: int
-    measured: tuple[int, ...]
-    full: tuple[int, ...]
+    counts: NDArray[np.int64]
 
 
 class _StreamHealth:
@@ -37,43 +36,44 @@ class _StreamHealth:
     def __init__(self, info: StreamInfo) -> None:
         self.info = info
         self._limit = np.array(
-            [[x.acc_range or np.inf] * 3 + [x.gyr_range or np.inf] * 3 for x in info.sensors], np.float64
-        )
+            [[x.acc_range or np.inf] * 3 + [x.gyr_range or np.inf] * 3 for x in info.sensors], np.float32
+        ) * np.float32(FULL)
         self._pieces: deque[_Piece] = deque()
+        self._total = np.zeros((len(info.sensors), 2), np.int64)
         self.sent_us: int | None = None
 
     def push(self, batch: Batch) -> None:
         """Take a batch."""
         self.sent_us = batch.sent_us
         x = batch.samples[:, :, :6]
-        n = len(x)
         step_us = round(1e6 / self.info.rate_hz)
-        last_us = (n - 1) * step_us if batch.offsets_us is None else int(batch.offsets_us[-1])
+        last_us = (len(x) - 1) * step_us if batch.offsets_us is None else int(batch.offsets_us[-1])
+        counts = np.empty(self._total.shape, np.int64)
         # a sum is not a number where any part of it is not
-        measured = np.isfinite(x.sum(axis=2)).sum(axis=0)
-        full = (np.abs(x) >= FULL * self._limit).any(axis=2).sum(axis=0)
+        counts[:, 0] = np.isfinite(x.sum(axis=2)).sum(axis=0)
+        counts[:, 1] = (np.abs(x) >= self._limit).any(axis=2).sum(axis=0)
         end_us = batch.t0_us + last_us + step_us
-        self._pieces.append(_Piece(batch.t0_us, end_us, n, tuple(measured.tolist()), tuple(full.tolist())))
+        self._pieces.append(_Piece(batch.t0_us, end_us, counts))
+        self._total += counts
         while end_us - self._pieces[0].end_us > OVER_S * 1e6:
-            self._pieces.popleft()
+            self._total -= self._pieces.popleft().counts
 
-    def of(self, i: int, silent_s: float, still: bool) -> SensorHealth:
-        """Health of the i-th sensor."""
-        sensor = self.info.sensors[i]
-        if not self._pieces:
-            return SensorHealth(sensor.id, sensor.segment, 0.0, 1.0, 0.0, silent_s, still)
-        span_s = max(1e-6 * (self._pieces[-1].end_us - self._pieces[0].start_us), 1e-6)
-        measured = sum(p.measured[i] for p in self._pieces)
-        full = sum(p.full[i] for p in self._pieces)
-        return SensorHealth(
-            id=sensor.id,
-            segment=sensor.segment,
-            rate_hz=measured / span_s,
-            lost_share=min(1.0, max(0.0, 1.0 - measured / max(1.0, span_s * self.info.rate_hz))),
-            saturated_share=full / max(1, measured),
-            silent_s=silent_s,
-            still=still,
-        )
+    def now(self, silent_s: float, still: Collection[Segment]) -> list[SensorHealth]:
+        """Health of its sensors."""
+        span_s = 1e-6 * (self._pieces[-1].end_us - self._pieces[0].start_us) if self._pieces else 1.0
+        expected = max(1.0, span_s * self.info.rate_hz)
+        return [
+            SensorHealth(
+                id=sensor.id,
+                segment=sensor.segment,
+                rate_hz=measured / max(span_s, 1e-6),
+                lost_share=min(1.0, max(0.0, 1.0 - measured / expected)),
+                saturated_share=full / max(1, measured),
+                silent_s=silent_s,
+                still=sensor.segment in still,
+            )
+            for sensor, (measured, full) in zip(self.info.sensors, self._total.tolist(), strict=True)
+        ]
 
 
 class Health:
@@ -93,12 +93,9 @@ class Health:
 
     def now(self, still: Collection[Segment]) -> tuple[SensorHealth, ...]:
         """Every sensor in the order of the hello; `still` : segments at rest."""
-        found = []
+        found: list[SensorHealth] = []
         for stream in self._streams.values():
             since = stream.sent_us if stream.sent_us is not None else self._begun_us
             silent_s = 0.0 if since is None else 1e-6 * (self._now_us - since)
-            found += [
-                stream.of(i, silent_s, sensor.segment in still)
-                for i, sensor in enumerate(stream.info.sensors)
-            ]
+            found += stream.now(silent_s, still)
         return tuple(found)

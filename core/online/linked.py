@@ -62,7 +62,8 @@ class Linked:
         signals, q, p = self._filtered.push(raw)
         known = signals.valid & np.isfinite(q[:, :, 0])
         still = np.ascontiguousarray(signals.still[:, self._feet, 0])
-        paths = Paths(p[:, self._feet], q[:, self._feet], still, known[:, self._feet])
+        feet = self._feet
+        paths = Paths(p.take(feet, axis=1), q.take(feet, axis=1), still, np.asarray(known).take(feet, axis=1))
         _level(p, self._feet, still, paths.valid, self._ankle, self._share, self._floor)
         return Placed(q, p, known, np.asarray(known[:, self._shown].all(axis=1)), paths)
 

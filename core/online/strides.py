@@ -149,7 +149,7 @@ class LiveStrides:
         first = self._sample(pending.stride.start_s) - 1
         found: dict[str, Value] = dict.fromkeys(SPATIAL, "gap")
         if history.reaches(first, at + 1):
-            span = self._span(first, at + 1, history)
+            span = self._span(first, at + 1, history, whole=False)
             found = distances(pending.stride, context, span, self._setup.surface)
         told, (values, reasons) = pending.told, _split(found)
         return replace(
@@ -194,8 +194,8 @@ class LiveStrides:
     def _sample(self, time_s: float) -> int:
         return floor(time_s * self._setup.rate_hz + 1e-6) - self._setup.first
 
-    def _span(self, first: int, past: int, history: History) -> Span:
-        """Samples first … past − 1 as the functions of a whole take want them."""
+    def _span(self, first: int, past: int, history: History, whole: bool = True) -> Span:
+        """Samples first … past − 1 as the functions of a whole take want them; not `whole`: no angles."""
         x = self._setup
         t_s = np.arange(x.first + first, x.first + past) / x.rate_hz
         q, valid = history.floats("course", first, past), history.bools("course_valid", first, past)
@@ -203,10 +203,11 @@ class LiveStrides:
         take = Orientations(
             t_s, x.rate_hz, by_segment, {s: valid[:, i] for i, s in enumerate(x.courses)}, "live"
         )
-        columns = history.floats("angles", first, past)
-        angles = JointAngles(
-            t_s, {name: columns[:, i] for i, name in enumerate(x.angles)}, {}, headings=headings(take)
-        )
+        angles = None
+        if whole:
+            columns = history.floats("angles", first, past)
+            named = {name: columns[:, i] for i, name in enumerate(x.angles)}
+            angles = JointAngles(t_s, named, {}, headings=headings(take))
         feet = None
         if x.feet:
             p, turned = history.floats("feet_p", first, past), history.floats("feet_q", first, past)
