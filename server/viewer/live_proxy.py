@@ -1,9 +1,9 @@
 """The way to the 3D figure of a live session.
 
-    GET /sessions/{sid}/live/figure?dark=…   for an iframe; leads on to the view's own page /views/<id>/
+    GET /sessions/{sid}/live/figure?dark=…   opens it: {"src": "/views/<id>/"} for an iframe (proxy.py)
 
 The view is shared by all who may run live sessions, one per theme, and is made again after it was stopped: to
-load the iframe anew is all a page has to do after its line was cut.
+ask for it anew is all a page has to do after its line was cut.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Annotated, cast
 import numpy as np
 import viser
 from fastapi import APIRouter, Request
-from fastapi.responses import RedirectResponse
+from fastapi.responses import JSONResponse
 
 from core.body.kinematics import nominal_body
 from core.body.model import BodyModel
@@ -39,7 +39,7 @@ router = APIRouter(include_in_schema=False)
 @router.get("/sessions/{sid}/live/figure")
 async def figure(
     request: Request, db: Db, sid: Id, who: Annotated[Identity, require(Action.RUN_LIVE)], dark: bool = False
-) -> RedirectResponse:
+) -> JSONResponse:
     """Open the live figure of a session."""
     body, norm = await asyncio.to_thread(_person, db, sid)
     hub: Hub = request.app.state.hub
@@ -52,7 +52,7 @@ async def figure(
         _attend(view, hub, sid, LiveReference(body, norm, lambda: _trained(hub, sid)))
 
     view = await views.open_live(("live", sid, "dark" if dark else "light"), draw, attend)
-    return RedirectResponse(f"/views/{view.id}/", 303, {"Cache-Control": "no-store"})
+    return JSONResponse({"src": f"/views/{view.id}/"}, headers={"Cache-Control": "no-store"})
 
 
 def _person(db: Database, sid: str) -> tuple[BodyModel, dict[str, Floats]]:

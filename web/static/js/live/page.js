@@ -4,6 +4,7 @@ import "./sensors.js";
 import "./calibration.js";
 import "./feedback-panel.js";
 import "./stride-chart.js";
+import "./view.js";
 import { Feed } from "./feed.js";
 import { whenOther } from "./given.js";
 import { Commands } from "./commands.js";
@@ -60,7 +61,7 @@ class LivePage extends HTMLElement {
     on("feedback", (state) => { this.feedback.show(state); this.top.paused(state); this.strip.state(state, this.feedback.next(state)); });
     on("notice", (notice) => this.notes.notice(notice));
     on("fresh", (fresh) => this.fresh(fresh));
-    on("line", (line) => this.notes.line(line));
+    on("line", (line) => { this.notes.line(line); this.figure.line(line); });
   }
 
   // One part at a time: pairing, calibration, the walk, what came of it.
