@@ -106,18 +106,18 @@ class TargetOffer(Response):
 
 
 class Feedback(Response):
-    """Strides with and without feedback of a session's live takes."""
+    """Strides with and without feedback of a session's live take; empty with a reason where there is none."""
 
-    prescription: dict[str, Any] | None
-    words: list[str]
-    reason: str | None
-    parameter: str | None
-    unit: str | None
-    side: str | None
-    rows: list[dict[str, Any]]
-    probes: list[dict[str, Any]]
-    levels: list[dict[str, Any]]
-    effects: list[dict[str, Any]]
-    retention: dict[str, Any] | None
-    notes: list[str]
-    strides: list[dict[str, Any]]
+    reason: str | None = None
+    prescription: dict[str, Any] | None = None
+    words: list[str] = Field(default=[])
+    parameter: str | None = None
+    unit: str | None = None
+    side: str | None = None
+    rows: list[dict[str, Any]] = Field(default=[])
+    probes: list[dict[str, Any]] = Field(default=[])
+    levels: list[dict[str, Any]] = Field(default=[])
+    effects: list[dict[str, Any]] = Field(default=[])
+    retention: dict[str, Any] | None = None
+    notes: list[str] = Field(default=[])
+    strides: list[dict[str, Any]] = Field(default=[])

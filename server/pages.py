@@ -19,6 +19,7 @@ from server.problems import TEMPLATES
 from server.services import (
     analyses,
     comparisons,
+    feedback,
     histories,
     patients,
     prescriptions,
@@ -256,9 +257,11 @@ def _session_page(
         latest = analyses.latest(c, sid) if who.may(Action.READ_RESULT) else None
         edits = reviews.Edits() if latest is None else reviews.edits_of(c, latest.id)
         context["before"] = None if latest is None else comparisons.before(c, context["session"])
+        trained = feedback.gather(c, sid) if latest is not None else None
     if latest is None and paper:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
     if latest is not None:
         context["report"] = session_views.report(blobs, latest, edits, context, paper=paper)
+        context["feedback"] = None if trained is None else feedback.view(blobs, trained)
     _opened(db, who, "session", sid)
     return _page(request, db, who, template, "patients", **context)

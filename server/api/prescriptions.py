@@ -5,24 +5,32 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
+from starlette.responses import Response
 
 from core.feedback import PARAMETERS
 from core.feedback.prescription import SOURCES
+from server import audit
 from server import feedback_schemas as schemas
 from server.api.context import Blobs, Db, Id
 from server.api.documents import refusals
+from server.api.downloads import BINARY, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.problems import Problem
 from server.report.feedback_words import prescription_words
+from server.report.tables import feedback_csv
 from server.schemas import Side
-from server.services import patients, prescriptions, targets
+from server.services import feedback, patients, prescriptions, targets
 from server.services.prescriptions import Written
+from server.storage.db import Database
 
 router = APIRouter(tags=["feedback"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
 Therapist = Annotated[Identity, require(Action.RUN_LIVE)]
+_CSV: dict[int | str, dict[str, Any]] = {
+    200: {"description": "The table", "content": {"text/csv": {"schema": BINARY}}}
+}
 
 
 @router.get("/patients/{patient_id}/prescriptions", response_model=list[schemas.Prescription])
@@ -78,6 +86,30 @@ def read_targets(
         }
         for source, o in offers
     ]
+
+
+@router.get("/sessions/{session_id}/feedback", response_model=schemas.Feedback)
+def read_feedback(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> dict[str, object]:
+    """Strides with and without feedback, probe blocks, level, side effects, and the retention test."""
+    gathered = _opened(db, who, session_id)
+    view = feedback.view(blobs, gathered)
+    if view is not None:
+        return view.to_json()
+    return {"reason": feedback.REASONS[gathered.reason or ""]}
+
+
+@router.get("/sessions/{session_id}/feedback.csv", response_class=Response, responses=_CSV)
+def read_feedback_table(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+    """Every stride of the live take with its cue; without feedback only the header."""
+    view = feedback.view(blobs, _opened(db, who, session_id))
+    return attachment(feedback_csv(view), f"feedback-{session_id[:8]}.csv")
+
+
+def _opened(db: Database, who: Identity, session_id: str) -> feedback.Gathered:
+    with db.write() as c:
+        found = feedback.gather(c, session_id)
+        audit.record(c, who, "feedback.opened", "session", session_id)
+    return found
 
 
 def _shown(written: Written) -> dict[str, Any]:

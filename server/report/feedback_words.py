@@ -92,11 +92,11 @@ def _shown(content: Prescription) -> str:
 
 def _level(content: Prescription) -> str:
     p = content.progression
-    start = "level from the last walk" if p.start_level is None else f"level {p.start_level}"
+    start = "as hard as the last walk allows" if p.start_level is None else f"at level {p.start_level}"
     if not p.automatic:
-        return f"begins at {start}; changed by hand"
+        return f"begins {start}; changed by hand"
     return (
-        f"begins at {start}; harder when more than {100 * p.share:g}{NBSP}% of {p.window} strides are in the "
+        f"begins {start}; harder when more than {100 * p.share:g}{NBSP}% of {p.window} strides are in the "
         f"zone, easier when more than {100 * p.away_share:g}{NBSP}% are far off"
     )
 

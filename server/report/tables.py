@@ -1,12 +1,15 @@
-"""CSV twins of what the page shows: the parameter table and the cycle curves."""
+"""CSV twins of what the pages show: parameters, cycle curves, trends, strides with feedback."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
 from core.change import Change
+from core.feedback.summary import kind_of
 from core.parameters.kinematic import POINTS
+from core.parameters.variability import unit_of
 from server.report.exports import write_csv
+from server.report.feedback import FeedbackView
 from server.report.model import ReportModel
 from server.report.trends import Trend, Visit
 
@@ -105,3 +108,21 @@ def curves_csv(report: ReportModel) -> bytes:
                     )
 
     return write_csv(header, rows())
+
+
+def feedback_csv(view: FeedbackView | None) -> bytes:
+    """One row per stride of a live take with its cue, numbers in full; without feedback only the header."""
+    header = (
+        *("n", "side", "start_s", "parameter", "value", "live_value", "unit", "kind", "shown", "why_not"),
+        *("in_zone", "level", "zone_low", "zone_high", "probe_block"),
+    )
+
+    def cells() -> Iterator[Sequence[object]]:
+        for m in () if view is None else view.split.strides:
+            c, name = m.cue, "" if view is None else view.content.parameter
+            yield (
+                *(c.n, c.side, c.start_s, name, m.value, c.value, unit_of(name), kind_of(c), c.shown),
+                *(c.why_not, m.inside, c.level, c.zone_low, c.zone_high, c.block),
+            )
+
+    return write_csv(header, cells())

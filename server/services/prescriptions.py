@@ -137,32 +137,53 @@ def cues(c: Connection, take_ids: Sequence[str]) -> list[Cue]:
 
 @dataclass(frozen=True)
 class Training:
-    """A live take with feedback."""
+    """A live take with feedback.
+
+    Parameters
+    ----------
+    recording_id : what the take became, None while it runs. content, baseline : as the take began with them.
+    """
 
     take_id: str
     session_id: str
+    recording_id: str | None
     performed_on: dt.date
     prescription_id: str
     content: Prescription
+    baseline: Baseline
 
 
 def trainings(c: Connection, patient_id: str) -> list[Training]:
     """All live takes of a patient that gave cues, the oldest first."""
     gave = select(live_event.c.seq).where(live_event.c.take_id == live_take.c.id, live_event.c.kind == "cue")
+    begun = (
+        select(live_event.c.content)
+        .where(live_event.c.take_id == live_take.c.id, live_event.c.kind == "prescription")
+        .order_by(live_event.c.seq)
+        .limit(1)
+        .scalar_subquery()
+    )
     query = (
         select(
             live_take.c.id,
             live_take.c.session_id,
+            live_take.c.recording_id,
             session.c.performed_on,
-            prescription.c.id,
-            prescription.c.content,
+            live_take.c.prescription_id,
+            begun,
         )
         .join(session, session.c.id == live_take.c.session_id)
-        .join(prescription, prescription.c.id == live_take.c.prescription_id)
-        .where(session.c.patient_id == patient_id, gave.exists())
+        .where(session.c.patient_id == patient_id, live_take.c.prescription_id.is_not(None), gave.exists())
         .order_by(session.c.performed_on, live_take.c.created_at, live_take.c.id)
     )
-    return [Training(*row[:4], Prescription.from_json(row[4])) for row in c.execute(query)]
+    return [
+        Training(
+            *row[:5],
+            Prescription.from_json(row[5]["prescription"]),
+            Baseline.from_json(row[5]["baseline"] or {}),
+        )
+        for row in c.execute(query)
+    ]
 
 
 def same_training(a: Prescription, b: Prescription) -> bool:

@@ -21,6 +21,7 @@ from server.services import comparisons, controls, histories, reviews
 from server.services.patients import Patient
 from server.services.sessions import Session
 from server.storage.blobs import BlobStore
+from web.words import day
 
 FEWEST: Final = 5
 """Strides below which a person's own mean and SD are no target (our choice)."""
@@ -137,10 +138,10 @@ def _own(walk: Walk, parameter: str, side: Side | None) -> Offer:
         n = 0 if found is None else found.n
         return Offer(
             None,
-            f"The {where} has {n} strides with this parameter on {walk.session.performed_on}; expected at "
-            f"least {FEWEST} that differ. Choose another source, or enter a target.",
+            f"The {where} has {n} strides with this parameter on {day(walk.session.performed_on)}; expected "
+            f"at least {FEWEST} that differ. Choose another source, or enter a target.",
         )
-    words = f"{where}, {found.n} strides on {walk.session.performed_on}"
+    words = f"{where}, {found.n} strides on {day(walk.session.performed_on)}"
     source: TargetSource = "own_baseline"
     return Offer(Target(source, found.mean, found.sd, words, walk.session.id))
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from core.feedback import Cue
-from server.services import live, patients, sessions
-from server.storage.tables import new_id
+from server.services import live, live_training, patients, sessions
+from server.storage.tables import live_take, new_id
 from tests.server import analysed
 from tests.server.clinic import Clinic
 
@@ -40,13 +40,22 @@ def walked(clinic: Clinic, patient: str, days: int, duration_s: float = 24.0) ->
     return session
 
 
-def take(clinic: Clinic, session: str, prescription: str | None, cues: Sequence[Cue]) -> str:
-    """A live take of a session that gave these cues and has ended; nothing of it is a recording."""
+def take(
+    clinic: Clinic,
+    session: str,
+    prescription: str,
+    cues: Sequence[Cue],
+    recording: str | None = None,
+) -> str:
+    """A live take of a session that gave these cues and has ended as this recording."""
     with clinic.db.write() as c:
         made, code = live.open_take(c, None, session)
         live.pair(c, code)
+        training = live_training.training_of(c, clinic.app.state.blobs, made)
+        assert training.prescription_id == prescription
         live.started(c, made.id, "replay", prescription)
         for cue in cues:
             live.add_event(c, None, made.id, "cue", cue.t_s, {"type": "cue", **cue.to_json()})
         live.end(c, None, made.id, "finished", count=1)
+        c.execute(live_take.update().where(live_take.c.id == made.id).values(recording_id=recording))
     return made.id

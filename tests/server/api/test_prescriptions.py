@@ -122,7 +122,7 @@ async def test_targets_are_the_persons_own_numbers_or_a_norm_at_their_speed(clin
     right, left = (_numbers(clinic, patient, "stride_time_s", side) for side in ("right", "left"))
     assert [offers["own_better_side"][k] for k in ("mean", "sd")] == [right.mean, right.sd]
     assert [offers["own_baseline"][k] for k in ("mean", "sd")] == [left.mean, left.sd]
-    assert offers["own_baseline"]["words"] == f"left side, {left.n} strides on 2026-03-02"
+    assert offers["own_baseline"]["words"] == f"left side, {left.n} strides on 2 Mar 2026"
     assert "Enter mean and SD" in offers["manual"]["reason"]
     assert "Choose the one that is" in both["own_better_side"]["reason"]
     norm = next(o for o in stance if o["source"] == "norm")

@@ -1,0 +1,43 @@
+"""A row of the tables of feedback: strides of one kind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from core.feedback.cue import Summary
+from server.report.feedback_words import NBSP, quantity
+from server.report.wording import Term, number
+
+NO_STRIDES: Final = "–"
+
+
+@dataclass(frozen=True)
+class Row:
+    """Strides of one kind; `text` is "0.52 ± 0.03", `zone` "65 %"; "–" where there is nothing."""
+
+    kind: str
+    label: str
+    part: bool
+    n: int
+    mean: float | None
+    sd: float | None
+    in_zone: float | None
+    text: str
+    zone: str
+
+
+def row(kind: str, label: str, part: bool, s: Summary, term: Term) -> Row:
+    """Put a summary into words."""
+    text = NO_STRIDES
+    if s.mean is not None:
+        spread = "" if s.sd is None else f" ± {number(s.sd, term.digits)}"
+        text = f"{number(s.mean, term.digits)}{spread}"
+    zone = NO_STRIDES if s.in_zone is None else f"{number(100.0 * s.in_zone)}{NBSP}%"
+    return Row(kind, label, part, s.n, s.mean, s.sd, s.in_zone, text, zone)
+
+
+def signed(value: float, term: Term) -> str:
+    """A difference with its sign, unless it rounds to nothing."""
+    shown = quantity(value, term)
+    return f"+{shown}" if value > 0 and float(f"{value:.{term.digits}f}") else shown

@@ -1,0 +1,125 @@
+"""What came of the feedback in a session's live take: its cues put to the strides of the analysis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from sqlalchemy import Connection
+
+from core.change.limits import Limb
+from core.feedback import AnalysedStride, Cue, split
+from core.frames import Side
+from core.parameters import cycle_curves
+from core.parameters.rows import Column
+from server.report import feedback as report
+from server.report.bundle import Bundle
+from server.report.feedback import FeedbackView
+from server.report.feedback_beside import Before, side_effects
+from server.services import analyses, patients, prescriptions, reviews, sessions
+from server.services.histories import Analysed
+from server.services.patients import Patient
+from server.services.prescriptions import Training
+from server.services.sessions import Session
+from server.storage.blobs import BlobStore
+
+REASONS: Final = {
+    "no_feedback": "No live take of this session gave feedback.",
+    "not_analysed": "The live take with feedback is not analysed yet.",
+    "other_recording": "The analysis is of another recording than the live take with feedback.",
+}
+"""Why there is no result, in sentences."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """A session with feedback: its analysis, what was trained in it, and the cues of the analysed take."""
+
+    at: Analysed
+    training: Training
+    cues: tuple[Cue, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Gathered:
+    """What the database knows of the feedback in a session.
+
+    Parameters
+    ----------
+    this : None with a `reason`. before : the visit before with the same training.
+    """
+
+    patient: Patient
+    this: Trained | None
+    before: Trained | None = None
+    reason: str | None = None
+
+
+def gather(c: Connection, session_id: str) -> Gathered:
+    """Read all that `view` needs; raises NotFound."""
+    session = sessions.get(c, session_id)
+    patient = patients.get(c, session.patient_id)
+    given = prescriptions.trainings(c, patient.id)
+    here = [t for t in given if t.session_id == session_id]
+    if not here:
+        return Gathered(patient, None, reason="no_feedback")
+    this = _trained(c, session, here)
+    if isinstance(this, str):
+        return Gathered(patient, None, reason=this)
+    before = None
+    for other in reversed(given[: given.index(here[0])]):
+        if prescriptions.same_training(other.content, this.training.content):
+            found = _trained(c, sessions.get(c, other.session_id), [other])
+            if isinstance(found, Trained):
+                before = found
+                break
+    return Gathered(patient, this, before)
+
+
+def view(blobs: BlobStore, gathered: Gathered) -> FeedbackView | None:
+    """Put cues and strides together; None where there is nothing, `reason` says why; IntegrityError."""
+    this, before = gathered.this, gathered.before
+    if this is None:
+        return None
+    content = this.training.content
+    bundle, strides = _strides(blobs, this)
+    curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
+    earlier = None
+    if before is not None:
+        there = before.at.session
+        earlier = Before(there.id, there.performed_on, split(_strides(blobs, before)[1], before.cues))
+    return report.feedback_view(
+        content,
+        split(strides, this.cues),
+        side_effects(content, this.training.baseline, strides, curves),
+        earlier,
+        _limb(gathered.patient, content.side),
+    )
+
+
+def _strides(blobs: BlobStore, trained: Trained) -> tuple[Bundle, tuple[AnalysedStride, ...]]:
+    """The strides of an analysis with its edits, each with the value of what was trained."""
+    bundle = reviews.bundle(blobs, trained.at.found, trained.at.edits)
+    columns = reviews.columns(blobs, trained.at.found, trained.at.edits)
+    nothing: Column = (None,) * len(bundle.strides.strides)
+    column = columns.get(trained.training.content.parameter, nothing)
+    return bundle, report.analysed_strides(bundle.strides, column)
+
+
+def _trained(c: Connection, session: Session, takes: Sequence[Training]) -> Trained | str:
+    """The take that the analysis of a session is of, or the reason why there is none."""
+    found = analyses.latest(c, session.id)
+    if found is None:
+        return "not_analysed"
+    take = next((t for t in takes if t.recording_id == found.recording_id), None)
+    if take is None:
+        return "not_analysed" if takes[-1].recording_id is None else "other_recording"
+    at = Analysed(session, found, reviews.edits_of(c, found.id))
+    return Trained(at, take, tuple(prescriptions.cues(c, [take.take_id])))
+
+
+def _limb(patient: Patient, side: Side | None) -> Limb | None:
+    if patient.affected_side is None or side is None:
+        return None
+    return "affected" if side == patient.affected_side else "unaffected"
