@@ -105,12 +105,12 @@ def shared(
 
 
 def send(devices: Sequence[Device], n: int = 10, take: str = "take") -> LiveTake:
-    """Batches of up to n samples in order of sending; a hole in a device's times begins a new batch."""
+    """Batches of up to n samples in order of sending; a hole that no offsets tell begins a new batch."""
     sent: list[tuple[int, int, Batch]] = []
     for d in devices:
         step = 1e6 / d.info.rate_hz
         true_us = np.rint((d.t_us - d.ahead_us) / d.drift).astype(np.int64)
-        holes = np.flatnonzero(np.diff(d.t_us) > 1.5 * step) + 1
+        holes = [] if d.jitter else (np.flatnonzero(np.diff(d.t_us) > 1.5 * step) + 1).tolist()
         for first, past in zip([0, *holes], [*holes, len(d.t_us)], strict=True):
             for a in range(first, past, n):
                 b = min(a + n, past)

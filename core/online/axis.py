@@ -15,9 +15,10 @@ import numpy as np
 
 from core.errors import Notice, SignalError
 from core.formats.live_clock import LiveClock, sample_times_us
-from core.formats.live_log import Batch, Hello
+from core.formats.live_log import Batch, Hello, SensorInfo, StreamInfo, decode_batch, encode_batch
 from core.frames import Bools, Floats, Segment
 from core.online.line import Line
+from core.online.rows import Rows
 from core.timeline import TimelineParams
 
 
@@ -84,16 +85,15 @@ class OnlineAxis:
         self.params = params or AxisParams()
         self._clock = LiveClock(hello)
         self._rates = {s.stream: s.rate_hz for s in hello.streams}
-        self._lines: dict[int, Line] = {}
-        slot = 0
-        for info in hello.streams:
-            line = Line(info, slot, self.params.timeline)
-            if line.width:
-                self._lines[info.stream] = line
-                slot += line.width
+        lines = [Line(info) for info in hello.streams]
+        self._lines = {line.stream: line for line in lines if line.ids}
         self.segments: tuple[Segment, ...] = tuple(x.segment for x in hello.sensors if x.segment is not None)
         """Worn segments in the order of the block's columns."""
         self.rate_hz = _rate(list(self._lines.values()), hello, self.params.timeline)
+        lines = list(self._lines.values())
+        self._rows = Rows(
+            [len(x.ids) for x in lines], [x.rate_hz for x in lines], self.rate_hz, self.params.timeline
+        )
         self._origin: tuple[int, int] | None = None  # stream and device time of the very first sample
         self._origin_us = 0
         self._start_s: float | None = None
@@ -126,9 +126,11 @@ class OnlineAxis:
                 )
         if self._start_s is None and not self._begin():
             return None
-        for x in self._lines.values():
+        for i, x in enumerate(self._lines.values()):
             if x.held and (offset := self._clock.offset_us(x.stream)) is not None:
-                x.place(offset - self._origin_us)
+                for t_us, samples in x.held:
+                    self._rows.append(i, t_us, offset - self._origin_us, samples, x.columns)
+                x.held = []
         return self._emit()
 
     def notices(self) -> tuple[Notice, ...]:
@@ -150,7 +152,7 @@ class OnlineAxis:
         for x in self._lines.values():
             if x not in heard:
                 self._tell("sensor_missing", x, "sent nothing so far; the take goes on without it.")
-        starts = [x.first_us() + (self._clock.offset_us(x.stream) or 0) - self._origin_us for x in heard]
+        starts = [x.first_us + (self._clock.offset_us(x.stream) or 0) - self._origin_us for x in heard]
         self._start_s = float(max(starts) * 1e-6)
         return True
 
@@ -158,30 +160,20 @@ class OnlineAxis:
         """Lay what is known on the axis."""
         assert self._start_s is not None  # noqa: S101 - set before the first call
         assert self._sent is not None  # noqa: S101
-        p = self.params
-        furthest = max(x.last_s for x in self._lines.values())
-        live = [
-            x
-            for x in self._lines.values()
-            if x.overdue_s(self._sent[1]) <= p.silent_s and furthest - x.last_s <= p.behind_s
-        ]
-        if not live:
-            return None
-        until = min(x.known_until() for x in live)
+        p, last_s = self.params, self._rows.last_s
+        furthest = last_s.max()
+        due = [x.overdue_s(self._sent[1]) <= p.silent_s for x in self._lines.values()]
+        live = np.array(due) & (last_s >= furthest - p.behind_s)
+        if not live.any():
+            live = last_s == furthest  # the senders' clocks are of no use
+        until = self._rows.until(live)
         # a little less than `on_grid`, so that rounding never gives out a point that its sample is not on
         past = int(np.floor((until - self._start_s) * self.rate_hz + 0.9 * p.timeline.on_grid)) + 1
         if past <= self._next:
             return None
-        first, count = self._next, past - self._next
-        index = np.arange(first, past)
-        axis = self._start_s + index / self.rate_hz
-        n = len(self.segments)
-        acc, gyr = np.empty((count, n, 3)), np.empty((count, n, 3))
-        valid, filled = np.empty((count, n), np.bool_), np.empty((count, n), np.bool_)
-        for x in self._lines.values():
-            x.lay(axis, self.rate_hz, acc, gyr, valid, filled)
-        self._next = past
-        return UniformBlock(first, index / self.rate_hz, acc, gyr, valid, filled)
+        first, self._next = self._next, past
+        t_s = np.arange(first, past) / self.rate_hz
+        return UniformBlock(first, t_s, *self._rows.lay(first, past, self._start_s))
 
     def _jumps(self, line: Line, first_us: int, sent_us: int) -> bool:
         """Tell whether a batch is too far ahead of its stream to be believed."""
@@ -217,3 +209,12 @@ def _rate(lines: Sequence[Line], hello: Hello, params: TimelineParams) -> float:
             sensor=slowest.ids[0],
         )
     return max(x.rate_hz for x in lines)
+
+
+def warm() -> None:
+    """Compile or load the kernels, for samples that look into a frame as decoded ones do."""
+    hello = Hello("", "cli", (StreamInfo(0, 100.0, "shared", (SensorInfo("", "pelvis"),)),))
+    axis = OnlineAxis(hello)
+    for seq in range(2):
+        at = 10_000 * seq
+        axis.push(decode_batch(encode_batch(Batch(0, seq, at, at, np.zeros((1, 1, 9), np.float32)))))

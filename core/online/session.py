@@ -16,6 +16,7 @@ from core.frames import GRAVITY, R_NEUTRAL, Protocol, Segment
 from core.fusion.orientations import Orientations
 from core.online.attempt import Wearer
 from core.online.axis import AxisParams, OnlineAxis, UniformBlock
+from core.online.axis import warm as warm_axis
 from core.online.calibrated import LiveCalibration
 from core.online.calibrated import warm as warm_calibration
 from core.online.calibrating import CalibratingParams, LiveCalibrator
@@ -146,6 +147,7 @@ def _told(frame: LiveFrame, block: UniformBlock, chain: Chain, outcomes: Sequenc
 
 def warm() -> None:
     """Compile or load every kernel of the chain, so that the first take does not wait for it."""
+    warm_axis()
     warm_calibration()
     for worn in (PRESETS["lower_body7"], PRESETS["feet_pelvis3"], PRESETS["feet2"]):
         chain = Chain(_standing(worn), worn)
