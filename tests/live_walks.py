@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from unittest.mock import patch
 
 import numpy as np
 
+from core.events.result import GaitEvent
 from core.formats.live_log import Batch, Hello, SensorInfo, StreamInfo
-from core.frames import Bools, Floats, Segment
-from core.online import LiveFrame, Online
+from core.frames import Floats, Side
+from core.online import LiveFrame, LiveStride, Online
+from core.online.chain import Chain
+from core.online.history import History
 from core.recording import UniformRecording
 
 
@@ -56,6 +61,53 @@ def trails(frames: Sequence[LiveFrame]) -> tuple[Floats, dict[str, Floats]]:
     return t, {name: values[:, i] for i, name in enumerate(told[0].names)}
 
 
-def only_valid(recording: UniformRecording, segment: Segment) -> Bools:
-    """When a sensor was there."""
-    return recording.sensors[segment].valid
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A live take, and all samples of its chain as they were remembered: name → (n, …) from `first` on."""
+
+    online: Online
+    frames: list[LiveFrame]
+    rows: dict[str, Floats]
+
+    @property
+    def chain(self) -> Chain:
+        chain = self.online.chain
+        assert chain is not None
+        return chain
+
+    @property
+    def events(self) -> list[GaitEvent]:
+        """In order of time."""
+        found = [e for f in self.frames for e in f.events]
+        return sorted(found, key=lambda e: (e.time_s, e.side, e.kind))
+
+    @property
+    def strides(self) -> list[LiveStride]:
+        """As told, most of them twice."""
+        return [s for f in self.frames for s in f.strides]
+
+    @property
+    def angles_deg(self) -> dict[str, Floats]:
+        """Angles over standing by name, (axis,) degrees, 0 before the chain begins."""
+        before = np.zeros((self.chain.first, len(self.chain.names)))
+        whole = np.degrees(np.concatenate((before, self.rows["angles"])))
+        return {name: whole[:, i] for i, name in enumerate(self.chain.names)}
+
+    def ankle(self, side: Side) -> Floats:
+        """Path (axis, 3) of an ankle, NaN before the chain begins."""
+        path = self.rows["feet_p"][:, list(self.chain.contact).index(side)]
+        return np.concatenate((np.full((self.chain.first, 3), np.nan), path))
+
+
+def recorded(recording: UniformRecording, sizes: int | Sequence[int] = 10) -> Run:
+    """`live` with all that the chain measures on."""
+    rows: list[dict[str, Floats]] = []
+    append = History.append
+
+    def kept(history: History, columns: Mapping[str, Floats]) -> None:
+        rows.append({name: x.copy() for name, x in columns.items()})
+        append(history, columns)
+
+    with patch.object(History, "append", kept):
+        online, frames = live(recording, sizes)
+    return Run(online, frames, {name: np.concatenate([r[name] for r in rows]) for name in rows[0]})

@@ -18,11 +18,10 @@ from core.frames import FOOT, Segment
 from core.fusion.orientations import Orientations
 from core.measure import Measured, Tracks, measure
 from core.online import LiveFrame, LiveStride, Online
-from core.online.chain import COURSES, Chain
+from core.online.chain import COURSES
 from core.online.frame import NOT_YET
-from core.online.history import History
 from core.recording import UniformRecording
-from tests.live_walks import batches, hello_of, live
+from tests.live_walks import Run, batches, hello_of, live, recorded
 from tests.walks import cut, lost, neura_walk, only, simulated
 
 FILTER_DELAY_S = {"neura_walk": 0.032, "simulated": 0.045}
@@ -183,58 +182,40 @@ def test_an_event_is_told_in_the_push_that_brings_its_sample_and_soon() -> None:
         assert np.percentile(delays, 95 if name == "simulated" else 100) <= FILTER_DELAY_S[name]
 
 
-class Recorder:
-    """All samples of a chain, taken where they are remembered."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.rows: list[dict[str, np.ndarray]] = []
-        append = History.append
-
-        def kept(history: History, columns: dict[str, np.ndarray]) -> None:
-            self.rows.append({name: x.copy() for name, x in columns.items()})
-            append(history, columns)
-
-        monkeypatch.setattr(History, "append", kept)
-
-    def tracks(self, chain: Chain, events: Sequence[GaitEvent]) -> Tracks:
-        """What `measure` wants of the same run."""
-        x = {name: np.concatenate([r[name] for r in self.rows]) for name in self.rows[0]}
-        n = len(x["angles"])
-        t_s = np.arange(chain.first, chain.first + n) / chain.rate_hz
-        courses = [s for s in COURSES if s in chain.segments]
-        sides = tuple(chain.contact)
-        take = Orientations(
-            t_s,
-            chain.rate_hz,
-            {s: x["course"][:, i] for i, s in enumerate(courses)},
-            {s: x["course_valid"][:, i] for i, s in enumerate(courses)},
-            "",
-        )
-        feet = FootTracks(
-            t_s=t_s,
-            rate_hz=chain.rate_hz,
-            p={s: x["feet_p"][:, i] for i, s in enumerate(sides)},
-            q={s: x["feet_q"][:, i] for i, s in enumerate(sides)},
-            still={s: x["feet_still"][:, i] for i, s in enumerate(sides)},
-            valid={s: x["feet_valid"][:, i] for i, s in enumerate(sides)},
-            linked=chain.estimator.linked,
-            source="",
-            body=chain.body,
-        )
-        return Tracks(
-            t_s=t_s,
-            rate_hz=chain.rate_hz,
-            events=GaitEvents(tuple(sorted(events, key=lambda e: (e.time_s, e.side, e.kind)))),
-            q={FOOT[s]: take.q[FOOT[s]] for s in sides},
-            valid={FOOT[s]: take.valid[FOOT[s]] for s in sides},
-            feet=feet,
-            angles=JointAngles(
-                t_s,
-                {name: x["angles"][:, i] for i, name in enumerate(chain.names)},
-                {},
-                headings=headings(take),
-            ),
-        )
+def tracks(run: Run) -> Tracks:
+    """What `measure` wants of the whole take."""
+    chain, x = run.chain, run.rows
+    t_s = np.arange(chain.first, chain.first + len(x["angles"])) / chain.rate_hz
+    courses = [s for s in COURSES if s in chain.segments]
+    sides = tuple(chain.contact)
+    take = Orientations(
+        t_s,
+        chain.rate_hz,
+        {s: x["course"][:, i] for i, s in enumerate(courses)},
+        {s: x["course_valid"][:, i].astype(bool) for i, s in enumerate(courses)},
+        "",
+    )
+    feet = FootTracks(
+        t_s=t_s,
+        rate_hz=chain.rate_hz,
+        p={s: x["feet_p"][:, i] for i, s in enumerate(sides)},
+        q={s: x["feet_q"][:, i] for i, s in enumerate(sides)},
+        still={s: x["feet_still"][:, i].astype(bool) for i, s in enumerate(sides)},
+        valid={s: x["feet_valid"][:, i].astype(bool) for i, s in enumerate(sides)},
+        linked=chain.estimator.linked,
+        source="",
+        body=chain.body,
+    )
+    angles = {name: x["angles"][:, i] for i, name in enumerate(chain.names)}
+    return Tracks(
+        t_s=t_s,
+        rate_hz=chain.rate_hz,
+        events=GaitEvents(tuple(run.events)),
+        q={FOOT[s]: take.q[FOOT[s]] for s in sides},
+        valid={FOOT[s]: take.valid[FOOT[s]] for s in sides},
+        feet=feet,
+        angles=JointAngles(t_s, angles, {}, headings=headings(take)),
+    )
 
 
 def compared(strides: Sequence[LiveStride], whole: Measured) -> int:
@@ -263,25 +244,19 @@ def compared(strides: Sequence[LiveStride], whole: Measured) -> int:
 
 
 @pytest.mark.parametrize("name", [n for n in SETS if n != "without feet"])
-def test_a_live_stride_has_the_figures_of_the_whole_take(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = Recorder(monkeypatch)
-    online, frames = live(worn(name))
-    assert online.chain is not None
-    said = told(frames)
-    whole = measure(kept.tracks(online.chain, said.events))
-    complete = [s for s in said.strides if s.complete]
+def test_a_live_stride_has_the_figures_of_the_whole_take(name: str) -> None:
+    run = recorded(worn(name))
+    whole = measure(tracks(run))
+    complete = [s for s in run.strides if s.complete]
     # the take ends in mid-stride: the last of each foot waits for its distances
-    assert len({s.n for s in said.strides}) == len(whole.strides.strides) <= len(complete) + 2
-    assert compared(said.strides, whole) > 14 * len(complete)
+    assert len({s.n for s in run.strides}) == len(whole.strides.strides) <= len(complete) + 2
+    assert compared(run.strides, whole) > 14 * len(complete)
 
 
 @pytest.mark.parametrize("person", ["hemiparetic", "parkinson", "step_asym"])
-def test_it_has_them_of_other_gaits_too(person: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = Recorder(monkeypatch)
-    online, frames = live(simulated(person, 2)[0])
-    assert online.chain is not None
-    said = told(frames)
-    assert compared(said.strides, measure(kept.tracks(online.chain, said.events))) > 500
+def test_it_has_them_of_other_gaits_too(person: str) -> None:
+    run = recorded(simulated(person, 2)[0])
+    assert compared(run.strides, measure(tracks(run))) > 500
 
 
 def test_a_stride_is_told_at_once_and_again_with_its_distances() -> None:
