@@ -5,118 +5,35 @@ from __future__ import annotations
 import hashlib
 import re
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
-import httpx
 import numpy as np
-import pytest
-from playwright.sync_api import Browser, FilePayload, Page, expect
+from playwright.sync_api import Browser, Page, expect
 
 from core.formats import SourceFile, read_recording
 from core.formats.live_log import decode_batch, parse_finish, peek, scan
 from core.formats.live_log import payload as payload_of
-from tests.browser import filling
+from tests.browser.capturing import (
+    Clinic,
+    choose,
+    clinic,
+    network,
+    pair,
+    place,
+    start,
+    tablet,
+    until,
+    walk_files,
+)
 from tests.browser.conftest import RunningServer
 from tests.browser.design import layout_faults, text_faults
 from tests.browser.network import Network
 from tests.browser.test_upload import SEGMENTS
-from tests.data import data_folder
+
+__all__ = ["clinic", "network"]
 
 SIZES = ((810, 1080), (1280, 800), (1024, 768), (360, 740))
 RECORDED_S = 25.03
-
-
-class Clinic:
-    """A session with a live take, by the interface the therapist's page uses."""
-
-    def __init__(self, client: httpx.Client, session: str) -> None:
-        self.client = client
-        self.session = session
-        self.code: str = self.post("/live")["code"]
-
-    def post(self, path: str, **body: Any) -> Any:
-        return filling.add(self.client, f"/sessions/{self.session}{path}", **body)
-
-    def take(self) -> Any:
-        answer = self.client.get(f"/api/v1/sessions/{self.session}/live")
-        return answer.raise_for_status().json()
-
-    def log(self, server: RunningServer) -> bytes:
-        """The recording's file as it is stored."""
-        found = self.client.get(f"/api/v1/sessions/{self.session}/recording").raise_for_status().json()
-        (file,) = found["files"]
-        (path,) = (p for p in (server.folder / "blobs").rglob(f"*{file['sha256']}") if p.is_file())
-        return path.read_bytes()
-
-
-@pytest.fixture
-def clinic(running: RunningServer, request: pytest.FixtureRequest) -> Iterator[Clinic]:
-    with running.client() as client:
-        code = f"CAP-{hashlib.sha256(request.node.name.encode()).hexdigest()[:8]}"
-        patient = filling.add(client, "/patients", code=code, height_m=1.75)["id"]
-        made = Clinic(client, filling.add_session(client, patient, "Walk, 10 m overground"))
-        yield made
-        if made.take()["state"] in {"pairing", "open", "streaming"}:
-            made.post("/live/close")
-
-
-@pytest.fixture
-def network(running: RunningServer) -> Iterator[Network]:
-    network = Network(running.url)
-    yield network
-    network.close()
-
-
-@contextmanager
-def tablet(browser: Browser, url: str, **more: Any) -> Iterator[Page]:
-    """The capture page on a new tablet; a script error or a refused style fails the test."""
-    context = browser.new_context(
-        base_url=url, viewport={"width": 810, "height": 1080}, accept_downloads=True, **more
-    )
-    page = context.new_page()
-    said: list[str] = []
-    page.on("pageerror", lambda e: said.append(str(e)))
-    page.on("console", lambda m: said.append(m.text) if "Content Security" in m.text else None)
-    page.goto("/capture")
-    yield page
-    context.close()
-    assert not said, said
-
-
-def pair(page: Page, code: str) -> None:
-    page.get_by_label("Pairing code").press_sequentially(code.lower())
-    expect(page.locator("[data-paired]")).to_be_visible()
-    expect(page.locator("[data-paired]")).to_contain_text("Paired with CAP-")
-
-
-def walk_files() -> list[tuple[str, bytes]]:
-    folder = data_folder("neura_walk", "rawimu")
-    return [(p.name, p.read_bytes()) for p in sorted(folder.glob("*.txt"))]
-
-
-def choose(page: Page, files: list[tuple[str, bytes]]) -> None:
-    payloads: list[FilePayload] = [{"name": n, "mimeType": "text/plain", "buffer": c} for n, c in files]
-    page.locator("[data-files]").set_input_files(payloads)
-
-
-def place(page: Page, segments: dict[str, str]) -> None:
-    for device, segment in segments.items():
-        page.locator(f"li[data-sensor='{device}'] [data-place]").click()
-        page.locator(f"dialog[open] button[value={segment}]").click()
-
-
-def start(page: Page) -> None:
-    page.locator("[data-go]").click()
-    expect(page.locator("[data-link]")).to_have_text("Connected", timeout=10_000)
-
-
-def until(page: Page, condition: str, timeout_s: float = 20) -> None:
-    page.wait_for_function(
-        f"() => {{ const page = document.querySelector('capture-page'); return {condition}; }}",
-        timeout=timeout_s * 1000,
-    )
 
 
 def expected_samples() -> dict[str, np.ndarray[Any, np.dtype[np.float32]]]:
@@ -149,7 +66,7 @@ def test_a_walk_played_on_the_tablet_is_the_recording_though_network_and_page_we
         expect(page.locator("[data-link]")).to_contain_text(re.compile(r"Keeping \d\.\d s here"))
         page.wait_for_timeout(3500)
         # recording goes on without the network
-        until(page, "page.outbox.made - page.outbox.acked > 80", 0.1)
+        until(page, "page.outbox.made - page.outbox.acked > 80", 5)
         network.mend()
         until(page, "page.outbox.made - page.outbox.acked < 10")
 

@@ -20,7 +20,7 @@ export class Link {
     this.offlineSince = performance.now();
     this.wanted = true;
     this.window = 0;
-    this.sent = 0;
+    this.sent = this.floor = 0;
     outbox.onstored = () => this.pump();
     this.awake = () => this.state === "waiting" && this.connect();
     addEventListener("online", this.awake);
@@ -51,11 +51,13 @@ export class Link {
   receive(message) {
     this.heard = performance.now();
     if (message.type === "welcome") {
+      if (message.next_seq < this.outbox.acked) return this.lose(message.next_seq);
       this.tries = 0;
       this.said = null;
       this.window = message.max_unacked;
-      this.sent = message.next_seq;
       this.outbox.resumeAt(message.next_seq);
+      // the last one again: the answer is how far the server's disk is, which this tablet may not have heard
+      this.sent = this.floor = Math.max(this.outbox.acked, message.next_seq - 1);
       this.set("open");
       if (this.battery) this.tellBattery(this.battery);
       this.pump();
@@ -85,7 +87,7 @@ export class Link {
     try {
       for (;;) {
         const socket = this.socket;
-        const to = Math.min(this.outbox.stored, this.outbox.acked + this.window, this.sent + READ_AT_ONCE);
+        const to = Math.min(this.outbox.stored, Math.max(this.floor, this.outbox.acked) + this.window, this.sent + READ_AT_ONCE);
         if (this.state !== "open" || this.sent >= to) break;
         const batches = await this.outbox.read(this.sent, to);
         if (socket !== this.socket || this.state !== "open") continue;
@@ -107,6 +109,11 @@ export class Link {
     this.socket.send(JSON.stringify({ type: "finish", count: this.outbox.made, sha256: this.outbox.sha256() }));
   }
 
+  lose(next) {
+    this.problem = { code: "lost", detail: `It had acknowledged ${this.outbox.acked} batches and holds ${next}.` };
+    this.end("refused");
+  }
+
   // The server counts fewer batches than this tablet: give it the rest, if it is still here.
   resend({ code, detail, next_seq: next }) {
     if (!(next >= this.outbox.acked)) {
@@ -114,7 +121,7 @@ export class Link {
       this.end("refused");
       return;
     }
-    this.sent = next;
+    this.sent = this.floor = next;
     this.finishSent = false;
     this.pump();
   }

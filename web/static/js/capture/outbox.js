@@ -30,7 +30,10 @@ export class Outbox {
   static async unfinished() {
     const db = await open();
     const [record] = await done(db.transaction("takes").objectStore("takes").getAll(null, 1));
-    return record ? new Outbox(db, record) : (db.close(), null);
+    if (!record) return db.close(), null;
+    // what was acknowledged is gone, and only then; the record was last written with a batch
+    const [first] = await done(db.transaction("batches").objectStore("batches").getAllKeys(null, 1));
+    return new Outbox(db, { ...record, acked: first ?? record.seq });
   }
 
   // paired: what the server answered to the code, {take, token, socket, session_title, patient_code}.

@@ -25,6 +25,7 @@ export function linkProblem({ code, detail }, heldS) {
   switch (code) {
     case "token": return { title: "The pairing is over", detail: `Ask for a new code on the session's live page and enter it here; recording goes on from where it stopped.${left}` };
     case "ended": return { title: "The recording was ended on the clinic's screen", detail: left ? `${left.trim()} Save them as a file and upload it to the session, or delete them.` : "Everything from this tablet is on the server." };
+    case "lost": return { title: "The server has lost part of this recording", detail: `${detail} Save what is left here and tell the person who runs the server.` };
     case "replaced": return { title: "Another tablet or page took over this recording", detail: `Go on there.${left}` };
     case "finish_mismatch": return { title: "Tablet and server do not hold the same", detail: `${detail} Save what is left here and tell the person who runs the server.` };
     default: return { title: "The server refused the recording", detail: `${detail || "It gave no reason."}${left}` };

@@ -1,0 +1,108 @@
+"""A session with an open live take, and a tablet with the capture page: what the tests of that page share."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import httpx
+import pytest
+from playwright.sync_api import Browser, FilePayload, Page, expect
+
+from tests.browser import filling
+from tests.browser.conftest import RunningServer
+from tests.browser.network import Network
+from tests.data import data_folder
+
+
+class Clinic:
+    """A session with a live take, by the interface the therapist's page uses."""
+
+    def __init__(self, client: httpx.Client, session: str) -> None:
+        self.client = client
+        self.session = session
+        self.code: str = self.post("/live")["code"]
+
+    def post(self, path: str, **body: Any) -> Any:
+        return filling.add(self.client, f"/sessions/{self.session}{path}", **body)
+
+    def take(self) -> Any:
+        answer = self.client.get(f"/api/v1/sessions/{self.session}/live")
+        return answer.raise_for_status().json()
+
+    def log(self, server: RunningServer) -> bytes:
+        """The recording's file as it is stored."""
+        found = self.client.get(f"/api/v1/sessions/{self.session}/recording").raise_for_status().json()
+        (file,) = found["files"]
+        (path,) = (p for p in (server.folder / "blobs").rglob(f"*{file['sha256']}") if p.is_file())
+        return path.read_bytes()
+
+
+@pytest.fixture
+def clinic(running: RunningServer, request: pytest.FixtureRequest) -> Iterator[Clinic]:
+    with running.client() as client:
+        code = f"CAP-{hashlib.sha256(request.node.name.encode()).hexdigest()[:8]}"
+        patient = filling.add(client, "/patients", code=code, height_m=1.75)["id"]
+        made = Clinic(client, filling.add_session(client, patient, "Walk, 10 m overground"))
+        yield made
+        if made.take()["state"] in {"pairing", "open", "streaming"}:
+            made.post("/live/close")
+
+
+@pytest.fixture
+def network(running: RunningServer) -> Iterator[Network]:
+    network = Network(running.url)
+    yield network
+    network.close()
+
+
+@contextmanager
+def tablet(browser: Browser, url: str, **more: Any) -> Iterator[Page]:
+    """The capture page on a new tablet; a script error or a refused style fails the test."""
+    context = browser.new_context(
+        base_url=url, viewport={"width": 810, "height": 1080}, accept_downloads=True, **more
+    )
+    page = context.new_page()
+    said: list[str] = []
+    page.on("pageerror", lambda e: said.append(str(e)))
+    page.on("console", lambda m: said.append(m.text) if "Content Security" in m.text else None)
+    page.goto("/capture")
+    yield page
+    context.close()
+    assert not said, said
+
+
+def pair(page: Page, code: str) -> None:
+    page.get_by_label("Pairing code").press_sequentially(code.lower())
+    expect(page.locator("[data-paired]")).to_be_visible()
+    expect(page.locator("[data-paired]")).to_contain_text("Paired with CAP-")
+
+
+def walk_files() -> list[tuple[str, bytes]]:
+    folder = data_folder("neura_walk", "rawimu")
+    return [(p.name, p.read_bytes()) for p in sorted(folder.glob("*.txt"))]
+
+
+def choose(page: Page, files: list[tuple[str, bytes]]) -> None:
+    payloads: list[FilePayload] = [{"name": n, "mimeType": "text/plain", "buffer": c} for n, c in files]
+    page.locator("[data-files]").set_input_files(payloads)
+
+
+def place(page: Page, segments: dict[str, str]) -> None:
+    for device, segment in segments.items():
+        page.locator(f"li[data-sensor='{device}'] [data-place]").click()
+        page.locator(f"dialog[open] button[value={segment}]").click()
+
+
+def start(page: Page) -> None:
+    page.locator("[data-go]").click()
+    expect(page.locator("[data-link]")).to_have_text("Connected", timeout=10_000)
+
+
+def until(page: Page, condition: str, timeout_s: float = 20) -> None:
+    page.wait_for_function(
+        f"() => {{ const page = document.querySelector('capture-page'); return {condition}; }}",
+        timeout=timeout_s * 1000,
+    )
