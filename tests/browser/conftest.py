@@ -184,7 +184,7 @@ def opened(flat: Browser, running: RunningServer, cookies: list[dict[str, str]])
         if signed_in:
             context.add_cookies(cookies)  # type: ignore[arg-type]
         page = context.new_page()
-        page.on("pageerror", lambda e: said.append(f"{path}: {e}") if _ours(str(e)) else None)
+        page.on("pageerror", lambda e: said.append(f"{path}: {e}") if is_ours(str(e)) else None)
         page.on("console", lambda m: said.append(f"{path}: {m.text}") if _matters(m.type, m.text) else None)
         page.goto(path)
         return page
@@ -197,10 +197,10 @@ def opened(flat: Browser, running: RunningServer, cookies: list[dict[str, str]])
 
 def _matters(kind: str, text: str) -> bool:
     # a 4xx that a test provokes is printed by the browser as an error; the page itself says it in words
-    return kind == "error" and "Failed to load resource" not in text and _ours(text)
+    return kind == "error" and "Failed to load resource" not in text and is_ours(text)
 
 
-def _ours(text: str) -> bool:
+def is_ours(text: str) -> bool:
     # viser's client tries `new Function` once; its own document's policy refuses that, and it goes on without
     return "unsafe-eval" not in text
 

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser import feed, filling
-from tests.browser.conftest import RunningServer
+from tests.browser.conftest import RunningServer, is_ours
 from tests.browser.design import layout_faults, text_faults
 from tests.browser.feed import Told
 
@@ -88,7 +88,7 @@ def told(flat: Browser, running: RunningServer, cookies: list[dict[str, str]]) -
         context.add_cookies(cookies)  # type: ignore[arg-type]
         context.add_init_script(f"({HEARD})()")
         page = context.new_page()
-        page.on("pageerror", lambda e: errors.append(str(e)))
+        page.on("pageerror", lambda e: errors.append(str(e)) if is_ours(str(e)) else None)
         this = Told.of(page)
         page.goto(path)
         page.wait_for_function("() => true")
