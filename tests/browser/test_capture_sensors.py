@@ -1,4 +1,4 @@
-"""The tablet's own sensors in real Chromium: Bluetooth by a made radio (no DOT is here), made motion events."""
+"""The own sensors of a tablet in real Chromium: Bluetooth by a made radio (no DOT is here), made motions."""
 
 from __future__ import annotations
 

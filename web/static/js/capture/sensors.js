@@ -28,10 +28,10 @@ export class SensorList {
   draw(rows, { fixed }) {
     while (this.list.children.length > rows.length) this.list.lastElementChild.remove();
     while (this.list.children.length < rows.length) this.list.append(this.template.cloneNode(true));
-    rows.forEach(({ sensor, health }, i) => this.row(this.list.children[i], i + 1, sensor, health, fixed));
+    rows.forEach((row, i) => this.row(this.list.children[i], row, fixed));
   }
 
-  row(li, number, sensor, health, fixed) {
+  row(li, { number, sensor, health }, fixed) {
     const part = (name) => li.querySelector(`[data-${name}]`);
     const side = sideOf(sensor.segment);
     li.className = sensor.segment ? health.kind : "unused";

@@ -109,10 +109,10 @@ export class View {
     if (state !== "prepare" && state !== "running") return null;
     if (link?.kind === "bad" && linkSays) return { title: "The server cannot take data now", detail: `${linkSays.detail} It is kept here and sent later.` };
     if (source?.kind === "device_motion" && !source.axes) return null;
-    const at = rows.findIndex(({ sensor, health }) => sensor.segment && health.kind === "bad");
-    if (at < 0) return null;
-    const { sensor, health } = rows[at];
-    return words.sensorProblem(at + 1, this.list.names[sensor.segment].toLowerCase(), sensor, health, state === "running");
+    const bad = rows.find(({ sensor, health }) => sensor.segment && health.kind === "bad");
+    if (!bad) return null;
+    const { number, sensor, health } = bad;
+    return words.sensorProblem(number, this.list.names[sensor.segment].toLowerCase(), sensor, health, state === "running");
   }
 
   note(problem) {

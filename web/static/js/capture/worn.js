@@ -62,7 +62,7 @@ export class Worn {
   }
 
   rows() {
-    return this.sensors.map((sensor) => ({ sensor, health: this.source.health(sensor) }));
+    return this.sensors.map((sensor, i) => ({ number: i + 1, sensor, health: this.source.health(sensor) }));
   }
 
   // Those that are placed and send.

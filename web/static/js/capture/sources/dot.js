@@ -59,6 +59,7 @@ export class Dot {
   async connect(sensor) {
     const server = await sensor.device.gatt.connect();
     const configuration = await server.getPrimaryService(SERVICES.configuration);
+    sensor.fresh = true;
     sensor.id = address(await (await configuration.getCharacteristic(INFO)).readValue());
     const { tag, rateHz } = settings(await (await configuration.getCharacteristic(DEVICE)).readValue());
     Object.assign(sensor, { label: tag || sensor.device.name, rateHz: rateHz || 60 });
@@ -94,7 +95,8 @@ export class Dot {
     const device = sensor.clock.read(sample.tUs);
     const here = nowUs();
     // The sensor's ticks, moved by a constant to this tablet's time so that they go on after a reload or reconnection.
-    if (sensor.shiftUs === null || Math.abs(device + sensor.shiftUs - here) > SAME_CLOCK_US) sensor.shiftUs = here - device;
+    if (sensor.shiftUs === null || (sensor.fresh && Math.abs(device + sensor.shiftUs - here) > SAME_CLOCK_US)) sensor.shiftUs = here - device;
+    sensor.fresh = false;
     const tUs = Math.max(device + sensor.shiftUs, (sensor.lastUs ?? 0) + 1);
     if (!this.onBatch || sensor.stream === undefined) return;
     sensor.lastUs = tUs;
