@@ -31,7 +31,8 @@ LAST: Final = 20
 SPREAD: Final = 2.0
 """Where no source has a limit, more than so many sd of the first strides is watched (our choice)."""
 
-GPS_SOURCE: Final = "set in the prescription; 1.6° is the MCID of the GPS, Baker et al. 2012, children"
+GPS_MCID: Final = (1.6, "MCID of the GPS, Baker et al. 2012, children")
+"""Limit in degrees and source; the nearest there is: no source has one of the sagittal profile."""
 
 
 class GuardWatch:
@@ -83,7 +84,8 @@ class GuardWatch:
         rise = last - first
         if limit is None:
             return SideEffect(rise, None, None, False, "no_limit")
-        return SideEffect(rise, limit, GPS_SOURCE, rise > limit, None)
+        source = GPS_MCID[1] if limit == GPS_MCID[0] else "set in the prescription"
+        return SideEffect(rise, limit, source, rise > limit, None)
 
 
 class _Ends(Generic[T]):

@@ -16,7 +16,7 @@ from server.report.columns import plain
 from server.report.feedback_beside import Before, Effect, Retention, effects, retention
 from server.report.feedback_chart import feedback_svg
 from server.report.feedback_rows import Row, row, signed
-from server.report.feedback_words import prescription_words, quantity, target_words, title
+from server.report.feedback_words import digits_of, prescription_words, quantity, target_words, title
 from server.report.wording import TERMS, Term, number
 
 KINDS: Final[tuple[tuple[Kind, str, bool], ...]] = (
@@ -122,7 +122,7 @@ def feedback_view(
     """
     term = TERMS[content.parameter]
     rows = tuple(
-        row(kind, label, part, split.kinds.get(kind, Summary()), term)
+        row(kind, label, part, split.kinds.get(kind, Summary()), digits_of(content))
         for kind, label, part in KINDS
         if kind in {"with", "without"} or kind in split.kinds
     )
@@ -136,8 +136,8 @@ def feedback_view(
             Probe(
                 p.number,
                 p.start_s,
-                row("with", "before", False, p.before, term),
-                row("probe", "probe", False, p.probe, term),
+                row("with", "before", False, p.before, digits_of(content)),
+                row("probe", "probe", False, p.probe, digits_of(content)),
             )
             for p in split.probes
         ),

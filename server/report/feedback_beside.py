@@ -15,7 +15,7 @@ from core.feedback import AnalysedStride, Baseline, FeedbackSplit, GuardState, P
 from core.feedback.guard import FIRST, GuardWatch
 from core.parameters.result import CycleCurves
 from server.report.feedback_rows import NO_STRIDES, Row, row, signed
-from server.report.feedback_words import quantity
+from server.report.feedback_words import digits_of, quantity
 from server.report.wording import Term
 
 EFFECT_REASONS: Final = {
@@ -133,8 +133,8 @@ def retention(
     return Retention(
         before.session_id,
         before.performed_on,
-        row("end", "End of the last training", False, end, term),
-        row("retention", "Start of this visit, without feedback", False, now, term),
+        row("end", "End of the last training", False, end, digits_of(content)),
+        row("retention", "Start of this visit, without feedback", False, now, digits_of(content)),
         difference,
         None if limit is None else limit.value,
         None if limit is None else limit.source,

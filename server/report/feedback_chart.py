@@ -77,8 +77,8 @@ def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str
             f'<svg x="{_f(x(i) / 10)}%" y="{_f(y(m.value) * inner / 1000)}" overflow="visible" width="1" '
             f'height="1"><circle class="{css}" r="2.6"/></svg>'
         )
-    for i, j, m in _runs(strides, lambda m: m.cue.level):
-        if x(j + 0.5) - x(i - 0.5) >= NARROW:
+    for i, j, m in _runs(strides, lambda m: (_opens(m), m.cue.level)):
+        if not _opens(m) and x(j + 0.5) - x(i - 0.5) >= NARROW:
             word = f"level {m.cue.level}"
             fixed.append(_text(f"{_f(x(i - 0.5) / 10)}%", inner + 28, word, "words", "start"))
     title = f"{term.label} of every stride over the zone of its level; the table has the numbers"
@@ -88,6 +88,11 @@ def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str
         '<svg viewBox="0 0 1000 1000" preserveAspectRatio="none" width="100%" height="100%" '
         f'overflow="hidden">{"".join(stretched)}</svg>{"".join(fixed)}</svg></div>'
     )
+
+
+def _opens(m: MatchedStride) -> bool:
+    """The stride is of the block a visit begins with, which may have no level yet."""
+    return m.cue.why_not in {"baseline", "retention"}
 
 
 def _block(m: MatchedStride) -> str:

@@ -27,12 +27,12 @@ class Row:
     zone: str
 
 
-def row(kind: str, label: str, part: bool, s: Summary, term: Term) -> Row:
+def row(kind: str, label: str, part: bool, s: Summary, digits: int) -> Row:
     """Put a summary into words."""
     text = NO_STRIDES
     if s.mean is not None:
-        spread = "" if s.sd is None else f" ± {number(s.sd, term.digits)}"
-        text = f"{number(s.mean, term.digits)}{spread}"
+        spread = "" if s.sd is None else f" ± {number(s.sd, digits)}"
+        text = f"{number(s.mean, digits)}{spread}"
     zone = NO_STRIDES if s.in_zone is None else f"{number(100.0 * s.in_zone)}{NBSP}%"
     return Row(kind, label, part, s.n, s.mean, s.sd, s.in_zone, text, zone)
 

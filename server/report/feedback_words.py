@@ -39,13 +39,18 @@ def quantity(value: float, term: Term, digits: int | None = None) -> str:
     return f"{number(value, term.digits if digits is None else digits)}{unit}"
 
 
+def digits_of(content: Prescription) -> int:
+    """Decimals of values beside the target: one more than the table has where its sd would hardly show."""
+    digits, sd = TERMS[content.parameter].digits, content.target.sd
+    return digits + 1 if sd is not None and sd < 5.0 * 10.0**-digits else digits
+
+
 def target_words(content: Prescription) -> str:
     """ "0.62 ± 0.05 m, adults …"."""
     t, term = content.target, TERMS[content.parameter]
     if t.mean is None or t.sd is None:
         return SOURCE_WORDS[t.source]
-    # an sd is small beside its mean: a digit more than the table has
-    digits = term.digits + 1 if t.sd < 10.0**-term.digits * 5 else term.digits
+    digits = digits_of(content)
     who = "entered" if t.source == "manual" else t.words or SOURCE_WORDS[t.source]
     return f"{number(t.mean, digits)} ± {quantity(t.sd, term, digits)}, {who}"
 

@@ -1,0 +1,84 @@
+"""What feedback did is on the session page and on paper."""
+
+from __future__ import annotations
+
+from contextlib import closing
+
+import pytest
+from playwright.sync_api import expect
+
+from core.feedback import FeedbackEngine
+from server.services import analyses, live, live_training, prescriptions, reviews
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from server.storage.tables import live_take
+from tests.browser import filling
+from tests.browser.conftest import Opener, RunningServer
+from tests.feedback import Walked
+
+GIVEN = {
+    "parameter": "step_length_m",
+    "side": "left",
+    "target": {"source": "manual", "mean": 0.68, "sd": 0.02},
+    "schedule": {"kind": "every", "probe_every": 6, "probe_strides": 3},
+}
+
+
+@pytest.fixture(scope="module")
+def trained(running: RunningServer) -> str:
+    """A session whose strides got the cues that the engine gives."""
+    files, sensors = filling.simulated_files()
+    with running.client() as client:
+        patient = filling.add(client, "/patients", code="P-0120", height_m=1.76, affected_side="left")["id"]
+        session = str(filling.add_session(client, patient, "Training 1"))
+        filling.upload(client, session, files)
+        assert filling.analyse(client, session, sensors)["state"] == "done"
+        filling.add(client, f"/patients/{patient}/prescriptions", **GIVEN)
+    blobs = BlobStore(running.folder / "blobs")
+    with closing(Database(running.folder / "sagittal.db")) as db, db.write() as c:
+        found = analyses.shown(c, session)
+        edits = reviews.edits_of(c, found.id)
+        take, code = live.open_take(c, None, session)
+        live.pair(c, code)
+        training = live_training.training_of(c, blobs, take)
+        live.started(c, take.id, "replay", training.prescription_id)
+        given = prescriptions.for_take(c, blobs, session)
+        assert given is not None
+        engine = FeedbackEngine(*given)
+        lengths = reviews.columns(blobs, found, edits)["step_length_m"]
+        strides = reviews.bundle(blobs, found, edits).strides.strides
+        for n, (s, length) in enumerate(zip(strides, lengths, strict=True)):
+            values = {"step_length_m": length}
+            counted = s.excluded_reason is None
+            cue = engine.push(Walked(n, s.side, s.start_s, s.end_s, s.end_s, values, {}, counted))
+            if cue is not None:
+                live.add_event(c, None, take.id, "cue", cue.t_s, cue.to_json())
+        live.end(c, None, take.id, "finished", count=1)
+        mine = live_take.c.id == take.id
+        c.execute(live_take.update().where(mine).values(recording_id=found.recording_id))
+    return session
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (810, 1080)])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_session_shows_its_strides_with_and_without_feedback(
+    opened: Opener, trained: str, width: int, height: int, scheme: str
+) -> None:
+    page = opened(f"/sessions/{trained}", width=width, height=height, scheme=scheme)
+    section = page.get_by_role("region", name="Feedback")
+    expect(section).to_contain_text("Step length, left: target 0.680 ± 0.020")
+    rows = section.get_by_role("row")
+    expect(rows.filter(has_text="With feedback").first).to_be_visible()
+    strides = int(rows.filter(has_text="With feedback").first.get_by_role("cell").first.inner_text())
+    assert strides > 5
+    assert section.locator("circle.fb-on").count() == strides + 1, "each stride, and the legend"
+    expect(section).to_contain_text("Probe block")
+    expect(section).to_contain_text("Sagittal profile score")
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_feedback_has_a_sheet_of_its_own_on_paper(opened: Opener, trained: str) -> None:
+    page = opened(f"/sessions/{trained}/print")
+    sheet = page.locator("article.sheet").last
+    expect(sheet.get_by_role("heading", name="Feedback")).to_be_visible()
+    assert sheet.evaluate("s => s.scrollHeight <= s.clientHeight + 1"), "one sheet"
