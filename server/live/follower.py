@@ -10,7 +10,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from core.errors import Notice
 from core.events.result import GaitEvent
@@ -22,7 +22,7 @@ from core.online import Online
 from core.online.frame import LiveFrame, LiveStride, Trail
 from core.recording import Subject
 from server.live import wire
-from server.live.messages import STALE_S, Begin, Command, Item, Kind, Picture, Report, Standing
+from server.live.messages import STALE_S, Begin, Command, Item, Kind, Picture, Report, Standing, Through
 
 CHUNK_BYTES: Final = 1 << 17
 """Read and estimated in one turn: some seconds; a take that catches up lets the others through."""
@@ -146,6 +146,8 @@ class Follower:
             if frame is not None:
                 self._tell(frame)
             self._obey()
+        elif record.kind == "F":
+            self._say(Through(self.take))
 
     def _obey(self) -> None:
         """Carry out the commands whose batch is the next one."""
@@ -155,7 +157,7 @@ class Follower:
                 self._online.command("redo_calibration")
                 self._stage = "waiting"
             elif command.name in COMMANDS and self._engine is not None:
-                self._engine.command(command.name, command.value)  # type: ignore[arg-type]
+                self._engine.command(command.name, command.value)
                 self._tell_standing()
 
     def _tell(self, frame: LiveFrame) -> None:
@@ -267,7 +269,7 @@ def _engine(begin: Begin) -> FeedbackEngine | None:
 
 
 def _protocol(name: str) -> Protocol:
-    return name  # type: ignore[return-value]  # the database holds only known ones
+    return cast("Protocol", name)  # the database holds only known ones
 
 
 def broken(error: Exception) -> Notice:

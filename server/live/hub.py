@@ -22,7 +22,7 @@ from server.live import protocol
 from server.live.committer import Committer
 from server.live.intake import Ended
 from server.live.journal import Journal
-from server.live.messages import Begin, Broken, Item, Picture, Report, Standing
+from server.live.messages import Begin, Broken, Item, Picture, Report, Standing, Through
 from server.live.pool import Pool
 from server.live.protocol import Close
 from server.live.recorder import open_recorder
@@ -32,6 +32,7 @@ from server.services import live, live_recordings
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.services.live_training import Training, training_of
 from server.settings import Settings
+from server.storage import fs
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 
@@ -41,6 +42,10 @@ TICK_S: Final = 0.1
 """How often silence is looked for; staleness is half a second."""
 STATE_S: Final = 1.0
 """How often the running counters are told."""
+GRACE_S: Final = 3.0
+"""Time a take that is just ending has when the server stops; after a kill the next start does the rest."""
+DRAIN_S: Final = 10.0
+"""Time the estimator has for what it has not told when a take ends."""
 AGAIN_S: Final = 30.0
 """Pause before a take that could not be stored (disk full) is tried again."""
 
@@ -54,9 +59,11 @@ class Hub:
         self.pool = Pool(settings, self._report, self._begin, self._restarted)
         self._committer = Committer()
         self._takes: dict[str, LiveTake] = {}
+        self._draining: dict[str, LiveTake] = {}
         self._rooms: dict[str, Room] = {}
         self._closing: dict[str, audit.Actor | None] = {}
         self._entering = asyncio.Lock()
+        self._ticking: asyncio.Task[None] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -74,10 +81,14 @@ class Hub:
             except Exception:
                 # its log stays as it is; the other takes and the clinic go on
                 log.exception("live take %s could not be opened again", take_id)
-        self._spawn(self._tick())
+        self._ticking = asyncio.create_task(self._tick())
 
     async def stop(self) -> None:
         """Acknowledge what has come, send the tablets away (they come back), end the estimators."""
+        if self._ticking is not None:
+            self._ticking.cancel()
+        if self._tasks:
+            await asyncio.wait(self._tasks, timeout=GRACE_S)
         for task in tuple(self._tasks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -223,8 +234,9 @@ class Hub:
         return _standing(row)
 
     def tell_state(self, take: LiveTake) -> None:
-        """Tell the browsers where a take stands."""
-        take.room.say("state", msgspec.json.encode(take.standing()))
+        """Tell the browsers where a take stands; of one that is over `_tell_over` has the last word."""
+        if self._takes.get(take.id) is take:
+            take.room.say("state", msgspec.json.encode(take.standing()))
 
     def tell_row(self, row: live.Take) -> None:
         """Tell the browsers of a take that no tablet has joined yet."""
@@ -260,10 +272,15 @@ class Hub:
                 _notify(take, "warn", "The live estimate starts again; nothing recorded is lost.")
 
     def _report(self, report: Report) -> None:
-        take = self._takes.get(getattr(report, "take", ""))
+        name = getattr(report, "take", "")
+        take = self._takes.get(name) or self._draining.get(name)
         if take is None:
             return
         match report:
+            case Picture() | Standing() if name in self._draining:
+                pass  # the session may have another take by now
+            case Through():
+                take.told.set()
             case Picture():
                 take.estimate = "ok"
                 take.show(report)
@@ -273,6 +290,7 @@ class Hub:
                 take.room.say("feedback", report.body)
             case Broken():
                 take.estimate = "failed"
+                take.told.set()
                 _notify(take, "bad", report.message)
                 self.journal.add(
                     take.id,
@@ -325,9 +343,12 @@ class Hub:
         try:
             with contextlib.suppress(NotFound):
                 await asyncio.to_thread(self._end, actor, take.id, state, end)
-            await self._let_go(take)
+            self._takes.pop(take.id, None)
+            self._draining[take.id] = take
+            await take.recorder.close()
             take.problem = end.problem
             take.recording_id = await self._store(take.id)
+            take.stored = True
             if take.tablet is not None:
                 if take.recording_id is not None:
                     take.tablet.say(protocol.finished(take.recording_id, take.problem))
@@ -337,17 +358,30 @@ class Hub:
                 self._tell_over(await asyncio.to_thread(self._row, take.id))
         finally:
             take.over.set()
+            await self._drain(take)
 
     async def _store(self, take_id: str) -> str | None:
         """Store until it works: the log holds acknowledged samples."""
         while True:
             try:
                 return await asyncio.to_thread(
-                    live_recordings.store, self._db, self._blobs, self._settings, self._queue, take_id
+                    live_recordings.keep, self._db, self._blobs, self._settings, self._queue, take_id
                 )
             except Exception:
                 log.exception("live take %s is not stored yet; trying again", take_id)
             await asyncio.sleep(AGAIN_S)
+
+    async def _drain(self, take: LiveTake) -> None:
+        """Hear the estimator out: the last strides and cues are still on their way."""
+        if self.pool.follows(take.id) and take.estimate == "ok":
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(DRAIN_S):
+                    await take.told.wait()
+        self.pool.leave(take.id)
+        self._draining.pop(take.id, None)
+        if take.stored:
+            path = live_recordings.log_path(self._settings.live, take.id)
+            await asyncio.to_thread(fs.remove_file, path)
 
     async def _let_go(self, take: LiveTake) -> None:
         self.pool.leave(take.id)

@@ -119,6 +119,12 @@ class Standing(msgspec.Struct, frozen=True, tag=True):
     body: bytes
 
 
+class Through(msgspec.Struct, frozen=True, tag=True):
+    """Estimator to web: the log has its end, and everything before it has been told."""
+
+    take: str
+
+
 class Broken(msgspec.Struct, frozen=True, tag=True):
     """Estimator to web: this take cannot be estimated any further; it is recorded all the same."""
 
@@ -128,7 +134,7 @@ class Broken(msgspec.Struct, frozen=True, tag=True):
 
 
 Order = Begin | Grow | Command | Charge | End
-Report = Ready | Picture | Item | Standing | Broken
+Report = Ready | Picture | Item | Standing | Through | Broken
 
 encode = msgspec.msgpack.encode
 decode_order = msgspec.msgpack.Decoder(Order).decode

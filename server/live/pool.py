@@ -130,6 +130,10 @@ class Pool:
             worker.takes.discard(take)
             worker.send(End(take))
 
+    def follows(self, take: str) -> bool:
+        """Whether a process follows this take."""
+        return self._of(take) is not None
+
     def _of(self, take: str) -> _Worker | None:
         return next((w for w in self._workers if take in w.takes), None)
 

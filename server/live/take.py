@@ -102,8 +102,10 @@ class LiveTake:
         self.training = training
         self.tablet: Line | None = None
         self.over = asyncio.Event()
+        self.told = asyncio.Event()
         self.recording_id: str | None = None
         self.problem: str | None = None
+        self.stored = False
         self.estimate = "ok"
         self.t_s: float | None = None
         self.stage: str | None = None

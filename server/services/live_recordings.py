@@ -46,12 +46,12 @@ def file_name(take: live.Take) -> str:
     return f"live-{take.created_at:%Y%m%dT%H%M%SZ}.sagittal-live"
 
 
-def store(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue, take_id: str) -> str | None:
+def keep(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue, take_id: str) -> str | None:
     """Make the log of a take that is over its session's newest recording; done already is fine.
 
     Returns
     -------
-    The recording's id; None when no sample ever came (then the log goes) or the session has been erased.
+    The recording's id; None when no sample ever came or the session has been erased. The log may go.
     """
     path = log_path(settings.live, take_id)
     try:
@@ -66,9 +66,8 @@ def store(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue, t
                 with db.write() as c:
                     take = _publish(c, blobs, queue, take_id, blob, hello)
     except NotFound:
-        take = None
-    fs.remove_file(path)
-    return take.recording_id if take is not None else None
+        return None
+    return take.recording_id
 
 
 def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) -> list[str]:
@@ -87,7 +86,8 @@ def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) 
             waiting.append(path.stem)
             continue
         try:
-            store(db, blobs, settings, queue, path.stem)
+            keep(db, blobs, settings, queue, path.stem)
+            fs.remove_file(path)
         except Exception:
             # one take that cannot be stored must not keep the clinic closed; its log stays for the next start
             log.exception("live take %s could not be stored", path.stem)
