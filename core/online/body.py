@@ -13,12 +13,12 @@ from core.body.erkf_params import ErkfParams
 from core.body.model import BodyModel
 from core.body.tree import person_tree
 from core.calibration.result import SegmentCalibration
-from core.frames import FOOT, GRAVITY, SIDES, Bools, Floats, Segment
+from core.frames import FOOT, GRAVITY, R_NEUTRAL, SIDES, Bools, Floats, Segment
 from core.online.bridge import Bridge
 from core.online.erkf import LiveErkf, Signals
 from core.online.frame import Method
 from core.online.still import Stillness
-from core.rotation import multiply
+from core.rotation import from_matrix, multiply
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,6 @@ class Filtered:
     Parameters
     ----------
     segments : of these sensors, all calibrated. column : segment → index among the chain's sensors.
-    q : (n, 4) segments to W where the standing begins.
     """
 
     def __init__(
@@ -130,7 +129,6 @@ class Filtered:
         body: BodyModel,
         rate_hz: float,
         params: ErkfParams,
-        q: Floats,
     ) -> None:
         mounts = {s: mounted[s].R_segment_sensor for s in segments}
         self.tree = person_tree(body, mounts, segments)
@@ -140,7 +138,8 @@ class Filtered:
         self._bridge = Bridge(self.tree, np.array(excess), np.array(bias), rate_hz)
         self._still = Stillness(len(segments), rate_hz)
         self._rate_hz, self._params = rate_hz, params
-        self._start = multiply(q, self.tree.q_mount)
+        # by convention all segments face ahead while standing (core/fusion/mahony.py)
+        self._start = multiply(from_matrix(R_NEUTRAL), self.tree.q_mount)
         self._filter: LiveErkf | None = None
 
     @property

@@ -15,17 +15,16 @@ import numpy as np
 from core.attitude import AttitudeParams
 from core.body.choice import WHOLE, possible
 from core.body.erkf import ErkfParams
-from core.body.erkf_poses import refined, run_erkf
 from core.body.l7s_filter import L7sParams
-from core.errors import EstimationError, Notice
+from core.errors import Notice
 from core.events.flags import StrideParams
 from core.events.foot_pitch import FootPitchParams
 from core.events.result import GaitEvent
-from core.frames import R_NEUTRAL, Bools, Floats, Segment, Side
+from core.frames import Bools, Floats, Segment, Side
 from core.online.body import Estimator, Filtered, FootPaths, Placed, Raw, worn_feet
 from core.online.calibrated import LiveCalibration
 from core.online.contacts import Attitudes, Contacts
-from core.online.erkf import live_params
+from core.online.erkf import HEADING_SD, live_params
 from core.online.frame import LiveStride
 from core.online.history import MOST, History
 from core.online.joints import LiveAngles
@@ -34,7 +33,6 @@ from core.online.sparse import Sparse
 from core.online.strides import LiveStrides, Setup
 from core.parameters.spatial import Surface
 from core.rest import samples
-from core.rotation import from_matrix
 
 NOT_LIVE: Final = (
     "The sensors that are worn ({}) show no figure while they stream: for one, wear both feet, or the pelvis "
@@ -102,7 +100,7 @@ class Chain:
         self.first = calibration.first + zero.start
         self.body = calibration.body
         self._notices: list[Notice] = []
-        self.estimator = self._choose(calibration, zero.start)
+        self.estimator = self._choose(calibration)
         feet = worn_feet(self.segments)
         turned = tuple(dict.fromkeys((*feet, *self.estimator.attitudes)))
         index = [self.segments.index(s) for s in turned]
@@ -144,42 +142,29 @@ class Chain:
         k = self._columns
         return self._advance(acc.take(k, axis=1), gyr.take(k, axis=1), valid.take(k, axis=1))
 
-    def _choose(self, calibration: LiveCalibration, at: int) -> Estimator:
+    def _choose(self, calibration: LiveCalibration) -> Estimator:
         """The estimator that the calibrated sensors allow, best first as offline."""
         calibrated, body, rate = calibration.calibrated, calibration.body, self.rate_hz
         mounted = calibrated.calibration.segments
         column = {s: i for i, s in enumerate(self.segments)}
-        level = from_matrix(R_NEUTRAL)
+        params = self.params.erkf
+        if calibration.turned:
+            params = replace(params, start_heading_sd=HEADING_SD)
 
-        def filtered(segments: Sequence[Segment], q: Mapping[Segment, Floats]) -> Filtered:
-            start = np.stack([q.get(s, level) for s in segments])
-            return Filtered(segments, column, mounted, body, rate, self.params.erkf, start)
+        def filtered(segments: Sequence[Segment]) -> Filtered:
+            return Filtered(segments, column, mounted, body, rate, params)
 
         best = next(iter(possible(self.segments)), None)
         if best == "erkf":
             worn = tuple(s for s in WHOLE if s in column)
-            return Linked(
-                worn, filtered(worn, self._standing(calibration, worn, at)), body.ankle_height, rate
-            )
-        worn_f = worn_feet(self.segments)
-        feet = FootPaths(filtered(worn_f, {})) if worn_f else None
+            return Linked(worn, filtered(worn), body.ankle_height, rate)
+        alone = worn_feet(self.segments)
+        feet = FootPaths(filtered(alone)) if alone else None
         if best in ("l7s_3i", "l7s_2i") and feet is not None:
             return Sparse(column, mounted, body, rate, feet, self.params.l7s)
         message = NOT_LIVE.format(", ".join(self.segments))
         self._notices.append(Notice("no_live_figure", message, severity="info"))
         return Unlinked(self.segments, feet)
-
-    def _standing(
-        self, calibration: LiveCalibration, worn: Sequence[Segment], at: int
-    ) -> Mapping[Segment, Floats]:
-        """How the segments stood by all that was walked since; empty = all facing ahead."""
-        coarse = replace(ErkfParams.people(), states=9)
-        try:
-            run = run_erkf(calibration.calibrated, calibration.orientations, calibration.body, worn, coarse)
-        except EstimationError as error:
-            self._notices.append(Notice(error.code, error.message, error.sensor))
-            return {}
-        return {s: q[at] for s, q in refined(run, calibration.orientations).q.items()}
 
     def _new_history(self) -> History:
         feet = len(self._contacts.sides)

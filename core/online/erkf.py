@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import radians
+from typing import Final
 
 import numpy as np
 
@@ -20,10 +21,12 @@ from core.body.tree import ImuTree
 from core.frames import Bools, Floats
 from core.online.still import ROLLING_MPS
 
-HEADING_SD = radians(2.0)
-"""Of the headings that the smoothed calibration walk gives to the standing start. Started from them instead
-of from "all segments face ahead", rotations of knee and ankle are 0.2 to 0.8° nearer to the truth on
-simulated people; anything from 1° to 5° does."""
+HEADING_SD: Final = radians(2.0)
+"""Of each segment's heading while standing, where forward axes were made to agree with the joints on the walk
+before (core/body/headings.py): they face ahead then, by calibration. Anything from 0.5° to 2° is alike; with
+the 30° of a start that knows nothing the filter turns them again, and the angles' zero of standing with them:
+1.4° of knee rotation on neura_walk, nothing else. The smoothed headings of the calibration walk are no better
+start."""
 
 
 def live_params() -> ErkfParams:
@@ -32,7 +35,6 @@ def live_params() -> ErkfParams:
         ErkfParams.live(),
         joint_centre_sd=ErkfParams.people().joint_centre_sd,
         zero_velocity_sd=ROLLING_MPS,
-        start_heading_sd=HEADING_SD,
     )
 
 

@@ -1,7 +1,7 @@
 """The live chain on neura_walk: what a tablet would have shown, sample by sample, against Vicon and offline.
 
-The chain knows nothing that comes later, except that its calibration looks back at the walk so far. Limits are
-those of spec/real-data.md §7 for any pipeline; what the live set of that section reached is beside them.
+The chain knows nothing that comes later, except that its calibration looks back at the walk so far. Limits
+are those of spec/real-data.md §7 for any pipeline; what the live set of that section reached is beside them.
 """
 
 from __future__ import annotations
