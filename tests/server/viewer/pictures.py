@@ -1,0 +1,82 @@
+"""What the estimator says of the small kinematic walk, encoded as it encodes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from core.body.poses import Poses
+from core.frames import FOOT, SIDES, SUFFIX, Side
+from core.online.frame import LiveFrame, LiveStride
+from server.live import wire
+from server.live.messages import Picture
+from tests.server import walk
+
+RATE_HZ = 30.0
+POSES: Poses = walk.poses(12.0, RATE_HZ)
+ANGLES = walk.angles(12.0, RATE_HZ)
+
+
+def frame(i: int, **changed: Any) -> LiveFrame:
+    """The i-th frame."""
+    made = LiveFrame(
+        t_s=float(POSES.t_s[i]),
+        seq=i,
+        stage="running",
+        method="erkf",
+        q={s: q[i] for s, q in POSES.q.items()},
+        p={s: p[i] for s, p in POSES.p.items()},
+        valid=True,
+        contact={s: bool(POSES.contact[FOOT[s]][i]) for s in SIDES},
+        angles={name: float(x[i]) for name, x in ANGLES.angles.items()},
+    )
+    return replace(made, **changed)
+
+
+def picture(i: int, take: str = "take", delay_s: float | None = 0.02, **changed: Any) -> Picture:
+    """The i-th picture."""
+    shown = frame(i, **changed)
+    phase = {s: 100.0 * ((shown.t_s / walk.STRIDE_S + walk.PHASE[s]) % 1.0) for s in SIDES}
+    body = wire.frame(shown, (), {}, dict(phase))
+    return Picture(take, shown.t_s, shown.seq, shown.stage, body, delay_s, 0, wire.pose(shown))
+
+
+@dataclass(frozen=True)
+class Leg:
+    """Curves of a side: as walked, scaled."""
+
+    side: Side
+    scale: float = 1.0
+
+    def curves(self) -> dict[str, np.ndarray]:
+        """Variable → (101,) rad."""
+        phase = np.linspace(0.0, 1.0, 101)
+        found = {"hip_flexion": walk.HIP, "knee_flexion": walk.KNEE, "ankle_dorsiflexion": walk.ANKLE}
+        return {name: self.scale * curve(phase) for name, curve in found.items()}
+
+
+def stride(n: int, leg: Leg, *, counted: bool = True, speed_mps: float | None = 1.2) -> bytes:
+    """What browsers are told of a stride."""
+    told = LiveStride(
+        n=n,
+        side=leg.side,
+        start_s=float(n),
+        foot_off_s=n + 0.6,
+        end_s=n + 1.0,
+        detected_s=n + 1.1,
+        values={"gait_speed_mps": speed_mps},
+        reasons={},
+        curves=leg.curves(),
+        turn_rad=0.0,
+        flags=(),
+        counted=counted,
+        complete=True,
+    )
+    return wire.encode(wire.stride(told))
+
+
+def suffixed(zero: dict[str, float], side: Side) -> dict[str, float]:
+    """Standing angles with the side's ending."""
+    return {f"{name}_{SUFFIX[side]}": x for name, x in zero.items()}

@@ -1,0 +1,209 @@
+"""From what the estimator says to one figure, and which walk is laid beside it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+import viser
+
+from core.angles import cardan_zxy, joint_angles
+from core.frames import SHANK, SIDES, THIGH, Side
+from core.fusion.orientations import Orientations
+from core.norms import adult_kinematics
+from core.rotation import conjugate, multiply
+from server.live.messages import STALE_S, Picture
+from server.viewer.live import LiveFigure
+from server.viewer.live_reference import LiveReference, standing_angles
+from server.viewer.live_watch import LiveWatch, Shown, moment_of
+from server.viewer.moment import Moment
+from server.viewer.reference import SEGMENTS, ReferenceWalk, better_side, mirrored
+from tests.server import walk
+from tests.server.viewer import pictures
+from tests.server.viewer.pictures import Leg, picture, stride
+
+NORM = {name: np.radians(band.mean_deg) for name, band in adult_kinematics(None).bands.items()}
+
+
+class Bedside:
+    """A figure and the watch that shows it."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self.figure = LiveFigure(server, walk.BODY)
+        self.ghost: object = "none"
+        self.strides: tuple[bytes, ...] = ()
+        self.looks = True
+        self.trained: Side | None = None
+        self.watch = LiveWatch(
+            self.figure,
+            LiveReference(walk.BODY, NORM, lambda: self.trained),
+            ghost=lambda: self.ghost,
+            strides=lambda: self.strides,
+            watched=lambda: self.looks,
+        )
+        self._nodes = server.scene._handle_from_node_name
+
+    @property
+    def bones(self) -> np.ndarray:
+        return np.asarray(self._nodes["/room/bones"].batched_positions).astype(float)
+
+
+@pytest.fixture
+def bedside() -> Iterator[Bedside]:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield Bedside(server)
+    server.stop()
+
+
+def test_pictures_pose_the_figure(bedside: Bedside) -> None:
+    for i in (10, 50):
+        bedside.watch.see(picture(i))
+        np.testing.assert_allclose(bedside.bones[0], pictures.POSES.p["thigh_l"][i], atol=1e-6)
+    assert not bedside.figure.is_grey
+
+
+def test_silence_makes_the_figure_grey_and_the_next_picture_gives_the_colours_back(bedside: Bedside) -> None:
+    bedside.watch.see(picture(10))
+    bedside.watch.look()
+    assert not bedside.figure.is_grey
+    time.sleep(STALE_S + 0.05)
+    bedside.watch.look()
+    assert bedside.figure.is_grey
+    bedside.watch.see(picture(11))
+    assert not bedside.figure.is_grey
+    bedside.watch.see(picture(12, delay_s=STALE_S + 0.1))
+    assert bedside.figure.is_grey
+    bedside.watch.see(picture(13, delay_s=None))
+    assert bedside.figure.is_grey
+
+
+def test_nothing_is_posed_while_nobody_looks_and_who_comes_sees_the_newest(bedside: Bedside) -> None:
+    bedside.looks = False
+    standing = bedside.bones
+    bedside.watch.see(picture(10))
+    bedside.watch.see(picture(40))
+    bedside.watch.look()
+    np.testing.assert_array_equal(bedside.bones, standing)
+    bedside.looks = True
+    bedside.watch.look()
+    np.testing.assert_allclose(bedside.bones[0], pictures.POSES.p["thigh_l"][40], atol=1e-6)
+
+
+def test_without_poses_somebody_stands_until_calibrated_and_stays_when_they_are_lost(
+    bedside: Bedside,
+) -> None:
+    standing = bedside.bones
+    bedside.watch.see(picture(0, stage="walk", q={}, p={}))
+    np.testing.assert_array_equal(bedside.bones, standing)
+    bedside.watch.see(picture(30))
+    walking = bedside.bones
+    bedside.watch.see(picture(31, q={}, p={}))
+    np.testing.assert_array_equal(bedside.bones, walking)
+    assert bedside.figure.is_grey
+    bedside.watch.see(picture(0, take="another", stage="stand", q={}, p={}))
+    np.testing.assert_array_equal(bedside.bones, standing)
+
+
+def test_the_ghost_follows_the_choice_of_the_therapist(bedside: Bedside) -> None:
+    bedside.watch.see(picture(30))
+    assert len(bedside.bones) == 6
+    bedside.ghost = "norm"
+    bedside.watch.see(picture(31))
+    assert len(bedside.bones) == 12
+    assert bedside.bones[6:, 2].min() > 0.2
+    bedside.ghost = "better"
+    bedside.watch.see(picture(32))
+    assert len(bedside.bones) == 6  # no strides yet
+    bedside.strides = (stride(0, Leg("left", 0.5)), stride(1, Leg("right")))
+    bedside.watch.see(picture(33))
+    assert len(bedside.bones) == 12
+    bedside.ghost = None
+    bedside.watch.see(picture(34))
+    assert len(bedside.bones) == 6
+
+
+def reference(trained: Side | None = None, norm: dict[str, np.ndarray] = NORM) -> LiveReference:
+    return LiveReference(walk.BODY, norm, lambda: trained)
+
+
+def knee(found: ReferenceWalk | None, phase: float) -> float:
+    """Knee flexion of both legs at one phase."""
+    assert found is not None
+    posed = found.at(dict.fromkeys(SIDES, phase), np.zeros(2), 0.0)
+    assert posed is not None
+    q = {s: posed[0][k] for k, s in enumerate(SEGMENTS)}
+    left, right = (-cardan_zxy(multiply(conjugate(q[THIGH[side]]), q[SHANK[side]]))[0] for side in SIDES)
+    assert left == pytest.approx(right, abs=1e-9)
+    return float(left)
+
+
+def test_the_better_side_is_the_one_that_moves_more_like_the_norm() -> None:
+    told = (stride(0, Leg("left", 0.5)), stride(1, Leg("right")))
+    found = reference().find("better", told, dict)
+    assert found is not None
+    assert found.lead == "right"
+    assert knee(found, 0.73) == pytest.approx(float(walk.KNEE(0.74)), abs=np.radians(1.5))
+    assert better_side({"left": Leg("left").curves()}, NORM) is None
+
+
+def test_the_side_that_is_trained_is_not_the_better_one() -> None:
+    told = (stride(0, Leg("left", 0.5)), stride(1, Leg("right")))
+    found = reference("right").find("better", told, dict)
+    assert found is not None
+    assert found.lead == "left"
+    assert knee(found, 0.73) == pytest.approx(0.5 * float(walk.KNEE(0.74)), abs=np.radians(1.0))
+
+
+def test_it_is_the_mean_of_the_last_strides_that_count() -> None:
+    told = [stride(n, Leg("right", 0.2), counted=n != 3) for n in range(4)]
+    told += [stride(n, Leg("right", 1.0 if n % 2 else 0.8)) for n in range(4, 9)]
+    told += [stride(9, Leg("right", 5.0), counted=False), stride(8, Leg("right", 0.8))]
+    found = reference("left").find("better", tuple(told), dict)
+    assert knee(found, 0.73) == pytest.approx(0.88 * float(walk.KNEE(0.74)), abs=np.radians(1.0))
+
+
+def test_a_new_stride_changes_the_mean() -> None:
+    found = reference("left")
+    one = (stride(0, Leg("right", 0.5)),)
+    first = found.find("better", one, dict)
+    assert found.find("better", one, dict) is first
+    second = found.find("better", (*one, stride(2, Leg("right", 1.0))), dict)
+    assert knee(second, 0.73) > knee(first, 0.73) + np.radians(5)
+
+
+def test_whoever_walks_too_slowly_for_a_norm_sees_none() -> None:
+    slow = tuple(stride(n, Leg("left"), speed_mps=0.6) for n in range(3))
+    assert reference().find("norm", slow[:2], dict) is not None
+    assert reference().find("norm", slow, dict) is None
+    assert reference(norm={}).find("norm", (), dict) is None
+
+
+def test_standing_angles_are_put_back_so_that_the_mirror_has_the_persons_own_posture() -> None:
+    i = 70
+    shown = Shown("erkf", {}, {n: float(np.degrees(x[i])) for n, x in raw_angles(zeroed=True).items()})
+    found = standing_angles(moment_at(i), shown.angles_deg)
+    raw = {name: x[0] for name, x in raw_angles(zeroed=False).items()}
+    for name, value in raw.items():
+        assert found[name] == pytest.approx(value, abs=1e-6), name
+    curves = {"knee_flexion": np.full(101, 0.3), "pelvis_obliquity": np.full(101, 0.1)}
+    left = mirrored(curves, {"knee_flexion_l": 0.05, "pelvis_obliquity": 0.02}, "left")
+    assert left["knee_flexion"][0] == pytest.approx(0.35)
+    assert left["pelvis_obliquity"][0] == pytest.approx(0.08)  # right up is positive, the left's own is not
+
+
+def moment_at(i: int) -> Moment:
+    made: Picture = picture(i)
+    assert made.pose is not None
+    return moment_of(made, made.pose, Shown("erkf", {}, {}))
+
+
+def raw_angles(*, zeroed: bool) -> dict[str, np.ndarray]:
+    """Angles of the walk as core.angles measures them, from the first sample as standing or as they are."""
+    poses = pictures.POSES
+    valid = dict.fromkeys(poses.q, poses.valid)
+    whole = joint_angles(Orientations(poses.t_s, poses.rate_hz, poses.q, valid, "kinematic"), (0.0, 0.03))
+    if zeroed:
+        return dict(whole.angles)
+    return {name: np.full(1, zero) for name, zero in whole.zero_offset.items()}
