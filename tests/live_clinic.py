@@ -100,3 +100,12 @@ async def heard(ws: ClientConnection, kind: str, **wanted: Any) -> dict[str, Any
             message = json.loads(await ws.recv())
             if message["type"] == kind and all(message.get(k) == v for k, v in wanted.items()):
                 return dict(message)
+
+
+async def closed(ws: ClientConnection) -> tuple[int, str]:
+    """How the server closes; what it says before is passed over."""
+    async with asyncio.timeout(PATIENCE_S):
+        with contextlib.suppress(websockets.exceptions.ConnectionClosedError):
+            async for _ in ws:
+                pass
+    return ws.close_code or 0, ws.close_reason or ""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import datetime as dt
 import json
 from dataclasses import replace
@@ -19,20 +18,11 @@ from server.live.protocol import Close
 from server.services import recordings
 from server.services.live_recordings import log_path
 from server.storage.tables import audit, job, live_take, now
-from tests.live_clinic import PATIENCE_S, heard, visit
+from tests.live_clinic import closed, heard, visit
 from tests.live_takes import HELLO, digest, finish_text, frame
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
-
-
-async def closed(ws: ClientConnection) -> tuple[int, str]:
-    """How the server closes; what it says before is passed over."""
-    async with asyncio.timeout(PATIENCE_S):
-        with contextlib.suppress(websockets.exceptions.ConnectionClosedError):
-            async for _ in ws:
-                pass
-    return ws.close_code or 0, ws.close_reason or ""
 
 
 async def acknowledged(ws: ClientConnection, below: int) -> None:

@@ -1,0 +1,58 @@
+"""A simulated walk as a tablet streams it, made once per process."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+from core.formats.live_log import Hello
+from core.simulate import simulate_scenario
+from server.live.follower import Follower
+from server.live.messages import Begin, Command, Item, Report
+from server.live.playback import Due, cut, hello_of
+from server.storage.tables import new_id
+
+PER_BATCH = 5
+
+
+@cache
+def walk(per_batch: int = PER_BATCH) -> tuple[Due, ...]:
+    """52 s: standing, walking there and back."""
+    return tuple(cut(simulate_scenario("comfortable", 3).recording, per_batch))
+
+
+@cache
+def _hello() -> Hello:
+    return hello_of(simulate_scenario("comfortable", 3).recording, "0" * 32)
+
+
+def walk_hello(take: str) -> Hello:
+    return replace(_hello(), take=take)
+
+
+def replayed(
+    log: Path,
+    *,
+    height_m: float = 1.75,
+    training: dict[str, object] | None = None,
+    commands: Sequence[Command] = (),
+) -> list[Report]:
+    """Everything an estimator says of a whole log."""
+    training = training or {}
+    said: list[Report] = []
+    begin = Begin(
+        new_id(), str(log), log.stat().st_size, height_m, "walk",
+        training.get("prescription"), training.get("baseline"), list(commands),  # type: ignore[arg-type]
+    )  # fmt: skip
+    follower = Follower(begin, said.append)
+    while follower.has_work:
+        follower.step()
+    follower.show()
+    follower.close()
+    return said
+
+
+def items(said: Sequence[Report], kind: str) -> list[Item]:
+    return [one for one in said if isinstance(one, Item) and one.kind == kind]

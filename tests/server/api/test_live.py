@@ -1,0 +1,202 @@
+"""Live takes over the API: opened, paired by a code, commanded, closed; who may and who may not."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import AsyncIterator
+from typing import Any
+
+import httpx
+import pytest
+import websockets
+from sqlalchemy import select, update
+
+from server.auth.throttle import MAX_PER_PAIR, Throttle
+from server.services.live import ALPHABET
+from server.storage.tables import live_take, now
+from tests.live_clinic import closed, heard, new_session, open_code, visit
+from tests.live_takes import frame
+from tests.server.clinic import Clinic, open_clinic
+from tests.server.serving import serve
+
+pytestmark = pytest.mark.anyio
+
+
+@pytest.fixture(scope="module")
+async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
+    async with open_clinic(tmp_path_factory.mktemp("live"), live_workers=0) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+async def port(clinic: Clinic) -> AsyncIterator[int]:
+    async with serve(clinic.app) as number:
+        yield number
+
+
+@pytest.fixture(autouse=True)
+def fresh_throttle(clinic: Clinic) -> None:
+    clinic.app.state.throttle = Throttle()
+
+
+async def pairing(client: httpx.AsyncClient, code: str) -> httpx.Response:
+    return await client.post("/api/v1/live/pairings", json={"code": code})
+
+
+async def test_a_code_joins_one_tablet_once(clinic: Clinic) -> None:
+    session = new_session(clinic)
+    async with clinic.client("clinician") as http, clinic.client() as stranger:
+        opened = await http.post(f"/api/v1/sessions/{session}/live")
+        assert opened.status_code == 201
+        take = opened.json()
+        assert len(take["code"]) == 6
+        assert set(take["code"]) <= set(ALPHABET)
+        left = dt.datetime.fromisoformat(take["expires_at"]) - now()
+        assert dt.timedelta(minutes=9) < left <= dt.timedelta(minutes=10)
+        spoken = f" {take['code'][:3].lower()}-{take['code'][3:]} "
+        paired = await pairing(stranger, spoken)
+        assert paired.status_code == 201
+        answer = paired.json()
+        assert (answer["take"], answer["socket"]) == (take["id"], "/api/v1/live")
+        assert answer["session_title"] == "Live training"
+        assert answer["patient_code"].startswith("L-")
+        again = await pairing(stranger, take["code"])
+        assert (again.status_code, again.json()["code"]) == (404, "code_not_valid")
+        state = (await http.get(f"/api/v1/sessions/{session}/live")).json()
+        assert (state["take"], state["state"], state["tablet"]) == (take["id"], "open", "none")
+    with clinic.db.read() as c:
+        row = c.execute(select(live_take).where(live_take.c.id == take["id"])).one()
+    assert answer["token"] not in str(row)
+    assert take["code"] not in str(row)
+
+
+async def test_an_expired_code_and_one_that_was_replaced_are_refused(clinic: Clinic) -> None:
+    session = new_session(clinic)
+    async with clinic.client("clinician") as http:
+        first = await open_code(http, session)
+        second = (await http.post(f"/api/v1/sessions/{session}/live/code")).json()["code"]
+        assert (await pairing(http, first)).status_code == 404
+        with clinic.db.write() as c:
+            past = now() - dt.timedelta(seconds=1)
+            c.execute(update(live_take).where(live_take.c.session_id == session).values(code_expires_at=past))
+        assert (await pairing(http, second)).status_code == 404
+
+
+async def test_guessing_codes_is_throttled(clinic: Clinic) -> None:
+    async with clinic.client() as http:
+        for _ in range(MAX_PER_PAIR):
+            assert (await pairing(http, "222222")).status_code == 404
+        refused = await pairing(http, "222222")
+        assert (refused.status_code, refused.json()["code"]) == (429, "too_many_attempts")
+        assert int(refused.headers["Retry-After"]) > 0
+
+
+async def test_a_session_has_one_open_take(clinic: Clinic) -> None:
+    session = new_session(clinic)
+    api = f"/api/v1/sessions/{session}/live"
+    async with clinic.client("clinician") as http:
+        assert (await http.get(api)).json()["state"] == "none"
+        for part in ("code", "close"):
+            refused = await http.post(f"{api}/{part}")
+            assert (refused.status_code, refused.json()["code"]) == (409, "no_open_take")
+        await open_code(http, session)
+        refused = await http.post(api)
+        assert (refused.status_code, refused.json()["code"]) == (409, "take_open")
+        closed = (await http.post(f"{api}/close")).raise_for_status().json()
+        assert (closed["state"], closed["recording_id"], closed["count"]) == ("closed", None, 0)
+        assert (await http.post(api)).status_code == 201
+        assert (await http.get(f"/api/v1/sessions/{'0' * 32}/live")).status_code == 404
+
+
+@pytest.mark.parametrize("role", ["viewer", "assistant", None])
+async def test_who_may_not_run_a_take_gets_neither_api_nor_feed(
+    clinic: Clinic, port: int, role: str | None
+) -> None:
+    async with visit(clinic, port) as v:
+        async with clinic.client(role) as http:
+            for method, part in (
+                ("POST", ""), ("GET", ""), ("POST", "/code"), ("POST", "/close"), ("GET", "/events"),
+            ):  # fmt: skip
+                answer = await http.request(method, v.api + part)
+                assert answer.status_code == (403 if role else 401)
+        url = f"ws://127.0.0.1:{port}/sessions/{v.session}/live/feed"
+        cookie = {"Cookie": f"sid={clinic.token(role)}"} if role else {}
+        with pytest.raises(websockets.exceptions.InvalidStatus) as refused:
+            async with websockets.connect(url, additional_headers=cookie):
+                pass
+        assert refused.value.response.status_code == (403 if role else 401)
+
+
+async def test_the_feed_of_another_site_or_of_no_session_is_refused(clinic: Clinic, port: int) -> None:
+    async with visit(clinic, port) as v:
+        cookie = {"Cookie": f"sid={clinic.token('clinician')}"}
+        url = f"ws://127.0.0.1:{port}/sessions/{v.session}/live/feed"
+        with pytest.raises(websockets.exceptions.InvalidStatus) as refused:
+            async with websockets.connect(
+                url, origin=websockets.Origin("http://evil.example"), additional_headers=cookie
+            ):
+                pass
+        assert refused.value.response.status_code == 403
+        nowhere = url.replace(v.session, "0" * 32)
+        async with websockets.connect(nowhere, additional_headers=cookie) as ws:
+            assert (await closed(ws))[0] == 4404
+
+
+async def test_a_page_that_is_open_before_the_take_sees_every_state(clinic: Clinic, port: int) -> None:
+    session = new_session(clinic)
+    url = f"ws://127.0.0.1:{port}/sessions/{session}/live/feed"
+    cookie = {"Cookie": f"sid={clinic.token('clinician')}"}
+    async with websockets.connect(url, additional_headers=cookie) as feed:
+        assert (await heard(feed, "state"))["state"] == "none"
+        async with visit(clinic, port, session) as v:
+            assert (await heard(feed, "state"))["state"] == "pairing"
+            assert (await heard(feed, "state"))["state"] == "open"
+            async with v.tablet() as ws:
+                assert (await heard(feed, "state", tablet="connected"))["state"] == "open"
+                await ws.send(frame(0))
+                assert (await heard(feed, "state", state="streaming"))["count"] == 1
+            assert (await heard(feed, "state", tablet="lost"))["state"] == "streaming"
+            made = (await v.http.post(f"{v.api}/close")).json()
+            over = await heard(feed, "state", state="closed")
+            assert over["recording"] == made["recording_id"] is not None
+
+
+async def test_commands_are_checked_kept_and_shown(clinic: Clinic, port: int) -> None:
+    async with visit(clinic, port) as v, v.tablet() as ws:
+        await heard(ws, "welcome")
+        wrong: tuple[tuple[str, Any], ...] = (
+            ("feedback", "yes"), ("pause", None), ("level", True), ("level", "1"), ("mark", 3),
+            ("start", True), ("jump", None), ("redo_calibration", 1),
+        )  # fmt: skip
+        for name, value in wrong:
+            answer = await v.http.post(f"{v.api}/commands", json={"command": name, "value": value})
+            assert answer.status_code == 422
+        nothing = await v.http.post(f"{v.api}/commands", json={"command": "undo_mark"})
+        assert (nothing.status_code, nothing.json()["code"]) == (409, "no_mark")
+        await ws.send(frame(0))
+        await heard(ws, "ack")
+        await v.command("mark", "turn")
+        await v.command("mark")
+        assert [m["value"] for m in (await v.command("level", -1))["marks"]] == ["turn", None]
+        assert [m["value"] for m in (await v.command("undo_mark"))["marks"]] == ["turn"]
+        assert (await v.command("ghost", "norm"))["ghost"] == "norm"
+        events = (await v.http.get(f"{v.api}/events")).raise_for_status().json()
+        kinds = [e["kind"] for e in events]
+        assert kinds == ["prescription", "mark", "mark", "level", "undo_mark", "ghost"]
+        assert events[3]["content"] == {"value": -1, "before": 1}
+        assert {e["by"] for e in events[1:]} == {"clinician"}
+
+
+async def test_ending_the_sign_in_ends_the_feed(
+    clinic: Clinic, port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.live.feed.CHECK_EVERY_S", 0.05)
+    async with visit(clinic, port) as v:
+        token = clinic.token("clinician")
+        url = f"ws://127.0.0.1:{port}/sessions/{v.session}/live/feed"
+        async with websockets.connect(url, additional_headers={"Cookie": f"sid={token}"}) as ws:
+            await heard(ws, "state")
+            async with clinic.client() as http:
+                http.cookies.set("sid", token)
+                (await http.post("/api/v1/sign-out")).raise_for_status()
+            assert (await closed(ws))[0] == 1008
