@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from core.frames import Segment, Side
 from server.jobs.table import TableQueue
-from server.services import analyses, patients, recordings, sessions
+from server.services import analyses, patients, prescriptions, recordings, sessions
 from server.settings import Settings, load_settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -96,6 +96,18 @@ VISITS = (
 """In the order of their analyses: the newest visit of each patient first."""
 
 
+PRESCRIBED: tuple[Person, Mapping[str, object]] = (
+    STROKE,
+    {
+        "parameter": "single_support_pct",
+        "side": "left",
+        "target": {"source": "manual", "mean": 35.0, "sd": 2.5},
+        "modes": ["bar", "tone"],
+    },
+)
+"""Who is trained in live walks: standing on the affected leg for as long as on the other one."""
+
+
 def record(visit: Visit) -> Simulation:
     """Simulate the take of a visit."""
     from core.simulate import Dropout, simulate_scenario
@@ -115,6 +127,8 @@ def fill(settings: Settings) -> None:
             for person in dict.fromkeys(v.person for v in VISITS):
                 fields = {k: v for k, v in vars(person).items() if k != "code"}
                 known[person.code] = patients.create(c, None, code=person.code, **fields).id
+            person, content = PRESCRIBED
+            prescriptions.write(c, blobs, None, known[person.code], content)
         for visit in VISITS:
             made = record(visit)
             files = mt_files(made.recording, visit.script, made.first_counter)

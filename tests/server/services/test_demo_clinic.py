@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from core.pipeline import analyse
-from server.services import patients, sessions
+from server.services import patients, prescriptions, sessions
 from server.services.demo_clinic import VISITS, fill, record
 from server.settings import Settings
 from server.storage.db import Database
@@ -20,10 +20,12 @@ def test_the_clinic_is_full_of_people_who_say_they_are_simulated(tmp_path: Path)
     with closing(Database(settings.database)) as db, db.read() as c:
         listed = patients.listing(c)
         visits = [v for p in listed for v in sessions.of_patient(c, p.id)]
+        trained = [p.code for p in listed if prescriptions.in_force(c, p.id) is not None]
     assert sorted(v.title for v in visits) == sorted(v.title for v in VISITS)
     assert all(v.state == "running" for v in visits)
     assert all(p.note.startswith("Simulated.") for p in listed)
     assert any(p.sessions == 2 for p in listed)
+    assert trained == ["NR-2107"], "somebody to walk live with feedback"
 
 
 @pytest.mark.parametrize(
