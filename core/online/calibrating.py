@@ -7,22 +7,25 @@ core/calibration/walking.py); that enough was walked is said by the offline cali
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from math import radians
 from typing import Final
 
 import numpy as np
 
 from core.calibration import calibrate
 from core.calibration.calibrate import FEW_STEPS
+from core.calibration.result import Calibration
 from core.calibration.walking import moving_mask
 from core.errors import Notice, SagittalError
-from core.frames import Segment
+from core.frames import Floats, Segment
 from core.online.attempt import Attempt, Wearer
 from core.online.axis import UniformBlock
 from core.online.calibrated import LiveCalibration, MountingParams, finished
 from core.online.frame import CalibrationView, SegmentCheck, Stage
+from core.online.standing import StandingNow, last_part, standing_now, upwards
 from core.recording import UniformRecording
-from core.rest import quietness, windows_of
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,10 @@ class CalibratingParams:
     wait_s : after it the attempt goes on without a sensor that sends nothing (our choice).
     stand_s : standing that is asked for (clinic practice, spec/fusion.md §2: 3 to 5 s). looked_s : of the
         last samples in which it is looked for; quietness is judged against the quietest second in them.
-    steps, walk_s : straight steps that are enough, or else time walked, as in small rooms.
+    steps, walk_s : straight steps that are enough, or else time walked, as in small rooms, with at least
+        `least_steps` of them: strapping sensors on is no walk.
+    moved : turn of a sensor against the vertical from one standing to the next, beyond which it was moved on
+        the body or put on in between. People stand alike within 10° (our choice).
     first_look_s : walking before the calibration is tried for the first time: two strides.
     kept_s : samples kept while nobody walks: a standing and its beginning.
     longest_s : an attempt that is not done by then starts anew (our choice).
@@ -48,6 +54,8 @@ class CalibratingParams:
     looked_s: float = 10.0
     steps: int = FEW_STEPS
     walk_s: float = 12.0
+    least_steps: int = 4
+    moved: float = radians(20.0)
     first_look_s: float = 2.5
     kept_s: float = 15.0
     longest_s: float = 120.0
@@ -75,6 +83,7 @@ class LiveCalibrator:
         self._attempt = Attempt(wearer, 0)
         self._working: tuple[Segment, ...] = ()
         self._walked = 0.0
+        self._up: Mapping[Segment, Floats] = {}
 
     def push(self, block: UniformBlock) -> LiveCalibration | None:
         """Take the next samples; the calibration, once, when they complete it.
@@ -124,13 +133,19 @@ class LiveCalibrator:
         complete = len(there) == len(self.wearer.segments)
         patient = self._length - self._begun >= p.wait_s * rate
         self.stage = "stand" if there and (complete or patient) else "waiting"
-        seen = _stillness(self._attempt.recording(there), p.mounting)
+        recording = self._attempt.recording(there)
+        seen = standing_now(recording, p.mounting.calibration.rest)
         self.view = replace(self.view, stood_s=seen.stood_s, walked_s=0.0, steps=0, checks=self._checks(seen))
         if self.stage == "stand" and seen.stood_s >= p.stand_s:
-            self.stage, self._working, self._walked = "walk", there, 0.0
-            # what was before this standing is of no attempt, walking least of all
-            self._attempt.keep_last(round(seen.stood_s * rate))
+            self.stage, self._working = "walk", there
             self.view = replace(self.view, ok=None, problem=None)
+            self._stand(recording, seen)
+
+    def _stand(self, recording: UniformRecording, seen: StandingNow) -> None:
+        """Begin with this standing; what was before it is of no attempt, walking least of all."""
+        self._attempt.keep_last(round(seen.stood_s * self.wearer.rate_hz))
+        self._up, self._walked = upwards(recording), 0.0
+        self.view = replace(self.view, walked_s=0.0, steps=0)
 
     def _there(self) -> tuple[Segment, ...]:
         """Segments whose sensor was there for most of the last second."""
@@ -141,11 +156,19 @@ class LiveCalibrator:
         """Standing is there: has enough been walked since?"""
         p, rate = self.params, self.wearer.rate_hz
         recording = self._attempt.recording(self._working)
-        seen = _stillness(_last(recording, p.kept_s), p.mounting)
+        seen = standing_now(last_part(recording, p.kept_s), p.mounting.calibration.rest)
         walked = float(np.count_nonzero(moving_mask(recording, p.mounting.calibration.walking)) / rate)
         stood = self.view.stood_s if walked and not seen.stood_s else seen.stood_s
         self._walked, before = walked, self._walked
         self.view = replace(self.view, stood_s=stood, walked_s=walked, checks=self._checks(seen))
+        if walked and seen.stood_s >= p.stand_s and (moved := self._moved(recording)):
+            message = (
+                f"{', '.join(moved)}: the sensor sits otherwise than when all stood before. What was walked "
+                "until now does not count; this standing does."
+            )
+            self._stand(recording, seen)
+            self.view = replace(self.view, problem=Notice("sensor_moved", message, moved[0]))
+            return None
         if not walked:
             self._attempt.keep_last(round(p.kept_s * rate))
             if seen.longest_s < p.stand_s:
@@ -160,61 +183,49 @@ class LiveCalibrator:
             self._restart(Notice("walk_too_short", message))
         return found
 
+    def _moved(self, recording: UniformRecording) -> list[Segment]:
+        """Segments whose sensor is turned against the vertical since the standing that began the attempt."""
+        now = upwards(recording)
+        limit = np.cos(self.params.moved)
+        return [s for s, x in self._up.items() if float(x @ now[s]) < limit]
+
     def _calibration(self, recording: UniformRecording) -> LiveCalibration | None:
         """The calibration if it can be had and rests on enough; a walk that gives none begins anew."""
         p = self.params
-        enough = self.view.walked_s >= p.walk_s
+        late = self.view.walked_s >= p.walk_s
         try:
             calibrated = calibrate(recording, p.mounting.calibration)
-            steps = calibrated.calibration.straight_steps or 0
+            found = calibrated.calibration
+            steps = found.straight_steps or 0
             self.view = replace(self.view, steps=steps)
-            if not enough and steps < p.steps:
+            least = p.least_steps if late else p.steps
+            if found.straight_steps is None and late:
+                least = 0  # a trunk sensor shows none
+            if steps < least or len(found.segments) < len(recording.sensors):
+                if late:
+                    self._restart(_why(found, steps, p))
                 return None
-            found = finished(calibrated, self._attempt.first, self.wearer.segments, p.mounting)
+            made = finished(calibrated, self._attempt.first, self.wearer.segments, p.mounting)
         except SagittalError as error:
-            if enough:
+            if late:
                 self._restart(Notice(error.code, error.message, error.sensor))
             return None
         self.stage = "running"
         self._attempt = Attempt(self.wearer, self._length)
-        self.view = replace(self.view, checks=found.checks, ok=found.ok, problem=None)
-        return found
+        self.view = replace(self.view, checks=made.checks, ok=made.ok, problem=None)
+        return made
 
-    def _checks(self, seen: _Stillness) -> tuple[SegmentCheck, ...]:
+    def _checks(self, seen: StandingNow) -> tuple[SegmentCheck, ...]:
         return tuple(SegmentCheck(s, s in seen.still) for s in self.wearer.segments)
 
 
-@dataclass(frozen=True)
-class _Stillness:
-    """Segments that are still now, how long all have been by now, and the longest rest of all."""
-
-    still: frozenset[Segment]
-    stood_s: float
-    longest_s: float
-
-
-def _stillness(recording: UniformRecording, params: MountingParams) -> _Stillness:
-    """By the rules of core/rest.py; the last second decides on now."""
-    rest, rate, n = params.calibration.rest, recording.rate_hz, len(recording.t_s)
-    quiet = {s: quietness(x, rate, rest).quiet for s, x in recording.sensors.items()}
-    if not quiet or not n:
-        return _Stillness(frozenset(), 0.0, 0.0)
-    windows = windows_of(np.logical_and.reduce(list(quiet.values())), rate, rest)
-    lasting = [b - a for a, b in windows if round(b * rate) >= n]
-    return _Stillness(
-        frozenset(s for s, x in quiet.items() if x[-1]),
-        lasting[-1] if lasting else 0.0,
-        max((b - a for a, b in windows), default=0.0),
+def _why(found: Calibration, steps: int, params: CalibratingParams) -> Notice:
+    """Why a calibration from so much walking is not taken."""
+    unknown = next((n for n in found.notices if n.code == "pelvis_heading_unknown"), None)
+    if unknown is not None:
+        return unknown
+    message = (
+        f"{params.walk_s:.0f} s of movement held about {steps} straight steps, {params.least_steps} are "
+        "needed. Stand still again, then walk straight ahead."
     )
-
-
-def _last(recording: UniformRecording, seconds: float) -> UniformRecording:
-    """The last seconds of a recording."""
-    part = slice(-round(seconds * recording.rate_hz), None)
-    sensors = {
-        s: replace(
-            x, acc=x.acc[part], gyr=x.gyr[part], valid=x.valid[part], interpolated=x.interpolated[part]
-        )
-        for s, x in recording.sensors.items()
-    }
-    return replace(recording, t_s=recording.t_s[part], sensors=sensors)
+    return Notice("few_steps", message)

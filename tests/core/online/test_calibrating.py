@@ -23,6 +23,7 @@ from core.online.calibrated import LiveCalibration
 from core.online.calibrating import LiveCalibrator
 from core.online.frame import CalibrationView, Stage
 from core.recording import Subject, UniformRecording
+from core.rotation import conjugate, exp, multiply, rotate
 from core.simulate import Arc, Pivot, Stand, Straight
 from tests.walks import cut, lost, neura_walk, only, scripted, simulated
 
@@ -245,6 +246,63 @@ def test_a_walk_round_a_corner_has_twelve_seconds() -> None:
     done = run(recording)
     assert len(done.found) == 1
     assert 12.0 <= done.calibrator.view.walked_s < 13.0
+
+
+def strapped_on(seed: int) -> UniformRecording:
+    """Seven sensors lie still for 4 s, then one after the other is picked up, turned and left otherwise."""
+    rng = np.random.default_rng(seed)
+    first = walk()
+    n, sensors = 3400, {}
+    for i, (segment, x) in enumerate(first.sensors.items()):
+        t = np.arange(n) / 100.0
+        held = (t > 4.0 + 4.0 * i) & (t < 10.0 + 4.0 * i)
+        rate = (
+            2.0
+            * np.sin(2 * np.pi * rng.uniform(0.2, 1.0, 3) * t[:, None] + rng.uniform(0, 6, 3))
+            * held[:, None]
+        )
+        q = np.empty((n, 4))
+        q[0] = 1.0, 0.0, 0.0, 0.0
+        for k in range(1, n):
+            q[k] = multiply(q[k - 1], exp(0.01 * rate[k]))
+        push = 3.0 * np.sin(2 * np.pi * rng.uniform(0.3, 2.0, 3) * t[:, None]) * held[:, None]
+        acc = rotate(conjugate(q), np.array([0.0, 0.0, 9.81])) + push + rng.normal(0, 0.02, (n, 3))
+        gyr = rate + rng.normal(0, 0.002, (n, 3))
+        here = np.ones(n, np.bool_)
+        sensors[segment] = replace(x, acc=acc, gyr=gyr, mag=None, valid=here, interpolated=~here)
+    return replace(first, t_s=np.arange(n) / 100.0, sensors=sensors)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_strapping_sensors_on_is_no_walk(seed: int) -> None:
+    done = run(joined(strapped_on(seed), walk()))
+    assert len(done.found) == 1
+    found = done.found[0]
+    assert found.ok
+    assert found.first >= 3400
+    alone = walked().found[0].calibrated.calibration.segments
+    for segment, mounted in found.calibrated.calibration.segments.items():
+        assert np.allclose(mounted.R_segment_sensor, alone[segment].R_segment_sensor, atol=0.03)
+
+
+def test_a_sensor_turned_between_two_standings_makes_the_second_count() -> None:
+    recording, _ = scripted(
+        (Stand(5.0), Straight(2.4, 0.6, 0.55), Stand(6.0), Straight(14.0, 0.6, 0.55), Stand(2.0))
+    )
+    n = 700
+    by = exp(np.array([0.0, 0.0, 0.6]))
+    x = recording.sensors["shank_r"]
+    acc, gyr = (np.where(np.arange(len(v))[:, None] < n, rotate(by, v), v) for v in (x.acc, x.gyr))
+    before = replace(
+        recording, sensors={**recording.sensors, "shank_r": replace(x, acc=acc, gyr=gyr, mag=None)}
+    )
+    plain, done = run(recording), run(before)
+    told = [v.problem for _, _, v in done.seen if v.problem is not None]
+    assert {p.code for p in told} == {"sensor_moved"}
+    assert {p.sensor for p in told} == {"shank_r"}
+    assert plain.found[0].first == 0
+    assert done.found[0].first > n
+    assert done.found[0].ok
 
 
 def test_a_take_in_which_hardly_anybody_walks_begins_anew() -> None:

@@ -1,0 +1,53 @@
+"""Standing as it is seen from now: who is still, for how long, and which way is up in each sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from core.frames import Floats, Segment
+from core.recording import UniformRecording
+from core.rest import RestParams, quietness, windows_of
+
+
+@dataclass(frozen=True)
+class StandingNow:
+    """Segments that are still now, how long all have been by now, and the longest rest of all."""
+
+    still: frozenset[Segment]
+    stood_s: float
+    longest_s: float
+
+
+def standing_now(recording: UniformRecording, rest: RestParams) -> StandingNow:
+    """By the rules of core/rest.py; the last second decides on now."""
+    rate, n = recording.rate_hz, len(recording.t_s)
+    quiet = {s: quietness(x, rate, rest).quiet for s, x in recording.sensors.items()}
+    if not quiet or not n:
+        return StandingNow(frozenset(), 0.0, 0.0)
+    windows = windows_of(np.logical_and.reduce(list(quiet.values())), rate, rest)
+    lasting = [b - a for a, b in windows if round(b * rate) >= n]
+    return StandingNow(
+        frozenset(s for s, x in quiet.items() if x[-1]),
+        lasting[-1] if lasting else 0.0,
+        max((b - a for a, b in windows), default=0.0),
+    )
+
+
+def last_part(recording: UniformRecording, seconds: float) -> UniformRecording:
+    """The last seconds of a recording."""
+    part = slice(-round(seconds * recording.rate_hz), None)
+    sensors = {
+        s: replace(
+            x, acc=x.acc[part], gyr=x.gyr[part], valid=x.valid[part], interpolated=x.interpolated[part]
+        )
+        for s, x in recording.sensors.items()
+    }
+    return replace(recording, t_s=recording.t_s[part], sensors=sensors)
+
+
+def upwards(recording: UniformRecording) -> dict[Segment, Floats]:
+    """Direction of the vertical in each sensor in the last second."""
+    mean = {s: x.acc[-round(recording.rate_hz) :].mean(axis=0) for s, x in recording.sensors.items()}
+    return {s: x / max(float(np.linalg.norm(x)), 1e-9) for s, x in mean.items()}
