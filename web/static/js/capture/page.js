@@ -63,7 +63,7 @@ class CapturePage extends HTMLElement {
   interrupted(kind) {
     this.paused = true;
     this.worn.take(kind);
-    this.say({ title: "This page was loaded again", detail: "Everything up to then is safe. Connect the sensors again and go on, or stop here." });
+    this.draw();
   }
 
   async paired({ code, ...paired }) {
@@ -246,6 +246,7 @@ class CapturePage extends HTMLElement {
   enter(state) {
     this.dataset.state = state;
     if (state === "running") this.stage = undefined;
+    else this.paused = false;
     stayAwake(state === "running" || state === "sending");
     this.draw();
     if (state === "pairing") this.$("code-form").querySelector("input").focus();

@@ -61,7 +61,7 @@ export class View {
     set(this.part("session-title"), record.session_title);
   }
 
-  sensors({ state, source, rows, ready, paused }) {
+  sensors({ state, source, rows, ready, paused, record }) {
     const prepare = state === "prepare";
     const kind = source?.kind;
     this.part("sources").hidden = !prepare || Boolean(source);
@@ -71,8 +71,8 @@ export class View {
     set(this.part("add-word"), ADD[kind] ?? "");
     const worn = rows.filter(({ sensor }) => sensor.segment).length;
     const copies = source?.copies?.length ? `, ${source.copies.length} ${source.copies.length === 1 ? "copy" : "copies"} left out` : "";
-    set(this.part("sum"), !source ? "Where do they come from?" : prepare ? `${ready.length} of ${rows.length} ready${copies}` : `${worn} recorded`);
-    this.list.draw(prepare ? rows : rows.filter(({ sensor }) => sensor.segment), { fixed: !prepare });
+    set(this.part("sum"), !source ? "Where do they come from?" : prepare ? `${ready.length} of ${rows.length} ready${copies}` : paused ? `${rows.length} of ${wanted(record)} connected` : `${worn} recorded`);
+    this.list.draw(prepare || paused ? rows : rows.filter(({ sensor }) => sensor.segment), { fixed: !prepare });
     this.axes(source, prepare);
   }
 
@@ -97,7 +97,7 @@ export class View {
   saying({ state, stage, elapsedS, heldS, paused }) {
     const say = state === "sending"
       ? { icon: "upload", title: "Sending the rest", more: heldS > 0.05 ? `${heldS.toFixed(1)} s are still on this tablet. Keep this page open.` : "The server closes the recording." }
-      : paused ? { icon: "info", title: "Recording stands still", more: "Connect the same sensors again to go on." } : words.instruction(stage, elapsedS);
+      : paused ? { icon: "info", title: "This page was loaded again", more: "Everything up to then is safe. Connect the same sensors again to go on, or stop here." } : words.instruction(stage, elapsedS);
     set(this.part("say"), say.title);
     set(this.part("say-more"), say.more);
     this.part("say-icon").setAttribute("href", `#i-${say.icon}`);
@@ -141,6 +141,8 @@ export class View {
     return "Say where the sensors are worn";
   }
 }
+
+const wanted = (record) => record.hello.streams.reduce((sum, stream) => sum + stream.sensors.length, 0);
 
 function set(element, text) {
   if (element.textContent !== text) element.textContent = text;
