@@ -1,6 +1,8 @@
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,6 +60,25 @@ async def open_ward(folder: Path) -> AsyncIterator[Ward]:
 async def ward(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Ward]:
     async with open_ward(tmp_path_factory.mktemp("clinic")) as opened:
         yield opened
+
+
+@pytest.fixture(scope="module")
+def loop() -> Iterator[asyncio.AbstractEventLoop]:
+    """An event loop in a thread of its own: playwright's synchronous interface owns this one."""
+    running = asyncio.new_event_loop()
+    thread = threading.Thread(target=running.run_forever, daemon=True)
+    thread.start()
+    yield running
+    running.call_soon_threadsafe(running.stop)
+    thread.join()
+    running.close()
+
+
+@pytest.fixture(scope="module")
+def served(loop: asyncio.AbstractEventLoop, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ward]:
+    ward = open_ward(tmp_path_factory.mktemp("clinic"))
+    yield asyncio.run_coroutine_threadsafe(ward.__aenter__(), loop).result(30)
+    asyncio.run_coroutine_threadsafe(ward.__aexit__(None, None, None), loop).result(30)
 
 
 def _finish_analysis(clinic: Clinic, patient_id: str, session_id: str) -> None:
