@@ -209,6 +209,29 @@ def test_own_clocks_are_laid_over_each_other_by_when_they_were_sent() -> None:
     assert block.valid.all()
 
 
+def test_shared_and_own_clocks_of_one_take_meet() -> None:
+    pelvis, shanks, left = (
+        device(0, 100.0, ("pelvis",)),
+        device(1, 60.0, ("shank_l", "shank_r"), 19.6, 1.4),
+        device(2, 60.0, ("foot_l",)),
+    )
+    pelvis, shanks = (replace(d, t_us=d.t_us + 9_000_000, ahead_us=9_000_000) for d in (pelvis, shanks))
+    take = send([pelvis, shanks, own(left, 777_000_000)], 6)
+    block, notices, axis = laid(take)
+    assert_equal_bits(block, axis.segments, of_file(take))
+    assert notices == ()
+    first = {d: s.t_s[0] for d, s in read_recording([SourceFile.of_bytes("x", take.log())]).streams.items()}
+    assert first["shank_l-id"] - first["pelvis-id"] == pytest.approx(0.4, abs=1e-5)
+    assert first["foot_l-id"] - first["pelvis-id"] == pytest.approx(0.0, abs=1e-5)
+
+
+def test_a_sender_whose_clock_is_of_no_use_does_not_stop_the_axis() -> None:
+    take = send([device(0, 100.0, ("foot_l",)), device(1, 100.0, ("foot_r",))])
+    mad = [replace(b, sent_us=1 << 52) if b.seq == 10 else b for b in take.batches]
+    block, _, _ = laid(LiveTake(take.hello, tuple(mad)))
+    assert len(block) > 1900
+
+
 def test_an_own_clock_that_is_delayed_more_is_off_by_the_difference_of_the_least_delays() -> None:
     left, right = device(0, 60.0, ("foot_l",)), device(1, 60.0, ("foot_r",))
     take = send([own(left, 5_000_000, delay_us=20_000), own(right, 0, delay_us=45_000)])
