@@ -33,11 +33,15 @@ class Clinic:
         return answer.raise_for_status().json()
 
     def log(self, server: RunningServer) -> bytes:
-        """The recording's file as it is stored."""
-        found = self.client.get(f"/api/v1/sessions/{self.session}/recording").raise_for_status().json()
-        (file,) = found["files"]
-        (path,) = (p for p in (server.folder / "blobs").rglob(f"*{file['sha256']}") if p.is_file())
-        return path.read_bytes()
+        return stored_log(self.client, server, self.session)
+
+
+def stored_log(client: httpx.Client, server: RunningServer, session: str) -> bytes:
+    """The recording's only file, as the server keeps it."""
+    found = client.get(f"/api/v1/sessions/{session}/recording").raise_for_status().json()
+    (file,) = found["files"]
+    (path,) = (p for p in (server.folder / "blobs").rglob(f"*{file['sha256']}") if p.is_file())
+    return path.read_bytes()
 
 
 @pytest.fixture

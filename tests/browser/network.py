@@ -13,8 +13,7 @@ class Network:
     """Relays connections to a server while it is up; down, it ends those there are and takes no more."""
 
     def __init__(self, url: str) -> None:
-        parts = urlsplit(url)
-        self._target = (parts.hostname or "127.0.0.1", parts.port or 80)
+        self.lead_to(url)
         self._door = socket.create_server(("127.0.0.1", 0))
         self.url = f"http://127.0.0.1:{self._door.getsockname()[1]}"
         self._up = True
@@ -22,6 +21,11 @@ class Network:
         self._pairs: set[socket.socket] = set()
         self._lock = threading.Lock()
         threading.Thread(target=self._listen, daemon=True).start()
+
+    def lead_to(self, url: str) -> None:
+        """Relay what comes from now on to this server."""
+        parts = urlsplit(url)
+        self._target = (parts.hostname or "127.0.0.1", parts.port or 80)
 
     def cut(self) -> None:
         """End all connections and refuse new ones."""

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import os
 import re
+import signal
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +17,12 @@ from playwright.sync_api import Browser, Page, expect
 from core.formats import SourceFile, read_recording
 from core.formats.live_log import decode_batch, parse_finish, peek, scan
 from core.formats.live_log import payload as payload_of
+from server.auth import accounts
+from server.auth.passwords import hash_password
+from server.auth.roles import Role
+from server.storage.db import Database
+from server.storage.migrate import upgrade
+from tests.browser import filling
 from tests.browser.capturing import (
     Clinic,
     choose,
@@ -21,11 +31,12 @@ from tests.browser.capturing import (
     pair,
     place,
     start,
+    stored_log,
     tablet,
     until,
     walk_files,
 )
-from tests.browser.conftest import RunningServer
+from tests.browser.conftest import NAME, PASSWORD, RunningServer, serve
 from tests.browser.design import layout_faults, text_faults
 from tests.browser.network import Network
 from tests.browser.test_upload import SEGMENTS
@@ -108,6 +119,40 @@ def test_a_walk_played_on_the_tablet_is_the_recording_though_network_and_page_we
     starts = np.array([h.t0_us for h in headers])
     counts = np.cumsum([0, *(h.n_samples for h in headers)])[:-1]
     np.testing.assert_array_equal(starts, counts * 10_000)
+
+
+def test_a_server_that_dies_in_the_middle_has_everything_in_the_end(flat: Browser, tmp_path: Path) -> None:
+    upgrade(tmp_path / "sagittal.db")
+    db = Database(tmp_path / "sagittal.db")
+    with db.write() as c:
+        accounts.create(c, NAME, "Anna", Role.ADMIN, hash_password(PASSWORD))
+    db.close()
+    columns = [f"L_foot.{kind}_{axis}" for kind in ("acc", "gyr") for axis in "xyz"]
+    rows = [[n / 100, *(c + n / 1000 for c in range(6))] for n in range(1500)]
+    lines = [",".join(["t_s", *columns]), *(",".join(map(str, row)) for row in rows)]
+    table = "\n".join(lines)
+    with contextlib.ExitStack() as servers:
+        server = servers.enter_context(serve(tmp_path))
+        client = servers.enter_context(server.client())
+        patient = filling.add(client, "/patients", code="CAP-K9")["id"]
+        session = filling.add_session(client, patient, "Walk")
+        code = filling.add(client, f"/sessions/{session}/live")["code"]
+        network = Network(server.url)
+        servers.callback(network.close)
+        with tablet(flat, network.url) as page:
+            pair(page, code)
+            choose(page, [("walk.csv", table.encode())])
+            start(page)
+            until(page, "page.outbox.acked > 40")
+            os.kill(server.pid, signal.SIGKILL)
+            expect(page.locator("[data-link]")).to_contain_text("Keeping", timeout=10_000)
+            server = servers.enter_context(serve(tmp_path))
+            network.lead_to(server.url)
+            expect(page.locator("[data-done]")).to_have_text("Recording is on the server", timeout=60_000)
+        with server.client() as again:
+            records, _ = scan(stored_log(again, server, session))
+    samples = np.concatenate([decode_batch(r.body).samples[:, 0, :6] for r in records if r.kind == "B"])
+    np.testing.assert_array_equal(samples, np.array(rows)[:, 1:].astype(np.float32))
 
 
 def test_a_network_that_only_goes_silent_is_noticed_and_nothing_is_lost(
