@@ -23,17 +23,20 @@ FAINT: Final = 0.35
 def add_batch(
     scene: viser.SceneApi, name: str, batch: Batch, *, ghost: bool = False
 ) -> viser.BatchedMeshHandle:
-    """Draw the first frame of a batch; with `ghost` the second one too, pale, in the same node."""
+    """Draw the first frame of a batch; with `ghost` the legs of the second one too, pale, in the same node."""
     frames = 2 if ghost else 1
-    opacity = np.where(batch.measured, 1.0, FAINT).astype(np.float32)
+    opacity, scale = np.where(batch.measured, 1.0, FAINT).astype(np.float32), batch.scale
     if ghost:
         opacity = np.append(opacity, np.full(len(opacity), PALE, np.float32))
+        # trunk and head of both are in the same place
+        legs = np.array([[tint != "body"] for tint in batch.tint], np.float32)
+        scale = np.concatenate((scale, legs * scale))
     return scene.add_batched_meshes_simple(
         name,
         *batch.mesh,
         batch.wxyz[:frames].reshape(-1, 4),
         batch.position[:frames].reshape(-1, 3),
-        batched_scales=np.tile(batch.scale, (frames, 1)),
+        batched_scales=scale,
         batched_colors=colours(batch, dark=False, ghost=ghost),
         batched_opacities=None if (opacity == 1.0).all() else opacity,
         lod="off",

@@ -251,6 +251,9 @@ def test_the_ghost_is_pale_and_goes_when_it_is_switched_off_or_no_phase_is_known
     assert len(colours) == 12
     assert {tuple(c) for c in colours[6:].tolist()} == {linear(GHOST[False])}
     np.testing.assert_allclose(np.asarray(scene["/bones"].batched_opacities)[6:], PALE)
+    own, ghost = np.split(np.asarray(scene["/bones"].batched_scales), 2)
+    np.testing.assert_array_equal(ghost[:4], own[:4])
+    assert not ghost[4:].any()  # no second trunk
     scene.figure.show(replace(moment(poses, 61), phase={}))
     assert (ghost_of(scene, "bones")[0][:, 2] < -50.0).all()
     scene.figure.show(replace(moment(poses, 62), phase={"right": 0.25, "left": None}))
