@@ -23,7 +23,7 @@ FAINT: Final = 0.35
 def add_batch(
     scene: viser.SceneApi, name: str, batch: Batch, *, ghost: bool = False
 ) -> viser.BatchedMeshHandle:
-    """Draw the first frame of a batch; with `ghost` the legs of the second one too, pale, in the same node."""
+    """Draw the first frame of a batch; with `ghost` the legs of the second too, pale, in the same node."""
     frames = 2 if ghost else 1
     opacity, scale = np.where(batch.measured, 1.0, FAINT).astype(np.float32), batch.scale
     if ghost:
