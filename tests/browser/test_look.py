@@ -20,6 +20,7 @@ Address = Callable[[Filled], str]
 PAGES: dict[str, Address] = {
     "sign-in": lambda f: "/sign-in",
     "set-up": lambda f: "/set-up/no-such-token",
+    "capture": lambda f: "/capture",
     "patients": lambda f: "/patients",
     "patient": lambda f: f"/patients/{f.patient}",
     "trends": lambda f: f"/patients/{f.patient}/trends",
@@ -48,7 +49,7 @@ PAGES: dict[str, Address] = {
 PAPER = {"print"}
 """A sheet of A4 has its own width; it scrolls inside the page on small screens."""
 
-OUT = {"sign-in", "set-up"}
+OUT = {"sign-in", "set-up", "capture"}
 FIGURE = {"session", "kinematics"}
 
 
