@@ -56,7 +56,7 @@ class Recorder:
 
     Parameters
     ----------
-    intake : what the log holds. log : open for appending. post : `loop.call_soon_threadsafe`.
+    intake : what the log holds. log : open for appending. post : the way to the event loop.
     """
 
     def __init__(
@@ -179,7 +179,7 @@ async def open_recorder(
     InputError
         live_log_order, live_log_damaged: the file is no log of ours; it is left as it is.
     """
-    post = asyncio.get_running_loop().call_soon_threadsafe
+    post = committer.post_to(asyncio.get_running_loop())
     try:
         intake, log = await asyncio.to_thread(restore, path, hello)
     except OSError as error:
