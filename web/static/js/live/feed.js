@@ -57,6 +57,7 @@ export class Feed extends EventTarget {
     if (type === "frame") {
       this.seen = performance.now();
       this.frame = message;
+      this.delay = this.#delay(message);
       this.#check();
     } else if (type === "stride") keep(this.strides, message);
     else if (type === "cue") keep(this.cues, message);
@@ -70,12 +71,21 @@ export class Feed extends EventTarget {
   // Another take begins with nothing of the one before.
   #forget() {
     this.strides.length = this.cues.length = 0;
-    this.frame = this.seen = this.feedback = undefined;
+    this.frame = this.seen = this.feedback = this.fastest = undefined;
     this.fresh = null;
   }
 
+  // Sample to screen: what the server measured, and how much longer this frame was on its way here than the fastest.
+  // A slow device would otherwise show the past as now.
+  #delay({ t, delay_ms: delay }) {
+    if (delay === null || delay === undefined) return null;
+    const way = this.seen - 1000 * t - delay;
+    this.fastest = Math.min(this.fastest ?? way, way);
+    return delay + way - this.fastest;
+  }
+
   #check() {
-    const fresh = this.seen === undefined ? null : this.age <= STALE_MS && !this.frame.stale;
+    const fresh = this.seen === undefined ? null : this.age <= STALE_MS && !this.frame.stale && (this.delay ?? 0) <= STALE_MS;
     if (fresh === this.fresh) return;
     this.fresh = fresh;
     this.dispatchEvent(new CustomEvent("fresh", { detail: fresh }));

@@ -75,6 +75,7 @@ class LivePage extends HTMLElement {
 
   state(state) {
     this.top.state(state);
+    if (state.ghost) this.ghost(state.ghost);
     this.notes.tablet(state);
     if (OVER.has(state.state)) {
       this.view("over");
@@ -99,7 +100,7 @@ class LivePage extends HTMLElement {
     this.sensors.show(health, data.segments);
     if (frame.stage === "running") this.chart.frame(frame);
     else this.calibration.show(frame.stage, frame.calibration, health, data.segments);
-    this.top.frame(frame);
+    this.top.delay(this.feed.delay);
     this.screen.frame(frame);
   }
 
@@ -171,13 +172,15 @@ class LivePage extends HTMLElement {
       const joint = e.target.closest("[data-joint]");
       if (joint) this.pick(joint.dataset.joint);
       const ghost = e.target.closest("[data-ghost]");
-      if (ghost) this.ghost(ghost);
+      if (ghost) {
+        this.ghost(ghost.dataset.ghost);
+        this.commands.send("ghost", ghost.dataset.ghost);
+      }
     });
   }
 
-  ghost(button) {
-    for (const b of this.querySelectorAll("[data-ghost]")) b.ariaPressed = String(b === button);
-    this.commands.send("ghost", button.dataset.ghost);
+  ghost(name) {
+    for (const b of this.querySelectorAll("[data-ghost]")) b.ariaPressed = String(b.dataset.ghost === name);
   }
 
   // STOP acts at once; without the tablet the take is ended with what has arrived.
@@ -201,7 +204,7 @@ class LivePage extends HTMLElement {
 
   speak() {
     if (this.dataset.view !== "run") return;
-    const delay = this.feed.frame?.delay_ms;
+    const { delay } = this.feed;
     const words = [this.feed.fresh === false ? "Paused, no new data" : "", this.querySelector("[data-in-zone]").textContent, delay === undefined || delay === null ? "" : `delay ${Math.round(delay)} milliseconds`];
     say(this.querySelector("[data-spoken]"), words.filter(Boolean).join(", "));
   }
