@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from math import radians
 from typing import Final
 
+import numba
 import numpy as np
 
 from core.body.erkf import ErkfInputs, links_of, new_record, noise_of
@@ -54,6 +55,18 @@ class Signals:
         return Signals(self.acc[k], self.gyr[k], self.valid[k], self.still[k])
 
 
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _flag(valid, still, foot, flags):  # type: ignore[no-untyped-def]
+    """Write the kernel's bits (T, n) of what is measured, stands and rests."""
+    for k in range(valid.shape[0]):
+        for i in range(valid.shape[1]):
+            flags[k, i] = 0 if valid[k, i] else INVALID
+            if foot[i] and still[k, i, 0]:
+                flags[k, i] |= CONTACT
+            if still[k, i, 1]:
+                flags[k, i] |= STILL
+
+
 class LiveErkf:
     """The filter of one tree; any division into blocks gives the same bits.
 
@@ -88,15 +101,16 @@ class LiveErkf:
     def push(self, signals: Signals) -> tuple[Floats, Floats]:
         """States (T, n, 16) and distances (T, joints) of the ends of each joint; NaN once it is `broken`."""
         T, n = signals.valid.shape
-        out, sd = np.full((T, n, 16), np.nan), np.empty((T, n))
-        residual, hit = np.full((T, len(self.tree.joints)), np.nan), np.empty((T, n), np.bool_)
+        out, sd = np.empty((T, n, 16)), np.empty((T, n))
+        residual, hit = np.empty((T, len(self.tree.joints))), np.empty((T, n), np.bool_)
         if self.broken:
+            out[:], residual[:] = np.nan, np.nan
             return out, residual
         step = np.full(T, self._dt)
         if self._first and T:
             step[0], self._first = 0.0, False
-        flags = np.where(signals.valid, 0, INVALID)
-        flags += CONTACT * (signals.still[:, :, 0] & self._foot) + STILL * signals.still[:, :, 1]
+        flags = np.empty((T, n), np.int64)
+        _flag(signals.valid, signals.still, self._foot, flags)
         broke = forward(
             self._x, self._P, self._before, self._dx, self._refused, step, signals.acc, signals.gyr, flags,
             self._heading, self._links, self._noise, self._record, out, sd, residual, hit,

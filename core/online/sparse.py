@@ -8,21 +8,23 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.l7s import inputs_of
 from core.body.l7s_filter import L7sInputs, L7sParams, L7sState, L7sTrack, Worn, filter_block, start
-from core.body.l7s_legs import BODIES, LEGS, LegModel, solve_legs
+from core.body.l7s_legs import BODIES, HIP_SIDE, LEGS, M_LEG, LegModel
 from core.body.model import BodyModel
-from core.body.tree import PRESETS
 from core.calibration.result import SegmentCalibration
 from core.errors import EstimationError
-from core.frames import FOOT, GRAVITY, Bools, Floats, Segment
-from core.fusion.orientations import Orientations
+from core.frames import FOOT, GRAVITY, SHANK, THIGH, Bools, Segment
 from core.online.body import FootPaths, Placed, Raw
 from core.online.frame import Method
-from core.rotation import from_matrix
+from core.online.sparse_kernel import in_sy_frames, legs
 
-FIGURE: Final = PRESETS["lower_body7"]
-"""Segments of the figure."""
+FIGURE: Final[tuple[Segment, ...]] = (
+    "pelvis",
+    *(segment for side in LEGS for segment in (THIGH[side], SHANK[side], FOOT[side])),
+)
+"""Segments of the figure in the kernel's order."""
+
+HIP_SIGN: Final = np.array([HIP_SIDE[side] for side in LEGS])
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
@@ -68,6 +70,8 @@ class Sparse:
         self._mounted = {s: mounted[s] for s in self.attitudes}
         self._model, self._rate_hz, self._params = LegModel.of(body), rate_hz, params or L7sParams()
         self._feet = feet
+        self._to_foot = np.array(self._model.to_isb("foot_l"))
+        self._back = {s: np.ascontiguousarray(self._model.to_isb(s).T) for s in self.attitudes}
         self._state: L7sState | None = None
         self._lost = np.zeros(len(LEGS), np.bool_)
         self._broken = False
@@ -84,30 +88,46 @@ class Sparse:
         if self._state is None:
             self._state = start(inputs, self._model, self._params)
         track = self._filtered(inputs)
-        T = len(inputs.step)
-        legs = solve_legs(track.R, track.p, self._model)
-        q = {"pelvis": from_matrix(track.R[:, 0] @ self._model.to_isb("pelvis")), **legs.q}
-        p = {"pelvis": track.p[:, 0], **legs.p}
-        whole = self._known(raw, inputs.step) & np.isfinite(track.p[:, 0, 0])
-        known = np.repeat(whole[:, None], len(FIGURE), axis=1)
-        return Placed(
-            np.stack([q[s] for s in FIGURE], axis=1), np.stack([p[s] for s in FIGURE], axis=1), known,
-            np.asarray(whole).reshape(T), paths,
-        )  # fmt: skip
+        T, x = len(inputs.step), self._model
+        q, p = np.empty((T, len(FIGURE), 4)), np.empty((T, len(FIGURE), 3))
+        legs(
+            track.R,
+            track.p,
+            x.hip_width,
+            x.thigh,
+            x.shank,
+            x.foot,
+            HIP_SIGN,
+            M_LEG.copy(),
+            self._to_foot,
+            q,
+            p,
+        )
+        whole = np.asarray(self._known(raw, inputs.step) & np.isfinite(track.p[:, 0, 0]))
+        return Placed(q, p, np.repeat(whole[:, None], len(FIGURE), axis=1), whole, paths)
 
     def _inputs(self, raw: Raw, step: Bools) -> L7sInputs:
-        acceleration: dict[Segment, Floats] = {}
-        for segment, i in self._column.items():
-            mounted = self._mounted[segment]
-            acceleration[segment] = np.empty((len(raw.acc), 3))
+        """As `inputs_of`."""
+        T = len(raw.acc)
+        R, acc = np.empty((T, 3, 3, 3)), np.zeros((T, 3, 3))
+        R[:, 0] = np.eye(3)
+        for b, segment in enumerate(BODIES):
+            if segment not in self._column:
+                continue
+            i, mounted, q = self._column[segment], self._mounted[segment], raw.turned[segment]
+            excess = mounted.rest_norm - GRAVITY
+            free = np.empty((T, 3))
             _free(
                 np.ascontiguousarray(raw.acc[:, i]), np.ascontiguousarray(raw.valid[:, i]),
-                mounted.R_segment_sensor, mounted.rest_norm - GRAVITY,
-                np.ascontiguousarray(raw.turned[segment]), acceleration[segment],
+                mounted.R_segment_sensor, excess, np.ascontiguousarray(q), free,
             )  # fmt: skip
-        take = Orientations(np.arange(len(raw.acc)) / self._rate_hz, self._rate_hz, raw.turned, {}, "live")
-        steps = {side: step[:, i] for i, side in enumerate(LEGS)}
-        return inputs_of(take, acceleration, steps, self._model, self._worn)
+            acc[:, b] = free
+            turned = np.empty((T, 3, 3))
+            in_sy_frames(np.ascontiguousarray(q), self._back[segment], turned)
+            R[:, b] = turned
+        if self._worn == "2I":
+            acc[:, 0] = 0.5 * (acc[:, 1] + acc[:, 2])
+        return L7sInputs(R, acc, step, self._worn)
 
     def _filtered(self, inputs: L7sInputs) -> L7sTrack:
         """The track of a block; NaN from the sample on at which the legs cannot be put together any more."""

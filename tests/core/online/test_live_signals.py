@@ -9,13 +9,17 @@ import pytest
 from core.angles import joint_angles
 from core.body import BodyModel
 from core.body.gaps import bridged
+from core.body.l7s_legs import M_LEG, LegModel, solve_legs
 from core.body.still import AT_REST, FOOT_STILL, still_samples
 from core.body.tree import PRESETS, person_tree
 from core.frames import GRAVITY, Bools, Floats
 from core.fusion.orientations import Orientations
 from core.online.bridge import Bridge
 from core.online.joints import LiveAngles
+from core.online.sparse import FIGURE, HIP_SIGN
+from core.online.sparse_kernel import in_sy_frames, legs
 from core.online.still import Stillness
+from core.rotation import from_matrix, to_matrix
 
 SEGMENTS = PRESETS["lower_body7"]
 RATE = 100.0
@@ -126,3 +130,22 @@ def test_angles_are_those_between_worn_neighbours(worn: tuple[str, ...]) -> None
     assert ("pelvis_tilt" in names) == ("pelvis" in worn)
     assert ("ankle_dorsiflexion_l" in names) == ("shank_l" in worn)
     assert not any(name.startswith(("hip", "knee")) for name in names)
+
+
+def test_compiled_legs_are_those_of_the_leg_model() -> None:
+    model = LegModel.of(BodyModel.from_height(1.7))
+    rng = np.random.default_rng(4)
+    small = rng.normal(scale=0.3, size=(300, 3, 4)) + np.array([1.0, 0.0, 0.0, 0.0])
+    R = to_matrix(small / np.linalg.norm(small, axis=2, keepdims=True))
+    p = np.array([[0.0, 0.0, 0.9], [0.0, 0.1, 0.1], [0.0, -0.1, 0.1]]) + rng.normal(0.0, 0.05, (300, 3, 3))
+    stored = solve_legs(R, p, model)
+    q, at = np.empty((300, 7, 4)), np.empty((300, 7, 3))
+    to_foot = np.array(model.to_isb("foot_l"))
+    legs(R, p, model.hip_width, model.thigh, model.shank, model.foot, HIP_SIGN, M_LEG.copy(), to_foot, q, at)
+    np.testing.assert_allclose(q[:, 0], from_matrix(R[:, 0] @ M_LEG), atol=1e-12)
+    for i, segment in enumerate(FIGURE[1:], 1):
+        np.testing.assert_allclose(q[:, i], stored.q[segment], atol=1e-12)
+        np.testing.assert_allclose(at[:, i], stored.p[segment], atol=1e-12)
+    again = np.empty((300, 3, 3))
+    in_sy_frames(q[:, 3].copy(), to_foot.T.copy(), again)
+    np.testing.assert_allclose(again, R[:, 1], atol=1e-12)
