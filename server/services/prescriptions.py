@@ -13,9 +13,10 @@ from typing import Any
 
 from sqlalchemy import Connection, insert, select, update
 
-from core.change import detectable
+from core.change import ChangeLimit, detectable
 from core.change.limits import Limb
 from core.feedback import Baseline, Cue, Prescription
+from core.frames import Side
 from server import audit
 from server.services import patients, sessions, targets
 from server.services.errors import Conflict, NotFound, ServiceError
@@ -117,9 +118,10 @@ def for_take(c: Connection, blobs: BlobStore, session_id: str) -> tuple[Prescrip
     if written is None:
         return None
     patient = patients.get(c, this.patient_id)
-    walk = targets.last_walk(c, blobs, patient, before=this)
     content = written.content
-    if content.target.source == "norm":
+    by_norm = content.target.source == "norm"
+    walk = targets.last_walk(c, blobs, patient, before=this, with_controls=by_norm)
+    if by_norm:
         fresh = targets.offer(walk, "norm", content.parameter, content.side).target
         content = content if fresh is None else replace(content, target=fresh)
     return content, _baseline(c, written, patient, walk, session_id)
@@ -215,24 +217,23 @@ def _baseline(
         # the block opens the visit, not its later takes
         after_training=bool(alike) and not today,
     )
-    if walk is None:
-        return baseline
-    usual = targets.usual(walk, content.parameter, content.side)
-    if usual is not None:
+    usual = None if walk is None else targets.usual(walk, content.parameter, content.side)
+    if walk is not None and usual is not None:
         baseline = replace(baseline, mean=usual.mean, sd=usual.sd, n=usual.n, session_id=walk.session.id)
-    if content.side is None:
-        return baseline
-    other = targets.other(content.side)
-    there = targets.usual(walk, content.parameter, other)
-    if there is None or there.mean is None:
-        return baseline
-    limb: Limb | None = None
-    if patient.affected_side is not None:
-        limb = "affected" if other == patient.affected_side else "unaffected"
-    mdc = detectable(content.parameter, there.mean, limb)
+    mdc = None if content.side is None else _mdc(patient, content, walk, targets.other(content.side))
     if mdc is None:
         return baseline
     return replace(baseline, other_mdc=mdc.value, other_mdc_source=f"MDC, {mdc.source}")
+
+
+def _mdc(patient: Patient, content: Prescription, walk: Walk | None, side: Side) -> ChangeLimit | None:
+    """Limit of change of the untrained side, from what it usually does, else from the target."""
+    there = None if walk is None else targets.usual(walk, content.parameter, side)
+    value = content.target.mean if there is None else there.mean
+    limb: Limb | None = None
+    if patient.affected_side is not None:
+        limb = "affected" if side == patient.affected_side else "unaffected"
+    return None if value is None else detectable(content.parameter, value, limb)
 
 
 def _last_level(c: Connection, own: Sequence[Training]) -> int | None:

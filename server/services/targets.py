@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import sqrt
 from typing import Final
@@ -29,12 +30,17 @@ FEWEST: Final = 5
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """An analysed session of a person with what it is compared with."""
+    """An analysed session of a person with what it is compared with.
+
+    Parameters
+    ----------
+    own_controls : the clinic's own norm, read when it is asked for: there may be many controls.
+    """
 
     session: Session
     numbers: Numbers
     norms: Norms
-    own_controls: Norms | None
+    own_controls: Callable[[], Norms | None]
 
 
 @dataclass(frozen=True)
@@ -51,12 +57,15 @@ def last_walk(
     patient: Patient,
     before: Session | None = None,
     session_id: str | None = None,
+    *,
+    with_controls: bool = True,
 ) -> Walk | None:
     """The newest analysed session of a person; None without one.
 
     Parameters
     ----------
     before : only sessions of its protocol on its day or earlier, itself not. session_id : only this one.
+    with_controls : look for the clinic's own controls too.
     """
     found = [
         a
@@ -70,15 +79,13 @@ def last_walk(
     last = found[-1]
     numbers = reviews.numbers(blobs, last.found, last.edits)
     speed = _mean(numbers, "gait_speed_mps", None)
-    group = controls.group(
-        blobs, controls.visits(c, patient, last.session), None if speed is None else speed.mean
-    )
-    return Walk(
-        last.session,
-        numbers,
-        comparisons.norms(patient, last.session, numbers),
-        None if group is None or speed is None else group.norms(speed.mean),
-    )
+    visits = controls.visits(c, patient, last.session) if with_controls else ()
+
+    def own_controls() -> Norms | None:
+        group = controls.group(blobs, visits, None if speed is None else speed.mean)
+        return None if group is None or speed is None else group.norms(speed.mean)
+
+    return Walk(last.session, numbers, comparisons.norms(patient, last.session, numbers), own_controls)
 
 
 def offer(walk: Walk | None, source: TargetSource, parameter: str, side: Side | None) -> Offer:
@@ -117,9 +124,10 @@ def usual(walk: Walk, parameter: str, side: Side | None) -> Parameter | None:
 
 def _norm(walk: Walk, parameter: str) -> Offer:
     norms = walk.norms
-    own = None if walk.own_controls is None else walk.own_controls.values.get(parameter)
-    values = [norms.expected.get(parameter), norms.values.get(parameter), own]
-    found = next((v for v in values if v is not None and v.comparable and v.sd > 0.0), None)
+    values = [norms.expected.get(parameter), norms.values.get(parameter)]
+    found = next((v for v in values if _serves(v)), None)
+    if found is None and (own := walk.own_controls()) is not None and _serves(own.values.get(parameter)):
+        found = own.values[parameter]
     if found is not None:
         return Offer(Target("norm", found.mean, found.sd, _words(found), walk.session.id))
     reason = norms.reason if parameter in ANGLES else norms.timing_reason
@@ -129,6 +137,10 @@ def _norm(walk: Walk, parameter: str) -> Offer:
         there = next((v for v in values if v is not None), None)
         said = "There is no norm of this parameter." if there is None else there.note
     return Offer(None, f"{said} Choose another source, or enter a target.")
+
+
+def _serves(value: NormValue | None) -> bool:
+    return value is not None and value.comparable and value.sd > 0.0
 
 
 def _own(walk: Walk, parameter: str, side: Side | None) -> Offer:

@@ -113,3 +113,15 @@ async def test_a_side_that_nobody_has_is_refused(clinic: Clinic) -> None:
     async with clinic.client("clinician") as client:
         answer = await client.post(f"{API}/patients", json={"code": "X", "affected_side": "both"})
     assert answer.status_code == 422
+
+
+async def test_a_target_of_feedback_is_that_of_own_controls_where_no_table_has_one(clinic: Clinic) -> None:
+    async with clinic.client("clinician", timeout=60) as client:
+        people = (await client.get(f"{API}/patients")).json()
+        patient = next(p for p in people if p["code"] == "P-1")["id"]
+        query = {"parameter": "foot_pitch_ic_deg", "side": "left"}
+        offers = (await client.get(f"{API}/patients/{patient}/targets", params=query)).json()
+    norm = next(o for o in offers if o["source"] == "norm")
+    assert norm["mean"] is not None
+    assert norm["sd"] > 0.0
+    assert f"{CONTROLS} controls of this clinic" in norm["words"]

@@ -160,6 +160,7 @@ async def test_a_take_gets_target_baseline_and_the_limit_of_the_other_side(clini
     FeedbackEngine(given, baseline)
     _, first = _for_take(clinic, before)
     assert first.mean is None, "nothing was known before the first walk"
+    assert first.other_mdc == 4.2, "the limit holds all the same"
 
 
 async def test_a_visit_after_a_training_begins_with_retention_and_goes_on_at_its_level(
