@@ -99,13 +99,14 @@ VISITS = (
 PRESCRIBED: tuple[Person, Mapping[str, object]] = (
     STROKE,
     {
-        "parameter": "single_support_pct",
+        "parameter": "stride_length_m",
         "side": "left",
-        "target": {"source": "manual", "mean": 35.0, "sd": 2.5},
-        "modes": ["bar", "tone"],
+        "target": {"source": "manual", "mean": 1.2, "sd": 0.05},
+        "modes": ["bar", "tone", "tick"],
+        "schedule": {"kind": "fading", "strides_per_share": 60, "probe_every": 30, "probe_strides": 6},
     },
 )
-"""Who is trained in live walks: standing on the affected leg for as long as on the other one."""
+"""Who is trained in live walks, and how: longer strides (server/services/demo_live.py)."""
 
 
 def record(visit: Visit) -> Simulation:

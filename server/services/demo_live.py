@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING, Any, Final
 from server.live.client import stream
 from server.live.pairing import pair
 from server.live.playback import Due, cut, hello_of, paced
-from server.services import live, patients, prescriptions, sessions
+from server.services import live, patients, sessions
 from server.services.demo_clinic import STROKE
 from server.settings import Settings, load_settings
-from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.tables import now
 
@@ -32,16 +31,8 @@ GROWTH: Final = 0.025
 """Each lap's steps are longer by so much of the first: he learns."""
 PER_BATCH: Final = 5
 
-PRESCRIPTION: Final[Mapping[str, object]] = {
-    "parameter": "stride_length_m",
-    "side": "left",
-    "target": {"source": "manual", "mean": 1.2, "sd": 0.05},
-    "modes": ["bar", "tone", "tick"],
-    "schedule": {"kind": "fading", "strides_per_share": 60, "probe_every": 30, "probe_strides": 6},
-}
 
-
-def training(seed: int = 5) -> Simulation:
+def training(laps: int = LAPS, seed: int = 5) -> Simulation:
     """Laps of a corridor for about eight minutes, the steps longer from lap to lap."""
     from core.simulate import PATIENTS, Arc, Script, Stand, Straight, simulate
     from core.simulate.script import scaled
@@ -50,12 +41,12 @@ def training(seed: int = 5) -> Simulation:
     man = PATIENTS["hemi_mild"]
     walker = man.walker.scaled_to(STROKE.height_m)
     turn_m, turn_s = 0.8 * man.step_m, 1.05 * man.step_s
-    laps: list[Straight | Arc] = []
-    for lap in range(LAPS):
+    course: list[Straight | Arc] = []
+    for lap in range(laps):
         length = man.step_m * (1.0 + GROWTH * lap)
         for way in (pi, -pi):
-            laps += [Straight(16.0, length, man.step_s), Arc(1.2, way, turn_m, turn_s)]
-    script: Script = (Stand(8.0), *laps, Stand(5.0))
+            course += [Straight(16.0, length, man.step_s), Arc(1.2, way, turn_m, turn_s)]
+    script: Script = (Stand(8.0), *course, Stand(5.0))
     return simulate(scaled(script, walker.scale), walker, seed, ON_SKIN)
 
 
@@ -63,8 +54,6 @@ def open_take(settings: Settings) -> str:
     """A session of the patient with an open take; returns its code."""
     with closing(Database(settings.database)) as db, db.write() as c:
         patient = next(p for p in patients.listing(c) if p.code == STROKE.code)
-        if prescriptions.in_force(c, patient.id) is None:
-            prescriptions.write(c, BlobStore(settings.blobs), None, patient.id, PRESCRIPTION)
         session = sessions.create(c, None, patient.id, title=TITLE, performed_on=now().date(), note="")
         return live.open_take(c, None, session.id)[1]
 

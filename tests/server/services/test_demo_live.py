@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from server.services import live, patients, prescriptions
+from server.services.demo_clinic import PRESCRIBED
+from server.services.demo_live import open_take, training, walk
+from server.storage.blobs import BlobStore
+from server.storage.tables import session
+from tests.server.clinic import open_clinic
+from tests.server.serving import serve
+
+
+@pytest.fixture(scope="session")
+def anyio_backend() -> str:
+    return "asyncio"
+
+
+@pytest.mark.anyio
+async def test_the_demo_s_live_patient_walks_is_told_how_and_becomes_a_recording(tmp_path: Path) -> None:
+    async with open_clinic(tmp_path, live_workers=1, min_free_bytes=0) as clinic, serve(clinic.app) as port:
+        person, content = PRESCRIBED
+        with clinic.db.write() as c:
+            fields = {k: v for k, v in vars(person).items() if k != "code"}
+            someone = patients.create(c, None, code=person.code, **fields)
+            prescriptions.write(c, BlobStore(clinic.settings.blobs), None, someone.id, content)
+        code = open_take(clinic.settings)
+        made = training(laps=1)
+        # a client with a loop of its own, as in the demo
+        await asyncio.to_thread(lambda: asyncio.run(walk(f"http://127.0.0.1:{port}", code, made, speed=10.0)))
+        with clinic.db.read() as c:
+            sid = c.execute(session.select()).one().id
+        async with asyncio.timeout(60):
+            while True:
+                with clinic.db.read() as c:
+                    take = live.current(c, sid)
+                    cues = [e for e in live.events(c, take.id) if e.kind == "cue"] if take else []
+                if take is not None and take.recording_id is not None and len(cues) > 10:
+                    break
+                await asyncio.sleep(0.2)
+    assert take.state == "finished"
+    assert take.problem is None
+    assert {e.content["side"] for e in cues} == {"left"}
