@@ -72,7 +72,7 @@ class Figure:
             for side, letter in self._letters.items():
                 letter.visible = valid and self._follow
                 letter.position = m.toes[side][i]
-            self._room.bring(m.root[i] if self._follow else self._middle)
+            self._room.bring(*(m.root[i] if self._follow else self._middle).tolist())
             self._ground.show(self._t_s, recent=self._follow)
         self._server.flush()
         return self._t_s

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import atan2
 from typing import Final
 
 import numpy as np
 import viser
 
-from core import rotation
 from core.body.model import BodyModel
 from core.frames import FOOT, SIDES, Floats, Segment
 from server.viewer.batches import add_batch, colours, put
@@ -19,7 +19,6 @@ from server.viewer.moment import Moment
 from server.viewer.reference import SEGMENTS, ReferenceWalk, standing
 from server.viewer.room import ROOM, Room, near
 
-_AXIS: Final = np.array([1.0, 0.0, 0.0])
 _BURIED: Final = np.array([0.0, 0.0, -100.0])
 """Where a ghost is that has no phase."""
 
@@ -62,7 +61,7 @@ class LiveFigure:
         self._floor.clear()
         self._path, self._t_s = LivePath(), None
         self._draw(Layout(SEGMENTS, self._body, ""), q, p, ("standing",))
-        self._room.bring(np.zeros(2))
+        self._room.bring(0.0, 0.0)
         self._set_grey(True)
         self._server.flush()
 
@@ -98,15 +97,14 @@ class LiveFigure:
 
     def _show(self, moment: Moment) -> None:
         lead: Segment = "pelvis" if "pelvis" in moment.q else next(iter(moment.q))
-        place = moment.p[lead]
-        x = rotation.rotate(moment.q[lead], _AXIS)
-        root, heading = self._path.push(moment.t_s, place[:2], float(np.arctan2(x[1], x[0])))
+        x, y, _ = moment.p[lead].tolist()
+        root_x, root_y, heading = self._path.push(moment.t_s, x, y, _yaw(*moment.q[lead].tolist()))
         q = {s: a[np.newaxis] for s, a in moment.q.items()}
         p = {s: a[np.newaxis] for s, a in moment.p.items()}
         ghost = self._reference is not None and all(s in q for s in SEGMENTS)
         if ghost and self._reference is not None:
             # the ghost is one frame more of the same layout
-            other = self._reference.at(moment.phase, place[:2], heading)
+            other = self._reference.at(moment.phase, (x, y), heading)
             for k, s in enumerate(SEGMENTS):
                 at = (moment.q[s], _BURIED) if other is None else (other[0][k], other[1][k])
                 q[s], p[s] = np.array([moment.q[s], at[0]]), np.array([moment.p[s], at[1]])
@@ -127,7 +125,7 @@ class LiveFigure:
                 sole, foot = placed.soles[side][0], moment.q[FOOT[side]]
                 self._floor.push(moment.t_s, side, sole, foot, moment.contact.get(side))
         self._floor.send(moment.t_s)
-        self._room.bring(root)
+        self._room.bring(root_x, root_y)
 
     def _draw(
         self,
@@ -157,3 +155,8 @@ class LiveFigure:
     def _paint(self) -> None:
         for _, batch, handle in self._drawn:
             handle.batched_colors = colours(batch, self._dark, ghost=len(batch.wxyz) > 1, grey=self._grey)
+
+
+def _yaw(w: float, x: float, y: float, z: float) -> float:
+    """core.rotation.yaw of one orientation, without arrays."""
+    return atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))

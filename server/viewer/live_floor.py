@@ -148,7 +148,7 @@ class _Steps:
         self._next = 0
         self._shown: int | None = None
         self._slowest = np.inf
-        self._rest: tuple[Floats, float] = (np.zeros(3), 0.0)
+        self._rest: tuple[Floats, Floats] = (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
         self._before: deque[tuple[float, Floats]] = deque()
 
     def clear(self) -> None:
@@ -175,7 +175,7 @@ class _Steps:
         speed = float(np.linalg.norm(sole - was)) / (t_s - since)
         if speed < self._slowest:
             self._slowest = speed
-            self._rest = sole, float(rotation.yaw(q))
+            self._rest = sole, q
             if speed < REST_MPS and self._shown is None:
                 self._print()
 
@@ -198,7 +198,7 @@ class _Steps:
         self._shown, self._slowest = None, np.inf
 
     def _put(self, k: int) -> None:
-        place, turn = self._rest
+        place, turn = self._rest[0], float(rotation.yaw(self._rest[1]))
         self._position[k] = (place[0], place[1], CLEAR_M)
         self._wxyz[k] = rotation.about(2, turn)
         put(self.node, self._wxyz, self._position)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections import deque
+from math import pi
 from typing import Final
 
-import numpy as np
-
-from core.frames import Floats
 from server.viewer.motion import ROOT_WINDOW_S
 
 GAP_S: Final = 1.0
 """After such a gap, or a step back in time, what was before says nothing about now."""
+
+Sample = tuple[float, float, float, float]
+"""Time in s, place in m, heading in rad."""
 
 
 class LivePath:
@@ -22,24 +23,48 @@ class LivePath:
     """
 
     def __init__(self) -> None:
-        self._seen: deque[tuple[float, float, float, float]] = deque()
         self._heading = 0.0
+        self._clear()
 
-    def push(self, t_s: float, place: Floats, heading: float) -> tuple[Floats, float]:
-        """Take in a place (2,) in m and a heading in rad and return both smoothed."""
-        if self._seen and not 0.0 <= t_s - self._seen[-1][0] <= GAP_S:
-            self._seen.clear()
+    def push(self, t_s: float, x: float, y: float, heading: float) -> tuple[float, float, float]:
+        """Take in a place in m and a heading in rad and return both smoothed."""
+        if self._late.samples and not 0.0 <= t_s - self._late.samples[-1][0] <= GAP_S:
+            self._clear()
         # unwrapped, so that a turn through ±π is a turn like any other
-        self._heading += (heading - self._heading + np.pi) % (2 * np.pi) - np.pi
-        self._seen.append((t_s, float(place[0]), float(place[1]), self._heading))
-        while self._seen[0][0] <= t_s - 2 * ROOT_WINDOW_S:
-            self._seen.popleft()
-        rows = np.array(self._seen)
-        late = rows[:, 0] > t_s - ROOT_WINDOW_S
-        now = rows[late, 1:].mean(axis=0)
-        if rows[0, 0] <= t_s - 1.5 * ROOT_WINDOW_S:
+        self._heading += (heading - self._heading + pi) % (2 * pi) - pi
+        self._late.add((t_s, x, y, self._heading))
+        while self._late.samples[0][0] <= t_s - ROOT_WINDOW_S:
+            self._early.add(self._late.drop())
+        while self._early.samples and self._early.samples[0][0] <= t_s - 2 * ROOT_WINDOW_S:
+            self._early.drop()
+        now, *at = self._late.mean()
+        if self._early.samples and self._early.samples[0][0] <= t_s - 1.5 * ROOT_WINDOW_S:
             # both windows by what is in them: the older one may not be full yet
-            way = now - rows[~late, 1:].mean(axis=0)
-            apart = rows[late, 0].mean() - rows[~late, 0].mean()
-            now += way / apart * (t_s - rows[late, 0].mean())
-        return now[:2], float(now[2])
+            before, *was = self._early.mean()
+            share = (t_s - now) / (now - before)
+            at = [a + (a - b) * share for a, b in zip(at, was, strict=True)]
+        return at[0], at[1], at[2]
+
+    def _clear(self) -> None:
+        self._late, self._early = _Window(), _Window()
+
+
+class _Window:
+    """Samples and their sums, kept up to date from one to the next."""
+
+    def __init__(self) -> None:
+        self.samples: deque[Sample] = deque()
+        self._sums = [0.0, 0.0, 0.0, 0.0]
+
+    def add(self, sample: Sample) -> None:
+        self.samples.append(sample)
+        self._sums = [a + b for a, b in zip(self._sums, sample, strict=True)]
+
+    def drop(self) -> Sample:
+        sample = self.samples.popleft()
+        # an empty window begins anew, so that rounding does not grow for ever
+        self._sums = [a - b for a, b in zip(self._sums, sample, strict=True)] if self.samples else [0.0] * 4
+        return sample
+
+    def mean(self) -> list[float]:
+        return [x / len(self.samples) for x in self._sums]

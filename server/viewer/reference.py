@@ -55,20 +55,22 @@ class ReferenceWalk:
             points.append(np.stack(np.broadcast_arrays(hip, knee, ankle, *sole), axis=1))
         self._pelvis, self._turn, self._points = pelvis, turn, points
 
-    def at(self, phases: Phases, place: Floats, heading: float) -> tuple[Floats, Floats] | None:
+    def at(self, phases: Phases, place: tuple[float, float], heading: float) -> tuple[Floats, Floats] | None:
         """Orientations (7, 4) and positions (7, 3) in m of `SEGMENTS`, the lower sole on the floor.
 
         Parameters
         ----------
         phases : side → 0 to 1; where one is not known, half a cycle from the other. None when neither is.
-        place : (2,) m, where the pelvis is. heading : rad, where the walk goes.
+        place : m, where the pelvis is. heading : rad, where the walk goes.
         """
         left, right = (_row(phases, side, self._last) for side in SIDES)
         if left is None or right is None:
             return None
         return self.pose(left, right, place, heading)
 
-    def pose(self, left: int, right: int, place: Floats, heading: float) -> tuple[Floats, Floats]:
+    def pose(
+        self, left: int, right: int, place: tuple[float, float], heading: float
+    ) -> tuple[Floats, Floats]:
         """As `at`, by the rows of the curves that the legs are at."""
         rows: dict[Side, int] = {"left": left, "right": right}
         lead = rows[self.lead]
@@ -85,7 +87,7 @@ class ReferenceWalk:
 
 def standing(body: BodyModel) -> tuple[Floats, Floats]:
     """Orientations and positions of `SEGMENTS` of somebody who stands at the origin and looks along x."""
-    return ReferenceWalk({name: np.zeros(1) for name in SAGITTAL}, body).pose(0, 0, np.zeros(2), 0.0)
+    return ReferenceWalk({name: np.zeros(1) for name in SAGITTAL}, body).pose(0, 0, (0.0, 0.0), 0.0)
 
 
 def _row(phases: Phases, side: Side, last: int) -> int | None:

@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from core.frames import Floats
 from server.viewer.colours import BACKGROUND, FLOOR
@@ -57,9 +56,8 @@ class Room:
         )
         server.initial_camera.fov = FOV_RAD
 
-    def bring(self, place: NDArray[np.floating]) -> None:
-        """Bring a place (2,) of the floor, m, to where the camera looks."""
-        x, y = place.tolist()
+    def bring(self, x: float, y: float) -> None:
+        """Bring a place of the floor, m, to where the camera looks."""
         self._node.position = (-x, -y, 0.0)
 
     def look(self, shot: Shot) -> None:

@@ -189,7 +189,9 @@ def test_the_camera_follows_a_walk_without_delay_and_without_its_sway(sway_m: fl
     path = LivePath()
     t = np.arange(300) / RATE_HZ
     place = np.stack((1.2 * t, sway_m * np.sin(2 * np.pi * t / 1.2)), axis=1)
-    found = np.array([path.push(float(x), p, 3.0 + 0.02 * x)[0] for x, p in zip(t, place, strict=True)])
+    found = np.array(
+        [path.push(s, x, y, 3.0)[:2] for s, (x, y) in zip(t.tolist(), place.tolist(), strict=True)]
+    )
     steady = found[90:]
     np.testing.assert_allclose(steady[:, 0], place[90:, 0], atol=0.02)
     assert np.abs(steady[:, 1]).max() <= 0.15 * sway_m + 1e-9
@@ -197,10 +199,9 @@ def test_the_camera_follows_a_walk_without_delay_and_without_its_sway(sway_m: fl
 
 def test_a_heading_may_turn_through_the_back() -> None:
     path = LivePath()
-    found = [
-        path.push(k / RATE_HZ, np.zeros(2), (3.0 + 0.01 * k + np.pi) % (2 * np.pi) - np.pi) for k in range(90)
-    ]
-    assert found[-1][1] == pytest.approx(3.89, abs=0.02)
+    turned = [(3.0 + 0.01 * k + np.pi) % (2 * np.pi) - np.pi for k in range(90)]
+    found = [path.push(k / RATE_HZ, 0.0, 0.0, x) for k, x in enumerate(turned)]
+    assert found[-1][2] == pytest.approx(3.89, abs=0.02)
 
 
 def ghost_of(scene: Scene, name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,139 @@
+"""What a 3D figure costs the web process at 30 frames a second, live and as a replay, by viewers."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+import viser
+
+from core.norms import adult_kinematics
+from server.viewer.figure import Figure
+from server.viewer.ghost import ghost_of
+from server.viewer.live import LiveFigure
+from server.viewer.live_reference import LiveReference
+from server.viewer.live_watch import LiveWatch
+from server.viewer.motion import prepare
+from tests.server import walk
+from tests.server.viewer.pictures import POSES, RATE_HZ, picture
+
+LASTS_S = 8.0
+SETTLES_S = 2.0
+BUDGET = 0.05
+"""Share of a core (issue 5)."""
+
+DRAIN = """
+import sys, threading, viser
+from websockets.sync.client import connect
+def drain():
+    with connect(f"ws://127.0.0.1:{sys.argv[1]}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None,
+                 compression=None, proxy=None) as ws:
+        ws.recv()
+        print("ready", flush=True)
+        for _ in ws: pass
+for _ in range(int(sys.argv[2])): threading.Thread(target=drain).start()
+"""
+"""Browsers that read everything, in a process of their own."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Shares of a core: of the whole process, and of the thread that poses."""
+
+    process: float
+    posing: float
+
+
+@contextmanager
+def watched(server: viser.ViserServer, viewers: int) -> Iterator[None]:
+    with subprocess.Popen(
+        [sys.executable, "-c", DRAIN, str(server.get_port()), str(viewers)], stdout=subprocess.PIPE
+    ) as browsers:
+        assert browsers.stdout is not None
+        for _ in range(viewers):
+            assert browsers.stdout.readline() == b"ready\n"
+        try:
+            yield
+        finally:
+            browsers.kill()
+
+
+def cost(show: Callable[[int], object]) -> Cost:
+    """CPU time per second of showing 30 frames a second."""
+    spent = []
+    for lasts in (SETTLES_S, LASTS_S):
+        process, thread, began = time.process_time(), time.thread_time(), time.perf_counter()
+        for i in range(round(lasts * RATE_HZ)):
+            show(i)
+            time.sleep(max(0.0, began + (i + 1) / RATE_HZ - time.perf_counter()))
+        took = time.perf_counter() - began
+        spent.append(Cost((time.process_time() - process) / took, (time.thread_time() - thread) / took))
+    return spent[-1]
+
+
+@contextmanager
+def view() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        yield server
+    finally:
+        server.stop()
+
+
+def live(server: viser.ViserServer) -> Callable[[int], object]:
+    """A live figure with the norm beside it, fed as the hub feeds it."""
+    norm = {name: np.radians(band.mean_deg) for name, band in adult_kinematics(None).bands.items()}
+    watch = LiveWatch(
+        LiveFigure(server, walk.BODY),
+        LiveReference(walk.BODY, norm, lambda: None),
+        ghost=lambda: "norm",
+        strides=lambda: (),
+        watched=lambda: True,
+    )
+    said = [picture(i) for i in range(len(POSES.t_s))]
+    return lambda i: watch.see(said[i])
+
+
+def replay(server: viser.ViserServer) -> Callable[[int], object]:
+    """The same walk replayed with another one over it."""
+    motion = prepare(replace(walk.poses(12.0, 60.0), method="erkf_smoothed"))
+    ghost = ghost_of(motion, walk.strides(), motion, walk.strides())
+    figure = Figure(server, replace(motion, ghost=ghost))
+    return lambda i: figure.pose(i / RATE_HZ)
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("viewers", [1, 4])
+def test_a_live_figure_takes_at_most_a_twentieth_of_a_core(viewers: int) -> None:
+    found = {}
+    for name, made in (("live", live), ("replay", replay)):
+        with view() as server:
+            show = made(server)
+            with watched(server, viewers):
+                found[name] = cost(show)
+    a, b = found["live"], found["replay"]
+    sys.stdout.write(
+        f"{viewers} viewers: live {a.process:.2%} of a core (posing {a.posing:.2%}), replay {b.process:.2%} "
+        f"(posing {b.posing:.2%}); live / replay {a.process / b.process:.2f}\n"
+    )
+    assert a.process <= BUDGET
+
+
+@pytest.mark.bench
+def test_a_picture_is_posed_within_two_milliseconds() -> None:
+    with view() as server:
+        show = live(server)
+        took = []
+        for i in range(300):
+            began = time.thread_time()
+            show(i)
+            took.append(time.thread_time() - began)
+    median = float(np.median(took[30:]))
+    sys.stdout.write(f"a live picture with ghost, trails and prints: median {1e3 * median:.2f} ms\n")
+    assert median <= 2e-3
