@@ -1,0 +1,170 @@
+"""Live takes that are not as they should be: belts, losses, a filter that breaks, other rates, nobody stands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.errors import ParameterError
+from core.frames import SIDES, Segment
+from core.online import LiveFrame, LiveStride, Online
+from core.online.linked import Linked
+from core.parameters.spatial import NAMES as SPATIAL
+from core.recording import SensorSignals, UniformRecording
+from tests.live_walks import batches, hello_of, live, recorded
+from tests.walks import cut, lost, only, simulated
+
+BELT = 1.1
+
+
+def walk(end_s: float = 24.0) -> UniformRecording:
+    return cut(simulated("comfortable", 1)[0], 0.0, end_s)
+
+
+def strides_of(frames: list[LiveFrame]) -> list[LiveStride]:
+    return [s for f in frames for s in f.strides]
+
+
+def codes(frames: list[LiveFrame]) -> list[str]:
+    return [n.code for f in frames for n in f.notices]
+
+
+@pytest.mark.parametrize("speed", [BELT, None])
+def test_on_a_belt_distances_are_the_belts_or_none(speed: float | None) -> None:
+    take = walk()
+    online = Online(hello_of(take), take.subject, "treadmill", belt_speed_mps=speed)
+    frames = [f for b in batches(take) if (f := online.push(b)) is not None]
+    strides = strides_of(frames)
+    assert len(strides) > 20
+    for s in strides:
+        assert s.complete
+        for name in SPATIAL:
+            if speed is not None and name in ("gait_speed_mps", "stride_length_m"):
+                continue
+            assert s.values[name] is None
+            assert s.reasons[name] == "treadmill"
+        length = s.values["stride_length_m"]
+        assert (length is None) == (speed is None)
+        if length is not None:
+            assert length == pytest.approx(BELT * (s.end_s - s.start_s))
+
+
+def test_a_belts_speed_without_a_treadmill_is_refused() -> None:
+    take = walk()
+    with pytest.raises(ParameterError) as caught:
+        Online(hello_of(take), take.subject, "walk", belt_speed_mps=BELT)
+    assert caught.value.code == "belt_speed_without_treadmill"
+
+
+@pytest.mark.parametrize("segment", ["foot_r", "shank_l", "pelvis"])
+def test_a_lost_sensor_comes_back_into_the_figure(segment: Segment) -> None:
+    """What hangs on it is withheld while it is away; a few steps later all is as if nothing had been."""
+    whole, holed = walk(), lost(walk(), segment, 14.0, 15.5)
+    expected, found = recorded(whole), recorded(holed)
+    away = [f for f in found.frames if 14.3 < f.t_s < 15.4]
+    assert away
+    assert not any(f.valid or segment in f.q for f in away)
+    assert all(np.isfinite(list(f.angles.values())).sum() >= 8 for f in away)
+    back = [f for f in found.frames if f.t_s > 15.7]
+    assert all(f.valid for f in back)
+    for name, angle in found.angles_deg.items():
+        if "flexion" in name:
+            assert np.abs(angle - expected.angles_deg[name])[-500:].max() < 3.0, name
+    gaps = [s for s in found.strides if "gap" in s.flags]
+    assert bool(gaps) == segment.startswith("foot")
+    for s in gaps:
+        assert not s.counted
+
+
+def test_a_filter_that_breaks_says_so_once_and_contacts_go_on() -> None:
+    take = walk()
+    online = Online(hello_of(take), take.subject)
+    frames, broken = [], False
+    for batch in batches(take):
+        frame = online.push(batch)
+        if frame is None:
+            continue
+        frames.append(frame)
+        if frame.t_s > 14.0 and not broken:
+            broken = True
+            assert online.chain is not None
+            assert isinstance(online.chain.estimator, Linked)
+            # nothing from outside breaks it
+            core = online.chain.estimator._filtered._filter
+            assert core is not None
+            core._P[:] = -1.0
+    assert codes(frames).count("live_figure_lost") == 1
+    after = [f for f in frames if f.t_s > 14.2]
+    assert not any(f.valid or f.q or f.p for f in after)
+    assert all(np.isnan(list(f.angles.values())).all() for f in after)
+    assert len([e for f in after for e in f.events]) > 20
+    late = [s for s in strides_of(after) if s.start_s > 14.2]
+    assert len(late) > 8
+    for s in late:
+        assert s.values["stride_time_s"] is not None
+        assert s.values["stride_length_m"] is None
+        assert s.values["knee_flexion_max_swing_deg"] is None
+
+
+def slower(take: UniformRecording, rate_hz: float) -> UniformRecording:
+    """The same at another rate, linearly between its samples."""
+    t_s = np.arange(0.0, take.t_s[-1], 1.0 / rate_hz)
+
+    def thin(x: SensorSignals) -> SensorSignals:
+        acc, gyr = (np.stack([np.interp(t_s, take.t_s, c) for c in y.T], axis=1) for y in (x.acc, x.gyr))
+        ok = np.ones(len(t_s), np.bool_)
+        return replace(x, acc=acc, gyr=gyr, mag=None, valid=ok, interpolated=~ok)
+
+    return replace(take, t_s=t_s, rate_hz=rate_hz, sensors={s: thin(x) for s, x in take.sensors.items()})
+
+
+@pytest.mark.parametrize("rate_hz", [60.0, 120.0])
+def test_sensors_of_another_rate_walk_the_same_strides(rate_hz: float) -> None:
+    hundred = [s for s in recorded(walk()).strides if s.complete]
+    other = [s for s in recorded(slower(walk(), rate_hz)).strides if s.complete]
+    assert len(hundred) == len(other)
+    for a, b in zip(hundred, other, strict=True):
+        assert a.side == b.side
+        assert a.start_s == pytest.approx(b.start_s, abs=0.02)
+        one, two = a.values["stride_length_m"], b.values["stride_length_m"]
+        assert one is not None
+        assert two is not None
+        assert one == pytest.approx(two, abs=0.04)
+
+
+def test_what_cannot_be_calibrated_gives_frames_all_the_same() -> None:
+    """A person who never stands still: the frames say what is waited for, and nothing is made up."""
+    take = cut(simulated("comfortable", 1)[0], 8.0, 20.0)
+    _, frames = live(take)
+    assert frames
+    assert {f.stage for f in frames} <= {"waiting", "stand"}
+    assert not strides_of(frames)
+    assert not any(f.q or f.angles or f.events for f in frames)
+    assert all(len(f.health) == len(take.sensors) for f in frames)
+
+
+def test_health_is_of_the_last_seconds() -> None:
+    take = lost(walk(), "foot_r", 12.0, 14.5)
+    _, frames = live(take)
+    by_time = {round(f.t_s, 2): {h.segment: h for h in f.health} for f in frames}
+    before, during, after = (by_time[t] for t in (11.99, 14.49, 23.99))
+    assert before["foot_r"].lost_share == 0.0
+    assert during["foot_r"].lost_share == pytest.approx(0.5, abs=0.03)
+    assert during["foot_l"].lost_share == 0.0
+    assert after["foot_r"].lost_share == 0.0
+    assert all(h.rate_hz == pytest.approx(100.0, rel=0.01) for h in after.values())
+    assert by_time[2.99]["pelvis"].still
+    assert not after["foot_l"].still or not after["foot_r"].still
+
+
+def test_contact_follows_the_events() -> None:
+    _, frames = live(only(walk(), "foot_l", "foot_r", "pelvis"), 1)
+    running = [f for f in frames if f.stage == "running"][1:]
+    state = dict(running[0].contact)
+    for f in running[1:]:
+        for e in f.events:
+            state[e.side] = e.kind == "ic"
+        assert dict(f.contact) == state
+    assert set(state) == set(SIDES)
