@@ -82,6 +82,7 @@ def stride(told: LiveStride) -> dict[str, Any]:
         "side": told.side,
         "start_s": _number(told.start_s, 4),
         "end_s": _number(told.end_s, 4),
+        "detected_s": _number(told.detected_s, 4),
         "foot_off_pct": _number(off, 2),
         "values": {name: _number(value, 5) for name, value in told.values.items()},
         "reasons": dict(told.reasons),

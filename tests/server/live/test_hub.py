@@ -20,10 +20,10 @@ from core.feedback import Cue
 from server.live.client import Report, stream
 from server.live.estimator import Estimator
 from server.live.hub import Hub
-from server.live.messages import Begin, Broken, Command, Grow, Item, Picture
+from server.live.messages import Begin, Broken, Command, End, Grow, Item, Picture
 from server.live.messages import Report as Told
 from server.live.take import STEERING
-from server.services import live, prescriptions, recordings
+from server.services import live, prescriptions, recordings, sessions
 from server.services.live_recordings import log_path
 from server.storage.tables import live_event
 from tests.live_clinic import Visit, heard, new_session, visit
@@ -47,8 +47,13 @@ STANCE = {
 async def estimating(
     tmp_path_factory: pytest.TempPathFactory, anyio_backend: str
 ) -> AsyncIterator[tuple[Clinic, int]]:
-    """A clinic with an estimator."""
+    """A clinic with an estimator that is warm."""
     async with open_clinic(tmp_path_factory.mktemp("estimating")) as clinic, serve(clinic.app) as port:
+        pool = hub_of(clinic).pool
+        pool.start()
+        async with asyncio.timeout(180):
+            while not pool.is_ready:
+                await asyncio.sleep(0.05)
         yield clinic, port
 
 
@@ -61,7 +66,7 @@ def prescribed(clinic: Clinic) -> str:
     """A session of somebody who trains."""
     session = new_session(clinic)
     with clinic.db.write() as c:
-        patient = live.sessions.get(c, session).patient_id
+        patient = sessions.get(c, session).patient_id
         prescriptions.write(c, clinic.app.state.blobs, None, patient, STANCE)
     return session
 
@@ -265,13 +270,12 @@ async def test_a_server_that_starts_again_waits_for_the_tablet_and_tells_no_cue_
             v.tablet(v.hello(walk_hello(v.take))) as ws,
         ):
             await heard(ws, "welcome")
-            sent = 0
-            while not page.of("cue"):
-                for one in frames[sent : sent + 60]:
+            for sent in range(60, 601, 60):
+                for one in frames[sent - 60 : sent]:
                     await ws.send(one)
-                sent += 60
                 while (await heard(ws, "ack"))["ack"] < sent:
                     pass
+            await page.until(lambda p: p.of("cue"))
             await v.command("mark", "before")
             await v.command("pause", True)
         hello, take, session, token = v.hello(walk_hello(v.take)), v.take, v.session, v.token
@@ -328,6 +332,7 @@ async def test_a_crash_while_the_take_becomes_a_recording_is_repaired_at_the_nex
         raise RuntimeError("the power is gone")
 
     frames = [due.frame for due in walk()[:20]]
+    monkeypatch.setattr("server.live.hub.GRACE_S", 0.1)
     async with open_clinic(tmp_path, live_workers=0) as clinic, serve(clinic.app) as port:
         with monkeypatch.context() as patch:
             patch.setattr(f"server.services.live_recordings._{broken}", dies)
@@ -369,6 +374,7 @@ def test_a_take_that_throws_is_told_and_leaves_the_others_alone(tmp_path: Path) 
     estimator.obey(Grow({"good": len(whole), "bad": 1300, "gone": 5}, 0.0))
     while estimator.has_work:
         estimator.work()
+    estimator.obey(End("good"))
     assert [s.take for s in said if isinstance(s, Broken)] == ["gone", "bad"]
     shown = [s for s in said if isinstance(s, Picture)]
     assert {s.take for s in shown} == {"good"}
