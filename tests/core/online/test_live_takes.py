@@ -1,4 +1,4 @@
-"""Live takes that are not as they should be: belts, losses, a filter that breaks, other rates, nobody stands."""
+"""Live takes that are not as they should be: belts, losses, broken filters, other rates, nobody standing."""
 
 from __future__ import annotations
 
