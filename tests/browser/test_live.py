@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import re
 from collections import defaultdict
-from collections.abc import Iterator
 from urllib.parse import urlsplit
 from uuid import uuid4
 
@@ -13,11 +13,15 @@ from playwright.sync_api import Browser, expect
 
 from core.online import warm
 from tests.browser import filling
+from tests.browser.capturing import choose, network, place, start, tablet, walk_files
 from tests.browser.conftest import Opener, RunningServer
 from tests.browser.network import Network
-from tests.browser.test_capture import choose, place, start, tablet, walk_files
+from tests.browser.streaming import until_strides, walking
 from tests.browser.test_live_screens import prescribe
+from tests.browser.test_replay import COUNT
 from tests.browser.test_upload import SEGMENTS
+
+__all__ = ["network"]
 
 RHYTHM = {
     "parameter": "stride_time_s",
@@ -57,13 +61,6 @@ WATCH = """() => {
 def compiled() -> None:
     """Have the kernels on disk, so that the estimator is ready before the walk is over."""
     warm()
-
-
-@pytest.fixture
-def network(running: RunningServer) -> Iterator[Network]:
-    network = Network(running.url)
-    yield network
-    network.close()
 
 
 def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(
@@ -134,3 +131,24 @@ def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(
     assert {"cue", "mark", "calibration"} <= {e["kind"] for e in events}
     shown = [e["content"] for e in events if e["kind"] == "cue" and e["content"]["shown"]]
     assert len({c["zone"] for c in shown}) > 1
+
+
+def test_the_figure_walks_and_stop_ends_the_take(
+    opened: Opener, solid: Browser, running: RunningServer
+) -> None:
+    with walking(running) as session:
+        page = opened(f"/sessions/{session}/live", browser=solid)
+        until_strides(page, 2)
+        page.frame_locator("live-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
+        page.get_by_role("button", name="Norm").click()
+        page.wait_for_timeout(2500)
+        pictures = []
+        for _ in range(3):
+            pictures.append(page.locator("live-view iframe").screenshot())
+            page.wait_for_timeout(400)
+        assert len(set(pictures)) > 1, "the figure stands still"
+        found = page.evaluate(COUNT, base64.b64encode(pictures[-1]).decode())
+        assert found["orange"] > 150
+        assert found["blue"] > 150
+        page.get_by_role("button", name="STOP").click()
+        page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), timeout=90_000)
