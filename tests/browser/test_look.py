@@ -10,11 +10,11 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from tests.browser.conftest import Filled, Opener, RunningServer
-from tests.browser.design import layout_faults, text_faults
+from tests.browser.design import all_faults, layout_faults, text_faults
+from tests.browser.streaming import until_strides, walking
 from tests.data import ROOT
 
-DESK, LAPTOP, TABLET, PHONE = (1280, 800), (1024, 768), (810, 1080), (360, 740)
-SIZES = (DESK, LAPTOP, TABLET, PHONE)
+DESK, TABLET, PHONE = (1280, 800), (810, 1080), (360, 740)
 
 Address = Callable[[Filled], str]
 PAGES: dict[str, Address] = {
@@ -32,6 +32,7 @@ PAGES: dict[str, Address] = {
     "unread": lambda f: f"/sessions/{f.unread}/upload",
     "session": lambda f: f"/sessions/{f.done}",
     "session-empty": lambda f: f"/sessions/{f.empty}",
+    "record-live": lambda f: f"/sessions/{f.empty}/live",
     "session-failed": lambda f: f"/sessions/{f.unusable}",
     "timeline": lambda f: f"/sessions/{f.done}/timeline",
     "parameter": lambda f: f"/sessions/{f.done}/parameters/step_length_m",
@@ -51,21 +52,15 @@ PAPER = {"print"}
 
 OUT = {"sign-in", "set-up", "capture"}
 FIGURE = {"session", "kinematics"}
+LIVE = "live"
+"""How the pictures of live pages begin."""
 
 
 @pytest.mark.parametrize("name", PAGES)
 def test_page_obeys_the_design_system(name: str, opened: Opener, filled: Filled) -> None:
-    faults = []
     page = opened(PAGES[name](filled), signed_in=name not in OUT)
     page.wait_for_load_state()
-    for width, height in SIZES:
-        page.set_viewport_size({"width": width, "height": height})
-        for scheme in ("light", "dark"):
-            # without motion: colours must not be read in the middle of a transition
-            page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
-            page.wait_for_timeout(30)
-            found = layout_faults(page) | text_faults(page)
-            faults += [f"{width} {scheme}: {found}"] if found else []
+    faults = all_faults(page)
     assert not faults, "\n".join(faults)
 
 
@@ -112,7 +107,7 @@ def test_screenshots_of_every_page(
     opened: Opener, solid: Browser, running: RunningServer, filled: Filled, tmp_path: Path
 ) -> None:
     """Written to docs/screens when SAGITTAL_SCREENS=1, else thrown away; the figure must be on them."""
-    folder = ROOT / "docs" / "screens" if os.environ.get("SAGITTAL_SCREENS") == "1" else tmp_path
+    folder = _screens(tmp_path)
     for name, address in PAGES.items():
         browser = {"browser": solid} if name in FIGURE else {}
         page = opened(address(filled), signed_in=name not in OUT, **browser)
@@ -130,9 +125,48 @@ def test_screenshots_of_every_page(
                 _wait_for_figure(page)
             page.screenshot(path=folder / f"{name}-dark.png")
             page.close()
-    sizes = [p.stat().st_size for p in folder.glob("*.png")]
+    sizes = [p.stat().st_size for p in folder.glob("*.png") if not p.name.startswith(LIVE)]
     assert len(sizes) == len(PAGES) + 8
     assert sum(sizes) < 6_000_000
+
+
+def test_screenshots_of_a_live_take(
+    opened: Opener, solid: Browser, running: RunningServer, tmp_path: Path
+) -> None:
+    """The therapist's page from calibration on, with the figure, and the patient's; both also dark."""
+    folder = _screens(tmp_path)
+    with walking(running) as session:
+        page = opened(f"/sessions/{session}/live", browser=solid)
+        page.locator("live-page[data-view=calibrate] .checks tbody tr").first.wait_for(timeout=60_000)
+        page.wait_for_timeout(1000)
+        page.screenshot(path=folder / "live-calibration.png")
+        until_strides(page, 4)
+        page.get_by_role("button", name="Norm").click()
+        page.wait_for_timeout(2500)
+        page.screenshot(path=folder / "live.png")
+        page.set_viewport_size({"width": TABLET[0], "height": TABLET[1]})
+        page.wait_for_timeout(1500)
+        page.screenshot(path=folder / "live-tablet.png")
+        page.close()
+        page = opened(f"/sessions/{session}/live", browser=solid, scheme="dark")
+        page.frame_locator("live-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
+        page.wait_for_timeout(2500)
+        until_strides(page, 4)
+        page.screenshot(path=folder / "live-dark.png")
+        page.close()
+        for scheme, name in (("light", "live-patient"), ("dark", "live-patient-dark")):
+            page = opened(f"/sessions/{session}/live/patient", scheme=scheme)
+            page.get_by_role("button", name="Without sound").click()
+            page.locator("[data-last] svg").first.wait_for(timeout=60_000)
+            page.screenshot(path=folder / f"{name}.png")
+            page.close()
+    sizes = [p.stat().st_size for p in folder.glob(f"{LIVE}*.png")]
+    assert len(sizes) >= 6
+    assert sum(sizes) < 1_500_000
+
+
+def _screens(otherwise: Path) -> Path:
+    return ROOT / "docs" / "screens" if os.environ.get("SAGITTAL_SCREENS") == "1" else otherwise
 
 
 def _wait_for_figure(page: Page) -> None:
