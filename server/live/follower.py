@@ -24,10 +24,12 @@ from core.recording import Subject
 from server.live import wire
 from server.live.messages import STALE_S, Begin, Command, Item, Kind, Picture, Report, Standing, Through
 
-CHUNK_BYTES: Final = 1 << 17
-"""Read and estimated in one turn: some seconds; a take that catches up lets the others through."""
+CHUNK_BYTES: Final = 1 << 14
+"""Read and estimated in one turn, half a second of seven sensors: who catches up lets others through."""
 EVERY_S: Final = 1 / 30
 """Pictures are sent no more often (viewer.md §5)."""
+SLOW_S: Final = 0.2
+"""What is for reading (sensors, calibration) is made anew no more often."""
 DRIFT: Final = 1e-4
 """Clocks run apart by less than this (100 ppm): the fastest path may become so much longer."""
 PICTURE_TRAILS: Final = 400
@@ -68,7 +70,9 @@ class Follower:
         self._late = False
         self._last: LiveFrame | None = None
         self._trail: deque[Trail] = deque(maxlen=PICTURE_TRAILS)
-        self._sent_at = -1.0
+        self._sent_at = self._slow_at = -1.0
+        self._slow: Mapping[str, Any] = {}
+        self._slow_stage = ""
 
     @property
     def has_work(self) -> bool:
@@ -115,7 +119,13 @@ class Follower:
         if due is None or now < due or self._last is None:
             return
         frame = self._last
-        body = wire.frame(frame, self._trail, self._battery, self._phase.at(frame.t_s))
+        if now >= self._slow_at + SLOW_S or frame.stage != self._slow_stage:
+            self._slow, self._slow_at, self._slow_stage = (
+                wire.slow_part(frame, self._battery),
+                now,
+                frame.stage,
+            )
+        body = wire.frame(frame, self._trail, self._slow, self._phase.at(frame.t_s))
         delay = None if self._late else self._delays.now(now)
         self._say(
             Picture(self.take, frame.t_s, frame.seq, frame.stage, body, delay, self._read, wire.pose(frame))

@@ -14,7 +14,7 @@ import numpy as np
 
 from core.errors import Notice
 from core.feedback import Cue, FeedbackState
-from core.frames import SIDES, SUFFIX, Side
+from core.frames import SIDES, SUFFIX, Floats, Side
 from core.online.frame import CalibrationView, LiveFrame, LiveStride, SensorHealth, Trail
 from server.live.messages import STALE_S, Pose
 
@@ -34,28 +34,36 @@ encode = msgspec.json.encode
 
 
 def frame(
-    shown: LiveFrame, trail: Iterable[Trail], battery: Mapping[str, float], phase: Mapping[Side, float | None]
+    shown: LiveFrame, trail: Iterable[Trail], slow: Mapping[str, Any], phase: Mapping[Side, float | None]
 ) -> bytes:
     """A frame with the angles since the last one that was sent, without the closing brace.
 
     Parameters
     ----------
-    trail : of this frame and those before it that were not sent.
+    trail : of this frame and those before it that were not sent. slow : its `slow_part`, or an earlier one.
     phase : per side the share of the running cycle, 0 to 100, None where unknown.
     """
     body = {
         "type": "frame",
         "t": _number(shown.t_s, 3),
         "stage": shown.stage,
-        "calibration": _calibration(shown.calibration),
         "method": shown.method,
         "angles_deg": {name: _number(value * _DEGREES, 2) for name, value in shown.angles.items()},
         "trace": _trace(trail),
         "phase": {SUFFIX[side]: _number(phase.get(side), 1) for side in SIDES},
         "contact": {SUFFIX[side]: bool(shown.contact.get(side, False)) for side in SIDES},
-        "health": [_health(row, battery.get(row.id)) for row in shown.health],
+        **slow,
     }
     return encode(body)[:-1]
+
+
+def slow_part(shown: LiveFrame, battery: Mapping[str, float]) -> dict[str, Any]:
+    """What of a frame is for reading and need not be made anew for every one: calibration and sensors."""
+    health = [_health(row, battery.get(row.id)) for row in shown.health]
+    return {
+        "calibration": msgspec.Raw(encode(_calibration(shown.calibration))),
+        "health": msgspec.Raw(encode(health)),
+    }
 
 
 def pose(shown: LiveFrame) -> Pose | None:
@@ -186,8 +194,8 @@ def _trace(trail: Iterable[Trail]) -> dict[str, list[float | None]]:
     # a new calibration may change the names: what was before is another curve
     names = pieces[-1].names
     pieces = [piece for piece in pieces if piece.names == names]
-    values = np.concatenate([piece.values for piece in pieces]) * _DEGREES
-    columns = {name: _numbers(values[:, i], 2) for i, name in enumerate(names)}
+    values = np.concatenate([piece.values for piece in pieces]).T * _DEGREES
+    columns = dict(zip(names, _rows(values, 2), strict=True))
     return {"t": _numbers(np.concatenate([piece.t_s for piece in pieces]), 3), **columns}
 
 
@@ -197,7 +205,16 @@ def _curve(values: Any) -> list[float | None]:
 
 
 def _numbers(values: Any, digits: int) -> list[float | None]:
-    return [v if isfinite(v) else None for v in np.round(values, digits).tolist()]
+    return _rows(np.asarray(values)[None], digits)[0]
+
+
+def _rows(values: Floats, digits: int) -> list[list[float | None]]:
+    """Rows of an array, rounded; undefined is None."""
+    rounded = np.round(values, digits)
+    rows: list[list[float | None]] = rounded.tolist()
+    if np.isfinite(rounded).all():
+        return rows
+    return [[v if v is not None and isfinite(v) else None for v in row] for row in rows]
 
 
 def _number(value: float | None, digits: int) -> float | None:

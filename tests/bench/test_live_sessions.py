@@ -22,6 +22,7 @@ import httpx
 import numpy as np
 import pytest
 import websockets
+from websockets.typing import Subprotocol
 
 from core.formats.live_log import (
     PROTOCOL,
@@ -97,6 +98,7 @@ class Session:
     told_s: list[float] = field(default_factory=list)
     cue_s: list[float] = field(default_factory=list)
     pictures: int = 0
+    shown_s: float = 0.0
     recording: str = ""
 
 
@@ -142,9 +144,9 @@ async def tablet(base: str, s: Session, sent: Sequence[bytes], ready: asyncio.Ev
     preload = int(RUNNING_S * RATE_HZ) // PER_BATCH
     async with websockets.connect(
         f"{base}/api/v1/live",
-        subprotocols=[PROTOCOL],
+        subprotocols=[Subprotocol(PROTOCOL)],
         compression=None,
-        proxy=None,  # type: ignore[list-item]
+        proxy=None,
     ) as ws:
         await ws.send(hello_json(replace(take()[0], take=s.take), s.token).decode())
         assert json.loads(await ws.recv())["type"] == "welcome"
@@ -195,6 +197,8 @@ async def browser(base: str, s: Session, cookie: str) -> None:
             now = loop.time()
             if text.startswith('{"type":"frame"'):  # type: ignore[arg-type]
                 s.pictures += 1
+                if not s.began:
+                    s.shown_s = json.loads(text)["t"]
             elif text.startswith('{"type":"stride"'):  # type: ignore[arg-type]
                 message = json.loads(text)
                 known[message["n"]] = message["detected_s"]
@@ -221,9 +225,9 @@ async def drive(base: str, cookie: str, all_of: Sequence[Session], pids: Sequenc
         for s, gate in zip(all_of, gates, strict=True)
     ]
     preload = int(RUNNING_S * RATE_HZ) // PER_BATCH
-    while any(len(s.sent) < preload for s in all_of):
-        await asyncio.sleep(0.2)
-    await asyncio.sleep(10.0)  # twenty calibrations at once
+    # twenty calibrations at once
+    while any(len(s.sent) < preload or s.shown_s < RUNNING_S - 0.5 for s in all_of):
+        await asyncio.sleep(0.1)
     gc.collect()
     gc.freeze()
     for i, gate in enumerate(gates):
