@@ -103,6 +103,7 @@ def place(page: Page, segments: dict[str, str]) -> None:
 def start(page: Page) -> None:
     page.locator("[data-go]").click()
     expect(page.locator("[data-link]")).to_have_text("Connected", timeout=10_000)
+    page.wait_for_timeout(800)  # until the page takes another tap on the same button for a Stop
 
 
 def until(page: Page, condition: str, timeout_s: float = 20) -> None:

@@ -100,6 +100,7 @@ def test_dots_go_on_after_a_reload_when_they_are_connected_again(
         expect(page.locator("[data-go]")).to_have_text("Connect the sensors again")
         before = page.evaluate("() => document.querySelector('capture-page').outbox.made")
         page.evaluate("() => radio.turn()")  # the other one is nearer now
+        page.wait_for_timeout(800)
         page.locator("[data-go]").click()
         expect(page.locator("li[data-sensor]")).to_have_count(1)
         page.locator("[data-go]").click()
@@ -219,7 +220,8 @@ def test_a_new_code_goes_on_with_the_take_of_a_tablet_that_was_sent_away(
         until(page, f"page.outbox.made > {made} + 10", 5)
         pair(page, again)
         expect(page.locator("[data-go]")).to_have_text("Stop")
-        until(page, f"page.outbox.acked > {made} + 20")
+        expect(page.get_by_role("alert")).to_be_hidden()
+        until(page, f"page.outbox.acked > {made} + 40")
         page.locator("[data-go]").click()
         expect(page.locator("[data-done]")).to_have_text("Recording is on the server", timeout=20_000)
     _, streams = read_log(clinic, running)

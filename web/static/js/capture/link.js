@@ -153,6 +153,12 @@ export class Link {
     this.timer = setTimeout(() => this.connect(), pause * 1000);
   }
 
+  // Go without a word; another link or none takes its place.
+  leave() {
+    this.onchange = () => {};
+    this.end("refused");
+  }
+
   end(state) {
     this.wanted = false;
     clearTimeout(this.timer);

@@ -12,6 +12,7 @@ import * as words from "./words.js";
 import { Worn } from "./worn.js";
 
 const DRAW_MS = 500;
+const TWICE_MS = 800; // a second tap on Start must not be a Stop
 const BYTES_PER_S = 7 * 100 * 36; // seven sensors at 100 Hz, nine float32 each
 
 class CapturePage extends HTMLElement {
@@ -102,6 +103,7 @@ class CapturePage extends HTMLElement {
   async go() {
     const { state } = this.dataset;
     if (state === "done") return this.enter("pairing");
+    if (state === "running" && performance.now() - this.entered < TWICE_MS) return;
     if (state === "running") return this.paused ? this.choose(this.worn.kind) : this.stop();
     if (state === "prepare") return this.start();
   }
@@ -147,7 +149,8 @@ class CapturePage extends HTMLElement {
   }
 
   connect() {
-    this.link?.end("refused");
+    this.link?.leave();
+    this.link = null; // the new one speaks before it is assigned
     this.link = new Link(this.outbox, { onchange: () => this.linked(), onmessage: (m) => this.told(m) });
   }
 
@@ -171,6 +174,7 @@ class CapturePage extends HTMLElement {
     const said = words.ending(this.outbox.made, this.link.marked);
     await this.outbox.forget();
     this.outbox = this.link = null;
+    this.paused = false;
     this.$("done").textContent = said.title;
     this.$("done-more").textContent = said.more;
     this.say(null);
@@ -211,9 +215,10 @@ class CapturePage extends HTMLElement {
 
   // Let go of the take.
   async drop({ silent = false } = {}) {
-    this.link?.end("refused");
+    this.link?.leave();
     await this.outbox.forget();
     this.outbox = this.link = null;
+    this.paused = false;
     if (!silent) this.say(null);
     this.enter("pairing");
   }
@@ -245,8 +250,8 @@ class CapturePage extends HTMLElement {
 
   enter(state) {
     this.dataset.state = state;
+    this.entered = performance.now();
     if (state === "running") this.stage = undefined;
-    else this.paused = false;
     stayAwake(state === "running" || state === "sending");
     this.draw();
     if (state === "pairing") this.$("code-form").querySelector("input").focus();
