@@ -13,6 +13,7 @@ from core.body.erkf_params import ErkfParams
 from core.body.model import BodyModel
 from core.body.tree import person_tree
 from core.calibration.result import SegmentCalibration
+from core.errors import Notice
 from core.frames import FOOT, GRAVITY, R_NEUTRAL, SIDES, Bools, Floats, Segment
 from core.online.bridge import Bridge
 from core.online.erkf import LiveErkf, Signals
@@ -84,6 +85,9 @@ class Estimator(Protocol):
     def push(self, raw: Raw) -> Placed:
         """The next samples; the first block is the whole standing window."""
 
+    def told(self) -> list[Notice]:
+        """What is new to be said of itself."""
+
 
 def worn_feet(segments: Iterable[Segment]) -> tuple[Segment, ...]:
     """Feet among these segments, left first."""
@@ -111,6 +115,16 @@ def _segments(states, mount, place, q, p):  # type: ignore[no-untyped-def]
             p[k, i, 1] -= (1 - 2 * (x * x + z * z)) * v + 2 * (y * z - w * x) * s
             p[k, i, 2] = states[k, i, 2] - 2 * (x * z - w * y) * u
             p[k, i, 2] -= 2 * (y * z + w * x) * v + (1 - 2 * (x * x + y * y)) * s
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """Signals as filtered; q (T, n, 4), p (T, n, 3) origins of segments; (T, joints) their ends apart, m."""
+
+    signals: Signals
+    q: Floats
+    p: Floats
+    residual: Floats
 
 
 class Filtered:
@@ -147,18 +161,18 @@ class Filtered:
         """The filter gave up."""
         return self._filter is not None and self._filter.broken
 
-    def push(self, raw: Raw) -> tuple[Signals, Floats, Floats]:
-        """Signals as filtered; orientation (T, n, 4) and origin (T, n, 3) of the segments."""
+    def push(self, raw: Raw) -> Tracked:
+        """The next samples."""
         # `take` lays its result out in order; an index would not, and another layout is another kernel
         k, valid = self._columns, raw.valid.take(self._columns, axis=1)
         acc, gyr = self._bridge.push(raw.acc.take(k, axis=1), raw.gyr.take(k, axis=1), valid)
         signals = Signals(acc, gyr, valid, self._still.push(acc, gyr, valid))
         if self._filter is None:
             self._filter = LiveErkf(self.tree, self._params, self._rate_hz, signals, self._start)
-        states, _ = self._filter.push(signals)
+        states, residual = self._filter.push(signals)
         q, p = np.empty((*valid.shape, 4)), np.empty((*valid.shape, 3))
         _segments(states, self.tree.q_mount, self.tree.place, q, p)
-        return signals, q, p
+        return Tracked(signals, q, p, residual)
 
 
 class FootPaths:
@@ -174,6 +188,6 @@ class FootPaths:
 
     def push(self, raw: Raw) -> Paths:
         """The next samples."""
-        signals, q, p = self._filtered.push(raw)
-        valid = signals.valid & np.isfinite(p[:, :, 0])
-        return Paths(p, q, np.ascontiguousarray(signals.still[:, :, 0]), valid)
+        x = self._filtered.push(raw)
+        valid = x.signals.valid & np.isfinite(x.p[:, :, 0])
+        return Paths(x.p, x.q, np.ascontiguousarray(x.signals.still[:, :, 0]), valid)

@@ -204,6 +204,7 @@ class Chain:
         self._count += len(acc)
         for x in known:
             self.contact[x.event.side] = x.event.kind == "ic"
+        self._notices += self.estimator.told()
         if self.estimator.broken and not self._told_broken:
             self._told_broken = True
             self._notices.append(Notice("live_figure_lost", BROKEN))

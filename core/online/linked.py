@@ -8,9 +8,11 @@ from typing import Final
 import numba
 import numpy as np
 
+from core.errors import Notice
 from core.frames import FOOT, SHANK, SIDES, THIGH, Segment
 from core.online.body import Filtered, FootPaths, Paths, Placed, Raw, worn_feet
 from core.online.frame import Method
+from core.online.watch import JointWatch
 
 LEVEL_S: Final = 0.1
 """The figure is let down or lifted to the floor of the foot that rests within about so long: for the eye."""
@@ -50,6 +52,7 @@ class Linked:
         self._shown = np.array([self.segments.index(s) for s in shown], np.int64)
         self.linked = len(feet) == 2 and not (set(self._feet.tolist()) & set(tree.roots()))
         self.source = "erkf_live" if self.linked else "erkf_feet_live"
+        self._watch, self._notices = JointWatch(tree, rate_hz), list[Notice]()
         self._share, self._floor = min(1.0, 1.0 / (LEVEL_S * rate_hz)), np.zeros(1)
 
     @property
@@ -59,13 +62,20 @@ class Linked:
 
     def push(self, raw: Raw) -> Placed:
         """The next samples; the first block is the whole standing window."""
-        signals, q, p = self._filtered.push(raw)
+        tracked = self._filtered.push(raw)
+        signals, q, p = tracked.signals, tracked.q, tracked.p
+        self._notices += self._watch.push(tracked.residual, signals.valid, signals.still)
         known = signals.valid & np.isfinite(q[:, :, 0])
         still = np.ascontiguousarray(signals.still[:, self._feet, 0])
         feet = self._feet
         paths = Paths(p.take(feet, axis=1), q.take(feet, axis=1), still, np.asarray(known).take(feet, axis=1))
         _level(p, self._feet, still, paths.valid, self._ankle, self._share, self._floor)
         return Placed(q, p, known, np.asarray(known[:, self._shown].all(axis=1)), paths)
+
+    def told(self) -> list[Notice]:
+        """Joints whose ends are too far apart."""
+        fresh, self._notices = self._notices, []
+        return fresh
 
 
 class Unlinked:
@@ -90,6 +100,10 @@ class Unlinked:
         q = np.stack([raw.turned[s] for s in self.segments], axis=1)
         paths = no_paths(T) if self._feet is None else self._feet.push(raw)
         return Placed(q, np.full((*q.shape[:2], 3), np.nan), raw.valid, np.zeros(T, np.bool_), paths)
+
+    def told(self) -> list[Notice]:
+        """Nothing."""
+        return []
 
 
 def no_paths(samples: int) -> Paths:

@@ -12,7 +12,7 @@ from core.body.l7s_filter import L7sInputs, L7sParams, L7sState, L7sTrack, Worn,
 from core.body.l7s_legs import BODIES, HIP_SIDE, LEGS, M_LEG, LegModel
 from core.body.model import BodyModel
 from core.calibration.result import SegmentCalibration
-from core.errors import EstimationError
+from core.errors import EstimationError, Notice
 from core.frames import FOOT, GRAVITY, SHANK, THIGH, Bools, Segment
 from core.online.body import FootPaths, Placed, Raw
 from core.online.frame import Method
@@ -105,6 +105,10 @@ class Sparse:
         )
         whole = np.asarray(self._known(raw, inputs.step) & np.isfinite(track.p[:, 0, 0]))
         return Placed(q, p, np.repeat(whole[:, None], len(FIGURE), axis=1), whole, paths)
+
+    def told(self) -> list[Notice]:
+        """What is new to be said of itself."""
+        return []
 
     def _inputs(self, raw: Raw, step: Bools) -> L7sInputs:
         """As `inputs_of`."""

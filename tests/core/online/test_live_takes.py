@@ -168,3 +168,15 @@ def test_contact_follows_the_events() -> None:
             state[e.side] = e.kind == "ic"
         assert dict(f.contact) == state
     assert set(state) == set(SIDES)
+
+
+@pytest.mark.parametrize(("a", "b"), [("shank_l", "shank_r"), ("foot_l", "foot_r")])
+def test_exchanged_sensors_are_told_while_they_stream(a: Segment, b: Segment) -> None:
+    take = walk()
+    swapped = dict(take.sensors)
+    swapped[a], swapped[b] = swapped[b], swapped[a]
+    right, wrong = live(take)[1], live(replace(take, sensors=swapped))[1]
+    assert "sensors_do_not_hang_together" not in codes(right)
+    told = [n for f in wrong for n in f.notices if n.code == "sensors_do_not_hang_together"]
+    assert told
+    assert len({n.message for n in told}) == len(told)
