@@ -25,6 +25,7 @@ PAGES: dict[str, Address] = {
     "patient": lambda f: f"/patients/{f.patient}",
     "trends": lambda f: f"/patients/{f.patient}/trends",
     "compare": lambda f: f"/sessions/{f.done}/compare/{f.earlier}",
+    "prescription": lambda f: f"/patients/{f.patient}/prescription",
     "programme": lambda f: f"/patients/{f.patient}/programme",
     "new-session": lambda f: f"/patients/{f.patient}/sessions/new",
     "upload": lambda f: f"/sessions/{f.empty}/upload",
