@@ -107,7 +107,8 @@ function logTracks(bytes, name, segments) {
     const tUs = new Float64Array(n), values = stream.sensors.map(() => new Float32Array(n * 9));
     let row = 0, lag = Infinity;
     for (const b of mine) {
-      if (b.t0Us - mine[0].t0Us < 1e6) lag = Math.min(lag, b.sentUs - b.t0Us);
+      const lastUs = b.t0Us + (b.offsetsUs ? b.offsetsUs.at(-1) : ((b.nSamples - 1) * 1e6) / stream.rate_hz);
+      if (b.t0Us - mine[0].t0Us < 1e6) lag = Math.min(lag, b.sentUs - lastUs);
       for (let i = 0; i < b.nSamples; i++, row++) {
         tUs[row] = b.t0Us + (b.offsetsUs ? b.offsetsUs[i] : (i * 1e6) / stream.rate_hz);
         values.forEach((v, s) => v.set(b.samples.subarray((i * b.nImu + s) * 9, (i * b.nImu + s) * 9 + 9), row * 9));
