@@ -1,4 +1,4 @@
-"""What a live walk leaves on the floor: the last footprints with a letter, the last seconds of the trails.
+"""What a live walk leaves on the floor: the last prints and seconds of the trails, and a letter at each foot.
 
 The rules are those of server/viewer/steps.py, applied as the frames come.
 """
@@ -119,7 +119,10 @@ class _Trail:
 
 
 class _Steps:
-    """Where one foot rested: shown when it first does, put right when the contact ends."""
+    """Where one foot rested: shown when it first does, put right when the contact ends.
+
+    The letter of the side stands at the foot while that is on the floor; in swing it has none.
+    """
 
     def __init__(self, scene: viser.SceneApi, side: Side, foot: float) -> None:
         self._position = np.zeros((PRINTS, 3), np.float32)
@@ -154,7 +157,6 @@ class _Steps:
     def clear(self) -> None:
         self._scale[:] = 0.0
         self.node.batched_scales = self._scale
-        self._letter.visible = False
         self._next = 0
         self.lose()
 
@@ -196,6 +198,7 @@ class _Steps:
         elif np.isfinite(self._slowest):
             self._print()  # it never rested: its slowest moment is all there is
         self._shown, self._slowest = None, np.inf
+        self._letter.visible = False
 
     def _put(self, k: int) -> None:
         place, turn = self._rest[0], float(rotation.yaw(self._rest[1]))

@@ -170,10 +170,24 @@ def test_prints_lie_where_the_replay_has_them(server: viser.ViserServer, poses: 
         apart = np.linalg.norm(shown[:, None] - known[None], axis=-1)
         assert apart.min(axis=1).max() < 0.02
         assert len(set(apart.argmin(axis=1))) == PRINTS
-        letter = scene[f"/letter_{side}"]
-        newest = shown[np.argmax(shown[:, 0])]
-        assert letter.visible
-        assert 0.1 < np.asarray(letter.position)[0] - newest[0] < 0.3
+
+
+def test_a_letter_stands_before_the_foot_that_is_on_the_floor(
+    server: viser.ViserServer, poses: Poses
+) -> None:
+    scene = Scene(server)
+    seen = dict.fromkeys(SIDES, 0)
+    for i in range(60, 200):
+        scene.figure.show(moment(poses, i))
+        for side in SIDES:
+            letter, ankle = scene[f"/letter_{side}"], poses.p[FOOT[side]][i]
+            if letter.visible:
+                assert poses.contact[FOOT[side]][i]
+                assert 0.1 < np.asarray(letter.position)[0] - ankle[0] < 0.4
+                seen[side] += 1
+    assert min(seen.values()) > 30
+    scene.figure.show(moment(poses, 200, valid=False))
+    assert not any(scene[f"/letter_{side}"].visible for side in SIDES)
 
 
 def test_another_take_starts_with_an_empty_floor(server: viser.ViserServer, poses: Poses) -> None:
