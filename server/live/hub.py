@@ -7,7 +7,6 @@ finishes what a crash left, opens the logs of takes that are still open and wait
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import time
 from collections.abc import Coroutine
@@ -20,6 +19,7 @@ from server import audit
 from server.jobs.queue import JobQueue
 from server.live import protocol
 from server.live.committer import Committer
+from server.live.ending import Ending
 from server.live.intake import Ended
 from server.live.journal import Journal
 from server.live.messages import Begin, Broken, Item, Picture, Report, Standing, Through
@@ -27,12 +27,11 @@ from server.live.pool import Pool
 from server.live.protocol import Close
 from server.live.recorder import open_recorder
 from server.live.room import Room
-from server.live.take import Line, LiveTake
+from server.live.rows import Rows
+from server.live.take import Line, LiveTake, standing_of
 from server.services import live, live_recordings
-from server.services.errors import Conflict, NotFound, ServiceError
-from server.services.live_training import Training, training_of
+from server.services.errors import Conflict
 from server.settings import Settings
-from server.storage import fs
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 
@@ -44,10 +43,8 @@ STATE_S: Final = 1.0
 """How often the running counters are told."""
 GRACE_S: Final = 3.0
 """Time a take that is just ending has when the server stops; after a kill the next start does the rest."""
-DRAIN_S: Final = 10.0
-"""Time the estimator has for what it has not told when a take ends."""
-AGAIN_S: Final = 30.0
-"""Pause before a take that could not be stored (disk full) is tried again."""
+ABANDONED_S: Final = live.TOKEN_LIFE.total_seconds()
+"""A take that no tablet has spoken to for so long is ended: no token opens it any more."""
 
 
 class Hub:
@@ -56,12 +53,12 @@ class Hub:
     def __init__(self, settings: Settings, db: Database, blobs: BlobStore, queue: JobQueue) -> None:
         self._settings, self._db, self._blobs, self._queue = settings, db, blobs, queue
         self.journal = Journal(db)
+        self.rows = Rows(db, blobs)
         self.pool = Pool(settings, self._report, self._begin, self._restarted)
+        self._ending = Ending(settings, db, blobs, queue, self.journal, self.pool, self._tell_over)
         self._committer = Committer()
         self._takes: dict[str, LiveTake] = {}
-        self._draining: dict[str, LiveTake] = {}
         self._rooms: dict[str, Room] = {}
-        self._closing: dict[str, audit.Actor | None] = {}
         self._entering = asyncio.Lock()
         self._ticking: asyncio.Task[None] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -77,7 +74,7 @@ class Hub:
         )
         for take_id in waiting:
             try:
-                await self.enter(await asyncio.to_thread(self._row, take_id), None)
+                await self.enter(await asyncio.to_thread(self.rows.take, take_id), None)
             except Exception:
                 # its log stays as it is; the other takes and the clinic go on
                 log.exception("live take %s could not be opened again", take_id)
@@ -105,11 +102,6 @@ class Hub:
 
     # the tablet
 
-    def admit(self, take_id: str, token: str) -> live.Take | None:
-        """The take a token opens, over or not; blocks."""
-        with self._db.read() as c:
-            return live.by_token(c, take_id, token)
-
     async def enter(self, row: live.Take, hello: Hello | None) -> LiveTake:
         """The open take of a tablet, with its log; raises ProtocolError, InputError."""
         async with self._entering:
@@ -118,7 +110,7 @@ class Hub:
                 if take.recorder.failure is not None:
                     await take.recorder.reopen()
                 return take
-            training, earlier = await asyncio.to_thread(self._prepared, row)
+            training, earlier = await asyncio.to_thread(self.rows.prepare, row)
             room = self.room(row.session_id)
             room.clear()
             take = LiveTake(self, row, room, training, earlier)
@@ -159,11 +151,11 @@ class Hub:
         ----------
         at_s : the moment a mark means, which is before its words are written; never after the newest sample.
         """
-        row = await asyncio.to_thread(self._open_row, session_id)
+        row = await asyncio.to_thread(self.rows.open_take, session_id)
         take = self._takes.get(row.id)
         if take is None:
             raise Conflict("no_tablet", "No tablet has joined this take yet; enter its code on the tablet.")
-        _check_value(name, value)
+        live.check_value(name, value)
         if name in ("start", "stop"):
             if take.tablet is None:
                 raise Conflict(
@@ -176,25 +168,25 @@ class Hub:
         if name == "mark" and at_s is not None and t_s is not None:
             t_s = min(at_s, t_s)
         content = take.steer(name, value, t_s)
-        await asyncio.to_thread(self._keep_command, actor, take.id, name, t_s, content)
+        await asyncio.to_thread(self.rows.keep_command, actor, take.id, name, t_s, content)
         self.tell_state(take)
         return take.standing()
 
     async def close(self, actor: audit.Actor | None, session_id: str) -> live.Take:
         """End a take without the tablet; what has come becomes the recording; raises Conflict."""
-        row = await asyncio.to_thread(self._open_row, session_id)
+        row = await asyncio.to_thread(self.rows.open_take, session_id)
         take = self._takes.get(row.id)
         if take is None:
-            over = await asyncio.to_thread(self._end, actor, row.id, "closed", Ended(0, ""))
+            over = await asyncio.to_thread(self.rows.end, actor, row.id, "closed", Ended(0, ""))
             self._tell_over(over)
             return over
-        self._closing[take.id] = actor
+        self._ending.ask(take, actor)
         answer = take.recorder.finish()
         if answer.close is not None:
-            del self._closing[take.id]
+            self._ending.unask(take)
             raise Conflict(answer.reason, "The server's disk refuses; make room and try again.")
         await take.over.wait()
-        return await asyncio.to_thread(self._row, row.id)
+        return await asyncio.to_thread(self.rows.take, row.id)
 
     def drop_from_thread(self, session_ids: list[str]) -> None:
         """As `drop`, from a thread that answers a request; blocks until done."""
@@ -204,7 +196,9 @@ class Hub:
     async def drop(self, session_ids: list[str]) -> None:
         """Let go of takes whose session is about to be erased."""
         for take in [t for t in self._takes.values() if t.session_id in session_ids]:
-            await self._let_go(take)
+            self.pool.leave(take.id)
+            del self._takes[take.id]
+            await take.recorder.close()
             if take.tablet is not None:
                 take.tablet.shut(Close.ENDED, "take_ended")
 
@@ -229,9 +223,7 @@ class Hub:
         take = self.take_of(session_id)
         if take is not None:
             return take.standing()
-        with self._db.read() as c:
-            row = live.current(c, session_id)
-        return _standing(row)
+        return standing_of(self.rows.current(session_id))
 
     def tell_state(self, take: LiveTake) -> None:
         """Tell the browsers where a take stands; of one that is over `_tell_over` has the last word."""
@@ -243,7 +235,7 @@ class Hub:
         take = self._takes.get(row.id)
         if take is None:
             self.room(row.session_id).clear()
-            self.room(row.session_id).say("state", msgspec.json.encode(_standing(row)))
+            self.room(row.session_id).say("state", msgspec.json.encode(standing_of(row)))
             self.pool.start()
         else:
             self.tell_state(take)
@@ -252,12 +244,12 @@ class Hub:
 
     def note_started(self, take: LiveTake) -> None:
         """The first batch has come."""
-        self._spawn(self._started(take))
+        self._spawn(asyncio.to_thread(self.rows.start, take.id, take.recorder.hello.source))
         self.tell_state(take)
 
     def note_ended(self, take: LiveTake, end: Ended) -> None:
         """The end is durable."""
-        self._spawn(self._complete(take, end))
+        self._spawn(self._ending.complete(take, end, lambda: self._forget(take)))
 
     # the estimators
 
@@ -273,11 +265,12 @@ class Hub:
 
     def _report(self, report: Report) -> None:
         name = getattr(report, "take", "")
-        take = self._takes.get(name) or self._draining.get(name)
+        draining = self._ending.draining(name)
+        take = draining or self._takes.get(name)
         if take is None:
             return
         match report:
-            case Picture() | Standing() if name in self._draining:
+            case Picture() | Standing() if draining is not None:
                 pass  # the session may have another take by now
             case Through():
                 take.told.set()
@@ -302,94 +295,11 @@ class Hub:
 
     # threads and tasks
 
-    def _row(self, take_id: str) -> live.Take:
-        with self._db.read() as c:
-            return live.get(c, take_id)
-
-    def _open_row(self, session_id: str) -> live.Take:
-        with self._db.read() as c:
-            return live.require_open(c, session_id)
-
-    def _prepared(self, row: live.Take) -> tuple[Training, list[live.LiveEvent]]:
-        with self._db.write() as c:
-            return training_of(c, self._blobs, row), live.events(c, row.id)
-
-    def _keep_command(
-        self, actor: audit.Actor | None, take_id: str, kind: str, t_s: float | None, content: object
-    ) -> None:
-        with self._db.write() as c:
-            live.add_event(c, actor, take_id, kind, t_s, content)
-
-    def _end(self, actor: audit.Actor | None, take_id: str, state: str, end: Ended) -> live.Take:
-        self.journal.write()
-        with self._db.write() as c:
-            return live.end(
-                c, actor, take_id, state, count=end.count, sha256=end.sha256 or None, problem=end.problem
-            )
-
-    async def _started(self, take: LiveTake) -> None:
-        def write() -> None:
-            with self._db.write() as c:
-                live.started(c, take.id, take.recorder.hello.source, take.training.prescription_id)
-
-        with contextlib.suppress(NotFound):
-            await asyncio.to_thread(write)
-
-    async def _complete(self, take: LiveTake, end: Ended) -> None:
-        """The steps after the end; each may be the last before a crash (services/live_recordings.py)."""
-        by_us = take.id in self._closing
-        actor = self._closing.pop(take.id, None)
-        state = "closed" if by_us else "finished"
-        try:
-            with contextlib.suppress(NotFound):
-                await asyncio.to_thread(self._end, actor, take.id, state, end)
-            self._takes.pop(take.id, None)
-            self._draining[take.id] = take
-            await take.recorder.close()
-            take.problem = end.problem
-            take.recording_id = await self._store(take.id)
-            take.stored = True
-            if take.tablet is not None:
-                if take.recording_id is not None:
-                    take.tablet.say(protocol.finished(take.recording_id, take.problem))
-                if by_us or take.recording_id is None:
-                    take.tablet.shut(Close.ENDED, "take_ended")
-            with contextlib.suppress(NotFound):
-                self._tell_over(await asyncio.to_thread(self._row, take.id))
-        finally:
-            take.over.set()
-            await self._drain(take)
-
-    async def _store(self, take_id: str) -> str | None:
-        """Store until it works: the log holds acknowledged samples."""
-        while True:
-            try:
-                return await asyncio.to_thread(
-                    live_recordings.keep, self._db, self._blobs, self._settings, self._queue, take_id
-                )
-            except Exception:
-                log.exception("live take %s is not stored yet; trying again", take_id)
-            await asyncio.sleep(AGAIN_S)
-
-    async def _drain(self, take: LiveTake) -> None:
-        """Hear the estimator out: the last strides and cues are still on their way."""
-        if self.pool.follows(take.id) and take.estimate == "ok":
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(DRAIN_S):
-                    await take.told.wait()
-        self.pool.leave(take.id)
-        self._draining.pop(take.id, None)
-        if take.stored:
-            path = live_recordings.log_path(self._settings.live, take.id)
-            await asyncio.to_thread(fs.remove_file, path)
-
-    async def _let_go(self, take: LiveTake) -> None:
-        self.pool.leave(take.id)
+    def _forget(self, take: LiveTake) -> None:
         self._takes.pop(take.id, None)
-        await take.recorder.close()
 
     def _tell_over(self, row: live.Take) -> None:
-        self.room(row.session_id).say("state", msgspec.json.encode(_standing(row)))
+        self.room(row.session_id).say("state", msgspec.json.encode(standing_of(row)))
         self.leave(row.session_id)
 
     async def _tick(self) -> None:
@@ -400,6 +310,9 @@ class Hub:
             tell = now - told >= STATE_S
             for take in tuple(self._takes.values()):
                 take.look(now)
+                if take.tablet is None and now - take.grown_at > ABANDONED_S and not take.over.is_set():
+                    self._ending.ask(take, None)
+                    take.recorder.finish()
                 if tell and take.state == "streaming":
                     self.tell_state(take)
             told = now if tell else told
@@ -415,41 +328,5 @@ class Hub:
             log.error("a live task failed", exc_info=task.exception())
 
 
-def _standing(row: live.Take | None) -> dict[str, Any]:
-    return {
-        "type": "state",
-        "take": None if row is None else row.id,
-        "state": "none" if row is None else row.state,
-        "tablet": "none",
-        "source": None if row is None else row.source,
-        "count": None if row is None else row.count,
-        "elapsed_s": None,
-        "marks": [],
-        "ghost": None,
-        "stale": False,
-        "estimate": "ok",
-        "recording": None if row is None else row.recording_id,
-        "problem": None if row is None else row.problem,
-    }
-
-
 def _notify(take: LiveTake, severity: str, text: str) -> None:
     take.room.say("notice", msgspec.json.encode({"type": "notice", "severity": severity, "text": text}))
-
-
-def _check_value(name: str, value: Any) -> None:
-    """Refuse what the estimator could not obey."""
-    if name in ("feedback", "pause"):
-        ok, expected = isinstance(value, bool), "true or false"
-    elif name == "level":
-        ok = isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 100
-        expected = "a whole number of steps, + easier, − harder"
-    elif name in ("mark", "ghost"):
-        ok, expected = (
-            value is None or (isinstance(value, str) and len(value) <= 200),
-            "a short text or nothing",
-        )
-    else:
-        ok, expected = value is None, "nothing"
-    if not ok:
-        raise ServiceError("bad_value", f"The value of the command {name} is not {expected}.")

@@ -109,7 +109,7 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> LiveTake | None:
         said = protocol.parse(message) if isinstance(message, str) else None
         if not isinstance(said, Hello):
             raise ProtocolError("hello_missing", "The first message must be a hello.")
-        row = await asyncio.to_thread(hub.admit, said.take, said.token)
+        row = await asyncio.to_thread(hub.rows.admit, said.take, said.token)
         if row is None:
             raise ProtocolError(
                 "token_not_valid",

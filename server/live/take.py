@@ -105,7 +105,6 @@ class LiveTake:
         self.told = asyncio.Event()
         self.recording_id: str | None = None
         self.problem: str | None = None
-        self.stored = False
         self.estimate = "ok"
         self.t_s: float | None = None
         self.stage: str | None = None
@@ -116,7 +115,7 @@ class LiveTake:
             self.steered.see(self.id, event.kind, event.t_s, event.content)
             if event.kind in TOLD:
                 self._seen[event.kind] += 1
-        self._grown_at = time.monotonic()
+        self.grown_at = time.monotonic()
         self._size = 0
 
     # the socket
@@ -137,7 +136,7 @@ class LiveTake:
 
     def grown(self, size: int) -> None:
         """The log can be read so far; if it was longer before, what was read of it is read again."""
-        self._grown_at = time.monotonic()
+        self.grown_at = time.monotonic()
         before, self._size = self._size, size
         if size < before:
             self._hub.pool.follow(self.id)
@@ -222,7 +221,7 @@ class LiveTake:
 
     def look(self, now: float) -> None:
         """Notice silence."""
-        if self.state == "streaming" and now - self._grown_at > STALE_S:
+        if self.state == "streaming" and now - self.grown_at > STALE_S:
             self.mind_silence(True)
 
     def mind_silence(self, stale: bool) -> None:
@@ -249,3 +248,22 @@ class LiveTake:
             "recording": self.recording_id,
             "problem": self.problem,
         }
+
+
+def standing_of(row: Take | None) -> dict[str, Any]:
+    """The same of a take that no tablet has joined yet or that is over; None = there was none."""
+    return {
+        "type": "state",
+        "take": None if row is None else row.id,
+        "state": "none" if row is None else row.state,
+        "tablet": "none",
+        "source": None if row is None else row.source,
+        "count": None if row is None else row.count,
+        "elapsed_s": None,
+        "marks": [],
+        "ghost": None,
+        "stale": False,
+        "estimate": "ok",
+        "recording": None if row is None else row.recording_id,
+        "problem": None if row is None else row.problem,
+    }

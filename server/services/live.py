@@ -186,12 +186,28 @@ def by_token(c: Connection, take_id: str, token: str) -> Take | None:
     return get(c, take_id) if hmac.compare_digest(row.token_sha256, token_hash(token)) else None
 
 
-def started(c: Connection, take_id: str, source: str, prescription_id: str | None) -> Take:
-    """Note the first samples and what they are used for."""
+def check_value(name: str, value: object) -> None:
+    """Refuse a command's value that cannot be obeyed; raises ServiceError bad_value."""
+    if name in ("feedback", "pause"):
+        ok, expected = isinstance(value, bool), "true or false"
+    elif name == "level":
+        ok = isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 100
+        expected = "a whole number of steps, + easier, − harder"
+    elif name in ("mark", "ghost"):
+        ok = value is None or (isinstance(value, str) and len(value) <= 200)
+        expected = "a short text or nothing"
+    else:
+        ok, expected = value is None, "nothing"
+    if not ok:
+        raise ServiceError("bad_value", f"The value of the command {name} is not {expected}.")
+
+
+def started(c: Connection, take_id: str, source: str) -> Take:
+    """Note the first samples."""
     c.execute(
         update(live_take)
         .where(live_take.c.id == take_id, live_take.c.state.in_(("pairing", "open")))
-        .values(state="streaming", source=source, prescription_id=prescription_id)
+        .values(state="streaming", source=source)
     )
     return get(c, take_id)
 

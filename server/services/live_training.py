@@ -10,12 +10,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, select, update
 
 from core.errors import SagittalError
 from server.services import analyses, live, prescriptions
 from server.storage.blobs import BlobStore
-from server.storage.tables import live_event
+from server.storage.tables import live_event, live_take
 
 log = logging.getLogger(__name__)
 
@@ -48,6 +48,7 @@ def training_of(c: Connection, blobs: BlobStore, take: live.Take) -> Training:
     if content is None:
         content = _prescribed(c, blobs, take)
         live.add_event(c, None, take.id, KIND, None, content)
+        c.execute(update(live_take).where(live_take.c.id == take.id).values(prescription_id=content["id"]))
     return Training(height, protocol, content["id"], content["prescription"], content["baseline"])
 
 

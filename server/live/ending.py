@@ -1,0 +1,124 @@
+"""The steps after the end of a take is on the disk; each may be the last before a crash.
+
+The row says that it is over, the log becomes a recording, the tablet hears of it, the estimator is heard out,
+the log goes (services/live_recordings.py takes up at the next start what is left).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable
+from typing import Final
+
+from server import audit
+from server.jobs.queue import JobQueue
+from server.live import protocol
+from server.live.intake import Ended
+from server.live.journal import Journal
+from server.live.pool import Pool
+from server.live.protocol import Close
+from server.live.rows import Rows
+from server.live.take import LiveTake
+from server.services import live, live_recordings
+from server.services.errors import NotFound
+from server.settings import Settings
+from server.storage import fs
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+
+log = logging.getLogger(__name__)
+
+DRAIN_S: Final = 10.0
+"""Time the estimator has for what it has not told when a take ends."""
+AGAIN_S: Final = 30.0
+"""Pause before a take that could not be stored (disk full) is tried again."""
+
+
+class Ending:
+    """Takes that are just ending.
+
+    Parameters
+    ----------
+    over : called with the row of a take that is over.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        db: Database,
+        blobs: BlobStore,
+        queue: JobQueue,
+        journal: Journal,
+        pool: Pool,
+        over: Callable[[live.Take], None],
+    ) -> None:
+        self._keep = (db, blobs, settings, queue)
+        self._settings = settings
+        self._rows = Rows(db, blobs)
+        self._journal, self._pool, self._over = journal, pool, over
+        self._asked: dict[str, audit.Actor | None] = {}
+        self._draining: dict[str, LiveTake] = {}
+
+    def ask(self, take: LiveTake, actor: audit.Actor | None) -> None:
+        """Somebody (None: the program) ends this take here, not the tablet."""
+        self._asked[take.id] = actor
+
+    def unask(self, take: LiveTake) -> None:
+        """It did not work."""
+        del self._asked[take.id]
+
+    def draining(self, take_id: str) -> LiveTake | None:
+        """A take that is over and whose estimator still speaks."""
+        return self._draining.get(take_id)
+
+    async def complete(self, take: LiveTake, end: Ended, forget: Callable[[], None]) -> None:
+        """Take all steps; `forget` is called once the take is over in the database."""
+        here = take.id in self._asked
+        actor = self._asked.pop(take.id, None)
+        try:
+            with contextlib.suppress(NotFound):
+                await asyncio.to_thread(self._journal.write)
+                state = "closed" if here else "finished"
+                await asyncio.to_thread(self._rows.end, actor, take.id, state, end)
+            self._draining[take.id] = take
+            forget()
+            await take.recorder.close()
+            take.problem = end.problem
+            take.recording_id = await self._store(take.id)
+            self._tell(take, here)
+            with contextlib.suppress(NotFound):
+                self._over(await asyncio.to_thread(self._rows.take, take.id))
+            take.over.set()
+            await self._drain(take)
+            path = live_recordings.log_path(self._settings.live, take.id)
+            await asyncio.to_thread(fs.remove_file, path)
+        finally:
+            take.over.set()
+            self._draining.pop(take.id, None)
+            self._pool.leave(take.id)
+
+    def _tell(self, take: LiveTake, here: bool) -> None:
+        if take.tablet is None:
+            return
+        if take.recording_id is not None:
+            take.tablet.say(protocol.finished(take.recording_id, take.problem))
+        if here or take.recording_id is None:
+            take.tablet.shut(Close.ENDED, "take_ended")
+
+    async def _store(self, take_id: str) -> str | None:
+        """Store until it works: the log holds acknowledged samples."""
+        while True:
+            try:
+                return await asyncio.to_thread(live_recordings.keep, *self._keep, take_id)
+            except Exception:
+                log.exception("live take %s is not stored yet; trying again", take_id)
+            await asyncio.sleep(AGAIN_S)
+
+    async def _drain(self, take: LiveTake) -> None:
+        """Hear the estimator out: the last strides and cues are still on their way."""
+        if self._pool.follows(take.id) and take.estimate == "ok":
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(DRAIN_S):
+                    await take.told.wait()

@@ -1,0 +1,64 @@
+"""What the hub reads and writes in the database; everything here blocks and is called in a thread."""
+
+from __future__ import annotations
+
+import contextlib
+
+from server import audit
+from server.live.intake import Ended
+from server.services import live
+from server.services.errors import NotFound
+from server.services.live_training import Training, training_of
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+
+
+class Rows:
+    """The rows of live takes."""
+
+    def __init__(self, db: Database, blobs: BlobStore) -> None:
+        self._db, self._blobs = db, blobs
+
+    def admit(self, take_id: str, token: str) -> live.Take | None:
+        """The take a token opens, over or not."""
+        with self._db.read() as c:
+            return live.by_token(c, take_id, token)
+
+    def take(self, take_id: str) -> live.Take:
+        """One take; raises NotFound."""
+        with self._db.read() as c:
+            return live.get(c, take_id)
+
+    def current(self, session_id: str) -> live.Take | None:
+        """The session's newest take."""
+        with self._db.read() as c:
+            return live.current(c, session_id)
+
+    def open_take(self, session_id: str) -> live.Take:
+        """The session's open take; raises NotFound, Conflict no_open_take."""
+        with self._db.read() as c:
+            return live.require_open(c, session_id)
+
+    def prepare(self, row: live.Take) -> tuple[Training, list[live.LiveEvent]]:
+        """What a take is coached with, and what happened in it so far."""
+        with self._db.write() as c:
+            return training_of(c, self._blobs, row), live.events(c, row.id)
+
+    def keep_command(
+        self, actor: audit.Actor | None, take_id: str, kind: str, t_s: float | None, content: object
+    ) -> None:
+        """Append what a person did."""
+        with self._db.write() as c:
+            live.add_event(c, actor, take_id, kind, t_s, content)
+
+    def start(self, take_id: str, source: str) -> None:
+        """Note the first batch; a take that was erased meanwhile is none."""
+        with contextlib.suppress(NotFound), self._db.write() as c:
+            live.started(c, take_id, source)
+
+    def end(self, actor: audit.Actor | None, take_id: str, state: str, end: Ended) -> live.Take:
+        """End a take; raises NotFound when it was erased meanwhile."""
+        with self._db.write() as c:
+            return live.end(
+                c, actor, take_id, state, count=end.count, sha256=end.sha256 or None, problem=end.problem
+            )
