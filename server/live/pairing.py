@@ -8,7 +8,7 @@ import urllib.request
 from dataclasses import dataclass
 from urllib.parse import urlsplit, urlunsplit
 
-from server.live.client import LiveError
+from server.live.sender import LiveError
 
 
 @dataclass(frozen=True)
