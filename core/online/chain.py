@@ -24,6 +24,7 @@ from core.frames import Bools, Floats, Segment, Side
 from core.online.body import Estimator, Filtered, FootPaths, Placed, Raw, worn_feet
 from core.online.calibrated import LiveCalibration
 from core.online.contacts import Attitudes, Contacts
+from core.online.drift import HeadingHold
 from core.online.erkf import HEADING_SD, live_params
 from core.online.frame import LiveStride
 from core.online.history import MOST, History
@@ -105,6 +106,8 @@ class Chain:
         turned = tuple(dict.fromkeys((*feet, *self.estimator.attitudes)))
         index = [self.segments.index(s) for s in turned]
         self._turned = turned
+        self._index = np.array(index, np.int64)
+        self._hold = HeadingHold(turned, rate)
         self._attitudes = Attitudes(index, [mounted[s] for s in turned], rate, self.params.attitude)
         self._contacts = Contacts(feet, rate, self.params.events)
         self._feet = np.array([self.segments.index(f) for f in feet], np.int64)
@@ -196,6 +199,9 @@ class Chain:
             parts = [slice(k, k + MOST) for k in range(0, len(acc), MOST)]
             return _joined([self._advance(acc[k], gyr[k], valid[k]) for k in parts])
         q = self._attitudes.push(acc, gyr, valid)
+        if self.estimator.attitudes:
+            k = self._index
+            self._hold.push(q, gyr.take(k, axis=1), valid.take(k, axis=1))
         turned = {s: q[:, i] for i, s in enumerate(self._turned)}
         placed = self.estimator.push(Raw(acc, gyr, valid, turned))
         angles = self._measure(placed, turned, valid)

@@ -8,15 +8,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
+from core.body.tree import PRESETS
 from core.frames import SIDES, Floats, Side
+from core.online.chain import COURSES
+from core.online.drift import HeadingHold
+from core.rotation import yaw
 from core.simulate import Truth
 from tests.accuracy.report import record
 from tests.live_walks import Run, recorded
-from tests.walks import simulated
+from tests.walks import only, simulated
 
 PEOPLE = (
     "comfortable",
@@ -36,6 +41,9 @@ FLEXION_DEG, FRONTAL_DEG, ROTATION_DEG = 2.0, 5.0, 4.0
 STRIDE_BIAS_MM, STRIDE_SD_MM = 15.0, 10.0
 CONTACT_MS = 15.0
 """Of the median: where a foot does not pitch up until it lands, the rule is early by that landing."""
+
+DRIFT_DEG = 3.0
+"""Of a foot's mean heading against the pelvis', last minute of five against the first, three sensors."""
 
 GROUPS = {
     "flexion": ("hip_flexion", "knee_flexion", "ankle_dorsiflexion"),
@@ -119,6 +127,31 @@ def test_what_is_shown_live_is_what_the_person_does(person: str) -> None:
         assert abs(made.strides.mean()) <= STRIDE_BIAS_MM
         assert made.strides.std() <= STRIDE_SD_MM
         assert abs(np.median(made.contacts)) <= CONTACT_MS
+
+
+def relative_heading_deg(seed: int) -> Floats:
+    """How far each foot's heading comes off the pelvis' in five minutes of pelvis and feet, degrees."""
+    recording, truth = simulated("five_minutes", seed)
+    run = recorded(only(recording, *PRESETS["feet_pelvis3"]))
+    course = run.rows["course"]
+    part = slice(run.chain.first, run.chain.first + len(course))
+    off = []
+    for i, segment in enumerate(COURSES[1:], 1):
+        told, true = (yaw(x) - yaw(y) for x, y in (
+            (course[:, i], course[:, 0]), (truth.q[segment][part], truth.q["pelvis"][part]),
+        ))  # fmt: skip
+        apart = np.exp(1j * (told - true))
+        minute = round(60.0 * recording.rate_hz)
+        off.append(np.angle(apart[-minute:].mean() / apart[:minute].mean()))
+    return np.asarray(np.degrees(off))
+
+
+def test_feet_do_not_drift_off_the_pelvis() -> None:
+    held = relative_heading_deg(1)
+    with patch.object(HeadingHold, "push", lambda *_: None):
+        free = relative_heading_deg(1)
+    assert np.abs(free).max() > 2.0 * DRIFT_DEG
+    assert np.abs(held).max() < DRIFT_DEG
 
 
 def test_write_down_the_figures() -> None:

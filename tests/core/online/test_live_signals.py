@@ -15,11 +15,12 @@ from core.body.tree import PRESETS, person_tree
 from core.frames import GRAVITY, Bools, Floats
 from core.fusion.orientations import Orientations
 from core.online.bridge import Bridge
+from core.online.drift import HeadingHold
 from core.online.joints import LiveAngles
 from core.online.sparse import FIGURE, HIP_SIGN
 from core.online.sparse_kernel import in_sy_frames, legs
 from core.online.still import Stillness
-from core.rotation import from_matrix, to_matrix
+from core.rotation import about, from_matrix, to_matrix, yaw
 
 SEGMENTS = PRESETS["lower_body7"]
 RATE = 100.0
@@ -149,3 +150,46 @@ def test_compiled_legs_are_those_of_the_leg_model() -> None:
     again = np.empty((300, 3, 3))
     in_sy_frames(q[:, 3].copy(), to_foot.T.copy(), again)
     np.testing.assert_allclose(again, R[:, 1], atol=1e-12)
+
+
+def drifting(n: int, seed: int) -> tuple[Floats, Floats]:
+    """Pelvis and two feet that swing, turn about every 20 s and drift apart by 6° and −4° a minute."""
+    t = np.arange(n) / RATE
+    way = np.pi * np.floor((t + 2.0) / 20.0) * np.clip(((t + 2.0) % 20.0) / 2.0, 0.0, 1.0)
+    rng = np.random.default_rng(seed)
+    course = np.stack((
+        way + np.radians(5.0) * np.sin(2 * np.pi * t),
+        way + np.radians(8.0) + np.radians(4.0) * np.sin(2 * np.pi * t + 1.0) + np.radians(6.0) * t / 60.0,
+        way - np.radians(8.0) + np.radians(4.0) * np.sin(2 * np.pi * t + 4.0) - np.radians(4.0) * t / 60.0,
+    ), axis=1)  # fmt: skip
+    return about(2, course + 0.01 * rng.standard_normal(course.shape)), np.full((n, 3, 3), 1.0)
+
+
+def test_headings_are_held_over_five_minutes_and_turns_are_not_taken_for_drift() -> None:
+    n = 30_000
+    q, gyr = drifting(n, 0)
+    valid = np.ones((n, 3), bool)
+    valid[15_000:15_200, 1] = False
+    held = q.copy()
+    HeadingHold(("pelvis", "foot_l", "foot_r"), RATE).push(held, gyr, valid)
+    np.testing.assert_array_equal(held[:, 0], q[:, 0])
+
+    def apart(x: Floats, i: int, at: slice) -> float:
+        return float(np.degrees(np.angle(np.mean(np.exp(1j * (yaw(x[at, i]) - yaw(x[at, 0])))))))
+
+    first, last = slice(200, 1600), slice(n - 1600, n - 200)
+    for i, rate in ((1, 6.0), (2, -4.0)):
+        assert abs(apart(q, i, last) - apart(q, i, first)) > 3.5 * abs(rate)
+        assert abs(apart(held, i, last) - apart(held, i, first)) < 3.0
+    again = q.copy()
+    hold = HeadingHold(("pelvis", "foot_l", "foot_r"), RATE)
+    for k in in_blocks(n, 5):
+        hold.push(again[k], gyr[k], valid[k])
+    np.testing.assert_array_equal(again, held)
+
+
+def test_a_segment_alone_has_nothing_to_be_held_to() -> None:
+    q, gyr = drifting(1000, 1)
+    one = np.ascontiguousarray(q[:, 1:2])
+    HeadingHold(("foot_l",), RATE).push(one, gyr[:, :1], np.ones((1000, 1), bool))
+    np.testing.assert_array_equal(one[:, 0], q[:, 1])
