@@ -151,7 +151,7 @@ def test_screenshots_of_a_live_take(
         page.close()
         page = opened(f"/sessions/{session}/live", browser=solid, scheme="dark")
         page.frame_locator("live-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
-        page.wait_for_timeout(2500)
+        page.wait_for_timeout(5000)
         until_strides(page, 4)
         page.screenshot(path=folder / "live-dark.png")
         page.close()

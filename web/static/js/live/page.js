@@ -1,6 +1,5 @@
 // <live-page>: the therapist's screen. What the feed says goes to the parts; what is pressed goes to the server.
 import "../progress.js";
-import "./sensors.js";
 import "./calibration.js";
 import "./feedback-panel.js";
 import "./stride-chart.js";
@@ -14,6 +13,7 @@ import { StripCard } from "./strip-card.js";
 import { Top } from "./top.js";
 import { After } from "./after.js";
 import { Notes } from "./notes.js";
+import { inOrder } from "./sensors.js";
 import { clock, number, say } from "./words.js";
 
 const data = JSON.parse(document.getElementById("live-data").textContent);
@@ -96,7 +96,7 @@ class LivePage extends HTMLElement {
     if (this.feed.state?.state === "streaming") this.view(frame.stage === "running" ? "run" : "calibrate");
     if (this.stage === "running" && frame.stage !== "running") this.again();
     this.stage = frame.stage;
-    const health = (frame.health ?? []).map((h) => ({ ...h, still: h.still ?? null }));
+    const health = inOrder(frame.health ?? []);
     this.sensors.show(health, data.segments);
     if (frame.stage === "running") this.chart.frame(frame);
     else this.calibration.show(frame.stage, frame.calibration, health, data.segments);

@@ -6,6 +6,7 @@ const INSIDE = 10, BESIDE = 112, STEP = 44;
 export class Bar {
   constructor(scene, { side, lengths, words }) {
     this.ball = scene.querySelector("[data-ball]");
+    this.ball.setAttribute("transform", `translate(450 ${CENTRE})`);
     scene.querySelector("[data-feet]").toggleAttribute("hidden", !lengths);
     ["up", "down"].forEach((way, i) => (scene.querySelector(`[data-guide=${way}]`).textContent = lengths ? "" : words[i]));
     // a right sole is a left one mirrored; the foot that steps is the trained one

@@ -5,6 +5,15 @@ import { number, say } from "./words.js";
 const EVERY_MS = 500; // rows are for reading; they need not follow every frame
 const WORST = ["none", "ok", "warn", "bad"];
 
+// From the middle outwards, left before right, from the hip down; what is not used comes last.
+const DOWN = ["chest", "pelvis", "thigh", "shank", "foot"];
+const place = ({ segment }) => {
+  if (!segment) return 99;
+  const [part, side] = segment.split("_");
+  return DOWN.indexOf(part) + ({ l: 10, r: 20 }[side] ?? 0);
+};
+export const inOrder = (health) => [...health].sort((a, b) => place(a) - place(b));
+
 class LiveSensors extends HTMLElement {
   connectedCallback() {
     this.body = this.querySelector("tbody");

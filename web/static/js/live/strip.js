@@ -31,7 +31,7 @@ class TargetStrip extends Plot {
     if (!range) return;
     const Y = (v) => EDGE.top + ((range[1] - v) / (range[1] - range[0])) * h;
     this.target(g, Y, w, colour);
-    const step = nice((range[1] - range[0]) / 4);
+    const step = nice((range[1] - range[0]) / 5);
     g.lineWidth = 1;
     for (let v = Math.ceil(range[0] / step) * step; v <= range[1]; v += step) {
       g.strokeStyle = colour.grid;
