@@ -8,7 +8,8 @@ const EDGE = { left: 44, right: 64, top: 10, bottom: 42 };
 const MARK = 6.5;
 
 class TargetStrip extends Plot {
-  // rows: [{value, kind: in|near|away|left|right|none, cued}] oldest first; zone: [low, high] | null
+  // rows: [{value, kind: in|near|away|left|right|none, cued, cue}] oldest first; zone: [low, high] of the next stride
+  // or null. A stride was judged by the zone of its cue, so the band steps where the level changed.
   show(rows, zone, digits) {
     Object.assign(this, { rows, zone, digits });
     this.ask();
@@ -16,12 +17,21 @@ class TargetStrip extends Plot {
 
   range() {
     const values = this.rows.map((r) => r.value).filter((v) => v !== null);
-    const all = [...values, ...(this.zone ?? [])].filter(Number.isFinite);
+    const all = [...values, ...this.zones().flat()].filter(Number.isFinite);
     if (!all.length) return null;
     const [low, high] = [Math.min(...all), Math.max(...all)];
     const least = 4 * 10 ** -this.digits; // never so close that rounding shows as walking
     const room = Math.max(0.25 * (high - low), (least - (high - low)) / 2, least / 4);
     return [low - room, high + room];
+  }
+
+  // The zone of each of the places, oldest first; none without a target.
+  zones() {
+    if (!this.zone) return [];
+    const known = this.rows.map((r) => (r.cue ? [r.cue.zone_low, r.cue.zone_high] : null));
+    let last = this.zone;
+    for (let i = known.length - 1; i >= 0; i--) last = known[i] ??= last;
+    return [...Array(SHOWN - known.length).fill(last), ...known];
   }
 
   draw(g, { width, height, colour }) {
@@ -57,12 +67,13 @@ class TargetStrip extends Plot {
 
   target(g, Y, w, colour) {
     if (!this.zone) return;
-    const [low, high] = this.zone;
+    const zones = this.zones(), X = (i) => Math.round(EDGE.left + (i / SHOWN) * w);
     g.fillStyle = colour.target;
-    g.fillRect(EDGE.left, Y(high), w, Y(low) - Y(high));
+    zones.forEach(([low, high], i) => g.fillRect(X(i), Y(high), X(i + 1) - X(i), Y(low) - Y(high)));
     g.strokeStyle = colour["target-line"];
     g.lineWidth = 1.25;
-    for (const v of [low, high]) trace(g, [[EDGE.left, Y(v)], [EDGE.left + w, Y(v)]]);
+    for (const end of [0, 1]) trace(g, zones.flatMap((z, i) => [[X(i), Y(z[end])], [X(i + 1), Y(z[end])]]));
+    const [low, high] = zones[SHOWN - 1];
     label(g, "target", EDGE.left + w + 8, Y((low + high) / 2) + 4, { colour: colour.ink, bold: true });
   }
 }
