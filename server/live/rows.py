@@ -41,8 +41,9 @@ class Rows:
 
     def prepare(self, row: live.Take) -> tuple[Training, list[live.LiveEvent]]:
         """What a take is coached with, and what happened in it so far."""
-        with self._db.write() as c:
-            return training_of(c, self._blobs, row), live.events(c, row.id)
+        training = training_of(self._db, self._blobs, row)
+        with self._db.read() as c:
+            return training, live.events(c, row.id)
 
     def keep_command(
         self, actor: audit.Actor | None, take_id: str, kind: str, t_s: float | None, content: object

@@ -142,6 +142,8 @@ class LiveTake:
             self._hub.pool.follow(self.id)
         else:
             self._hub.pool.grow(self.id, size)
+        if self.steered.stale and not self._hub.pool.follows(self.id):
+            self.mind_silence(False)
 
     def acknowledged(self, below: int) -> None:
         """Batches are on the disk."""

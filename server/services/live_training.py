@@ -15,6 +15,7 @@ from sqlalchemy import Connection, select, update
 from core.errors import SagittalError
 from server.services import analyses, live, prescriptions
 from server.storage.blobs import BlobStore
+from server.storage.db import Database
 from server.storage.tables import live_event, live_take
 
 log = logging.getLogger(__name__)
@@ -39,16 +40,21 @@ class Training:
     baseline: Mapping[str, Any] | None = None
 
 
-def training_of(c: Connection, blobs: BlobStore, take: live.Take) -> Training:
-    """What this take began with, or begins with now; the connection must be a writing one."""
-    said = analyses.completed(c, take.session_id, None)
-    height, protocol = said.get("subject", {}).get("height_m"), said["protocol"]
+def training_of(db: Database, blobs: BlobStore, take: live.Take) -> Training:
+    """What this take began with, or begins with now."""
     query = select(live_event.c.content).where(live_event.c.take_id == take.id, live_event.c.kind == KIND)
-    content = c.execute(query.order_by(live_event.c.seq).limit(1)).scalar()
-    if content is None:
-        content = _prescribed(c, blobs, take)
-        live.add_event(c, None, take.id, KIND, None, content)
-        c.execute(update(live_take).where(live_take.c.id == take.id).values(prescription_id=content["id"]))
+    with db.read() as c:
+        said = analyses.completed(c, take.session_id, None)
+        content = c.execute(query.order_by(live_event.c.seq).limit(1)).scalar()
+        begins = content is None
+        if content is None:
+            content = _prescribed(c, blobs, take)
+    if begins:
+        with db.write() as c:
+            live.add_event(c, None, take.id, KIND, None, content)
+            row = update(live_take).where(live_take.c.id == take.id)
+            c.execute(row.values(prescription_id=content["id"]))
+    height, protocol = said.get("subject", {}).get("height_m"), said["protocol"]
     return Training(height, protocol, content["id"], content["prescription"], content["baseline"])
 
 
