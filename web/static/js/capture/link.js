@@ -87,7 +87,9 @@ export class Link {
     try {
       for (;;) {
         const socket = this.socket;
-        const to = Math.min(this.outbox.stored, Math.max(this.floor, this.outbox.acked) + this.window, this.sent + READ_AT_ONCE);
+        const { acked, stored } = this.outbox;
+        const most = acked < this.floor ? this.floor + 1 : acked + this.window; // what is on the server's disk is asked first
+        const to = Math.min(stored, most, this.sent + READ_AT_ONCE);
         if (this.state !== "open" || this.sent >= to) break;
         const batches = await this.outbox.read(this.sent, to);
         if (socket !== this.socket || this.state !== "open") continue;

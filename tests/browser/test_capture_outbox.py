@@ -1,0 +1,126 @@
+"""What the tablet keeps in IndexedDB, in real Chromium: over reloads, a crash, and beyond what memory holds."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import hashlib
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Error, Page
+
+from core.formats.live_log import Batch, encode_batch, peek
+from core.formats.live_log import payload as payload_of
+from tests.browser.conftest import RunningServer
+
+OPEN = """const { Outbox } = await import('/static/js/capture/outbox.js');
+    const text = (b) => btoa(Array.from(b, (v) => String.fromCharCode(v)).join(''));
+    const hello = { streams: [{ stream: 0, rate_hz: 100, sensors: [{ id: 'A' }] }] };
+    const samples = (n) => new Float32Array(45).fill(n);
+    const batch = (n) => ({ stream: 0, t0Us: n * 50000, sentUs: n, nImu: 1, samples: samples(n) });"""
+BEGIN = OPEN + "const outbox = await Outbox.begin({ take: 't', token: 'k' }); await outbox.note({ hello });"
+AGAIN = OPEN + "const outbox = await Outbox.unfinished();"
+
+
+@pytest.fixture
+def context(flat: Browser, running: RunningServer) -> Iterator[BrowserContext]:
+    context = flat.new_context(base_url=running.url)
+    yield context
+    context.close()
+
+
+def opened(context: BrowserContext) -> Page:
+    page = context.new_page()
+    page.goto("/static/icon.svg")
+    return page
+
+
+def run(page: Page, body: str) -> Any:
+    return page.evaluate(f"async () => {{ {body} }}")
+
+
+def frame(n: int) -> bytes:
+    return encode_batch(Batch(0, n, n * 50_000, n, np.full((5, 1, 9), n, np.float32)))
+
+
+def digest(count: int) -> str:
+    found = hashlib.sha256()
+    for n in range(count):
+        found.update(payload_of(frame(n), peek(frame(n))))
+    return found.hexdigest()
+
+
+def test_more_than_memory_holds_is_read_back_in_order_with_its_hash(context: BrowserContext) -> None:
+    page = opened(context)
+    run(page, BEGIN + "for (let n = 0; n < 700; n++) outbox.add(batch(n), 100); await outbox.settled();")
+    page.reload()
+    found = run(
+        page,
+        AGAIN
+        + """const all = [];
+        while (all.length < 700) all.push(...await outbox.read(all.length, all.length + 32));
+        return { all: all.map(text), made: outbox.made, stored: outbox.stored, acked: outbox.acked,
+          held: outbox.heldS, sha: outbox.sha256(), last: outbox.record.lastUs[0] };""",
+    )
+    assert [base64.b64decode(b) for b in found["all"]] == [frame(n) for n in range(700)]
+    assert (found["made"], found["stored"], found["acked"]) == (700, 700, 0)
+    assert found["held"] == pytest.approx(35)
+    assert found["sha"] == digest(700)
+    assert found["last"] == 699 * 50_000 + 40_000
+
+
+def test_acknowledged_batches_leave_the_tablet_and_the_hash_goes_on(context: BrowserContext) -> None:
+    page = opened(context)
+    run(
+        page,
+        BEGIN + "for (let n = 0; n < 30; n++) outbox.add(batch(n), 100);"
+        " await outbox.settled(); await outbox.acknowledge(25);",
+    )
+    page.reload()
+    found = run(
+        page,
+        AGAIN
+        + """const acked = outbox.acked, first = (await outbox.read(25, 30)).map(text);
+        for (let n = 30; n < 40; n++) outbox.add(batch(n), 100);
+        await outbox.settled(); await outbox.acknowledge(40);
+        return { acked, first, sha: outbox.sha256(), left: (await outbox.read(0, 40)).length };""",
+    )
+    assert found["acked"] == 25
+    assert [base64.b64decode(b) for b in found["first"]] == [frame(n) for n in range(25, 30)]
+    assert found["sha"] == digest(40)
+    assert found["left"] == 0
+    page.reload()
+    assert run(page, AGAIN + "return [outbox.made, outbox.acked];") == [40, 40]
+
+
+def test_what_was_stored_survives_a_crash_of_the_page(context: BrowserContext) -> None:
+    page = opened(context)
+    stored: list[int] = []
+    page.expose_function("tell", lambda n: stored.append(n))
+    run(
+        page,
+        BEGIN
+        + """outbox.onstored = () => tell(outbox.stored); let n = 0;
+        setInterval(() => outbox.add(batch(n++), 100), 5);""",
+    )
+    while not stored or stored[-1] < 60:
+        page.wait_for_timeout(50)
+    with page.expect_event("crash"), contextlib.suppress(Error):
+        page.goto("chrome://crash")
+    again = opened(context)
+    found = run(
+        again,
+        AGAIN + "return [outbox.made, outbox.sha256(), (await outbox.read(0, outbox.made)).length];",
+    )
+    assert found[0] >= stored[-1] >= 60
+    assert found[1] == digest(found[0])
+    assert found[2] == found[0]
+
+
+def test_a_finished_take_leaves_nothing_behind(context: BrowserContext) -> None:
+    page = opened(context)
+    run(page, BEGIN + "outbox.add(batch(0), 100); await outbox.forget();")
+    assert run(page, AGAIN + "return outbox;") is None
