@@ -113,10 +113,17 @@ class Layout:
         self._carrier = np.array(
             [len(self.segments) if x.trunk else self.segments.index(x.segment) for x in self._parts], np.intp
         )
-        turn, at = (np.array([getattr(x, f) for x in self._parts]) for f in ("turn", "at"))
-        self._turned = np.flatnonzero((turn != _STAYS).any(axis=-1))
-        self._moved = np.flatnonzero(at.any(axis=-1))
-        self._turn, self._at = turn[self._turned][:, None], at[self._moved][:, None]
+        # a chest carries its parts as it is turned, a heading only knows where the front is
+        upright = "chest" not in self.segments
+        raised = [rotation.multiply(_NEUTRAL, x.turn) if x.trunk and upright else x.turn for x in self._parts]
+        offset = [
+            rotation.rotate(_NEUTRAL, np.array(x.at)) if x.trunk and upright else np.array(x.at)
+            for x in self._parts
+        ]
+        self._turn = np.array([_turning(x) for x in raised]).reshape(-1, 4, 4)
+        self._at = np.array(offset, np.float64).reshape(-1, 1, 3)
+        self._moved = np.flatnonzero(self._at.any(axis=(1, 2)))
+        self._arm = np.array([_swinging(x) for x in self._at[self._moved, 0]]).reshape(-1, 16, 3)
         self._meshes = {"bones": shapes.bone(), "shoes": _shoe(body), "balls": shapes.ball()}
         names: list[str] = [x.name for x in self._parts]
         ends = {
@@ -145,7 +152,7 @@ class Layout:
         """Place all parts; q (m, 4) and p (m, 3) of every segment of this layout."""
         turn, at = [q[s] for s in self.segments], [p[s] for s in self.segments]
         if "pelvis" in self.segments:
-            turn.append(_trunk(q))
+            turn.append(q["chest"] if "chest" in q else _facing(q["pelvis"]))
             at.append(p["pelvis"])
         frames = len(at[0])
         wxyz = np.empty((frames, len(self._parts), 4), np.float32)
@@ -154,9 +161,11 @@ class Layout:
             block = slice(start, start + _BLOCK)
             held = np.array([x[block] for x in turn])[self._carrier]
             moved = np.array([x[block] for x in at])[self._carrier]
-            moved[self._moved] += rotation.rotate(held[self._moved], self._at)
-            held[self._turned] = rotation.multiply(held[self._turned], self._turn)
-            wxyz[block], position[block] = held.swapaxes(0, 1), moved.swapaxes(0, 1)
+            arms = held[self._moved]
+            pairs = (arms[..., None] * arms[..., None, :]).reshape(*arms.shape[:-1], 16)
+            moved += self._at
+            moved[self._moved] += pairs @ self._arm
+            wxyz[block], position[block] = (held @ self._turn).swapaxes(0, 1), moved.swapaxes(0, 1)
         return Placed(
             {
                 name: Batch(self._meshes[name], wxyz[:, rows], position[:, rows], *self._look[name])
@@ -207,11 +216,28 @@ def _parts(segments: Sequence[Segment], body: BodyModel) -> list[Part]:
     return parts
 
 
-def _trunk(q: Mapping[Segment, Floats]) -> Floats:
-    """Orientation of the chest; without a sensor there, upright and facing as the pelvis does."""
-    if "chest" in q:
-        return q["chest"]
-    return rotation.multiply(rotation.about(2, rotation.yaw(q["pelvis"])), _NEUTRAL)
+def _facing(q: Floats) -> Floats:
+    """Turn (m, 4) about the vertical to where x of q (m, 4) points: core.rotation's yaw, in fewer steps."""
+    w, x, y, z = q.T
+    return rotation.about(2, np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
+
+
+def _turning(turn: Floats) -> Floats:
+    """Matrix (4, 4) with q ⊗ turn = q @ matrix."""
+    return np.array([rotation.multiply(row, turn) for row in np.eye(4)])
+
+
+def _swinging(at: Floats) -> Floats:
+    """Matrix (16, 3) with R(q) at = at + (all products of two components of q) @ matrix, for unit q.
+
+    R(q) v = v + 2 w (u × v) + 2 u × (u × v) is quadratic in the components (core.rotation.rotate).
+    """
+    found = np.zeros((4, 4, 3))
+    for i, u in enumerate(np.eye(3), start=1):
+        found[0, i] = 2.0 * np.cross(u, at)
+        for k, v in enumerate(np.eye(3), start=1):
+            found[i, k] = 2.0 * np.cross(u, np.cross(v, at))
+    return found.reshape(16, 3)
 
 
 @lru_cache(maxsize=32)

@@ -40,6 +40,7 @@ class LiveFigure:
         self._layout: Layout | None = None
         self._key: tuple[object, ...] = ()
         self._drawn: list[tuple[str, Batch, viser.BatchedMeshHandle]] = []
+        self._times = 0
         self._grey = True
         self._t_s: float | None = None
         self._room.set_dark(dark)
@@ -139,13 +140,18 @@ class LiveFigure:
             handle.remove()
         placed = layout.place(q, p)
         self._layout, self._key = layout, key
+        # a new name each time: under the old one the client keeps its shader, which does not fit another number
+        # of copies or copies with opacities (GL_INVALID_OPERATION, and nothing is drawn)
+        self._times += 1
         self._drawn = [
-            (name, batch, add_batch(self._server.scene, f"{ROOM}/{name}", batch, ghost=len(batch.wxyz) > 1))
-            for name, batch in placed.batches.items()
-            if batch.tint
+            (name, batch, self._add(name, batch)) for name, batch in placed.batches.items() if batch.tint
         ]
         self._paint()
         return placed
+
+    def _add(self, name: str, batch: Batch) -> viser.BatchedMeshHandle:
+        path = f"{ROOM}/{name}_{self._times}"
+        return add_batch(self._server.scene, path, batch, ghost=len(batch.wxyz) > 1)
 
     def _set_grey(self, grey: bool) -> None:
         if grey != self._grey:

@@ -76,13 +76,20 @@ class ReferenceWalk:
         lead = rows[self.lead]
         pelvis = rotation.multiply(rotation.about(2, heading), self._pelvis[lead])
         legs = [(self._turn[k], self._points[k], rows[side]) for k, side in enumerate(SIDES)]
-        turn = rotation.multiply(pelvis, np.concatenate([turn[row] for turn, _, row in legs]))
-        points = rotation.rotate(pelvis, np.concatenate([points[row] for _, points, row in legs]))
-        p = np.empty((len(SEGMENTS), 3))
+        q, p = np.empty((len(SEGMENTS), 4)), np.empty((len(SEGMENTS), 3))
+        q[0] = pelvis
+        # pelvis ⊗ turn and R(pelvis) point, for all of them at once
+        q[1:] = np.concatenate([turn[row] for turn, _, row in legs]) @ _before(*pelvis.tolist())
+        points = np.concatenate([points[row] for _, points, row in legs]) @ rotation.to_matrix(pelvis).T
         p[0] = 0.0
         p[1:4], p[4:7] = points[:3], points[_POINTS : _POINTS + 3]
         p += (*place, -points[:, 2].min())
-        return np.concatenate((pelvis[np.newaxis], turn)), p
+        return q, p
+
+
+def _before(w: float, x: float, y: float, z: float) -> Floats:
+    """Matrix (4, 4) with q ⊗ turn = turn @ matrix."""
+    return np.array([[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]])
 
 
 def standing(body: BodyModel) -> tuple[Floats, Floats]:

@@ -96,8 +96,8 @@ def test_a_moment_is_drawn_as_the_replay_draws_it(
         scene.figure.show(moment(part, i))
         for name, batch in replay.batches.items():
             if batch.tint:
-                np.testing.assert_array_equal(scene[f"/{name}"].batched_positions, batch.position[i])
-                np.testing.assert_array_equal(scene[f"/{name}"].batched_wxyzs, batch.wxyz[i])
+                np.testing.assert_allclose(scene[f"/{name}"].batched_positions, batch.position[i], atol=1e-6)
+                np.testing.assert_allclose(scene[f"/{name}"].batched_wxyzs, batch.wxyz[i], atol=1e-6)
                 np.testing.assert_array_equal(scene[f"/{name}"].batched_scales, batch.scale)
 
 
