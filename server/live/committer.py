@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import logging
 import threading
 import time
@@ -104,7 +105,8 @@ class Lane:
             if records and not self._broken:
                 try:
                     self.log.append(b"".join(records))
-                except OSError as error:
+                except Exception as error:
+                    log.exception("the live log %s cannot be written", self.log.path.name)
                     self._break(error)
                 else:
                     self._written += len(records)
@@ -118,7 +120,8 @@ class Lane:
                 return
             try:
                 self.log.sync()
-            except OSError as error:
+            except Exception as error:
+                log.exception("the live log %s cannot be synced", self.log.path.name)
                 self._break(error)
             else:
                 self._synced = self._written
@@ -144,10 +147,10 @@ class Lane:
             self._broken = True
             self.log.close()
 
-    def _break(self, error: OSError) -> None:
-        log.error("%s: %s", self.log.path.name, error)
+    def _break(self, error: Exception) -> None:
+        """Whatever it is (no memory, a mistake of ours): this take says so, the others go on."""
         self._broken = True
-        self._post(self._owner.broke, error)
+        self._post(self._owner.broke, error if isinstance(error, OSError) else OSError(errno.EIO, str(error)))
 
 
 class Committer:

@@ -147,6 +147,14 @@ def test_values_that_cannot_be_measured_are_kept() -> None:
     assert greeted().offer(whole).keep == ("B", whole)
 
 
+def test_clocks_that_jump_change_nothing_in_the_order() -> None:
+    intake = greeted()
+    for seq, (t0, sent) in enumerate([(5, 5), (1 << 52, 0), (0, 1 << 52), (0, 0)]):
+        whole = resealed(frame(seq), lambda b, t0=t0, sent=sent: struct.pack_into("<QQ", b, 20, t0, sent))  # type: ignore[misc]
+        assert intake.offer(whole).keep == ("B", whole)
+    assert intake.next_seq == 4
+
+
 def test_a_tablet_that_does_not_wait_for_acknowledgements_is_closed() -> None:
     intake = greeted(MOST_UNACKED, synced=False)
     answer = intake.offer(frame(MOST_UNACKED))

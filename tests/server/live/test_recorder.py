@@ -256,6 +256,32 @@ def test_a_disk_that_still_refuses_is_tried_again_at_the_next_hello(
     asyncio.run(run())
 
 
+def test_a_take_that_cannot_be_written_at_all_leaves_the_others_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def run() -> None:
+        committer = Committer(0.02)
+        committer.start()
+        one, other = Heard(), Heard()
+        first = await open_recorder(tmp_path / "1.log", HELLO, committer, one)
+        second = await open_recorder(tmp_path / "2.log", HELLO, committer, other)
+
+        def out_of_memory(_: bytes) -> None:
+            raise MemoryError
+
+        monkeypatch.setattr(first._lane.log, "append", out_of_memory)
+        first.offer(frame(0))
+        await until(lambda: one.failures)
+        assert one.failures[0].code == "storage_failed"
+        second.offer(frame(0))
+        await until(lambda: other.acks == [1])
+        await first.close()
+        await second.close()
+        committer.stop()
+
+    asyncio.run(run())
+
+
 def test_a_disk_that_cannot_begin_a_take_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async def begin() -> str | None:
         try:
