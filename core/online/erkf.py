@@ -7,7 +7,9 @@ and stride lengths within 1 % of it; with joint centres of 1 cm the flexions are
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import radians
 from typing import Final
 
@@ -18,9 +20,11 @@ from core.body.erkf import ErkfInputs, links_of, new_record, noise_of
 from core.body.erkf_kernel import CONTACT, INVALID, STILL, forward
 from core.body.erkf_params import ErkfParams
 from core.body.erkf_start import start_state
+from core.body.gaps import HOLD_S
 from core.body.tree import ImuTree
 from core.frames import Bools, Floats
 from core.online.still import ROLLING_MPS
+from core.rotation import exp, multiply, rotate
 
 HEADING_SD: Final = radians(2.0)
 """Of each segment's heading while standing, where forward axes were made to agree with the joints on the walk
@@ -28,6 +32,12 @@ before (core/body/headings.py): they face ahead then, by calibration. Anything f
 the 30° of a start that knows nothing the filter turns them again, and the angles' zero of standing with them:
 1.4° of knee rotation on neura_walk, nothing else. The smoothed headings of the calibration walk are no better
 start."""
+
+
+UP: Final = np.array([0.0, 0.0, 1.0])
+
+SETTLED_TILT: Final = radians(3.0)
+"""Of gravity in one sample of a foot that stands: the rule's 1.2 m/s² would be 7°, a foot's rest has less."""
 
 
 def live_params() -> ErkfParams:
@@ -96,10 +106,17 @@ class LiveErkf:
         self._x, self._P, self._before = state.nominal, state.P, state.before
         self._dx, self._refused = state.injected, state.refused
         self._heading = np.empty((0, n))
+        self._gone, self._adrift = np.zeros(n, np.int64), np.zeros(n, np.bool_)
+        linked = {i for j in tree.joints for i in (j.proximal, j.distal)}
+        self._alone = [i for i in tree.feet if i not in linked]
+        self._hold, self._params = round(HOLD_S * rate_hz), params
         self.broken = False
 
     def push(self, signals: Signals) -> tuple[Floats, Floats]:
-        """States (T, n, 16) and distances (T, joints) of the ends of each joint; NaN once it is `broken`."""
+        """States (T, n, 16) and distances (T, joints) of the ends of each joint; NaN once it is `broken`.
+
+        NaN too is a foot by itself that was lost for long, until it rests again.
+        """
         T, n = signals.valid.shape
         out, sd = np.empty((T, n, 16)), np.empty((T, n))
         residual, hit = np.empty((T, len(self.tree.joints))), np.empty((T, n), np.bool_)
@@ -111,10 +128,54 @@ class LiveErkf:
             step[0], self._first = 0.0, False
         flags = np.empty((T, n), np.int64)
         _flag(signals.valid, signals.still, self._foot, flags)
-        broke = forward(
-            self._x, self._P, self._before, self._dx, self._refused, step, signals.acc, signals.gyr, flags,
-            self._heading, self._links, self._noise, self._record, out, sd, residual, hit,
-        )  # fmt: skip
-        if broke >= 0:
-            out[broke:], residual[broke:], self.broken = np.nan, np.nan, True
+        adrift = np.zeros((T, n), np.bool_)
+        begins = list(self._settles(signals, adrift))
+        for first, past in pairwise(sorted({0, T, *(k for k, _ in begins)})):
+            for _, i in (x for x in begins if x[0] == first):
+                self._settle(i, signals.acc[first, i], signals.gyr[first, i])
+            k = slice(first, past)
+            broke = forward(
+                self._x, self._P, self._before, self._dx, self._refused, step[k], signals.acc[k],
+                signals.gyr[k], flags[k], self._heading, self._links, self._noise, self._record, out[k],
+                sd[k], residual[k], hit[k],
+            )  # fmt: skip
+            if broke >= 0:
+                out[first + broke :], residual[first + broke :], self.broken = np.nan, np.nan, True
+                break
+        out[adrift] = np.nan
         return out, residual
+
+    def _settles(self, signals: Signals, adrift: Bools) -> Iterator[tuple[int, int]]:
+        """Sample and sensor where one that hangs on nothing rests again after a loss; marks those before it.
+
+        A foot that is lost in mid-swing turns on by a right angle while its last rate is held, and nothing
+        but its next rest says where it is: the filter alone took half a minute to find back.
+        """
+        if not self._gone.any() and not self._adrift.any() and bool(signals.valid.all()):
+            return
+        for k in range(len(adrift)):
+            for i in self._alone:
+                self._gone[i] = 0 if signals.valid[k, i] else self._gone[i] + 1
+                if self._gone[i] > self._hold:
+                    self._adrift[i] = True
+                elif self._adrift[i] and signals.still[k, i, 0]:
+                    self._adrift[i] = False
+                    yield k, i
+            adrift[k] = self._adrift
+
+    def _settle(self, i: int, acc: Floats, gyr: Floats) -> None:
+        """Begin sensor i anew where it is, at rest: level by gravity, as it faces."""
+        x, m, c = self._x[i], self._noise.m, self._params
+        x[3:6] = 0.0
+        force = rotate(x[6:10], acc)
+        force /= np.linalg.norm(force)
+        axis = np.cross(force, UP)
+        sine = float(np.linalg.norm(axis))
+        turn = axis * (np.arctan2(sine, force[2]) / sine) if sine > 0.0 else np.zeros(3)
+        x[6:10] = multiply(exp(turn), x[6:10])
+        part = slice(i * m, (i + 1) * m)
+        self._P[part], self._P[:, part], self._dx[part] = 0.0, 0.0, 0.0
+        sd = np.repeat((c.start_position_sd, ROLLING_MPS, SETTLED_TILT, c.start_gyr_bias_sd,
+                        c.start_acc_bias_sd), 3)[:m]  # fmt: skip
+        self._P[part, part] = np.diag(sd**2)
+        self._before[i], self._refused[i] = np.concatenate((acc, gyr)), 0

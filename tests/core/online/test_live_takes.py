@@ -78,6 +78,24 @@ def test_a_lost_sensor_comes_back_into_the_figure(segment: Segment) -> None:
         assert not s.counted
 
 
+@pytest.mark.parametrize("seconds", [0.5, 1.0, 5.0])
+def test_feet_by_themselves_begin_anew_at_their_next_rest(seconds: float) -> None:
+    """The tablet is out of reach for a while: nobody's samples come, one foot is in mid-swing."""
+    take = only(walk(32.0), "pelvis", "foot_l", "foot_r")
+    holed = take
+    for segment in take.sensors:
+        holed = lost(holed, segment, 15.0, 15.0 + seconds)
+    whole, found = ([s for s in recorded(x).strides if s.complete] for x in (take, holed))
+    after = [s for s in found if s.start_s > 15.0 + seconds + 1.5]
+    assert len(after) > 10
+    for s in after:
+        (same,) = (x for x in whole if x.side == s.side and abs(x.end_s - s.end_s) < 0.1)
+        one, other = same.values["stride_length_m"], s.values["stride_length_m"]
+        assert one is not None
+        assert other is not None
+        assert other == pytest.approx(one, abs=0.03), (s.side, s.end_s)
+
+
 def test_a_filter_that_breaks_says_so_once_and_contacts_go_on() -> None:
     take = walk()
     online = Online(hello_of(take), take.subject)
