@@ -140,8 +140,8 @@ class LiveFigure:
             handle.remove()
         placed = layout.place(q, p)
         self._layout, self._key = layout, key
-        # a new name each time: under the old one the client keeps its shader, which does not fit another number
-        # of copies or copies with opacities (GL_INVALID_OPERATION, and nothing is drawn)
+        # a new name each time: under the old one the client keeps its shader, which does not fit copies that
+        # have opacities now (GL_INVALID_OPERATION, and nothing is drawn)
         self._times += 1
         self._drawn = [
             (name, batch, self._add(name, batch)) for name, batch in placed.batches.items() if batch.tint

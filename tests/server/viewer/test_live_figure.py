@@ -51,7 +51,10 @@ class Scene:
         self.figure = LiveFigure(server, walk.BODY)
 
     def __getitem__(self, name: str) -> viser.SceneNodeHandle:
-        return self.server.scene._handle_from_node_name[f"/room{name}"]
+        nodes = self.server.scene._handle_from_node_name
+        # batches have the number of the drawing behind their name
+        drawn = [node for node in nodes if node.startswith(f"/room{name}_")]
+        return nodes[f"/room{name}" if f"/room{name}" in nodes else drawn[-1]]
 
     def play(self, poses: Poses, until_s: float, since_s: float = 0.0) -> int:
         """Show all moments of a time; the index of the last."""
