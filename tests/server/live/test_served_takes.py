@@ -1,0 +1,91 @@
+"""Takes of a whole server with its workers: analysed at their end, kept when it is asked to stop."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+from core.formats.live_log import PROTOCOL, hello_json
+from server.live.client import stream
+from tests.live_takes import stored
+from tests.live_walk import walk, walk_hello
+from tests.service import new_session, served, wait_for
+
+
+def opened(client: httpx.Client, session: str) -> tuple[dict[str, Any], str]:
+    """What a tablet got for its code, and the address of its socket."""
+    code = client.post(f"/api/v1/sessions/{session}/live").raise_for_status().json()["code"]
+    paired = client.post("/api/v1/live/pairings", json={"code": code}).raise_for_status().json()
+    return paired, str(client.base_url).replace("http://", "ws://").rstrip("/") + paired["socket"]
+
+
+def test_a_finished_take_is_analysed_like_an_upload(tmp_path: Path) -> None:
+    async def frames() -> AsyncIterator[bytes]:
+        for due in walk():
+            yield due.frame
+
+    with served(tmp_path / "data") as service:
+        client = service.client
+        session = new_session(client, "P-1")
+        paired, url = opened(client, session)
+        report = asyncio.run(stream(url, paired["token"], walk_hello(paired["take"]), frames()))
+        recording = client.get(f"/api/v1/sessions/{session}/recording").raise_for_status().json()
+        assert recording["id"] == report.recording
+        assert [f["name"].rpartition(".")[2] for f in recording["files"]] == ["sagittal-live"]
+        jobs = client.get("/api/v1/jobs").raise_for_status().json()
+        assert {j["kind"] for j in jobs} == {"inspect", "analyse"}
+        for one in jobs:
+            assert wait_for(client, one["id"])["state"] == "done"
+        found = client.get(f"/api/v1/sessions/{session}/report").raise_for_status().json()
+        (analysis,) = client.get(f"/api/v1/sessions/{session}/analyses").raise_for_status().json()
+        content = client.get(f"/api/v1/sessions/{session}/files/{recording['files'][0]['name']}").content
+    assert content.startswith(b"SAGLIVE1\n")
+    assert analysis["recording_id"] == report.recording
+    strides = next(p for p in found["parameters"] if p["name"] == "stride_time_s")
+    assert 0.9 < strides["left"]["value"] < 1.2
+
+
+def test_sigterm_in_the_middle_of_a_take_keeps_what_came_and_ends_within_ten_seconds(tmp_path: Path) -> None:
+    frames = [due.frame for due in walk()[:300]]
+    with served(tmp_path / "data") as service:
+        client = service.client
+        session = new_session(client, "P-1")
+        paired, url = opened(client, session)
+        feed = f"{str(client.base_url).replace('http://', 'ws://').rstrip('/')}/sessions/{session}/live/feed"
+        cookie = {"Cookie": f"sid={client.cookies['sid']}"}
+        with (
+            connect(url, subprotocols=[Subprotocol(PROTOCOL)], compression=None) as ws,
+            connect(feed, additional_headers=cookie, compression=None) as page,
+        ):
+            ws.send(hello_json(walk_hello(paired["take"]), paired["token"]).decode())
+            assert "welcome" in str(ws.recv())
+            acknowledged = 0
+            for one in frames[:60]:
+                ws.send(one)
+            while acknowledged < 60:
+                message = str(ws.recv())
+                if '"ack"' in message:
+                    acknowledged = int(message.split(":")[-1].rstrip("}"))
+            page.recv()
+            began = time.monotonic()
+            service.process.send_signal(signal.SIGTERM)
+            service.process.wait(10)
+            took = time.monotonic() - began
+            with contextlib.suppress(ConnectionClosed):
+                while True:
+                    ws.recv(timeout=5)
+    assert service.process.returncode == 0
+    assert took < 10
+    kept = stored(tmp_path / "data" / "live" / f"{paired['take']}.log")
+    assert kept == frames[: len(kept)]
+    assert len(kept) >= acknowledged
