@@ -257,6 +257,7 @@ def clean() -> Iterator[None]:
 
 
 @pytest.mark.bench
+@pytest.mark.timeout(SECONDS + 300)
 @pytest.mark.usefixtures("clean")
 def test_twenty_sessions_are_acknowledged_estimated_and_coached_in_time(tmp_path: Path) -> None:
     with served(tmp_path / "data") as service:
@@ -288,6 +289,8 @@ def test_twenty_sessions_are_acknowledged_estimated_and_coached_in_time(tmp_path
         f"estimator of a core; MB {memory}\n"
     )
     assert counts == [batches] * SESSIONS
+    assert seen[-1][0].memory < 1.1 * seen[0][0].memory
+    assert seen[-1][1].memory < 1.1 * seen[0][1].memory
     assert all(s.recording for s in all_of)
     assert np.quantile(acks, 0.99) <= 0.4
     assert np.quantile(told, 0.95) <= 0.06
