@@ -1,4 +1,4 @@
-"""What the tablet keeps in IndexedDB, in real Chromium: over reloads, a crash, and beyond what memory holds."""
+"""What the tablet keeps in IndexedDB, in real Chromium: over reloads, a crash, beyond what memory holds."""
 
 from __future__ import annotations
 

@@ -40,7 +40,8 @@ export class Outbox {
   static async begin(paired) {
     const db = await open();
     const record = {
-      ...paired, hello: null, source: null, seq: 0, acked: 0, spanS: 0, stopped: false, hash: new Sha256().state(), lastUs: {},
+      ...paired, hello: null, source: null, seq: 0, acked: 0, spanS: 0, stopped: false,
+      hash: new Sha256().state(), lastUs: {},
     };
     const transaction = db.transaction(["takes", "batches"], "readwrite");
     transaction.objectStore("takes").clear(); // an earlier take was finished or given up before a new code is entered
@@ -74,7 +75,8 @@ export class Outbox {
     const bytes = encodeBatch({ ...batch, seq });
     const samples = batch.samples.length / (batch.nImu * 9);
     this.record.spanS += samples / rateHz / this.record.hello.streams.length;
-    this.record.lastUs[batch.stream] = batch.t0Us + (batch.offsetsUs ? batch.offsetsUs.at(-1) : ((samples - 1) * 1e6) / rateHz);
+    const lastUs = batch.offsetsUs ? batch.offsetsUs.at(-1) : ((samples - 1) * 1e6) / rateHz;
+    this.record.lastUs[batch.stream] = batch.t0Us + lastUs;
     this.hash.update(payload(bytes));
     this.waiting.push({ seq, bytes });
     this.writing ??= this.write();
@@ -126,10 +128,14 @@ export class Outbox {
     const found = [];
     for (let seq = from; seq < to; seq++) {
       const bytes = this.recent.get(seq);
-      if (!bytes) return found.length ? found : done(this.db.transaction("batches").objectStore("batches").getAll(IDBKeyRange.bound(seq, to, false, true)));
+      if (!bytes) return found.length ? found : this.fromDisk(seq, to);
       found.push(bytes);
     }
     return found;
+  }
+
+  fromDisk(from, to) {
+    return done(this.db.transaction("batches").objectStore("batches").getAll(IDBKeyRange.bound(from, to, false, true)));
   }
 
   // All below `ack` are on the server's disk.

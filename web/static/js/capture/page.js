@@ -19,9 +19,13 @@ class CapturePage extends HTMLElement {
   async connectedCallback() {
     this.$ = (name) => this.querySelector(`[data-${name}]`);
     this.$("host").textContent = location.host;
-    this.worn = new Worn({ onchange: () => this.draw(), onend: () => this.stop(), onbattery: (sensors) => this.link?.tellBattery(sensors) });
+    this.worn = new Worn({
+      onchange: () => this.draw(), onend: () => this.stop(), onbattery: (sensors) => this.link?.tellBattery(sensors),
+    });
     this.view = new View(this, { onplaced: (sensor, segment) => this.worn.place(sensor, segment) });
-    codeForm(this.$("code-form"), { onpaired: (paired) => this.guarded(() => this.paired(paired)), onproblem: (p) => this.say({ title: p.title, detail: p.detail }) });
+    codeForm(this.$("code-form"), {
+      onpaired: (paired) => this.guarded(() => this.paired(paired)), onproblem: ({ title, detail }) => this.say({ title, detail }),
+    });
     const on = (name, act) => this.$(name).addEventListener("click", () => this.guarded(act));
     on("go", () => this.go());
     on("change", () => this.change());
@@ -31,11 +35,13 @@ class CapturePage extends HTMLElement {
     on("axes-again", () => this.worn.source.check());
     on("save", () => this.saveRest());
     on("give-up", () => this.giveUp());
-    for (const b of this.querySelectorAll("[data-source]")) b.addEventListener("click", () => this.guarded(() => this.choose(b.dataset.source)));
+    for (const b of this.querySelectorAll("[data-source]")) {
+      b.addEventListener("click", () => this.guarded(() => this.choose(b.dataset.source)));
+    }
     this.$("files").addEventListener("change", (e) => this.guarded(() => this.read([...e.target.files])));
     for (const [kind, why] of [["dot", whyNoDot()], ["device_motion", whyNoMotion()]]) if (why) this.view.unavailable(kind, why);
     this.room = await roomHours(BYTES_PER_S);
-    if (!(await alone())) return this.say({ title: "This page is open in another tab", detail: "Go on there, or close it and reload this one." });
+    if (!(await alone())) return this.say(words.OTHER_TAB);
     setInterval(() => this.draw(), DRAW_MS);
     await this.guarded(() => this.wake());
   }
@@ -70,7 +76,7 @@ class CapturePage extends HTMLElement {
   async paired({ code, ...paired }) {
     this.say(null);
     if (this.outbox && this.outbox.record.take !== paired.take) {
-      return this.say({ title: "This code belongs to another recording", detail: "Part of the earlier one is still on this tablet only. Save or delete it first." }, true);
+      return this.say(words.OTHER_TAKE, true);
     }
     if (this.outbox) {
       await this.outbox.note({ ...paired, code });
@@ -112,7 +118,9 @@ class CapturePage extends HTMLElement {
     const { source } = this.worn;
     const segments = Object.fromEntries(this.worn.ready().map((sensor) => [sensor.id, sensor.segment]));
     remember(segments);
-    const hello = { type: "hello", protocol: PROTOCOL, take: this.outbox.record.take, source: source.kind, streams: source.streams(segments) };
+    const hello = {
+      type: "hello", protocol: PROTOCOL, take: this.outbox.record.take, source: source.kind, streams: source.streams(segments),
+    };
     await this.outbox.note({ hello, kind: source.kind, source: source.saved() });
     this.say(null);
     this.connect();
@@ -205,7 +213,8 @@ class CapturePage extends HTMLElement {
   }
 
   async giveUp() {
-    if (await this.view.sure("Delete what is on this tablet?", `${this.outbox.heldS.toFixed(1)} s of the recording are not on the server and cannot be brought back.`, "Delete it")) await this.drop();
+    const sure = await this.view.sure("Delete what is on this tablet?", words.loss(this.outbox.heldS), "Delete it");
+    if (sure) await this.drop();
   }
 
   async change() {

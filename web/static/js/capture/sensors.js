@@ -48,7 +48,8 @@ export class SensorList {
     set(part("rate"), `${Math.round(rate)} Hz`);
     for (const button of [part("place"), part("place-too")]) {
       button.disabled = fixed;
-      button.setAttribute("aria-label", `Sensor ${sensor.id}: ${sensor.segment ? this.names[sensor.segment] : "not placed"}. Change`);
+      const where = sensor.segment ? this.names[sensor.segment] : "not placed";
+      button.setAttribute("aria-label", `Sensor ${sensor.id}: ${where}. Change`);
       button.onclick = () => this.ask(sensor);
     }
     const known = sensor.battery !== null && sensor.battery !== undefined;
@@ -68,7 +69,8 @@ export class SensorList {
 
   ask(sensor) {
     this.asked = sensor;
-    this.dialog.querySelector("[data-which]").textContent = `Sensor ${sensor.id}${sensor.label && sensor.label !== sensor.id ? `, ${sensor.label}` : ""}`;
+    const called = sensor.label && sensor.label !== sensor.id ? `, ${sensor.label}` : "";
+    this.dialog.querySelector("[data-which]").textContent = `Sensor ${sensor.id}${called}`;
     for (const b of this.dialog.querySelectorAll(".place")) b.setAttribute("aria-pressed", b.value === sensor.segment);
     this.dialog.returnValue = "";
     this.dialog.showModal();

@@ -70,8 +70,11 @@ export class View {
     this.part("end").hidden = !paused || state !== "running";
     set(this.part("add-word"), ADD[kind] ?? "");
     const worn = rows.filter(({ sensor }) => sensor.segment).length;
-    const copies = source?.copies?.length ? `, ${source.copies.length} ${source.copies.length === 1 ? "copy" : "copies"} left out` : "";
-    set(this.part("sum"), !source ? "Where do they come from?" : prepare ? `${ready.length} of ${rows.length} ready${copies}` : paused ? `${rows.length} of ${wanted(record)} connected` : `${worn} recorded`);
+    const n = source?.copies?.length ?? 0;
+    const copies = n ? `, ${n} ${n === 1 ? "copy" : "copies"} left out` : "";
+    const counted = `${ready.length} of ${rows.length} ready${copies}`;
+    const recorded = paused ? `${rows.length} of ${wanted(record)} connected` : `${worn} recorded`;
+    set(this.part("sum"), !source ? "Where do they come from?" : prepare ? counted : recorded);
     this.list.draw(prepare || paused ? rows : rows.filter(({ sensor }) => sensor.segment), { fixed: !prepare });
     this.axes(source, prepare);
   }
@@ -83,7 +86,8 @@ export class View {
     const { test, axes } = source;
     if (axes) {
       set(this.part("axes-say"), "The axes of this device are checked");
-      set(this.part("axes-more"), `Turning it agreed with gravity within ${axes.errorDeg.toFixed(0)}°. This is remembered until the browser changes.`);
+      const fit = Math.max(1, Math.round(axes.errorDeg));
+      set(this.part("axes-more"), `Turning it agreed with gravity within ${fit}°. This is remembered until the browser changes.`);
     } else if (test.problem) {
       set(this.part("axes-say"), "The check did not work");
       set(this.part("axes-more"), test.problem);
@@ -95,9 +99,7 @@ export class View {
   }
 
   saying({ state, stage, elapsedS, heldS, paused }) {
-    const say = state === "sending"
-      ? { icon: "upload", title: "Sending the rest", more: heldS > 0.05 ? `${heldS.toFixed(1)} s are still on this tablet. Keep this page open.` : "The server closes the recording." }
-      : paused ? { icon: "info", title: "This page was loaded again", more: "Everything up to then is safe. Connect the same sensors again to go on, or stop here." } : words.instruction(stage, elapsedS);
+    const say = state === "sending" ? words.sendingRest(heldS) : paused ? words.RELOADED : words.instruction(stage, elapsedS);
     set(this.part("say"), say.title);
     set(this.part("say-more"), say.more);
     this.part("say-icon").setAttribute("href", `#i-${say.icon}`);
@@ -107,7 +109,7 @@ export class View {
   // The first thing that is wrong, where nothing else was said.
   trouble({ state, rows, link, linkSays, source }) {
     if (state !== "prepare" && state !== "running") return null;
-    if (link?.kind === "bad" && linkSays) return { title: "The server cannot take data now", detail: `${linkSays.detail} It is kept here and sent later.` };
+    if (link?.kind === "bad" && linkSays) return words.serverFull(linkSays.detail);
     if (source?.kind === "device_motion" && !source.axes) return null;
     const bad = rows.find(({ sensor, health }) => sensor.segment && health.kind === "bad");
     if (!bad) return null;
@@ -124,16 +126,18 @@ export class View {
   button({ state, source, ready, rows, paused, room }) {
     const go = this.part("go");
     const n = ready.length;
-    const start = n ? `Start with ${n} sensor${n === 1 ? "" : "s"}` : source ? (rows.length ? this.reason(source) : "Add a sensor") : "Choose where sensors come from";
+    const missing = !source ? "Choose where sensors come from" : rows.length ? this.reason(source) : "Add a sensor";
+    const start = n ? `Start with ${n} sensor${n === 1 ? "" : "s"}` : missing;
     const word = {
-      loading: "One moment", stuck: "Save or delete what is left", pairing: "Enter the code", prepare: start, sending: "Sending", done: "Start another",
-      running: paused ? "Connect the sensors again" : "Stop",
+      loading: "One moment", stuck: "Save or delete what is left", pairing: "Enter the code", prepare: start,
+      sending: "Sending", done: "Start another", running: paused ? "Connect the sensors again" : "Stop",
     }[state];
     set(this.part("go-word"), word);
-    go.disabled = state === "loading" || state === "stuck" || state === "pairing" || state === "sending" || (state === "prepare" && !n);
+    go.disabled = ["loading", "stuck", "pairing", "sending"].includes(state) || (state === "prepare" && !n);
     go.classList.toggle("stop", state === "running" && !paused);
     const keeps = `Nothing is lost if the network drops: ${words.hours(room)}.`;
-    set(this.part("hint"), { prepare: `Stand still for 5 seconds after the tone. ${keeps}`, running: keeps, sending: keeps }[state] ?? "");
+    const hints = { prepare: `Stand still for 5 seconds after the tone. ${keeps}`, running: keeps, sending: keeps };
+    set(this.part("hint"), hints[state] ?? "");
   }
 
   reason(source) {

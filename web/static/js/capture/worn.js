@@ -3,6 +3,7 @@ import { suggest } from "./mapping.js";
 import { DeviceMotion } from "./sources/device_motion.js";
 import { Dot } from "./sources/dot.js";
 import { Replay } from "./sources/replay.js";
+import { NOT_THOSE } from "./words.js";
 
 const SOURCES = { dot: Dot, device_motion: DeviceMotion, replay: Replay };
 
@@ -67,7 +68,8 @@ export class Worn {
 
   // Those that are placed and send.
   ready() {
-    return this.rows().filter(({ sensor, health }) => sensor.segment && health.kind !== "bad" && health.text !== "Check").map(({ sensor }) => sensor);
+    const sends = ({ sensor, health }) => sensor.segment && health.kind !== "bad" && health.text !== "Check";
+    return this.rows().filter(sends).map(({ sensor }) => sensor);
   }
 
   // Sensors, order and rates as the hello of an interrupted take has them: the server takes no other.
@@ -81,6 +83,6 @@ export class Worn {
       if (known && this.kind !== "replay") sensor.rateHz = known.rateHz;
     }
     const streams = this.source.streams(Object.fromEntries(all.map((x) => [x.id, x.segment])));
-    if (JSON.stringify(streams) !== JSON.stringify(hello.streams)) throw new Error("These are not the sensors this recording began with. Connect the same ones, or stop here.");
+    if (JSON.stringify(streams) !== JSON.stringify(hello.streams)) throw new Error(NOT_THOSE);
   }
 }

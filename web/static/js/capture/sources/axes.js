@@ -7,7 +7,7 @@ export const POSES = [
   { name: "upright", axis: 1, words: "Stand it upright, top edge up" },
   { name: "flat again", axis: 2, words: "Lay it flat again, screen up" },
 ];
-const GRAVITY = 9.81;
+const GRAVITY = 9.81, OFF = 1.5; // m/s²; phones read up to a tenth beside it
 const STILL_S = 0.8;
 const STILL_SPREAD = 0.35; // m/s² over the still time
 const ALONG = 0.92; // share of gravity on the pose's axis, about 23°
@@ -17,7 +17,8 @@ const MOST_TURNING = 3.5; // rad on the way of a quarter turn: three quarters th
 
 const length = (v) => Math.hypot(...v);
 const mean = (rows, key) => [0, 1, 2].map((i) => rows.reduce((sum, row) => sum + row[key][i], 0) / rows.length);
-const angleDeg = (a, b) => (Math.acos(Math.max(-1, Math.min(1, a.reduce((s, v, i) => s + v * b[i], 0) / (length(a) * length(b))))) * 180) / Math.PI;
+const dot = (a, b) => a.reduce((sum, v, i) => sum + v * b[i], 0);
+const angleDeg = (a, b) => (Math.acos(Math.max(-1, Math.min(1, dot(a, b) / (length(a) * length(b))))) * 180) / Math.PI;
 
 // All ways to read three rates as right-handed or left-handed axes, in degrees or radians.
 function* readings() {
@@ -52,7 +53,9 @@ export class AxesTest {
     const late = this.rows.slice(from);
     const middle = mean(late, "acc"), norm = length(middle);
     if (late.some((row) => length(row.acc.map((v, i) => v - middle[i])) > STILL_SPREAD)) return false;
-    if (Math.abs(norm - GRAVITY) > 1.5) return this.fail(`Lying still it measures ${norm.toFixed(1)} m/s², not 9.8; its acceleration has no gravity in it.`);
+    if (Math.abs(norm - GRAVITY) > OFF) {
+      return this.fail(`Lying still it measures ${norm.toFixed(1)} m/s², not 9.8; its acceleration has no gravity in it.`);
+    }
     if (Math.abs(middle[this.pose.axis]) < ALONG * norm) return false;
     this.still.push({ from, to: this.rows.length - 1, acc: middle, rate: mean(late, "rate") });
     if (!this.pose) this.decide();
@@ -66,9 +69,12 @@ export class AxesTest {
 
   decide() {
     const signs = this.still.map(({ acc }, i) => Math.sign(acc[POSES[i].axis]));
-    if (signs.some((s) => s !== signs[0])) return this.fail("One edge was the wrong way round: expected the left long edge down, then the top edge up.");
+    if (signs.some((s) => s !== signs[0])) {
+      return this.fail("One edge was the wrong way round: expected the left long edge down, then the top edge up.");
+    }
     const rest = mean(this.still, "rate"); // what the rates show in rest is their offset
-    const found = [...readings()].map((reading) => ({ ...reading, error: this.misfit(reading, rest) })).sort((a, b) => a.error - b.error);
+    const found = [...readings()].map((reading) => ({ ...reading, error: this.misfit(reading, rest) }));
+    found.sort((a, b) => a.error - b.error);
     const [best, next] = found;
     if (best.error > FITS_DEG || next.error < OTHERS_DEG) {
       const off = best.error <= 180 ? ` (${best.error.toFixed(0)}° off)` : "";
@@ -103,6 +109,5 @@ function turn(v, r) {
   if (angle < 1e-12) return v;
   const k = r.map((x) => x / angle), c = Math.cos(angle), s = Math.sin(angle);
   const cross = [k[1] * v[2] - k[2] * v[1], k[2] * v[0] - k[0] * v[2], k[0] * v[1] - k[1] * v[0]];
-  const dot = k[0] * v[0] + k[1] * v[1] + k[2] * v[2];
-  return v.map((x, i) => x * c + cross[i] * s + k[i] * dot * (1 - c));
+  return v.map((x, i) => x * c + cross[i] * s + k[i] * dot(k, v) * (1 - c));
 }

@@ -14,7 +14,8 @@ export const ACC_RANGE = 16 * 9.80665, GYR_RANGE = 2000 * (Math.PI / 180); // ±
 export function whyNot() {
   if (navigator.bluetooth) return null;
   if (!isSecureContext) return "Bluetooth needs https. Open this page by the server's https address.";
-  return "This browser cannot reach Bluetooth sensors. Use Chrome or Edge on Android, Windows, macOS or ChromeOS; on an iPad use a browser with Web Bluetooth, such as Bluefy.";
+  return "This browser cannot reach Bluetooth sensors. Use Chrome or Edge on Android, Windows, macOS or ChromeOS;"
+    + " on an iPad use a browser with Web Bluetooth, such as Bluefy.";
 }
 
 const nowUs = () => (performance.timeOrigin + performance.now()) * 1000;
@@ -43,7 +44,10 @@ export class Dot {
       throw new Error(`Bluetooth did not answer (${error.message}). Switch Bluetooth on and allow it for this page.`);
     }
     if (this.sensors.some((s) => s.device === device)) return;
-    const sensor = { device, id: device.id, label: device.name, segment: null, battery: null, rateHz: 60, meter: new RateMeter(), clock: new Clock(), rows: [], tries: 0, shiftUs: null };
+    const sensor = {
+      device, id: device.id, label: device.name, segment: null, battery: null, rateHz: 60, meter: new RateMeter(),
+      clock: new Clock(), rows: [], tries: 0, shiftUs: null,
+    };
     device.addEventListener("gattserverdisconnected", () => this.again(sensor));
     try {
       await this.connect(sensor);
@@ -72,7 +76,8 @@ export class Dot {
     const battery = await (await server.getPrimaryService(SERVICES.battery)).getCharacteristic(BATTERY);
     const charge = (view) => {
       sensor.battery = view.getUint8(0);
-      this.onbattery(Object.fromEntries(this.sensors.filter((s) => s.battery !== null).map((s) => [s.id, s.battery])));
+      const known = this.sensors.filter((s) => s.battery !== null);
+      this.onbattery(Object.fromEntries(known.map((s) => [s.id, s.battery])));
       this.onchange();
     };
     charge(await battery.readValue());
@@ -95,7 +100,8 @@ export class Dot {
     const device = sensor.clock.read(sample.tUs);
     const here = nowUs();
     // The sensor's ticks, moved by a constant to this tablet's time so that they go on after a reload or reconnection.
-    if (sensor.shiftUs === null || (sensor.fresh && Math.abs(device + sensor.shiftUs - here) > SAME_CLOCK_US)) sensor.shiftUs = here - device;
+    const restarted = sensor.fresh && Math.abs(device + sensor.shiftUs - here) > SAME_CLOCK_US;
+    if (sensor.shiftUs === null || restarted) sensor.shiftUs = here - device;
     sensor.fresh = false;
     const tUs = Math.max(device + sensor.shiftUs, (sensor.lastUs ?? 0) + 1);
     if (!this.onBatch || sensor.stream === undefined) return;
@@ -110,7 +116,8 @@ export class Dot {
     sensor.rows = [];
     const t0Us = Math.round(rows[0].tUs);
     const offsetsUs = Uint32Array.from(rows, (row) => Math.round(row.tUs) - t0Us);
-    this.onBatch({ stream: sensor.stream, t0Us, nImu: 1, samples: Float32Array.from(rows.flatMap((r) => r.values)), offsetsUs }, sensor.rateHz);
+    const samples = Float32Array.from(rows.flatMap((row) => row.values));
+    this.onBatch({ stream: sensor.stream, t0Us, nImu: 1, samples, offsetsUs }, sensor.rateHz);
   }
 
   saved() { return {}; }
@@ -150,7 +157,9 @@ export class Dot {
   health(sensor) {
     const silent = sensor.meter.silentS();
     const rateHz = sensor.meter.rateHz();
-    if (silent === null || silent > SILENT_S) return { kind: "bad", text: "No data", rateHz: 0, note: silent === null ? "" : `last seen ${Math.round(silent)} s ago` };
+    if (silent === null || silent > SILENT_S) {
+      return { kind: "bad", text: "No data", rateHz: 0, note: silent === null ? "" : `last seen ${Math.round(silent)} s ago` };
+    }
     if (sensor.rateHz < 40) return { kind: "bad", text: "Too slow", rateHz, note: "set 60 Hz in the Movella app" };
     if (rateHz < 0.9 * sensor.rateHz) return { kind: "warn", text: "Weak", rateHz, note: "move it closer" };
     if (sensor.battery !== null && sensor.battery < LOW_BATTERY) return { kind: "warn", text: "Low", rateHz, note: "charge it soon" };

@@ -6,13 +6,6 @@ import { parseTable, looksLikeTable } from "./table.js";
 // A track: sensors that tick together. {ids, segments, rateHz, clock, tUs: Float64Array(n), values: [Float32Array(n*9)]}
 const WRAP = 65536;
 
-export class FileProblem extends Error {
-  constructor(code, message) {
-    super(message);
-    this.code = code;
-  }
-}
-
 async function bytesOf(file) {
   let bytes = new Uint8Array(await file.arrayBuffer());
   if (bytes[0] === 0x1f && bytes[1] === 0x8b) {
@@ -41,12 +34,13 @@ export async function readFiles(files) {
     else if (looksLikeTable(text)) tracks.push(parseTable(text, file.name));
     else if (text.trimStart().startsWith("{")) Object.assign(segments, mappingOf(text, file.name));
     else {
-      throw new FileProblem("unknown_format", `${file.name} is neither Xsens MT Manager text, a Sagittal live log nor a table with time and sensor columns. Choose such files; others can be uploaded on the session's page.`);
+      throw new Error(`${file.name} is neither Xsens MT Manager text, a Sagittal live log nor a table with time and sensor`
+        + " columns. Choose such files; others can be uploaded on the session's page.");
     }
   }
   const { unique, copies } = withoutCopies(texts);
   if (unique.length) tracks.push(counterTrack(unique));
-  if (!tracks.length) throw new FileProblem("empty", "There is no recording among these files. Choose the sensors' files.");
+  if (!tracks.length) throw new Error("There is no recording among these files. Choose the sensors' files.");
   return { tracks, segments, copies };
 }
 
@@ -55,7 +49,7 @@ function mappingOf(text, name) {
   try {
     return JSON.parse(text).sensors ?? {};
   } catch {
-    throw new FileProblem("unknown_format", `${name} is not readable JSON. Leave it out or choose it again.`);
+    throw new Error(`${name} is not readable JSON. Leave it out or choose it again.`);
   }
 }
 
@@ -63,8 +57,11 @@ function mappingOf(text, name) {
 function withoutCopies(texts) {
   const unique = [], copies = [];
   for (const one of texts) {
-    if (unique.some((u) => u.id === one.id)) throw new FileProblem("duplicate_device", `Sensor ${one.id} comes in two files (${one.name}). Choose the files of one walk, each sensor once.`);
-    const twin = unique.find((u) => u.values.length === one.values.length && u.values.every((v, i) => Object.is(v, one.values[i])));
+    if (unique.some((u) => u.id === one.id)) {
+      throw new Error(`Sensor ${one.id} comes in two files (${one.name}). Choose the files of one walk, each sensor once.`);
+    }
+    const same = (u) => u.values.length === one.values.length && u.values.every((v, i) => Object.is(v, one.values[i]));
+    const twin = unique.find(same);
     if (twin) copies.push({ id: one.id, of: twin.id });
     else unique.push(one);
   }
@@ -74,9 +71,15 @@ function withoutCopies(texts) {
 // Sensors of one Awinda master share its packet counter of 16 bit; they start and end at different counts.
 function counterTrack(texts) {
   const rateHz = texts.find((t) => t.rateHz)?.rateHz;
-  if (!rateHz) throw new FileProblem("rate_unknown", `${texts[0].name} does not say its rate. Export it with "Update Rate", or upload it on the session's page and name the rate there.`);
+  if (!rateHz) {
+    throw new Error(`${texts[0].name} does not say its rate. Export it with "Update Rate", or upload it on the session's`
+      + " page and name the rate there.");
+  }
   const other = texts.find((t) => t.rateHz && Math.abs(t.rateHz - rateHz) > 1e-6);
-  if (other) throw new FileProblem("rates_differ", `${other.name} has ${other.rateHz} Hz, the others ${rateHz} Hz; one packet counter cannot tick twice. Choose the files of one walk.`);
+  if (other) {
+    throw new Error(`${other.name} has ${other.rateHz} Hz, the others ${rateHz} Hz; one packet counter cannot tick twice.`
+      + " Choose the files of one walk.");
+  }
   const reference = texts[0].counter[0];
   const counts = texts.map(({ counter }) => {
     const out = Float64Array.from(counter);
@@ -98,7 +101,7 @@ function counterTrack(texts) {
 
 function logTracks(bytes, name, segments) {
   const records = scanLog(bytes);
-  if (records[0]?.kind !== "H") throw new FileProblem("bad_log", `${name} is a live log without its first record; it cannot be played.`);
+  if (records[0]?.kind !== "H") throw new Error(`${name} is a live log without its first record; it cannot be played.`);
   const hello = JSON.parse(new TextDecoder().decode(records[0].body));
   const batches = records.filter((r) => r.kind === "B").map((r) => decodeBatch(r.body));
   return hello.streams.map((stream) => {
@@ -111,11 +114,17 @@ function logTracks(bytes, name, segments) {
       if (b.t0Us - mine[0].t0Us < 1e6) lag = Math.min(lag, b.sentUs - lastUs);
       for (let i = 0; i < b.nSamples; i++, row++) {
         tUs[row] = b.t0Us + (b.offsetsUs ? b.offsetsUs[i] : (i * 1e6) / stream.rate_hz);
-        values.forEach((v, s) => v.set(b.samples.subarray((i * b.nImu + s) * 9, (i * b.nImu + s) * 9 + 9), row * 9));
+        values.forEach((v, s) => {
+          const at = (i * b.nImu + s) * 9;
+          v.set(b.samples.subarray(at, at + 9), row * 9);
+        });
       }
     }
     for (const sensor of stream.sensors) if (sensor.segment) segments[sensor.id] = sensor.segment;
     // clocks of their own meet where their fastest message of the first second was sent (docs/live-protocol.md)
-    return { ids: stream.sensors.map((s) => s.id), sensors: stream.sensors, rateHz: stream.rate_hz, clock: stream.clock, lagUs: stream.clock === "own" ? lag : 0, tUs, values };
+    return {
+      ids: stream.sensors.map((s) => s.id), sensors: stream.sensors, rateHz: stream.rate_hz, clock: stream.clock,
+      lagUs: stream.clock === "own" ? lag : 0, tUs, values,
+    };
   });
 }

@@ -35,7 +35,8 @@ export function parseMtText(text, name) {
   if (!lines.length) throw new Error(`${name} has a header but no samples. Record or export it again.`);
   const columns = columnsOf(names, lines[0], separator, name);
   if (columns[0][0] === undefined) {
-    throw new Error(`${name} has no ${names.includes("FreeAcc_X") ? "acceleration with gravity" : "acceleration"} (Acc_X, Acc_Y, Acc_Z). Export it again with it.`);
+    const what = names.includes("FreeAcc_X") ? "acceleration with gravity" : "acceleration";
+    throw new Error(`${name} has no ${what} (Acc_X, Acc_Y, Acc_Z). Export it again with it.`);
   }
   if (columns[1][0] === undefined) throw new Error(`${name} has no rate of turn (Gyr_X, Gyr_Y, Gyr_Z). Export it again with it.`);
   const wanted = columns.flat();

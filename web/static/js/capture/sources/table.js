@@ -19,14 +19,18 @@ export function parseTable(text, name) {
   const { separator, names, ids, at } = layoutOf(text);
   for (const id of ids) {
     const lost = CHANNELS.slice(0, 6).find((c) => !names.includes(`${id}.${c}`));
-    if (lost) throw new Error(`${name} has no column ${id}.${lost}. Each sensor needs acc_x, acc_y, acc_z, gyr_x, gyr_y and gyr_z.`);
+    if (lost) {
+      throw new Error(`${name} has no column ${id}.${lost}. Each sensor needs acc_x, acc_y, acc_z, gyr_x, gyr_y and gyr_z.`);
+    }
   }
   const time = names.indexOf("t_s");
   const places = ids.map((id) => CHANNELS.map((c) => names.indexOf(`${id}.${c}`)));
-  const rows = text.slice(at).split(/\r?\n/).filter((line) => line.trim()).map((line) => line.split(separator).map((c) => (c.trim() ? Number(c) : NaN)));
+  const lines = text.slice(at).split(/\r?\n/).filter((line) => line.trim());
+  const rows = lines.map((line) => line.split(separator).map((c) => (c.trim() ? Number(c) : NaN)));
   const backwards = rows.findIndex((row, i) => !(i ? row[time] > rows[i - 1][time] : row[time] >= 0));
-  if (rows.length < 2 || backwards >= 0) {
-    throw new Error(rows.length < 2 ? `${name} has no samples.` : `${name}: t_s does not grow in row ${backwards + 2}. Times are in seconds, each later than the one before.`);
+  if (rows.length < 2) throw new Error(`${name} has no samples. Choose another one.`);
+  if (backwards >= 0) {
+    throw new Error(`${name}: t_s does not grow in row ${backwards + 2}. Times are in seconds, each later than the one before.`);
   }
   const tUs = Float64Array.from(rows, (row) => Math.round(row[time] * 1e6));
   const steps = Array.from(tUs.subarray(1), (t, i) => t - tUs[i]).sort((a, b) => a - b);
