@@ -108,14 +108,14 @@ class LiveErkf:
         self._heading = np.empty((0, n))
         self._gone, self._adrift = np.zeros(n, np.int64), np.zeros(n, np.bool_)
         linked = {i for j in tree.joints for i in (j.proximal, j.distal)}
-        self._alone = [i for i in tree.feet if i not in linked]
+        self._alone = frozenset(tree.feet) - linked
         self._hold, self._params = round(HOLD_S * rate_hz), params
         self.broken = False
 
     def push(self, signals: Signals) -> tuple[Floats, Floats]:
         """States (T, n, 16) and distances (T, joints) of the ends of each joint; NaN once it is `broken`.
 
-        NaN too is a foot by itself that was lost for long, until it rests again.
+        NaN too is a foot that was lost for long, until it rests again.
         """
         T, n = signals.valid.shape
         out, sd = np.empty((T, n, 16)), np.empty((T, n))
@@ -146,21 +146,23 @@ class LiveErkf:
         return out, residual
 
     def _settles(self, signals: Signals, adrift: Bools) -> Iterator[tuple[int, int]]:
-        """Sample and sensor where one that hangs on nothing rests again after a loss; marks those before it.
+        """Sample and foot where one that hangs on nothing rests again after a loss; marks all until they do.
 
-        A foot that is lost in mid-swing turns on by a right angle while its last rate is held, and nothing
-        but its next rest says where it is: the filter alone took half a minute to find back.
+        A foot that is lost in mid-swing turns on by a right angle while its last rate is held. The joints
+        bring it back within a second, up to 50° off until then; for one by itself only its next rest says
+        where it is, and the filter alone took half a minute.
         """
         if not self._gone.any() and not self._adrift.any() and bool(signals.valid.all()):
             return
         for k in range(len(adrift)):
-            for i in self._alone:
+            for i in self.tree.feet:
                 self._gone[i] = 0 if signals.valid[k, i] else self._gone[i] + 1
                 if self._gone[i] > self._hold:
                     self._adrift[i] = True
                 elif self._adrift[i] and signals.still[k, i, 0]:
                     self._adrift[i] = False
-                    yield k, i
+                    if i in self._alone:
+                        yield k, i
             adrift[k] = self._adrift
 
     def _settle(self, i: int, acc: Floats, gyr: Floats) -> None:

@@ -26,7 +26,7 @@ from core.fusion.orientations import Orientations
 from core.online.contacts import Known
 from core.online.figures import Span, distances, early_figures
 from core.online.frame import LiveStride
-from core.online.history import History
+from core.online.history import KEPT_S, History
 from core.parameters.flats import OTHER
 from core.parameters.rows import Value
 from core.parameters.spatial import NAMES as SPATIAL
@@ -34,9 +34,6 @@ from core.parameters.spatial import Surface
 
 REMEMBERED: Final = 20
 """Strides of a foot that the next one is compared with: those of the therapist's strip."""
-
-EVENTS: Final = 16
-"""Contacts of both feet that are kept: those of four strides."""
 
 LATER: Final[frozenset[StrideFlag]] = frozenset(("last", "non_periodic"))
 """Flags that only a later stride, or none, can give."""
@@ -77,7 +74,7 @@ class LiveStrides:
 
     def __init__(self, setup: Setup, params: StrideParams | None = None) -> None:
         self._setup, self._params = setup, params or StrideParams()
-        self._events: deque[GaitEvent] = deque(maxlen=EVENTS)
+        self._events: deque[GaitEvent] = deque()
         self._recent: dict[Side, deque[Stride]] = {s: deque(maxlen=REMEMBERED) for s in OTHER}
         self._pending: list[_Pending] = []
         self._count = 0
@@ -88,6 +85,9 @@ class LiveStrides:
         for at, event in known:
             told += self._given_up(at, history)
             self._events.append(event)
+            # as far back as the samples go
+            while event.detected_s - self._events[0].time_s > KEPT_S + self._params.max_s:
+                self._events.popleft()
             told += self._completed(at, history)
             if event.kind == "ic":
                 told += self._landed(at, event, history)
@@ -145,7 +145,7 @@ class LiveStrides:
         return [self._complete(p, p.until, history) for p in ready]
 
     def _complete(self, pending: _Pending, at: int, history: History) -> LiveStride:
-        context = self._context()
+        context = self._context(pending.stride.start_s)
         first = self._sample(pending.stride.start_s) - 1
         found: dict[str, Value] = dict.fromkeys(SPATIAL, "gap")
         if history.reaches(first, at + 1):
@@ -171,13 +171,15 @@ class LiveStrides:
             landed is None or other not in self._setup.feet or moved(other, landed)
         )
 
-    def _context(self) -> list[Stride]:
-        """Recent strides of both feet, and what is known of those that have begun."""
+    def _context(self, since: float) -> list[Stride]:
+        """Strides of both feet that end later, and what is known of those that have begun."""
         found = []
         for side in self._setup.feet:
             contacts = [e.time_s for e in self._events if e.side == side and e.kind == "ic"]
             leavings = [e.time_s for e in self._events if e.side == side and e.kind == "tc"]
             for start, end in pairwise(contacts):
+                if end < since:
+                    continue
                 off = next((t for t in leavings if start < t < end), None)
                 landings = [
                     e.time_s
