@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 
+from core.errors import SagittalError
 from server.jobs.lifeline import die_with, when_parent_ends
 from server.live import follower
 from server.live.follower import Follower
@@ -95,7 +96,8 @@ class Estimator:
         except (BrokenPipeError, ConnectionError):
             raise
         except Exception as error:
-            log.exception("the estimate of live take %s failed", take)
+            if not isinstance(error, SagittalError):
+                log.exception("the estimate of live take %s failed", take)
             self._drop(take)
             said = follower.broken(error)
             self._say(Broken(take, said.code, said.message))

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final, cast
 
-from core.errors import Notice
+from core.errors import Notice, SagittalError
 from core.events.result import GaitEvent
 from core.feedback import Baseline, Prescription
 from core.feedback.engine import COMMANDS, FeedbackEngine
@@ -283,7 +283,9 @@ def _protocol(name: str) -> Protocol:
 
 
 def broken(error: Exception) -> Notice:
-    """What is said of a take whose estimate threw."""
+    """What is said of a take whose estimate threw; what core itself refuses it says why."""
+    if isinstance(error, SagittalError):
+        return Notice(error.code, error.message, severity="error")
     return Notice(
         "live_estimate_failed",
         "The live estimate of this take stopped on an error of the program; the take itself is recorded and "

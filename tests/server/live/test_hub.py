@@ -8,6 +8,7 @@ import json
 import os
 import signal
 from collections.abc import AsyncIterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from sqlalchemy import select
 from websockets.asyncio.client import ClientConnection
 
 from core.feedback import Cue
+from core.formats.live_log import FILE_MARK, hello_json, record
 from server.live.client import Report, stream
 from server.live.estimator import Estimator
 from server.live.hub import Hub
@@ -358,8 +360,6 @@ async def test_a_crash_while_the_take_becomes_a_recording_is_repaired_at_the_nex
 
 
 def test_a_take_that_throws_is_told_and_leaves_the_others_alone(tmp_path: Path) -> None:
-    from core.formats.live_log import FILE_MARK, hello_json, record
-
     good, bad = tmp_path / "good.log", tmp_path / "bad.log"
     whole = FILE_MARK + record("H", hello_json(walk_hello("a" * 32)))
     for due in walk()[:100]:
@@ -380,6 +380,23 @@ def test_a_take_that_throws_is_told_and_leaves_the_others_alone(tmp_path: Path) 
     assert {s.take for s in shown} == {"good"}
     assert not [s for s in said if isinstance(s, Item) and s.take != "good"]
     estimator.obey(Command("bad", 0, "pause", True))  # of a take that was given up: nothing to do
+
+
+def test_a_take_without_a_mapped_sensor_is_told_why_it_cannot_be_estimated(tmp_path: Path) -> None:
+    hello = walk_hello("a" * 32)
+    stream_ = hello.streams[0]
+    nothing = tuple(replace(sensor, segment=None) for sensor in stream_.sensors)
+    log = tmp_path / "take.log"
+    whole = FILE_MARK + record("H", hello_json(replace(hello, streams=(replace(stream_, sensors=nothing),))))
+    log.write_bytes(whole + record("B", walk()[0].frame))
+    said: list[Told] = []
+    estimator = Estimator(said.append)
+    estimator.obey(Begin("one", str(log), log.stat().st_size, None, "walk", None, None, []))
+    estimator.work()
+    (only,) = said
+    assert isinstance(only, Broken)
+    assert only.code == "no_mapping"
+    assert not estimator.has_work
 
 
 async def test_an_estimator_ends_with_a_killed_server(tmp_path: Path) -> None:
