@@ -55,7 +55,9 @@ def test_a_finished_take_is_analysed_like_an_upload(tmp_path: Path) -> None:
     assert 0.9 < strides["left"]["value"] < 1.2
 
 
-def test_sigterm_in_the_middle_of_a_take_keeps_what_came_and_ends_within_ten_seconds(tmp_path: Path) -> None:
+def test_sigterm_in_a_take_keeps_what_came_and_ends_within_ten_seconds_nothing_was_computed_there(
+    tmp_path: Path,
+) -> None:
     frames = [due.frame for due in walk()[:300]]
     with served(tmp_path / "data") as service:
         client = service.client
@@ -77,6 +79,8 @@ def test_sigterm_in_the_middle_of_a_take_keeps_what_came_and_ends_within_ten_sec
                 if '"ack"' in message:
                     acknowledged = int(message.split(":")[-1].rstrip("}"))
             page.recv()
+            loaded = Path(f"/proc/{service.process.pid}/maps").read_text()
+            assert [x for x in ("llvmlite", "scipy", "numba") if f"/{x}/" in loaded] == []
             began = time.monotonic()
             service.process.send_signal(signal.SIGTERM)
             service.process.wait(10)
