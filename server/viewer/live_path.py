@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections import deque
-from math import pi
+from math import hypot, pi
 from typing import Final
 
 from server.viewer.motion import ROOT_WINDOW_S
 
 GAP_S: Final = 1.0
 """After such a gap, or a step back in time, what was before says nothing about now."""
+
+NEAR_M: Final = 0.3
+"""The smoothed place is never farther from the person: sway and push of a stride stay well below it; in a
+turn back the correction points the wrong way and would bring the person into the camera."""
 
 Sample = tuple[float, float, float, float]
 """Time in s, place in m, heading in rad."""
@@ -43,7 +47,9 @@ class LivePath:
             before, *was = self._early.mean()
             share = (t_s - now) / (now - before)
             at = [a + (a - b) * share for a, b in zip(at, was, strict=True)]
-        return at[0], at[1], at[2]
+        off_x, off_y = at[0] - x, at[1] - y
+        share = min(1.0, NEAR_M / (hypot(off_x, off_y) or NEAR_M))
+        return x + share * off_x, y + share * off_y, at[2]
 
     def _clear(self) -> None:
         self._late, self._early = _Window(), _Window()

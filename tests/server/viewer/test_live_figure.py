@@ -304,3 +304,12 @@ def test_a_moment_costs_little(server: viser.ViserServer, poses: Poses) -> None:
         layout.place(q, p)
         took.append(time.thread_time() - began)
     assert np.median(took) <= 0.4e-3
+
+
+def test_who_turns_back_stays_in_the_picture() -> None:
+    path = LivePath()
+    for i in range(400):
+        t = i / 50
+        x = 1.2 * (t if t < 4 else 8 - t)
+        seen_x, seen_y, _ = path.push(t, x, 0.0, 0.0)
+        assert np.hypot(seen_x - x, seen_y) < 0.31
