@@ -209,7 +209,7 @@ def test_the_therapist_ends_the_take_and_the_tablet_says_so(
 
 
 def test_what_is_left_when_the_take_was_closed_can_be_saved(
-    flat: Browser, clinic: Clinic, network: Network
+    flat: Browser, running: RunningServer, clinic: Clinic, network: Network
 ) -> None:
     with tablet(flat, network.url) as page:
         pair(page, clinic.code)
@@ -222,17 +222,21 @@ def test_what_is_left_when_the_take_was_closed_can_be_saved(
         clinic.post("/live/close")
         network.mend()
         expect(page.get_by_role("alert")).to_contain_text("ended on the clinic's screen", timeout=15_000)
+        acknowledged = page.evaluate("() => document.querySelector('capture-page').outbox.acked")
         with page.expect_download() as saving:
             page.get_by_role("button", name="Save what is left").click()
         rest = saving.value.path().read_bytes()
         page.get_by_role("button", name="Delete it").first.click()
         page.locator("dialog[open]").get_by_role("button", name="Delete it").click()
         expect(page.get_by_label("Pairing code")).to_be_visible()
-    records, length = scan(rest)
-    assert length == len(rest)
-    stored = [peek(r.body).seq for r in records if r.kind == "B"]
-    assert stored == list(range(stored[0], stored[0] + len(stored)))
-    assert len(stored) > 30
+    recording = read_recording([SourceFile("rest.sagittal-live", len(rest), lambda: rest)], None)
+    acc = expected_samples()["00B40C55"][:, :3]
+    left = recording.streams["00B40C55"].acc.astype(np.float32)
+    np.testing.assert_array_equal(left, acc[5 * acknowledged : 5 * acknowledged + len(left)])
+    # nothing is missing between what the server has and what was saved
+    there = sum(peek(r.body).n_samples for r in scan(clinic.log(running))[0] if r.kind == "B")
+    assert 5 * acknowledged <= there < 5 * acknowledged + len(left)
+    assert len(left) > 150
 
 
 def test_a_tablet_keeps_its_pairing_and_its_mapping_over_a_reload(

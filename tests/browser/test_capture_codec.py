@@ -13,7 +13,6 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from core.formats import SourceFile, read_recording
-from core.formats.live_hello import parse_hello
 from core.formats.live_log import Batch, encode_batch, record, scan
 from tests.browser.conftest import RunningServer
 from tests.data import data_folder
@@ -103,22 +102,28 @@ def test_a_batch_of_the_server_is_read_back(blank: Page) -> None:
     assert said == "a damaged batch"
 
 
-def test_a_saved_rest_is_a_log_that_the_server_reads(blank: Page) -> None:
-    frames = [encode_batch(Batch(0, n, n * 50_000, n, np.ones((5, 1, 9), np.float32))) for n in (4, 5)]
+def test_a_saved_rest_is_a_recording_that_the_server_reads(blank: Page) -> None:
+    rng = np.random.default_rng(4)
+    samples = rng.normal(0, 5, (40, 5, 1, 9)).astype(np.float32)
+    frames = [encode_batch(Batch(0, n + 60, n * 50_000, n * 50_000, samples[n])) for n in range(40)]
     made = run(
         blank,
         "live/wire.js",
-        "const parts = m.logParts({ ...a.hello, token: 'secret' }, a.frames.map(bytes));"
+        "const { Sha256 } = await import('/static/js/live/sha256.js');"
+        "const hash = new Sha256(), frames = a.frames.map(bytes);"
+        "for (const frame of frames) hash.update(m.payload(frame));"
+        "const parts = m.logParts({ ...a.hello, token: 'secret' }, frames, hash.hex());"
         " return text(new Uint8Array(await new Blob(parts).arrayBuffer()));",
         {"hello": HELLO, "frames": [b64(f) for f in frames]},
     )
     log = base64.b64decode(made)
-    records, length = scan(log)
-    assert length == len(log)
-    assert [r.kind for r in records] == ["H", "B", "B"]
-    assert [r.body for r in records[1:]] == frames
-    assert parse_hello(records[0].body).sensors[0].id == "A1"
     assert b"secret" not in log
+    recording = read_recording([SourceFile("rest.sagittal-live", len(log), lambda: log)], None)
+    assert recording.notices == ()
+    assert recording.segments == {"A1": "pelvis"}
+    stream = recording.streams["A1"]
+    np.testing.assert_array_equal(stream.acc, samples[:, :, 0, :3].reshape(-1, 3))
+    np.testing.assert_allclose(np.diff(stream.t_s), 0.01, atol=1e-9)
 
 
 def test_the_browsers_scan_of_a_log_stops_where_the_servers_does(blank: Page) -> None:

@@ -134,6 +134,12 @@ export class Outbox {
     return found;
   }
 
+  // Everything that is not acknowledged.
+  async all() {
+    await this.settled();
+    return this.fromDisk(this.acked, this.made);
+  }
+
   fromDisk(from, to) {
     return done(this.db.transaction("batches").objectStore("batches").getAll(IDBKeyRange.bound(from, to, false, true)));
   }

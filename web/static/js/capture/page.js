@@ -1,5 +1,6 @@
 // <capture-page>: pair, place the sensors, record, hand over. States: loading, pairing, prepare, running, sending, done.
-import { PROTOCOL, logParts } from "../live/wire.js";
+import { Sha256 } from "../live/sha256.js";
+import { PROTOCOL, logParts, payload } from "../live/wire.js";
 import { alone, roomHours, stayAwake, tone } from "./device.js";
 import { Link } from "./link.js";
 import { remember } from "./mapping.js";
@@ -204,7 +205,10 @@ class CapturePage extends HTMLElement {
 
   async saveRest() {
     const { outbox } = this;
-    const parts = logParts(outbox.record.hello, await outbox.read(outbox.acked, outbox.made));
+    const batches = await outbox.all();
+    const hash = new Sha256();
+    for (const bytes of batches) hash.update(payload(bytes));
+    const parts = logParts(outbox.record.hello, batches, hash.hex());
     const link = document.createElement("a");
     link.href = URL.createObjectURL(new Blob(parts));
     link.download = `rest-${outbox.record.take.slice(0, 8)}.sagittal-live`;

@@ -63,7 +63,7 @@ export function linkProblem({ code, detail }, heldS) {
       return { title: "The pairing is over", detail: how + left };
     }
     case "ended": {
-      const keep = `${left.trim()} Save them as a file and upload it to the session, or delete them.`;
+      const keep = `${left.trim()} Save them as a file, which can be uploaded to a session of its own, or delete them.`;
       const detailed = left ? keep : "Everything from this tablet is on the server.";
       return { title: "The recording was ended on the clinic's screen", detail: detailed };
     }

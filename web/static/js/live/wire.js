@@ -85,8 +85,8 @@ export function scanLog(bytes) {
   return records;
 }
 
-// A log of a hello and batches, as the parts of a Blob.
-export function logParts(hello, batches) {
+// A whole log of a hello and some batches, numbered from 0, as the parts of a Blob; `sha256` over their payloads.
+export function logParts(hello, batches, sha256) {
   const record = (kind, body) => {
     const part = new Uint8Array(9 + body.length), view = new DataView(part.buffer);
     part[8] = kind.charCodeAt(0);
@@ -95,8 +95,17 @@ export function logParts(hello, batches) {
     view.setUint32(4, crc32(part.subarray(8)), true);
     return part;
   };
+  const json = (value) => new TextEncoder().encode(JSON.stringify(value));
   const { token, ...rest } = hello;
-  return [LOG_MAGIC, record("H", new TextEncoder().encode(JSON.stringify(rest))), ...batches.map((b) => record("B", b))];
+  const numbered = batches.map((bytes, seq) => record("B", renumbered(bytes, seq)));
+  return [LOG_MAGIC, record("H", json(rest)), ...numbered, record("F", json({ type: "finish", count: batches.length, sha256 }))];
+}
+
+function renumbered(bytes, seq) {
+  const copy = bytes.slice(), view = new DataView(copy.buffer), body = copy.length - 4;
+  view.setBigUint64(12, BigInt(seq), true);
+  view.setUint32(body, crc32(copy.subarray(0, body)), true);
+  return copy;
 }
 
 function text(bytes) {
