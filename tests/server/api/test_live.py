@@ -10,12 +10,14 @@ import httpx
 import pytest
 import websockets
 from sqlalchemy import select, update
+from sqlalchemy.exc import IntegrityError
 
 from server.auth.throttle import MAX_PER_PAIR, Throttle
+from server.services import patients, sessions
 from server.services.live import ALPHABET
-from server.storage.tables import live_take, now
+from server.storage.tables import live_event, live_take, now, prescription
 from tests.live_clinic import closed, heard, new_session, open_code, visit
-from tests.live_takes import frame
+from tests.live_takes import finish_text, frame
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
@@ -200,3 +202,55 @@ async def test_ending_the_sign_in_ends_the_feed(
                 http.cookies.set("sid", token)
                 (await http.post("/api/v1/sign-out")).raise_for_status()
             assert (await closed(ws))[0] == 1008
+
+
+async def test_an_erased_patient_leaves_no_take_event_prescription_or_sample(
+    clinic: Clinic, port: int
+) -> None:
+    async with visit(clinic, port) as v:
+        admin = clinic.client("admin")
+        with clinic.db.read() as c:
+            patient = patients.get(c, sessions.get(c, v.session).patient_id)
+        written = await v.http.post(
+            f"/api/v1/patients/{patient.id}/prescriptions",
+            json={
+                "parameter": "stance_pct",
+                "side": None,
+                "target": {"source": "manual", "mean": 60, "sd": 2},
+            },
+        )
+        written.raise_for_status()
+        async with v.tablet() as ws:
+            await heard(ws, "welcome")
+            frames = [frame(i) for i in range(3)]
+            for one in frames:
+                await ws.send(one)
+            await v.command("mark", "CANARY")
+            await ws.send(finish_text(frames))
+            await heard(ws, "finished")
+        (await v.http.post(v.api)).raise_for_status()  # another take, which nobody joins
+        sample = frames[1][200:300]
+
+        def found() -> list[str]:
+            files = [p for p in clinic.settings.data_dir.rglob("*") if p.is_file()]
+            return [p.name for p in files if sample in p.read_bytes() or b"CANARY" in p.read_bytes()]
+
+        assert found()
+        async with admin:
+            path = f"/api/v1/patients/{patient.id}"
+            assert (await admin.delete(path, params={"confirm": "not it"})).status_code == 409
+            assert (await admin.delete(path, params={"confirm": patient.code})).status_code == 204
+    assert found() == []
+    with clinic.db.read() as c:
+        assert c.execute(select(prescription).where(prescription.c.patient_id == patient.id)).first() is None
+        mine = select(live_take.c.id).where(live_take.c.session_id == v.session)
+        assert c.execute(mine).first() is None
+        assert c.execute(select(live_event).where(live_event.c.take_id == v.take)).first() is None
+
+
+async def test_events_of_a_take_cannot_be_changed(clinic: Clinic, port: int) -> None:
+    async with visit(clinic, port) as v, v.tablet() as ws:
+        await heard(ws, "welcome")
+        await v.command("mark")
+        with pytest.raises(IntegrityError, match="append-only"), clinic.db.write() as c:
+            c.execute(update(live_event).where(live_event.c.take_id == v.take).values(t_s=1.0))
