@@ -59,7 +59,7 @@ class LiveFeedback extends HTMLElement {
     let state = out.firstElementChild;
     if (!state) out.replaceChildren((state = document.createElement("span")));
     if (guard.other?.beyond) setState(state, "warn", `changed by ${withUnit(guard.other.change, this.term)}`);
-    else if (guard.gps?.beyond) setState(state, "warn", `walk changed, GPS +${number(guard.gps.change, 1)}°`);
+    else if (guard.gps?.beyond) setState(state, "warn", `walk changed, sagittal score +${number(guard.gps.change, 1)}°`);
     else if (guard.state === "ok") setState(state, "ok", "no side effect");
     else setState(state, "none", NOT_JUDGED[guard.other?.reason] ?? "not known yet");
   }
