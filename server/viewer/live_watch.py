@@ -6,6 +6,7 @@ Pictures are shown as they come, newest wins; from one that is half a second old
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections.abc import Callable
 from typing import Final, cast
@@ -18,6 +19,8 @@ from server.live.messages import STALE_S, Picture, Pose
 from server.viewer.live import LiveFigure
 from server.viewer.live_reference import LiveReference, standing_angles
 from server.viewer.moment import Moment
+
+log = logging.getLogger(__name__)
 
 TICK_S: Final = 0.1
 """How often silence is looked for."""
@@ -58,6 +61,7 @@ class LiveWatch:
         self._at = -np.inf
         self._is_shown = True
         self._take: str | None = None
+        self._failed = False
 
     def see(self, picture: Picture) -> None:
         """Take in the newest picture and show it if somebody looks."""
@@ -81,7 +85,18 @@ class LiveWatch:
             self._figure.set_stale()
 
     def _show(self, picture: Picture) -> None:
+        """Show a picture; a figure that fails may not disturb the take whose pictures it shows."""
         self._is_shown = True
+        try:
+            self._pose(picture)
+            self._failed = False
+        except Exception:
+            if not self._failed:
+                log.exception("the live figure of take %s could not be shown", picture.take)
+            self._failed = True
+            self._at = -np.inf  # what is still seen is not now
+
+    def _pose(self, picture: Picture) -> None:
         if picture.take != self._take:
             self._take = picture.take
             self._figure.wait()

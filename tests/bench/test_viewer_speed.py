@@ -26,8 +26,8 @@ from tests.server.viewer.pictures import POSES, RATE_HZ, picture
 LASTS_S, WINDOWS = 2.0, 6
 """Windows of walking; the first is for settling."""
 BUDGET, FURTHER = 0.05, 0.01
-"""Shares of a core: of a figure that somebody looks at (issue 5), and of each one more who does, which is viser's
-own work: it packs and sends every frame for every browser, and the replay costs the same there."""
+"""Shares of a core: of a figure that somebody looks at (issue 5), and of each one more who does. That is
+viser's own work, which packs and sends every frame for every browser; the replay costs the same there."""
 
 DRAIN = """
 import sys, threading, viser

@@ -26,10 +26,14 @@ ARGS = [
     "--disable-sync",
 ]
 
+PATIENCE_MS = 60_000
+"""A picture without a graphics card, beside other work."""
+
 
 def shot(frame: Any) -> np.ndarray:
     """Picture (h, w, 3) of an element."""
-    return np.asarray(Image.open(io.BytesIO(frame.screenshot())).convert("RGB"))
+    png = frame.screenshot(timeout=PATIENCE_MS)
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
 
 
 def until(frame: Any, enough: Callable[[dict[Side, int]], bool], dark: bool = False) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
+import msgspec
 import numpy as np
 import pytest
 import viser
@@ -15,6 +16,7 @@ from core.fusion.orientations import Orientations
 from core.norms import adult_kinematics
 from core.rotation import conjugate, multiply
 from server.live.messages import STALE_S, Picture
+from server.live.room import Room
 from server.viewer.live import LiveFigure
 from server.viewer.live_reference import LiveReference, standing_angles
 from server.viewer.live_watch import LiveWatch, Shown, moment_of
@@ -105,6 +107,21 @@ def test_without_poses_somebody_stands_until_calibrated_and_stays_when_they_are_
     assert bedside.figure.is_grey
     bedside.watch.see(picture(0, take="another", stage="stand", q={}, p={}))
     np.testing.assert_array_equal(bedside.bones, standing)
+
+
+def test_a_picture_that_cannot_be_shown_disturbs_nobody_and_the_figure_turns_grey(
+    bedside: Bedside, caplog: pytest.LogCaptureFixture
+) -> None:
+    room = Room()
+    with room.watching(bedside.watch.see):
+        room.show(picture(10))
+        for i in (11, 12):
+            room.show(msgspec.structs.replace(picture(i), body=b"{"))
+        assert len(caplog.records) == 1
+        bedside.watch.look()
+        assert bedside.figure.is_grey
+        room.show(picture(13))
+        assert not bedside.figure.is_grey
 
 
 def test_the_ghost_follows_the_choice_of_the_therapist(bedside: Bedside) -> None:
