@@ -8,14 +8,14 @@ import pytest
 from playwright.sync_api import expect
 
 from core.feedback import FeedbackEngine
-from server.services import analyses, live, live_training, prescriptions, reviews
+from server.services import analyses, prescriptions, reviews
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
-from server.storage.tables import live_take
 from tests.browser import filling
 from tests.browser.conftest import Opener, RunningServer
 from tests.browser.design import all_faults
 from tests.feedback import Walked
+from tests.server.feedback import ended_take
 
 GIVEN = {
     "parameter": "step_length_m",
@@ -36,27 +36,26 @@ def trained(running: RunningServer) -> str:
         assert filling.analyse(client, session, sensors)["state"] == "done"
         filling.add(client, f"/patients/{patient}/prescriptions", **GIVEN)
     blobs = BlobStore(running.folder / "blobs")
-    with closing(Database(running.folder / "sagittal.db")) as db, db.write() as c:
-        found = analyses.shown(c, session)
-        edits = reviews.edits_of(c, found.id)
-        take, code = live.open_take(c, None, session)
-        live.pair(c, code)
-        training = live_training.training_of(c, blobs, take)
-        live.started(c, take.id, "replay", training.prescription_id)
-        given = prescriptions.for_take(c, blobs, session)
+    with closing(Database(running.folder / "sagittal.db")) as db:
+        with db.read() as c:
+            found = analyses.shown(c, session)
+            edits = reviews.edits_of(c, found.id)
+            given = prescriptions.for_take(c, blobs, session)
         assert given is not None
         engine = FeedbackEngine(*given)
         lengths = reviews.columns(blobs, found, edits)["step_length_m"]
         strides = reviews.bundle(blobs, found, edits).strides.strides
-        for n, (s, length) in enumerate(zip(strides, lengths, strict=True)):
-            values = {"step_length_m": length}
-            counted = s.excluded_reason is None
-            cue = engine.push(Walked(n, s.side, s.start_s, s.end_s, s.end_s, values, {}, counted))
-            if cue is not None:
-                live.add_event(c, None, take.id, "cue", cue.t_s, cue.to_json())
-        live.end(c, None, take.id, "finished", count=1)
-        mine = live_take.c.id == take.id
-        c.execute(live_take.update().where(mine).values(recording_id=found.recording_id))
+        told = [
+            engine.push(
+                Walked(
+                    n, s.side, s.start_s, s.end_s, s.end_s, {"step_length_m": length}, {},
+                    counted=s.excluded_reason is None,
+                )
+            )
+            for n, (s, length) in enumerate(zip(strides, lengths, strict=True))
+        ]  # fmt: skip
+        cues = [cue for cue in told if cue is not None]
+        ended_take(db, blobs, session, cues, found.recording_id)
     return session
 
 

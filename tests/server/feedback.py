@@ -8,6 +8,8 @@ from typing import Any
 
 from core.feedback import Cue
 from server.services import live, live_training, patients, sessions
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
 from server.storage.tables import live_take, new_id
 from tests.server import analysed
 from tests.server.clinic import Clinic
@@ -41,21 +43,26 @@ def walked(clinic: Clinic, patient: str, days: int, duration_s: float = 24.0) ->
 
 
 def take(
-    clinic: Clinic,
-    session: str,
-    prescription: str,
-    cues: Sequence[Cue],
-    recording: str | None = None,
+    clinic: Clinic, session: str, prescription: str, cues: Sequence[Cue], recording: str | None = None
 ) -> str:
-    """A live take of a session that gave these cues and has ended as this recording."""
-    with clinic.db.write() as c:
+    """A live take of a session with this prescription in force, as `ended_take`."""
+    begun, made = ended_take(clinic.db, clinic.app.state.blobs, session, cues, recording)
+    assert begun.prescription_id == prescription
+    return made
+
+
+def ended_take(
+    db: Database, blobs: BlobStore, session: str, cues: Sequence[Cue], recording: str | None
+) -> tuple[live_training.Training, str]:
+    """A take that gave these cues and has ended as this recording: how it began, and its id."""
+    with db.write() as c:
         made, code = live.open_take(c, None, session)
         live.pair(c, code)
-        training = live_training.training_of(c, clinic.app.state.blobs, made)
-        assert training.prescription_id == prescription
-        live.started(c, made.id, "replay", prescription)
+    begun = live_training.training_of(db, blobs, made)
+    with db.write() as c:
+        live.started(c, made.id, "replay")
         for cue in cues:
             live.add_event(c, None, made.id, "cue", cue.t_s, {"type": "cue", **cue.to_json()})
         live.end(c, None, made.id, "finished", count=1)
         c.execute(live_take.update().where(live_take.c.id == made.id).values(recording_id=recording))
-    return made.id
+    return begun, made.id
