@@ -222,6 +222,9 @@ def test_what_is_left_when_the_take_was_closed_can_be_saved(
         clinic.post("/live/close")
         network.mend()
         expect(page.get_by_role("alert")).to_contain_text("ended on the clinic's screen", timeout=15_000)
+        page.reload()
+        expect(page.locator("[data-go]")).to_have_text("Save or delete what is left", timeout=10_000)
+        expect(page.get_by_role("button", name="Save what is left")).to_be_visible()
         acknowledged = page.evaluate("() => document.querySelector('capture-page').outbox.acked")
         with page.expect_download() as saving:
             page.get_by_role("button", name="Save what is left").click()

@@ -63,6 +63,7 @@ class CapturePage extends HTMLElement {
     this.enter("running");
     if (kind !== "replay") return this.interrupted(kind);
     await this.worn.read(source.files);
+    if (!this.outbox || this.dataset.state === "stuck" || this.dataset.state === "done") return; // refused meanwhile
     this.worn.restore(hello);
     this.run();
   }
