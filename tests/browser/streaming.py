@@ -31,7 +31,7 @@ LONGER: Mapping[str, Any] = {
 
 @cache
 def _training() -> Simulation:
-    return demo_live.training(2)
+    return demo_live.training(4)
 
 
 @contextmanager
