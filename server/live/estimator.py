@@ -8,10 +8,12 @@ from __future__ import annotations
 import logging
 import os
 import resource
+import select
 import signal
 import sys
 import time
 from collections.abc import Callable
+from math import ceil
 from multiprocessing.connection import Connection
 
 from core.errors import SagittalError
@@ -124,13 +126,16 @@ def main() -> None:
 def follow(line: Connection) -> None:
     """Read orders and logs in turn; raises EOFError when the other side has gone."""
     estimator = Estimator(lambda report: line.send_bytes(encode(report)))
+    # Connection.poll would make a selector at every call, and this is asked hundreds of times a second
+    orders = select.poll()
+    orders.register(line.fileno(), select.POLLIN)
     while True:
         wait: float | None = 0.0
         if not estimator.has_work:
             due = estimator.due_at
             wait = None if due is None else max(0.0, due - time.monotonic())
         # all orders that are there first: what has come meanwhile is read in one go
-        while line.poll(wait):
+        while orders.poll(None if wait is None else ceil(1000.0 * wait)):
             estimator.obey(decode_order(line.recv_bytes()))
             wait = 0.0
         estimator.work()
