@@ -145,7 +145,7 @@ def test_screenshots_of_a_live_take(
         page.screenshot(path=folder / "live-calibration.png")
         until_strides(page, 4)
         page.get_by_role("button", name="Norm").dispatch_event("click")
-        page.wait_for_timeout(2500)
+        _wait_for_live_figure(page)
         page.screenshot(path=folder / "live.png")
         page.set_viewport_size({"width": TABLET[0], "height": TABLET[1]})
         page.wait_for_timeout(1500)
@@ -159,11 +159,9 @@ def test_screenshots_of_a_live_take(
             page.close()
         page = opened(f"/sessions/{session}/live", browser=solid, scheme="dark")
         page.frame_locator("live-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
-        page.wait_for_timeout(5000)
         until_strides(page, 4)
+        _wait_for_live_figure(page)
         page.screenshot(path=folder / "live-dark.png")
-        picture = base64.b64encode(page.locator("live-view iframe").screenshot()).decode()
-        assert page.evaluate(COUNT, picture)["orange"] > 150, "no figure"
         page.close()
     sizes = [p.stat().st_size for p in folder.glob(f"{LIVE}*.png")]
     assert len(sizes) >= 6
@@ -172,6 +170,16 @@ def test_screenshots_of_a_live_take(
 
 def _screens(otherwise: Path) -> Path:
     return ROOT / "docs" / "screens" if os.environ.get("SAGITTAL_SCREENS") == "1" else otherwise
+
+
+def _wait_for_live_figure(page: Page) -> None:
+    """Software WebGL needs seconds for the first picture of a figure that moves."""
+    for _ in range(20):
+        picture = base64.b64encode(page.locator("live-view iframe").screenshot()).decode()
+        if page.evaluate(COUNT, picture)["orange"] > 150:
+            return
+        page.wait_for_timeout(1000)
+    pytest.fail("no figure")
 
 
 def _wait_for_figure(page: Page) -> None:
