@@ -58,7 +58,8 @@ def frame(t: float, stage: Stage = "running", *, stale: bool = False, contact: s
         angles=dict(zip(NAMES, values[-1], strict=True)),
     )  # fmt: skip
     trail = Trail(np.array([t - 0.02, t - 0.01, t]), NAMES, values)
-    body = wire.frame(shown, [trail], {"00B40B00": 84.0, "00B40B05": 9.0}, phase)
+    slow = wire.slow_part(shown, {"00B40B00": 84.0, "00B40B05": 9.0})
+    body = wire.frame(shown, [trail], slow, phase)
     return (
         body + b',"delay_ms":%d,"stale":%s}' % (640 if stale else 58, b"true" if stale else b"false")
     ).decode()
