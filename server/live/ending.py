@@ -118,7 +118,7 @@ class Ending:
 
     async def _drain(self, take: LiveTake) -> None:
         """Hear the estimator out: the last strides and cues are still on their way."""
-        if self._pool.follows(take.id) and take.estimate == "ok":
+        if self._pool.follows(take.id) and take.estimate != "failed":
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(DRAIN_S):
                     await take.told.wait()

@@ -275,7 +275,9 @@ class Hub:
             case Through():
                 take.told.set()
             case Picture():
-                take.estimate = "ok"
+                if take.estimate != "ok":
+                    take.estimate = "ok"
+                    self.tell_state(take)
                 take.show(report)
             case Item():
                 take.tell(report)

@@ -105,7 +105,7 @@ class LiveTake:
         self.told = asyncio.Event()
         self.recording_id: str | None = None
         self.problem: str | None = None
-        self.estimate = "ok"
+        self.estimate = "preparing"
         self.t_s: float | None = None
         self.stage: str | None = None
         self._hub = hub
@@ -246,7 +246,7 @@ class LiveTake:
             "marks": [mark.to_json() for mark in self.steered.marks],
             "ghost": self.steered.ghost,
             "stale": self.steered.stale,
-            "estimate": self.estimate,
+            "estimate": self.estimate if self._hub.pool.follows(self.id) else "none",
             "recording": self.recording_id,
             "problem": self.problem,
         }
@@ -265,7 +265,7 @@ def standing_of(row: Take | None) -> dict[str, Any]:
         "marks": [],
         "ghost": None,
         "stale": False,
-        "estimate": "ok",
+        "estimate": "none",
         "recording": None if row is None else row.recording_id,
         "problem": None if row is None else row.problem,
     }

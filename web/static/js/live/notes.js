@@ -2,6 +2,7 @@
 import { shape } from "./shapes.js";
 
 const NOTICE_MS = 12000;
+const PREPARED_MS = 3000;
 
 export class Notes {
   constructor(box) {
@@ -45,6 +46,15 @@ export class Notes {
     if (state.state === "streaming" && state.tablet !== "connected")
       this.put("tablet", "warn", "The tablet is not connected.", "It goes on recording and keeps everything; what is missing comes when it is back. Nothing is lost.", { do: "close", word: "End without the tablet" });
     else this.take("tablet");
+  }
+
+  // A server that has just started still loads, at its first start compiles, the filters.
+  estimate(state) {
+    const waits = state.state === "streaming" && state.estimate === "preparing";
+    this.waitsSince = waits ? this.waitsSince ?? performance.now() : undefined;
+    if (waits && performance.now() - this.waitsSince > PREPARED_MS)
+      this.put("estimate", "warn", "The live estimate is still being prepared.", "After a start of the server that takes up to a minute. The walk is recorded meanwhile, and the estimate catches up.");
+    else this.take("estimate");
   }
 
   // STOP without a tablet: the person decides, because what the tablet still holds would stay there.

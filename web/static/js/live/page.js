@@ -77,6 +77,7 @@ class LivePage extends HTMLElement {
     this.top.state(state);
     if (state.ghost) this.ghost(state.ghost);
     this.notes.tablet(state);
+    this.notes.estimate(state);
     if (OVER.has(state.state)) {
       this.view("over");
       this.after.show(state, this.watched === state.take);

@@ -97,7 +97,7 @@ class PatientScreen extends HTMLElement {
     if (!this.scene || this.held() !== null) return;
     if (this.told_n === cue.n) return; // told again after the line came back
     this.told_n = cue.n;
-    if (!cue.shown) return this.alone();
+    if (!cue.shown || cue.late) return this.alone(); // about a step long past nothing is said
     const kind = KIND[cue.zone];
     delete this.dataset.faded;
     this.scene.show(this.error(cue), kind);
