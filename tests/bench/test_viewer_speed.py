@@ -28,7 +28,7 @@ LASTS_S, WINDOWS = 2.0, 6
 """Windows of walking; the first is for settling."""
 NO_DEARER: Final = 1.6
 """Live / replay. The aim is a twentieth of a core for a figure that somebody looks at (issue 5): measured 4.0
-to 7.4 % by the state of the machine, which the replay of the same walk shares. A further viewer costs 0.7 %."""
+to 7.4 % by the state of the machine, which the replay of the same walk shares. Each further viewer: 0.7 %."""
 
 DRAIN = """
 import sys, threading, viser
