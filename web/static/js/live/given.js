@@ -6,7 +6,12 @@ export async function whenOther(data, changed) {
   const all = await request("GET", `/api/v1/patients/${data.patient}/prescriptions`).catch(() => null);
   if (!all) return;
   const now = all.find((p) => p.ended_at === null)?.content ?? null;
-  if (JSON.stringify(now) === JSON.stringify(data.prescription)) return;
+  if (plain(now) === plain(data.prescription)) return;
   data.prescription = now;
   changed();
+}
+
+// As text in which the order of members does not matter.
+function plain(value) {
+  return JSON.stringify(value, (_, v) => (v && typeof v === "object" && !Array.isArray(v) ? Object.fromEntries(Object.entries(v).sort()) : v));
 }

@@ -27,12 +27,19 @@ class PatientScreen extends HTMLElement {
     on("frame", (frame) => this.frame(frame));
     on("cue", (cue) => this.cue(cue));
     on("state", (state) => {
-      if (state.state === "streaming" && this.before !== "streaming") whenOther(data, () => this.picture());
+      if (state.state === "streaming" && this.before !== "streaming") whenOther(data, () => this.anew());
       this.before = state.state;
     });
     for (const type of ["state", "feedback", "fresh", "line"]) on(type, () => this.hold());
     this.feed.open();
     this.hold();
+  }
+
+  // Another prescription: what was said of the one before goes.
+  anew() {
+    this.picture();
+    this.message("", "");
+    this.querySelector("[data-last]").replaceChildren();
   }
 
   picture() {
