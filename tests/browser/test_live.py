@@ -33,6 +33,23 @@ RHYTHM = {
 }
 """Amid the stride times of this walk, 1.34 to 1.51 s: its strides lie in the zone and on both sides of it."""
 
+HEAD, WALK, STAND = 6, 1120, 2075
+"""Lines before the samples of neura_walk, and where in them the walk begins and ends."""
+
+
+def longer(files: list[tuple[str, bytes]]) -> list[tuple[str, bytes]]:
+    """The same with the walk three times over: after calibration the real one has three strides left."""
+    made = []
+    for name, content in files:
+        lines = content.decode().splitlines(keepends=True)
+        rows = [line.split(",", 1) for line in lines[HEAD:]]
+        first = int(rows[0][0])
+        order = [*rows[:STAND], *rows[WALK:STAND], *rows[WALK:STAND], *rows[STAND:]]
+        told = (f"{first + i},{rest}" for i, (_, rest) in enumerate(order))
+        made.append((name, "".join([*lines[:HEAD], *told]).encode()))
+    return made
+
+
 WATCH = """() => {
   const text = (selector) => {
     const element = document.querySelector(selector);
@@ -79,7 +96,7 @@ def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(
         device.get_by_label("Pairing code").press_sequentially(page.locator("[data-code]").inner_text())
         expect(device.locator("[data-paired]")).to_contain_text(code)
         expect(page.locator("[data-waiting]")).to_contain_text("The tablet is paired")
-        choose(device, walk_files())
+        choose(device, longer(walk_files()))
         place(device, SEGMENTS)
         seen: dict[str, list[str]] = defaultdict(list)
         page.expose_function("note", lambda key, value: seen[key].append(value))
@@ -111,13 +128,13 @@ def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(
         page.get_by_role("button", name="Mark", exact=True).click()
         page.get_by_label("What happened").fill("looked up")
         page.keyboard.press("Enter")
-        expect(screen.locator("[data-pause-title]")).to_have_text("Well done", timeout=30_000)
+        expect(screen.locator("[data-pause-title]")).to_have_text("Well done", timeout=60_000)
         expect(device.locator("[data-done]")).to_have_text("Recording is on the server", timeout=30_000)
     assert len(set(seen["chart"])) > 3, "the chart stands still"
     assert len(set(seen["value"])) > 2
     assert len(set(seen["message"])) > 1, "feedback does not change with the stride"
     assert any("“looked up”" in text for text in seen["mark"])
-    assert re.match(r"\d of \d in zone", seen["zone"][-1])
+    assert re.match(r"\d+ of \d+ in zone", seen["zone"][-1])
 
     # the end: saved, analysed, opened
     page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), timeout=60_000)
@@ -141,14 +158,15 @@ def test_the_figure_walks_and_stop_ends_the_take(
         until_strides(page, 2)
         page.frame_locator("live-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
         page.get_by_role("button", name="Norm").dispatch_event("click")
-        page.wait_for_timeout(2500)
-        pictures = []
-        for _ in range(3):
+        pictures: list[bytes] = []
+        found = {"orange": 0, "blue": 0}
+        for _ in range(40):  # the figure is drawn anew with its ghost, by software here
+            page.wait_for_timeout(500)
             pictures.append(page.locator("live-view iframe").screenshot())
-            page.wait_for_timeout(400)
-        assert len(set(pictures)) > 1, "the figure stands still"
-        found = page.evaluate(COUNT, base64.b64encode(pictures[-1]).decode())
-        assert found["orange"] > 150
-        assert found["blue"] > 150
+            found = page.evaluate(COUNT, base64.b64encode(pictures[-1]).decode())
+            if len(set(pictures)) > 2 and min(found["orange"], found["blue"]) > 150:
+                break
+        assert len(set(pictures)) > 2, "the figure stands still"
+        assert min(found["orange"], found["blue"]) > 150
         page.get_by_role("button", name="STOP").click()
         page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), timeout=90_000)

@@ -91,7 +91,7 @@ def test_a_programme_is_started_linked_to_its_visits_and_ended(
     page.goto(f"/patients/{patient}/sessions/new")
     chosen = page.get_by_label("Visit of the programme").locator("option:checked")
     expect(chosen).to_contain_text("T2, training")
-    page.get_by_role("button", name="Upload the recording").click()
+    page.get_by_role("button", name="Upload a recording").click()
     page.wait_for_url(re.compile(r"/upload$"))
     page.goto(f"/patients/{patient}")
     expect(page.locator(".prog .wk.now .dots i.done")).to_have_count(2)
