@@ -17,7 +17,7 @@ ENV PATH=/opt/sagittal/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     SAGITTAL_HOME=/data \
     SAGITTAL_HOST=0.0.0.0 \
-    NUMBA_CACHE_DIR=/data/cache/numba
+    XDG_CACHE_HOME=/data/cache
 USER sagittal
 VOLUME ["/data"]
 EXPOSE 8000

@@ -1,13 +1,15 @@
-"""Curves from the anatomical zero: what a goniometer read in standing, added back (spec/clinic.md §8.4)."""
+"""Curves from the anatomical zero: what a goniometer read in standing, added back
+(docs/science/joint-angles.md, "Anatomical zero")."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from core.frames import SIDES, SUFFIX, Floats, Side
-from core.parameters.kinematic import FIGURES, kinematic
+from core.parameters.kinematic import FIGURES, is_level, kinematic
 from core.parameters.result import CycleCurves, Parameter
 from core.standing import JOINTS, PELVIS, check_standing
 
@@ -25,15 +27,28 @@ def anatomical_curves(curves: CycleCurves, standing_deg: Mapping[str, float]) ->
     """
     check_standing(standing_deg)
     found: dict[str, dict[Side, Floats]] = {}
+    bounds: dict[str, dict[Side, float]] = {}
     for variable, sides in curves.curves.items():
         for side, rows in sides.items():
-            name = variable if variable in PELVIS else f"{variable}_{SUFFIX[side]}"
-            if name not in standing_deg:
+            if standing_name(variable, side) not in standing_deg:
                 continue
-            # cycle curves of the left have the left side up
-            sign = -1.0 if variable == "pelvis_obliquity" and side == "left" else 1.0
-            found.setdefault(variable, {})[side] = rows + sign * float(np.radians(standing_deg[name]))
-    return CycleCurves(found, curves.stride_index, curves.used, curves.foot_off_pct)
+            offset = float(np.radians(standing_offset_deg(variable, side, standing_deg)))
+            found.setdefault(variable, {})[side] = rows + offset
+            if (bound := curves.bounds.get(variable, {}).get(side)) is not None:
+                bounds.setdefault(variable, {})[side] = bound + offset
+    return replace(curves, curves=found, bounds=bounds)
+
+
+def standing_name(variable: str, side: Side) -> str:
+    """Name of the standing angle that a variable's curves of a side start from."""
+    return variable if variable in PELVIS else f"{variable}_{SUFFIX[side]}"
+
+
+def standing_offset_deg(variable: str, side: Side, standing_deg: Mapping[str, float]) -> float:
+    """What is added to cycle curves from standing to make them anatomical, degrees; KeyError if not read."""
+    # cycle curves of the left have the left side up
+    sign = -1.0 if variable == "pelvis_obliquity" and side == "left" else 1.0
+    return sign * standing_deg[standing_name(variable, side)]
 
 
 def anatomical_parameters(curves: CycleCurves, standing_deg: Mapping[str, float]) -> tuple[Parameter, ...]:
@@ -46,7 +61,7 @@ def anatomical_parameters(curves: CycleCurves, standing_deg: Mapping[str, float]
         p
         for p in kinematic(level)
         if p.side is not None
-        and FIGURES[p.name].statistic != "range"
+        and is_level(p.name)
         and p.side in level.curves.get(FIGURES[p.name].variable, {})
     )
 

@@ -1,4 +1,4 @@
-"""Joint angles: one sequence, one sign table (spec/clinic.md §1, spec/estimators.md §1).
+"""Joint angles: one sequence, one sign table (docs/science/joint-angles.md).
 
 Joints: R = R_proximalᵀ R_distal = Rz(a) Rx(b) Ry(c), the joint coordinate system of Grood and Suntay 1983 in
 ISB frames: a about the proximal medio-lateral axis, b about the floating axis, c about the distal long axis.
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from core.fusion.orientations import Orientations
 
 GIMBAL_LIMIT: Final = radians(80.0)
-"""|b| beyond which a and c cannot be told apart (spec/fusion.md §7)."""
+"""|b| beyond which a and c cannot be told apart (docs/science/joint-angles.md, "Joints")."""
 
 SIGNS: Final[dict[str, tuple[tuple[str, float, float], ...]]] = {
     "hip": (("hip_flexion", 1, 1), ("hip_adduction", 1, -1), ("hip_rotation", 1, -1)),
@@ -56,6 +56,8 @@ class JointAngles:
         `core.anatomical` adds them back.
     headings : "pelvis", "foot_l", "foot_r" → (n,) rad about the vertical, left positive, unwrapped, from a
         zero of its own; only of segments with a sensor. Its course over a stride means something.
+    withheld : angles that were taken out again → reason (`core.withheld`).
+    bounds : name → rad, the straight knee of a leg model: at it the angle is a limit and no measurement.
     """
 
     t_s: Floats
@@ -66,6 +68,8 @@ class JointAngles:
     diagnostics: Mapping[str, object] = field(default_factory=dict)
     standing_deg: Mapping[str, float] = field(default_factory=dict)
     headings: Mapping[str, Floats] = field(default_factory=dict)
+    withheld: Mapping[str, str] = field(default_factory=dict)
+    bounds: Mapping[str, float] = field(default_factory=dict)
 
 
 def joint_angles(
@@ -183,7 +187,8 @@ def joints(side: Side) -> tuple[tuple[str, Segment, Segment], ...]:
 
 
 def cardan_zxy(q: Floats) -> Floats:
-    """Angles (..., 3) = (a, b, c) in rad of q (..., 4) = Rz(a) Rx(b) Ry(c) (spec/estimators.md §1)."""
+    """Angles (..., 3) = (a, b, c) in rad of q (..., 4) = Rz(a) Rx(b) Ry(c)
+    (docs/science/joint-angles.md, "Joints")."""
     R = to_matrix(q)
     a = np.arctan2(-R[..., 0, 1], R[..., 1, 1])
     b = np.arcsin(np.clip(R[..., 2, 1], -1.0, 1.0))
@@ -192,7 +197,7 @@ def cardan_zxy(q: Floats) -> Floats:
 
 
 def pelvis_angles(q: Floats) -> tuple[Floats, Floats]:
-    """Anterior tilt and obliquity (right side up) in rad of the pelvis q (..., 4) in W (clinic.md §1)."""
+    """Anterior tilt and obliquity (right side up) in rad of the pelvis q (..., 4) in W (Baker 2001)."""
     R = to_matrix(multiply(conjugate(from_matrix(R_NEUTRAL)), q))
     tilt = -np.arctan2(R[..., 1, 0], R[..., 1, 1])
     obliquity = -np.arcsin(np.clip(-R[..., 1, 2], -1.0, 1.0))

@@ -2,10 +2,11 @@
 
 Mahony, Hamel and Pflimlin 2008 (IEEE TAC 53(5)), eq 32 with k_I = 0: q̇ = ½ q ⊗ (ω + k_P e), e = a × â, where
 â = R(q)ᵀ e₃ is the predicted vertical and a the specific force. Two differences, both for walking:
-- a is divided by its norm at rest, not by its own (spec/fusion.md §1, Eq 31). Over a stride the horizontal
-  acceleration averages to zero; divided by its own norm it does not and pulls the vertical aside.
+- a is divided by its norm at rest, not by its own (docs/science/orientation.md, "Departures from the paper").
+  Over a stride the horizontal acceleration averages to zero; divided by its own norm it does not and pulls
+  the vertical aside.
 - the integral term is left out: without a magnetometer the bias about the vertical is unobservable and runs
-  away (spec/fusion.md §4.6, rule i). The bias is the mean over rest. Heading is only as good as the
+  away. The bias is the mean over rest. Heading is only as good as the
   gyroscope.
 
 The module sits beside core/rest.py because calibration needs tilt to find the walking direction and fusion
@@ -30,9 +31,10 @@ class AttitudeParams:
 
     Parameters
     ----------
-    kp : 1/s; a tilt error decays with time constant 1/kp. 0.1 is the untuned gain of spec/fusion.md §4.6.
-    relearn_s : shortest invalid stretch after which the tilt is learnt anew (spec/fusion.md §3: ≤ 0.1 s is
-        interpolated upstream and never seen here).
+    kp : 1/s; a tilt error decays with time constant 1/kp. 0.1 is untuned
+        (docs/science/orientation.md, "Parameters").
+    relearn_s : shortest invalid stretch after which the tilt is learnt anew; up to 0.1 s are interpolated
+        upstream (docs/science/timeline.md, "Rule") and never seen here.
     """
 
     kp: float = 0.1

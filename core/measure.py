@@ -14,16 +14,17 @@ from core.body.feet import FootTracks
 from core.edits import Edit, edited_events, edited_strides
 from core.errors import Notice
 from core.events.bouts import Bout, bouts_of
-from core.events.flags import StrideParams
+from core.events.flags import StrideParams, with_flag
 from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
-from core.events.strides import stride_list
+from core.events.strides import counted, stride_list
 from core.events.turns import Turn
 from core.frames import Bools, Floats, Segment
 from core.parameters import Surface, take_figures
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
 from core.parameters.smoothness import stride_smoothness
+from core.parameters.spatial import in_place
 from core.parameters.trunk import trunk_regularity
 from core.parameters.walking import bout_parameters, step_parameters, step_strides, turn_parameters
 from core.rest import Window
@@ -108,7 +109,7 @@ def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
         An edit does not fit the events: `no_such_event`, `event_outside`, `event_order` (core/edits.py).
     """
     events = edited_events(tracks.events, edits, tracks.duration_s)
-    strides = edited_strides(stride_list(events, tracks, tracks.turning, tracks.params), edits)
+    strides = edited_strides(_walked(tracks, events), edits)
     figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk)
     # contacts, found or set by a person, say more than the trunk
     steps = None if events.events else tracks.steps
@@ -116,6 +117,17 @@ def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
     first = figures.parameters if steps is None else _of_steps(tracks, steps, figures.parameters)
     parameters = first + bout_parameters(bouts) + turn_parameters(tracks.turns)
     return Measured(events, strides, parameters, figures.columns, bouts, tracks.turns, steps)
+
+
+def _walked(tracks: Tracks, events: GaitEvents) -> Strides:
+    """The stride list, without strides that lead nowhere where the feet's paths are known."""
+    found = stride_list(events, tracks, tracks.turning, tracks.params)
+    marching = in_place(found, tracks.feet, tracks.surface)
+    if not marching:
+        return found
+    return counted(
+        [with_flag(s, "in_place") if i in marching else s for i, s in enumerate(found.strides)], tracks.params
+    )
 
 
 def _of_steps(tracks: Tracks, steps: Steps, figures: tuple[Parameter, ...]) -> tuple[Parameter, ...]:

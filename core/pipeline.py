@@ -23,7 +23,7 @@ from core.body.l7s import free_acceleration
 from core.body.poses import Poses
 from core.body.walking_frame import in_walking_frame
 from core.calibration import CalibrationParams
-from core.calibration.result import CalibratedRecording, Calibration
+from core.calibration.result import Calibration
 from core.errors import Notice, ParameterError, SagittalError
 from core.events import FootPitchParams, StrideParams
 from core.events.consensus import ConsensusParams, all_detectors, consensus, with_confidence
@@ -37,8 +37,10 @@ from core.measure import Measured, Tracks, measure
 from core.parameters.result import Parameter
 from core.parameters.spatial import surface_of
 from core.quality import QualityReport
+from core.quality.stuck import mark_stuck, working
 from core.recording import Recording, UniformRecording
 from core.timeline import TimelineParams
+from core.withheld import withhold, withhold_distances
 
 SCHEMA: Final = 1
 """Version of the Analysis bundle and of analysis.json."""
@@ -179,7 +181,8 @@ def analyse(
     start("timeline")
     uniform = timeline.synchronise(recording, config.timeline)
     start("quality")
-    report = quality.assess(recording, uniform)
+    uniform = mark_stuck(uniform)
+    report = quality.assess(recording, uniform, working=working(uniform).sensors)
     reached: dict[str, object] = {}
     problem = next((n for n in report.notices if n.severity == "error"), None)
     if problem is None:
@@ -202,6 +205,7 @@ def _run_stages(
     reached: dict[str, object],
 ) -> None:
     """Fill `reached` stage by stage, so that an error leaves everything before it."""
+    whole, uniform = uniform, working(uniform)
     if all(s in TRUNK for s in uniform.sensors):
         start("events")
         reached["tracks"] = _of_trunk(uniform, config)
@@ -209,6 +213,8 @@ def _run_stages(
     start("calibration")
     calibrated = calibration.calibrate(uniform, config.calibration)
     reached["calibration"] = calibrated.calibration
+    # the poses say what could not be had for want of a sensor that failed
+    calibrated = replace(calibrated, recording=whole)
     start("orientation")
     orientations = fusion.estimate(calibrated, config.fusion)
     reached["orientations"] = orientations
@@ -238,13 +244,16 @@ def _run_stages(
         for side in SIDES
     }
     reached["body"] = assumed
-    posed = estimate_poses(calibrated, orientations, contacts, lengths, config.poses)
+    posed = withhold_distances(estimate_poses(calibrated, orientations, contacts, lengths, config.poses))
+    calibrated = posed.calibrated
     reached |= {"poses": posed.poses, "orientations": posed.orientations, "feet": posed.feet}
+    reached["calibration"] = calibrated.calibration
     start("angles")
     joint = angles.joint_angles(
         posed.orientations, calibrated.calibration.zero, posed.poses, uniform.subject.standing_angles_deg
     )
-    reached |= {"angles": joint, "tracks": _whole(tracks, calibrated, posed, joint)}
+    joint = withhold(joint, posed.poses, posed.orientations)
+    reached |= {"angles": joint, "tracks": _whole(tracks, posed, joint)}
 
 
 def _contacts(orientations: Orientations, config: PipelineConfig) -> GaitEvents:
@@ -280,19 +289,21 @@ def _of_trunk(uniform: UniformRecording, config: PipelineConfig) -> Tracks:
     )
 
 
-def _whole(
-    tracks: Tracks, calibrated: CalibratedRecording, posed: PoseEstimate, joint: JointAngles
-) -> Tracks:
+def _whole(tracks: Tracks, posed: PoseEstimate, joint: JointAngles) -> Tracks:
     """The tracks with all that the later stages gave; a foot whose sensor failed keeps what it had."""
     better = {s: q for s, q in posed.orientations.q.items() if s in tracks.q}
-    acceleration = free_acceleration(calibrated, posed.orientations)
+    acceleration = free_acceleration(posed.calibrated, posed.orientations)
     return replace(
         tracks,
         q={**tracks.q, **better},
         feet=posed.feet,
         angles=joint,
         trunk={
-            s: in_walking_frame(acceleration[s], posed.orientations.q[s], tracks.rate_hz)
+            s: np.where(
+                posed.orientations.valid[s][:, None],
+                in_walking_frame(acceleration[s], posed.orientations.q[s], tracks.rate_hz),
+                np.nan,
+            )
             for s in TRUNK
             if s in posed.orientations.q
         },

@@ -7,7 +7,7 @@ one time axis with a validity mask per sensor (made by core/timeline.py). All la
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import Final
 
@@ -88,6 +88,25 @@ class Subject:
             )
         check_standing(self.standing_angles_deg)
         object.__setattr__(self, "standing_angles_deg", MappingProxyType(dict(self.standing_angles_deg)))
+
+    def completed(self, other: Subject) -> Subject:
+        """What is known here, and from `other` what is not."""
+        height, width = self.height_m, self.standing_width_m
+        return Subject(
+            other.height_m if height is None else height,
+            other.standing_width_m if width is None else width,
+            {**other.standing_angles_deg, **self.standing_angles_deg},
+            self.shoe or other.shoe,
+        )
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values, keys as in a manifest's `subject`."""
+        return {
+            "height_m": self.height_m,
+            "standing_width_m": self.standing_width_m,
+            "standing_angles_deg": dict(self.standing_angles_deg),
+            "shoe": None if self.shoe is None else asdict(self.shoe),
+        }
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,9 @@
 """Where the sensors are at rest: quiet windows anywhere in a take, for all sensors together or for one.
 
 A sample is quiet when the 1-s window around it has mean |ω − b| below 6 °/s and std |f| below 0.25 m/s²
-(spec/real-data.md §2.1). b is the sensor's own offset, taken from its quietest window instead of the median
-of the take: in a take that is mostly walking the median is a property of the gait, not of the gyroscope.
+(docs/science/calibration.md, "Rest"). b is the sensor's own offset, taken from its quietest window instead of
+the median of the take: in a take that is mostly walking the median is a property of the gait, not of the
+gyroscope.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ Window = tuple[float, float]
 
 @dataclass(frozen=True)
 class RestParams:
-    """What counts as rest (spec/real-data.md §2.1; shortest window spec/fusion.md §2)."""
+    """What counts as rest (docs/science/calibration.md, "Rest")."""
 
     window_s: float = 1.0
     gyro_limit: float = radians(6.0)

@@ -1,7 +1,7 @@
 """Quaternions and rotation matrices on (..., 4) and (..., 3, 3) arrays.
 
 Hamilton, scalar first (w, x, y, z); q maps body to world: v_W = q ⊗ v_B ⊗ q*.
-Source: spec/fusion.md §0, spec/estimators.md §1.
+Source: docs/coordinate-systems.md, "Frames"; references in docs/science/orientation.md.
 """
 
 from __future__ import annotations

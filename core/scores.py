@@ -1,10 +1,10 @@
-"""How far gait is from a reference, in one number each: GVS, GPS, gps_sagittal, GDI* (spec/clinic.md §3).
+"""How far gait is from a reference, in one number each: GVS, GPS, gps_sagittal, GDI*.
 
-Every score exists raw and with offsets removed. Raw needs curves with the zero of the reference; angles that
-are only known from the person's own standing have none, and say so. Half of a healthy adult's raw GPS is pure
-offset, so the two are never mixed. GDI* = 100 − 10 (ln GPS − mean) / sd with mean and sd of ln GPS of the
-reference people: 100 is their middle, every 10 below it one sd (after Schwartz & Rozumalski 2008); it is not
-the GDI, whose feature matrix nobody may ship.
+docs/science/norms-and-scores.md, "GVS and GPS". Every score exists raw and with offsets removed. Raw needs
+curves with the zero of the reference; angles that are only known from the person's own standing have none,
+and say so. Half of a healthy adult's raw GPS is pure offset, so the two are never mixed. GDI* = 100 − 10 (ln
+GPS − mean) / sd with mean and sd of ln GPS of the reference people: 100 is their middle, every 10 below it
+one sd (after Schwartz & Rozumalski 2008); it is not the GDI, whose feature matrix nobody may ship.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 
 from core.anatomical import anatomical_curves
+from core.events.result import COMPARED
 from core.frames import SIDES, Side
 from core.norms.adults import adult_reference
 from core.norms.place import percentile_of_z
@@ -35,6 +36,7 @@ from core.norms.profile import (
 from core.norms.tables import wbds_group
 from core.parameters.kinematic import MEAN_ZERO, MeanCurve, mean_curve
 from core.parameters.result import CycleCurves
+from core.parameters.variability import TOO_FEW
 
 GDI_STAR: Final[Mapping[Profile, str]] = {"gps": "gdi_star", "gps_sagittal": "gdi_star_sagittal"}
 """Name of the index made from each profile; the reduced one has a name of its own."""
@@ -57,7 +59,8 @@ class Score:
     percentile : of the reference people who score lower, by their log-normal spread; None for a GVS.
     missing : variables it lacks. reason : "angle_zero_standing", "no_level" (rotation and progression are
         measured from their own mean, never against the walking direction), "joint_missing", "no_strides",
-        "estimated" (no two sensors measure it), "variables_missing" (several reasons, see the GVS),
+        "too_few_strides", "estimated" (no two sensors measure it), "variables_missing" (several reasons, see
+        the GVS),
         "no_reference", "no_norm_for_age", "score_zero" (the very curves of the reference: no GDI*).
     """
 
@@ -167,11 +170,14 @@ def _gvs(
         reason = "no_reference"
     elif standing is None:
         there = side in curves.curves.get(variable, {})
-        reason = "no_strides" if there else "joint_missing"
+        why = curves.why.get(variable, {}).get(side)
+        reason = why or ("no_strides" if there else "joint_missing")
     elif estimated:
         reason = "estimated"
     elif own is None:
         reason = "no_level" if variable in MEAN_ZERO else "angle_zero_standing"
+    elif own.n < COMPARED:
+        reason = TOO_FEW
     if reason is not None or own is None or own.mean is None:
         missing = (variable,)
         return Score("gvs_deg", variable, side, mode, None, "deg", 0, healthy, None, missing, reason)

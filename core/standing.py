@@ -1,7 +1,8 @@
 """Joint angles of quiet standing as a goniometer reads them: the link from our zero to the anatomical one.
 
-Our calibration makes the person's own standing the zero (spec/clinic.md §1, §8.4). Who stands with a knee
-bent by 10° has every knee angle 10° too small against any reference, until somebody enters these 10°.
+Our calibration makes the person's own standing the zero (docs/science/joint-angles.md, "Zero"). Who stands
+with a knee bent by 10° has every knee angle 10° too small against any reference, until somebody enters these
+10°.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Every sensor is laid on the axis of the take by its own times: samples that fall on it are copied bit for bit,
 others are interpolated linearly. Holes of up to 0.1 s are interpolated and flagged, longer ones are invalid
-and hold the last value (spec/fusion.md §3).
+and hold the last value (docs/science/timeline.md, "Rule").
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ class TimelineParams:
 
     Parameters
     ----------
-    max_gap_s : longest missing stretch that is interpolated (spec/fusion.md §3).
-    min_rate_hz : below, contacts cannot be found (spec/fusion.md §5.3).
+    max_gap_s : longest missing stretch that is interpolated (docs/science/timeline.md, "Parameters").
+    min_rate_hz : below, contacts cannot be found (docs/science/timeline.md, "Parameters").
     min_duration_s : shorter takes cannot hold 1 s of rest and two strides [our choice].
     min_share : a sensor that lasts less than this share of the median duration does not cut the take for the
         others; it is invalid where it has no samples [our choice].

@@ -4,7 +4,8 @@
         c.execute(...)
         audit.record(c, actor, "patient.renamed", "patient", pid, {"fields": ["code"]})
 
-One row per opened or changed resource; never a patient's code or name in `detail` (it outlives an erasure).
+Rows of what is only looked at go through server/trail.py. One row per opened or changed resource; never a
+patient's code or name in `detail` (it outlives an erasure).
 Triggers forbid UPDATE and DELETE; who gets around them breaks the chain, which `sagittal check` sees.
 """
 
@@ -18,6 +19,7 @@ from typing import Any, Protocol
 
 from sqlalchemy import Connection, Row, insert, select
 
+from server.storage.db import highest_number
 from server.storage.tables import audit, now
 
 GENESIS = "0" * 64
@@ -43,12 +45,14 @@ def record(
     resource: str,
     resource_id: str | None,
     detail: Mapping[str, Any] | None = None,
+    *,
+    at: dt.datetime | None = None,
 ) -> None:
-    """Append one row; the connection must be a writing one, actor None = the system itself."""
+    """Append one row; the connection must be a writing one, actor None = the system itself, at None = now."""
     last = c.execute(select(audit.c.seq, audit.c.hash).order_by(audit.c.seq.desc()).limit(1)).first()
     row = {
         "seq": 1 if last is None else last.seq + 1,
-        "at": now(),
+        "at": at or now(),
         "user_id": actor.user_id if actor else None,
         "user_name": actor.name if actor else None,
         "action": action,
@@ -67,7 +71,10 @@ def entries(c: Connection, *, before: int | None = None, limit: int = 100) -> li
 
 
 def problems(c: Connection) -> list[str]:
-    """Where the chain is broken: changed rows, removed rows, a cut-off beginning."""
+    """Where the chain is broken: changed rows, removed rows, a cut-off beginning or end.
+
+    A whole database that is older than the one before is not seen here but in storage/high_water.py.
+    """
     found = []
     expected, previous = 1, GENESIS
     for row in c.execute(select(audit).order_by(audit.c.seq)):
@@ -78,6 +85,9 @@ def problems(c: Connection) -> list[str]:
         if _seal(row._asdict()) != row.hash:
             found.append(f"audit row {row.seq} has been changed")
         expected, previous = row.seq + 1, row.hash
+    highest = highest_number(c, audit.name)
+    if highest >= expected:
+        found.append(f"audit rows {expected} to {highest}, the newest, have been removed")
     return found
 
 

@@ -27,7 +27,7 @@ def live(request: Request, db: Db, sid: Id, who: Therapist) -> Response:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
         view = live_views.live_view(c, session, patient, capture=str(request.base_url) + "capture")
-    opened(db, who, "session", sid)
+    opened(request, who, "session", sid)
     return page(request, db, who, "live.html", "patients", session=session, patient=patient, **view)
 
 
@@ -38,5 +38,5 @@ def patient_screen(request: Request, db: Db, sid: Id, who: Therapist) -> Respons
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
         view = live_views.patient_view(c, session)
-    opened(db, who, "session", sid)
+    opened(request, who, "session", sid)
     return page(request, db, who, "live-patient.html", "patients", session=session, patient=patient, **view)

@@ -46,6 +46,19 @@ class Mark(Response):
     value: str | None
 
 
+class LiveSensor(Response):
+    """A sensor as the recorder knows it; frames have it with what the estimator counts."""
+
+    id: str
+    segment: str | None
+    rate_hz: float
+    lost_pct: float | None = Field(description="null: only an estimator counts")
+    still: bool | None
+    battery_pct: float | None
+    state: str = Field(description="ok, warn, bad, none")
+    words: str
+
+
 class LiveState(Response):
     """Where a session's newest take stands: the feed's `state` message."""
 
@@ -55,11 +68,13 @@ class LiveState(Response):
     tablet: str = Field(description="connected, lost, or none (has not joined, or the take is over)")
     source: str | None
     count: int | None = Field(description="batches so far")
-    elapsed_s: float | None
+    elapsed_s: float | None = Field(description="length of what has come, estimated or not")
+    sensors: list[LiveSensor] = Field(description="empty until a tablet has joined and once the take is over")
     marks: list[Mark]
     ghost: str | None
     stale: bool
-    estimate: str = Field(description="ok or failed")
+    stopping: bool
+    estimate: str = Field(description="preparing, ok, failed, or none (nobody estimates)")
     recording: str | None
     problem: str | None
 

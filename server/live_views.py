@@ -1,4 +1,4 @@
-"""What the live pages start with, as plain values: scales and norms of curves, terms, prescription."""
+"""What the live pages start with, as plain values: scales of curves, terms, prescription."""
 
 from __future__ import annotations
 
@@ -7,11 +7,8 @@ from urllib.parse import urlsplit
 
 from sqlalchemy import Connection
 
-from core.norms import norms_for
-from core.norms.speed import SLOW_MPS
 from server.page_views import PROTOCOL_NAMES, SEGMENT_NAMES
-from server.report.notes import GROUPS
-from server.report.wording import NO_NORM, TERMS, VARIABLES, ZERO_WORDS, Variable
+from server.report.wording import TERMS, VARIABLES, ZERO_WORDS, Variable
 from server.services import prescriptions
 from server.services.patients import Patient
 from server.services.sessions import Session
@@ -31,43 +28,23 @@ UNPRESCRIBED: Final = (
 
 LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 
-GAIT_SPEED: Final = "gait_speed_mps"
-
 
 def live_view(c: Connection, session: Session, patient: Patient, *, capture: str) -> dict[str, Any]:
     """The therapist's page; `capture` = address of the page the tablet opens."""
-    age = session.performed_on.year - patient.birth_year if patient.birth_year else None
-    height = session.height_m if session.height_m is not None else patient.height_m
-    # how fast the person will walk is not known yet: everybody's comfortable pace, until they prove slower
-    norms = norms_for(age, patient.sex, None, height)  # type: ignore[arg-type]
-    bands = {name: band for name, band in norms.bands.items() if band.comparable}
-    given = _prescribed(c, patient.id)
     shown = [v for v in VARIABLES if v.name in JOINTS]
-    source = next((bands[v.name] for v in shown if v.name in bands), None)
-    note = NO_NORM.get(norms.reason or "", "No norm for this person.")
-    if source is not None:
-        who = GROUPS.get(source.group, source.group)
-        note = f"Norm: {source.n} {who}, mean ± 1 SD. Angles {ZERO_WORDS['standing']}; compare shapes."
     return {
         "capture": capture,
         "only_here": urlsplit(capture).hostname in LOOPBACK,
         "protocol": PROTOCOL_NAMES.get(session.protocol, session.protocol),
         "joints": [(v.name, JOINTS[v.name]) for v in shown],
-        "norm_note": note,
         "live": {
             "session": session.id,
             "patient": patient.id,
-            "variables": [_variable(v, bands.get(v.name)) for v in shown],
-            "norm_note": note,
-            "slow": {
-                "below_mps": SLOW_MPS,
-                "parameter": GAIT_SPEED,
-                "words": NO_NORM["no_speed_matched_norm"],
-            },
+            "variables": [_variable(v) for v in shown],
             "segments": SEGMENT_NAMES,
             "terms": _terms(),
             "choices": [name for name in UNPRESCRIBED if name in TERMS],
-            "prescription": given,
+            "prescription": _prescribed(c, patient.id),
         },
     }
 
@@ -90,18 +67,14 @@ def _prescribed(c: Connection, patient_id: str) -> dict[str, Any] | None:
     return None if written is None else written.content.to_json()
 
 
-def _variable(v: Variable, band: Any) -> dict[str, Any]:
-    norm = None
-    if band is not None:
-        norm = {"mean": band.mean_deg.round(2).tolist(), "sd": band.sd_deg.round(2).tolist()}
+def _variable(v: Variable) -> dict[str, Any]:
     return {
         "name": v.name,
-        "label": v.label,
+        "label": f"{v.label}, {ZERO_WORDS['standing']}",
         "range": v.y_range,
         "ticks": v.ticks,
         "up": v.up,
         "down": v.down,
-        "norm": norm,
     }
 
 

@@ -25,10 +25,12 @@ def _run(command: str, given: dict[str, object]) -> int:
     # numba and the web stack take seconds to import: each command loads only what it needs
     from importlib import import_module
 
-    from server.settings import SettingsError
+    from server.compile_cache import share_compile_cache
+    from server.settings import SettingsError, load_settings
 
-    run = getattr(import_module(f"server.commands.{command}"), command)
     try:
+        share_compile_cache(load_settings({"data_dir": given.get("data_dir")}).cache)
+        run = getattr(import_module(f"server.commands.{command}"), command)
         return int(run(**given))
     except SettingsError as error:
         sys.stderr.write(f"{error}\n")
@@ -82,7 +84,17 @@ def _parser() -> argparse.ArgumentParser:
         help="comfortable, fast_with_turns, hemiparetic, squats, postures … (docs/simulation.md)",
     )
     p.add_argument("--seed", type=int, default=1)
-    _data_option(add("check", "Check the database, every stored file by its hash, and the audit chain."))
+    _data_option(
+        add("check", "Check the database, every stored file by its hash, live logs, trash, the audit chain.")
+    )
+    p = add("trash", "List stored files that the database does not know; they stay 30 days.")
+    _data_option(p)
+    p.add_argument("--restore", action="store_true", help="put back those that the database refers to")
+    p = add("adopt", "List live recordings that the database does not know, or give one to a session.")
+    _data_option(p)
+    p.add_argument("take", nargs="?", help="one of the list")
+    p.add_argument("--session", metavar="ADDRESS", help="the session's page, or its id")
+    _data_option(add("accept", "Go on with this database, though it was emptied, put back or exchanged."))
     _data_option(add("migrate", "Bring the database to the schema of this version (after a backup)."))
     p = add("user", "Add a user, or give one a new password, on the command line.")
     _data_option(p)

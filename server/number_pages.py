@@ -36,5 +36,5 @@ def parameter(
     number = reports.behind_number(
         blobs, found, edits, context["patient"], context["session"], name, context["controls"]
     )
-    opened(db, who, "session", sid)
+    opened(request, who, "session", sid)
     return page(request, db, who, "parameter.html", "patients", number=number, **context)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from sqlalchemy import Connection, func, select
 
+from core.errors import FormatError
 from server.auth.roles import Role
 from server.jobs.queue import JobView
 from server.report.exports import parameter_row
 from server.report.wording import TERMS
 from server.services import analyses, jobs, live, reviews, sessions
 from server.services.patients import Patient
-from server.storage.blobs import BlobStore
+from server.storage.blobs import BlobStore, IntegrityError
 from server.storage.tables import ACTIVE_STATES, job, patient
 from web.words import number, seconds
 
@@ -60,8 +61,6 @@ STATES: Final[Mapping[str, tuple[str, str]]] = {
 }
 """State of a session → shape and word."""
 
-NO_STRIDES: Final = {"kind": "bad", "text": "No strides"}
-
 JOB_WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "queued": ("none", "Waiting"),
     "running": ("run", "Running"),
@@ -91,15 +90,22 @@ def patient_view(p: Patient) -> dict[str, Any]:
     return {**vars(p), "who": who_words(p.sex, p.birth_year)}
 
 
-def patient_rows(c: Connection, found: Sequence[Patient]) -> list[dict[str, Any]]:
-    """Rows of the patients list, each with the state of its latest visit."""
+def patient_rows(
+    c: Connection, blobs: BlobStore, found: Sequence[Patient], *, results: bool
+) -> list[dict[str, Any]]:
+    """Rows of the patients list, each with the state of its latest visit; with `results`, of its data."""
     rows = []
     streaming = {take.patient_id: take.session_id for take in live.streaming(c)}
+    newest = sessions.newest_of(c, [p.id for p in found])
+    running = _active(c, lambda j: j.patient_id)
+    shown = analyses.latest_of(c, [s.id for s in newest.values()]) if results else {}
+    edits = reviews.edits_of_all(c, [a.id for a in shown.values()])
     for p in found:
-        visits = sessions.of_patient(c, p.id)
-        running = _running(c, [v.id for v in visits]) if p.running else None
-        last = status(visits[0].state) if visits else {"kind": "none", "text": "No session yet"}
-        row = {"visits": p.sessions, "last": p.last_visit, "job": running, "status": last}
+        if p.id in newest:
+            last = _state_of(blobs, newest[p.id], shown.get(newest[p.id].id), edits)
+        else:
+            last = {"kind": "none", "text": "No session yet"}
+        row = {"visits": p.sessions, "last": p.last_visit, "job": running.get(p.id), "status": last}
         rows.append(patient_view(p) | row | {"live": streaming.get(p.id)})
     follow_few([row["job"] for row in rows])
     return rows
@@ -119,23 +125,44 @@ def visits(c: Connection, blobs: BlobStore, patient_id: str, *, results: bool) -
     """The visits of a patient, newest first, with the key parameters of each visit's latest analysis."""
     rows = []
     streaming = {take.session_id for take in live.streaming(c)}
-    for s in sessions.of_patient(c, patient_id):
-        latest = analyses.latest(c, s.id) if results else None
-        cells, strides = key_cells(_parameters(c, blobs, latest) if latest else [])
+    running = _active(c, lambda j: j.session_id)
+    there = sessions.of_patient(c, patient_id)
+    shown = analyses.latest_of(c, [s.id for s in there]) if results else {}
+    edits = reviews.edits_of_all(c, [found.id for found in shown.values()])
+    for s in there:
+        latest = shown.get(s.id)
+        numbers = reviews.numbers(blobs, latest, edits[latest.id]).parameters if latest else ()
+        cells, strides = key_cells([parameter_row(p) for p in numbers])
         rows.append(
             {
                 **vars(s),
                 "href": f"/sessions/{s.id}{_page_of(s, live=s.id in streaming)}",
                 "live": s.id in streaming,
-                "protocol_name": PROTOCOL_NAMES.get(s.protocol, s.protocol),
+                "condition": s.walked().words,
                 "cells": cells,
                 "strides": strides,
-                "job": _running(c, [s.id]) if s.state == "running" else None,
-                "status": NO_STRIDES if latest and not any((strides or {}).values()) else status(s.state),
+                "job": running.get(s.id),
+                "status": _state_of(blobs, s, latest, edits),
             }
         )
     follow_few([row["job"] for row in rows])
     return rows
+
+
+def _state_of(
+    blobs: BlobStore,
+    s: sessions.Session,
+    shown: analyses.Analysis | None,
+    edits: Mapping[str, reviews.Edits],
+) -> dict[str, str]:
+    """What a list says of a session: of one that is analysed how good its data are, as its own page does."""
+    if s.state != "done" or shown is None or "analysis.json" not in shown.files:
+        return status(s.state)
+    try:
+        kind, text = reviews.verdict(blobs, shown, edits[shown.id])
+    except (IntegrityError, FormatError):  # its own page says what is wrong; the others stay in reach
+        kind, text = "bad", "Cannot be read"
+    return {"kind": kind, "text": text}
 
 
 def _page_of(s: sessions.Session, *, live: bool) -> str:
@@ -143,12 +170,6 @@ def _page_of(s: sessions.Session, *, live: bool) -> str:
     if live:
         return "/live"
     return "/upload" if s.state in {"empty", "uploaded"} else ""
-
-
-def _parameters(c: Connection, blobs: BlobStore, found: analyses.Analysis) -> Sequence[Mapping[str, Any]]:
-    """Parameters as stored, or as a person's edits give them."""
-    numbers = reviews.numbers(blobs, found, reviews.edits_of(c, found.id))
-    return [parameter_row(p) for p in numbers.parameters]
 
 
 def key_cells(parameters: Sequence[Mapping[str, Any]]) -> tuple[list[dict[str, Any]], dict[str, int] | None]:
@@ -206,8 +227,9 @@ def newest_job(c: Connection, session_id: str) -> JobView | None:
     return next(iter(jobs.of_session(c, session_id)), None)
 
 
-def _running(c: Connection, session_ids: Sequence[str]) -> dict[str, Any] | None:
-    """The running job of these sessions, else one that waits."""
-    found = [j for sid in session_ids for j in jobs.of_session(c, sid) if not j.finished]
-    found.sort(key=lambda j: j.state != "running")
-    return job_dict(found[0]) if found else None
+def _active(c: Connection, whose: Callable[[jobs.ListedJob], str | None]) -> dict[str | None, dict[str, Any]]:
+    """The running job, else the newest that waits, by what `whose` takes of it (patient or session)."""
+    found: dict[str | None, dict[str, Any]] = {}
+    for listed in jobs.active(c):
+        found.setdefault(whose(listed), job_dict(listed.job))
+    return found

@@ -8,8 +8,9 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
+from core.condition import USUAL
 from server import audit, page_views, prescription_views, session_views, upload_views, visit_views
-from server.api.context import Blobs, Db, Id
+from server.api.context import Blobs, Db, Id, OpenTrail
 from server.auth import accounts, one_time
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -29,6 +30,7 @@ from server.services import (
     sessions,
     signals,
 )
+from server.shell import listed as _listed
 from server.shell import opened as _opened
 from server.shell import page as _page
 from server.storage.blobs import BlobStore
@@ -39,6 +41,8 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 PATIENTS_SHOWN = 200
 AUDIT_ROWS = 100
+FRAGMENT = "x-sagittal-fragment"
+"""Header by which the page's own script asks for a part of it."""
 
 
 @router.get("/")
@@ -67,13 +71,16 @@ def set_up(request: Request, db: Db, token: str) -> Response:
 def patient_list(
     request: Request,
     db: Db,
+    blobs: Blobs,
     who: Annotated[Identity, require(Action.READ_PATIENT)],
     q: Annotated[str, Query(max_length=200)] = "",
 ) -> Response:
     """All patients, the latest visit first."""
     with db.read() as c:
-        rows = page_views.patient_rows(c, patients.listing(c, search=q, limit=PATIENTS_SHOWN))
+        found = patients.listing(c, search=q, limit=PATIENTS_SHOWN)
+        rows = page_views.patient_rows(c, blobs, found, results=who.may(Action.READ_RESULT))
         total = page_views.patient_count(c)
+    _listed(request, who, "patient")
     return _page(request, db, who, "patients.html", "patients", patients=rows, query=q, total=total)
 
 
@@ -87,7 +94,7 @@ def patient_page(
         visits = page_views.visits(c, blobs, pid, results=who.may(Action.READ_RESULT))
         done, plans = histories.read(c, patient)
         written = prescriptions.of_patient(c, pid) if who.may(Action.READ_RESULT) else []
-    _opened(db, who, "patient", pid)
+    _opened(request, who, "patient", pid)
     trend = None
     if who.may(Action.READ_RESULT):
         trend = visit_views.teaser(histories.history(blobs, patient, done, plans))
@@ -104,17 +111,17 @@ def patient_page(
 def new_session(
     request: Request, db: Db, pid: Id, who: Annotated[Identity, require(Action.CREATE_SESSION)]
 ) -> Response:
-    """Ask for protocol, date, height and aids of a new visit."""
+    """Ask for protocol, date, height and walking condition of a new visit."""
     today = now().date()
     with db.read() as c:
         patient = patients.get(c, pid)
         plans = programmes.of_patient(c, pid)
-    _opened(db, who, "patient", pid)
+    _opened(request, who, "patient", pid)
     open_visits = [v for plan in plans[:1] for v in plan.visits if v.session_id is None]
     return _page(
         request, db, who, "session-new.html", "patients",
         patient=patient, protocols=page_views.PROTOCOLS, today=today.isoformat(), open_visits=open_visits,
-        near=plans[0].near(today) if plans else None,
+        near=plans[0].near(today) if plans else None, usual=USUAL,
     )  # fmt: skip
 
 
@@ -127,7 +134,7 @@ def upload(
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
         view = upload_views.upload_view(c, recordings.current(c, sid), session, patient)
-    _opened(db, who, "session", sid)
+    _opened(request, who, "session", sid)
     return _page(request, db, who, "upload.html", "patients", session=session, patient=patient, **view)
 
 
@@ -161,19 +168,27 @@ def timeline(
         context["lanes"] = [vars(lane) for lane in signals.lanes(blobs, latest)]
         context["fixed_because"] = reviews.take(blobs, latest).fixed_because
         context["editable"] = context["fixed_because"] is None and who.may(Action.REVIEW)
-    _opened(db, who, "session", sid)
+    _opened(request, who, "session", sid)
     return _page(request, db, who, "timeline.html", "patients", **context)
 
 
 @router.get("/sessions/{sid}/timeline/numbers")
 def timeline_numbers(
-    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+    request: Request,
+    db: Db,
+    blobs: Blobs,
+    trail: OpenTrail,
+    sid: Id,
+    who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
-    """The part of the timeline page that follows an edit."""
+    """The part of the timeline page that follows an edit; asked for in another way, the page itself."""
+    if FRAGMENT not in request.headers:
+        return RedirectResponse(f"/sessions/{sid}/timeline#numbers", status_code=303)
     with db.read() as c:
         context = session_views.base(c, sid)
         latest = analyses.shown(c, sid)
         edits = reviews.edits_of(c, latest.id)
+    trail.watched(who, "numbers.opened", "session", sid)
     numbers = session_views.numbers(blobs, latest, edits, context)
     return TEMPLATES.TemplateResponse(request, "_numbers.html", {"numbers": numbers})
 
@@ -194,7 +209,7 @@ def data(
     with db.read() as c:
         context = session_views.base(c, sid)
         context |= session_views.downloads(c, blobs, sid, results=who.may(Action.READ_RESULT))
-    _opened(db, who, "session", sid)
+    _opened(request, who, "session", sid)
     return _page(request, db, who, "data.html", "patients", **context)
 
 
@@ -203,6 +218,7 @@ def jobs(request: Request, db: Db, who: Annotated[Identity, require(Action.READ_
     """What is being computed, and what was."""
     with db.read() as c:
         rows = page_views.job_rows(c)
+    _listed(request, who, "job")
     return _page(request, db, who, "jobs.html", "jobs", jobs=rows)
 
 
@@ -254,14 +270,16 @@ def _session_page(
 ) -> Response:
     with db.read() as c:
         context = session_views.base(c, sid)
-        latest = analyses.latest(c, sid) if who.may(Action.READ_RESULT) else None
-        edits = reviews.Edits() if latest is None else reviews.edits_of(c, latest.id)
-        context["before"] = None if latest is None else comparisons.before(c, context["session"])
-        trained = feedback.gather(c, sid) if latest is not None else None
-    if latest is None and paper:
+        patient = context["patient"]
+        done = histories.analysed(c, patient.id) if who.may(Action.READ_RESULT) else []
+        this = next((a for a in done if a.session.id == sid), None)
+        if this is not None:
+            context["before"] = comparisons.before(c, this.session, done)
+            trained = feedback.gather(c, patient, sid, done)
+    if this is None and paper:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
-    if latest is not None:
-        context["report"] = session_views.report(blobs, latest, edits, context, paper=paper)
-        context["feedback"] = None if trained is None else feedback.view(blobs, trained)
-    _opened(db, who, "session", sid)
+    if this is not None:
+        context["report"] = session_views.report(blobs, this.found, this.edits, context, paper=paper)
+        context["feedback"] = feedback.view(blobs, trained)
+    _opened(request, who, "session", sid)
     return _page(request, db, who, template, "patients", **context)

@@ -27,7 +27,7 @@ def prescribe(
     with db.read() as c:
         patient = patients.get(c, pid)
         now = prescriptions.in_force(c, pid)
-    opened(db, who, "patient", pid)
+    opened(request, who, "patient", pid)
     return page(
         request, db, who, "prescription.html", "patients",
         patient=patient, now=now, f=views.starting_point(now, patient.affected_side),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sqlite3
 from collections.abc import Mapping
 from http import HTTPStatus
 from pathlib import Path
@@ -23,6 +24,7 @@ from starlette.websockets import WebSocket, WebSocketState
 import web
 from core.errors import SagittalError
 from server.auth.headers import add_security_headers
+from server.storage.refusal import refusal_of
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
@@ -90,6 +92,9 @@ def as_problem(error: Exception) -> Problem:
         return Problem(
             error.status_code, code, SENTENCES.get(code, said) if is_bare else said, headers=error.headers
         )
+    refusal = refusal_of(error)
+    if refusal is not None:
+        return Problem(507, refusal.value, refusal.sentence)
     if isinstance(error, OperationalError) and "locked" in str(error.orig):
         return Problem(503, "database_busy", SENTENCES["database_busy"], headers={"Retry-After": "5"})
     return Problem(500, "internal_error", SENTENCES["internal_error"])
@@ -140,6 +145,8 @@ def install(app: FastAPI) -> None:
         problem = as_problem(error)
         if problem.status == HTTPStatus.INTERNAL_SERVER_ERROR and isinstance(error, LOGGED_HERE):
             log.error("%s %s", connection.scope["type"], problem.code, exc_info=error)
+        if problem.status == HTTPStatus.INSUFFICIENT_STORAGE:
+            log.warning("%s refused: %s", connection.scope["type"], problem.code)
         if isinstance(connection, WebSocket):
             await refuse_websocket(connection, problem)
             return None
@@ -148,8 +155,23 @@ def install(app: FastAPI) -> None:
         add_security_headers(response.headers)
         return response
 
-    for kind in (AnyHttpException, SagittalError, RequestValidationError, OperationalError, Exception):
+    async def handle_disk(connection: HTTPConnection, error: Exception) -> Response | None:
+        # of another kind: to the server, which logs it, and to the handler of everything
+        if refusal_of(error) is None:
+            raise error
+        return await handle(connection, error)
+
+    all_kinds: tuple[type[Exception], ...] = (
+        AnyHttpException,
+        SagittalError,
+        RequestValidationError,
+        OperationalError,
+        Exception,
+    )
+    for kind in all_kinds:
         app.add_exception_handler(kind, handle)  # type: ignore[arg-type]
+    for raw in (OSError, sqlite3.OperationalError):
+        app.add_exception_handler(raw, handle_disk)  # type: ignore[arg-type]
 
 
 def _wants_page(connection: HTTPConnection) -> bool:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
+from core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
 from core.frames import Protocol
 from server.auth.passwords import MAX_LENGTH, MIN_LENGTH
 from server.auth.roles import Role
@@ -173,12 +174,17 @@ class Patient(Response):
 
 
 class SessionNew(Request):
-    """A new visit, today unless said otherwise."""
+    """A new visit, today unless said otherwise; of how it was walked null = not stated."""
 
     title: Line = ""
     performed_on: dt.date = dt.date.min
     protocol: Protocol = "walk"
     height_m: Height | None = None
+    pace: WalkingPace | None = None
+    aid: WalkingAid | None = None
+    orthosis: Orthosis | None = None
+    shoes: Footwear | None = None
+    feedback: bool = Field(default=False, description="biofeedback was given; a live take sets it by itself")
     note: Note = None
 
 
@@ -241,6 +247,11 @@ class Session(Response):
     performed_on: dt.date
     protocol: str
     height_m: float | None
+    pace: WalkingPace | None
+    aid: WalkingAid | None
+    orthosis: Orthosis | None
+    shoes: Footwear | None
+    feedback: bool
     note: str
     created_at: dt.datetime
     state: str
@@ -335,6 +346,7 @@ class Report(Response):
     angle_zero: str | None
     zero_offset_deg: dict[str, float]
     since: dict[str, Any] | None
+    condition: str
     provenance: dict[str, Any]
 
 

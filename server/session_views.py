@@ -16,8 +16,9 @@ from server.report.estimator import CHOICES, EstimatorView, estimator_view
 from server.report.model import ReportModel
 from server.report.panels import CurvePanel
 from server.report.table import Row
-from server.report.wording import ZERO_WORDS
 from server.services import analyses, controls, live, patients, recordings, reports, reviews, sessions
+from server.services.patients import Patient
+from server.services.sessions import Session
 from server.storage.blobs import BlobStore
 from web.words import day, seconds
 
@@ -56,6 +57,7 @@ SHOWN: Final = (
     "curve_notes",
     "used",
     "replay",
+    "condition",
     "profile",
     "limits",
 )
@@ -95,10 +97,11 @@ def base(c: Connection, session_id: str) -> dict[str, Any]:
         "session": session,
         "patient": patient,
         "controls": controls.visits(c, patient, session),
-        "recording": recordings.current(c, session_id),
+        "recording": session.state != "empty",
         "job": None if job is None else job_dict(job),
         "stages": list(STAGE_NAMES.items()),
         "live_now": take.state if take is not None and take.is_open else None,
+        "damages": live.damages(c, session_id),
         "report": None,
     }
 
@@ -178,6 +181,7 @@ def report(
         **{name: getattr(model, name) for name in SHOWN},
         "groups": _groups(model, paper=paper),
         "since": None if paper else model.since,
+        "not_compared": _not_compared(session, model),
         "more": [(name, rows) for name, rows in model.groups if name in SECONDARY],
         "missing": [
             (r.title, r.reason.removeprefix("not measured: "))
@@ -188,11 +192,10 @@ def report(
         "warnings": _notices(model),
         "curves": curves,
         "key_curve": _chart(model.key_curve, KEY_HEIGHT, x_unit=True),
-        "zero_words": ZERO_WORDS.get(model.angle_zero or "", model.angle_zero),
         "strip": strip_svg(bundle.strides, model.duration_s) if model.strides else "",
         "stride_words": f"{used} of {total} used",
         "empty_reason": _why_empty(model),
-        "identity": _identity(patient, session),
+        "identity": _identity(patient, session, model.condition),
         "provenance_line": f"Sagittal {found.code_version} · settings {found.config_sha256[:8]} · "
         f"input {found.input_sha256[:8]} · {day(found.created_at)}",
         "has_poses": "poses.parquet" in found.files,
@@ -273,12 +276,22 @@ def _chart(panel: CurvePanel, height: int, *, x_unit: bool) -> dict[str, Any]:
     return chart_view(panel, cycle_svg(panel, height=height, x_unit=x_unit))
 
 
-def _identity(patient: Any, session: Any) -> list[tuple[str, str]]:
+def _not_compared(session: Session, model: ReportModel) -> str | None:
+    """Why the table has no column of change, None where it has."""
+    if model.since is not None:
+        return None
+    if session.feedback:
+        return "Walked with feedback: shown, not compared with other visits."
+    return f"No earlier visit in this condition to compare with: {model.condition}."
+
+
+def _identity(patient: Patient, session: Session, condition: str) -> list[tuple[str, str]]:
     height = session.height_m or patient.height_m
     return [
         ("Code", patient.code),
         ("Age, sex", who_words(patient.sex, patient.birth_year) or "not given"),
         ("Height", f"{height:.2f} m" if height else "not given"),
         ("Protocol", PROTOCOL_NAMES.get(session.protocol, session.protocol)),
+        ("Walked", condition),
         ("Date", day(session.performed_on)),
     ]

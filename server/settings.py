@@ -9,6 +9,7 @@ command line goes before the environment, the environment before the defaults be
 from __future__ import annotations
 
 import dataclasses
+import ipaddress
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,6 +17,7 @@ from pathlib import Path
 
 MB = 1_000_000
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
+PROXY_DOMAIN = "addresses or networks of proxies, such as 172.16.0.0/12, and not all of the internet"
 
 
 class SettingsError(ValueError):
@@ -30,8 +32,12 @@ class Settings:
     ----------
     data_dir : folder of database, blobs and caches; made at first start, readable by its owner only.
     host, port : address the web server listens on.
-    allowed_hosts : names a request may carry in `Host` besides loopback (DNS rebinding, service.md §d).
+    allowed_hosts : names a request may carry in `Host` besides loopback (a name that was rebound to our
+        address is refused).
     behind_tls : a reverse proxy speaks HTTPS for us: cookies are `Secure`, any address may be bound.
+    trusted_proxies : addresses and networks whose X-Forwarded-For and -Proto are believed, so that throttles
+        count clients and not the proxy; behind TLS loopback is always one of them.
+    max_connections : connections at once, at most what the system's limit of open files has room for.
     max_file_bytes, max_set_bytes, max_files : limits of one upload and of one recording's upload set.
     min_free_bytes : uploads are refused below this free disk space.
     workers : worker processes started by `sagittal serve`; each keeps one warm child.
@@ -39,8 +45,8 @@ class Settings:
     lease_s : a worker that has not renewed its job for so long is taken for dead; renewed every third of it.
     job_timeout_s : longest run of one job.
     child_memory_bytes : address space of the computing child (RLIMIT_AS; libraries alone map 1 GB), 0 = none.
-    sweep_grace_s : age from which a file that nothing refers to is removed.
-    idle_minutes, absolute_hours : life of a sign-in (service.md §d).
+    sweep_grace_s : age from which a file that nothing refers to goes to the trash.
+    idle_minutes, absolute_hours : life of a sign-in.
     task_modules : modules whose import registers kinds of jobs.
     """
 
@@ -49,6 +55,8 @@ class Settings:
     port: int = 8000
     allowed_hosts: tuple[str, ...] = ()
     behind_tls: bool = False
+    trusted_proxies: tuple[str, ...] = ()
+    max_connections: int = 1000
     max_file_bytes: int = 500 * MB
     max_set_bytes: int = 1000 * MB
     max_files: int = 200
@@ -69,10 +77,12 @@ class Settings:
             _require(getattr(self, name) >= 0, name, getattr(self, name), "0 or more")
         for name in ("lease_s", "job_timeout_s", "idle_minutes", "absolute_hours"):
             _require(getattr(self, name) > 0, name, getattr(self, name), "more than 0")
-        for name in ("max_file_bytes", "max_set_bytes", "max_files"):
+        for name in ("max_connections", "max_file_bytes", "max_set_bytes", "max_files"):
             _require(getattr(self, name) >= 1, name, getattr(self, name), "1 or more")
         for name in ("min_free_bytes", "child_memory_bytes", "sweep_grace_s"):
             _require(getattr(self, name) >= 0, name, getattr(self, name), "0 or more")
+        for proxy in self.trusted_proxies:
+            _require(_is_some_network(proxy), "trusted_proxies", f"'{proxy}'", PROXY_DOMAIN)
         if self.host not in LOOPBACK and not self.behind_tls:
             raise SettingsError(
                 f"host is '{self.host}': patients' data would cross the network unencrypted. Put a TLS proxy "
@@ -90,6 +100,11 @@ class Settings:
         return (*LOOPBACK, *self.allowed_hosts)
 
     @property
+    def proxies(self) -> tuple[str, ...]:
+        """Every proxy that is believed."""
+        return ("127.0.0.1", "::1", *self.trusted_proxies) if self.behind_tls else self.trusted_proxies
+
+    @property
     def database(self) -> Path:
         """The SQLite file."""
         return self.data_dir / "sagittal.db"
@@ -103,6 +118,21 @@ class Settings:
     def live(self) -> Path:
         """Folder of the logs of live takes that have not become recordings yet."""
         return self.data_dir / "live"
+
+    @property
+    def trash(self) -> Path:
+        """Folder of stored files that nothing refers to any more (storage/trash.py)."""
+        return self.data_dir / "trash"
+
+    @property
+    def erasing(self) -> Path:
+        """Folder of notes about erasures under way, so that an interrupted one is finished."""
+        return self.data_dir / "erasing"
+
+    @property
+    def mark(self) -> Path:
+        """The file that says how far the audit log has ever come (storage/high_water.py)."""
+        return self.data_dir / "audit.mark"
 
     @property
     def cache(self) -> Path:
@@ -168,6 +198,14 @@ def _parse(name: str, kind: str, text: str) -> object:
                 return text
     except (ValueError, KeyError):
         raise SettingsError(f"{_variable(name)} is '{text}', expected {kind}.") from None
+
+
+def _is_some_network(text: str) -> bool:
+    """Whether it names some addresses; were all of them believed, every client could lie about its own."""
+    try:
+        return ipaddress.ip_network(text).prefixlen > 0
+    except ValueError:
+        return False
 
 
 def _require(ok: bool, name: str, value: object, domain: str) -> None:

@@ -5,15 +5,20 @@ from __future__ import annotations
 from fastapi import Request
 from starlette.responses import Response
 
-from server import audit, page_views
+from core.body.model import NOMINAL_HEIGHT_M
+from core.condition import CHOICES
+from server import page_views
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.problems import TEMPLATES
 from server.services.provenance import CODE_VERSION
 from server.storage.db import Database
+from server.trail import Trail
 from web.words import FILTERS
 
 TEMPLATES.env.filters.update(FILTERS)
+TEMPLATES.env.globals["conditions"] = CHOICES
+TEMPLATES.env.globals["ASSUMED_HEIGHT"] = f"{NOMINAL_HEIGHT_M:.2f} m"
 
 NAVIGATION = (
     ("patients", "people", "Patients", "/patients", Action.READ_PATIENT),
@@ -24,10 +29,16 @@ NAVIGATION = (
 """Rail entries: page, icon, word, address, and what one must be allowed to do to see it."""
 
 
-def opened(db: Database, who: Identity, resource: str, resource_id: str) -> None:
+def opened(request: Request, who: Identity, resource: str, resource_id: str) -> None:
     """Write down that somebody looked at it."""
-    with db.write() as c:
-        audit.record(c, who, f"{resource}.opened", resource, resource_id)
+    trail: Trail = request.app.state.trail
+    trail.opened(who, f"{resource}.opened", resource, resource_id)
+
+
+def listed(request: Request, who: Identity, resource: str) -> None:
+    """Write down that somebody looks at the list of all."""
+    trail: Trail = request.app.state.trail
+    trail.watched(who, f"{resource}.listed", resource, None)
 
 
 def page(

@@ -5,17 +5,40 @@ from __future__ import annotations
 import datetime as dt
 from typing import Any, Literal
 
+from core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
 from server.schemas import Response
 
 
+class Condition(Response):
+    """How a take was walked, and the same in words; null = not stated, of a belt not entered."""
+
+    protocol: str
+    belt_speed_mps: float | None
+    pace: WalkingPace | None
+    aid: WalkingAid | None
+    orthosis: Orthosis | None
+    shoes: Footwear | None
+    feedback: bool
+    words: str
+
+
 class TrendVisit(Response):
-    """An analysed visit; `label` of the programme's plan, null outside one."""
+    """An analysed visit; `label` of the programme's plan, null outside one. With feedback: a training."""
 
     session_id: str
     performed_on: dt.date
     title: str
     label: str | None
     kind: Literal["assessment", "training"]
+    condition: Condition
+
+
+class OtherWalks(Response):
+    """Visits walked otherwise: how many, and the newest of them, to be asked for with `like`."""
+
+    condition: Condition
+    count: int
+    session_id: str
 
 
 class Change(Response):
@@ -39,7 +62,7 @@ class Change(Response):
 
 
 class TrendPoint(Response):
-    """A value at a visit (index into `visits`); `change` is against the first assessment."""
+    """A value at a visit (index into `visits`); `change` from the first assessment, null with feedback."""
 
     visit: int
     value: float
@@ -51,13 +74,13 @@ class TrendPoint(Response):
 
 
 class TrendLine(Response):
-    """One side; `base` and `latest` are indices of the first and the last assessment among the points."""
+    """One side; `base` and `latest` are indices of the first and the last assessment, null without one."""
 
     side: str | None
     mdc: float | None
     mcid: float | None
     points: list[TrendPoint]
-    base: int
+    base: int | None
     latest: int | None
     words: str | None
 
@@ -73,10 +96,12 @@ class Trend(Response):
 
 
 class Trends(Response):
-    """Figures over the visits of one protocol."""
+    """Figures over the visits walked under one condition."""
 
     protocol: str | None
+    condition: Condition | None
     visits: list[TrendVisit]
+    others: list[OtherWalks]
     trends: list[Trend]
 
 
@@ -87,6 +112,7 @@ class ComparedSession(Response):
     performed_on: dt.date
     title: str
     protocol: str
+    condition: Condition
     analysis_id: str
 
 
@@ -97,9 +123,13 @@ class ChangeInWords(Change):
 
 
 class Comparison(Response):
-    """Two sessions, the earlier one first; `cautions` say how the measurements themselves differ."""
+    """Two sessions, the earlier one first; `cautions` say how walks and measurements themselves differ.
+
+    `comparable` false: they were not walked alike, or with feedback, and no change has a verdict.
+    """
 
     before: ComparedSession
     after: ComparedSession
+    comparable: bool
     cautions: list[str]
     changes: list[ChangeInWords]

@@ -10,7 +10,8 @@ from sqlalchemy import Connection
 
 from core.frames import SEGMENTS
 from server.page_views import SEGMENT_NAMES, job_dict
-from server.services import analyses, sessions
+from server.report.bundle import ABOUT_FILES
+from server.services import histories
 from server.services.patients import Patient
 from server.services.recordings import Recording
 from server.services.sessions import Session
@@ -54,7 +55,8 @@ def upload_view(c: Connection, this: Recording | None, s: Session, p: Patient) -
         for f in (this.files if this else ())
     ]
     manifest = (this.manifest if this else None) or {}
-    subject = manifest.get("subject") or {}
+    found = (this.inspection if this else None) or {}
+    measured = {"height_m": s.height_m or p.height_m, **(manifest.get("subject") or {})}
     look = this.job if this else None
     waiting = look is not None and not look.finished
     problem = None
@@ -68,9 +70,14 @@ def upload_view(c: Connection, this: Recording | None, s: Session, p: Patient) -
         if this is None or this.inspection is None or waiting
         else found_view(this, remembered(c, s)),
         "segments": SEGMENT_CHOICES,
-        "said": dict(_paths({**manifest, "subject": {"height_m": s.height_m or p.height_m, **subject}})),
+        "said": _said({"subject": found.get("subject") or {}}) | _said({**manifest, "subject": measured}),
         "goniometer": GONIOMETER,
     }
+
+
+def _said(tree: Mapping[str, Any]) -> dict[str, object]:
+    """Values by their path, without those nobody gave."""
+    return {path: value for path, value in _paths(tree) if value is not None}
 
 
 def _paths(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, object]]:
@@ -84,9 +91,10 @@ def _paths(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, obj
 
 def remembered(c: Connection, s: Session) -> Mapping[str, str | None]:
     """Which sensor sat where at this patient's other visits, the newest analysed one that says so."""
-    for other in sessions.of_patient(c, s.patient_id):
-        found = analyses.latest(c, other.id) if other.id != s.id else None
-        sensors: Mapping[str, str | None] = ((found.manifest if found else None) or {}).get("sensors") or {}
+    for other in reversed(histories.analysed(c, s.patient_id)):
+        if other.session.id == s.id:
+            continue
+        sensors: Mapping[str, str | None] = (other.found.manifest or {}).get("sensors") or {}
         if any(sensors.values()):
             return sensors
     return {}
@@ -128,8 +136,10 @@ def found_view(this: Recording, earlier: Mapping[str, str | None]) -> dict[str, 
     hint = next(
         (text for basis, text in BASIS_WORDS.items() if basis in known), "Say where each sensor sits."
     )
+    left_out = [n["message"] for n in found["notices"] if n["code"] in ABOUT_FILES]
     return {
         "facts": _facts(found, devices),
+        "unused": left_out,
         "sensors": [_sensor(d, chosen[d["device_id"]][0]) for d in devices],
         "notices": _notices(found, devices),
         "manifest": dict(this.manifest or {}),
@@ -210,7 +220,7 @@ def _at_rest(still: Sequence[float]) -> str:
 
 
 def _notices(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
-    """Every notice once; copies are gathered into one sentence."""
+    """Every notice once; copies are gathered into one sentence, unused files have their own list."""
     copies = [d for d in devices if d["duplicate_of"]]
     notices = []
     if copies:
@@ -226,7 +236,7 @@ def _notices(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> 
         notices.append({"kind": "", "title": title, "message": message})
     everything = [*found["notices"], *(n for d in devices for n in d["notices"])]
     for n in everything:
-        if n["code"] == DUPLICATE:
+        if n["code"] == DUPLICATE or n["code"] in ABOUT_FILES:
             continue
         where = f", {n['sensor']}" if n["sensor"] else ""
         title = n["code"].replace("_", " ").capitalize() + where

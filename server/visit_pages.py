@@ -15,6 +15,7 @@ from server.api.context import Blobs, Db, Id
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.schemas import HexId
 from server.services import comparisons, histories, patients, programmes, sessions
 from server.services.course import SIX_WEEKS
 from server.shell import opened, page
@@ -40,13 +41,14 @@ def trends(
     who: Reader,
     show: Shown,
     protocol: Protocol | None = None,
+    like: HexId | None = None,
 ) -> Response:
     """Figures over the visits of a patient."""
     with db.read() as c:
         patient = patients.get(c, pid)
         done, plans = histories.read(c, patient)
-    history = histories.history(blobs, patient, done, plans, protocol)
-    opened(db, who, "patient", pid)
+    history = histories.history(blobs, patient, done, plans, protocol, like)
+    opened(request, who, "patient", pid)
     view = visit_views.trends_view(history, show)
     return page(request, db, who, "trends.html", "patients", patient=patient, trends=view)
 
@@ -65,8 +67,8 @@ def compare(request: Request, db: Db, blobs: Blobs, sid: Id, other: Id, who: Rea
     """Two sessions: curves over one another, every figure before and after, in words."""
     with db.read() as c:
         found = comparisons.pair(c, sid, other)
-    opened(db, who, "session", found.before.session.id)
-    opened(db, who, "session", found.after.session.id)
+    opened(request, who, "session", found.before.session.id)
+    opened(request, who, "session", found.after.session.id)
     view = visit_views.comparison_view(blobs, found)
     return page(request, db, who, "compare.html", "patients", patient=found.patient, pair=found, compare=view)
 
@@ -82,7 +84,7 @@ def programme(
         plans = programmes.of_patient(c, pid)
         linked = {v.session_id for plan in plans for v in plan.visits}
         free = [s for s in sessions.of_patient(c, pid) if s.id not in linked]
-    opened(db, who, "patient", pid)
+    opened(request, who, "patient", pid)
     return page(
         request, db, who, "programme.html", "patients",
         patient=patient,

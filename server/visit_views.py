@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
-from server.page_views import PROTOCOL_NAMES
 from server.report.change_words import change_words, term_of
 from server.report.comparison import ComparedRow
 from server.report.curves import cycle_svg
 from server.report.notes import GROUPS
-from server.report.panels import CurvePanel
+from server.report.panels import CurvePanel, same_zero
 from server.report.trend_chart import Ahead, trend_svg
 from server.report.trends import PRIMARY, Line, Trend, Visit, names_in, trends
 from server.report.wording import number
@@ -113,9 +113,9 @@ def trends_view(history: History, chosen: Sequence[str]) -> dict[str, Any]:
         **_shown(history, found, height=196),
         "groups": list(groups.items()),
         "query": "&".join(f"show={name}" for name in names),
-        "protocol": PROTOCOL_NAMES.get(history.protocol or "", history.protocol),
-        "protocol_value": history.protocol,
-        "others": [(value, PROTOCOL_NAMES.get(value, value), n) for value, n in history.others.items()],
+        "condition": None if history.condition is None else history.condition.words,
+        "like": history.visits[-1].session_id if history.visits else None,
+        "others": [(o.session_id, o.condition.words, o.count) for o in history.others],
         "visits": [_column(v) for v in history.visits],
         "rows": [row for trend in found for row in _rows(trend, history.visits)],
     }
@@ -126,19 +126,17 @@ def comparison_view(blobs: BlobStore, found: Pair) -> dict[str, Any]:
     rows = comparisons.rows(blobs, found)
     _, old = reports.read(blobs, found.before.found, found.before.edits, found.patient, found.before.session)
     _, new = reports.read(blobs, found.after.found, found.after.edits, found.patient, found.after.session)
-    earlier = {p.variable.name: p for p in old.panels}
     last_row = len(new.panels) - COLUMNS
-    charts = []
-    for i, panel in enumerate(new.panels):
+    charts, drawn = [], []
+    for i, (before, after) in enumerate(zip(old.panels, new.panels, strict=True)):
         below = i >= last_row
+        earlier, panel = same_zero(before, after)
         svg = cycle_svg(
-            panel,
-            height=PAGE_HEIGHTS[below],
-            x_unit=below,
-            single_strides=False,
-            earlier=earlier[panel.variable.name],
+            panel, height=PAGE_HEIGHTS[below], x_unit=below, single_strides=False, earlier=earlier
         )
-        charts.append({**chart_view(panel, svg), "gone": _gone(earlier[panel.variable.name])})
+        charts.append({**chart_view(panel, svg), "gone": _gone(earlier)})
+        drawn.append(panel)
+    shown = replace(new, panels=tuple(drawn))
     groups: dict[str, list[ComparedRow]] = {}
     for row in rows:
         groups.setdefault(row.group, []).append(row)
@@ -153,11 +151,12 @@ def comparison_view(blobs: BlobStore, found: Pair) -> dict[str, Any]:
         "more": [(name, _pairs(mine)) for name, mine in groups.items() if name in SECONDARY],
         "limits": [(", ".join(dict.fromkeys(titles)), s) for s, titles in sources.items()],
         "real": judged,
+        "comparable": found.comparable,
         "cautions": found.cautions,
-        "replay": new.replay,
+        "replay": shown.replay,
         "figure": all("poses.parquet" in a.found.files for a in (found.before, found.after)),
         "used": {"before": old.used, "after": new.used},
-        "norm_source": new.norm_source,
+        "norm_source": next((p.norm.source for p in drawn if p.norm is not None), None),
         "norm_note": new.norm_note,
         "quality": {"before": old.quality, "after": new.quality},
     }
@@ -204,17 +203,21 @@ def _figure(
     trend: Trend, line: Line, visits: Sequence[Visit], coming: Sequence[Ahead], height: int
 ) -> dict[str, Any]:
     change = line.change
-    base = visits[line.points[line.base].visit]
-    waiting = "one assessment so far" if base.kind == "assessment" else "no assessment yet"
+    base = None if line.base is None else visits[line.points[line.base].visit]
     return {
         "title": trend.term.label,
         "unit": trend.term.unit,
         "side": line.side,
         "svg": trend_svg(trend, line, visits, coming, height),
         "words": None if change is None else change_words(change),
-        "since": base.label or day(base.performed_on),
-        "waiting": waiting,
+        "since": None if base is None else base.label or day(base.performed_on),
+        "waiting": _waiting(line),
     }
+
+
+def _waiting(line: Line) -> str:
+    """What is said as long as there are not two assessments."""
+    return "no assessment yet" if line.base is None else "one assessment so far"
 
 
 def _column(v: Visit) -> dict[str, Any]:
@@ -222,7 +225,7 @@ def _column(v: Visit) -> dict[str, Any]:
         "href": f"/sessions/{v.session_id}",
         "label": v.label,
         "day": v.performed_on,
-        "training": v.kind == "training",
+        "training": None if v.kind == "assessment" else "with feedback" if v.feedback else "training",
     }
 
 
@@ -247,6 +250,7 @@ def _rows(trend: Trend, visits: Sequence[Visit]) -> list[dict[str, Any]]:
                 "span": len(trend.lines),
                 "cells": cells,
                 "words": None if change is None else change_words(change),
+                "waiting": _waiting(line),
             }
         )
     return rows

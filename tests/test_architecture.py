@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import ast
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
@@ -13,7 +16,7 @@ import pytest
 from tests.data import ROOT
 
 ALLOWED_IN_CORE = {"numpy", "scipy", "numba", "core"}
-ALLOWED_IN_FORMATS = ALLOWED_IN_CORE | {"pyarrow", "h5py", "defusedxml"}
+ALLOWED_IN_FORMATS = ALLOWED_IN_CORE | {"pyarrow", "defusedxml"}
 EFFECTS = {
     "socket",
     "http",
@@ -58,6 +61,24 @@ def test_a_planted_import_is_found(tmp_path: Path) -> None:
     planted.parent.mkdir()
     planted.write_text("def f():\n    import time, requests\n    from sqlalchemy.orm import Session\n")
     assert outsiders(planted) == {"time", "requests", "sqlalchemy"}
+
+
+NEEDED_BY_OTHERS = {"python-multipart"}
+"""Starlette reads forms with it and imports it only then."""
+
+
+def test_every_dependency_is_imported_by_what_is_shipped() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    declared = {re.split(r"[^a-z0-9-]", line)[0] for line in project["dependencies"]}
+    imported = {
+        package
+        for folder in ("core", "server", "web", "migrations")
+        for path in (ROOT / folder).rglob("*.py")
+        for package in imported_packages(path.read_text("utf-8"))
+    }
+    providers = packages_distributions()
+    used = {name.lower().replace("_", "-") for package in imported for name in providers.get(package, ())}
+    assert declared - used == NEEDED_BY_OTHERS
 
 
 @pytest.mark.parametrize("folder", ["core", "server", "web"])

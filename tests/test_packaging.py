@@ -27,7 +27,7 @@ def test_container_keeps_data_in_a_volume_and_caches_there() -> None:
     assert json.loads(last("VOLUME")) == ["/data"]
     environment = last("ENV")
     assert "SAGITTAL_HOME=/data" in environment
-    assert "NUMBA_CACHE_DIR=/data/" in environment
+    assert "XDG_CACHE_HOME=/data/cache" in environment
 
 
 def test_container_starts_without_a_shell_and_checks_its_health() -> None:

@@ -28,7 +28,7 @@ class Choice:
 
     Parameters
     ----------
-    segments : with a working sensor, in the order of spec/estimators.md §1. failed : without.
+    segments : with a working sensor, in the order of docs/science/erkf.md. failed : without.
     possible : estimators, best first. reduced : see `Poses.reduced`.
     """
 

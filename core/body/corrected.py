@@ -16,7 +16,7 @@ def corrected_signals(
     """Specific force and angular rate (T, n, 3), valid (T, n) of the sensors of these segments, in order.
 
     What |acc| at rest differs from G is taken off as a bias along the segment's axis that is vertical at
-    rest, not as a scale; the gyroscope's mean at rest is taken off (spec/real-data.md §0.8, §2.1).
+    rest, not as a scale; the gyroscope's mean at rest is taken off (docs/science/calibration.md, "Standing").
     """
     acc, gyr, valid = [], [], []
     for segment in segments:

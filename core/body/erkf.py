@@ -1,14 +1,14 @@
 """The error-state Kalman filter of Potter et al. 2021 for any tree of IMUs.
 
 Every IMU is a free body with position, velocity and orientation of its accelerometer; what holds them
-together are measurements: joint centres coincide (eq 21–23), hinge axes agree (eq 24–26), a foot on the floor
-does not move (eq 15–17), gravity is where the accelerometer sees it (eq 18–20). Errors are local (right),
+together are measurements: joint centres coincide (eq 32–33), hinge axes agree (eq 34–35), a foot on the floor
+does not move (eq 28–29), gravity is where the accelerometer sees it (eq 30–31). Errors are local (right),
 Hamilton.
 
 Where we differ from the paper: trapezoidal steps; the exact derivative of the step (the paper leaves out
 δp/δθ); biases as states; process noise that follows impacts; a χ² gate on zero velocity; the blocks of one
 step are taken one after the other, which with diagonal noise is the same as their stacked update; the reset
-Jacobian (eq 27) is carried in the next step's transition. Source: spec/estimators.md §3, spec/kernels.md §3.
+Jacobian (eq 27) is carried in the next step's transition. Equations: docs/science/erkf.md.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def erkf_inputs(
     Parameters
     ----------
     acc, gyr : (T, n, 3), gyro bias at rest removed, excess of |acc| at rest removed along gravity
-        (spec/real-data.md §0.8); samples that are not finite count as lost.
+        (docs/science/calibration.md, "Standing"); samples that are not finite count as lost.
 
     Raises
     ------

@@ -17,13 +17,13 @@ from core.errors import ParameterError
 
 Integration = Literal["trapezoid", "euler"]
 """euler: Potter 2021 eq 8, the sample at the start of the step; it costs 0.6 to 0.9° at 100 Hz
-(spec/estimators.md §0.3). trapezoid: the mean of both ends."""
+(docs/science/erkf.md, "Prediction"). trapezoid: the mean of both ends."""
 
 GATE: Final = 16.27
 """χ² of 3 degrees of freedom at 0.999."""
 
 SOFT_TISSUE: Final[Mapping[str, float]] = {"thigh_l": 0.2, "thigh_r": 0.2}
-"""σ_ω in rad/s of the sensors that move most on the bone (spec/real-data.md §2.9)."""
+"""σ_ω in rad/s of the sensors that move most on the bone (docs/science/erkf.md, "Parameters")."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,12 @@ class ErkfParams:
     ----------
     states : per IMU, 9 (position, velocity, orientation) or 15 (with both biases).
     acc_sd : m/s². gyr_sd : rad/s. gyr_sd_of : IMU → its own. impact : share c of the change of specific force
-        from sample to sample that is added as uncertainty, σ_a² + (c |f_k − f_k−1|)² (spec/real-data.md
-        §0.1).
+        from sample to sample that is added as uncertainty, σ_a² + (c |f_k − f_k−1|)²
+        (docs/science/erkf.md, "Impacts").
     gyr_walk, acc_walk : random walk of the biases, rad/s/√s and m/s²/√s (15 states).
     zero_velocity_sd : m/s. gate : largest χ² of a zero velocity. reaccept_s : contact refused for so long is
-        accepted after all; then `reaccept_m` is added to the foot's uncertainty (spec/estimators.md §3.3).
+        accepted after all; then `reaccept_m` is added to the foot's uncertainty
+        (docs/science/erkf.md, "Zero velocity").
     tilt_sd : of the direction of f. joint_centre_sd : m. joint_axis_sd, heading_sd : rad. zaru_sd : rad/s.
     gap_acc_sd, gap_gyr_sd : in place of acc_sd and gyr_sd while an IMU is lost.
     start_* : of the first sample; `start_heading_sd` about the vertical, must cover the first headings'
@@ -91,14 +92,14 @@ class ErkfParams:
 
     @classmethod
     def offline(cls) -> ErkfParams:
-        """For stored recordings, with the smoother: 15 states (spec/real-data.md §2.9)."""
+        """For stored recordings, with the smoother: 15 states (docs/science/erkf.md, "Parameters")."""
         return cls()
 
     @classmethod
     def people(cls) -> ErkfParams:
         """`offline` for sensors on skin at nominal places: joint centres known to some centimetres.
 
-        spec/estimators.md §3.6, last row. On simulated people with soft tissue and sensors 2 cm off their
+        docs/science/erkf.md, "Parameters". On simulated people with soft tissue and sensors 2 cm off their
         nominal places it takes the bias of stride lengths from 2 cm to below 1 cm.
         """
         return cls(joint_centre_sd=0.03)
@@ -110,7 +111,8 @@ class ErkfParams:
 
     @classmethod
     def paper(cls) -> ErkfParams:
-        """Potter 2021 Table 1 at 512 Hz, σ_JA = 0.02 rad as its Table 2 demands (spec/estimators.md §0.1)."""
+        """Potter 2021 Table 1 at 512 Hz, σ_JA = 0.02 rad as its Table 2 demands
+        (docs/science/erkf.md, "Departures from the paper")."""
         return cls(
             states=9,
             integration="euler",

@@ -1,8 +1,8 @@
-"""One step of time of the ErKF: Potter 2021 eq 8–14 with both ends of the step, and P ← F P Fᵀ + Q.
+"""One step of time of the ErKF: Potter 2021 eq 8–15 with both ends of the step, and P ← F P Fᵀ + Q.
 
 F couples nothing between IMUs, so P is passed through by blocks: rows, then columns, of the lower block
 triangle only, then mirrored. (A full row and column pass is not symmetric in floating point, and the
-asymmetry grows without bound: spec/kernels.md §3.2.)
+asymmetry grows without bound: docs/science/erkf.md, "Prediction".)
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Tilt comes from the mean specific force; heading from the convention that all segments face +x at the start
 (a common heading, free gauge); positions from the tree with the ankles at their height over the floor, so
-that joint centres coincide. Source: spec/estimators.md §3.5.
+that joint centres coincide. Equations: docs/science/erkf.md, "Start".
 
 Positions laid out with wrong orientations are wrong by them, so the first covariance joins both: taken as
 independent, the joint centres of a person who stands, which say nothing of headings, would seem to measure

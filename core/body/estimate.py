@@ -1,8 +1,8 @@
 """Orientations → Poses by the best estimator that the worn sensors allow, and the paths of the feet.
 
 Seven sensors: ErKF with smoother (Potter 2021). Pelvis and feet, or feet alone: L7S (Sy 2021) for the figure,
-and an unlinked ErKF for each foot, because stride lengths are never taken from L7S (spec/real-data.md §0.7).
-What is asked of a take with a failed sensor is in choice.py.
+and an unlinked ErKF for each foot, because stride lengths are never taken from L7S
+(docs/science/l7s.md, "Limits"). What is asked of a take with a failed sensor is in choice.py.
 """
 
 from __future__ import annotations
@@ -83,10 +83,13 @@ class PoseEstimate:
 
     Parameters
     ----------
+    calibrated : the recording with the mountings that the orientations belong to: legs apart, forward axes
+        agreed with the joints. Whatever follows takes these, never those that went in.
     orientations : of the segments with a working sensor, refined where the ErKF ran: what angles are of.
     poses : the figure. feet : None when no foot sensor works.
     """
 
+    calibrated: CalibratedRecording
     orientations: Orientations
     poses: Poses
     feet: FootTracks | None
@@ -179,9 +182,8 @@ class _Take:
             "3I" if estimator == "l7s_3i" else "2I",
         )
         notices = (*poses.notices, *l7s_notices(self.calibrated.recording.protocol))
-        return PoseEstimate(
-            self.orientations, replace(poses, health=l7s_health(poses), notices=notices), None
-        )
+        poses = replace(poses, health=l7s_health(poses), notices=notices)
+        return PoseEstimate(self.calibrated, self.orientations, poses, None)
 
     def chain(self, segments: tuple[Segment, ...]) -> PoseEstimate:
         """ErKF and smoother, once the forward axes agree."""
@@ -198,13 +200,12 @@ class _Take:
             notices=(*poses.notices, *erkf_notices(run, health), *told(errors)),
             diagnostics={"heading_error_rad": errors},
         )
-        return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body))
+        return PoseEstimate(calibrated, orientations, poses, foot_tracks(run, orientations, self.body))
 
     def anchored(self) -> PoseEstimate:
         """Orientations as they are, a figure by forward kinematics."""
-        return PoseEstimate(
-            self.orientations, forward_kinematics(self.orientations, self.body, self.contacts), None
-        )
+        poses = forward_kinematics(self.orientations, self.body, self.contacts)
+        return PoseEstimate(self.calibrated, self.orientations, poses, None)
 
     def steps(self) -> dict[Side, Bools]:
         """When each foot is still."""

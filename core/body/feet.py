@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from core.body.model import BodyModel
 from core.frames import Bools, Floats, Side
@@ -21,6 +21,7 @@ class FootTracks:
     linked : both feet hang on one chain of sensors, so that their places relative to each other are known;
         False: each foot has its own origin and heading.
     source : the estimator, "erkf_smoothed" or "erkf_feet".
+    withheld : side → reason why no distance of this foot is told (core/withheld.py).
     """
 
     t_s: Floats
@@ -32,3 +33,4 @@ class FootTracks:
     linked: bool
     source: str
     body: BodyModel
+    withheld: Mapping[Side, str] = field(default_factory=dict)

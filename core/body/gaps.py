@@ -3,9 +3,10 @@
 Holding its last values on would turn it round and round, and the joints its neighbours with it. It goes on as
 it last did for a moment. Then the end of a limb is taken as fixed to what it hangs on, and a link between two
 joints, which hold both its ends, as upright, at an even speed and turning as the trunk does. The filter's
-noise for lost samples is wide (spec/estimators.md §3.3), so this decides little but what no joint tells: the
-heading with which the sensor comes back, when the person has turned meanwhile. Simulated, 8 s with half a
-turn in them: a lost foot is 9 mm off its place, a thigh 3, a shank 8; with no turning assumed 161, 56, 8.
+noise for lost samples is wide (docs/science/erkf.md, "Lost samples"), so this decides little but what no
+joint tells: the heading with which the sensor comes back, when the person has turned meanwhile. Simulated, 8
+s with half a turn in them: a lost foot is 9 mm off its place, a thigh 3, a shank 8; with no turning assumed
+161, 56, 8.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from core.frames import GRAVITY, Bools, Floats
 from core.rotation import conjugate, multiply, rotate
 
 HOLD_S: Final = 0.3
-"""So long a sensor goes on as it last did: a gap of 0.3 s in mid-swing costs 1.4° at the ankle (§3.3)."""
+"""So long a sensor goes on as it last did: a gap of 0.3 s in mid-swing costs 1.4° at the ankle."""
 
 POSTURE_S: Final = 1.0
 """About a stride: the mean specific force over it is gravity in the mean posture."""

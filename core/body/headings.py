@@ -2,8 +2,9 @@
 
 Calibration finds each segment's forward axis on its own, from the direction of walking. Joint centres tell
 the ErKF the sensors' headings relative to each other, so a segment whose heading they change has a wrong
-forward axis. Its mounting is turned by the mean change while walking (spec/real-data.md §2.8). Which way is
-ahead no joint can tell: it is the median of the segments, so that no single calibration decides for all.
+forward axis. Its mounting is turned by the mean change while walking
+(docs/science/calibration.md, "Forward axes by the joints"). Which way is ahead no joint can tell: it is the
+median of the segments, so that no single calibration decides for all.
 """
 
 from __future__ import annotations
@@ -37,11 +38,11 @@ ROUNDS: Final = 3
 0.2° of 30° and 0.4° of 60° (neura_walk, each sensor alone)."""
 
 WARN: Final = radians(15.0)
-"""Two measures of a heading that differ by more are told (spec/real-data.md §3, heading)."""
+"""Two measures of a heading that differ by more are told (docs/science/real-recordings.md, "Heading")."""
 
 BAD: Final = radians(60.0)
-"""A start this far off need not come back (spec/real-data.md §0.4), and no mounting is taken so wrongly: two
-sensors are exchanged, or one was turned during the take."""
+"""A start this far off need not come back (docs/science/real-recordings.md, "Heading"), and no mounting is
+taken so wrongly: two sensors are exchanged, or one was turned during the take."""
 
 TELL: Final = radians(10.0)
 """A forward axis off by more is told: beyond what soft tissue does to the joints' own view of it."""

@@ -5,7 +5,7 @@ with minus the velocity of the sole point in contact, integrated, so that there 
 puts the lowest sole point in contact on z = 0 at every moment, so that height does not drift. The sole rolls:
 between heel and ball the contact point is the lower one, blended smoothly. Horizontal drift is that of the
 relative chain only and is not corrected: positions are for looking at, stride lengths need an estimator
-(spec/real-data.md §0.3).
+(docs/science/body-model.md, "Figure without a filter").
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 HEEL, BALL = -0.21, 0.53
 """Heel and ball contact points in front of the ankle as fractions of foot length: the −.055 and .14 m of the
-walker at a foot of .265 m (spec/estimators.md §2.2)."""
+walker at a foot of .265 m."""
 
 
 @dataclass(frozen=True)

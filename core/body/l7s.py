@@ -1,7 +1,7 @@
 """Seven poses from three IMUs or two by Sy's L7S; the filter is in core/body/l7s_filter.py.
 
 A sparse mode of visibly lower accuracy: never take stride lengths from it where anything better is worn
-(spec/real-data.md §0.7).
+(docs/science/l7s.md, "Limits").
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ __all__ = [
 
 STRETCHED_M: Final = 1e-6
 """A leg this close to its full length is at the bound: the knee is within .2° of straight. The projection
-leaves 1e-4 m too much with one pass, 1e-8 with two (spec/estimators.md §4.5 counts that as "clip"); with this
+leaves 1e-4 m too much with one pass, 1e-8 with two (docs/science/l7s.md, "Legs"); with this
 margin the count is the same for any number of passes."""
 
 
@@ -56,7 +56,7 @@ def l7s_poses(
     -------
     Poses in ISB frames, method "l7s_3i" or "l7s_2i", `contact` = steps. After a loss of a foot they are valid
     again from its next rest on: until then nobody knows where it went. The feet's orientation is that of the
-    constrained state and differs from the measured one by some degrees (spec/estimators.md §4.4).
+    constrained state and differs from the measured one by some degrees (docs/science/l7s.md, "Constraints").
     Diagnostics by side: `knee_straight_share`, samples with a foot in motion at which the leg is at its full
     length, so that the knee is a bound and no measurement; `hinge_m`, `excess_m`, largest residuals of the
     constraints; `step_share`; `foot_turned_rad`, mean angle from measured to reported.
@@ -114,7 +114,7 @@ def free_acceleration(calibrated: CalibratedRecording, orientations: Orientation
     """Accelerations (n, 3) of the sensors with an orientation, in W without gravity, m/s²; zero while lost.
 
     What the accelerometer's norm at rest differs from G is taken off as a bias along the segment's axis that
-    is vertical at rest, not as a scale (spec/real-data.md §0.8).
+    is vertical at rest, not as a scale (docs/science/calibration.md, "Standing").
     """
     found: dict[Segment, Floats] = {}
     for segment, q in orientations.q.items():

@@ -1,15 +1,17 @@
 """L7S: seven bodies from three IMUs (pelvis and feet) or from two (feet), Sy et al. 2021.
 
-Sy, Lovell, Redmond 2021, IEEE TBME (spec/estimators.md §4): a constrained Kalman filter on SE(3)³ × R⁹. The
-state is the pose and velocity of pelvis and feet; thighs and shanks follow from hinged knees and ankles.
-What we do otherwise than the paper prints (evidence in spec/estimators.md §4 and §5):
+Sy, Lovell, Redmond 2021, IEEE Sensors Journal (docs/science/l7s.md): a constrained Kalman filter on SE(3)³ ×
+R⁹. The state is the pose and velocity of pelvis and feet; thighs and shanks follow from hinged knees and
+ankles. What we do otherwise than the paper prints (evidence:
+docs/science/l7s.md, "Departures from the paper"):
 
 - eq 18: the feet's blocks of the mid-pelvis row carry −½, the minus is lost in print.
 - eq 32: the ankle lies at −d/2 on the foot's z axis, which points to the toe; print has +.
 - eq 20: σ there is a variance; it jumps to 10 m² at toe-off and decays from the last flagged sample on, not
   below 1e-4 m², which is also its value while a step is flagged (missing in print).
 - eq 6: `adjoint="printed"` keeps the paper's Ad(+Ω) with the C of the authors' program; the derivation gives
-  Ad(−Ω) and with the full C no term at all: `"exact"`. The printed form is measurably better and is default.
+  Ad(−Ω) and with the full C no term at all: `"exact"`. Only the printed form holds feet together whose
+  headings disagree by more than some 3°, so it is the default.
 - eq 7: 𝒢 puts acceleration noise into the position as if that were in world axes; with this local
   error it is in body axes, so its covariance with velocity is turned by Rᵀ. Otherwise the result would depend
   on which way the person walks in the world.
@@ -38,7 +40,8 @@ SIZE: Final = 27
 """Length of the error vector (ρ φ of pelvis, left foot, right foot; ν of the three)."""
 
 HEADING_LIMIT: Final = np.pi / 2
-"""Headings of the worn sensors that are further apart at the start are refused (spec/estimators.md §3.5)."""
+"""Headings of the worn sensors that are further apart at the start are refused
+(docs/science/l7s.md, "Start")."""
 
 
 @dataclass(frozen=True)

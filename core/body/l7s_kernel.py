@@ -13,7 +13,7 @@ from core.frames import Floats
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def predict(R, p, v, P, acc, dt, q_acc, q_turn, printed):  # type: ignore[no-untyped-def]
-    """Move the mean by eq 3–4 with ω = 0 and P by eq 5 (spec/estimators.md §4.2)."""
+    """Move the mean by eq 3–4 with ω = 0 and P by eq 5 (docs/science/l7s.md, "Prediction")."""
     omega = np.empty(3)
     for b in range(3):
         rho, phi, nu = 6 * b, 6 * b + 3, VELOCITY + 3 * b
@@ -77,7 +77,7 @@ def _relative(a: Floats, b: Floats, out: Floats) -> None:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def yaw_row(R, leg, out):  # type: ignore[no-untyped-def]
-    """Write J_f (3,) = ∂θ/∂φ of a foot, θ the heading of the feet's summed z axes (§4.3)."""
+    """Write J_f (3,) = ∂θ/∂φ of a foot, θ the heading of the feet's summed z axes (eq 22–25)."""
     tx, ty = R[1, 0, 2] + R[2, 0, 2], R[1, 1, 2] + R[2, 1, 2]
     length = tx * tx + ty * ty
     Rf = R[1 + leg]
@@ -89,7 +89,7 @@ def yaw_row(R, leg, out):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def measure(R, p, v, P, measured, three, step, z_variance, heights, r, dx, work):  # type: ignore[no-untyped-def]
-    """The stacked update: leaves the correction in dx and injects it (spec/estimators.md §4.3).
+    """The stacked update: leaves the correction in dx and injects it (docs/science/l7s.md, "Measurements").
 
     heights : pelvis, foot. r : variances (orientation, mid-pelvis, pelvis z, yaw, zero velocity).
     """

@@ -1,8 +1,8 @@
 """Sy's body model: its lengths, its frames against ours, and the legs from hip, ankle and hinge axis.
 
-Sy's frames (spec/estimators.md §1): pelvis, thigh and shank x forward, y left, z up; foot z from ankle to
-toe, y left, x down. We keep the inclination of the line from ankle to toe under the sole's forward axis, so
-that nothing of it is left in our foot frame; with it 0 the conversion is the M_foot of §1.
+Sy's frames (docs/science/l7s.md, "Frames and symbols"): pelvis, thigh and shank x forward, y left, z up; foot
+z from ankle to toe, y left, x down. We keep the inclination of the line from ankle to toe under the sole's
+forward axis, so that nothing of it is left in our foot frame; with it 0 the conversion is M_FOOT alone.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ HIP_SIDE: Final[dict[Side, float]] = {"left": 1.0, "right": -1.0}
 
 M_LEG: Final[Floats] = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 M_FOOT: Final[Floats] = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-"""R_ISB = R_Sy M (spec/estimators.md §1)."""
+"""R_ISB = R_Sy M (docs/science/l7s.md, "Frames and symbols")."""
 M_LEG.setflags(write=False)
 M_FOOT.setflags(write=False)
 

@@ -2,7 +2,7 @@
 
 X ← X Exp(ε), ε = (ρ_p φ_p ρ_lf φ_lf ρ_rf φ_rf ν_p ν_lf ν_rf). With diagonal R the stacked update of Sy 2021
 eq 9–12 equals one row after the other at one linearisation: the correction dx is added up and the residual of
-each row is taken at dx (spec/kernels.md §3.2).
+each row is taken at dx (docs/science/erkf.md, "Corrections").
 """
 
 from __future__ import annotations

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 NOMINAL_HEIGHT_M = 1.70
-"""Body height assumed when nobody gave one (spec/real-data.md: ±5 cm change joint angles by ±0.2°)."""
+"""Body height assumed when nobody gave one (±5 cm change joint angles by ±0.2°:
+docs/science/body-model.md, "Lengths")."""
 
 THIGH_FRACTION, SHANK_FRACTION, ANKLE_FRACTION, FOOT_FRACTION = 0.245, 0.246, 0.039, 0.152
 """Segment lengths as fractions of body height: Winter 2009, fig 4.1."""
 
 HIP_FRACTION = 0.11
-"""Distance of the hip centres as a fraction of body height (spec/real-data.md §2.7)."""
+"""Distance of the hip centres as a fraction of body height (docs/science/body-model.md, "Lengths")."""
 
 
 @dataclass(frozen=True)

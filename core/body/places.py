@@ -1,8 +1,8 @@
 """Where sensors are taken to sit when nobody has measured it: nominal positions in segment axes.
 
 Segment frames are those of core/frames.py (x anterior, y up, z to the right), origins of core/body/poses.py.
-Source: spec/real-data.md §2.7. 2 cm beside the place change joint angles by ≤ 0.3° and strides by ≤ 0.5 cm
-(§3 "Sensitivity"); 7 cm along the shank or 3 cm up or down the foot change strides by 1 to 4 cm.
+Source: docs/science/body-model.md, "Places of sensors". 2 cm beside the place change joint angles by ≤ 0.3°
+and strides by ≤ 0.5 cm; 7 cm along the shank or 3 cm up or down the foot change strides by 1 to 4 cm.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ class Poses:
     ----------
     q : segment → (n, 4) segment to world, scalar first.
     p : segment → (n, 3) position of the segment's origin, m, world W (floor at z = 0). Origins: pelvis
-        mid-hip, thigh hip centre, shank knee centre, foot ankle centre (spec/estimators.md §1).
+        mid-hip, thigh hip centre, shank knee centre, foot ankle centre (docs/coordinate-systems.md).
     valid : (n,) all segments of the figure measured.
     contact : segment (feet) → (n,) True while the foot is taken to be on the floor.
     method : "erkf_smoothed", "l7s_3i", "l7s_2i", "stance_foot_anchor", or "none" when there is no figure.

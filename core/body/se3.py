@@ -2,7 +2,7 @@
 
 ξ = (ρ, φ); T Exp(ξ) = (R Exp(φ), p + R J_l(φ) ρ). ad(ξ) = [[φ×, ρ×], [0, φ×]];
 Φ(ξ) = Σ (−1)^i/(i+1)! ad(ξ)^i (Sy 2021 eq 8) is the right Jacobian. Every function writes into `out`.
-Source: spec/estimators.md §4.1; Barfoot 2017, State Estimation for Robotics, §7.
+Source: docs/science/l7s.md, "Frames and symbols"; Barfoot 2017, State Estimation for Robotics, §7.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 Bierman 1973, "Fixed interval smoothing with discrete measurements": the adjoint λ goes back through the very
 blocks of the forward pass, so no covariance is inverted, and x^s = x ⊞ G(−P λ) (G the reset of the last
 correction). Only one state per segment is kept; a segment is filtered again, recorded, and swept back. The
-result does not depend on the segment length, to the bit. It equals the Rauch–Tung–Striebel smoother of
-spec/estimators.md §3.7 at a hundredth of its memory (spec/kernels.md §3.2).
+result does not depend on the segment length, to the bit. It equals the Rauch–Tung–Striebel smoother at a
+hundredth of its memory (docs/science/erkf.md, "Smoother").
 """
 
 from __future__ import annotations

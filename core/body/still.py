@@ -2,8 +2,9 @@
 
 Both are rules on the magnitude of angular rate and of specific force, so they need no orientation. A foot's
 rule is the wide one: .7 rad/s and 1.2 m/s² find 14 of 14 stances of the real walk with none too many
-(spec/real-data.md §4); what it lets through wrongly is the χ² gate's matter. Events (core/events) say where
-contact begins and ends; the foot is flat and still only in a part of that time.
+(docs/science/real-recordings.md, "Contacts at rest"); what it lets through wrongly is the χ² gate's matter.
+Events (core/events) say where contact begins and ends; the foot is flat and still only in a part of that
+time.
 """
 
 from __future__ import annotations
@@ -26,10 +27,10 @@ class StillRule:
 
 
 FOOT_STILL = StillRule(0.7, 1.2, 0.06, 0.06)
-"""A foot on the floor (spec/estimators.md §3.4)."""
+"""A foot on the floor (docs/science/erkf.md, "Zero velocity")."""
 
 AT_REST = StillRule(0.08, 0.25, 0.3, 0.3)
-"""A sensor at rest: its specific force is gravity (spec/estimators.md §3.3)."""
+"""A sensor at rest: its specific force is gravity (docs/science/erkf.md, "Zero velocity")."""
 
 
 def still_samples(acc: Floats, gyr: Floats, valid: Bools, rate_hz: float, rule: StillRule) -> Bools:

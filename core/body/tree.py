@@ -29,7 +29,7 @@ PRESETS: Final[Mapping[Preset, tuple[Segment, ...]]] = {
     "single_foot_r": ("foot_r",),
     "single_foot_l": ("foot_l",),
 }
-"""Sensors of each set-up, in the order of spec/estimators.md §1."""
+"""Sensors of each set-up, in the order of docs/science/erkf.md."""
 
 HINGED: Final = "shank"
 """The knee is the joint with a hinge axis, z of thigh and shank; its distal segment begins so."""

@@ -3,8 +3,7 @@
 A block is 0 = h(x) + noise with at most two IMUs. Its H is ±1 on three errors (position, velocity or bias)
 and a 3 × 3 matrix on δθ, so H P costs a few rows of P. Blocks are taken one after the other against the
 accumulated correction dx, which is injected once per step: with diagonal noise that equals the paper's
-stacked update. Rows: spec/estimators.md §3.3, Potter 2021 eq 15–26; V = L⁻¹ H P, P ← P − VᵀV: spec/kernels.md
-§3.2.
+stacked update. Rows: Potter 2021 eq 28–35; V = L⁻¹ H P, P ← P − VᵀV: docs/science/erkf.md, "Corrections".
 """
 
 from __future__ import annotations
@@ -184,7 +183,8 @@ def correct(P, dx, place, H, y, sd, V, E, U):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
 def back_correct(lam, place, H, V, E):  # type: ignore[no-untyped-def]
-    """λ ← λ − Hᵀ L⁻ᵀ (V λ + e): one block of the modified Bryson–Frazier smoother (spec/kernels.md §3.2)."""
+    """λ ← λ − Hᵀ L⁻ᵀ (V λ + e): one block of the modified Bryson–Frazier smoother
+    (docs/science/erkf.md, "Smoother")."""
     z0, z1, z2 = E[0], E[1], E[2]
     for c in range(len(lam)):
         z0 += V[0, c] * lam[c]

@@ -39,7 +39,8 @@ from core.rest import Window
 from core.rotation import conjugate, rotate
 
 DISAGREEMENT = radians(15.0)
-"""Difference of two measures of the walking direction that is told (spec/real-data.md §3, heading)."""
+"""Difference of two measures of the walking direction that is told
+(docs/science/real-recordings.md, "Heading")."""
 
 COARSE = radians(30.0)
 """The same where velocity comes from one rest only: a tilt of 1° and 3 s make 0.5 m/s across (our choice)."""
@@ -54,7 +55,7 @@ was wrong."""
 
 CLEAR_MARGIN = radians(15.0)
 """Gait-rule margin that contradicts a measured direction: right signs had 18 to 40° on neura_walk
-(spec/real-data.md, mount methods), while a simulated thigh shows 8° the other way."""
+(docs/science/calibration.md, "Signs"), while a simulated thigh shows 8° the other way."""
 
 Method = Literal["walking_direction", "gyro_pca"]
 
@@ -224,7 +225,8 @@ def _by_gyro(
 def _signed(
     segment: Segment, axis: float, written: float | None, R_vertical: Floats, q: Floats, walk: Walk
 ) -> tuple[float, tuple[Notice, ...]]:
-    """Choose the sign of an axis: by declared mounting first, then by the gait rules (fusion.md §2.3)."""
+    """Choose the sign of an axis: by declared mounting first, then by the gait rules
+    (docs/science/calibration.md, "Signs")."""
     if written is not None:
         angle = nearest_sign(axis, written)
         return angle, _sign_notices(segment, angle, R_vertical, q, walk)

@@ -33,7 +33,7 @@ FACING = radians(20.0)
 """Turn between standing and the first straight part that still counts as facing the walk (our choice)."""
 
 FEW_STEPS = 8
-"""Steps below which calibration says how few there were (spec/fusion.md §2)."""
+"""Steps below which calibration says how few there were (docs/science/calibration.md, "Parameters")."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,8 @@ class CalibrationParams:
     Parameters
     ----------
     method : how the anterior axis of leg segments is found; the trunk is always by walking direction or
-        declared mounting, because walking gives it no sagittal axis (spec/fusion.md §2.6).
+        declared mounting, because walking gives it no sagittal axis
+        (docs/science/calibration.md, "Flexion axis by gyro PCA").
     """
 
     method: Method = "walking_direction"
@@ -72,7 +73,7 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
 
     References
     ----------
-    spec/real-data.md §2 (recipe), spec/fusion.md §2 (gyro PCA, sign rules, codes).
+    docs/science/calibration.md; Nazarahari 2021, ch. 3 (gyro PCA).
     """
     params = params or CalibrationParams()
     if not recording.sensors:

@@ -1,6 +1,7 @@
 """The flexion axis as principal axis of the angular rate, and the sign rules of gait.
 
-Thesis ch. 3 with the corrections of spec/fusion.md §1–2: rows instead of columns in Eq 14, another seed axis
+Nazarahari 2021 (thesis), ch. 3, with the corrections of
+docs/science/calibration.md, "Flexion axis by gyro PCA": rows instead of columns in Eq 14, another seed axis
 when the sensor's x is vertical, γ = atan2(−p_x, p_z) instead of Eq 15.
 """
 
@@ -15,10 +16,12 @@ from core.errors import CalibrationError
 from core.frames import Bools, Floats, Segment
 
 SINGLE_AXIS, GOOD_AXIS = 0.70, 0.85
-"""Share of the first component: below the first an error, below the second a notice (fusion.md §2)."""
+"""Share of the first component: below the first an error, below the second a notice
+(docs/science/calibration.md, "Parameters")."""
 
 WEAK_MARGIN = radians(5.0)
-"""Difference of the two sides of the sagittal angle below which its sign is weak (fusion.md §2.3d)."""
+"""Difference of the two sides of the sagittal angle below which its sign is weak
+(docs/science/calibration.md, "Signs")."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +65,7 @@ def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionA
 
 
 def about_vertical(gamma: float) -> Floats:
-    """Matrix R_y(γ): R_y(γ) p = +z for γ = atan2(−p_x, p_z) (fusion.md §1, Eq 15 corrected)."""
+    """Matrix R_y(γ): R_y(γ) p = +z for γ = atan2(−p_x, p_z) (thesis Eq 15, corrected)."""
     c, s = np.cos(gamma), np.sin(gamma)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
@@ -70,7 +73,7 @@ def about_vertical(gamma: float) -> Floats:
 def sagittal_angle(up: Floats, R_segment_sensor: Floats) -> Floats:
     """Sagittal inclination (n,) in rad, distal end forward positive, from the vertical (n, 3) in the sensor.
 
-    From inclination, not from an integrated rate: 6 of 6 signs right (spec/real-data.md §2, mount methods).
+    From inclination, not from an integrated rate: 6 of 6 signs right (docs/science/calibration.md, "Signs").
     """
     v = up @ R_segment_sensor.T
     return np.asarray(np.arctan2(v[:, 0], v[:, 1]))
@@ -80,7 +83,7 @@ def gait_margin(angle: Floats, walking: Bools, segment: Segment) -> float:
     """How clearly the sagittal angle is the right way round, rad; negative: the wrong way round.
 
     In walking, heel rise tips foot and shank further back than they ever tip forward, and the thigh swings
-    further forward than back (spec/fusion.md §2.3c; percentiles 2 and 98).
+    further forward than back (docs/science/calibration.md, "Signs"; percentiles 2 and 98).
     """
     low, high = np.percentile(angle[walking], [2.0, 98.0])
     margin = abs(high) - abs(low) if segment.startswith("thigh") else abs(low) - abs(high)

@@ -1,11 +1,12 @@
 """The direction of walking in each sensor's own world, from its accelerometer and gyroscope alone.
 
 Horizontal vectors are complex numbers x + iy. Every sensor has its own z-up world whose heading is arbitrary;
-the direction of walking, seen in each of them, is what they have in common (spec/real-data.md §2.5).
+the direction of walking, seen in each of them, is what they have in common
+(docs/science/calibration.md, "Direction of walking").
 
 Two measures, both over the straight parts of a walk, each part turned back by the angle walked since the
 first:
-- rest-to-rest velocity with linear de-drift: ≤ 2° on a short walk out and back (spec/real-data.md §0.4);
+- rest-to-rest velocity with linear de-drift: ≤ 2° on a short walk out and back;
 - principal axis of the horizontal acceleration below 4 Hz: legs ≤ 3.4°, any length of walk, without a sign.
 """
 
@@ -31,7 +32,8 @@ class HeadingParams:
 
     Parameters
     ----------
-    cutoff_hz : low-pass of the acceleration before its principal axis (spec/real-data.md §0, mount methods).
+    cutoff_hz : low-pass of the acceleration before its principal axis
+        (docs/science/calibration.md, "Parameters").
     longest_velocity_s : longest time between two rests over which velocity is integrated, s. An accelerometer
         bias of 0.05 m/s² that the linear de-drift leaves over to 10 % bends a 1 m/s walk by 7° after 25 s.
     start_s : part of the walk next to a rest over which its velocity is averaged for a sign, s. leg_gap_s,

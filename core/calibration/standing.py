@@ -13,7 +13,8 @@ from core.recording import SensorSignals, UniformRecording
 from core.rest import RestParams, Window, quietness, rest_windows, runs, samples
 
 LONGEST_S = 8.0
-"""Rest that is used, s; 1, 2, 3, 5 and 8 s gave the same angles within 0.1° (spec/real-data.md §2.1)."""
+"""Rest that is used, s; 1, 2, 3, 5 and 8 s gave the same angles within 0.1°
+(docs/science/calibration.md, "Standing")."""
 
 MARGIN_S = 0.25
 """Part of a rest next to movement that is left out, s, where the rest is long enough."""
@@ -25,7 +26,8 @@ LONG_WALK_S = 10.0
 """A walk this long, or half as long as the longest, is not the putting on of sensors (our choice)."""
 
 NORM_RANGE = (7.0, 13.0)
-"""|f| at rest that can be gravity in m/s²; real sensors are within 6.6 % of 9.81 (spec/estimators.md §1)."""
+"""|f| at rest that can be gravity in m/s²; real sensors are within 6.6 % of 9.81
+(docs/science/calibration.md, "Standing")."""
 
 WOBBLE_FACTOR = 2.5
 """Up to this many times the gyro limit a failed rest is called not still, beyond it no rest (our choice)."""
@@ -68,7 +70,8 @@ def stand(signals: SensorSignals, rate_hz: float, window: Window, segment: Segme
 
 
 def vertical_frame(up: Floats) -> Floats:
-    """Rows (x, y, z) of the vertical frame in sensor coordinates, y = up (spec/fusion.md §2.1).
+    """Rows (x, y, z) of the vertical frame in sensor coordinates, y = up
+    (docs/science/calibration.md, "Standing").
 
     The seed axis is the sensor's x, or its z when x is within 26° of vertical (|up_x| > 0.9).
     """

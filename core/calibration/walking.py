@@ -33,8 +33,9 @@ class WalkingParams:
         sensor over 1 s, m/s² (both our choice: straight walking on neura_walk has at least 1.9 rad/s and 0.73
         m/s², the simulator's slow walk 1.3 and 2.2, standing at most 0.04 and 0.07).
     shortest_s : shortest straight part that is used.
-    turn_rate, turn_margin_s, turn_cutoff_hz : low-passed yaw rate of a turn (spec/real-data.md §2.3). Without
-        a trunk sensor the cut-off is halved, because legs yaw with every step.
+    turn_rate, turn_margin_s, turn_cutoff_hz : low-passed yaw rate of a turn
+        (docs/science/calibration.md, "Parameters"). Without a trunk sensor the cut-off is halved, because
+        legs yaw with every step.
     """
 
     leg_rate: float = 0.5
@@ -95,7 +96,8 @@ def turn_sensors(recording: UniformRecording) -> list[Segment]:
 
 
 def _gaps(recording: UniformRecording, segment: Segment) -> bool:
-    """Was the sensor lost for longer than the 0.1 s that are interpolated (spec/fusion.md §3)?"""
+    """Was the sensor lost for longer than the 0.1 s that are interpolated
+    (docs/science/timeline.md, "Rule")?"""
     return any(b - a > 0.1 * recording.rate_hz for a, b in runs(~recording.sensors[segment].valid))
 
 

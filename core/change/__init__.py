@@ -1,4 +1,4 @@
-"""Across visits: limits of change with their sources, and the verdict on a difference (spec/clinic.md §2)."""
+"""Across visits: limits of change, and the verdict on a difference (docs/science/change.md)."""
 
 from core.change.limits import (
     ChangeLimit,
@@ -8,9 +8,18 @@ from core.change.limits import (
     relevant,
     repeatability,
 )
-from core.change.verdict import Change, parameter_changes, ratio_changes, score_changes, score_name
+from core.change.verdict import (
+    UNLIKE,
+    Change,
+    parameter_changes,
+    ratio_changes,
+    score_changes,
+    score_name,
+    unjudged,
+)
 
 __all__ = [
+    "UNLIKE",
     "Change",
     "ChangeLimit",
     "Repeatability",
@@ -22,4 +31,5 @@ __all__ = [
     "repeatability",
     "score_changes",
     "score_name",
+    "unjudged",
 ]

@@ -1,7 +1,8 @@
-"""How much a figure must change to be more than measurement error, and to matter (spec/clinic.md §2).
+"""How much a figure must change to be more than measurement error, and to matter.
 
-MDC: the minimal detectable change at 95 % unless its source says otherwise. MCID: the minimal clinically
-important difference. Each was found on certain people with a certain method; both are printed beside it.
+docs/science/change.md, "Limits and their sources". MDC: the minimal detectable change at 95 % unless its
+source says otherwise. MCID: the minimal clinically important difference. Each was found on certain people
+with a certain method; both are printed beside it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""Two sessions → what changed: within measurement error, real, or clinically relevant (spec/clinic.md §2).
+"""Two sessions → what changed: within measurement error, real, or clinically relevant.
 
-"Real" only beyond the MDC, "clinically relevant" only beyond MDC and MCID. A published MDC takes enough
-strides for granted: the limit is never smaller than what the strides of the two sessions leave open.
+docs/science/change.md, "Verdict". "Real" only beyond the MDC, "clinically relevant" only beyond MDC and MCID.
+A published MDC takes enough strides for granted: the limit is never smaller than what the strides of the two
+sessions leave open.
 """
 
 from __future__ import annotations
@@ -21,14 +22,19 @@ from core.change.limits import (
 )
 from core.frames import Side
 from core.norms.values import NormValue
+from core.parameters.kinematic import is_level
 from core.parameters.result import Parameter
 from core.parameters.symmetry import Symmetry
+from core.parameters.variability import TOO_FEW, comparable
 from core.scores import Score
 
 Verdict = Literal["within_measurement_error", "real_change", "clinically_relevant"]
 
 STRIDES: Final = "strides of the two sessions, 95 %"
 """Source of a limit that comes from the spread of the strides alone."""
+
+UNLIKE: Final = "conditions_differ"
+"""Reason of a change between takes that were not walked alike (core/condition.py)."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +46,9 @@ class Change:
     before, after : values; difference = after − before, in `unit`.
     limit, limit_source, people : the change must pass this to be real; None without a source.
     mcid, mcid_source : and this to matter; None without a source.
-    verdict : None with a `reason`: "no_value" (one of the sessions has none, or of other sides), "no_mdc"
-        (no source has a limit for it).
+    verdict : None with a `reason`: "no_value" (one of the sessions has none, or of other sides),
+        "too_few_strides" in one of them, "no_mdc" (no source has a limit for it), "conditions_differ" (not
+        walked alike, core/condition.py).
     towards_norm : nearer to the middle of the norm than before; None without a comparable norm.
     note : "from_standing": a change of how the person stands is part of it.
     """
@@ -121,6 +128,13 @@ def score_changes(
     return tuple(changes)
 
 
+def unjudged(change: Change) -> Change:
+    """The same difference between takes that were not walked alike: no verdict, no direction."""
+    if change.difference is None:
+        return change
+    return replace(change, verdict=None, towards_norm=None, reason=UNLIKE)
+
+
 def score_name(score: Score) -> str:
     """Name of a score across sessions: "gps_sagittal_deg raw", "gvs_deg knee_flexion offset_removed"."""
     return " ".join(part for part in (score.name, score.variable, score.mode) if part)
@@ -136,6 +150,8 @@ def _parameter(
     change = _plain(new.name, new.side, new.unit, None if old is None else old.mean, new.mean)
     if old is None or old.mean is None or new.mean is None:
         return change
+    if not (comparable(old) and comparable(new)):
+        return replace(change, reason=TOO_FEW)
     limb: Limb | None = None
     if affected is not None and new.side is not None:
         limb = "affected" if new.side == affected else "unaffected"
@@ -145,7 +161,7 @@ def _parameter(
         mdc = ChangeLimit(open_by_strides, "these strides", STRIDES)
     if norm is not None and norm.comparable and old.mean != new.mean:
         change = replace(change, towards_norm=abs(new.mean - norm.mean) < abs(old.mean - norm.mean))
-    if _from_standing(new):
+    if is_level(new.name):
         change = replace(change, note="from_standing")
     return _judged(change, mdc, relevant(new.name, limb))
 
@@ -156,15 +172,6 @@ def _strides(old: Parameter, new: Parameter) -> float:
         0.5 * (p.ci_high - p.ci_low) for p in (old, new) if p.ci_low is not None and p.ci_high is not None
     ]
     return hypot(*halves) if len(halves) == 2 else 0.0
-
-
-def _from_standing(p: Parameter) -> bool:
-    """The level of a joint angle, whose zero is how the person stood that day; the floor is the same."""
-    return (
-        p.unit == "deg"
-        and p.name.startswith(("hip_", "knee_", "ankle_", "pelvis_"))
-        and (not p.name.endswith("_rom_deg"))
-    )
 
 
 def _plain(name: str, side: Side | None, unit: str, before: float | None, after: float | None) -> Change:

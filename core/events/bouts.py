@@ -1,7 +1,8 @@
 """Contacts → walking bouts, and the stops inside and between them.
 
 A bout is walking without a long break; a gait that only shuffles the feet once is none. Terms and the two
-limits: spec/field.md §4a (mobgap's rules as executed: at least 4 strides in total, breaks of at most 3 s).
+limits: docs/science/strides.md, "Walking bouts" (mobgap's rules as executed: at least 4 strides in total,
+breaks of at most 3 s).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ class BoutParams:
     Parameters
     ----------
     break_s : longest time between two contacts of a bout. min_strides : least strides of a bout, those of
-        both feet counted (spec/field.md §4a).
+        both feet counted (mobgap).
     stop_share : a step that takes so many times the median step of its bout holds a stop. Our choice: a step
         cannot take that long without one foot standing still; the steps of the virtual patients stay below
         1.7, a start or end of gait included.

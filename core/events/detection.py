@@ -1,6 +1,6 @@
 """Orientations → GaitEvents: the foot-pitch rule on each foot, and what must be said about its result.
 
-Source: spec/fusion.md §5.2–5.4 and §9 (codes).
+Source: docs/science/events.md, "Foot-pitch rule" and "Refusals".
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def detect(orientations: Orientations, params: FootPitchParams | None = None) ->
             continue
         no_rest = [n for n in orientations.notices if n.code == "no_rest" and n.sensor in (None, foot)]
         if no_rest:
-            # without rest the foot's attitude means nothing (spec/fusion.md §5.4: patient without rest)
+            # without rest the foot's attitude means nothing, and so does the zero of its pitch
             notices.extend(n for n in no_rest if n not in notices)
             continue
         s, valid = pitch_signal(orientations.q[foot]), orientations.valid[foot]
@@ -157,7 +157,7 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list
 
 
 def _threshold_notice(figures: dict[str, PitchFigures], params: FootPitchParams) -> Notice:
-    """Show both feet's counts when the threshold is not the published one (spec/fusion.md §5.3)."""
+    """Show both feet's counts when the threshold is not the published one."""
     counts = ", ".join(f"{foot} {f.n_ic} initial contacts" for foot, f in figures.items())
     return Notice(
         "event_threshold_changed",

@@ -1,7 +1,8 @@
 """What the neighbours of a cycle say about it, and which of its flags sets it aside.
 
-A flag is an observation and stays; the reason of exclusion is a decision made from it. Flags of steadiness
-(first, last, near a turn, alone) yield when a walk is so short that nothing would be left.
+A flag is an observation and stays; the reason of exclusion is a decision made from it. How gait starts, stops
+and turns is no steady walking however short the walk; only strides next to a turn count where hardly anything
+else would be left.
 """
 
 from __future__ import annotations
@@ -17,12 +18,8 @@ from core.events.result import Stride, StrideFlag
 
 ORDER: Final[tuple[StrideFlag, ...]] = get_args(StrideFlag)
 
-YIELDING: Final[tuple[tuple[StrideFlag, ...], ...]] = (
-    ("first", "last", "near_turn", "non_periodic"),
-    ("first", "last"),
-    (),
-)
-"""Flags that set a cycle aside only while enough cycles are left: all of them, then fewer."""
+YIELDING: Final[StrideFlag] = "near_turn"
+"""The flag that sets a cycle aside only while enough others are left."""
 
 
 @dataclass(frozen=True)
@@ -32,16 +29,16 @@ class StrideParams:
     Parameters
     ----------
     min_s : shorter is two events of one step; the detector itself cannot follow shorter cycles
-        (spec/fusion.md §5.4: stride < 0.4 s).
-    max_s : longer is a stop, not a stride (mobgap's stride rule: at most 3 s; spec/field.md §4a).
+        (docs/science/events.md, "Limits").
+    max_s : longer is a stop, not a stride (mobgap's stride rule: at most 3 s).
     bout_break_s : a walking bout ends where a foot makes no contact for longer (mobgap: 3 s; same place).
     turn_rad : heading change of the foot over a stride that counts as turning. Our choice: straight strides
         of gaitmap_foot and neura_walk stay within 15°, turning ones exceed 30°.
     turn_share : share of a stride inside the pelvis turning mask that counts as turning. Our choice.
-    turn_margin : strides set aside on each side of a turn (spec/field.md §2 thread 16: two steps). On
+    turn_margin : strides set aside on each side of a turn (two steps, as clinics drop them). On
         gaitmap_foot these six strides last 4 % longer, two standard deviations, than the steady ones.
     edge_strides : strides set aside at each end of a bout: gait starts and stops within them
-        (spec/clinic.md §3, CV).
+        (docs/science/strides.md, "Flags").
     outlier_sd : a stride time further from the foot's median than so many robust standard deviations
         (1.4826 × median absolute deviation) …
     outlier_share : … and than this share of the median is an outlier. Our choice: the share keeps all that
@@ -49,7 +46,7 @@ class StrideParams:
     outlier_from : least number of strides of a foot to call one of them an outlier. Our choice.
     run_strides : fewer successive cycles than this are a shift of weight, not walking. Our choice: two, the
         least that repeat.
-    min_kept : flags of steadiness yield when fewer strides would be left on a foot. Our choice: three
+    min_kept : strides next to a turn count when fewer than these would be left on a foot. Our choice: three
         strides are the least with a spread worth printing; the notice `short_walk` says so.
     """
 
@@ -83,24 +80,25 @@ def flagged(own: Sequence[Stride], params: StrideParams) -> list[Stride]:
                 more[i].add("near_turn")
     for i in _outliers(own, params):
         more[i].add("outlier")
-    return [replace(s, flags=tuple(f for f in ORDER if f in m)) for s, m in zip(own, more, strict=True)]
+    return [with_flag(s, *m) for s, m in zip(own, more, strict=True)]
 
 
-def decided(strides: Sequence[Stride], params: StrideParams) -> tuple[list[Stride], tuple[StrideFlag, ...]]:
-    """Set cycles aside by their flags; gives the flags that had to yield so that cycles are left."""
-    chosen: list[Stride] = []
-    soft: tuple[StrideFlag, ...] = ()
-    for soft in YIELDING:
-        yielding = tuple(f for f in YIELDING[0] if f not in soft)
-        chosen = [replace(s, excluded_reason=_reason(s, yielding)) for s in strides]
-        left = Counter(s.side for s in chosen if s.excluded_reason is None)
-        if all(left[s.side] >= params.min_kept for s in chosen if s.excluded_reason in soft):
-            break
-    return chosen, tuple(f for f in YIELDING[0] if f not in soft)
+def with_flag(stride: Stride, *more: StrideFlag) -> Stride:
+    """The cycle with these flags too, in their order."""
+    return replace(stride, flags=tuple(f for f in ORDER if f in more or f in stride.flags))
 
 
-def _reason(stride: Stride, yielding: tuple[StrideFlag, ...]) -> StrideFlag | None:
-    return next((f for f in stride.flags if f not in yielding), None)
+def decided(strides: Sequence[Stride], params: StrideParams) -> tuple[list[Stride], bool]:
+    """Set cycles aside by the first of their flags; True where those next to a turn had to count."""
+    strict = [replace(s, excluded_reason=next(iter(s.flags), None)) for s in strides]
+    left = Counter(s.side for s in strict if s.excluded_reason is None)
+    if all(left[s.side] >= params.min_kept for s in strict if s.excluded_reason == YIELDING):
+        return strict, False
+    return [replace(s, excluded_reason=_but_near_turn(s)) for s in strides], True
+
+
+def _but_near_turn(stride: Stride) -> StrideFlag | None:
+    return next((f for f in stride.flags if f != YIELDING), None)
 
 
 def _runs(own: Sequence[Stride], params: StrideParams) -> list[list[int]]:

@@ -2,12 +2,13 @@
 
 Signal: s = upward component of the foot's forward axis, 0 at standing, toes up positive; it knows neither
 heading nor Euler angles. The foot leaves the floor at a minimum of s below −0.2, lands at the maximum after.
-Source: Nazarahari thesis ch. 6 with the corrections of spec/fusion.md §5.1–5.3 (times in seconds, both the
-time of the extremum and the time it is known).
+Source: Nazarahari thesis ch. 6, Algorithm 1, with the departures of docs/science/events.md, "Departures from
+the thesis" (times in seconds, both the time of the extremum and the time it is known).
 
 How near the maximum is to the true contact is a property of how a person lands, not of the rule: with a foot
-that pitches up until it touches it is within a few ms, otherwise early by up to 0.1 s (spec/patients.md §3).
-An initial contact before the first terminal contact is not reported, by design.
+that pitches up until it touches it is within a few ms, otherwise early by up to 0.1 s
+(docs/science/events.md, "What the extrema mean"). An initial contact before the first terminal contact is not
+reported, by design.
 """
 
 from __future__ import annotations
@@ -31,15 +32,15 @@ class FootPitchParams:
         of one kind (thesis Alg 1: 15 samples at 100 Hz).
     monotone_share : share of the window's steps that must lead towards the extremum (thesis Alg 1: 0.8).
     threshold : level of s between stance and push-off (thesis Alg 1: −0.2 = 11.5° toes down). Do not raise
-        it: at −0.1 a drop foot loses most of its contacts (spec/patients.md §0.5).
+        it: at −0.1 a drop foot loses most of its contacts (docs/science/events.md, "Refusals").
     fall : an initial contact with the toes up counts once s has fallen this far below its maximum, or by half
         of it; what rises again before was a plateau of the swing, and the later maximum is taken. Our choice:
-        the additive noise on s that the rule stands (spec/fusion.md §5.4). A foot that lands on its heel
+        the additive noise on s that the rule stands (tests/core/events). A foot that lands on its heel
         falls so far within a few samples: real recordings give the same contacts with and without.
-    min_rate_hz : below it the window holds too few samples (spec/fusion.md §5.3).
-    suspect_max : a foot that never pitches up beyond this was not level at rest (spec/fusion.md §5.3).
-    suspect_quiet : largest mean |s| of quiet standing (spec/fusion.md §5.3).
-    quiet_rad_s : a second counts as quiet below this mean angular speed (spec/fusion.md §3).
+    min_rate_hz : below it the window holds fewer than six samples.
+    suspect_max : a foot that never pitches up beyond this was not level at rest: 6°, our choice.
+    suspect_quiet : largest mean |s| of quiet standing: 6°, our choice.
+    quiet_rad_s : a second counts as quiet below this mean angular speed: standing, our choice.
     """
 
     window_s: float = 0.150

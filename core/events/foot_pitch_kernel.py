@@ -1,4 +1,4 @@
-"""The compiled part of the foot-pitch rule (spec/fusion.md §5.2); core/events/foot_pitch.py explains it."""
+"""The compiled part of the foot-pitch rule (docs/science/events.md); foot_pitch.py explains it."""
 
 from __future__ import annotations
 

@@ -4,7 +4,8 @@ Every swing is a peak of the rate (forward positive). After it the segment slows
 and has a negative peak: one of the two is the initial contact. Before it, while the heel rises, the rate has
 its deepest minimum: the terminal contact. The published detectors differ in segment, feature, waiting times
 and threshold. Their full rules are not openly readable; the presets put together what is public of them
-(spec/fusion.md §5.6) and are called reconstructions: figures of theirs are not figures of the papers.
+(docs/science/events.md, "Presets") and are called reconstructions: figures of theirs are not figures of the
+papers.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ class GyroPeakParams:
         shuffle half of the swings of the foot exceed the threshold. apart_s : distance of two swings for it.
     wait_s : from a contact to the terminal contact that may follow it.
     low_pass_hz : zero-phase low-pass of the rate, None = as it is.
-    longest_s : from swing peak to contact, and from terminal contact to swing peak. min_rate_hz : spec §5.3.
+    longest_s : from swing peak to contact, and from terminal contact to swing peak. min_rate_hz : as the
+        foot-pitch rule's.
     """
 
     name: str = "gyro_peaks"
@@ -78,7 +80,7 @@ PRESETS: Final[Mapping[str, GyroPeakParams]] = MappingProxyType(
         )
     }
 )
-"""Reconstructions of published detectors (spec/fusion.md §5.6), by the first author's name."""
+"""Reconstructions of published detectors (docs/science/events.md, "Presets"), by the first author's name."""
 
 RECONSTRUCTION: Final = "reconstruction"
 """What a preset is called wherever its name is shown."""

@@ -51,7 +51,7 @@ class LumbarParams:
         stride, three contacts.
     bout_score : least mean score of a bout in a take that has walking somewhere. Our choice: noise has 0.2,
         daily life with turns and stops (mobgap_lowback Test11) at least 0.29.
-    min_rate_hz : spec/fusion.md §6 for a trunk sensor.
+    min_rate_hz : our choice: the shortest step in which maxima are looked for has five samples.
     """
 
     scale: float = 0.107

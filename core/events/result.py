@@ -17,6 +17,7 @@ StrideFlag = Literal[
     "incomplete",
     "implausible_time",
     "turn",
+    "in_place",
     "outlier",
     "first",
     "last",
@@ -24,6 +25,11 @@ StrideFlag = Literal[
     "non_periodic",
 ]
 """What a rule found about a cycle (core/events/flags.py), in the order in which it names the reason."""
+
+COMPARED: Final = 4
+"""Fewer counted strides of a side stand with their number and are compared with nothing: not with the other
+side, a norm, a limit or another visit. Our choice: of three the 95 % interval is still wider than twice their
+spread."""
 
 MANUAL: Final = "manual"
 """Begins the exclusion reason that a person gave: "manual:<text>"."""
@@ -73,8 +79,8 @@ class Stride:
     opposite_tc_s, opposite_ic_s : the other foot's events inside the cycle, None if not found.
     turn_rad : heading change of the foot over the stride, left positive; None if not known.
     excluded_reason : None = counted; else one of `flags` or "manual:<text>".
-    flags : all that the rules found, also where the cycle counts: a short walk keeps its edges, a person may
-        take a cycle in again.
+    flags : all that the rules found, also where the cycle counts: a short walk keeps what is next to a turn,
+        a person may take a cycle in again.
     """
 
     side: Side

@@ -40,11 +40,12 @@ class Steps:
         """Times from contact to contact inside the bouts, without stops.
 
         The steps of the first and last stride of a bout, where gait starts and stops, are left out as in the
-        stride list, unless nothing else was walked.
+        stride list.
         """
         inside = [self._times(bout) for bout in self.bouts]
-        steady = [t for times in inside for t in times[EDGE_STEPS : len(times) - EDGE_STEPS] if t is not None]
-        return tuple(steady or (t for times in inside for t in times if t is not None))
+        return tuple(
+            t for times in inside for t in times[EDGE_STEPS : len(times) - EDGE_STEPS] if t is not None
+        )
 
     def _times(self, bout: Bout) -> list[float | None]:
         """Step times of a bout in order, None for one that holds a stop."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from core.errors import Notice
 from core.events.flags import StrideParams, decided, flagged
-from core.events.result import GaitEvents, Stride, StrideFlag, Strides
+from core.events.result import COMPARED, GaitEvents, Stride, StrideFlag, Strides
 from core.frames import FOOT, SIDES, Bools, Oriented, Side
 from core.rotation import yaw
 
@@ -52,10 +52,13 @@ def stride_list(
         for stride in flagged(side_strides(side, events, orientations, turning, params), params)
     ]
     plain.sort(key=lambda s: (s.start_s, s.side))
-    listed, yielding = decided(plain, params)
-    notices = [_short_walk(yielding, params)] if yielding else []
-    notices.extend(_unused(listed))
-    return Strides(tuple(listed), tuple(notices))
+    return counted(plain, params)
+
+
+def counted(strides: Sequence[Stride], params: StrideParams) -> Strides:
+    """The list with what its flags decide, and what must be said about what is left."""
+    listed, near_turns = decided(strides, params)
+    return Strides(tuple(listed), (*_short_walk(listed, near_turns), *_unused(listed)))
 
 
 def side_strides(
@@ -118,16 +121,21 @@ def _first(times: Sequence[float], after: float, before: float) -> float | None:
     return inside[0] if inside else None
 
 
-def _short_walk(yielding: Sequence[StrideFlag], params: StrideParams) -> Notice:
-    """Say which unsteady strides had to be counted."""
-    edges = "the first and last strides, where gait starts and stops, " if "first" in yielding else ""
-    near = "strides next to a turn " if "near_turn" in yielding else ""
-    return Notice(
-        "short_walk",
-        f"The walk is so short that fewer than {params.min_kept} strides of a foot would be left:"
-        f" {edges}{'and ' if edges and near else ''}{near}are counted too. Record a longer walk for steady"
-        " figures.",
-    )
+def _short_walk(strides: Sequence[Stride], near_turns: bool) -> list[Notice]:
+    """Say when so few strides count that nothing is compared, and when those next to a turn had to count."""
+    left = Counter(s.side for s in strides if s.excluded_reason is None)
+    few = [side for side in SIDES if 0 < left[side] < COMPARED]
+    said = []
+    if few:
+        counts = " and ".join(f"{left[side]} {side}" for side in few)
+        word = "stride counts" if sum(left[s] for s in few) == 1 else "strides count"
+        said.append(
+            f"Only {counts} {word}; fewer than {COMPARED} of a side are compared with nothing. Walk further "
+            "straight ahead."
+        )
+    if near_turns:
+        said.append("So few are left that strides next to a turn are counted too.")
+    return [Notice("short_walk", " ".join(said))] if said else []
 
 
 def _unused(strides: Sequence[Stride]) -> list[Notice]:
@@ -138,7 +146,9 @@ def _unused(strides: Sequence[Stride]) -> list[Notice]:
         if own and all(s.excluded_reason for s in own):
             reasons = Counter(s.excluded_reason for s in own)
             words = ", ".join(f"{n} {reason}" for reason, n in reasons.most_common())
-            notices.append(
-                Notice("no_strides", f"None of the {len(own)} {side} strides counts: {words}.", FOOT[side])
+            said = (
+                f"None of the {len(own)} {side} strides counts: {words}. How a walk starts, turns and stops "
+                "is left out: walk further straight ahead."
             )
+            notices.append(Notice("no_strides", said, FOOT[side]))
     return notices

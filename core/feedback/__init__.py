@@ -1,4 +1,4 @@
-"""Biofeedback: a prescription and strides → cues (spec/clinic.md §4, field.md §1n, fusion.md §7)."""
+"""Biofeedback: a prescription and strides → cues (docs/science/feedback.md)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Side effects while training: the other side, and the sagittal profile of both legs.
 
-The target parameter decides which others follow, also for the worse (spec/clinic.md §4; Legrand et al. 2025).
+The target parameter decides which others follow, also for the worse (Legrand et al. 2025).
 Compared are the last strides with the first ones of the take, of which nothing was fed back yet or hardly.
 """
 

@@ -1,4 +1,4 @@
-"""How hard it is now, and the rule that changes it (Schließmann et al. 2018, spec/clinic.md §4)."""
+"""How hard it is now, and the rule that changes it (Schließmann et al. 2018; docs/science/feedback.md)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """What is trained and how: one parameter, its target, when feedback is given, how hard, when to stop.
 
-One parameter at a time (Schließmann et al. 2018, spec/clinic.md §4); target, mode, schedule and dose are
-fields of the record because reviews find that studies differ in them (Spencer et al. 2021, field.md §1n).
+One parameter at a time (Schließmann et al. 2018; docs/science/feedback.md); target, mode, schedule and dose
+are fields of the record because reviews find that studies differ in them (Spencer et al. 2021).
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Schedule:
     ----------
     kind : every stride, or fading: the share goes down step by step.
     shares_pct, strides_per_share : the steps and how many training strides each lasts; the last one stays.
-        100 → 50 → 0 % as in spec/clinic.md §4; the length is our choice.
+        shares and length are our choice.
     probe_every, probe_strides : after so many training strides, so many without feedback; None = no probes.
         Errors return at once when feedback goes (Roemmich et al. 2016): only probes show what was learnt.
     retention_strides : without feedback at the start of a visit that follows a training of the same.
@@ -85,7 +85,7 @@ class Schedule:
 
 @dataclass(frozen=True)
 class Progression:
-    """How hard it is, and when that changes (Schließmann et al. 2018, spec/clinic.md §4).
+    """How hard it is, and when that changes (Schließmann et al. 2018).
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class StopRule:
 
 @dataclass(frozen=True)
 class Guard:
-    """Side effects that are looked for while training (Legrand et al. 2025, spec/field.md §1n: feedback on
+    """Side effects that are looked for while training (Legrand et al. 2025: feedback on
     stance time cost 7.9 points of the GDI).
 
     Parameters

@@ -1,7 +1,7 @@
 """The zone of a level, where a value lies in it, and the sound of an error.
 
 Level 0 is the target ± band. Each level above adds one width, an sd of the target, on the side where the
-person is; the other, overshooting side stays as at level 0 (Schließmann et al. 2018, spec/clinic.md §4).
+person is; the other, overshooting side stays as at level 0 (Schließmann et al. 2018).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ BASE_HZ: Final = 440.0
 SEMITONES_PER_SD: Final = 4.0
 LOUDEST_SD: Final = 3.0
 QUIETEST: Final = 0.2
-"""Pitch and level grow in proportion to the error above the dead band (spec/fusion.md §7 [O]): pitch as an
+"""Pitch and level grow in proportion to the error above the dead band (Nazarahari thesis ch. 8): pitch as an
 ear counts it, an octave up at 3 sd, where the level is full too. The figures are our choice."""
 
 

@@ -1,4 +1,4 @@
-"""Clinical flags: measured values against limits and where the limits come from (spec/clinic.md §4).
+"""Clinical flags: measured values against limits and where the limits come from (docs/science/flags.md).
 
 A flag says "swing peak of the left knee 38°, limit 44.3°", never what a person has. Limits on the level of an
 angle need the anatomical level: without goniometer angles the standing posture would decide them.

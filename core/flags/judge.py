@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from core.anatomical import anatomical_curves
+from core.events.result import COMPARED
 from core.flags.rules import CURVES, RULES, SWING_TO_STANCE, Beyond, Kind, Rule
 from core.frames import SIDES, Side
 from core.norms.lookup import Norms
@@ -17,6 +18,7 @@ from core.norms.tables import WBDS, wbds_group
 from core.parameters.flats import OTHER
 from core.parameters.kinematic import stride_figures
 from core.parameters.result import CycleCurves, Parameter
+from core.parameters.variability import TOO_FEW, Spread, differ
 
 Zero = Literal["anatomical", "standing"]
 
@@ -34,7 +36,8 @@ class Flag:
     value, unit : measured, mean over `n` counted strides. limit, beyond : exceeded when above or below it.
     exceeded : None where it cannot be said, then `reason`: "angle_zero_standing" (the level needs
         goniometer angles), "joint_missing", "no_strides", "gap", "no_controls" (no own control group has
-        the measure), "no_norm_for_age", "side_missing", or the parameter's own.
+        the measure), "no_norm_for_age", "side_missing", "too_few_strides", "sides_alike" (beyond the limit,
+        but the strides do not say that the sides differ), or the parameter's own.
     marked : beyond the second, stronger limit too.
     zero : what an angle is measured from, None where its zero does not matter.
     source : of the limit. verified : False = to be shown as "unverified cut-off".
@@ -67,6 +70,7 @@ class _Value:
     mean: float | None
     n: int = 0
     reason: str | None = None
+    sd: float | None = None
 
 
 @dataclass(frozen=True)
@@ -123,11 +127,14 @@ def flags(
 def _values(
     curves: CycleCurves | None, parameters: Sequence[Parameter], standing_deg: Mapping[str, float]
 ) -> _Values:
-    plain = {(p.name, p.side): _Value(p.mean, p.n, p.reason) for p in parameters if p.side is not None}
+    plain = {(p.name, p.side): _Value(p.mean, p.n, p.reason, p.sd) for p in parameters if p.side is not None}
     for side in SIDES:
         swing, stance = plain.get(("swing_time_s", side)), plain.get(("stance_time_s", side))
         if swing is not None and stance is not None and swing.mean is not None and stance.mean:
-            plain[SWING_TO_STANCE, side] = _Value(swing.mean / stance.mean, min(swing.n, stance.n))
+            of = swing.mean / stance.mean
+            # at most: the two of a stride may vary against each other
+            sd = None if swing.sd is None or stance.sd is None else (swing.sd + of * stance.sd) / stance.mean
+            plain[SWING_TO_STANCE, side] = _Value(of, min(swing.n, stance.n), sd=sd)
     if curves is None:
         return _Values(plain)
     return _Values(plain, _figures(curves), _figures(anatomical_curves(curves, standing_deg)))
@@ -141,7 +148,8 @@ def _figures(curves: CycleCurves) -> dict[tuple[str, Side], _Value]:
             counted = values[curves.used[side]]
             whole = counted[np.isfinite(counted)]
             if len(whole):
-                found[name, side] = _Value(float(whole.mean()), len(whole))
+                sd = float(whole.std(ddof=1)) if len(whole) > 1 else None
+                found[name, side] = _Value(float(whole.mean()), len(whole), sd=sd)
             else:
                 found[name, side] = _Value(None, 0, "gap" if len(counted) else "no_strides")
     return found
@@ -182,7 +190,7 @@ def _difference(rule: Rule, side: Side, found: _Values) -> Flag:
         return _flag(rule, side, _Value(None, 0, "joint_missing" if a is None else "side_missing"), zero)
     if a.mean is None or b.mean is None:
         return _flag(rule, side, _Value(None, 0, a.reason or "side_missing"), zero)
-    flag = _flag(rule, side, _Value(b.mean - a.mean, min(a.n, b.n)), zero)
+    flag = _clear(_flag(rule, side, _Value(b.mean - a.mean, min(a.n, b.n)), zero), a, b)
     return replace(flag, note="sides_stand_differently") if zero == "standing" else flag
 
 
@@ -196,8 +204,17 @@ def _ratio(rule: Rule, found: _Values) -> Flag:
     if small <= SMALLEST:
         return _flag(rule, None, _Value(None, 0, "near_zero"), None)
     side: Side = "left" if left.mean >= right.mean else "right"
-    flag = _flag(rule, side, _Value(large / small, min(left.n, right.n)), None)
+    flag = _clear(_flag(rule, side, _Value(large / small, min(left.n, right.n)), None), left, right)
     return flag if rule.measure == "step_length_m" else replace(flag, note="late_foot_off")
+
+
+def _clear(flag: Flag, a: _Value, b: _Value) -> Flag:
+    """Sides whose strides overlap so far that either may be the larger are not beyond anything."""
+    if not flag.exceeded or a.mean is None or b.mean is None:
+        return flag
+    if differ(Spread(a.mean, a.sd, a.n), Spread(b.mean, b.sd, b.n)):
+        return flag
+    return replace(flag, exceeded=None, marked=False, reason="sides_alike")
 
 
 def _flag(rule: Rule, side: Side | None, value: _Value, zero: Zero | None) -> Flag:
@@ -205,6 +222,8 @@ def _flag(rule: Rule, side: Side | None, value: _Value, zero: Zero | None) -> Fl
     if value.mean is not None:
         if rule.limit is None:
             reason = "no_controls"
+        elif value.n < COMPARED:
+            reason = TOO_FEW
         else:
             exceeded = _beyond(value.mean, rule.limit, rule.beyond)
             marked = rule.marked is not None and _beyond(value.mean, rule.marked, rule.beyond)

@@ -1,6 +1,6 @@
-"""Limits that values are held against, each with its source (spec/clinic.md §3, §4).
+"""Limits that values are held against, each with its source (docs/science/flags.md, "Rules").
 
-A limit nobody of us has read in its source is kept and marked unverified (spec §8.2). Not here: the range
+A limit nobody of us has read in its source is kept and marked unverified. Not here: the range
 from foot-off to the swing peak of the knee (our foot-off is 0.07 s late, worth 20° of it), and hip abduction
 as a sign of circumduction (it stays normal when the pelvis is hiked; the path of the foot shows it).
 """
@@ -54,14 +54,14 @@ CURVES: Final[Mapping[str, CurveFigure]] = {
     "ankle_dorsiflexion_rom_deg": CurveFigure("ankle_dorsiflexion", "range"),
     "pelvis_obliquity_max_swing_deg": CurveFigure("pelvis_obliquity", "max", 60, 100),
 }
-"""What is read from the cycle curves, in the windows of spec/clinic.md §4."""
+"""What is read from the cycle curves, in the windows of docs/science/flags.md, "Rules"."""
 
 SWING_TO_STANCE: Final = "swing_to_stance"
 """Swing time over stance time of a side; its ratio between the sides is the overall temporal symmetry of
 Patterson et al. 2008."""
 
 _STIFF: Final = "cluster analysis of 50 people after stroke, 24 with a stiff knee, at their own speed"
-"""spec/clinic.md §4; its abstract was read, which names no authors."""
+"""Its abstract was read, which names no authors."""
 
 _PRACTICE: Final = "clinical use; no source confirmed"
 _CONTROLS: Final = "mean ± 2 SD of own controls"
@@ -136,7 +136,7 @@ RULES: Final[tuple[Rule, ...]] = (
 """In the order of a report: knee, ankle and foot, pelvis and hip, sides against each other."""
 
 PERRY_MPS: Final = (0.4, 0.8)
-"""Speeds between the classes of walking after stroke: Perry et al. 1995 (spec/clinic.md §3)."""
+"""Speeds between the classes of walking after stroke: Perry et al. 1995 (docs/science/flags.md)."""
 
 Ambulation = Literal["household", "limited_community", "community"]
 

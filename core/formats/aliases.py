@@ -1,4 +1,4 @@
-"""What vendors and laboratories call the segments, and how file names say them (spec/field.md §4d)."""
+"""What vendors and laboratories call the segments, and how file names say them."""
 
 from __future__ import annotations
 

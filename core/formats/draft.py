@@ -35,7 +35,8 @@ class Draft:
     ----------
     clock : what `ticks` (n,) are: "counter" packet counter as written, "device" seconds, "index" row number.
     acc, gyr, mag : (n, 3), quat : (n, 4); SI units, NaN where missing; None without such columns.
-    rate_hz : None = the file does not say.
+    rate_hz : None = the file does not say. wrap : count at which a counter starts again, None = 16 bit, or 32
+        when it shows more.
     """
 
     device_id: str
@@ -48,6 +49,7 @@ class Draft:
     quat: Floats | None
     rate_hz: float | None
     notices: tuple[Notice, ...] = ()
+    wrap: int | None = None
 
 
 def finish(drafts: Sequence[Draft]) -> dict[str, ImuStream]:
@@ -81,7 +83,7 @@ def _with_rate(d: Draft, all_of_take: Sequence[Draft]) -> Draft:
         return d
     if d.clock == "device" and len(d.ticks) > 1:
         step = float(np.median(np.diff(d.ticks)))
-        if step > 0:
+        if step > 0 and np.isfinite(1.0 / step):
             return replace(d, rate_hz=1.0 / step)
     known = {o.rate_hz for o in all_of_take if o.clock == d.clock and o.rate_hz is not None}
     if len(known) == 1:
@@ -132,7 +134,7 @@ def _in_order(d: Draft) -> Draft:
     """Unwrap the counter and drop rows that repeat or run backwards."""
     good = np.isfinite(d.ticks)
     lost = int(np.count_nonzero(~good))
-    ticks = _unwrapped(d.ticks[good]) if d.clock == "counter" else d.ticks[good]
+    ticks = _unwrapped(d.ticks[good], _wrap(d, d.ticks[good])) if d.clock == "counter" else d.ticks[good]
     if not len(ticks):
         raise FormatError("empty", f"{d.source} has no row with a valid counter or time.", sensor=d.device_id)
     highest = np.maximum.accumulate(ticks)
@@ -177,14 +179,15 @@ def _in_order(d: Draft) -> Draft:
     )
 
 
-def _wrap(ticks: Floats) -> int:
-    """Range of the counter: 16 bit in Xsens MT exports, unless it shows a larger value."""
+def _wrap(d: Draft, ticks: Floats) -> int:
+    """Range of the counter: as declared, else 16 bit as in Xsens exports, unless it shows a larger value."""
+    if d.wrap is not None:
+        return d.wrap
     return WRAP_16 if not len(ticks) or ticks.max() < WRAP_16 else WRAP_32
 
 
-def _unwrapped(ticks: Floats) -> Floats:
+def _unwrapped(ticks: Floats, wrap: int) -> Floats:
     """Counter without wraps: steps are taken modulo its range, to the nearer side."""
-    wrap = _wrap(ticks)
     step = np.mod(np.diff(ticks) + wrap // 2, wrap) - wrap // 2
     return np.concatenate((ticks[:1], ticks[:1] + np.cumsum(step)))
 
@@ -196,7 +199,7 @@ def _shared_counter(group: Sequence[Draft]) -> list[Draft]:
     """
     rate = Counter(_rate(d) for d in group).most_common(1)[0][0]
     start = float(group[0].ticks[0])
-    wrap = max(_wrap(d.ticks[:1]) for d in group)
+    wrap = max(_wrap(d, d.ticks[:1]) for d in group)
     out = []
     for d in group:
         if abs(_rate(d) - rate) > 1e-6 * rate:

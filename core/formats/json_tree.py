@@ -86,10 +86,12 @@ class Node:
 
     def choice(self, key: str, allowed: tuple[str, ...], code: str) -> str | None:
         """One of the allowed texts or None; `code` names the mistake."""
-        value = self.text(key)
+        value = self.value.get(key)
+        if value is not None and not isinstance(value, str):
+            raise self._wrong(key, "a text")
         if value is not None and value not in allowed:
             options = ", ".join(repr(a) for a in allowed)
-            raise ManifestError(code, f"{self.at(key)} is '{value}'; expected one of {options}.")
+            raise ManifestError(code, f"{self.at(key)} is {value!r}; expected one of {options}.")
         return value
 
     def names(self, key: str, n: int) -> tuple[str, ...] | None:

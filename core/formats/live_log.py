@@ -35,6 +35,8 @@ __all__ = [
     "FILE_MARK",
     "MOST_FRAME_BYTES",
     "PROTOCOL",
+    "RECORD_HEAD",
+    "RECORD_STARTS",
     "Batch",
     "Clock",
     "Finish",
@@ -51,6 +53,7 @@ __all__ = [
     "finish_json",
     "hello_json",
     "hello_of",
+    "is_whole_length",
     "parse_finish",
     "parse_hello",
     "payload",
@@ -76,6 +79,10 @@ KINDS: Final = b"HBF"
 _HEAD: Final = struct.Struct("<IHHHHQQQ")
 _CRC: Final = struct.Struct("<I")
 _RECORD: Final = struct.Struct("<II")
+RECORD_HEAD: Final = _RECORD.size
+"""Bytes of a record before its kind's letter."""
+RECORD_STARTS: Final = (b"B" + _CRC.pack(MAGIC), b'F{"')
+"""How the bodies of records begin that may follow others: where to look for one behind damage."""
 
 Buffer = bytes | bytearray | memoryview
 Kind = Literal["H", "B", "F"]
@@ -294,6 +301,14 @@ def record(kind: Kind, body: Buffer) -> bytes:
     """One record of the log."""
     whole = b"".join((kind.encode(), body))
     return _RECORD.pack(len(whole), crc32(whole)) + whole
+
+
+def is_whole_length(head: bytes, size: int) -> bool:
+    """Whether a record with these first RECORD_HEAD bytes would fit into `size` bytes."""
+    if len(head) < _RECORD.size:
+        return False
+    length: int = _RECORD.unpack(head)[0]
+    return 1 <= length <= min(MOST_FRAME_BYTES + 1, size - _RECORD.size)
 
 
 def scan(data: Buffer, start: int = 0) -> tuple[list[Record], int]:

@@ -9,85 +9,19 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from types import MappingProxyType
 from typing import Final
 
 from core.errors import ManifestError, ParameterError
 from core.formats.aliases import segment_named
 from core.formats.json_tree import Node, no_constant, unique
-from core.frames import GRAVITY, PROTOCOLS, SEGMENTS, Protocol, Segment
+from core.formats.source_spec import SourceSpec, read_source
+from core.frames import PROTOCOLS, SEGMENTS, Protocol, Segment
 from core.recording import Subject, check_belt
 from core.shoe import Shoe
 
-ACC_UNITS: Final[dict[str, float]] = {
-    "m/s2": 1.0,
-    "m/s^2": 1.0,
-    "m/s²": 1.0,
-    "g": GRAVITY,
-    "mg": GRAVITY / 1e3,
-}
-GYR_UNITS: Final[dict[str, float]] = {
-    "rad/s": 1.0,
-    "deg/s": 0.017453292519943295,
-    "°/s": 0.017453292519943295,
-}
-TIME_UNITS: Final[dict[str, float]] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
-QUAT_ORDERS: Final = ("wxyz", "xyzw")
 MAX_BYTES: Final = 1_000_000
 """A manifest is a page of text; more is a mistake."""
-
-
-@dataclass(frozen=True)
-class Channels:
-    """Column names of one sensor in a table; several header rows are joined by "/".
-
-    Parameters
-    ----------
-    acc, gyr, mag : three names each, x, y, z. quat : four names in the order the source declares.
-    """
-
-    acc: tuple[str, ...]
-    gyr: tuple[str, ...] | None = None
-    mag: tuple[str, ...] | None = None
-    quat: tuple[str, ...] | None = None
-
-
-@dataclass(frozen=True)
-class SourceSpec:
-    """How one file (or all files that match a pattern) is to be read; None = the file says so itself.
-
-    Parameters
-    ----------
-    file : name or pattern with * and ?, compared with the whole path and with its last part.
-    skip_rows : lines before the header. header_rows : lines of the header.
-    index_column : the first column is no signal.
-    rate_hz : nominal sampling rate. time_column, time_unit : where the time is; else the rate makes it.
-    gravity_included : False when the device has already removed gravity (not usable, said so).
-    columns : sensor id or segment → its columns; empty for formats that name their columns themselves.
-    quat_order : "wxyz" or "xyzw". frame : "sensor" or None.
-    """
-
-    file: str
-    skip_rows: int = 0
-    header_rows: int = 1
-    index_column: bool = False
-    separator: str | None = None
-    rate_hz: float | None = None
-    time_column: str | None = None
-    time_unit: str = "s"
-    acc_unit: str | None = None
-    gyr_unit: str | None = None
-    mag_unit: str | None = None
-    gravity_included: bool = True
-    columns: Mapping[str, Channels] = field(default_factory=dict)
-    quat_order: str | None = None
-    frame: str | None = None
-
-    def covers(self, name: str) -> bool:
-        """Tell whether this entry speaks of the file `name`."""
-        last = name.replace("\\", "/").rsplit("/", 1)[-1]
-        return self.file in (name, last) or fnmatchcase(name, self.file) or fnmatchcase(last, self.file)
 
 
 @dataclass(frozen=True)
@@ -110,6 +44,23 @@ class Manifest:
     def source_of(self, name: str) -> SourceSpec | None:
         """First entry of `sources` that covers a file."""
         return next((s for s in self.sources if s.covers(name)), None)
+
+    def completed(self, other: Manifest) -> Manifest:
+        """This manifest, with what it leaves open taken from another.
+
+        `sensors` are taken as a whole, since one of them says who wears what; everything else by its parts.
+        A belt's speed goes with its protocol.
+        """
+        protocol = self.protocol or other.protocol
+        belt = other.belt_speed_mps if other.protocol == protocol else None
+        return Manifest(
+            subject=self.subject.completed(other.subject),
+            protocol=protocol,
+            mounting=MappingProxyType({**other.mounting, **self.mounting}),
+            sensors=self.sensors or other.sensors,
+            sources=(*self.sources, *other.sources),
+            belt_speed_mps=self.belt_speed_mps if self.belt_speed_mps is not None else belt,
+        )
 
 
 def is_manifest(value: object) -> bool:
@@ -164,7 +115,7 @@ def manifest_of(root: object) -> Manifest:
         protocol=protocol,
         mounting=MappingProxyType({_segment(k, f"mounting.{k}"): mounting.string(k) for k in mounting.keys}),
         sensors=MappingProxyType(_sensors(sensors)),
-        sources=tuple(_source(n) for n in top.children("sources")),
+        sources=tuple(read_source(n) for n in top.children("sources")),
         belt_speed_mps=belt,
     )
 
@@ -231,52 +182,3 @@ def _segment(name: str, path: str) -> Segment:
             f"{path}: '{name}' is no segment; expected one of {', '.join(SEGMENTS)} or null.",
         )
     return segment
-
-
-_SOURCE_KEYS: Final = (
-    "file", "skip_rows", "header_rows", "index_column", "separator", "rate_hz", "time_column", "time_unit",
-    "acc_unit", "gyr_unit", "mag_unit", "gravity_included", "columns", "quat_order", "frame",
-)  # fmt: skip
-
-
-def _source(node: Node) -> SourceSpec:
-    node.only(*_SOURCE_KEYS)
-    if node.text("file") is None:
-        raise ManifestError(
-            "manifest_bad_value", f"{node.path}.file is missing; give a file name or a pattern (*.txt)."
-        )
-    rate = node.number("rate_hz")
-    if rate is not None and not 1.0 <= rate <= 10_000.0:
-        raise ManifestError(
-            "manifest_bad_value", f"{node.path}.rate_hz is {rate:g}; expected 1 to 10000 samples/s."
-        )
-    frame = node.choice("frame", ("sensor",), "unsupported_frame")
-    columns = node.child("columns")
-    gravity = node.flag("gravity_included")
-    return SourceSpec(
-        file=node.string("file"),
-        skip_rows=node.count("skip_rows", 0, 1000),
-        header_rows=node.count("header_rows", 1, 10),
-        index_column=node.flag("index_column") or False,
-        separator=node.choice("separator", (",", ";", "\t", " ", "|"), "manifest_bad_value"),
-        rate_hz=rate,
-        time_column=node.text("time_column"),
-        time_unit=node.choice("time_unit", tuple(TIME_UNITS), "unknown_unit") or "s",
-        acc_unit=node.choice("acc_unit", tuple(ACC_UNITS), "unknown_unit"),
-        gyr_unit=node.choice("gyr_unit", tuple(GYR_UNITS), "unknown_unit"),
-        mag_unit=node.text("mag_unit"),
-        gravity_included=True if gravity is None else gravity,
-        columns=MappingProxyType({k: _channels(columns.child(k)) for k in columns.keys}),
-        quat_order=node.choice("quat_order", QUAT_ORDERS, "manifest_bad_value"),
-        frame=frame,
-    )
-
-
-def _channels(node: Node) -> Channels:
-    node.only("acc", "gyr", "mag", "quat")
-    acc = node.names("acc", 3)
-    if acc is None:
-        raise ManifestError(
-            "manifest_bad_value", f"{node.path}.acc is missing; name three columns (x, y, z)."
-        )
-    return Channels(acc, node.names("gyr", 3), node.names("mag", 3), node.names("quat", 4))

@@ -1,4 +1,5 @@
-"""Sagittal's own recording file: Parquet with one column per channel (spec/kernels.md §6).
+"""Sagittal's own recording file: Parquet with one column per channel
+(docs/formats.md, "Sagittal recording (Parquet)").
 
 int64 time in µs, float32 signals, zstd with byte-stream split, page checksums and no dictionary; what is not
 a signal (units, sensor → segment, subject, protocol, hashes of the originals) is JSON in the schema metadata.
@@ -9,7 +10,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any, Final, cast
 
 import numpy as np
@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from core.errors import FormatError, Notice, SagittalError
+from core.errors import FormatError, Notice
 from core.formats.draft import signal_digest
 from core.frames import Floats, Protocol, Segment
 from core.recording import ImuStream, Recording, Subject
@@ -33,9 +33,13 @@ _AXES: Final = {
     "mag": ("mag_x", "mag_y", "mag_z"),
     "quat": ("quat_w", "quat_x", "quat_y", "quat_z"),
 }
+DAMAGE: Final = (
+    pa.ArrowException, OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError,
+)  # fmt: skip
+"""What reading raises of a file that `write_recording` did not write, metadata nested without end too."""
 _MAX_ROWS: Final = 50_000_000
 _MAX_BYTES: Final = 4_000_000_000
-"""Declared sizes are checked before anything is allocated (service.md §e)."""
+"""Declared sizes are checked before anything is allocated."""
 
 
 def write_recording(recording: Recording) -> bytes:
@@ -78,12 +82,7 @@ def _metadata(r: Recording) -> dict[str, object]:
     return {
         "schema": SCHEMA,
         "units": {"t": "us", "acc": "m/s2", "gyr": "rad/s", "quat": "wxyz, sensor to world"},
-        "subject": {
-            "height_m": r.subject.height_m,
-            "standing_width_m": r.subject.standing_width_m,
-            "standing_angles_deg": dict(r.subject.standing_angles_deg),
-            "shoe": None if r.subject.shoe is None else asdict(r.subject.shoe),
-        },
+        "subject": r.subject.to_json(),
         "protocol": r.protocol,
         "belt_speed_mps": r.belt_speed_mps,
         "mounting": dict(r.mounting),
@@ -147,16 +146,15 @@ def read_recording(data: bytes, source: str) -> Recording:
                 f"{source} was written by a newer Sagittal (schema {info['schema']}); update this one.",
             )
         return _recording(file.read(use_threads=False), info, source)
-    except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, AttributeError, IndexError) as e:
+    except DAMAGE as e:
         raise FormatError("bad_parquet", f"{source} is a damaged recording ({e}); upload it again.") from e
-    except SagittalError:
-        raise
 
 
 def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Recording:
     axis = table[_TIME].to_numpy()
     streams: dict[str, ImuStream] = {}
     segments: dict[str, object] = {}
+    notices: list[Notice] = []
     for sensor in _list(info["sensors"]):
         device = str(sensor["id"])
         first = table[f"{device}.acc_x"].combine_chunks()
@@ -165,6 +163,16 @@ def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Reco
         acc = signals["acc"]
         if acc is None:
             raise KeyError(f"{device}.acc")
+        known = [_read_notice(n) for n in _list(sensor["notices"])]
+        known += _clear_infinite(device, signals)
+        if not np.isfinite(acc).all(axis=1).any():
+            message = f"{device} in {source} holds no acceleration; results that need it are left out."
+            notices.append(Notice("sensor_missing", message, device))
+            continue
+        if (gyr := signals["gyr"]) is not None and not np.isfinite(gyr).all(axis=1).any():
+            signals["gyr"] = None
+            message = f"{device} in {source} holds no angular rate; it cannot be used for orientations."
+            known.append(Notice("missing_gyro", message, device))
         streams[device] = ImuStream(
             device_id=device,
             source=str(sensor["source"]),
@@ -176,12 +184,14 @@ def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Reco
             rate_hz=float(str(sensor["rate_hz"])),
             clock=str(sensor["clock"]),
             digest=signal_digest(acc, signals["gyr"], signals["mag"]),
-            notices=tuple(_read_notice(n) for n in _list(sensor["notices"])),
+            notices=tuple(known),
         )
         if sensor["mapped"]:
             segments[device] = sensor["segment"]
-    subject, mounting, sha = info["subject"], info["mounting"], info["sha256"]
-    if not (isinstance(subject, dict) and isinstance(mounting, dict) and isinstance(sha, dict)):
+    if not streams:
+        raise FormatError("no_signal", f"No sensor in {source} measured anything; record again.")
+    subject = info["subject"]
+    if not isinstance(subject, dict) or not isinstance(info["protocol"], str):
         raise TypeError("metadata")
     return Recording(
         streams=streams,
@@ -193,9 +203,9 @@ def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Reco
             None if (shoe := subject.get("shoe")) is None else Shoe(**shoe),
         ),
         protocol=cast("Protocol", info["protocol"]),
-        mounting=mounting,
-        sha256=sha,
-        notices=tuple(_read_notice(n) for n in _list(info["notices"])),
+        mounting=_texts(info["mounting"]),
+        sha256=_texts(info["sha256"]),
+        notices=(*(_read_notice(n) for n in _list(info["notices"])), *notices),
         belt_speed_mps=None if (belt := info.get("belt_speed_mps")) is None else float(str(belt)),
     )
 
@@ -207,6 +217,25 @@ def _signal(
         return None
     with np.errstate(invalid="ignore"):
         return np.stack([table[f"{device}.{n}"].to_numpy()[rows] for n in names], axis=-1).astype(np.float64)
+
+
+def _clear_infinite(device: str, signals: Mapping[str, Floats | None]) -> list[Notice]:
+    """Make infinite values missing ones, in place; a notice where there were any."""
+    count = 0
+    for kind in ("acc", "gyr", "mag"):
+        signal = signals[kind]
+        if signal is not None:
+            wrong = np.isinf(signal)
+            count += int(np.count_nonzero(wrong.any(axis=1)))
+            signal[wrong] = np.nan
+    message = f"{count} samples of {device} are infinite and count as lost."
+    return [Notice("not_finite", message, device)] if count else []
+
+
+def _texts(value: object) -> dict[str, str]:
+    if not isinstance(value, dict) or not all(isinstance(x, str) for x in value.values()):
+        raise TypeError("metadata: expected texts")
+    return value
 
 
 def _list(value: object) -> list[dict[str, object]]:

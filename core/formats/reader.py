@@ -13,7 +13,7 @@ from core.formats.draft import Draft, finish
 from core.formats.manifest import Manifest, parse_manifest
 from core.formats.source import SourceFile, sha256
 from core.frames import Segment
-from core.recording import Recording, Subject
+from core.recording import Recording
 
 FORMATS = "Xsens MT Manager text, CSV or TSV with a manifest, Sagittal Parquet, Sagittal live log"
 _SHOWN = 5
@@ -40,7 +40,7 @@ def read_recording(
     Parameters
     ----------
     files : sensor files, archives of them, optionally a manifest or an OpenSense mapping among them.
-    manifest : wins over a manifest among the files.
+    manifest : wins over a manifest among the files, which completes what it leaves open.
     limits : of archives.
 
     Raises
@@ -74,15 +74,13 @@ def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload
             data = text.to_utf8(member.read())
             if last == "manifest.json" or _sniff.sniff(data)[0] == "manifest":
                 upload.manifests.append((member.name, data))
-    if given is not None:
-        for name, _ in upload.manifests:
-            message = f"{name} was not used because another manifest was given."
-            upload.notices.append(Notice("ignored_file", message, severity="info"))
-        return given
     if len(upload.manifests) > 1:
         names = " and ".join(n for n, _ in upload.manifests)
         raise ManifestError("manifest_twice", f"There are several manifests ({names}); keep one.")
-    return parse_manifest(upload.manifests[0][1]) if upload.manifests else None
+    if not upload.manifests:
+        return given
+    found = parse_manifest(upload.manifests[0][1])
+    return found if given is None else given.completed(found)
 
 
 def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> None:
@@ -184,23 +182,12 @@ def _declared(recording: Recording, manifest: Manifest | None, upload: _Upload) 
     return replace(
         recording,
         segments=segments,
-        subject=_said(manifest.subject, recording.subject) if manifest else recording.subject,
+        subject=manifest.subject.completed(recording.subject) if manifest else recording.subject,
         protocol=(manifest.protocol if manifest else None) or recording.protocol,
         belt_speed_mps=(manifest.belt_speed_mps if manifest else None) or recording.belt_speed_mps,
         mounting={**recording.mounting, **(manifest.mounting if manifest else {})},
         sha256={**recording.sha256, **upload.sha256},
         notices=tuple(notices),
-    )
-
-
-def _said(declared: Subject, read: Subject) -> Subject:
-    """What was declared, completed by what the file says."""
-    height, width = declared.height_m, declared.standing_width_m
-    return Subject(
-        read.height_m if height is None else height,
-        read.standing_width_m if width is None else width,
-        {**read.standing_angles_deg, **declared.standing_angles_deg},
-        declared.shoe or read.shoe,
     )
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import re
 
 import numpy as np
 
 from core.errors import FormatError, ManifestError, Notice
 from core.formats import text
 from core.formats.draft import Draft
-from core.formats.manifest import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, SourceSpec
+from core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, Counter, SourceSpec
 from core.frames import Floats
 
 _ROWS_TO_LOOK_AT = 4
@@ -39,16 +40,25 @@ def read(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
         spec.separator.encode() if spec.separator else text.guess_separator(rows[: max(1, len(rows) - 1)])
     )
     separator = chosen or b","
+    if separator == b" ":
+        header, rows = [_squeezed(h) for h in header], [_squeezed(r) for r in rows]
     names = _names(header, rows[0], separator, spec)
     wanted = _wanted(spec, names, source)
     body = text.after_lines(data, spec.skip_rows + spec.header_rows)
+    if separator == b" ":
+        body = memoryview(_squeezed(bytes(body)))
     comma = text.has_decimal_comma(rows[0], separator)
     table = text.read_columns(body, source, separator, names, wanted, decimal_comma=comma)
-    ticks, clock, rate = _time(table, spec)
+    ticks, clock = _time(table, spec, source)
     return [
-        _sensor(device, channels, table, spec, source, ticks, clock, rate)
+        _sensor(device, channels, table, spec, source, ticks, clock)
         for device, channels in spec.columns.items()
     ]
+
+
+def _squeezed(data: bytes) -> bytes:
+    """Columns that were lined up with several spaces are one space apart, and none is before the first."""
+    return re.sub(rb"(?m)^ +| +(?=\r?$)", b"", re.sub(rb" +", b" ", data))
 
 
 def _check(spec: SourceSpec, source: str) -> None:
@@ -65,8 +75,12 @@ def _check(spec: SourceSpec, source: str) -> None:
         raise ManifestError(
             "unit_missing", f"{where}: gyr_unit is missing; expected one of {', '.join(GYR_UNITS)}."
         )
+    if spec.rate_hz is None and spec.counter is not None:
+        raise ManifestError("rate_missing", f"{where}: counter.rate_hz is missing; give counts per second.")
     if spec.rate_hz is None and spec.time_column is None:
-        raise ManifestError("rate_missing", f"{where}: give rate_hz (samples per second) or time_column.")
+        raise ManifestError(
+            "rate_missing", f"{where}: give rate_hz (samples per second), time_column or counter."
+        )
     if spec.quat_order is None and any(c.quat for c in spec.columns.values()):
         raise ManifestError("manifest_bad_value", f"{where}: quat columns need quat_order, 'wxyz' or 'xyzw'.")
 
@@ -90,9 +104,10 @@ def _wanted(spec: SourceSpec, names: list[str], source: str) -> list[str]:
     there = names[1:] if spec.index_column else names
     wanted: list[str] = []
     asked = [(f"columns.{d}.{kind}", n) for d, c in spec.columns.items() for kind, n in _asked(c)]
-    if spec.time_column is not None:
-        asked.append(("time_column", spec.time_column))
-        there = names
+    for path, clock in (("time_column", spec.time_column), ("counter.column", _counted(spec))):
+        if clock is not None:
+            asked.append((path, clock))
+            there = names
     for path, name in asked:
         if name not in there:
             near = difflib.get_close_matches(name, there, 1, 0.4)
@@ -108,12 +123,39 @@ def _asked(c: Channels) -> list[tuple[str, str]]:
     return [(kind, name) for kind, group in groups for name in group or ()]
 
 
-def _time(table: text.Columns, spec: SourceSpec) -> tuple[Floats, str, float | None]:
+def _counted(spec: SourceSpec) -> str | None:
+    return None if spec.counter is None else spec.counter.column
+
+
+def _time(table: text.Columns, spec: SourceSpec, source: str) -> tuple[Floats, str]:
+    """Ticks of every row and what they are (see `Draft`)."""
+    if spec.counter is not None:
+        counts = table.values[spec.counter.column]
+        _check_counter(counts, spec.counter, source)
+        return counts, "counter"
     if spec.time_column is None:
         n = len(next(iter(table.values.values())))
-        return np.arange(n, dtype=np.float64), "index", spec.rate_hz
-    ticks = table.values[spec.time_column] * TIME_UNITS[spec.time_unit]
-    return ticks, "device", spec.rate_hz
+        return np.arange(n, dtype=np.float64), "index"
+    return table.values[spec.time_column] * TIME_UNITS[spec.time_unit], "device"
+
+
+def _check_counter(counts: Floats, counter: Counter, source: str) -> None:
+    """Refuse a column that does not count samples: time would run at another speed."""
+    steps = np.diff(counts[np.isfinite(counts)])
+    step = float(np.median(steps)) if len(steps) else 1.0
+    if step != 1.0:
+        raise FormatError(
+            "bad_counter",
+            f"{source}: column '{counter.column}' goes up by {step:g} from row to row, expected 1; "
+            "name the column that counts samples, or use time_column.",
+        )
+    highest = float(np.nanmax(counts)) if len(steps) else 0.0
+    if counter.wrap is not None and highest >= counter.wrap:
+        raise FormatError(
+            "bad_counter",
+            f"{source}: column '{counter.column}' counts to {highest:.0f}, but counter.wrap is "
+            f"{counter.wrap}; expected a larger wrap.",
+        )
 
 
 def _sensor(
@@ -124,7 +166,6 @@ def _sensor(
     source: str,
     ticks: Floats,
     clock: str,
-    rate: float | None,
 ) -> Draft:
     notices = [Notice(n.code, n.message, device, n.t_s, n.severity) for n in table.notices]
     acc = _stack(table, channels.acc) * ACC_UNITS[spec.acc_unit or "m/s2"]
@@ -157,7 +198,8 @@ def _sensor(
     if quat is not None and spec.quat_order == "xyzw":
         quat = quat[:, [3, 0, 1, 2]]
     mag = None if channels.mag is None else _stack(table, channels.mag)
-    return Draft(device, source, clock, ticks, acc, gyr, mag, quat, rate, tuple(notices))
+    wrap = spec.counter.wrap if spec.counter else None
+    return Draft(device, source, clock, ticks, acc, gyr, mag, quat, spec.rate_hz, tuple(notices), wrap)
 
 
 def _stack(table: text.Columns, names: tuple[str, ...]) -> Floats:

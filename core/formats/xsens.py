@@ -1,4 +1,4 @@
-"""Xsens MT Manager text exports, 4.x to 2022 (spec/clinic.md §5): one file per sensor.
+"""Xsens MT Manager text exports, 4.x to 2022 (docs/formats.md, "Xsens MT Manager text"): one file per sensor.
 
 Comment lines ("//"), one header line, then rows separated by tab, comma, semicolon or space. Any subset of
 the columns may be there; blank or "NaN" cells are missing; the packet counter has 16 bit.
@@ -16,7 +16,7 @@ from core import rotation
 from core.errors import FormatError, Notice
 from core.formats import text
 from core.formats.draft import Draft
-from core.formats.manifest import ACC_UNITS, GYR_UNITS, SourceSpec
+from core.formats.source_spec import ACC_UNITS, GYR_UNITS, SourceSpec
 from core.frames import Floats
 
 _ACC: Final = ("Acc_X", "Acc_Y", "Acc_Z")

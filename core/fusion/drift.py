@@ -5,7 +5,7 @@ two segments this shows as rotation and adduction, later as flexion. Nothing in 
 while somebody walks straight, the heading of a segment relative to the pelvis, averaged over strides, stays
 what it was in the first straight walking next to standing. So the slow change of the stride-averaged relative
 heading is taken out. The price, told in the notice: a true slow change of the mean transverse posture is
-taken out with it. Short walks are left alone (spec/real-data.md: 10 s of walking need none).
+taken out with it. Short walks are left alone (docs/science/orientation.md, "Relative drift").
 """
 
 from __future__ import annotations
@@ -125,7 +125,8 @@ def _drift(
 
 
 def _gaps(valid: Bools, rate_hz: float) -> list[tuple[int, int]]:
-    """Gaps that interrupt the heading: longer than the 0.1 s that are interpolated (spec/fusion.md §3)."""
+    """Gaps that interrupt the heading: longer than the 0.1 s that are interpolated
+    (docs/science/timeline.md, "Rule")."""
     return [r for r in runs(~valid) if r[1] - r[0] > 0.1 * rate_hz]
 
 

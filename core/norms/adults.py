@@ -22,7 +22,7 @@ def adult_reference() -> CurveReference:
     """Reference of GVS, GPS, gps_sagittal and GDI*: comfortable overground walking, anatomical angles.
 
     One group for every age: the spread of the scores is that of all 42 against each other, and speed changes
-    the curves more than age does (spec/clinic.md §2, §3).
+    the curves more than age does (docs/science/norms-and-scores.md, "Speed").
     """
     bands = adult_kinematics(None).bands
     return CurveReference(

@@ -13,14 +13,16 @@ from typing import Final
 
 import numpy as np
 
+from core.events.result import COMPARED
 from core.frames import SIDES, Floats, Side
 from core.norms.kinematics import NormBand
 from core.norms.lookup import Norms
 from core.norms.profile import SAGITTAL, CurveReference, MeanCurves, leave_one_out, person_mean
 from core.norms.speed import walking_speed
 from core.norms.values import NormValue, Sex
-from core.parameters.kinematic import mean_curve
+from core.parameters.kinematic import MEAN_ZERO, mean_curve
 from core.parameters.result import CycleCurves, Parameter
+from core.parameters.variability import comparable
 
 FEWEST: Final = 5
 """People below which there is no group (our choice; percentiles allow for small groups, see `place`)."""
@@ -138,13 +140,13 @@ def control_group(
 
 
 def mean_curves(curves: CycleCurves) -> MeanCurves:
-    """Mean curves of the counted strides in degrees, as a control session keeps them."""
+    """Mean curves of the counted strides in degrees, as a control session keeps them; none of too few."""
     found: dict[Side, dict[str, Floats]] = {}
     for variable, sides in curves.curves.items():
         for side in sides:
-            mean = mean_curve(curves, variable, side).mean
-            if mean is not None:
-                found.setdefault(side, {})[variable] = np.degrees(mean)
+            mean = mean_curve(curves, variable, side)
+            if mean.mean is not None and mean.n >= COMPARED:
+                found.setdefault(side, {})[variable] = np.degrees(mean.mean)
     return found
 
 
@@ -153,11 +155,11 @@ def _within(value: float | None, limits: Range | None) -> bool:
 
 
 def _mean_values(sessions: Sequence[ControlSession]) -> Values:
-    """A person's mean of every parameter over their sessions."""
+    """A person's mean of every parameter over their sessions, of those with enough strides."""
     found: dict[tuple[str, Side | None], list[float]] = {}
     for s in sessions:
         for p in s.parameters:
-            if p.mean is not None:
+            if p.mean is not None and comparable(p):
                 found.setdefault((p.name, p.side), []).append(p.mean)
     return {key: float(np.mean(v)) for key, v in found.items()}
 
@@ -209,7 +211,7 @@ def _bands(people: Sequence[MeanCurves], group: str, source: str) -> dict[str, N
             n=len(means),
             group=group,
             source=source,
-            comparable=True,
+            zero="stride_mean" if variable in MEAN_ZERO else "standing",
             confidence="normal" if variable in SAGITTAL else "low",
             note="",
         )

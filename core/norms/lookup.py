@@ -31,7 +31,7 @@ class Norms:
     pace : class of the walkway norms that this speed falls into.
     values : parameter → reference, each with n, group, source and whether it is comparable.
     expected : step length and cadence expected at this very speed (treadmill, 0.5 to 1.5 m/s).
-    bands : variable → band over the cycle.
+    bands : variable → band over the cycle, each with its zero.
     reason : why no angle is compared: "no_norm_for_age", "no_speed_matched_norm".
     timing_reason : why no time or distance is compared: these, or "age_unknown", "sex_unknown". Gait speed
         itself is held against the speed healthy people like, however slow the person.
@@ -68,12 +68,12 @@ def norms_for(
     ----------
     age : years; None = all adults, and nobody for times and distances. sex : None = nobody for these.
     speed_mps : walking speed. height_m : makes it dimensionless.
-    anatomical : variables whose anatomical level is known on both sides (`core.anatomical`); the others
-        compare in shape and range only.
+    anatomical : variables whose anatomical level is known on both sides (`core.anatomical`); figures of the
+        others compare in range only.
     """
     speed = None if speed_mps is None else walking_speed(speed_mps, height_m)
     at = None if speed is None else speed.equivalent_mps
-    bands = adult_kinematics(age, at, anatomical)
+    bands = adult_kinematics(age, at)
     values = {} if bands.reason else dict(angle_values(age, anatomical).values)
     # a class of speeds is of people of this age and sex, whose legs are in it already
     pace = pace_of(age, sex, speed_mps)

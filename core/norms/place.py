@@ -10,7 +10,7 @@ from core.norms.values import NormValue
 
 GRADES_SD: Final = (1.5, 4.5)
 """|z| up to which a value has grade 0 and 1, beyond 2: the steps of the Edinburgh Visual Gait Score
-(spec/clinic.md §3)."""
+(docs/science/norms-and-scores.md, "Place")."""
 
 Grade = Literal[0, 1, 2]
 

@@ -2,7 +2,8 @@
 
 Baker et al. 2009 (Gait & Posture 30:265) and 2012: a GVS is the RMS over the cycle of one curve minus its
 reference, the GPS of a side the RMS of its nine, the overall GPS the RMS of fifteen, the pelvis once, left by
-convention (spec/clinic.md §3). RMS everywhere: averaging the GVS, or padding a side with zeros, gives less.
+convention (docs/science/norms-and-scores.md, "GVS and GPS"). RMS everywhere: averaging the GVS, or padding a
+side with zeros, gives less.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ NINE: Final = (
 """Variables of the GPS."""
 
 SAGITTAL: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
-"""Variables of `gps_sagittal`, which is never called GPS (spec/clinic.md §3)."""
+"""Variables of `gps_sagittal`, which is never called GPS: it has three of nine variables."""
 
 Profile = Literal["gps", "gps_sagittal"]
 PROFILES: Final[Mapping[Profile, tuple[str, ...]]] = {"gps": NINE, "gps_sagittal": SAGITTAL}

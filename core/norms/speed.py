@@ -1,8 +1,8 @@
 """Walking speed as norms are chosen by it: free of the length of the legs.
 
-Dimensionless speed v / √(g L) (Hof 1996, Gait & Posture 4:222) makes short and tall people alike. Norms are
-given for adults with legs of about 0.9 m (spec/clinic.md §2), so a person's speed is also told as the speed
-of such legs; where the height is not known it is the speed itself.
+docs/science/norms-and-scores.md, "Speed". Dimensionless speed v / √(g L) (Hof 1996, Gait & Posture 4:222)
+makes short and tall people alike. Norms are given for adults with legs of about 0.9 m, so a person's speed is
+also told as the speed of such legs; where the height is not known it is the speed itself.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from core.body.model import ANKLE_FRACTION, SHANK_FRACTION, THIGH_FRACTION
 from core.frames import GRAVITY
 
 LEG_M: Final = 0.9
-"""Leg of the reference adults, hip to floor (spec/clinic.md §2)."""
+"""Leg of the reference adults, hip to floor."""
 
 SLOW_MPS: Final = 0.8
-"""No adult reference exists for walking slower than this on such legs (spec/clinic.md §8.3)."""
+"""No adult reference exists for walking slower than this on such legs."""
 
 WBDS_MPS: Final = (1.25, 0.16)
-"""Mean and sd of the speed at which the adults of the angle norms walked (spec/clinic.md §2)."""
+"""Mean and sd of the speed at which the adults of the angle norms walked."""
 
 
 @dataclass(frozen=True)

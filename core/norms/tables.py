@@ -14,10 +14,10 @@ WBDS_N: Mapping[str, int] = {"adult_21_84": 42, "adult_21_54": 25, "adult_55_84"
 """Subjects per age group of the WBDS tables."""
 
 LEVEL = "The level depends on the protocol: published sets differ by up to 5° at hip and knee."
-"""Said wherever the level of an angle is compared (spec/clinic.md §2: WBDS against Schwartz et al. 2008)."""
+"""Said wherever the level of an angle is compared (WBDS against Schwartz et al. 2008)."""
 
 ADULT_AGE = 18.0
-"""Below it no adult table applies (spec/clinic.md §2: the tables start at 21; 18 to 20 use all adults)."""
+"""Below it no adult table applies (the tables start at 21; 18 to 20 use all adults)."""
 
 
 @cache

@@ -200,7 +200,7 @@ def expected_at_speed(
 ) -> Mapping[str, NormValue]:
     """Step length and cadence expected at a walking speed, 0.5 to 1.5 m/s on a treadmill; empty outside.
 
-    y = a·v^b with a log-normal residual; `sd` is its width to first order (spec/clinic.md §2). With the leg
+    y = a·v^b with a log-normal residual; `sd` is its width to first order. With the leg
     length it is fitted dimensionless: step length / L and cadence √(L / g) against v / √(g L).
     """
     if not 0.5 <= speed_mps <= 1.5:

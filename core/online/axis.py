@@ -56,6 +56,7 @@ class UniformBlock:
     acc, gyr : (T, n, 3) m/s², rad/s of the n worn sensors in the order of `OnlineAxis.segments`; finite
         everywhere, invalid samples hold the last value (0 before the first).
     valid : (T, n) measured or interpolated over ≤ 0.1 s. interpolated : (T, n) filled.
+    out : (T, n) of a sensor that was found not to measure and is left out for good; None = nobody looked.
     """
 
     first: int
@@ -64,6 +65,7 @@ class UniformBlock:
     gyr: Floats
     valid: Bools
     interpolated: Bools
+    out: Bools | None = None
 
     def __len__(self) -> int:
         return len(self.t_s)

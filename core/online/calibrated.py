@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from core.body import nominal_body
@@ -65,14 +65,18 @@ class LiveCalibration:
 
 
 def finished(
-    calibrated: CalibratedRecording, first: int, worn: Sequence[Segment], params: MountingParams
+    calibrated: CalibratedRecording,
+    first: int,
+    worn: Sequence[Segment],
+    params: MountingParams,
+    out: Collection[Segment] = (),
 ) -> LiveCalibration:
     """What follows the calibration proper offline, too: legs apart, forward axes that agree.
 
     Parameters
     ----------
     calibrated : as `core.calibration.calibrate` gives it. worn : all segments, also those
-        without samples.
+        without samples. out : of these, sensors that do not measure, which was told.
 
     Raises
     ------
@@ -91,7 +95,7 @@ def finished(
             notices += told(turned)
         except EstimationError as error:
             notices.append(Notice(error.code, error.message, error.sensor))
-    notices += _missing(recording, worn)
+    notices += _missing(recording, [s for s in worn if s not in out])
     checks = tuple(_check(s, calibrated, notices) for s in worn)
     return LiveCalibration(
         calibrated=calibrated,

@@ -19,7 +19,7 @@ from core.calibration.calibrate import FEW_STEPS
 from core.calibration.result import Calibration
 from core.calibration.walking import moving_mask
 from core.errors import Notice, SagittalError
-from core.frames import Floats, Segment
+from core.frames import Bools, Floats, Segment
 from core.online.attempt import Attempt, Wearer
 from core.online.axis import UniformBlock
 from core.online.calibrated import LiveCalibration, MountingParams, finished
@@ -36,8 +36,9 @@ class CalibratingParams:
     ----------
     tick_s : time between judgements.
     wait_s : after it the attempt goes on without a sensor that sends nothing (our choice).
-    stand_s : standing that is asked for (clinic practice, spec/fusion.md §2: 3 to 5 s). looked_s : of the
-        last samples in which it is looked for; quietness is judged against the quietest second in them.
+    stand_s : standing that is asked for (in the clinic 3 to 5 s: docs/science/calibration.md, "Recipe").
+        looked_s : of the last samples in which it is looked for; quietness is judged against the quietest
+        second in them.
     steps, walk_s : straight steps that are enough, or else time walked, as in small rooms, with at least
         `least_steps` of them: strapping sensors on is no walk.
     moved : turn of a sensor against the vertical from one standing to the next, beyond which it was moved on
@@ -82,6 +83,7 @@ class LiveCalibrator:
         self._begun = 0
         self._attempt = Attempt(wearer, 0)
         self._working: tuple[Segment, ...] = ()
+        self._out: frozenset[Segment] = frozenset()
         self._walked = 0.0
         self._up: Mapping[Segment, Floats] = {}
 
@@ -94,17 +96,28 @@ class LiveCalibrator:
         if block.first != self._length:
             self._length = self._begun = block.first
             self._attempt = Attempt(self.wearer, block.first)
-        start = 0
+        start, found = 0, None
         while start < len(block):
             stop = min(len(block), start + self._tick - self._length % self._tick)
             self._length += stop - start
             if self.stage != "running":
                 self._attempt.append(block, start, stop)
-                if self._length % self._tick == 0 and (found := self._judge()) is not None:
+                if self._length % self._tick == 0:
+                    if block.out is not None:
+                        self._leave_out(block.out[stop - 1])
+                    found = self._judge()
+                if found is not None:
                     self._length += len(block) - stop
                     return found
             start = stop
         return None
+
+    def _leave_out(self, out: Bools) -> None:
+        """Go on without sensors (n,) that were found not to measure."""
+        self._out = frozenset(s for s, x in zip(self.wearer.segments, out, strict=True) if x)
+        self._working = tuple(s for s in self._working if s not in self._out)
+        if self.stage == "walk" and not self._working:
+            self._restart(None)
 
     def redo(self) -> None:
         """Begin anew with the next sample that is pushed."""
@@ -130,7 +143,7 @@ class LiveCalibrator:
         p, rate = self.params, self.wearer.rate_hz
         self._attempt.keep_last(round(p.looked_s * rate))
         there = self._there()
-        complete = len(there) == len(self.wearer.segments)
+        complete = len(there) == len(self.wearer.segments) - len(self._out)
         patient = self._length - self._begun >= p.wait_s * rate
         self.stage = "stand" if there and (complete or patient) else "waiting"
         recording = self._attempt.recording(there)
@@ -150,7 +163,8 @@ class LiveCalibrator:
     def _there(self) -> tuple[Segment, ...]:
         """Segments whose sensor was there for most of the last second."""
         share = self._attempt.valid(round(self.wearer.rate_hz)).mean(axis=0)
-        return tuple(s for s, x in zip(self.wearer.segments, share, strict=True) if x > 0.5)
+        there = (s for s, x in zip(self.wearer.segments, share, strict=True) if x > 0.5)
+        return tuple(s for s in there if s not in self._out)
 
     def _look_for_walk(self) -> LiveCalibration | None:
         """Standing is there: has enough been walked since?"""
@@ -187,7 +201,7 @@ class LiveCalibrator:
         """Segments whose sensor is turned against the vertical since the standing that began the attempt."""
         now = upwards(recording)
         limit = np.cos(self.params.moved)
-        return [s for s, x in self._up.items() if float(x @ now[s]) < limit]
+        return [s for s, x in self._up.items() if s in now and float(x @ now[s]) < limit]
 
     def _calibration(self, recording: UniformRecording) -> LiveCalibration | None:
         """The calibration if it can be had and rests on enough; a walk that gives none begins anew."""
@@ -205,7 +219,7 @@ class LiveCalibrator:
                 if late:
                     self._restart(_why(found, steps, p))
                 return None
-            made = finished(calibrated, self._attempt.first, self.wearer.segments, p.mounting)
+            made = finished(calibrated, self._attempt.first, self.wearer.segments, p.mounting, self._out)
         except SagittalError as error:
             if late:
                 self._restart(Notice(error.code, error.message, error.sensor))

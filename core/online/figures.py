@@ -23,6 +23,7 @@ from core.parameters.kinematic import (
     turning_angle,
 )
 from core.parameters.phases import phase_rows
+from core.parameters.plausible import IMPOSSIBLE, impossible
 from core.parameters.rows import Value
 from core.parameters.spatial import NAMES as SPATIAL
 from core.parameters.spatial import Surface, spatial_row
@@ -59,6 +60,8 @@ def early_figures(stride: Stride, span: Span, surface: Surface) -> Figures:
     for name, column in temporal_values((stride,)).items():
         value = float(column[0])
         found[name] = missing(name, (stride,)) if isnan(value) else value
+        if impossible(name, value):
+            found[name] = IMPOSSIBLE
     pitch = foot_pitches(span)
     flat = stances(one, span.t_s, pitch)
     curves = cycle_curves(span.angles or NO_ANGLES, one)
@@ -72,6 +75,8 @@ def early_figures(stride: Stride, span: Span, surface: Surface) -> Figures:
         if values is not None and len(values):
             value = float(values[0])
             reason = "no_terminal_contact" if name == FOOT_PITCH[1] and stride.tc_s is None else "gap"
+            if name in FIGURES and (why := curves.why.get(FIGURES[name].variable, {}).get(stride.side)):
+                reason = why
             found[name] = value if isfinite(value) else reason
     if surface.protocol == "treadmill" or span.feet is None or stride.side not in span.feet.p:
         found |= spatial_row(stride, one, span.feet, surface)

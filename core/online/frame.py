@@ -67,7 +67,7 @@ class SensorHealth:
     Parameters
     ----------
     rate_hz : as measured. lost_share, saturated_share : 0 to 1. silent_s : since its last sample, by the
-        other streams' clocks. still : at rest now.
+        other streams' clocks. still : at rest now. stuck : sends values that it does not measure.
     """
 
     id: str
@@ -77,6 +77,7 @@ class SensorHealth:
     saturated_share: float
     silent_s: float
     still: bool
+    stuck: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +106,9 @@ class LiveStride:
     values : parameters of a stride as in the stride table (core.parameters: temporal, spatial, stance,
         phases, kinematic), None where undefined. reasons : why, for every None.
     curves : variable → (101,) rad over the cycle, as `cycle_curves`; only those known throughout.
-    turn_rad : heading change of the foot, left positive. flags : those that need no later stride; "first" of
-        a bout and "near_turn" after a turn among them. counted : no flag.
+    turn_rad : heading change of the foot, left positive. flags : those that are known by then; "first" of a
+        bout and "near_turn" after a turn from the start, "last" and "in_place" when it is `complete`.
+        counted : no flag.
     """
 
     n: int

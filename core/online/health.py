@@ -58,7 +58,9 @@ class _StreamHealth:
         while end_us - self._pieces[0].end_us > OVER_S * 1e6:
             self._total -= self._pieces.popleft().counts
 
-    def now(self, silent_s: float, still: Collection[Segment]) -> list[SensorHealth]:
+    def now(
+        self, silent_s: float, still: Collection[Segment], stuck: Collection[Segment]
+    ) -> list[SensorHealth]:
         """Health of its sensors."""
         span_s = 1e-6 * (self._pieces[-1].end_us - self._pieces[0].start_us) if self._pieces else 1.0
         expected = max(1.0, span_s * self.info.rate_hz)
@@ -71,6 +73,7 @@ class _StreamHealth:
                 saturated_share=full / max(1, measured),
                 silent_s=silent_s,
                 still=sensor.segment in still,
+                stuck=sensor.segment in stuck,
             )
             for sensor, (measured, full) in zip(self.info.sensors, self._total.tolist(), strict=True)
         ]
@@ -91,11 +94,11 @@ class Health:
             self._begun_us = batch.sent_us
         self._now_us = max(self._now_us, batch.sent_us)
 
-    def now(self, still: Collection[Segment]) -> tuple[SensorHealth, ...]:
-        """Every sensor in the order of the hello; `still` : segments at rest."""
+    def now(self, still: Collection[Segment], stuck: Collection[Segment] = ()) -> tuple[SensorHealth, ...]:
+        """Every sensor in the order of the hello; `still` : segments at rest. stuck : that do not measure."""
         found: list[SensorHealth] = []
         for stream in self._streams.values():
             since = stream.sent_us if stream.sent_us is not None else self._begun_us
             silent_s = 0.0 if since is None else 1e-6 * (self._now_us - since)
-            found += stream.now(silent_s, still)
+            found += stream.now(silent_s, still, stuck)
         return tuple(found)

@@ -24,7 +24,9 @@ from core.online.chain import Chain, ChainParams, Outcome
 from core.online.frame import EMPTY_TRAIL, LiveFrame, Trail
 from core.online.health import Health
 from core.online.still import Stillness
+from core.online.stuck import StuckSensors
 from core.parameters.spatial import Surface
+from core.quality.stuck import warm as warm_stuck
 from core.recording import SensorSignals, Subject, UniformRecording, check_belt
 from core.rotation import from_matrix
 
@@ -71,6 +73,7 @@ class Online:
         )
         self._health = Health(hello)
         self._still = Stillness(len(self._axis.segments), self._axis.rate_hz)
+        self._stuck = StuckSensors(self._axis.segments, self._axis.rate_hz)
         self.chain: Chain | None = None
 
     @property
@@ -84,8 +87,9 @@ class Online:
         block = self._axis.push(batch)
         if block is None:
             return None
+        block, stuck = self._stuck.push(block)
         rests = self._still.push(block.acc, block.gyr, block.valid)[-1, :, 1]
-        notices = list(self._axis.notices())
+        notices = [*self._axis.notices(), *stuck]
         outcomes: list[Outcome] = []
         start = 0
         if self.chain is None:
@@ -101,7 +105,9 @@ class Online:
             t_s=float(block.t_s[-1]),
             seq=batch.seq,
             stage=self._calibrating.stage,
-            health=self._health.now([s for s, x in zip(self.segments, rests, strict=True) if x]),
+            health=self._health.now(
+                [s for s, x in zip(self.segments, rests, strict=True) if x], self._stuck.now
+            ),
             calibration=self._calibrating.view,
             notices=tuple(notices),
         )
@@ -148,6 +154,7 @@ def _told(frame: LiveFrame, block: UniformBlock, chain: Chain, outcomes: Sequenc
 def warm() -> None:
     """Compile or load every kernel of the chain, so that the first take does not wait for it."""
     warm_axis()
+    warm_stuck()
     warm_calibration()
     for worn in (PRESETS["lower_body7"], PRESETS["feet_pelvis3"], PRESETS["feet2"]):
         chain = Chain(_standing(worn), worn)

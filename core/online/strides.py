@@ -1,7 +1,8 @@
 """Contacts → live strides: each told when its second contact is known, and again when its distances are.
 
 The stride list of a whole take asks the neighbours of a stride whether it counts; here only those before it
-can be asked (core/events/flags.py says which flags those are: all but "last" and "non_periodic").
+can be asked: not yet whether it is the last. It is told as counted, and told again as not counted when nobody
+steps on, or when its distances say that it led nowhere.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from core.angles import JointAngles, headings
 from core.body.feet import FootTracks
 from core.body.model import BodyModel
-from core.events.flags import StrideParams, flagged
+from core.events.flags import StrideParams, flagged, with_flag
 from core.events.result import GaitEvent, GaitEvents, Stride, StrideFlag
 from core.events.strides import side_strides
 from core.frames import Floats, Segment, Side
@@ -36,7 +37,7 @@ REMEMBERED: Final = 20
 """Strides of a foot that the next one is compared with: those of the therapist's strip."""
 
 LATER: Final[frozenset[StrideFlag]] = frozenset(("last", "non_periodic"))
-"""Flags that only a later stride, or none, can give."""
+"""Flags that only a later stride, or none, can give; the neighbours before a stride must not."""
 
 
 @dataclass(frozen=True)
@@ -142,9 +143,14 @@ class LiveStrides:
         """Those nobody steps on after: a stop. Each at its own sample, whatever the blocks are."""
         ready = sorted((p for p in self._pending if p.until <= at), key=lambda p: p.until)
         self._pending = [p for p in self._pending if p.until > at]
-        return [self._complete(p, p.until, history) for p in ready]
+        return [self._complete(p, p.until, history, *self._stopped(p.stride)) for p in ready]
 
-    def _complete(self, pending: _Pending, at: int, history: History) -> LiveStride:
+    def _stopped(self, stride: Stride) -> tuple[StrideFlag, ...]:
+        """The foot has not been heard of since: nobody walked on, only the other one may be missing."""
+        on = any(e.side == stride.side and e.time_s > stride.end_s for e in self._events)
+        return () if on else ("last",)
+
+    def _complete(self, pending: _Pending, at: int, history: History, *late: StrideFlag) -> LiveStride:
         context = self._context(pending.stride.start_s)
         first = self._sample(pending.stride.start_s) - 1
         found: dict[str, Value] = dict.fromkeys(SPATIAL, "gap")
@@ -152,8 +158,13 @@ class LiveStrides:
             span = self._span(first, at + 1, history, whole=False)
             found = distances(pending.stride, context, span, self._setup.surface)
         told, (values, reasons) = pending.told, _split(found)
+        if found["stride_length_m"] == "in_place":
+            late = (*late, "in_place")
+        flags = with_flag(replace(pending.stride, flags=told.flags), *late).flags
         return replace(
             told,
+            flags=flags,
+            counted=not flags,
             detected_s=(self._setup.first + at) / self._setup.rate_hz,
             values={**told.values, **values},
             reasons={k: v for k, v in told.reasons.items() if k not in found} | reasons,

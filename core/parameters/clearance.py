@@ -1,9 +1,9 @@
 """How far heel and toe of the sole pass the floor in swing.
 
 Heights are above the line between the floor at the two flats of a stride, so that drift in height does not
-count. Without the shape of the shoe there is no clearance, and never that of the sensor in its place
-(spec/field.md §2, §4b): the toe passes the floor by one or two centimetres (Winter 1992), less than shoes
-differ, and a heel 7 cm from where it is taken to be is 7 of 23 cm wrong on gaitmap_foot.
+count (docs/science/spatial.md, "Clearance"). Without the shape of the shoe there is no clearance, and never
+that of the sensor in its place: the toe passes the floor by one or two centimetres (Winter 1992), less than
+shoes differ, and a heel 7 cm from where it is taken to be is 7 of 23 cm wrong on gaitmap_foot.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ def toe_clearance(h: Floats) -> float | ClearanceReason:
 
     Returns
     -------
-    "no_swing_minimum" where the tip only rises or only falls, as some hemiparetic swings do (spec/clinic.md
-    §4): any number there would be that of the window's edge.
+    "no_swing_minimum" where the tip only rises or only falls, as some hemiparetic swings do: any
+    number there would be that of the window's edge.
     """
     if len(h) < 3:
         return "no_swing_minimum"

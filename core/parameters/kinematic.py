@@ -1,7 +1,7 @@
 """JointAngles and Strides → curves over the gait cycle and the figures read from them.
 
 A curve has 101 points, 0 to 100 % from initial contact to the next of the same foot, by linear interpolation.
-The windows of the figures are those of the reference table (spec/clinic.md §2), so that both mean the same.
+The windows of the figures are those of the reference table (core/norms/data), so that both mean the same.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ import numpy as np
 
 from core.angles import JointAngles
 from core.events.result import Strides
-from core.frames import FOOT, SIDES, SUFFIX, Floats, Oriented, Segment, Side
+from core.frames import FOOT, SIDES, SUFFIX, Bools, Floats, Oriented, Segment, Side
+from core.parameters.plausible import IMPOSSIBLE, LEAST_KNEE
 from core.parameters.resample import resample
 from core.parameters.result import CycleCurves, Parameter
 from core.parameters.rows import Column, as_column
@@ -55,8 +56,21 @@ FIGURES: Final[Mapping[str, CurveFigure]] = {
 }
 """Parameter name → how it is read from the cycle curve."""
 
+
+def is_level(name: str) -> bool:
+    """The parameter is a joint angle with a zero, not a range: how the person stood is part of it."""
+    figure = FIGURES.get(name)
+    return figure is not None and figure.statistic != "range"
+
+
+AT_BOUND: Final = "at_bound"
+"""Reason of a figure that is the end of what an estimator allows in most strides."""
+
+BOUND_DEG: Final = 0.2
+"""A leg at its full length leaves the knee within this of straight (core/body/l7s.py)."""
+
 FOOT_PITCH: Final = ("foot_pitch_ic_deg", "foot_pitch_tc_deg")
-"""Sole to floor at the contacts, toes up positive, 0 at standing (spec/field.md §4b)."""
+"""Sole to floor at the contacts, toes up positive, 0 at standing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +93,18 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
     Pelvis angles appear once per side, over that side's cycles; obliquity is positive with that side up.
     Pelvic rotation (that side forward) and foot progression (toes in) are measured from their own mean over
     the stride: against the walking direction they have no level (`MEAN_ZERO`).
-    A stride in which the angle is not known throughout is a row of NaN.
+    A stride in which the angle is not known throughout is a row of NaN; one in which a knee bends the wrong
+    way as no knee can (`LEAST_KNEE`) as well.
     """
     index = {side: tuple(i for i, s in enumerate(strides.strides) if s.side == side) for side in SIDES}
     curves: dict[str, dict[Side, Floats]] = {}
+    ends: dict[str, dict[Side, float]] = {}
+    why: dict[str, dict[Side, str]] = {}
+    for name, reason in angles.withheld.items():
+        base, _, suffix = name.rpartition("_")
+        own_sides = [s for s in SIDES if SUFFIX[s] == suffix]
+        for side in own_sides or SIDES:
+            why.setdefault(base if own_sides else name, {})[side] = reason
     for side in SIDES:
         own = [strides.strides[i] for i in index[side]]
         bounds = np.array([(s.start_s, s.end_s) for s in own]).reshape(-1, 2)
@@ -103,7 +125,15 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
         rows = resample(np.stack([angles.angles[name] for name in names]), angles.t_s, bounds, POINTS)
         for (name, base), row in zip(names.items(), rows, strict=True):
             sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
+            if base == "knee_flexion":
+                least = LEAST_KNEE - np.radians(angles.standing_deg.get(name, 0.0))
+                torn = (row < least).any(axis=1)
+                row = np.where(torn[:, None], np.nan, row)
+                if torn.any():
+                    why.setdefault(base, {})[side] = IMPOSSIBLE
             curves.setdefault(base, {})[side] = sign * row
+            if name in angles.bounds:
+                ends.setdefault(base, {})[side] = angles.bounds[name]
     return CycleCurves(
         curves=curves,
         stride_index=index,
@@ -114,6 +144,8 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
         foot_off_pct={
             side: np.array([_foot_off(strides, i) for i in rows], np.float64) for side, rows in index.items()
         },
+        why=why,
+        bounds=ends,
     )
 
 
@@ -189,7 +221,8 @@ def kinematic(
 
     Returns
     -------
-    without a value a reason: "joint_missing" (a segment carries no sensor), "no_strides", "gap".
+    without a value a reason: "joint_missing" (a segment carries no sensor), "no_strides", "gap", "at_bound"
+    (in most strides), "estimator_bad", "impossible".
     """
     figures: dict[str, Mapping[Side, Floats]] = {name: {} for name in FIGURES}
     figures |= stride_figures(curves)
@@ -198,15 +231,39 @@ def kinematic(
     for side in SIDES:
         used = curves.used[side]
         for name, sides in figures.items():
+            variable = FIGURES[name].variable if name in FIGURES else name
+            why = curves.why.get(variable, {}).get(side)
             if side not in sides:
-                reason = "joint_missing"
+                reason = why or "joint_missing"
                 values: list[float] = []
             else:
-                reason = "gap" if used.any() else "no_strides"
+                reason = (why or "gap") if used.any() else "no_strides"
                 counted = sides[side][used]
+                resting = _at_bound(curves, name, side, counted)
+                if np.count_nonzero(resting) > 0.5 * len(counted):
+                    reason, counted = AT_BOUND, counted[:0]
                 values = counted[np.isfinite(counted)].tolist()
             parameters.append(summary(name, side, values, "deg", None if values else reason))
     return tuple(parameters)
+
+
+def _at_bound(curves: CycleCurves, name: str, side: Side, values: Floats) -> Bools:
+    """Figures (strides,) in degrees that are the bound of a leg model and no measurement."""
+    figure = FIGURES.get(name)
+    bound = None if figure is None else curves.bounds.get(figure.variable, {}).get(side)
+    if figure is None or bound is None or figure.statistic == "range":
+        return np.zeros(len(values), np.bool_)
+    return np.asarray(np.abs(values - np.degrees(bound)) < BOUND_DEG, np.bool_)
+
+
+def without_bounds(
+    curves: CycleCurves, figures: Mapping[str, Mapping[Side, Floats]]
+) -> dict[str, dict[Side, Floats]]:
+    """The same figures, NaN in strides in which they are the bound of a leg model."""
+    return {
+        name: {s: np.where(_at_bound(curves, name, s, x), np.nan, x) for s, x in sides.items()}
+        for name, sides in figures.items()
+    }
 
 
 def per_stride_figures(strides: Strides, figures: Mapping[str, Mapping[Side, Floats]]) -> dict[str, Column]:

@@ -57,11 +57,17 @@ def phase_rows(
     """
     adjacent, vertical = _adjacent(strides, feet), _vertical(strides, angles, pitch)
     linked = feet is not None and feet.linked
+    # where a foot passes the other is of both paths
+    doubt = next(iter(feet.withheld.values()), None) if feet is not None and linked else None
     rows = []
     for i, s in enumerate(strides.strides):
-        has_ankle = angles is not None and f"ankle_dorsiflexion_{SUFFIX[s.side]}" in angles.angles
+        ankle = f"ankle_dorsiflexion_{SUFFIX[s.side]}"
+        upright = "joint_missing"
+        if angles is not None:
+            known = ankle in angles.angles
+            upright = "tibia_not_vertical" if known else angles.withheld.get(ankle, upright)
         row = _stance(s, float(stances.heel_off_s[i]), stances.rows[i]["push_pct"])
-        row |= _swing(s, float(adjacent[i]), float(vertical[i]), linked, has_ankle)
+        row |= _swing(s, float(adjacent[i]), float(vertical[i]), linked, upright, doubt)
         rows.append(row)
     return tuple(rows)
 
@@ -82,13 +88,12 @@ def _stance(s: Stride, heel_off_s: float, push: Value) -> dict[str, Value]:
 
 
 def _swing(
-    s: Stride, adjacent_s: float, vertical_s: float, linked: bool, has_ankle: bool
+    s: Stride, adjacent_s: float, vertical_s: float, linked: bool, upright: str, doubt: str | None
 ) -> dict[str, Value]:
     names = NAMES[2:]
     if s.tc_s is None:
         return dict.fromkeys(names, "no_terminal_contact")
-    passed = "feet_not_adjacent" if linked else "feet_not_linked"
-    upright = "tibia_not_vertical" if has_ankle else "joint_missing"
+    passed = doubt or ("feet_not_adjacent" if linked else "feet_not_linked")
     if vertical_s <= adjacent_s:
         vertical_s = float("nan")
     percent = 100.0 / s.duration_s
@@ -109,7 +114,7 @@ def _swings(strides: Strides, own: list[int]) -> Floats:
 def _adjacent(strides: Strides, feet: FootTracks | None) -> Floats:
     """When (strides,) the swinging ankle passes the other, s; NaN if never or not known."""
     found = np.full(len(strides.strides), np.nan)
-    if feet is None or not feet.linked:
+    if feet is None or not feet.linked or feet.withheld:
         return found
     for side in SIDES:
         own = [i for i, s in enumerate(strides.strides) if s.side == side]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from core.frames import Bools, Floats, Side
 
@@ -14,7 +14,7 @@ class Parameter:
 
     Parameters
     ----------
-    name : field term with its unit, e.g. "stride_time_s" (spec/field.md §4b).
+    name : field term with its unit, e.g. "stride_time_s" (docs/parameters.md).
     side : "left", "right" or None for the whole take.
     n : strides behind the number. mean, sd : None with a `reason` when undefined (sd also when n < 2).
     reason : None, or a stable code: "no_strides", "opposite_foot_missing", "no_terminal_contact" …
@@ -46,9 +46,13 @@ class CycleCurves:
         NaN rows where the stride has gaps. Row i belongs to `stride_index[side][i]` of the stride list.
     used : side → (strides,) True where the stride counts.
     foot_off_pct : side → (strides,) terminal contact in % of cycle, NaN if not found.
+    why : variable → side → reason of an angle that was withheld, or impossible in some stride.
+    bounds : variable → side → rad, as `JointAngles.bounds`.
     """
 
     curves: Mapping[str, Mapping[Side, Floats]]
     stride_index: Mapping[Side, tuple[int, ...]]
     used: Mapping[Side, Bools]
     foot_off_pct: Mapping[Side, Floats]
+    why: Mapping[str, Mapping[Side, str]] = field(default_factory=dict)
+    bounds: Mapping[str, Mapping[Side, float]] = field(default_factory=dict)

@@ -1,8 +1,9 @@
 """Paths of the feet and strides → distances: lengths, width, speed, swing paths.
 
 A foot's place is where its ankle is at its flat (flats.py). Stride length and speed are between the two
-flats of one foot, in the same window (spec/field.md §4b); a step is between the flats of the two feet and
-belongs to the foot that lands. The direction of progression of a stride is from its first flat to its second.
+flats of one foot, in the same window (docs/science/spatial.md); a step is between the flats of the two feet
+and belongs to the foot that lands. The direction of progression of a stride is from its first flat to its
+second.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ STEP_M: Final = 0.05
 
 Reason = Literal[
     "treadmill", "no_foot_track", "no_foot_flat", "gap", "feet_not_linked", "opposite_foot_missing",
-    "no_shoe_geometry", "no_swing_minimum", "no_terminal_contact", "standing_width_unknown",
+    "no_shoe_geometry", "no_swing_minimum", "no_terminal_contact", "standing_width_unknown", "in_place",
 ]  # fmt: skip
 
 
@@ -99,6 +100,24 @@ def spatial_row(stride: Stride, strides: Strides, feet: FootTracks | None, surfa
     return _row(stride, feet, None if feet is None else _paths(strides, feet))
 
 
+def in_place(strides: Strides, feet: FootTracks | None, surface: Surface = GROUND) -> frozenset[int]:
+    """Places in the list of strides that end where they began: weight was shifted, nobody walked on.
+
+    Empty on a treadmill, where every stride does.
+    """
+    if feet is None or surface.protocol == "treadmill":
+        return frozenset()
+    found = places(strides.strides, feet)
+    return frozenset(
+        i
+        for i, s in enumerate(strides.strides)
+        if (at := found.get((s.side, s.start_s))) is not None
+        and (then := found.get((s.side, s.end_s))) is not None
+        and then > at
+        and hypot(*(feet.p[s.side][then, :2] - feet.p[s.side][at, :2]).tolist()) < STEP_M
+    )
+
+
 def per_stride_spatial(rows: Sequence[Row]) -> dict[str, Column]:
     """Columns of the stride table, one entry per stride."""
     return row_columns(rows, NAMES)
@@ -111,7 +130,8 @@ def spatial(
 
     Returns
     -------
-    without a value a reason: "no_strides" or one of `Reason`, the most frequent of the strides.
+    without a value a reason: "no_strides", "estimator_bad" (the path of the foot is withheld) or one of
+    `Reason`, the most frequent of the strides.
     """
     counted = [
         (s.side, row) for s, row in zip(strides.strides, rows, strict=True) if s.excluded_reason is None
@@ -132,7 +152,10 @@ def _total(feet: FootTracks | None, surface: Surface) -> Parameter:
     if feet is None:
         return summary(name, None, [], "m", "no_foot_track")
     ways = []
-    for side, still in feet.still.items():
+    told = {side: still for side, still in feet.still.items() if side not in feet.withheld}
+    if not told and feet.withheld:
+        return summary(name, None, [], "m", next(iter(feet.withheld.values())))
+    for side, still in told.items():
         edges = np.flatnonzero(np.diff(np.concatenate(([False], still & feet.valid[side], [False]))))
         middles = (edges[::2] + edges[1::2]) // 2
         lengths = np.linalg.norm(np.diff(feet.p[side][middles, :2], axis=0), axis=1)
@@ -181,6 +204,8 @@ def _paths(strides: Strides, feet: FootTracks) -> _Paths:
 def _row(s: Stride, feet: FootTracks | None, paths: _Paths | None) -> Row:
     if feet is None or paths is None or s.side not in feet.p:
         return dict.fromkeys(NAMES, "no_foot_track")
+    if s.side in feet.withheld:
+        return dict.fromkeys(NAMES, feet.withheld[s.side])
     first, last = paths.places[s.side, s.start_s], paths.places[s.side, s.end_s]
     if first is None or last is None:
         return dict.fromkeys(NAMES, "no_foot_flat")
@@ -190,7 +215,7 @@ def _row(s: Stride, feet: FootTracks | None, paths: _Paths | None) -> Row:
     x, y = (p[last, :2] - p[first, :2]).tolist()
     length = hypot(x, y)
     if length < STEP_M:
-        return dict.fromkeys(NAMES, "no_foot_flat")
+        return dict.fromkeys(NAMES, "in_place" if last > first else "no_foot_flat")
     along = np.array([x / length, y / length])
     mirror = 1.0 if s.side == "left" else -1.0
     outward = np.array([-along[1], along[0]]) * mirror
@@ -230,6 +255,8 @@ def _step(
         reason = "opposite_foot_missing"
     elif not feet.linked:
         reason = "feet_not_linked"
+    elif OTHER[s.side] in feet.withheld:
+        return dict.fromkeys(("step_length_m", "step_width_m"), feet.withheld[OTHER[s.side]])
     else:
         opposite = paths.places[OTHER[s.side], s.opposite_ic_s]
         reason = "no_foot_flat"

@@ -1,7 +1,7 @@
 """Parts of the stance: loading, foot flat, push-off, from the pitch of the foot.
 
 The foot is flat around its quietest moment for as long as its pitch stays within `FLAT_RAD` of that moment's
-(spec/field.md §4b: IC to foot flat, flat, heel-off to TC, in % of stance). Fitted to nothing: the limit is
+(IC to foot flat, flat, heel-off to TC, in % of stance). Fitted to nothing: the limit is
 the geometry of a centimetre.
 """
 

@@ -1,7 +1,8 @@
 """Left against right, or the affected side against the other: indices with their sign, or the difference.
 
-The sides are stored; what compares them is derived when it is shown (spec/clinic.md §8.5). Every index says
-which side it puts first, and none is 0 or absolute for want of something better (spec/field.md §2).
+The sides are stored; what compares them is derived when it is shown. Every index says which side it puts
+first, and none is 0 or absolute for want of something better (docs/science/phases-and-regularity.md,
+"Symmetry").
 """
 
 from __future__ import annotations
@@ -17,11 +18,21 @@ from core.events.result import Strides
 from core.frames import SIDES, Side
 from core.parameters.flats import OTHER
 from core.parameters.result import Parameter
-from core.parameters.variability import CV_STRIDES, STEADY_STRIDES, cv_pct
+from core.parameters.variability import (
+    CV_STRIDES,
+    STEADY_STRIDES,
+    Spread,
+    comparable,
+    cv_pct,
+    difference_interval,
+)
 
-LEAST: Final[Mapping[str, float]] = {"s": 0.05, "m": 0.05, "%": 2.0, "m/s": 0.05}
-"""Unit → smallest value that may be divided by. Our choice: five times what a contact (a sample of 10 ms) or
-a place of a foot (1 cm) is known to; of a share of the stride about two samples."""
+KNOWN_TO: Final[Mapping[str, float]] = {"s": 0.01, "m": 0.01, "%": 0.4, "m/s": 0.01}
+"""Unit → what a contact (a sample of 10 ms), a place of a foot (1 cm) or a share of the stride is known to.
+What mounting and calibration do to one side does not average out over the strides: less is no difference."""
+
+LEAST: Final[Mapping[str, float]] = {unit: 5.0 * known for unit, known in KNOWN_TO.items()}
+"""Unit → smallest value that may be divided by. Our choice: five times what it is known to."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +43,8 @@ class Symmetry:
     ----------
     first : the side that stands first: the affected one, else left. reference : "affected/unaffected" or
         "left/right".
-    difference : first − other, in `unit`. ratio : first / other.
+    difference : first − other, in `unit`. low, high : its 95 % interval, None where the spread of a side is
+        not known. ratio : first / other.
     index_pct : 100 (first − other) / mean of both (Robinson 1987), positive when the first is larger.
     angle_pct : (45° − atan(first / other)) / 90° · 100 (Zifchock 2008), as published: NEGATIVE when the
         first is larger.
@@ -49,10 +61,18 @@ class Symmetry:
     index_pct: float | None = None
     angle_pct: float | None = None
     reason: str | None = None
+    low: float | None = None
+    high: float | None = None
+
+    @property
+    def clear(self) -> bool:
+        """Which side is larger can be said: the interval leaves out 0, and values are known that well."""
+        told = self.low is not None and self.high is not None and self.low * self.high > 0.0
+        return told and abs(self.difference) >= KNOWN_TO.get(self.unit, 0.0)
 
 
 def symmetries(parameters: Sequence[Parameter], affected: Side | None = None) -> tuple[Symmetry, ...]:
-    """Compare the sides of every parameter that has a value on both, in the order given.
+    """Compare the sides of every parameter that has a value of enough strides on both, in the order given.
 
     Parameters
     ----------
@@ -60,13 +80,15 @@ def symmetries(parameters: Sequence[Parameter], affected: Side | None = None) ->
     """
     first: Side = affected or "left"
     found = {(p.name, p.side): p for p in parameters}
+    reference = "left/right" if affected is None else "affected/unaffected"
     pairs = (
         (found.get((p.name, first)), found.get((p.name, OTHER[first]))) for p in parameters if p.side == first
     )
     return tuple(
-        _symmetry(a, a.mean, b.mean, first, "left/right" if affected is None else "affected/unaffected")
+        _symmetry(a, Spread(a.mean, a.sd, a.n), Spread(b.mean, b.sd, b.n), first, reference)
         for a, b in pairs
-        if a is not None and b is not None and a.mean is not None and b.mean is not None
+        if a is not None and a.mean is not None and comparable(a)
+        if b is not None and b.mean is not None and comparable(b)
     )
 
 
@@ -117,8 +139,10 @@ def phase_coordination(strides: Strides) -> Parameter:
     return Parameter(name, None, len(phi), value, None, "%", note=note)
 
 
-def _symmetry(of: Parameter, a: float, b: float, first: Side, reference: str) -> Symmetry:
-    plain = Symmetry(of.name, of.unit, first, reference, a - b)
+def _symmetry(of: Parameter, first: Spread, other: Spread, side: Side, reference: str) -> Symmetry:
+    low, high = difference_interval(first, other) or (None, None)
+    a, b = first.mean, other.mean
+    plain = Symmetry(of.name, of.unit, side, reference, a - b, low=low, high=high)
     if of.unit == "deg":
         return replace(plain, reason="angle")
     if min(a, b) <= LEAST.get(of.unit, 0.0):

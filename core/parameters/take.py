@@ -16,6 +16,7 @@ from core.parameters.kinematic import (
     per_stride_figures,
     stride_figures,
     turning_angle,
+    without_bounds,
 )
 from core.parameters.phases import NAMES as PHASES
 from core.parameters.phases import phase_rows
@@ -91,7 +92,7 @@ def take_figures(
             **per_stride_spatial(rows),
             **row_columns(flat.rows, PARTS),
             **row_columns(phases, PHASES),
-            **per_stride_figures(strides, figures),
+            **per_stride_figures(strides, without_bounds(curves, figures)),
         },
     )
 

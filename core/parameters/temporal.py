@@ -1,6 +1,7 @@
 """Strides → temporal parameters, per stride and per side.
 
-Definitions: spec/field.md §4b. Percentages are of the stride. A step belongs to the foot that lands.
+Definitions: docs/science/phases-and-regularity.md, "Times". Percentages are of the stride. A step belongs to
+the foot that lands.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats
+from core.parameters.plausible import IMPOSSIBLE, LIMITS, impossible
 from core.parameters.result import Parameter
 from core.parameters.rows import Column, as_column
 from core.parameters.variability import summary, unit_of
@@ -44,7 +46,7 @@ def stride_values(stride: Stride) -> dict[str, float | None]:
 
 def per_stride(strides: Strides) -> dict[str, Column]:
     """Columns of the stride table, one entry per stride of the list (counted or not), in its order."""
-    return {name: as_column(x) for name, x in temporal_values(strides.strides).items()}
+    return {name: as_column(x) for name, x in possible_values(strides.strides).items()}
 
 
 def temporal_values(strides: Sequence[Stride]) -> dict[str, Floats]:
@@ -71,6 +73,16 @@ def temporal_values(strides: Sequence[Stride]) -> dict[str, Floats]:
     return values
 
 
+def possible_values(strides: Sequence[Stride]) -> dict[str, Floats]:
+    """As `temporal_values`; NaN also where no person can have the value."""
+    found = temporal_values(strides)
+    for name, (low, high) in LIMITS.items():
+        if name in found:
+            x = found[name]
+            found[name] = np.where((x < low) | (x > high), np.nan, x)
+    return found
+
+
 def temporal(strides: Strides) -> tuple[Parameter, ...]:
     """Temporal parameters over the counted strides of each side, and the cadence of both.
 
@@ -83,14 +95,17 @@ def temporal(strides: Strides) -> tuple[Parameter, ...]:
     steps: list[float] = []
     for side in SIDES:
         used = strides.used(side)
-        for name, column in temporal_values(used).items():
+        found = temporal_values(used)
+        for name, column in possible_values(used).items():
             values = column[~np.isnan(column)].tolist()
-            parameters.append(
-                summary(name, side, values, unit_of(name), None if values else missing(name, used))
-            )
+            there = not np.isnan(found[name]).all()
+            why = None if values else IMPOSSIBLE if there else missing(name, used)
+            parameters.append(summary(name, side, values, unit_of(name), why))
             if name == "step_time_s":
                 steps.extend(values)
     reason = "opposite_foot_missing" if strides.used() else "no_strides"
+    if not steps and any(p.reason == IMPOSSIBLE and p.name == "step_time_s" for p in parameters):
+        reason = IMPOSSIBLE
     parameters.append(cadence(summary("step_time_s", None, steps, "s", reason)))
     return tuple(parameters)
 
@@ -113,6 +128,8 @@ def cadence(step: Parameter) -> Parameter:
     named = replace(step, name="cadence_spm", unit="steps/min")
     if step.mean is None:
         return named
+    if impossible(named.name, 60.0 / step.mean):
+        return summary(named.name, step.side, [], named.unit, IMPOSSIBLE)
     low, high = step.ci_low, step.ci_high
     # two wildly different steps say nothing about how few a minute may have
     known = low is not None and high is not None and low > 0.0

@@ -3,7 +3,7 @@
 Harmonic ratio of a stride: the acceleration over one stride as a Fourier series of the stride's frequency;
 the sum of the amplitudes of the first ten even harmonics over that of the first ten odd ones, for left-right
 the reverse (Gage 1964; Smidt, Arora and Johnston 1971; Bellanca et al. 2013). Two equal steps make the even
-ones; the ratio tells how alike the two steps of a stride are. It has no norm here (spec/clinic.md §8.2).
+ones; the ratio tells how alike the two steps of a stride are. It has no norm here.
 
 Regularity: the unbiased autocorrelation at the time of one step and of one stride, where its peak is
 (Moe-Nilssen and Helbostad 2004); 1 = every step, or stride, like the one before.

@@ -7,19 +7,22 @@ up and down, so that it is the least uncertainty there is, not all of it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
+from math import sqrt
 from typing import Final
 
 import numpy as np
 
+from core.events.result import COMPARED
 from core.frames import Side
 from core.parameters.result import Parameter
 
 CV_STRIDES: Final = 10
-"""Fewer strides have no coefficient of variation (spec/field.md §4b; PhysiGait's rule)."""
+"""Fewer strides have no coefficient of variation: it would say little. Customary."""
 
 STEADY_STRIDES: Final = 30
-"""Fewer strides than this carry the note `few_strides` (spec/clinic.md §3 and §8.5)."""
+"""Fewer strides than this carry the note `few_strides`."""
 
 CONFIDENCE: Final = 0.95
 """Of the interval of the mean."""
@@ -34,7 +37,29 @@ UNITS: Final[Mapping[str, str]] = {
     "m": "m",
     "s": "s",
 }
-"""Last part of a parameter's name → its unit (spec/field.md §4a: the unit is in the name); "" has none."""
+"""Last part of a parameter's name → its unit; "" has none."""
+
+
+COUNTED: Final[Mapping[str, str]] = {
+    "cadence_spm": "steps",
+    "total_distance_m": "feet",
+    "step_count": "steps",
+    "walking_bout_count": "bouts",
+    "walking_duration_min": "bouts",
+    "turn_count": "turns",
+    "turn_angle_deg": "turns",
+    "turn_duration_s": "turns",
+    "turn_peak_velocity_dps": "turns",
+}
+"""What a parameter is the mean of, where not of strides."""
+
+TOO_FEW: Final = "too_few_strides"
+"""Reason of a comparison that is not made for want of strides."""
+
+
+def comparable(p: Parameter) -> bool:
+    """Enough strides, or steps, to be held against the other side, a norm, a limit or another visit."""
+    return p.n >= COMPARED or COUNTED.get(p.name, "steps") != "steps"
 
 
 def unit_of(name: str) -> str:
@@ -67,7 +92,7 @@ def summary(
 
 
 def cv_pct(values: Sequence[float] | np.ndarray, unit: str) -> float | None:
-    """Coefficient of variation 100 sd / mean, sd with n − 1 (spec/field.md §4b).
+    """Coefficient of variation 100 sd / mean, sd with n − 1.
 
     None below `CV_STRIDES` values, for angles, and for values that are not all positive: a quantity whose
     zero is a convention, or which passes through it, has no ratio.
@@ -76,6 +101,34 @@ def cv_pct(values: Sequence[float] | np.ndarray, unit: str) -> float | None:
     if len(x) < CV_STRIDES or unit == "deg" or not (x > 0.0).all():
         return None
     return 100.0 * float(x.std(ddof=1)) / float(x.mean())
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Mean, standard deviation (n − 1; None below two) and number of the values of one side."""
+
+    mean: float
+    sd: float | None
+    n: int
+
+
+def difference_interval(a: Spread, b: Spread) -> tuple[float, float] | None:
+    """95 % interval of a − b, None without spreads (Welch 1947, Biometrika 34:28; freedom rounded down)."""
+    if a.sd is None or b.sd is None:
+        return None
+    own, other = a.sd**2 / a.n, b.sd**2 / b.n
+    between = own + other
+    if between == 0.0:
+        return a.mean - b.mean, a.mean - b.mean
+    freedom = between**2 / (own**2 / (a.n - 1) + other**2 / (b.n - 1))
+    half = t_quantile(max(int(freedom), 1)) * sqrt(between)
+    return a.mean - b.mean - half, a.mean - b.mean + half
+
+
+def differ(a: Spread, b: Spread) -> bool:
+    """The strides say which of two sides is larger: the interval of the difference leaves out 0."""
+    ends = difference_interval(a, b)
+    return ends is not None and ends[0] * ends[1] > 0.0
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Walking bouts, turns and the steps of a trunk sensor → parameters of the whole take (spec/field.md §4b)."""
+"""Walking bouts, turns and steps of a trunk sensor → parameters of the whole take (docs/parameters.md)."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from core.events.bouts import Bout
 from core.events.steps import EDGE_STEPS, Steps
 from core.events.turns import Turn
+from core.parameters.plausible import IMPOSSIBLE, impossible
 from core.parameters.result import Parameter
 from core.parameters.temporal import cadence
 from core.parameters.variability import summary, unit_of
@@ -60,8 +61,9 @@ def step_parameters(steps: Steps) -> tuple[Parameter, ...]:
     A step belongs to the whole take: which foot landed is told for whole walks or not at all, and a step's
     two ends have errors of different feet.
     """
-    times = steps.step_times_s
-    reason = None if times else next((n.code for n in steps.notices), "no_strides")
+    found = steps.step_times_s
+    times = [t for t in found if not impossible("step_time_s", t)]
+    reason = None if times else next((n.code for n in steps.notices), IMPOSSIBLE if found else "no_strides")
     step = summary("step_time_s", None, times, "s", reason)
     n = len(steps.steps)
     return (cadence(step), step, Parameter("step_count", None, n, float(n), None, ""))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -18,6 +18,10 @@ from core.recording import Recording, SensorSignals, UniformRecording
 from core.rest import RestParams, Window, rest_windows, runs, samples
 
 Level = Literal["good", "usable", "poor"]
+"""Best first."""
+
+Verdict = Literal["good", "warn", "bad"]
+"""Of an estimator, as core/body/health.py gives it."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +30,8 @@ class QualityParams:
 
     Parameters
     ----------
-    saturated : share of samples at range (spec/fusion.md §9). magnetic : |m| off its rest norm, and
-    magnetic_share : of samples that are (spec/fusion.md §4.6).
+    saturated : share of samples at range. magnetic : |m| off its rest norm, and
+    magnetic_share : of samples that are (docs/science/quality.md, "Range", "Magnetic field").
     invalid_usable, invalid_poor : share of the take without data of a sensor [our choice].
     interpolated : share that was filled [our choice].
     acc_floor, gyr_floor : m/s², rad/s below which nothing can be at its range (±2 g, ±250 °/s: the narrowest
@@ -125,8 +129,17 @@ class QualityReport:
         }
 
 
+def shown_level(level: Level, verdict: Verdict | None) -> Level:
+    """The level that people see: the worse of the signals' and the pose estimator's, None = none ran."""
+    of_estimator: dict[Verdict | None, Level] = {"warn": "usable", "bad": "poor"}
+    return max(level, of_estimator.get(verdict, "good"), key=get_args(Level).index)
+
+
 def assess(
-    recording: Recording, uniform: UniformRecording, params: QualityParams | None = None
+    recording: Recording,
+    uniform: UniformRecording,
+    params: QualityParams | None = None,
+    working: Collection[Segment] | None = None,
 ) -> QualityReport:
     """Judge the sensors that are worn on a segment.
 
@@ -134,9 +147,10 @@ def assess(
     ----------
     recording : as read; units, signs and losses are judged on the original samples.
     uniform : the same take on its axis.
+    working : segments whose sensor measures (core/quality/stuck.py); rest is asked of those. None = all.
     """
     params = params or QualityParams()
-    rest = rest_windows(uniform, params.rest)
+    rest = rest_windows(uniform, params.rest, working)
     sensors: dict[Segment, SensorQuality] = {}
     notices: list[Notice] = [n for n in (*recording.notices, *uniform.notices) if n.severity == "error"]
     if not rest:
@@ -151,7 +165,8 @@ def assess(
     for segment, signals in uniform.sensors.items():
         quality, found = _sensor(segment, signals, recording, uniform, rest, params)
         sensors[segment] = quality
-        notices += found
+        # of one that does not measure no unit, range or hole need be told beside that
+        notices += found if working is None or segment in working else []
     notices += _copies(recording)
     level, reasons = _level(sensors, [*uniform.notices, *notices], params)
     return QualityReport(

@@ -11,7 +11,7 @@ from core.frames import Segment
 from core.quality.signals import facts
 from core.quality.suggestion import Suggestion, suggest
 from core.quality.suspicion import suspicions
-from core.recording import ImuStream, Recording
+from core.recording import ImuStream, Recording, Subject
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Inspection:
 
     devices: tuple[DeviceFacts, ...]
     duration_s: float
-    height_m: float | None
+    subject: Subject
     protocol: str
     notices: tuple[Notice, ...]
 
@@ -90,7 +90,7 @@ class Inspection:
         return {
             "devices": [d.to_json() for d in self.devices],
             "duration_s": round(self.duration_s, 3),
-            "height_m": self.height_m,
+            "subject": self.subject.to_json(),
             "protocol": self.protocol,
             "notices": [n.to_json() for n in self.notices],
         }
@@ -121,7 +121,7 @@ def describe(recording: Recording) -> Inspection:
     return Inspection(
         devices=tuple(devices),
         duration_s=max(ends) - min(starts) if ends else 0.0,
-        height_m=recording.subject.height_m,
+        subject=recording.subject,
         protocol=recording.protocol,
         notices=recording.notices,
     )

@@ -124,7 +124,10 @@ def _rest_before(acc: Floats, onset: int, rate_hz: float) -> slice | None:
     if not starts:
         return None
     parts = [acc[s : s + width] for s in starts]
-    unrest = np.array([np.linalg.norm(p.std(axis=0)) / np.linalg.norm(p.mean(axis=0)) for p in parts])
+    force = np.array([np.linalg.norm(p.mean(axis=0)) for p in parts])
+    unrest = np.array([np.linalg.norm(p.std(axis=0)) for p in parts])
+    # where there is no gravity nothing tells which way is up
+    unrest = np.divide(unrest, force, out=np.full_like(force, np.inf), where=force > 0.0)
     if unrest.min() > STILL:
         return None
     chosen = starts[int(np.flatnonzero(unrest <= 1.2 * unrest.min())[-1])]

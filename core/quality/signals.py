@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from core.frames import GRAVITY, Floats
 
 STILL: Final = 0.03
-"""A second is still when acc varies less than this share of its mean (0.25 m/s², spec/real-data.md §2.1)."""
+"""A second is still when acc varies less than this share of its mean (0.25 m/s²:
+docs/science/quality.md, "Stillness of one sensor")."""
 PLATEAU: Final = 3
 """Neighbouring samples at the largest value that make a plateau: noise does not repeat it [our choice]."""
 RANGES: Final = (
@@ -105,7 +106,7 @@ def saturation(x: Floats, floor: float) -> tuple[float, float | None]:
     """
     clipped = np.zeros(len(x), np.bool_)
     value: float | None = None
-    for axis in np.nan_to_num(x, nan=0.0).T:
+    for axis in np.nan_to_num(x, nan=0.0, posinf=0.0, neginf=0.0).T:
         for signed in (axis, -axis):
             top = float(signed.max())
             if top < floor:
@@ -126,7 +127,7 @@ def saturation(x: Floats, floor: float) -> tuple[float, float | None]:
 def magnetic_share(mag: Floats, still: slice, limit: float) -> float | None:
     """Share of samples whose |m| differs from its own norm at rest by more than `limit` (fraction).
 
-    None when the magnetometer has no reading at rest. Source: spec/fusion.md §4.6.
+    None when the magnetometer has no reading at rest. Source: docs/science/quality.md, "Magnetic field".
     """
     norm = np.linalg.norm(mag, axis=1)
     rest = norm[still]

@@ -101,6 +101,8 @@ def _by_movement(streams: list[ImuStream]) -> dict[str, Suggestion]:
         return {}
     force = np.linalg.norm(acc, axis=2)
     shaking = np.stack([smooth(np.abs(np.diff(f, prepend=f[0])), SMOOTH_S, GRID_HZ) for f in force])
+    if not (np.ptp(rates[:, walking], axis=1).all() and np.ptp(shaking[:, walking], axis=1).all()):
+        return {}  # one of them does not measure
     energy = np.sqrt((rates[:, walking] ** 2).mean(axis=1))
     alike: Floats = np.asarray(np.corrcoef(rates[:, walking]), np.float64)
     bond = alike + np.asarray(np.corrcoef(shaking[:, walking]), np.float64)

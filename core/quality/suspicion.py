@@ -1,7 +1,7 @@
 """Units and signs that make every later number wrong: found by physics, said before anything is computed.
 
-Thresholds: spec/fusion.md §9 (rest norm 9.81 m/s² or 1 g ± 10 %, gyroscope at rest below 0.2 rad/s, largest
-rate above 10 °/s) unless marked as our choice.
+Thresholds: docs/science/quality.md, "Units and signs" (rest norm 9.81 m/s² or 1 g ± 10 %, gyroscope at rest
+below 0.2 rad/s, largest rate above 10 °/s) unless marked as our choice.
 """
 
 from __future__ import annotations

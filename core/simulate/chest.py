@@ -1,4 +1,5 @@
-"""A sensor on the breastbone while a person sits, stands, lies and walks (spec/patients.md §5).
+"""A sensor on the breastbone while a person sits, stands, lies and walks
+(docs/science/simulation.md, "Chest").
 
 For the recognition of postures and of rising from a chair. It moves in one plane: no rolling over in bed, no
 turning, no stairs; it has not been compared with recordings of a chest.
@@ -47,7 +48,8 @@ POSTURES: Final[Mapping[Posture, Held]] = MappingProxyType(
 )
 
 CHANGE_S: Final = 1.5
-"""Duration of rising and sitting down; healthy people take 1.5 ± 0.3 s (spec/clinic.md iTUG)."""
+"""Duration of rising and sitting down; healthy people take 1.5 ± 0.3 s
+(docs/science/simulation.md, "Chest")."""
 
 LYING_S: Final = 3.0
 """Duration of lying down and getting up."""

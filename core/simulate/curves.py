@@ -3,7 +3,7 @@
 Pelvis and hip adduction are fits of the WBDS adult means (Fukuchi 2018, n = 42; rotation and obliquity made
 antisymmetric, tilt symmetric between the sides). Hip, knee, ankle and foot pitch are WBDS fits plus
 corrections fitted once, so that the *resulting* curves meet the WBDS means at step 0.64 m, 0.54 s: they are
-commands, not the curves that come out (spec/patients.md §1 "Target curves").
+commands, not the curves that come out (docs/science/simulation.md, "Target curves").
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The seven bodies in motion: prescribed feet and pelvis, legs by closed-form inverse kinematics.
 
 The feet are therefore exactly still in stance and the joint centres coincide to rounding
-(spec/estimators.md §2.2, patients.md §1). The knee is a hinge: its adduction and rotation are zero.
+(docs/science/simulation.md, "Legs"). The knee is a hinge: its adduction and rotation are zero.
 """
 
 from __future__ import annotations

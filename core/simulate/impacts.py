@@ -1,8 +1,8 @@
 """The shock of contact: every sensor of the leg and the pelvis shakes on its segment for a tenth of a second.
 
 It is given as motion of the sensor, so acceleration, rate and pose belong together; the segment itself does
-not notice. Size and rhythm resemble shoes on a hard floor, they are not measured ones (spec/patients.md §1
-"Impacts").
+not notice. Size and rhythm resemble shoes on a hard floor, they are not measured ones
+(docs/science/simulation.md, "Impacts").
 """
 
 from __future__ import annotations

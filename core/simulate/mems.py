@@ -18,7 +18,7 @@ GYR_RANGE: Final = radians(2000.0)
 
 @dataclass(frozen=True)
 class SensorNoise:
-    """Errors of one sensor; densities are per √Hz, walks per √s (spec/estimators.md §2.2 "MEMS").
+    """Errors of one sensor; densities are per √Hz, walks per √s (docs/science/simulation.md, "Devices").
 
     Parameters
     ----------

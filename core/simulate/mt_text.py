@@ -1,4 +1,4 @@
-"""Streams as Xsens MT Manager 4.x writes them: one text file per sensor (spec/clinic.md §5)."""
+"""Streams as Xsens MT Manager 4.x writes them: one text file per sensor (docs/formats.md)."""
 
 from __future__ import annotations
 

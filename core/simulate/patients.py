@@ -1,4 +1,5 @@
-"""Twelve virtual people: how each walks differently from the healthy reference (spec/patients.md §3).
+"""Twelve virtual people: how each walks differently from the healthy reference
+(docs/science/simulation.md, "Virtual people").
 
 One body, plausible in scale, no clinical data: they show that the analysis finds and names a deviation, never
 how well it does on patients. Where one side is affected it is the left. Parameters are commands; what comes

@@ -1,7 +1,7 @@
 """The pelvis: its way over the floor, its angles, and its height from the knee of the loaded leg.
 
 Height from the loaded knee (not from a fixed vertical wave) is what brings the stance knee to the norm
-(spec/patients.md §0.2, §1 "Pelvis").
+(docs/science/simulation.md, "Pelvis").
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """The three-body walker of Potter et al. 2021 (data set 1): a pelvis and two straight legs with hinged hips.
 
-It exists to reproduce that paper's Tables 2 and 3; people do not walk like this (spec/estimators.md §2.1).
-Sensors sit 8 cm above the middle of the hips and at the ends of the legs, turned as their segments.
+It exists to reproduce that paper's Tables 2 and 3; people do not walk like this
+(docs/science/simulation.md, "Potter's walker"). Sensors sit 8 cm above the middle of the hips and at the ends
+of the legs, turned as their segments.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ ACC_SD: Final = 0.027
 """White noise of the accelerometer per sample at 512 Hz, m/s² (Potter Table 1)."""
 
 GYR_SD: Final = float(np.radians(5.66))
-"""White noise of the gyroscope per sample at 512 Hz, rad/s (Potter Table 1; spec/estimators.md §0.1)."""
+"""White noise of the gyroscope per sample at 512 Hz, rad/s (Potter Table 1;
+docs/science/erkf.md, "Departures from the paper")."""
 
 
 @dataclass(frozen=True)

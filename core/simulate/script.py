@@ -1,8 +1,8 @@
 """What the person does: script items, and the footprints they lead to.
 
 Each walking item is cut into steps; before standing a short closing step brings the feet together. A step
-carries its own drawn deviations, so the footprints are the exact truth (spec/estimators.md §2.2,
-patients.md §1).
+carries its own drawn deviations, so the footprints are the exact truth
+(docs/science/simulation.md, "Footprints").
 """
 
 from __future__ import annotations

@@ -58,13 +58,14 @@ _LAP: Script = (
 
 
 def _bouts(patient: Patient, bout_m: float = 12.0) -> Scenario:
-    """Two straight bouts with a stop, the take the signatures of spec/patients.md §3 were measured on."""
+    """Two straight bouts with a stop, the take the signatures of virtual people were measured on."""
     bout = Straight(bout_m, patient.step_m, patient.step_s)
     return Scenario(patient.title, (Stand(6.0), bout, Stand(2.0), bout, Stand(4.0)), walker=patient.walker)
 
 
 def _festination(start: Patient, steps: int = 14) -> Scenario:
-    """Steps that grow shorter and quicker, a freeze of 4 s, and the same again (spec/patients.md §3)."""
+    """Steps that grow shorter and quicker, a freeze of 4 s, and the same again
+    (docs/science/simulation.md, "Virtual people")."""
     hurry = Steps(
         tuple((start.step_m * (1 - 0.035 * i), 0.0, start.step_s * (1 - 0.02 * i)) for i in range(steps))
     )

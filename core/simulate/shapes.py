@@ -1,7 +1,7 @@
 """The smooth pieces every simulated path is made of: all are at least C³, so accelerations have no steps.
 
 A hard maximum on the knee gives acceleration spikes of 1,800 m/s², a blend weight that is not zero at
-foot-off 290 m/s² (spec/patients.md §1 "Continuity").
+foot-off 290 m/s² (docs/science/simulation.md).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from core.frames import Floats
 
 
 def smoothstep(u: Floats) -> Floats:
-    """C³ step from 0 (u ≤ 0) to 1 (u ≥ 1), of any shape (spec/estimators.md §2.1)."""
+    """C³ step from 0 (u ≤ 0) to 1 (u ≥ 1), of any shape (docs/science/simulation.md)."""
     u = np.clip(u, 0.0, 1.0)
     return u**4 * (35.0 - 84.0 * u + 70.0 * u**2 - 20.0 * u**3)
 
@@ -49,7 +49,7 @@ def smooth(x: Floats, window: int) -> Floats:
 def join(u: Floats, start: Floats, end: Floats) -> Floats:
     """Correction over u ∈ [0, 1] that takes on the value AND the rate of `start` at 0 and of `end` at 1.
 
-    Without the rates foot-off peaks were 13–16 g (spec/patients.md §1 "Swing foot").
+    Without the rates foot-off peaks were 13–16 g (docs/science/simulation.md, "Swing foot").
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Skin and muscle under a sensor: thigh and shank sensors turn and slide a little as hip and knee bend.
 
-A deterministic function of the joint angles, zero in standing (spec/estimators.md §2.2 "Soft tissue"; its
+A deterministic function of the joint angles, zero in standing (docs/science/simulation.md, "Soft tissue"; its
 size is a judgement, real artefacts differ between people and places).
 """
 

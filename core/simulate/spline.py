@@ -1,7 +1,7 @@
 """Velocities and accelerations of sampled poses: exact derivatives of quintic interpolating splines.
 
-Truth and signals come from one curve, so integrating the signals gives the truth back (spec/estimators.md
-§2.2).
+Truth and signals come from one curve, so integrating the signals gives the truth back
+(docs/science/simulation.md, "Signals").
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """The foot on the floor: heel rocker after contact, flat and exactly still, rolling forefoot at push-off.
 
 A rigid foot that pivots about a point cannot push off as people do (the ankle stays 4 cm too low at 60 % of
-the cycle); the forefoot therefore rolls on a radius without slip (spec/patients.md §0.3, §1 "Contact foot").
+the cycle); the forefoot therefore rolls on a radius without slip
+(docs/science/simulation.md, "Contact foot").
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The foot in the air: the leg follows the target angles, corrected onto the contact paths at both ends.
 
-Stance is given in world space, swing in joint space (spec/patients.md §0.2, §1 "Swing foot").
+Stance is given in world space, swing in joint space (docs/science/simulation.md, "Swing foot").
 """
 
 from __future__ import annotations
@@ -27,9 +27,8 @@ HIP_STANDING = 10.0 * DEGREE
 
 LANDING_RISE = 14.0 * DEGREE
 """Rise of the pitch over the second half of swing, so that its maximum is at contact; without it the pitch
-peaks up to 0.1 s early (spec/patients.md §1). The specification's 6° over the last 30 % leave the pitch of
-those who land nearly flat level for 0.1 s, and half a degree of error in an orientation then moves its
-maximum by 150 ms."""
+peaks up to 0.1 s early. A rise of 6° over the last 30 % leaves the pitch of those who land nearly flat level
+for 0.1 s, and half a degree of error in an orientation then moves its maximum by 150 ms."""
 
 TIP_FROM, TIP_TO = 0.50, 0.85
 """Shares of the swing between which the pitch takes on its landing path."""

@@ -20,7 +20,8 @@ def event_table(truth: Truth) -> dict[str, Column]:
     """`time_s`, `side`, `kind` and `source` of all contacts in order of time.
 
     Terminal contact has two rows: source "truth_release" (last touch) and "truth_lift5" (sole 5 mm up, what
-    detectors and force plates come close to); compare detectors with the latter (spec/patients.md §0.6).
+    detectors and force plates come close to); compare detectors with the latter
+    (docs/science/simulation.md, "Timing").
     """
     rows: list[tuple[float, str, str, str]] = []
     for side in SIDES:

@@ -1,4 +1,5 @@
-"""Target angles of one leg: the healthy curves with what this side does differently (spec/patients.md §1).
+"""Target angles of one leg: the healthy curves with what this side does differently
+(docs/science/simulation.md, "Target curves").
 
 Centres and widths of the humps are phases of the own cycle, 0 = initial contact.
 """

@@ -39,7 +39,7 @@ class FootTiming:
 
 
 def foot_timing(plan: Plan, walker: Walker, side: Side) -> FootTiming:
-    """Times of one foot (spec/patients.md §1 "Events")."""
+    """Times of one foot (docs/science/simulation.md, "Timing")."""
     gait = walker.sides[side]
     prints = plan.footprints[side]
     rows = []
@@ -80,7 +80,7 @@ def gait_phase(t: Floats, plan: Plan, timing: FootTiming, rate_hz: float) -> Flo
     """Unwrapped phase (n,) of one leg: whole numbers at its contacts.
 
     The other foot's contact is pinned to one half: without it slow or uneven gaits land with 20–29° knee
-    flexion instead of 4–9° (spec/patients.md §1 "Phase").
+    flexion instead of 4–9° (docs/science/simulation.md, "Timing").
     """
     if not len(timing.contact):
         return np.full(len(t), STANDING_PHASE)

@@ -1,7 +1,7 @@
 """What really happened: poses, angles, contacts and strides that belong to a simulated recording.
 
-Angles follow the sequence and signs of spec/clinic.md §1, taken here from the rotation matrices on their own,
-so that a sign error in core/angles.py cannot hide.
+Angles follow the sequence and signs of docs/coordinate-systems.md, taken here from the rotation matrices on
+their own, so that a sign error in core/angles.py cannot hide.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from core.simulate.timing import FootTiming
 from core.simulate.walker import SIGN
 
 LIFT_M = 0.005
-"""Foot off the floor as detectors see it: lowest sole point this high (spec/patients.md §0.6)."""
+"""Foot off the floor as detectors see it: lowest sole point this high
+(docs/science/simulation.md, "Timing")."""
 
 ZERO_MARGIN_S = (0.5, 1.0)
 """Left out of the first standing, at its start and end, for the zero: the pelvis prepares the first step."""
@@ -179,7 +180,8 @@ def joint_angles(q: Mapping[Segment, Floats]) -> dict[str, Floats]:
 
 
 def _cardan(proximal: Floats, distal: Floats) -> tuple[Floats, Floats, Floats]:
-    """Angles a, b, c (n,) of proximalᵀ distal = Rz(a) Rx(b) Ry(c) (spec/clinic.md §1)."""
+    """Angles a, b, c (n,) of proximalᵀ distal = Rz(a) Rx(b) Ry(c)
+    (docs/science/joint-angles.md, "Joints")."""
     r = np.swapaxes(proximal, 1, 2) @ distal
     return (
         np.arctan2(-r[:, 0, 1], r[:, 1, 1]),

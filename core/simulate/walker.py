@@ -22,7 +22,7 @@ SIGN: Mapping[Side, float] = {"right": 1.0, "left": -1.0}
 
 @dataclass(frozen=True)
 class Anatomy:
-    """Lengths in m (spec/patients.md §1); the sole is a heel point, a flat part and a rolling forefoot.
+    """Lengths in m; the sole is a heel point, a flat part and a rolling forefoot.
 
     Parameters
     ----------
@@ -57,7 +57,8 @@ class Anatomy:
 
 @dataclass(frozen=True)
 class SideGait:
-    """How one leg walks; phases are fractions of the own stride (spec/patients.md §3 "Default SIDE").
+    """How one leg walks; phases are fractions of the own stride
+    (docs/science/simulation.md, "Timing", "Target curves").
 
     Parameters
     ----------
@@ -98,7 +99,8 @@ class SideGait:
 
 @dataclass(frozen=True)
 class Variability:
-    """Standard deviations from step to step; time and length relative (spec/patients.md §2 "Variability")."""
+    """Standard deviations from step to step; time and length relative
+    (docs/science/simulation.md, "Footprints")."""
 
     step_time: float = 0.012
     step_length: float = 0.027
@@ -126,7 +128,8 @@ class Walker:
     rotation_factor, obliquity_factor : on the pelvis curves.
     tibial_rotation_rad : internal rotation of the shank that comes with a right angle at the knee.
     lands_rising : the foot pitches up until it touches the floor. People differ in this, and event rules
-        that look for the largest pitch are early by up to 0.1 s without it (spec/patients.md §3).
+        that look for the largest pitch are early by up to 0.1 s without it
+        (docs/science/simulation.md, "Swing foot").
     impact : how hard the feet land, 1 = as most people at 1.2 m/s.
     """
 

@@ -7,8 +7,8 @@ from typing import Annotated
 from fastapi import APIRouter
 from starlette.responses import Response
 
-from server import audit, schemas
-from server.api.context import Blobs, Db, Id, Queue
+from server import schemas
+from server.api.context import Blobs, Db, Id, OpenTrail, Queue
 from server.api.documents import refusals
 from server.api.downloads import attachment
 from server.auth.access import require
@@ -39,19 +39,21 @@ def analyse(
 
 
 @router.get("/sessions/{session_id}/analyses", response_model=list[schemas.Analysis])
-def list_analyses(session_id: Id, db: Db, who: Reader) -> list[schemas.Analysis]:
+def list_analyses(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[schemas.Analysis]:
     """The finished analyses of a session, the one its pages show first."""
     with db.read() as c:
         sessions.get(c, session_id)
-        return [_shown(found) for found in analyses.of_session(c, session_id)]
+        made = analyses.of_session(c, session_id)
+    trail.watched(who, "analyses.opened", "session", session_id)
+    return [_shown(found) for found in made]
 
 
 @router.get("/analyses/{analysis_id}", response_model=schemas.Analysis)
-def read_analysis(analysis_id: Id, db: Db, who: Reader) -> schemas.Analysis:
+def read_analysis(analysis_id: Id, db: Db, trail: OpenTrail, who: Reader) -> schemas.Analysis:
     """Open an analysis: what went in, by what version, and which files came out."""
-    with db.write() as c:
+    with db.read() as c:
         found = analyses.get(c, analysis_id)
-        audit.record(c, who, "analysis.opened", "analysis", analysis_id)
+    trail.opened(who, "analysis.opened", "analysis", analysis_id)
     return _shown(found)
 
 
@@ -65,12 +67,12 @@ def read_analysis(analysis_id: Id, db: Db, who: Reader) -> schemas.Analysis:
         }
     },
 )
-def read_file(analysis_id: Id, name: str, db: Db, blobs: Blobs, who: Reader) -> Response:
+def read_file(analysis_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
     """Download a result file; its name says which analysis it is of, never of whom."""
-    with db.write() as c:
+    with db.read() as c:
         found = analyses.get(c, analysis_id)
-        content = analyses.file_bytes(blobs, found, name)
-        audit.record(c, who, "analysis.file_opened", "analysis", analysis_id, {"file": name})
+    content = analyses.file_bytes(blobs, found, name)
+    trail.opened(who, "analysis.file_opened", "analysis", analysis_id, {"file": name})
     stem, dot, ending = name.rpartition(".")
     return attachment(content, f"{stem}-{analysis_id[:8]}{dot}{ending}")
 

@@ -8,8 +8,8 @@ from fastapi import APIRouter
 from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
-from server import audit, trend_schemas
-from server.api.context import Blobs, Db, Id
+from server import trend_schemas
+from server.api.context import Blobs, Db, Id, OpenTrail
 from server.api.documents import refusals
 from server.api.downloads import BINARY, attachment
 from server.auth.access import require
@@ -21,6 +21,7 @@ from server.services import comparisons
 from server.services.comparisons import Pair
 from server.services.histories import Analysed
 from server.storage.db import Database
+from server.trail import Trail
 
 router = APIRouter(prefix="/sessions/{session_id}/compare", tags=["trends"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -32,12 +33,13 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("/{other_id}", response_model=None, responses=_JSON)
-def compare(session_id: Id, other_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+def compare(session_id: Id, other_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
     """Every figure before and after, its change against MDC and MCID, and what may be in the way."""
-    found = _opened(db, who, session_id, other_id)
+    found = _opened(db, trail, who, session_id, other_id)
     content = {
         "before": _session(found.before),
         "after": _session(found.after),
+        "comparable": found.comparable,
         "cautions": found.cautions,
         "changes": [{**vars(r.change), "words": r.words.verdict} for r in comparisons.rows(blobs, found)],
     }
@@ -45,17 +47,19 @@ def compare(session_id: Id, other_id: Id, db: Db, blobs: Blobs, who: Reader) -> 
 
 
 @router.get("/{other_id}/changes.csv", response_class=Response, responses=_CSV)
-def compare_as_table(session_id: Id, other_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+def compare_as_table(
+    session_id: Id, other_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
+) -> Response:
     """The same as a table."""
-    found = _opened(db, who, session_id, other_id)
+    found = _opened(db, trail, who, session_id, other_id)
     name = f"changes-{found.before.session.id[:8]}-{found.after.session.id[:8]}.csv"
     return attachment(comparison_csv(comparisons.rows(blobs, found)), name)
 
 
-def _opened(db: Database, who: Identity, session_id: str, other_id: str) -> Pair:
-    with db.write() as c:
+def _opened(db: Database, trail: Trail, who: Identity, session_id: str, other_id: str) -> Pair:
+    with db.read() as c:
         found = comparisons.pair(c, session_id, other_id)
-        audit.record(c, who, "comparison.opened", "session", session_id, {"with": other_id})
+    trail.opened(who, "comparison.opened", "session", session_id, {"with": other_id})
     return found
 
 
@@ -65,5 +69,6 @@ def _session(a: Analysed) -> dict[str, Any]:
         "performed_on": a.session.performed_on.isoformat(),
         "title": a.session.title,
         "protocol": a.session.protocol,
+        "condition": {**vars(a.condition), "words": a.condition.words},
         "analysis_id": a.found.id,
     }

@@ -15,6 +15,7 @@ from server.live.hub import Hub
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.trail import Trail
 
 
 def _settings(connection: HTTPConnection) -> Settings:
@@ -31,6 +32,10 @@ def _blobs(connection: HTTPConnection) -> BlobStore:
 
 def _logins(connection: HTTPConnection) -> Logins:
     return cast("Logins", connection.app.state.logins)
+
+
+def _trail(connection: HTTPConnection) -> Trail:
+    return cast("Trail", connection.app.state.trail)
 
 
 def _throttle(connection: HTTPConnection) -> Throttle:
@@ -55,6 +60,7 @@ Blobs = Annotated[BlobStore, Depends(_blobs)]
 Queue = Annotated[JobQueue, Depends(_queue)]
 Feed = Annotated[JobFeed, Depends(_feed)]
 LiveHub = Annotated[Hub, Depends(_hub)]
+OpenTrail = Annotated[Trail, Depends(_trail)]
 OpenLogins = Annotated[Logins, Depends(_logins)]
 Failures = Annotated[Throttle, Depends(_throttle)]
 

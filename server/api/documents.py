@@ -21,7 +21,7 @@ _WORDS = {
     "422": "A field or the data is not as expected",
     "429": "Too many failed attempts",
     "503": "Busy with other changes or sign-ins; try again in some seconds",
-    "507": "Not enough free disk space",
+    "507": "The server's disk is full or cannot be written; nothing was saved",
 }
 _PROBLEM = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/ProblemDetails"}}}
 
@@ -55,7 +55,7 @@ def _complete(document: dict[str, Any]) -> dict[str, Any]:
     for path, item in document["paths"].items():
         for method, operation in item.items():
             responses = operation["responses"]
-            common = {"400", "422", "503"} if path.startswith("/api/") else {"400"}
+            common = {"400", "422", "503", "507"} if path.startswith("/api/") else {"400"}
             if operation.get("security") != []:
                 common |= {"401", "403"}
             if method not in {"get", "head"}:

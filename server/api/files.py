@@ -12,8 +12,8 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 
-from server import audit, schemas
-from server.api.context import Blobs, Config, Db, Id
+from server import schemas
+from server.api.context import Blobs, Config, Db, Id, OpenTrail
 from server.api.documents import refusals
 from server.api.downloads import BINARY, attachment
 from server.auth.access import require
@@ -46,7 +46,7 @@ _FORM = {
     "/{name:path}",
     status_code=201,
     response_model=schemas.StoredFile,
-    responses=refusals(413, 507),
+    responses=refusals(413),
     openapi_extra={"requestBody": {"required": True, **_RAW}},
 )
 async def put_file(
@@ -59,8 +59,8 @@ async def put_file(
     who: Annotated[Identity, require(Action.UPLOAD)],
 ) -> recordings.RecordedFile:
     """Add a file to the current recording, the raw body as its content; the same name replaces it."""
-    _check_declared(request, settings.max_file_bytes)
-    upload = await run_in_threadpool(recordings.receive, db, blobs, settings, who, session_id, name)
+    size = _declared(request, settings.max_file_bytes)
+    upload = await run_in_threadpool(recordings.receive, db, blobs, settings, who, session_id, name, size)
     with upload:
         try:
             async for chunk in _megabytes(request):
@@ -74,7 +74,7 @@ async def put_file(
     "",
     status_code=201,
     response_model=list[schemas.StoredFile],
-    responses=refusals(411, 413, 507),
+    responses=refusals(411, 413),
     openapi_extra={"requestBody": {"required": True, **_FORM}},
 )
 async def post_files(
@@ -91,9 +91,10 @@ async def post_files(
             411, "length_required", "A form upload must say its length. Send a Content-Length header."
         )
     # boundaries and part headers take some hundred bytes a file
-    _check_declared(request, settings.max_set_bytes + 1000 * settings.max_files)
+    size = _declared(request, settings.max_set_bytes + 1000 * settings.max_files)
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise Problem(422, "no_form", "Expected multipart/form-data with the field 'files'.")
+    await run_in_threadpool(recordings.require_room, blobs, settings, size)
     parser = MultiPartParser(
         request.headers, request.stream(), max_files=settings.max_files, max_fields=settings.max_files
     )
@@ -132,13 +133,14 @@ def read_file(
     name: FileName,
     db: Db,
     blobs: Blobs,
+    trail: OpenTrail,
     who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """Download an original file, byte for byte."""
-    with db.write() as c:
+    with db.read() as c:
         recording = recordings.require_current(c, session_id)
         content = recordings.file_bytes(c, blobs, recording.id, name)
-        audit.record(c, who, "recording.file_opened", "recording", recording.id)
+    trail.opened(who, "recording.file_opened", "recording", recording.id)
     return attachment(content, name.rpartition("/")[2], "application/octet-stream")
 
 
@@ -151,8 +153,8 @@ def delete_file(
         return recordings.remove_file(c, who, session_id, name)
 
 
-def _check_declared(request: Request, limit: int) -> None:
-    """Refuse before a byte is read when the client itself says that it is too much."""
+def _declared(request: Request, limit: int) -> int:
+    """Return how many bytes the client announces, 0 = it does not say; raise Problem 413 beyond it."""
     declared = request.headers.get("content-length", "0")
     if not declared.isdecimal() or int(declared) > limit:
         raise Problem(
@@ -161,6 +163,7 @@ def _check_declared(request: Request, limit: int) -> None:
             f"The body has {declared} bytes, at most {limit} are taken. "
             "Split the recording or ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
         )
+    return int(declared)
 
 
 async def _megabytes(request: Request) -> AsyncIterator[bytes]:

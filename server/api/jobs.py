@@ -13,7 +13,7 @@ from starlette.responses import StreamingResponse
 
 from server import schemas
 from server.api import context
-from server.api.context import Db, Id
+from server.api.context import Db, Id, OpenTrail
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -33,20 +33,25 @@ Reader = Annotated[Identity, require(Action.READ_JOB)]
 @router.get("", response_model=list[schemas.ListedJob])
 def list_jobs(
     db: Db,
+    trail: OpenTrail,
     who: Reader,
     active: Annotated[bool, Query(description="only queued and running ones")] = False,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> list[schemas.ListedJob]:
     """Jobs, the newest first."""
     with db.read() as c:
-        return [_shown(found) for found in jobs.listing(c, active_only=active, limit=limit)]
+        rows = jobs.listing(c, active_only=active, limit=limit)
+    trail.watched(who, "job.listed", "job", None)
+    return [_shown(found) for found in rows]
 
 
 @router.get("/{job_id}", response_model=schemas.ListedJob)
-def read_job(job_id: Id, db: Db, who: Reader) -> schemas.ListedJob:
+def read_job(job_id: Id, db: Db, trail: OpenTrail, who: Reader) -> schemas.ListedJob:
     """One job: its progress, or why it failed."""
     with db.read() as c:
-        return _shown(jobs.get(c, job_id))
+        found = jobs.get(c, job_id)
+    trail.watched(who, "job.opened", "job", job_id)
+    return _shown(found)
 
 
 @router.get(

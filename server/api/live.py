@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 
 from server import live_schemas as schemas
-from server.api.context import Db, Failures, Id, LiveHub, address_of
+from server.api.context import Db, Failures, Id, LiveHub, OpenTrail, address_of
 from server.api.documents import PUBLIC, refusals
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -36,10 +36,11 @@ async def open_take(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> dic
 
 
 @router.get("/sessions/{session_id}/live", response_model=schemas.LiveState)
-def read_take(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> dict[str, Any]:
+def read_take(session_id: Id, db: Db, hub: LiveHub, trail: OpenTrail, who: Therapist) -> dict[str, Any]:
     """Where the session's newest take stands."""
     with db.read() as c:
         sessions.get(c, session_id)
+    trail.watched(who, "live.watched", "session", session_id)
     return hub.standing(session_id)
 
 
@@ -78,11 +79,13 @@ async def close_take(session_id: Id, hub: LiveHub, who: Therapist) -> live.Take:
 
 
 @router.get("/sessions/{session_id}/live/events", response_model=list[schemas.LiveEvent])
-def list_events(session_id: Id, db: Db, who: Therapist) -> list[live.LiveEvent]:
+def list_events(session_id: Id, db: Db, trail: OpenTrail, who: Therapist) -> list[live.LiveEvent]:
     """What happened in the session's takes, in order."""
     with db.read() as c:
         sessions.get(c, session_id)
-        return [event for take in live.takes_of(c, session_id) for event in live.events(c, take.id)]
+        found = [event for take in live.takes_of(c, session_id) for event in live.events(c, take.id)]
+    trail.watched(who, "live.events_opened", "session", session_id)
+    return found
 
 
 @router.post(
@@ -94,7 +97,7 @@ def list_events(session_id: Id, db: Db, who: Therapist) -> list[live.LiveEvent]:
     openapi_extra=PUBLIC,
 )
 async def pair(
-    request: Request, body: schemas.Pairing, db: Db, hub: LiveHub, failures: Failures
+    request: Request, body: schemas.Pairing, db: Db, hub: LiveHub, trail: OpenTrail, failures: Failures
 ) -> dict[str, Any]:
     """Join a tablet to a take by its code; a code works once."""
     # counted per address: a stranger cannot keep other tablets out by guessing
@@ -111,6 +114,7 @@ async def pair(
         paired, take = await run_in_threadpool(write)
     except live.CodeNotValid:
         failures.fail(who, address)
+        await run_in_threadpool(trail.refused, "live.pairing_failed", "live", None, address)
         raise
     failures.succeed(who, address)
     hub.tell_row(take)

@@ -6,8 +6,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from server import audit, schemas
-from server.api.context import Blobs, Config, Db, Id, LiveHub
+from server import schemas
+from server.api.context import Blobs, Config, Db, Id, LiveHub, OpenTrail
 from server.api.documents import refusals
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -20,6 +20,7 @@ router = APIRouter(prefix="/patients", tags=["patients"])
 @router.get("", response_model=list[schemas.Patient])
 def list_patients(
     db: Db,
+    trail: OpenTrail,
     who: Annotated[Identity, require(Action.READ_PATIENT)],
     q: Annotated[str, Query(max_length=200, description="part of a code or a note")] = "",
     limit: Annotated[int, Query(ge=1, le=1000)] = 200,
@@ -27,7 +28,9 @@ def list_patients(
 ) -> list[patients.Patient]:
     """All patients, the latest visit first."""
     with db.read() as c:
-        return patients.listing(c, search=q, limit=limit, offset=offset)
+        found = patients.listing(c, search=q, limit=limit, offset=offset)
+    trail.watched(who, "patient.listed", "patient", None)
+    return found
 
 
 @router.post("", status_code=201, response_model=schemas.Patient, responses=refusals(409))
@@ -41,12 +44,12 @@ def add_patient(
 
 @router.get("/{patient_id}", response_model=schemas.Patient)
 def read_patient(
-    patient_id: Id, db: Db, who: Annotated[Identity, require(Action.READ_PATIENT)]
+    patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_PATIENT)]
 ) -> patients.Patient:
     """Open a patient."""
-    with db.write() as c:
+    with db.read() as c:
         found = patients.get(c, patient_id)
-        audit.record(c, who, "patient.opened", "patient", patient_id)
+    trail.opened(who, "patient.opened", "patient", patient_id)
     return found
 
 
@@ -79,17 +82,19 @@ def delete_patient(
         else:
             visits = []
     hub.drop_from_thread(visits)
-    erasure.erase_patient(db, blobs, settings.live, who, patient_id, confirm=confirm)
+    erasure.erase_patient(db, blobs, settings, who, patient_id, confirm=confirm)
 
 
 @router.get("/{patient_id}/sessions", response_model=list[schemas.Session])
 def list_sessions(
-    patient_id: Id, db: Db, who: Annotated[Identity, require(Action.READ_SESSION)]
+    patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> list[sessions.Session]:
     """The patient's visits, the newest first."""
     with db.read() as c:
         patients.get(c, patient_id)
-        return sessions.of_patient(c, patient_id)
+        found = sessions.of_patient(c, patient_id)
+    trail.opened(who, "sessions.opened", "patient", patient_id)
+    return found
 
 
 @router.post(

@@ -9,9 +9,8 @@ from starlette.responses import Response
 
 from core.feedback import PARAMETERS
 from core.feedback.prescription import SOURCES
-from server import audit
 from server import feedback_schemas as schemas
-from server.api.context import Blobs, Db, Id
+from server.api.context import Blobs, Db, Id, OpenTrail
 from server.api.documents import refusals
 from server.api.downloads import BINARY, attachment
 from server.auth.access import require
@@ -21,9 +20,10 @@ from server.problems import Problem
 from server.report.feedback_words import prescription_words
 from server.report.tables import feedback_csv
 from server.schemas import Side
-from server.services import feedback, patients, prescriptions, targets
+from server.services import feedback, histories, patients, prescriptions, sessions, targets
 from server.services.prescriptions import Written
 from server.storage.db import Database
+from server.trail import Trail
 
 router = APIRouter(tags=["feedback"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -34,11 +34,13 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("/patients/{patient_id}/prescriptions", response_model=list[schemas.Prescription])
-def list_prescriptions(patient_id: Id, db: Db, who: Reader) -> list[dict[str, Any]]:
+def list_prescriptions(patient_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[dict[str, Any]]:
     """The patient's prescriptions, the newest first; one that has not ended is in force."""
     with db.read() as c:
         patients.get(c, patient_id)
-        return [_shown(w) for w in prescriptions.of_patient(c, patient_id)]
+        written = prescriptions.of_patient(c, patient_id)
+    trail.opened(who, "prescriptions.opened", "patient", patient_id)
+    return [_shown(w) for w in written]
 
 
 @router.post("/patients/{patient_id}/prescriptions", status_code=201, response_model=schemas.Prescription)
@@ -64,6 +66,7 @@ def read_targets(
     patient_id: Id,
     db: Db,
     blobs: Blobs,
+    trail: OpenTrail,
     who: Reader,
     parameter: Annotated[str, Query(max_length=64, description="one that a prescription can train")],
     side: Annotated[Side | None, Query(description="that is trained; none = both")] = None,
@@ -75,6 +78,7 @@ def read_targets(
         )
     with db.read() as c:
         walk = targets.last_walk(c, blobs, patients.get(c, patient_id))
+    trail.watched(who, "targets.opened", "patient", patient_id)
     offers = [(source, targets.offer(walk, source, parameter, side)) for source in SOURCES]
     return [
         {
@@ -89,9 +93,9 @@ def read_targets(
 
 
 @router.get("/sessions/{session_id}/feedback", response_model=schemas.Feedback)
-def read_feedback(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> dict[str, object]:
+def read_feedback(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> dict[str, object]:
     """Strides with and without feedback, probe blocks, level, side effects, and the retention test."""
-    gathered = _opened(db, who, session_id)
+    gathered = _opened(db, trail, who, session_id)
     view = feedback.view(blobs, gathered)
     if view is not None:
         return view.to_json()
@@ -99,16 +103,17 @@ def read_feedback(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> dict[str
 
 
 @router.get("/sessions/{session_id}/feedback.csv", response_class=Response, responses=_CSV)
-def read_feedback_table(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+def read_feedback_table(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
     """Every stride of the live take with its cue; without feedback only the header."""
-    view = feedback.view(blobs, _opened(db, who, session_id))
+    view = feedback.view(blobs, _opened(db, trail, who, session_id))
     return attachment(feedback_csv(view), f"feedback-{session_id[:8]}.csv")
 
 
-def _opened(db: Database, who: Identity, session_id: str) -> feedback.Gathered:
-    with db.write() as c:
-        found = feedback.gather(c, session_id)
-        audit.record(c, who, "feedback.opened", "session", session_id)
+def _opened(db: Database, trail: Trail, who: Identity, session_id: str) -> feedback.Gathered:
+    with db.read() as c:
+        patient = patients.get(c, sessions.get(c, session_id).patient_id)
+        found = feedback.gather(c, patient, session_id, histories.analysed(c, patient.id))
+    trail.opened(who, "feedback.opened", "session", session_id)
     return found
 
 

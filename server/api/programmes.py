@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter
 
 from server import schemas
-from server.api.context import Db, Id
+from server.api.context import Db, Id, OpenTrail
 from server.api.documents import refusals
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -20,12 +20,14 @@ Planner = Annotated[Identity, require(Action.WRITE_SESSION)]
 
 @router.get("/patients/{patient_id}/programmes", response_model=list[schemas.Programme])
 def list_programmes(
-    patient_id: Id, db: Db, who: Annotated[Identity, require(Action.READ_SESSION)]
+    patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> list[programmes.Programme]:
     """The patient's programmes, the newest first, with what was done, is missing and comes next."""
     with db.read() as c:
         patients.get(c, patient_id)
-        return programmes.of_patient(c, patient_id)
+        found = programmes.of_patient(c, patient_id)
+    trail.opened(who, "programmes.opened", "patient", patient_id)
+    return found
 
 
 @router.post(

@@ -7,17 +7,27 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path
 from starlette.responses import Response
 
-from server import audit, schemas
-from server.api.context import Blobs, Db, Id
+from server import schemas
+from server.api.context import Blobs, Db, Id, OpenTrail
 from server.api.downloads import BINARY, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.report.model import ReportModel
 from server.report.tables import curves_csv, parameters_csv
-from server.services import analyses, comparisons, controls, patients, reports, reviews, sessions
+from server.services import (
+    analyses,
+    comparisons,
+    controls,
+    histories,
+    patients,
+    reports,
+    reviews,
+    sessions,
+)
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.trail import Trail
 
 router = APIRouter(prefix="/sessions/{session_id}", tags=["report"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -27,15 +37,15 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("/report", response_model=schemas.Report)
-def read_report(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> dict[str, object]:
+def read_report(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> dict[str, object]:
     """Quality, parameters with norms, cycle curves with norm bands, strides, provenance."""
-    return _opened(db, blobs, who, session_id).to_json()
+    return _opened(db, blobs, trail, who, session_id).to_json()
 
 
 @router.get("/parameters.csv", response_class=Response, responses=_CSV)
-def read_parameters(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+def read_parameters(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
     """The table of parameters, left and right, with the norm."""
-    report = _opened(db, blobs, who, session_id)
+    report = _opened(db, blobs, trail, who, session_id)
     return attachment(parameters_csv(report), f"parameters-{session_id[:8]}.csv")
 
 
@@ -45,32 +55,33 @@ def read_parameter(
     name: Annotated[str, Path(pattern=r"^[a-z0-9_]{1,64}$")],
     db: Db,
     blobs: Blobs,
+    trail: OpenTrail,
     who: Reader,
 ) -> dict[str, object]:
     """One parameter with its definition and the value of every stride, counted or not."""
-    with db.write() as c:
+    with db.read() as c:
         session = sessions.get(c, session_id)
         patient = patients.get(c, session.patient_id)
         found = analyses.shown(c, session_id)
         edits = reviews.edits_of(c, found.id)
         known = controls.visits(c, patient, session)
-        audit.record(c, who, "parameter.opened", "session", session_id, {"parameter": name})
+    trail.opened(who, "parameter.opened", "session", session_id, {"parameter": name})
     return reports.behind_number(blobs, found, edits, patient, session, name, known).to_json()
 
 
 @router.get("/curves.csv", response_class=Response, responses=_CSV)
-def read_curves(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+def read_curves(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
     """The cycle curves: mean and spread by side and per cent of the cycle, with the norm."""
-    return attachment(curves_csv(_opened(db, blobs, who, session_id)), f"curves-{session_id[:8]}.csv")
+    return attachment(curves_csv(_opened(db, blobs, trail, who, session_id)), f"curves-{session_id[:8]}.csv")
 
 
-def _opened(db: Database, blobs: BlobStore, who: Identity, session_id: str) -> ReportModel:
-    with db.write() as c:
+def _opened(db: Database, blobs: BlobStore, trail: Trail, who: Identity, session_id: str) -> ReportModel:
+    with db.read() as c:
         session = sessions.get(c, session_id)
         patient = patients.get(c, session.patient_id)
         found = analyses.shown(c, session_id)
         edits = reviews.edits_of(c, found.id)
-        before = comparisons.before(c, session)
+        before = comparisons.before(c, session, histories.analysed(c, patient.id))
         known = controls.visits(c, patient, session)
-        audit.record(c, who, "report.opened", "session", session_id, {"analysis_id": found.id})
+    trail.opened(who, "report.opened", "session", session_id, {"analysis_id": found.id})
     return reports.read(blobs, found, edits, patient, session, before, known)[1]

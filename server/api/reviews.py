@@ -10,9 +10,8 @@ from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
 from core.edits import edit_of
-from server import audit
 from server import review_schemas as schemas
-from server.api.context import Blobs, Db, Id
+from server.api.context import Blobs, Db, Id, OpenTrail
 from server.api.documents import refusals
 from server.api.downloads import BINARY, attachment
 from server.auth.access import require
@@ -23,6 +22,7 @@ from server.report.wording import excluded_words
 from server.services import analyses, reviews, signals
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.trail import Trail
 
 router = APIRouter(prefix="/sessions/{session_id}", tags=["review"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -39,9 +39,9 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("/edits", response_model=None, responses=_REVIEW)
-def read_review(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+def read_review(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
     """Events, strides and parameters as they count now, and the edits that made them so."""
-    return _review(blobs, *_opened(db, who, session_id, "review"))
+    return _review(blobs, *_opened(db, trail, who, session_id, "review"))
 
 
 @router.post("/edits", status_code=201, response_model=None, responses=_MADE)
@@ -61,17 +61,17 @@ def undo_edit(session_id: Id, db: Db, blobs: Blobs, who: Reviewer, seen: Seen = 
 
 
 @router.get("/events.csv", response_class=Response, responses=_CSV)
-def read_events(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+def read_events(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
     """Contacts and foot-offs as they count, edited ones with the source "manual"."""
-    found, edits = _opened(db, who, session_id, "events")
+    found, edits = _opened(db, trail, who, session_id, "events")
     events = reviews.bundle(blobs, found, edits).events
     return attachment(events_csv(events), f"events-{session_id[:8]}.csv")
 
 
 @router.get("/strides.csv", response_class=Response, responses=_CSV)
-def read_strides(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
+def read_strides(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
     """Every stride with its parameters, as it counts."""
-    found, edits = _opened(db, who, session_id, "strides")
+    found, edits = _opened(db, trail, who, session_id, "strides")
     result = reviews.measured(blobs, found, edits)
     content = (
         analyses.file_bytes(blobs, found, "strides.csv")
@@ -82,9 +82,11 @@ def read_strides(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> Response:
 
 
 @router.get("/signals", response_model=list[schemas.Lane])
-def list_signals(session_id: Id, db: Db, blobs: Blobs, who: Reader) -> tuple[signals.Lane, ...]:
+def list_signals(
+    session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
+) -> tuple[signals.Lane, ...]:
     """Which signals there are: derived ones of feet and joints, raw ones of every sensor."""
-    found, _ = _shown(db, session_id)
+    found = _watched(db, trail, who, session_id)
     return signals.lanes(blobs, found)
 
 
@@ -94,29 +96,33 @@ def read_signal(
     name: str,
     db: Db,
     blobs: Blobs,
+    trail: OpenTrail,
     who: Reader,
     start_s: Annotated[float, Query(ge=0, le=1e6, allow_inf_nan=False)] = 0.0,
     end_s: Annotated[float, Query(ge=0, le=1e6, allow_inf_nan=False)] = 1e6,
     points: Annotated[int, Query(ge=1, le=signals.MOST_POINTS)] = 1000,
 ) -> Response:
     """A window of a signal in at most so many parts, the least and the greatest value of each."""
-    found, _ = _shown(db, session_id)
+    found = _watched(db, trail, who, session_id)
     return JSONResponse(asdict(signals.piece(blobs, found, name, start_s, end_s, points)))
 
 
-def _shown(db: Database, session_id: str) -> tuple[analyses.Analysis, reviews.Edits]:
+def _watched(db: Database, trail: Trail, who: Identity, session_id: str) -> analyses.Analysis:
+    """Signals are asked for at every zoom and step."""
     with db.read() as c:
         found = analyses.shown(c, session_id)
-        return found, reviews.edits_of(c, found.id)
+    trail.watched(who, "signals.opened", "session", session_id, {"analysis_id": found.id})
+    return found
 
 
 def _opened(
-    db: Database, who: Identity, session_id: str, what: str
+    db: Database, trail: Trail, who: Identity, session_id: str, what: str
 ) -> tuple[analyses.Analysis, reviews.Edits]:
-    with db.write() as c:
+    with db.read() as c:
         found = analyses.shown(c, session_id)
-        audit.record(c, who, f"{what}.opened", "session", session_id, {"analysis_id": found.id})
-        return found, reviews.edits_of(c, found.id)
+        edits = reviews.edits_of(c, found.id)
+    trail.opened(who, f"{what}.opened", "session", session_id, {"analysis_id": found.id})
+    return found, edits
 
 
 def _review(blobs: BlobStore, found: analyses.Analysis, edits: reviews.Edits, status: int = 200) -> Response:

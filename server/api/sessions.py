@@ -6,8 +6,8 @@ from typing import Annotated
 
 from fastapi import APIRouter
 
-from server import audit, schemas
-from server.api.context import Blobs, Config, Db, Id, LiveHub, Queue
+from server import schemas
+from server.api.context import Blobs, Config, Db, Id, LiveHub, OpenTrail, Queue
 from server.api.documents import refusals
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -21,12 +21,12 @@ router = APIRouter(prefix="/sessions/{session_id}", tags=["sessions"])
 
 @router.get("", response_model=schemas.Session)
 def read_session(
-    session_id: Id, db: Db, who: Annotated[Identity, require(Action.READ_SESSION)]
+    session_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> sessions.Session:
     """Open a session."""
-    with db.write() as c:
+    with db.read() as c:
         found = sessions.get(c, session_id)
-        audit.record(c, who, "session.opened", "session", session_id)
+    trail.opened(who, "session.opened", "session", session_id)
     return found
 
 
@@ -53,16 +53,17 @@ def delete_session(
 ) -> None:
     """Remove a session with its recordings and results, for ever; only the audit rows stay."""
     hub.drop_from_thread([session_id])
-    erasure.erase_session(db, blobs, settings.live, who, session_id)
+    erasure.erase_session(db, blobs, settings, who, session_id)
 
 
 @router.get("/recording", response_model=schemas.Recording)
 def read_recording(
-    session_id: Id, db: Db, who: Annotated[Identity, require(Action.READ_SESSION)]
+    session_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> recordings.Recording:
     """The current upload set: its files, what was found in them, the mapping."""
     with db.read() as c:
         found = recordings.current(c, session_id)
+    trail.watched(who, "recording.opened", "session", session_id)
     if found is None:
         raise NotFound("recording of session", session_id)
     return found

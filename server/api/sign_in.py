@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Request, Response
 from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
 from sqlalchemy import Connection, Row
+from sqlalchemy.exc import OperationalError
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, RedirectResponse
 
 from server import audit, schemas
-from server.api.context import Db, Failures, OpenLogins, address_of
+from server.api.context import Db, Failures, OpenLogins, OpenTrail, address_of
 from server.api.documents import PUBLIC, refusals
 from server.auth import accounts, one_time
 from server.auth.access import require
@@ -21,6 +25,9 @@ from server.auth.passwords import hash_password
 from server.auth.roles import POLICY, Action, Role
 from server.auth.sessions import Logins
 from server.auth.tokens import token_hash
+from server.problems import SENTENCES, Problem
+from server.storage.refusal import refusal_of
+from server.trail import Trail
 
 router = APIRouter(tags=["account"])
 address_router = APIRouter(include_in_schema=False)
@@ -32,7 +39,10 @@ _BODY = {"schema": schemas.SignIn.model_json_schema()}
 async def _credentials(request: Request) -> schemas.SignIn:
     """Read JSON, or the form of a page without scripts."""
     is_form = request.headers.get("content-type", "").startswith(_FORM)
-    body = await request.body()
+    try:
+        body = await request.body()
+    except ClientDisconnect:
+        raise Problem(400, "bad_request", SENTENCES["bad_request"]) from None
     try:
         if is_form:
             return schemas.SignIn.model_validate(dict(await request.form()))
@@ -55,12 +65,20 @@ def sign_in(
     body: Annotated[schemas.SignIn, Depends(_credentials)],
     db: Db,
     logins: OpenLogins,
+    trail: OpenTrail,
     failures: Failures,
 ) -> Any:
     """Sign in with name and password; the answer sets the session cookie."""
-    row = accounts.check_password(db, failures, body.name, body.password, address_of(request))
-    with db.write() as c:
-        token = _open(c, logins, row, request, "sign_in")
+    row = accounts.check_password(db, failures, trail, body.name, body.password, address_of(request))
+    try:
+        with db.write() as c:
+            token = _open(c, logins, row, request, "sign_in")
+    except OperationalError as error:
+        kept = logins.keep(row.id, read_token(request)) if refusal_of(error) else None
+        if kept is None:
+            raise
+        token = kept
+        trail.opened(_identity(row, token), "sign_in", "user", row.id)
     response: Response
     if request.headers.get("content-type", "").startswith(_FORM):
         response = RedirectResponse(local_path(body.next), status_code=303)
@@ -72,12 +90,14 @@ def sign_in(
 
 @router.post("/sign-out", status_code=204)
 def sign_out(
-    request: Request, db: Db, logins: OpenLogins, who: Annotated[Identity, require(Action.USE_ACCOUNT)]
+    request: Request,
+    logins: OpenLogins,
+    trail: OpenTrail,
+    who: Annotated[Identity, require(Action.USE_ACCOUNT)],
 ) -> Response:
     """End this sign-in."""
-    with db.write() as c:
-        logins.end(c, who.login_id)
-        audit.record(c, who, "sign_out", "user", who.user_id)
+    logins.close(who.login_id)
+    trail.opened(who, "sign_out", "user", who.user_id)
     response = Response(status_code=204)
     clear_token(response, request)
     return response
@@ -91,13 +111,15 @@ def sign_out(
     responses=refusals(404, 409),
     openapi_extra=PUBLIC,
 )
-def set_up(token: str, body: schemas.SetUp, request: Request, db: Db, logins: OpenLogins) -> Any:
+def set_up(
+    token: str, body: schemas.SetUp, request: Request, db: Db, logins: OpenLogins, trail: OpenTrail
+) -> Any:
     """Make the first administrator with the token of the printed address, and sign in."""
     with db.read() as c:
         valid = one_time.is_valid(c, token, "set_up")
     # the hash takes long: outside of the transaction, and not for everybody who guesses
     hashed = hash_password(body.password) if valid else ""
-    with db.write() as c:
+    with _told(trail, request), db.write() as c:
         one_time.use(c, token, "set_up")
         row = accounts.create(c, body.name, body.display_name, Role.ADMIN, hashed)
         audit.record(c, None, "user.set_up", "user", row.id)
@@ -125,12 +147,13 @@ def change_password(
     request: Request,
     db: Db,
     logins: OpenLogins,
+    trail: OpenTrail,
     failures: Failures,
     who: Annotated[Identity, require(Action.USE_ACCOUNT)],
 ) -> None:
     """Change one's own password; all other sign-ins of this person end."""
     # 403, not 401: the person is signed in and must not be sent to the sign-in page
-    accounts.check_password(db, failures, who.name, body.current, address_of(request), status=403)
+    accounts.check_password(db, failures, trail, who.name, body.current, address_of(request), status=403)
     hashed = hash_password(body.password)
     with db.write() as c:
         accounts.change(c, who.user_id, {"password_hash": hashed})
@@ -139,9 +162,9 @@ def change_password(
 
 
 @address_router.get("/sign-in/{token}", dependencies=[require(Action.SIGN_IN)])
-def sign_in_once(token: str, request: Request, db: Db, logins: OpenLogins) -> Response:
+def sign_in_once(token: str, request: Request, db: Db, logins: OpenLogins, trail: OpenTrail) -> Response:
     """Sign in with a printed one-time address and go to the patients."""
-    with db.write() as c:
+    with _told(trail, request), db.write() as c:
         user_id = one_time.use(c, token, "sign_in")
         row = accounts.get(c, user_id or "")
         session = _open(c, logins, row, request, "sign_in.one_time")
@@ -160,6 +183,19 @@ def local_path(path: str | None) -> str:
 
 def _open(c: Connection, logins: Logins, row: Row[Any], request: Request, action: str) -> str:
     token = logins.start(c, row.id, replaces=read_token(request))
-    actor = Identity(row.id, row.name, row.display_name, Role(row.role), token_hash(token))
-    audit.record(c, actor, action, "user", row.id)
+    audit.record(c, _identity(row, token), action, "user", row.id)
     return token
+
+
+def _identity(row: Row[Any], token: str) -> Identity:
+    return Identity(row.id, row.name, row.display_name, Role(row.role), token_hash(token))
+
+
+@contextlib.contextmanager
+def _told(trail: Trail, request: Request) -> Iterator[None]:
+    """Write down a one-time address that was not valid."""
+    try:
+        yield
+    except one_time.NotValid:
+        trail.refused("sign_in.failed", "user", None, address_of(request))
+        raise

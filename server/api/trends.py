@@ -9,9 +9,10 @@ from fastapi import APIRouter, Query
 from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
+from core.condition import WalkingCondition
 from core.frames import Protocol
-from server import audit, trend_schemas
-from server.api.context import Blobs, Db, Id
+from server import trend_schemas
+from server.api.context import Blobs, Db, Id, OpenTrail
 from server.api.downloads import BINARY, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -20,10 +21,12 @@ from server.report.change_words import change_words
 from server.report.columns import plain
 from server.report.tables import trends_csv
 from server.report.trends import Line, Trend, names_in, trends
+from server.schemas import HexId
 from server.services import histories, patients
 from server.services.histories import History
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.trail import Trail
 
 router = APIRouter(prefix="/patients/{patient_id}", tags=["trends"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -36,8 +39,13 @@ Names = Annotated[
         description="names of figures; none = all that were measured",
     ),
 ]
-Walked = Annotated[
-    Protocol | None, Query(description="visits of this protocol; none = that of the newest visit")
+Walked = Annotated[Protocol | None, Query(description="visits of this protocol only")]
+Like = Annotated[
+    HexId | None,
+    Query(
+        description="visits walked as in this session; none = as in the newest one at the person's own pace "
+        "and without feedback, else as in the newest"
+    ),
 ]
 _JSON: dict[int | str, dict[str, Any]] = {200: {"model": trend_schemas.Trends}}
 _CSV: dict[int | str, dict[str, Any]] = {
@@ -50,12 +58,14 @@ def read_trends(
     patient_id: Id,
     db: Db,
     blobs: Blobs,
+    trail: OpenTrail,
     who: Reader,
     show: Names,
     protocol: Walked = None,
+    like: Like = None,
 ) -> Response:
     """Values by visit with the norm, and the change since the first assessment against MDC and MCID."""
-    known, found = _opened(db, blobs, who, patient_id, show, protocol)
+    known, found = _opened(db, blobs, trail, who, patient_id, show, protocol, like)
     visits = [
         {
             "session_id": v.session_id,
@@ -63,10 +73,18 @@ def read_trends(
             "title": v.title,
             "label": v.label,
             "kind": v.kind,
+            "condition": _condition(v.condition),
         }
         for v in known.visits
     ]
-    content = {"protocol": known.protocol, "visits": visits, "trends": [_trend(t) for t in found]}
+    walked = known.condition
+    content = {
+        "protocol": None if walked is None else walked.protocol,
+        "condition": None if walked is None else _condition(walked),
+        "visits": visits,
+        "others": [{**vars(o), "condition": _condition(o.condition)} for o in known.others],
+        "trends": [_trend(t) for t in found],
+    }
     return JSONResponse(plain(content))
 
 
@@ -75,27 +93,39 @@ def read_trends_table(
     patient_id: Id,
     db: Db,
     blobs: Blobs,
+    trail: OpenTrail,
     who: Reader,
     show: Names,
     protocol: Walked = None,
+    like: Like = None,
 ) -> Response:
     """The same as a table: one row per figure, side and visit."""
-    known, found = _opened(db, blobs, who, patient_id, show, protocol)
+    known, found = _opened(db, blobs, trail, who, patient_id, show, protocol, like)
     return attachment(trends_csv(known.visits, found), f"trends-{patient_id[:8]}.csv")
 
 
 def _opened(
-    db: Database, blobs: BlobStore, who: Identity, patient_id: str, names: list[str], protocol: str | None
+    db: Database,
+    blobs: BlobStore,
+    trail: Trail,
+    who: Identity,
+    patient_id: str,
+    names: list[str],
+    protocol: str | None,
+    like: str | None,
 ) -> tuple[History, tuple[Trend, ...]]:
-    with db.write() as c:
-        patient = patients.get(c, patient_id)
-        audit.record(c, who, "trends.opened", "patient", patient_id)
     with db.read() as c:
+        patient = patients.get(c, patient_id)
         done, plans = histories.read(c, patient)
-    known = histories.history(blobs, patient, done, plans, protocol)
+    trail.opened(who, "trends.opened", "patient", patient_id)
+    known = histories.history(blobs, patient, done, plans, protocol, like)
     there = names_in(known.visits)
     wanted = [n for n in names if n in there] if names else there
     return known, trends(known.visits, wanted, known.norms, known.usual, known.patient.affected_side)
+
+
+def _condition(walked: WalkingCondition) -> dict[str, Any]:
+    return {**vars(walked), "words": walked.words}
 
 
 def _trend(trend: Trend) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from server.auth.throttle import Throttle
 from server.problems import Problem
 from server.storage.db import Database
 from server.storage.tables import new_id, now, user
+from server.trail import Trail
 
 
 def create(c: Connection, name: str, display_name: str | None, role: Role, password_hash: str) -> Row[Any]:
@@ -62,9 +63,16 @@ def change(c: Connection, user_id: str, values: dict[str, object]) -> Row[Any]:
 
 
 def check_password(
-    db: Database, throttle: Throttle, name: str, password: str, address: str, *, status: int = 401
+    db: Database,
+    throttle: Throttle,
+    trail: Trail,
+    name: str,
+    password: str,
+    address: str,
+    *,
+    status: int = 401,
 ) -> Row[Any]:
-    """Return the account that this name and password open.
+    """Return the account that this name and password open; a failure is in the audit log.
 
     Raises
     ------
@@ -79,6 +87,7 @@ def check_password(
     stored = row.password_hash if row is not None and row.active else None
     if not verify_password(password, stored) or row is None:
         throttle.fail(name, address)
+        trail.refused("sign_in.failed", "user", None if row is None else row.id, address)
         raise Problem(status, "wrong_password", "Name or password is wrong. Check both and try again.")
     throttle.succeed(name, address)
     return row

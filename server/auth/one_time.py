@@ -13,6 +13,17 @@ from server.storage.tables import now, one_time_token, user
 LIFE = dt.timedelta(hours=24)
 
 
+class NotValid(Problem):
+    """The address cannot be used, for whatever reason."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            404,
+            "link_not_valid",
+            "This address has been used, has expired, or never existed. Restart the server to get a new one.",
+        )
+
+
 def needs_set_up(c: Connection) -> bool:
     """Tell whether nobody can sign in yet."""
     return not c.execute(select(func.count()).select_from(user)).scalar_one()
@@ -35,15 +46,11 @@ def is_valid(c: Connection, token: str, purpose: str) -> bool:
 
 
 def use(c: Connection, token: str, purpose: str) -> str | None:
-    """Use the token up and return its user id (None for set-up); raise Problem 404 when it cannot be used."""
+    """Use the token up and return its user id (None for set-up); raise NotValid when it cannot be used."""
     row = _find(c, token, purpose)
     # one answer for unknown, used and expired: nothing to learn by guessing
     if row is None:
-        raise Problem(
-            404,
-            "link_not_valid",
-            "This address has been used, has expired, or never existed. Restart the server to get a new one.",
-        )
+        raise NotValid
     hashed = token_hash(token)
     c.execute(update(one_time_token).where(one_time_token.c.token_sha256 == hashed).values(used_at=now()))
     return row[0]

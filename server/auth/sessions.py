@@ -2,29 +2,46 @@
 
 from __future__ import annotations
 
+import dataclasses
 import datetime as dt
 from collections.abc import Callable
-from typing import Any
+from typing import Final
 
-from sqlalchemy import Connection, Row, delete, insert, select, update
+from sqlalchemy import Connection, delete, insert, select, update
+from sqlalchemy.exc import OperationalError
 
 from server.auth.identity import Identity
 from server.auth.roles import Role
 from server.auth.tokens import new_token, token_hash
 from server.storage.db import Database
+from server.storage.refusal import refusal_of
 from server.storage.tables import login_session, now, user
 
 TOUCH_EVERY = dt.timedelta(seconds=30)
 """Activity is written at most this often: each write costs one fsync."""
+MOST_KEPT: Final = 1000
+"""Sign-ins that live in memory because the disk refused them."""
+
+
+@dataclasses.dataclass(frozen=True)
+class _Login:
+    """One sign-in as it is stored, or as it is kept while the disk refuses to be written."""
+
+    user_id: str
+    last_seen_at: dt.datetime
+    expires_at: dt.datetime
 
 
 class Logins:
     """The open sign-ins.
 
+    While the disk refuses to be written, people still come in, stay and go: what cannot be stored is kept in
+    memory and ends with the process.
+
     Parameters
     ----------
     db : the database.
-    idle, absolute : life without activity, and life in all (service.md §d).
+    idle, absolute : life without activity, and life in all (docs/operations.md, "Settings").
     clock : aware time now.
     """
 
@@ -39,13 +56,17 @@ class Logins:
         self._idle = idle
         self._absolute = absolute
         self._clock = clock
+        self._kept: dict[str, _Login] = {}  # opened while the disk refused
+        self._seen: dict[str, dt.datetime] = {}  # activity that the disk refused
+        self._ended: set[str] = set()  # ends that the disk refused
 
     def start(self, c: Connection, user_id: str, replaces: str | None) -> str:
         """Open a sign-in and return its new token; the token the browser came with, if any, ends here."""
         at = self._clock()
         if replaces is not None:
             self.end(c, token_hash(replaces))
-        c.execute(delete(login_session).where(login_session.c.expires_at <= at))
+        gone = login_session.c.token_sha256.in_(self._ended)
+        c.execute(delete(login_session).where((login_session.c.expires_at <= at) | gone))
         token = new_token()
         c.execute(
             insert(login_session).values(
@@ -58,6 +79,18 @@ class Logins:
         )
         return token
 
+    def keep(self, user_id: str, replaces: str | None) -> str | None:
+        """Open a sign-in in memory, when the disk refuses to store it; None when too many are kept."""
+        at = self._clock()
+        if replaces is not None:
+            self._forget(token_hash(replaces))
+        self._kept = {k: v for k, v in self._kept.items() if v.expires_at > at}
+        if len(self._kept) >= MOST_KEPT:
+            return None
+        token = new_token()
+        self._kept[token_hash(token)] = _Login(user_id, at, at + self._absolute)
+        return token
+
     def find(self, token: str) -> Identity | None:
         """Return who holds this token and count the visit as activity; None when it is unknown or over."""
         return self.touch(token_hash(token))
@@ -65,44 +98,86 @@ class Logins:
     def touch(self, login_id: str) -> Identity | None:
         """Count a running view or replay as activity; None when the sign-in is over, so the view must end."""
         at = self._clock()
-        row = self._open(login_id, at)
-        if row is None:
+        found = self._open(login_id, at)
+        if found is None:
             return None
+        login, identity = found
         # a short idle time must not end between two writes
-        if row.last_seen_at <= at - min(TOUCH_EVERY, self._idle / 4):
-            with self._db.write() as c:
-                c.execute(
-                    update(login_session)
-                    .where(login_session.c.token_sha256 == login_id)
-                    .values(last_seen_at=at)
-                )
-        return Identity(row.id, row.name, row.display_name, Role(row.role), login_id)
+        if login.last_seen_at <= at - min(TOUCH_EVERY, self._idle / 4):
+            self._write_seen(login_id, at)
+        return identity
 
     def is_open(self, login_id: str) -> bool:
         """Tell whether a sign-in goes on, without counting as activity."""
         return self._open(login_id, self._clock()) is not None
 
+    def close(self, login_id: str) -> None:
+        """End one sign-in, also on a disk that refuses to be written."""
+        try:
+            with self._db.write() as c:
+                self.end(c, login_id)
+        except OperationalError as error:
+            if refusal_of(error) is None:
+                raise
+            self._forget(login_id)
+
     def end(self, c: Connection, login_id: str) -> None:
         """End one sign-in."""
+        self._kept.pop(login_id, None)
         c.execute(delete(login_session).where(login_session.c.token_sha256 == login_id))
 
     def end_all(self, c: Connection, user_id: str, but: str | None = None) -> None:
         """End every sign-in of one person, except the one (by its login id) that asks for it."""
+        for login_id in [k for k, v in self._kept.items() if v.user_id == user_id and k != but]:
+            self._kept.pop(login_id, None)
         c.execute(
             delete(login_session).where(
                 login_session.c.user_id == user_id, login_session.c.token_sha256 != (but or "")
             )
         )
 
-    def _open(self, login_id: str, at: dt.datetime) -> Row[Any] | None:
+    def _open(self, login_id: str, at: dt.datetime) -> tuple[_Login, Identity] | None:
+        """The sign-in with who it is, None when it is unknown or over."""
+        if login_id in self._ended:
+            return None
+        kept = self._kept.get(login_id)
+        stored = select(login_session.c.last_seen_at, login_session.c.expires_at, user).join(
+            user, user.c.id == login_session.c.user_id
+        )
+        query = (
+            stored.where(login_session.c.token_sha256 == login_id)
+            if kept is None
+            else select(user).where(user.c.id == kept.user_id)
+        )
         with self._db.read() as c:
-            return c.execute(
-                select(login_session.c.last_seen_at, user)
-                .join(user, user.c.id == login_session.c.user_id)
-                .where(
-                    login_session.c.token_sha256 == login_id,
-                    login_session.c.expires_at > at,
-                    login_session.c.last_seen_at > at - self._idle,
-                    user.c.active,
-                )
-            ).one_or_none()
+            person = c.execute(query.where(user.c.active)).one_or_none()
+        if person is None:
+            return None
+        login = kept or _Login(person.id, person.last_seen_at, person.expires_at)
+        seen = max(login.last_seen_at, self._seen.get(login_id, login.last_seen_at))
+        if login.expires_at <= at or seen <= at - self._idle:
+            return None
+        identity = Identity(person.id, person.name, person.display_name, Role(person.role), login_id)
+        return dataclasses.replace(login, last_seen_at=seen), identity
+
+    def _write_seen(self, login_id: str, at: dt.datetime) -> None:
+        if login_id not in self._kept:
+            try:
+                with self._db.write() as c:
+                    c.execute(
+                        update(login_session)
+                        .where(login_session.c.token_sha256 == login_id)
+                        .values(last_seen_at=at)
+                    )
+            except OperationalError as error:
+                if refusal_of(error) is None:
+                    raise
+            else:
+                self._seen.pop(login_id, None)
+                return
+        self._seen[login_id] = at
+
+    def _forget(self, login_id: str) -> None:
+        """End a sign-in in memory; a stored one ends by itself when it is idle."""
+        if self._kept.pop(login_id, None) is None:
+            self._ended.add(login_id)

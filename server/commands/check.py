@@ -10,7 +10,7 @@ from server.settings import load_settings
 
 
 def check(data_dir: Path | None) -> int:
-    """Check the database, every stored file by its hash, and the audit chain; 1 when something is wrong."""
+    """Check database, stored files, live logs, trash and audit chain; 1 when something is wrong."""
     from server.services import checks
     from server.storage.blobs import BlobStore
     from server.storage.db import Database
@@ -26,7 +26,7 @@ def check(data_dir: Path | None) -> int:
         sys.stderr.write(f"{error}\n")
         return 1
     with closing(Database(settings.database)) as db:
-        findings = checks.check(db, BlobStore(settings.blobs))
+        findings = checks.check(db, BlobStore(settings.blobs), settings)
     for finding in findings:
         sys.stdout.write(f"{finding.area}: {finding.message}\n")
     sys.stdout.write(f"{len(findings)} problems in {settings.data_dir}\n" if findings else "All is well.\n")

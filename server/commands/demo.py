@@ -14,6 +14,7 @@ from pathlib import Path
 from sqlalchemy import func, select
 
 from server.commands.serve import run, say
+from server.compile_cache import has_compiled_filters
 from server.settings import load_settings
 from server.storage.db import Database
 
@@ -66,7 +67,8 @@ def _report(database: Path) -> None:
     from server.storage.tables import job
 
     began, told = time.monotonic(), ""
-    say("Compiling the filters (once per machine, about half a minute) …")
+    if not has_compiled_filters():
+        say("Compiling the filters (once for you and this version, about half a minute) …")
     pause = threading.Event()
     with closing(Database(database)) as db:
         while True:

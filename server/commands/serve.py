@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import signal
-import socket
 import sys
 import threading
 from collections.abc import Callable
@@ -13,9 +12,6 @@ from contextlib import closing
 from pathlib import Path
 
 from server.settings import Settings, load_settings
-
-GRACE_S = 4
-"""Time open requests (event streams, views) have to end after SIGTERM; all in all it ends within 10 s."""
 
 
 def serve(data_dir: Path | None, host: str | None, port: int | None, workers: int | None) -> int:
@@ -37,12 +33,14 @@ def serve(data_dir: Path | None, host: str | None, port: int | None, workers: in
 
 def run(settings: Settings, announce: Callable[[str], None]) -> int:
     """Run web server and workers; `announce` gets the address once requests are answered."""
-    import uvicorn
-
     from server.app import create_app
     from server.jobs.supervisor import Workers
+    from server.services.custody import StrangersError, refuse_strangers
     from server.storage import fs
     from server.storage.migrate import MigrationError, upgrade
+    from server.web_server.build import build_server
+    from server.web_server.connection import ConnectionLimits
+    from server.web_server.listener import make_room, open_listener
 
     start_log()
     fs.make_folder(settings.data_dir)
@@ -54,23 +52,16 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
         )
         return 1
     try:
+        refuse_strangers(settings)
         upgrade(settings.database)
-        listener = _listen(settings)
-    except (MigrationError, OSError) as error:
+        listener = open_listener(settings.host, settings.port)
+    except (StrangersError, MigrationError, OSError) as error:
         sys.stderr.write(f"{error}\n")
         lock.release()
         return 1
     workers = Workers(settings)
-    server = uvicorn.Server(
-        uvicorn.Config(
-            create_app(settings),
-            log_level="warning",
-            access_log=False,
-            proxy_headers=settings.behind_tls,
-            timeout_graceful_shutdown=GRACE_S,
-            ws_per_message_deflate=False,
-        )
-    )
+    limits = ConnectionLimits(most=make_room(settings.max_connections))
+    server = build_server(create_app(settings), settings, limits)
     host = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{host}:{listener.getsockname()[1]}"
     threading.Thread(target=_when_started, args=(server, lambda: announce(address)), daemon=True).start()
@@ -98,21 +89,6 @@ def say(text: str) -> None:
     """Print one line at once, also into a pipe."""
     sys.stdout.write(text + "\n")
     sys.stdout.flush()
-
-
-def _listen(settings: Settings) -> socket.socket:
-    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
-    listener = socket.socket(family, socket.SOCK_STREAM)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listener.bind((settings.host, settings.port))
-    except OSError as error:
-        listener.close()
-        raise OSError(
-            f"Port {settings.port} on {settings.host} cannot be used ({error.strerror}); "
-            "choose another with --port."
-        ) from None
-    return listener
 
 
 def _when_started(server: object, then: Callable[[], None]) -> None:

@@ -10,6 +10,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 import server
+from server.compile_cache import share_compile_cache
 from server.jobs.messages import Order, Reply, decode_reply, encode
 from server.settings import Settings
 
@@ -27,8 +28,8 @@ def environment(settings: Settings) -> dict[str, str]:
     """What a process of ours inherits: settings, the path to our code, one thread, a lasting kernel cache."""
     root = str(Path(server.__file__).parent.parent)
     path = os.pathsep.join(p for p in (root, os.environ.get("PYTHONPATH")) if p)
-    cache = {"NUMBA_CACHE_DIR": os.environ.get("NUMBA_CACHE_DIR") or str(settings.cache / "numba")}
-    return {**os.environ, **settings.environment(), **ONE_THREAD, **cache, "PYTHONPATH": path}
+    share_compile_cache(settings.cache)
+    return {**os.environ, **settings.environment(), **ONE_THREAD, "PYTHONPATH": path}
 
 
 class Child:

@@ -24,6 +24,7 @@ from server.jobs.queue import Claim, Hold, JobQueue
 from server.jobs.runner import Child, ChildDiedError
 from server.jobs.table import TableQueue
 from server.jobs.task import TASKS, Task, load
+from server.services import erasure
 from server.services.sweep import sweep
 from server.settings import Settings, load_settings
 from server.storage.blobs import Blob, BlobStore
@@ -68,7 +69,7 @@ class Worker:
                 try:
                     if time.monotonic() >= next_sweep:
                         next_sweep = time.monotonic() + SWEEP_S
-                        sweep(self._db, self._blobs, grace_s=self._settings.sweep_grace_s)
+                        sweep(self._db, self._blobs, self._settings)
                     worked = self._turn()
                     pause_s = IDLE_S
                 except (ChildDiedError, SQLAlchemyError, OSError):
@@ -178,8 +179,17 @@ class Worker:
                 f"The result could not be stored ({error.strerror}). Make room, run again.",
             )
         else:
-            if not done and self._queue.look(claim) is Hold.CANCEL:
-                self._queue.stop(claim)
+            if not done:
+                self._put_away(claim, blobs)
+
+    def _put_away(self, claim: Claim, blobs: Mapping[str, Blob]) -> None:
+        """Deal with a result that nobody wants any more."""
+        if self._queue.look(claim) is Hold.CANCEL:
+            self._queue.stop(claim)
+        elif blobs and self._queue.get(claim.job_id) is None:
+            # erased while it was computed: nothing of it may wait in the trash
+            names = [blob.sha256 for blob in blobs.values()]
+            erasure.discard(self._db, self._blobs, str(claim.params["space"]), names)
 
     def _store(self, task: Task, claim: Claim, files: Mapping[str, bytes]) -> dict[str, Blob]:
         if not task.keeps_files:

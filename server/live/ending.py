@@ -92,6 +92,8 @@ class Ending:
                 self._over(await asyncio.to_thread(self._rows.take, take.id))
             take.over.set()
             await self._drain(take)
+            # before the log goes: an estimator that gets to this take only later finds it ended, not lost
+            self._pool.leave(take.id)
             path = live_recordings.log_path(self._settings.live, take.id)
             await asyncio.to_thread(fs.remove_file, path)
         finally:

@@ -40,6 +40,7 @@ async def feed(ws: WebSocket, sid: Id, who: Annotated[Identity, require(Action.R
     def look() -> bytes:
         with db.read() as c:
             sessions.get(c, sid)
+        ws.app.state.trail.watched(who, "live.watched", "session", sid)
         return msgspec.json.encode(hub.standing(sid))
 
     try:

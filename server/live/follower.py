@@ -10,9 +10,9 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, BinaryIO, Final, cast
 
-from core.errors import Notice, SagittalError
+from core.errors import InputError, Notice, SagittalError
 from core.events.result import GaitEvent
 from core.feedback import Baseline, Prescription
 from core.feedback.engine import COMMANDS, FeedbackEngine
@@ -27,7 +27,7 @@ from server.live.messages import STALE_S, Begin, Command, Item, Kind, Picture, R
 CHUNK_BYTES: Final = 1 << 14
 """Read and estimated in one turn, half a second of seven sensors: who catches up lets others through."""
 EVERY_S: Final = 1 / 30
-"""Pictures are sent no more often (viewer.md §5)."""
+"""Pictures are sent no more often (docs/data-flow.md, "The 3D figure")."""
 SLOW_S: Final = 0.2
 """What is for reading (sensors, calibration) is made anew no more often."""
 DRIFT: Final = 1e-4
@@ -51,7 +51,7 @@ class Follower:
         self._begin = begin
         self._say = say
         self._clock = clock
-        self._file = Path(begin.path).open("rb")  # noqa: SIM115 - closed by `close`
+        self._file: BinaryIO | None = None
         self._read = 0
         self._size = begin.size
         self._arrived: deque[tuple[int, float]] = deque()
@@ -99,7 +99,9 @@ class Follower:
         self._battery = {**self._battery, **percent}
 
     def step(self) -> None:
-        """Read and estimate the next part of the log."""
+        """Read and estimate the next part of the log; raises InputError live_log_gone."""
+        if self._file is None:
+            self._file = _open_log(self._begin.path)
         self._file.seek(self._read)
         data = self._file.read(min(CHUNK_BYTES, self._size - self._read))
         found, used = scan(data) if self._read == 0 else scan_records(data)
@@ -136,7 +138,8 @@ class Follower:
 
     def close(self) -> None:
         """Let go of the file."""
-        self._file.close()
+        if self._file is not None:
+            self._file.close()
 
     def _use(self, record: Record, end: int) -> None:
         if record.kind == "H":
@@ -269,6 +272,16 @@ class _Phase:
             # half a cycle too late: the person has stopped
             found[side] = None if share is None or not 0.0 <= share <= 150.0 else min(share, 100.0)
         return found
+
+
+def _open_log(path: str) -> BinaryIO:
+    try:
+        return Path(path).open("rb")
+    except FileNotFoundError:
+        raise InputError(
+            "live_log_gone",
+            "The log of this take is not in the data folder any more, so nothing of it can be estimated.",
+        ) from None
 
 
 def _engine(begin: Begin) -> FeedbackEngine | None:

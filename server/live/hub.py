@@ -65,8 +65,10 @@ class Hub:
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def start(self) -> None:
-        """Finish what a crash left and open the takes that are still open."""
+        """Warm the estimators, finish what a crash left and open the takes that are still open."""
         self._loop = asyncio.get_running_loop()
+        # getting warm takes seconds, with new filters half a minute: not while somebody walks already
+        self.pool.start()
         self._committer.start()
         self.journal.start()
         waiting = await asyncio.to_thread(
@@ -119,6 +121,9 @@ class Hub:
             take.source = take.recorder.hello.source
             self._takes[row.id] = take
             take.grown(take.recorder.size)
+        if take.recorder.damage is not None:
+            _notify(take, "bad", take.recorder.damage.sentence)
+            self._note(take, live.DAMAGED, take.recorder.damage.sentence)
         if take.recorder.end is not None:
             self.note_ended(take, take.recorder.end)
         else:
@@ -164,7 +169,7 @@ class Hub:
             take.tablet.say(protocol.command("start" if name == "start" else "stop"))
         if name == "undo_mark" and not take.steered.marks:
             raise Conflict("no_mark", "There is no mark to undo.")
-        t_s = take.t_s
+        t_s = take.t_s if take.t_s is not None else take.recorder.elapsed_s
         if name == "mark" and at_s is not None and t_s is not None:
             t_s = min(at_s, t_s)
         content = take.steer(name, value, t_s)
@@ -236,7 +241,6 @@ class Hub:
         if take is None:
             self.room(row.session_id).clear()
             self.room(row.session_id).say("state", msgspec.json.encode(standing_of(row)))
-            self.pool.start()
         else:
             self.tell_state(take)
 
@@ -287,13 +291,12 @@ class Hub:
                 take.estimate = "failed"
                 take.told.set()
                 _notify(take, "bad", report.message)
-                self.journal.add(
-                    take.id,
-                    "notice",
-                    take.t_s,
-                    {"code": report.code, "text": report.message, "severity": "bad"},
-                )
+                self._note(take, report.code, report.message)
                 self.tell_state(take)
+
+    def _note(self, take: LiveTake, code: str, text: str) -> None:
+        """Keep with the take what the server has to say of it."""
+        self.journal.add(take.id, "notice", take.t_s, live.own_notice(code, text))
 
     # threads and tasks
 

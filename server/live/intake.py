@@ -74,6 +74,14 @@ def refusal(error: ProtocolError) -> Answer:
     return Answer(protocol.error(error.code, error.message), error.close, error.code)
 
 
+@dataclass
+class _Span:
+    """How long a stream has lasted, by its own clock."""
+
+    began_us: int
+    length_s: float = 0.0
+
+
 class Intake:
     """What is known of one take: its hello, how far it is, and whether it has ended.
 
@@ -88,11 +96,22 @@ class Intake:
         self._said: Finish | None = None  # the end, as the tablet or this side said it
         self._base = 0  # batches that were there when the log was opened
         self._end_durable = False
+        self._spans: dict[int, _Span] = {}
 
     @property
     def ended(self) -> Ended | None:
         """The end, once it is durable."""
         return self._ended() if self._end_durable else None
+
+    @property
+    def elapsed_s(self) -> float | None:
+        """From the first to the last sample, on the clock of the stream that is longest; None without one."""
+        return max((span.length_s for span in self._spans.values()), default=None)
+
+    @property
+    def heard(self) -> frozenset[int]:
+        """Streams of which a batch has come."""
+        return frozenset(self._spans)
 
     @property
     def is_over(self) -> bool:
@@ -192,6 +211,10 @@ class Intake:
     def _take(self, frame: bytes, header: Header) -> None:
         self._hash.update(payload(frame, header))
         self.next_seq += 1
+        if self.hello is not None:
+            span = self._spans.setdefault(header.stream, _Span(header.t0_us))
+            lasted = (header.n_samples - 1) / self.hello.stream(header.stream).rate_hz
+            span.length_s = max(span.length_s, 1e-6 * (header.t0_us - span.began_us) + lasted)
 
     def _finish(self, finish: Finish) -> Answer:
         if self._said is not None:

@@ -13,6 +13,8 @@ from typing import Any, Final
 from sqlalchemy import insert, select
 from sqlalchemy.exc import SQLAlchemyError
 
+from core.feedback import Cue
+from server.services.live_training import note_feedback
 from server.storage.db import Database
 from server.storage.tables import live_event, live_take, now
 
@@ -66,6 +68,7 @@ class Journal:
                 kept = [row for row in rows if row["take_id"] in there]
                 if kept:
                     c.execute(insert(live_event), kept)
+                    note_feedback(c, {row["take_id"] for row in kept if _told(row)})
         except SQLAlchemyError:
             log.exception("%d live events are not written yet", len(rows))
             with self._guard:
@@ -78,3 +81,7 @@ class Journal:
             self._stop.wait(self._interval_s)
             self._work.clear()
             self.write()
+
+
+def _told(row: Mapping[str, Any]) -> bool:
+    return row["kind"] == "cue" and Cue.from_json(row["content"]).with_feedback

@@ -10,7 +10,10 @@ from typing import Any, Final, Literal
 import msgspec
 
 STALE_S: Final = 0.5
-"""Data older than this are not fed back (experience.md, Biofeedback)."""
+"""Data older than this are not fed back (docs/feedback.md, "Which strides get a cue")."""
+
+BATTERY_WARN_PCT: Final = 15.0
+"""Our choice: a DOT streams 6 h, so there is about an hour left."""
 
 Kind = Literal["stride", "cue", "calibration", "guard", "notice"]
 

@@ -1,4 +1,4 @@
-"""The estimator processes: started with the first take, replaced when they die, ended with the server.
+"""The estimator processes: started with the server to be warm before the first take; replaced when they die.
 
 Used on the event loop. What goes to a process never piles up: of a log's lengths only the newest counts.
 """
@@ -102,7 +102,6 @@ class Pool:
 
     def follow(self, take: str) -> None:
         """Give a take to the process with the fewest, or have its process read it again from the start."""
-        self.start()
         if not self._workers:
             return
         worker = self._of(take) or min(self._workers, key=lambda w: len(w.takes))

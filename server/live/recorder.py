@@ -13,7 +13,6 @@ listener is called back on the loop when it can be read, when it is durable, and
 from __future__ import annotations
 
 import asyncio
-import errno
 from pathlib import Path
 from typing import Protocol
 
@@ -22,8 +21,7 @@ from server.live.committer import Committer, Lane, Post
 from server.live.intake import Answer, Ended, Intake, refusal
 from server.live.protocol import Close, ProtocolError
 from server.storage import segments
-
-FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
+from server.storage.refusal import FULL
 
 
 class Listener(Protocol):
@@ -57,6 +55,8 @@ class Recorder:
     Parameters
     ----------
     intake : what the log holds. log : open for appending. post : the way to the event loop.
+
+    `damage` : what could not be read of the log when it was opened, None = all is well.
     """
 
     def __init__(
@@ -67,6 +67,7 @@ class Recorder:
         self.path = log.path
         self.hello = intake.hello
         self._intake = intake
+        self.damage = log.damage
         self._lane = Lane(log, self, post)
         self._committer = committer
         self._listener = listener
@@ -82,6 +83,16 @@ class Recorder:
     def durable(self) -> int:
         """So many batches survive a power cut."""
         return self._intake.durable
+
+    @property
+    def elapsed_s(self) -> float | None:
+        """Seconds from the first to the last sample that has come; None before the first."""
+        return self._intake.elapsed_s
+
+    @property
+    def heard(self) -> frozenset[int]:
+        """Streams of which a batch has come."""
+        return self._intake.heard
 
     @property
     def size(self) -> int:

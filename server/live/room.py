@@ -17,7 +17,7 @@ from server.live.messages import Picture
 QUEUE: Final = 200
 """Strides, cues and notices kept for a browser that does not read: two minutes of walking."""
 SHOWN: Final = 20
-"""Strides and cues that a new browser gets (experience.md: the strip of the last 20 strides)."""
+"""Strides and cues that a new browser gets (the page's strip has the last 20 strides)."""
 STATES: Final = ("state", "feedback", "frame")
 """Kinds of which only the newest counts, in the order in which a new browser gets them."""
 

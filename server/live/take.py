@@ -20,7 +20,8 @@ from server.live.messages import STALE_S, Begin, Charge, Command, Item, Picture
 from server.live.protocol import ProtocolError
 from server.live.recorder import Recorder
 from server.live.room import Room
-from server.services.live import LiveEvent, Take
+from server.live.sensors import sensor_rows
+from server.services.live import LiveEvent, Take, is_own_notice
 from server.services.live_training import Training
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ class Steered:
     marks: list[Mark] = field(default_factory=list)
     ghost: Any = None
     stale: bool = False
+    stopping: bool = False
 
     def see(self, take_id: str, kind: str, t_s: float | None, content: Mapping[str, Any]) -> None:
         """Take in one event."""
@@ -73,6 +75,8 @@ class Steered:
             self.commands.append(Command(take_id, int(content["before"]), kind, value))
         if kind == "stale":
             self.stale = bool(value)
+        elif kind == "stop":
+            self.stopping = True
         elif kind == "ghost":
             self.ghost = value
         elif kind == "mark":
@@ -113,10 +117,11 @@ class LiveTake:
         self.steered = Steered()
         for event in earlier:
             self.steered.see(self.id, event.kind, event.t_s, event.content)
-            if event.kind in TOLD:
+            if event.kind in TOLD and not is_own_notice(event.content):  # those are no item of the estimator
                 self._seen[event.kind] += 1
         self.grown_at = time.monotonic()
         self._size = 0
+        self._battery: dict[str, float] = {}
 
     # the socket
 
@@ -126,10 +131,14 @@ class LiveTake:
         if answer.keep is not None and self.state != "streaming" and answer.keep[0] == "B":
             self.state = "streaming"
             self._hub.note_started(self)
+        if answer.keep is not None and answer.keep[0] == "F":
+            self.steered.stopping = True
+            self._hub.tell_state(self)
         return answer
 
     def charge(self, percent: Mapping[str, float]) -> None:
         """Show the battery."""
+        self._battery |= percent
         self._hub.pool.send(Charge(self.id, dict(percent)))
 
     # the recorder's listener
@@ -234,7 +243,9 @@ class LiveTake:
                 self._hub.journal.add(self.id, "stale", self.t_s, content)
 
     def standing(self) -> dict[str, Any]:
-        """The state for the browsers."""
+        """The state for the browsers: clock and sensors are the recorder's, whoever estimates or not."""
+        elapsed = self.recorder.elapsed_s
+        silent = time.monotonic() - self.grown_at > STALE_S
         return {
             "type": "state",
             "take": self.id,
@@ -242,10 +253,12 @@ class LiveTake:
             "tablet": "connected" if self.tablet is not None else "lost",
             "source": self.source,
             "count": self.recorder.next_seq,
-            "elapsed_s": None if self.t_s is None else round(self.t_s),
+            "elapsed_s": None if elapsed is None else round(elapsed, 1),
+            "sensors": sensor_rows(self.recorder.hello, self.recorder.heard, self._battery, silent=silent),
             "marks": [mark.to_json() for mark in self.steered.marks],
             "ghost": self.steered.ghost,
             "stale": self.steered.stale,
+            "stopping": self.steered.stopping,
             "estimate": self.estimate if self._hub.pool.follows(self.id) else "none",
             "recording": self.recording_id,
             "problem": self.problem,
@@ -262,9 +275,11 @@ def standing_of(row: Take | None) -> dict[str, Any]:
         "source": None if row is None else row.source,
         "count": None if row is None else row.count,
         "elapsed_s": None,
+        "sensors": [],
         "marks": [],
         "ghost": None,
         "stale": False,
+        "stopping": False,
         "estimate": "none",
         "recording": None if row is None else row.recording_id,
         "problem": None if row is None else row.problem,

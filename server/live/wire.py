@@ -16,14 +16,12 @@ from core.errors import Notice
 from core.feedback import Cue, FeedbackState
 from core.frames import SIDES, SUFFIX, Floats, Side
 from core.online.frame import CalibrationView, LiveFrame, LiveStride, SensorHealth, Trail
-from server.live.messages import STALE_S, Pose
+from server.live.messages import BATTERY_WARN_PCT, STALE_S, Pose
 
 LOST_WARN, LOST_BAD = 0.01, 0.20
 """Shares of lost samples, as the report judges a whole take (core/quality/assessment.py)."""
 SATURATED_WARN: Final = 0.001
-"""Share of samples at range, as there (spec/fusion.md §9)."""
-BATTERY_WARN_PCT: Final = 15.0
-"""Our choice: a DOT streams 6 h, so there is about an hour left."""
+"""Share of samples at range, as there."""
 CURVE_POINTS: Final = 51
 """Every second of the 101 points of a cycle: a chart on a tablet shows no more."""
 
@@ -176,6 +174,8 @@ def _judged(row: SensorHealth, battery_pct: float | None) -> tuple[str, str]:
         return "none", "not used"
     if row.silent_s > STALE_S:
         return "bad", f"silent for {row.silent_s:.0f} s" if row.silent_s >= 1.0 else "silent"
+    if row.stuck:
+        return "bad", "does not measure"
     if row.lost_share > LOST_BAD:
         return "bad", f"{100.0 * row.lost_share:.0f} % lost"
     if row.lost_share > LOST_WARN:

@@ -131,7 +131,7 @@ def _chart(row: Row, values: Sequence[StrideValue], duration_s: float) -> str:
             parts.append(f'<line class="m{side[0]}" {line}/>')
     parts += [_mark(s, y(s.value), duration_s) for s in shown if s.value is not None]
     return (
-        f'<div class="chart behind"><svg width="100%" height="{HEIGHT}" overflow="visible" role="img">'
+        f'<div class="chart behind"><svg width="100%" height="{HEIGHT}" overflow="visible" role="group">'
         f"<title>{escape(row.title)} of every stride over time</title>{''.join(parts)}</svg></div>"
     )
 

@@ -37,13 +37,18 @@ EDIT_WORDS: Final[Mapping[EditKind, tuple[str, str]]] = {
 """Kind of edit → words for one and for several."""
 
 
+ABOUT_FILES: Final = frozenset({"ignored_file", "file_not_read", "file_given_twice"})
+"""Codes of notices about files of an upload that hold nothing for this take; the upload page lists them."""
+
+
 @dataclass(frozen=True, eq=False)
 class Bundle:
     """A finished analysis as stored; a part that was not reached is None or empty.
 
     Parameters
     ----------
-    quality, calibration, estimator, provenance : the JSON of analysis.json.
+    quality, calibration, estimator, provenance : the JSON of analysis.json. warnings : its notices but for
+        those that the upload page has told.
     """
 
     quality: Mapping[str, Any]
@@ -77,13 +82,20 @@ def load_bundle(files: Mapping[str, bytes]) -> Bundle:
         quality=data["quality"],
         calibration=data["calibration"],
         parameters=tuple(Parameter(**row) for row in data["parameters"]),
-        warnings=tuple(Notice(**row) for row in data["warnings"]),
+        warnings=read_warnings(data),
         provenance=data["provenance"],
         estimator=data.get("estimator"),
         angles=read_angles(files["angles.parquet"]) if "angles.parquet" in files else None,
         events=read_events(files["events.csv"]) if "events.csv" in files else GaitEvents(()),
         strides=read_strides(files["strides.csv"]) if "strides.csv" in files else Strides(()),
     )
+
+
+def read_warnings(data: Mapping[str, Any]) -> tuple[Notice, ...]:
+    """Notices of analysis.json about the take; of files that hold nothing for it the upload page has told."""
+    told = {*ABOUT_FILES, "duplicate_stream"}
+    notices = (Notice(**row) for row in data["warnings"])
+    return tuple(n for n in notices if n.severity == "error" or n.code not in told)
 
 
 def reviewed(bundle: Bundle, measured: Measured, edits: Sequence[Edit]) -> Bundle:
@@ -123,6 +135,8 @@ def read_angles(data: bytes) -> JointAngles:
         zero,
         meta["angle_zero"],
         standing_deg=standing,
+        withheld=dict(meta.get("withheld", {})),
+        bounds={name: math.radians(bound) for name, bound in meta.get("bounds_deg", {}).items()},
         headings={name.removesuffix("_heading"): course for name, course in headings.items()},
     )
 

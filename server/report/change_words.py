@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
-from core.change import Change
-from server.report.wording import TERMS, Term, number
+from core.change import UNLIKE, Change
+from core.parameters.variability import TOO_FEW
+from server.report.wording import TERMS, Term, number, title_of
 
 VERDICTS: Final[Mapping[str, str]] = {
     "within_measurement_error": "within measurement error",
     "real_change": "real change",
     "clinically_relevant": "real change, clinically relevant",
 }
-"""Verdict → words (spec/clinic.md §2)."""
+"""Verdict → words (docs/science/change.md, "Verdict")."""
 
 NO_LIMIT: Final = "no measurement error known"
+TOO_FEW_WORDS: Final = "too few strides to compare"
+UNLIKE_WORDS: Final = "not judged, the conditions differ"
 
 SCORE_TERMS: Final[Mapping[str, Term]] = {
     "gps_sagittal_deg": Term(
@@ -49,7 +52,9 @@ class ChangeWords:
 
 def term_of(name: str, unit: str = "") -> Term:
     """How a figure is called; one without wording shows its own name."""
-    known = TERMS.get(name) or SCORE_TERMS.get(name)
+    if name in TERMS:
+        return replace(TERMS[name], label=title_of(name, TERMS[name].label))
+    known = SCORE_TERMS.get(name)
     shown = "°" if unit == "deg" else unit
     return known or Term(name, shown, "Other", 2, (0.0, 1.0), ("larger", "smaller"))
 
@@ -93,7 +98,7 @@ def _limit_digits(term: Term) -> int:
 
 def _verdict(change: Change) -> str:
     if change.verdict is None:
-        return NO_LIMIT
+        return {TOO_FEW: TOO_FEW_WORDS, UNLIKE: UNLIKE_WORDS}.get(change.reason or "", NO_LIMIT)
     said = VERDICTS[change.verdict]
     if change.verdict == "real_change" and change.mcid is not None:
         said += ", smaller than clinically relevant"

@@ -39,7 +39,7 @@ def parquet_file(t_s: Floats, columns: Mapping[str, np.ndarray], meta: Mapping[s
     """Columns over time as Parquet with `meta` as JSON under "sagittal"; NaN becomes null."""
     arrays = {"t_s": pa.array(t_s)} | {k: pa.array(v, from_pandas=True) for k, v in columns.items()}
     table = pa.table(arrays).replace_schema_metadata({"sagittal": json.dumps(plain(meta))})
-    # neighbouring samples share their high bytes: splitting the bytes halves the file (spec/kernels.md §6)
+    # neighbouring samples share their high bytes: splitting the bytes halves the file
     split = [k for k, a in arrays.items() if pa.types.is_floating(a.type)]
     sink = io.BytesIO()
     pq.write_table(table, sink, compression="zstd", use_dictionary=False, use_byte_stream_split=split)  # type: ignore[arg-type] # the stubs know bool only

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from core.change import Change, parameter_changes
+from core.change import Change, parameter_changes, unjudged
 from core.frames import Side
 from core.norms import Norms, NormValue
 from server.report.change_words import SCORE_TERMS, ChangeWords, change_words, term_of
@@ -54,12 +54,18 @@ def changes(
 
 
 def compared_rows(
-    before: Numbers, after: Numbers, norms: Norms | None = None, affected: Side | None = None
+    before: Numbers,
+    after: Numbers,
+    norms: Norms | None = None,
+    affected: Side | None = None,
+    *,
+    comparable: bool = True,
 ) -> tuple[ComparedRow, ...]:
-    """The table of a comparison."""
+    """The table of a comparison; without verdicts where the two were not walked alike."""
     reasons = {(p.name, p.side): p.reason for p in figures(after)}
     rows = []
-    for c in changes(before, after, norms, affected):
+    for found in changes(before, after, norms, affected):
+        c = found if comparable else unjudged(found)
         term = term_of(c.name, c.unit)
         old, new = ("–" if value is None else number(value, term.digits) for value in (c.before, c.after))
         reason = reason_words(reasons.get((c.name, c.side))) if c.after is None else None

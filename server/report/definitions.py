@@ -1,4 +1,4 @@
-"""What each parameter is, in one sentence: spec/field.md §4b and what we chose where it leaves a choice."""
+"""What each parameter is, in one sentence; docs/parameters.md says more."""
 
 from __future__ import annotations
 

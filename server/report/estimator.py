@@ -1,4 +1,4 @@
-"""Which pose estimator ran, on what, and what it measured about itself, in words (clinic.md §7)."""
+"""Which pose estimator ran, on what, and what it measured about itself, in words."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from core.events.steps import Steps
 from core.parameters import cycle_curves
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
+from core.quality import shown_level
 from core.scores import Scores, scores
 from server.report import signals, tracks
 from server.report.columns import SCHEMA, parquet_file, plain
@@ -69,7 +70,7 @@ def summary(analysis: Analysis) -> dict[str, object]:
     """Content of analysis.json (schema 1) as plain JSON values."""
     return {
         "schema": SCHEMA,
-        "quality": plain(analysis.quality.to_json()),
+        "quality": _quality(analysis),
         "calibration": _calibration(analysis.calibration, analysis.angles),
         "estimator": _estimator(analysis),
         "parameters": [parameter_row(p) for p in analysis.parameters],
@@ -78,6 +79,23 @@ def summary(analysis: Analysis) -> dict[str, object]:
         "warnings": [n.to_json() for n in analysis.notices],
         "provenance": plain(analysis.provenance),
     }
+
+
+def _quality(analysis: Analysis) -> dict[str, object]:
+    """The quality report; its level is the worse of signals and estimator, `signals_level` the signals'."""
+    found = plain(analysis.quality.to_json())
+    assert isinstance(found, dict)  # noqa: S101 (narrows the type; `plain` keeps mappings)
+    verdict = None if analysis.poses is None else worst(analysis.poses.health)
+    level = shown_level(analysis.quality.level, verdict)
+    reasons = [*analysis.quality.reasons, *([JUDGED[verdict]] if verdict in JUDGED else [])]
+    return {**found, "level": level, "signals_level": analysis.quality.level, "reasons": reasons}
+
+
+JUDGED: Final[Mapping[str | None, str]] = {
+    "warn": "The pose estimator doubts part of its result.",
+    "bad": "The sensors contradict each other: the pose estimator cannot stand behind its result.",
+}
+"""Verdict of the estimator → reason of the level."""
 
 
 def _scores(analysis: Analysis) -> list[dict[str, object]]:
@@ -120,7 +138,11 @@ def angles_parquet(angles: JointAngles) -> bytes:
     columns = {f"{name}_deg": np.degrees(a).astype(np.float32) for name, a in angles.angles.items()}
     columns |= {f"{s}_heading_deg": np.degrees(a).astype(np.float32) for s, a in angles.headings.items()}
     zero = {name: math.degrees(offset) for name, offset in angles.zero_offset.items()}
-    meta = {"schema": SCHEMA, "angle_zero": angles.zero, "zero_offset_deg": zero}
+    meta: dict[str, object] = {"schema": SCHEMA, "angle_zero": angles.zero, "zero_offset_deg": zero}
+    if angles.withheld:
+        meta["withheld"] = dict(angles.withheld)
+    if angles.bounds:
+        meta["bounds_deg"] = {name: math.degrees(bound) for name, bound in angles.bounds.items()}
     if angles.standing_deg:
         meta["standing_angles_deg"] = dict(angles.standing_deg)
     return parquet_file(angles.t_s, columns, meta)
@@ -154,7 +176,7 @@ def steps_csv(steps: Steps) -> bytes:
 
 
 def strides_csv(strides: Strides, columns: Mapping[str, Column]) -> bytes:
-    """Every stride, used or not, with its own parameters (spec/field.md §4b) and the rules that it meets.
+    """Every stride, used or not, with its own parameters and the rules that it meets.
 
     Parameters
     ----------
@@ -250,7 +272,7 @@ def _walking(analysis: Analysis) -> dict[str, object] | None:
 
 
 def _estimator(analysis: Analysis) -> dict[str, object] | None:
-    """Which pose estimator ran on what, and its health (spec/estimators.md §7)."""
+    """Which pose estimator ran on what, and its health (docs/estimators.md, "Health")."""
     poses = analysis.poses
     if poses is None:
         return None

@@ -6,9 +6,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Final
 
-from core.anatomical import anatomical_parameters
+from core.anatomical import anatomical_parameters, standing_name
 from core.events.result import Strides
-from core.frames import SIDES, SUFFIX
+from core.frames import SIDES
 from core.norms import Norms
 from core.parameters.result import CycleCurves
 from core.parameters.rows import Column
@@ -34,7 +34,7 @@ def level_column(
     if column is None:
         return None
     variable = next((v for v in (*PELVIS, *JOINTS) if name.startswith(f"{v}_")), "")
-    read = {s: standing_deg.get(variable if variable in PELVIS else f"{variable}_{SUFFIX[s]}") for s in SIDES}
+    read = {s: standing_deg.get(standing_name(variable, s)) for s in SIDES}
     return tuple(
         None if v is None or (zero := read[s.side]) is None else v + zero
         for s, v in zip(strides.strides, column, strict=True)
@@ -55,5 +55,5 @@ def level_rows(
     estimated : variables that no two sensors measure; a goniometer does not help them.
     """
     measured = replace(curves, curves={v: c for v, c in curves.curves.items() if v not in estimated})
-    rows = parameter_rows(anatomical_parameters(measured, standing_deg), norms)
+    rows = parameter_rows(anatomical_parameters(measured, standing_deg), norms, zero="anatomical")
     return tuple(replace(row, name=f"{row.name.removesuffix('_deg')}{_SUFFIX}", group=GROUP) for row in rows)

@@ -1,4 +1,4 @@
-"""Values against limits and where the limits come from: no diagnosis (spec/clinic.md §4, §6)."""
+"""Values against limits and where the limits come from: no diagnosis (docs/science/flags.md)."""
 
 from __future__ import annotations
 
@@ -41,6 +41,8 @@ REASONS: Final[Mapping[str, str]] = {
     "side_missing": "the other side is missing",
     "near_zero": "a side is near zero",
     "no_norm_for_age": "the people of the limit are adults",
+    "too_few_strides": "too few strides to judge",
+    "sides_alike": "the strides do not say that the sides differ",
 }
 """Why a value cannot be held against its limit; other codes as in the table."""
 

@@ -112,7 +112,8 @@ class ReportModel:
     groups : parameter rows under their headings. key_curve : the panel shown on the overview.
     norm_note : source, number and speed of the reference people, or why there is none.
     curve_notes : how to read the curves, in sentences: zero, offsets, confidence, what is drawn.
-    since : the visit that `change` of the rows refers to, None without an earlier one of this protocol.
+    since : the visit that `change` of the rows refers to, None without an earlier one walked alike.
+    condition : how the take was walked, in words.
     """
 
     problem: str | None
@@ -133,6 +134,7 @@ class ReportModel:
     profile: ProfileView | None = None
     limits: LimitsView | None = None
     since: Since | None = None
+    condition: str = ""
 
     @property
     def key_curve(self) -> CurvePanel:
@@ -178,6 +180,7 @@ class ReportModel:
                 "profile": None if self.profile is None else _profile_json(self.profile),
                 "limits": None if self.limits is None else asdict(self.limits),
                 "since": None if self.since is None else asdict(self.since),
+                "condition": self.condition,
                 "provenance": self.provenance,
             }
         )
@@ -208,10 +211,11 @@ def report_model(
     norms = norms_for(age, sex, speed_mps, height_m)
     own = None if controls is None else controls.norms(speed_mps, height_m)
     if own is not None:
-        norms = replace(norms, values={**own.values, **norms.values})
+        compared = {name: v for name, v in norms.values.items() if v.comparable or name not in own.values}
+        norms = replace(norms, values={**own.values, **compared})
     rows = parameter_rows(bundle.parameters, norms, estimated_variables(bundle.estimator), affected)
     curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
-    panels = curve_panels(bundle, curves, norms)
+    panels = curve_panels(bundle, curves, norms, own)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
     if curves is not None and standing:
         level = norms_for(age, sex, speed_mps, height_m, anatomical_variables(standing))
@@ -306,6 +310,8 @@ def _warning(n: Notice) -> Warning_:
 def _key_number(row: Row) -> KeyNumber:
     pair = row.both is None
     norm = f"norm {row.norm}" if row.norm else ""
+    cells = {"": row.both} if row.both is not None else {" left": row.left, " right": row.right}
+    few = ", ".join(f"{c.few}{side}" for side, c in cells.items() if c is not None and c.few)
     return KeyNumber(
         name=row.name,
         title=row.title,
@@ -314,7 +320,7 @@ def _key_number(row: Row) -> KeyNumber:
         text="" if row.both is None else row.both.text,
         left="–" if row.left is None else row.left.text,
         right="–" if row.right is None else row.right.text,
-        words=", ".join(w for w in (row.difference, norm) if w),
+        words=", ".join(w for w in (few, row.difference, norm) if w),
     )
 
 
@@ -338,6 +344,7 @@ def _panel_json(p: CurvePanel) -> dict[str, object]:
         "variable": v.name,
         "title": p.title,
         "plane": v.plane,
+        "zero": p.zero,
         "low_confidence": p.low_confidence,
         "reason": p.reason,
         "y_range_deg": v.y_range,

@@ -14,7 +14,7 @@ from server.report.bundle import Bundle
 from server.report.estimator import estimator_view
 from server.report.panels import DRAWN_STRIDES, CurvePanel
 from server.report.table import Row
-from server.report.wording import NO_NORM, VARIABLES, ZERO_WORDS, number
+from server.report.wording import NO_NORM, VARIABLES, number
 
 SPEED: Final = "gait_speed_mps"
 
@@ -33,8 +33,9 @@ def norm_note(
     sentences = []
     if norms.reason is not None:
         sentences.append(NO_NORM.get(norms.reason, norms.reason))
-    band = next((p.norm for p in panels if p.norm is not None), None)
-    if band is not None:
+    used = any(p.norm is not None and p.norm.zero == "anatomical" for p in panels)
+    band = next(iter(norms.bands.values()), None)
+    if band is not None and (used or any(r.norm is not None and r.name in ANGLES for r in rows)):
         who = GROUPS.get(band.group, band.group)
         sentences.append(
             f"Norm: {band.n} {who}, overground at their comfortable 1.25 ± 0.16 m/s, mean ± 1 SD "
@@ -66,7 +67,6 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
     """How to read the curves, in sentences: zero, offsets, confidence, what is drawn."""
     if bundle.angles is None:
         return ()
-    zero = ZERO_WORDS.get(bundle.angles.zero, bundle.angles.zero)
     labels = {v.name: v.label.lower() for v in VARIABLES if v.plane == "sagittal"}
     offsets = []
     for name, value in bundle.angles.zero_offset.items():
@@ -75,13 +75,19 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
         label = labels.get(base if side else name)
         if label is not None:
             offsets.append(f"{label}{side or ''} {number(float(np.degrees(value)))}°")
-    about_zero = (
-        f"Angles are measured {zero}: the posture of the standing part is 0°. "
-        f"Subtracted: {', '.join(offsets)}. A person who stands bent gets curves shifted by that much."
-    )
+    about_zero = []
+    if any(p.zero == "standing" and p.reason is None for p in panels):
+        about_zero.append(
+            "Curves named from standing have the posture of the standing part at 0°. "
+            f"Subtracted: {', '.join(offsets)}. A person who stands bent gets curves shifted by that much."
+        )
+    if any(p.zero == "anatomical" and p.reason is None for p in panels):
+        about_zero.append(
+            "Curves named anatomical start from what the goniometer read in standing, as the norm does."
+        )
     view = estimator_view(bundle.estimator)
     notes = [
-        about_zero,
+        *about_zero,
         *([view.estimated] if view is not None and view.estimated else []),
         *_norm_notes(panels),
     ]

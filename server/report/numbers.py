@@ -11,16 +11,18 @@ from core.norms.profile import ScoreSpread
 from core.parameters import cycle_curves
 from core.parameters.result import Parameter
 from core.scores import Score, scores
-from server.report.bundle import Bundle
+from server.report.bundle import Bundle, read_warnings
 from server.report.estimator import estimated_variables
+from server.report.quality_box import data_verdict
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """Parameters, and the scores over several curves, of one analysis."""
+    """Parameters, the scores over several curves, and the verdict on the data (its shape and word)."""
 
     parameters: tuple[Parameter, ...]
     scores: tuple[Score, ...]
+    verdict: tuple[str, str]
 
 
 def read_numbers(content: bytes) -> Numbers | None:
@@ -29,16 +31,22 @@ def read_numbers(content: bytes) -> Numbers | None:
     if "scores" not in data:
         return None
     parameters = tuple(Parameter(**row) for row in data["parameters"])
-    return Numbers(parameters, tuple(_score(row) for row in data["scores"]))
+    judged = data_verdict(
+        data["quality"], data.get("estimator"), {n.severity for n in read_warnings(data)}, parameters
+    )
+    return Numbers(parameters, tuple(_score(row) for row in data["scores"]), judged)
 
 
 def numbers_of(bundle: Bundle) -> Numbers:
     """The numbers of an analysis that was read with its curves."""
+    judged = data_verdict(
+        bundle.quality, bundle.estimator, {n.severity for n in bundle.warnings}, bundle.parameters
+    )
     if bundle.angles is None:
-        return Numbers(bundle.parameters, ())
+        return Numbers(bundle.parameters, (), judged)
     curves = cycle_curves(bundle.angles, bundle.strides)
     found = scores(curves, bundle.angles.standing_deg, estimated=estimated_variables(bundle.estimator))
-    return Numbers(bundle.parameters, tuple(s for s in found.scores if s.variable is None))
+    return Numbers(bundle.parameters, tuple(s for s in found.scores if s.variable is None), judged)
 
 
 def _score(row: Mapping[str, Any]) -> Score:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
+from core.anatomical import anatomical_variables, standing_offset_deg
 from core.frames import SIDES, Floats, Side
 from core.norms import NormBand
+from core.norms.kinematics import Zero
 from core.norms.lookup import Norms
 from core.parameters import mean_curve
 from core.parameters.kinematic import MEAN_ZERO
@@ -17,6 +19,14 @@ from core.parameters.result import CycleCurves
 from server.report.bundle import Bundle
 from server.report.estimator import estimated_variables
 from server.report.wording import VARIABLES, ZERO_WORDS, Variable, reason_words
+
+NO_BAND: Final[Mapping[Zero, str]] = {
+    "standing": "No norm band: these curves start from this person's standing, the norm from the anatomical "
+    "zero. Enter goniometer angles of standing to compare.",
+    "stride_mean": "No norm band: measured from its own mean over the stride, the norm is not.",
+    "anatomical": "No norm band: the norm is measured from standing.",
+}
+"""Zero of a curve → why none of the known bands may stand behind it."""
 
 DRAWN_STRIDES: Final = 40
 """Single strides drawn per side at most, spread over the take; more only make the page heavy."""
@@ -48,13 +58,18 @@ class CurvePanel:
     Parameters
     ----------
     title : with the zero in words, "Knee flexion, from standing".
+    zero : what the curves are measured from, None without angles. added_deg : what of it a goniometer read,
+        by side, and was added; empty from standing.
     low_confidence : frontal and transverse planes, and joints without a sensor on both of their segments.
     reason : why there is no curve, None if there is one.
-    norm : band to draw, None where it is not comparable. norm_note : what must be said about it.
+    norm : band to draw, of the same zero; None where there is none. norm_note : what must be said about it,
+        or why there is none though a norm exists.
     """
 
     variable: Variable
     title: str
+    zero: Zero | None
+    added_deg: Mapping[Side, float]
     low_confidence: bool
     reason: str | None
     norm: NormBand | None
@@ -62,44 +77,102 @@ class CurvePanel:
     sides: Mapping[Side, SideCurve]
 
 
-def curve_panels(bundle: Bundle, curves: CycleCurves | None, norms: Norms) -> tuple[CurvePanel, ...]:
+def curve_panels(
+    bundle: Bundle, curves: CycleCurves | None, norms: Norms, own: Norms | None = None
+) -> tuple[CurvePanel, ...]:
     """All panels in reading order; a variable without a curve keeps its place and says why.
+
+    Where a goniometer was used on both sides the curves are anatomical, else from standing.
 
     Parameters
     ----------
     curves : of the bundle's angles over its strides, None without angles.
+    norms, own : published reference, and the clinic's own controls; the first that has a band of the same
+        zero gives it, to a variable that sensors measure.
     """
-    zero = None if bundle.angles is None else bundle.angles.zero
     estimated = estimated_variables(bundle.estimator)
-    return tuple(
-        _panel(v, curves, zero, norms.bands.get(v.name), sure=v.name not in estimated) for v in VARIABLES
+    standing = {} if bundle.angles is None else bundle.angles.standing_deg
+    level = set(anatomical_variables(standing)).difference(estimated)
+    known = () if own is None else (own.bands,)
+    found = []
+    for v in VARIABLES:
+        bands = [b for by_name in (norms.bands, *known) if (b := by_name.get(v.name)) is not None]
+        added = {s: standing_offset_deg(v.name, s, standing) for s in SIDES} if v.name in level else {}
+        found.append(_panel(v, curves, added, bands, sure=v.name not in estimated))
+    return tuple(found)
+
+
+def same_zero(before: CurvePanel, after: CurvePanel) -> tuple[CurvePanel, CurvePanel]:
+    """Two panels of a variable to be drawn in one: both from standing unless both are anatomical."""
+    if before.zero == after.zero or None in (before.zero, after.zero):
+        return before, after
+    return _from_standing(before), _from_standing(after)
+
+
+def _from_standing(panel: CurvePanel) -> CurvePanel:
+    if panel.zero != "anatomical":
+        return panel
+    sides = {s: _moved(c, -panel.added_deg[s]) for s, c in panel.sides.items()}
+    return replace(
+        panel,
+        title=_title(panel.variable, "standing"),
+        zero="standing",
+        added_deg={},
+        norm=None,
+        norm_note="",
+        sides=sides,
     )
 
 
 def _panel(
-    variable: Variable, curves: CycleCurves | None, zero: str | None, band: NormBand | None, *, sure: bool
+    variable: Variable,
+    curves: CycleCurves | None,
+    added: Mapping[Side, float],
+    bands: Sequence[NormBand],
+    *,
+    sure: bool,
 ) -> CurvePanel:
     sides = {} if curves is None else {s: _side(curves, variable.name, s) for s in SIDES}
     sides = {s: c for s, c in sides.items() if c.mean_deg is not None}
+    sides = {s: _moved(c, added.get(s, 0.0)) for s, c in sides.items()}
     reason = None if sides else _why_missing(variable, curves)
-    if variable.name in MEAN_ZERO:
-        zero = "stride_mean"
-    words = "" if zero is None else ZERO_WORDS.get(zero, zero)
+    zero: Zero | None = None
+    if curves is not None:
+        zero = "stride_mean" if variable.name in MEAN_ZERO else "anatomical" if added else "standing"
+    fitting = next((b for b in bands if b.zero == zero), None) if sure and reason is None else None
+    note = "" if fitting is None else fitting.note
+    if fitting is None and bands and sure and zero is not None:
+        note = NO_BAND[zero]
     return CurvePanel(
         variable=variable,
-        title=f"{variable.label}, {words}" if words else variable.label,
+        title=_title(variable, zero),
+        zero=zero,
+        added_deg=added,
         low_confidence=variable.plane != "sagittal" or not sure,
         reason=reason,
-        norm=band if band is not None and band.comparable and reason is None else None,
-        norm_note="" if band is None else band.note,
+        norm=fitting,
+        norm_note=note,
         sides=sides,
     )
+
+
+def _title(variable: Variable, zero: Zero | None) -> str:
+    return variable.label if zero is None else f"{variable.label}, {ZERO_WORDS[zero]}"
+
+
+def _moved(curve: SideCurve, by_deg: float) -> SideCurve:
+    """The curve with its zero moved."""
+    if by_deg == 0.0 or curve.mean_deg is None:
+        return curve
+    strides = {i: row + by_deg for i, row in curve.strides.items()}
+    return replace(curve, mean_deg=curve.mean_deg + by_deg, strides=strides)
 
 
 def _why_missing(variable: Variable, curves: CycleCurves | None) -> str:
     if curves is None:
         return reason_words("not_reached")
-    return reason_words("no_strides" if variable.name in curves.curves else "joint_missing")
+    why = next(iter(curves.why.get(variable.name, {}).values()), None)
+    return reason_words(why or ("no_strides" if variable.name in curves.curves else "joint_missing"))
 
 
 def _side(curves: CycleCurves, name: str, side: Side) -> SideCurve:

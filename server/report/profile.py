@@ -1,4 +1,4 @@
-"""The movement analysis profile: how far each curve is from healthy adults (spec/clinic.md §3, §7)."""
+"""The movement analysis profile: how far each curve is from healthy adults (docs/norms.md, "Scores")."""
 
 from __future__ import annotations
 

@@ -1,11 +1,14 @@
-"""Is the data good: the box above everything else, in words and a few numbers (clinic.md §7)."""
+"""Is the data good: the box above everything else, in words and a few numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, cast
 
+from core.parameters.result import Parameter
+from core.quality import shown_level
+from core.quality.assessment import Verdict
 from server.report.bundle import Bundle
 from server.report.estimator import estimator_view
 from server.report.wording import number, place_words
@@ -51,38 +54,55 @@ class QualityBox:
 def quality_box(bundle: Bundle) -> QualityBox:
     """Judge a finished analysis.
 
-    Bad when the analysis stopped, no stride counts or the signals are poor; warn when the signals are only
-    usable or any stage has a warning; else ok.
+    Bad when the analysis stopped, no stride counts, the signals are poor or the pose estimator cannot stand
+    behind its result; warn when the signals are only usable, the estimator doubts or any stage has a warning;
+    else ok.
     """
-    level = bundle.quality.get("level", "good")
-    severities = {n.severity for n in bundle.warnings}
-    if "error" in severities:
-        kind, word = "bad", "Analysis stopped"
-    elif not bundle.strides.used() and not _trunk_steps(bundle):
-        kind, word = "bad", "No strides"
-    elif level == "poor":
-        kind, word = "bad", "Poor data"
-    elif level == "usable" or "warning" in severities:
-        kind, word = "warn", "Usable, see notices"
-    else:
-        kind, word = "ok", "Good data"
+    kind, word = data_verdict(
+        bundle.quality, bundle.estimator, {n.severity for n in bundle.warnings}, bundle.parameters
+    )
     items = [
         *_counted(bundle),
         *_signals(bundle.quality),
-        *_calibration(bundle.calibration, needed=not _trunk_steps(bundle)),
+        *_calibration(bundle.calibration, needed=not _trunk_steps(bundle.parameters)),
         *_estimator(bundle.estimator),
     ]
     return QualityBox(kind, word, tuple(items))
 
 
-def _trunk_steps(bundle: Bundle) -> int:
+def data_verdict(
+    quality: Mapping[str, Any],
+    estimator: Mapping[str, Any] | None,
+    severities: Collection[str],
+    parameters: Sequence[Parameter],
+) -> tuple[str, str]:
+    """Shape (ok, warn, bad) and word for the data of an analysis; the same in every list and on its page.
+
+    Parameters
+    ----------
+    quality, estimator : of analysis.json. severities : of its notices. parameters : as they count.
+    """
+    health = None if estimator is None else cast("Verdict", estimator["verdict"])
+    level = shown_level(quality.get("level", "good"), health)
+    if "error" in severities:
+        return "bad", "Analysis stopped"
+    if not any(p.name == "stride_time_s" and p.n for p in parameters) and not _trunk_steps(parameters):
+        return "bad", "No strides"
+    if level == "poor":
+        return "bad", "Sensors disagree" if health == "bad" else "Poor data"
+    if level == "usable" or "warning" in severities:
+        return "warn", "Usable, see notices"
+    return "ok", "Good data"
+
+
+def _trunk_steps(parameters: Sequence[Parameter]) -> int:
     """Steps that a trunk sensor told, where no foot carries one."""
-    return next((int(p.mean) for p in bundle.parameters if p.name == "step_count" and p.mean is not None), 0)
+    return next((int(p.mean) for p in parameters if p.name == "step_count" and p.mean is not None), 0)
 
 
 def _counted(bundle: Bundle) -> list[QualityItem]:
     """Strides of the feet, or steps of the trunk where there are none."""
-    steps = _trunk_steps(bundle)
+    steps = _trunk_steps(bundle.parameters)
     if steps and not bundle.strides.strides:
         return [QualityItem("Steps", str(steps), "trunk sensor")]
     return [_strides(bundle)]

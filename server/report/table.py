@@ -7,28 +7,26 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from core.frames import Side
+from core.norms.kinematics import Zero
 from core.norms.lookup import Norms
 from core.parameters.result import Parameter
 from core.parameters.symmetry import Symmetry, symmetries
+from core.parameters.variability import COUNTED, comparable
 from server.report.change_words import ChangeWords
 from server.report.curves import range_svg
-from server.report.wording import TERMS, Term, difference_words, number, reason_words, symmetry_words
+from server.report.wording import (
+    NO_DIFFERENCE,
+    TERMS,
+    Term,
+    difference_words,
+    number,
+    reason_words,
+    symmetry_words,
+    title_of,
+)
 
 NOBODY: Final = Norms(None, None)
 """No reference people at all."""
-
-COUNTED: Final[Mapping[str, str]] = {
-    "cadence_spm": "steps",
-    "total_distance_m": "feet",
-    "step_count": "steps",
-    "walking_bout_count": "bouts",
-    "walking_duration_min": "bouts",
-    "turn_count": "turns",
-    "turn_angle_deg": "turns",
-    "turn_duration_s": "turns",
-    "turn_peak_velocity_dps": "turns",
-}
-"""What a number is the mean of, where not of strides."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,8 @@ class Cell:
     Parameters
     ----------
     ci : 95 % confidence interval of the mean over the strides. cv_pct : None below 10 strides.
-    z, percentile : among the norm's people, None without a comparable norm.
+    z, percentile : among the norm's people, None without a comparable norm or with too few strides.
+    few : "3 strides" where they are too few to be compared with anything, else "".
     """
 
     value: float
@@ -50,6 +49,7 @@ class Cell:
     cv_pct: float | None = None
     z: float | None = None
     percentile: float | None = None
+    few: str = ""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Row:
         behind it; None where no comparable norm exists, `norm_note` then says why if there is a reason.
     reason : words in place of all numbers, None if there is any.
     low_confidence : of an angle that the estimator's model gives; it has no norm.
-    symmetry : left against right in numbers, None unless both sides have one.
+    symmetry : left against right in numbers, None unless both sides have one of enough strides.
     change : since the visit before, of every side that has one; empty without such a visit.
     """
 
@@ -88,8 +88,8 @@ class Row:
 
     @property
     def symmetry_words(self) -> str:
-        """Ratio, index and angle of the two sides in words; empty where there is none."""
-        return "" if self.symmetry is None else symmetry_words(self.symmetry)
+        """Ratio, index and angle of the two sides in words; empty where they do not clearly differ."""
+        return "" if self.symmetry is None or not self.symmetry.clear else symmetry_words(self.symmetry)
 
     change: tuple[ChangeWords, ...] = ()
 
@@ -116,6 +116,7 @@ def parameter_rows(
     norms: Norms = NOBODY,
     estimated: Collection[str] = (),
     affected: Side | None = None,
+    zero: Zero = "standing",
 ) -> tuple[Row, ...]:
     """Rows in the order of the table; parameters without wording come last under their own name.
 
@@ -123,13 +124,14 @@ def parameter_rows(
     ----------
     affected : side that ratios are taken of, None = left over right.
     estimated : variables that no two sensors measure; what is derived from them has low confidence.
+    zero : what the levels of joint angles are measured from.
     """
     found: dict[str, dict[str | None, Parameter]] = {}
     for p in parameters:
         found.setdefault(p.name, {})[p.side] = p
     known = [name for name in TERMS if name in found]
     other = [name for name in found if name not in TERMS]
-    rows = (_row(name, found[name], norms, affected) for name in (*known, *other))
+    rows = (_row(name, found[name], norms, affected, zero) for name in (*known, *other))
     return tuple(_unsure(r) if any(r.name.startswith(f"{v}_") for v in estimated) else r for r in rows)
 
 
@@ -139,20 +141,23 @@ def grouped(rows: Sequence[Row]) -> tuple[tuple[str, tuple[Row, ...]], ...]:
     return tuple((name, tuple(r for r in rows if r.group == name)) for name in names)
 
 
-def _row(name: str, sides: Mapping[str | None, Parameter], norms: Norms, affected: Side | None = None) -> Row:
+def _row(
+    name: str, sides: Mapping[str | None, Parameter], norms: Norms, affected: Side | None, zero: Zero
+) -> Row:
     term, norm = TERMS.get(name) or _unknown(name, sides), norms.values.get(name)
     both, left, right = (_cell(sides.get(side), term, norms) for side in (None, "left", "right"))
     missing = both is None and left is None and right is None
+    symmetry = next(iter(symmetries(tuple(sides.values()), affected)), None)
     shown = norm if norm is not None and norm.comparable else None
     return Row(
         name=name,
-        title=term.label,
+        title=title_of(name, term.label, zero),
         unit=term.unit,
         group=term.group,
         both=both,
         left=left,
         right=right,
-        difference=_difference(left, right, sides, term) if both is None and not missing else None,
+        difference=_difference(left, right, sides, term, symmetry) if both is None and not missing else None,
         reason=reason_words(next(iter(sides.values())).reason) if missing else None,
         scale=term.scale,
         norm=None
@@ -163,7 +168,7 @@ def _row(name: str, sides: Mapping[str | None, Parameter], norms: Norms, affecte
         norm_n=None if shown is None else shown.n,
         norm_source=None if shown is None else shown.source,
         norm_note="" if norm is None else norm.note,
-        symmetry=next(iter(symmetries(tuple(sides.values()), affected)), None),
+        symmetry=symmetry,
     )
 
 
@@ -188,11 +193,18 @@ def _unsure(row: Row) -> Row:
 
 
 def _difference(
-    left: Cell | None, right: Cell | None, sides: Mapping[str | None, Parameter], term: Term
+    left: Cell | None,
+    right: Cell | None,
+    sides: Mapping[str | None, Parameter],
+    term: Term,
+    symmetry: Symmetry | None,
 ) -> str | None:
-    """Words for left against right, or why one side has no number."""
+    """Words for left against right, or why a side has no number; None where too few strides are compared."""
     if left is not None and right is not None:
-        return difference_words(left.value, right.value, term)
+        if symmetry is None:
+            return None
+        same = difference_words(left.value, right.value, term)
+        return same if symmetry.clear or same == NO_DIFFERENCE else "no clear difference"
     side = "left" if left is None else "right"
     absent = sides.get(side)
     return f"{side} {reason_words(None if absent is None else absent.reason)}"
@@ -210,7 +222,8 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> Cell | None:
         told.append(f"95 % CI {number(ci[0], digits)} to {number(ci[1], digits)}")
     if p.cv_pct is not None:
         told.append(f"CV {number(p.cv_pct, 1)} %{' of few strides' if p.note == 'few_strides' else ''}")
-    place = norms.place(p.name, p.mean)
+    enough = comparable(p)
+    place = norms.place(p.name, p.mean if enough else None)
     if place.z is not None and place.percentile is not None:
         told.append(f"z {number(place.z, 1)}, percentile {number(place.percentile)} of the norm")
     return Cell(
@@ -223,6 +236,7 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> Cell | None:
         p.cv_pct,
         place.z,
         place.percentile,
+        "" if enough else f"{p.n} {what if p.n != 1 else what.removesuffix('s')}",
     )
 
 

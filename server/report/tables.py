@@ -36,6 +36,7 @@ def parameters_csv(report: ReportModel) -> bytes:
         "norm_sd",
         "norm_source",
         "reason",
+        "condition",
     )
 
     def rows() -> Iterator[Sequence[object]]:
@@ -54,6 +55,7 @@ def parameters_csv(report: ReportModel) -> bytes:
                         *(None if r.symmetry is None else getattr(r.symmetry, what) for what in SYMMETRY),
                         *norm,
                         r.reason if c is None else None,
+                        report.condition,
                     )
 
     return write_csv(header, rows())
@@ -64,7 +66,7 @@ def trends_csv(visits: Sequence[Visit], found: Sequence[Trend]) -> bytes:
     header = (
         *("name", "side", "unit", "date", "session_id", "visit", "kind"),
         *("n", "mean", "sd", "ci_low", "ci_high"),
-        *("change", "verdict", "mdc", "mdc_source", "mcid", "mcid_source", "reason"),
+        *("change", "verdict", "mdc", "mdc_source", "mcid", "mcid_source", "reason", "condition"),
     )
 
     def rows() -> Iterator[Sequence[object]]:
@@ -77,6 +79,7 @@ def trends_csv(visits: Sequence[Visit], found: Sequence[Trend]) -> bytes:
                         *(v.performed_on.isoformat(), v.session_id, v.label or "", v.kind),
                         *(p.n, p.value, p.sd, p.ci_low, p.ci_high),
                         *((None,) * 7 if c is None else _judged(c)),
+                        v.condition.words,
                     )
 
     return write_csv(header, rows())
@@ -87,8 +90,18 @@ def _judged(c: Change) -> tuple[object, ...]:
 
 
 def curves_csv(report: ReportModel) -> bytes:
-    """One row per variable, side and % of cycle: mean and sd over the counted strides, and the norm."""
-    header = ("variable", "side", "pct_cycle", "n", "mean_deg", "sd_deg", "norm_mean_deg", "norm_sd_deg")
+    """One row per variable, side and % of cycle: mean and sd over the counted strides, norm of that zero."""
+    header = (
+        "variable",
+        "side",
+        "pct_cycle",
+        "n",
+        "mean_deg",
+        "sd_deg",
+        "norm_mean_deg",
+        "norm_sd_deg",
+        "zero",
+    )
 
     def rows() -> Iterator[Sequence[object]]:
         for p in report.panels:
@@ -105,6 +118,7 @@ def curves_csv(report: ReportModel) -> bytes:
                         None if c.sd_deg is None else float(c.sd_deg[i]),
                         None if p.norm is None else float(p.norm.mean_deg[i]),
                         None if p.norm is None else float(p.norm.sd_deg[i]),
+                        p.zero,
                     )
 
     return write_csv(header, rows())

@@ -61,7 +61,12 @@ def tracks_parquet(tracks: Tracks) -> bytes:
         "steps": None if tracks.steps is None else _steps_meta(tracks.steps),
         "feet": None
         if feet is None
-        else {"linked": feet.linked, "source": feet.source, "body": dataclasses.asdict(feet.body)},
+        else {
+            "linked": feet.linked,
+            "source": feet.source,
+            "body": dataclasses.asdict(feet.body),
+            "withheld": dict(feet.withheld),
+        },
     }
     return parquet_file(tracks.t_s, columns, meta)
 
@@ -129,6 +134,7 @@ def _feet(
         linked=bool(meta["linked"]),
         source=str(meta["source"]),
         body=_made(BodyModel, meta["body"]),
+        withheld=meta.get("withheld", {}),
     )
 
 

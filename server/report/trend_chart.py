@@ -46,9 +46,8 @@ def value_range(trend: Trend) -> tuple[float, float]:
     values: list[float] = []
     for line in trend.lines:
         values += [p.value for p in line.points]
-        base = line.points[line.base].value
         for size in (line.mdc, line.mcid):
-            values += [] if size is None else [base - size, base + size]
+            values += [] if size is None else [line.start - size, line.start + size]
     if trend.norm is not None:
         values += [trend.norm.mean - trend.norm.sd, trend.norm.mean + trend.norm.sd]
     low, high = min(values), max(values)
@@ -66,7 +65,7 @@ def trend_svg(
     ahead : planned assessments to come, hairlines with their label. height : px with margins.
     """
     plot = _Plot(value_range(trend), visits, ahead, height - TOP - BOTTOM)
-    base = line.points[line.base].value
+    base = line.start
     if trend.norm is not None:
         plot.band("band", trend.norm.mean - trend.norm.sd, trend.norm.mean + trend.norm.sd)
     if line.mdc is not None:
@@ -165,15 +164,14 @@ class _Plot:
             large = self._visits[p.visit].kind == "assessment"
             css, radius = (f"pl-{key}", 5.0) if large else (f"ps-{key}", 2.8)
             self._dot(self._at(p.visit), p.value, css, radius)
-        shown = {line.base} if line.latest is None else {line.base, line.latest}
-        for i in sorted(shown):
+        for i in sorted({i for i in (line.base, line.latest) if i is not None}):
             p = line.points[i]
             x, y = _pct(self._at(p.visit)), self._px(p.value)
             self._text(x, y, number(p.value, digits), "strong halo", "middle", dy=-11)
 
     def labels(self, line: Line) -> None:
         """Name band and limit where nothing is measured yet, else in the middle, away from the two values."""
-        base = line.points[line.base].value
+        base = line.start
         last = max(v.performed_on for v in self._visits)
         free = self._alone or any(a.day > last for a in self._ahead)
         x, anchor, dx = ("100%", "end", -4) if free else ("50%", "middle", 0)

@@ -1,7 +1,8 @@
 """Figures over the visits of a person: what changed since the first assessment, and by how much it must.
 
-The first assessment is the base: its measurement error is the band that a later value must leave to be a real
-change (spec/clinic.md §2, §7). Trainings are shown and not judged on: an assessment is.
+All of them are walked under one condition. The first assessment is the base: its measurement error is the
+band that a later value must leave to be a real change (docs/norms.md, "Change"). Trainings are shown and
+never the base; with feedback they are not compared with it either.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Final, Literal
 
 from core.change import Change, detectable, parameter_changes, relevant
 from core.change.limits import Limb
+from core.condition import WalkingCondition
 from core.frames import SIDES, Side
 from core.norms import Norms, NormValue
 from core.parameters.result import Parameter
@@ -43,7 +45,8 @@ class Visit:
     Parameters
     ----------
     label : of the planned visit, "PRE" or "T4"; None outside a programme.
-    kind : an unplanned session counts as an assessment. numbers : what was measured.
+    kind : an unplanned session counts as an assessment, one with feedback as a training.
+    condition : how it was walked. numbers : what was measured.
     """
 
     session_id: str
@@ -51,13 +54,18 @@ class Visit:
     title: str
     label: str | None
     kind: VisitKind
-    protocol: str
+    condition: WalkingCondition
     numbers: Numbers
+
+    @property
+    def feedback(self) -> bool:
+        """It was walked with feedback."""
+        return self.condition.feedback
 
 
 @dataclass(frozen=True)
 class Point:
-    """A value at a visit; `change` = against the base, None for the base itself."""
+    """A value at a visit; `change` = against the base, None for the base itself and with feedback."""
 
     visit: int
     value: float
@@ -74,17 +82,22 @@ class Line:
 
     Parameters
     ----------
-    points : visits with a value, oldest first. base : index of the first assessment among them.
+    points : visits with a value, oldest first. base : index of the first assessment among them, None = none.
     latest : index of the last assessment after it, else None: nothing to judge yet.
     mdc, mcid : around the base; None without a source.
     """
 
     side: Side | None
     points: tuple[Point, ...]
-    base: int
+    base: int | None
     latest: int | None
     mdc: float | None
     mcid: float | None
+
+    @property
+    def start(self) -> float:
+        """Value that the limits lie around: of the base; without one there are no limits."""
+        return self.points[self.base or 0].value
 
     @property
     def change(self) -> Change | None:
@@ -116,7 +129,7 @@ def trends(
     usual: Mapping[str, NormValue] | None = None,
     affected: Side | None = None,
 ) -> tuple[Trend, ...]:
-    """Follow figures over visits of one protocol, oldest first; those without a value are left out.
+    """Follow figures over visits of one condition, oldest first; those without a value are left out.
 
     Parameters
     ----------
@@ -196,19 +209,21 @@ def _line(
     if not measured:
         return None
     assessed = [k for k, (i, _, _) in enumerate(measured) if visits[i].kind == "assessment"]
-    base = assessed[0] if assessed else 0
-    first = measured[base][1]
+    base = assessed[0] if assessed else None
+    first = None if base is None else measured[base][1]
     known = None if norm is None else {name: norm}
+
+    def change(k: int) -> Change | None:
+        i, p, _ = measured[k]
+        if first is None or k == base or visits[i].feedback:
+            return None
+        return parameter_changes([first], [p], affected, known)[0]
+
     points = [
-        Point(
-            i, value, p.sd, p.n, p.ci_low, p.ci_high,
-            None if k == base else parameter_changes([first], [p], affected, known)[0],
-        )
-        for k, (i, p, value) in enumerate(measured)
-    ]  # fmt: skip
-    later = [k for k in assessed if k > base]
-    latest = later[-1] if later else None
-    mdc, mcid = _limits(first, points, latest, affected)
+        Point(i, value, p.sd, p.n, p.ci_low, p.ci_high, change(k)) for k, (i, p, value) in enumerate(measured)
+    ]
+    latest = assessed[-1] if len(assessed) > 1 else None
+    mdc, mcid = (None, None) if first is None else _limits(first, points, latest, affected)
     return Line(side, tuple(points), base, latest, mdc, mcid)
 
 

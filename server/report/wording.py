@@ -1,4 +1,4 @@
-"""How variables, parameters, reasons and differences are called in front of people (clinic.md §1, §7)."""
+"""How variables, parameters, reasons and differences are called in front of people."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from core.parameters.kinematic import is_level
 from core.parameters.symmetry import Symmetry
 
 Plane = Literal["sagittal", "frontal", "transverse"]
@@ -17,7 +18,7 @@ class Variable:
 
     Parameters
     ----------
-    label : title of its chart. y_range, ticks : degrees, fixed in all sessions (DESIGN.md §6.3).
+    label : title of its chart. y_range, ticks : degrees, the same in all sessions.
     up, down : words at the two ends of the axis.
     """
 
@@ -62,7 +63,7 @@ VARIABLES: Final[tuple[Variable, ...]] = (
 )
 """In reading order: pelvis, hip, knee, ankle; sagittal, frontal, transverse.
 
-Ranges are those of clinic.md §7, wider where an angle measured from standing goes below an anatomical one.
+Ranges are those customary in gait reports, wider where an angle from standing goes below an anatomical one.
 """
 
 
@@ -170,21 +171,30 @@ TERMS: Final[Mapping[str, Term]] = {
     "stride_regularity_v": Term("Regularity of strides, vertical", "", _TRUNK, 2, (0, 1), _SIZE),
     "stride_regularity_ap": Term("Regularity of strides, forward", "", _TRUNK, 2, (0, 1), _SIZE),
     "stride_sparc": Term("Smoothness of a stride (SPARC)", "", _TRUNK, 2, (-6, -1), _SIZE),
-    "double_support_s": Term("Double support", "s", _SUPPORT, 2, (0, 0.8), _TIME),
-    "initial_double_support_s": Term("Initial double support", "s", _SUPPORT, 2, (0, 0.4), _TIME),
-    "terminal_double_support_s": Term("Terminal double support", "s", _SUPPORT, 2, (0, 0.4), _TIME),
-    "single_support_s": Term("Single support", "s", _SUPPORT, 2, (0.2, 0.8), _TIME),
+    "double_support_s": Term("Double support time", "s", _SUPPORT, 2, (0, 0.8), _TIME),
+    "initial_double_support_s": Term("Initial double support time", "s", _SUPPORT, 2, (0, 0.4), _TIME),
+    "terminal_double_support_s": Term("Terminal double support time", "s", _SUPPORT, 2, (0, 0.4), _TIME),
+    "single_support_s": Term("Single support time", "s", _SUPPORT, 2, (0.2, 0.8), _TIME),
 }
 """Parameter name → how the table shows it, in the order of the table."""
 
 ZERO_WORDS: Final[Mapping[str, str]] = {
+    "anatomical": "anatomical",
     "standing": "from standing",
     "stride_mean": "from its mean over the stride",
 }
-"""`angle_zero` → what is added to titles of angles."""
+"""Zero of an angle → what is added to its title."""
+
+
+def title_of(name: str, label: str, zero: str = "standing") -> str:
+    """Title of a parameter: a level says what it is measured from, so that no two figures share a name."""
+    return f"{label}, {ZERO_WORDS[zero]}" if is_level(name) else label
+
 
 REASONS: Final[Mapping[str, str]] = {
-    "no_strides": "not measured: no complete stride of this side",
+    "no_strides": "not measured: no stride of this side counts",
+    "too_few_strides": "not measured: fewer than 4 strides of this side count",
+    "in_place": "not measured: the foot came down where it was",
     "no_terminal_contact": "not measured: no foot-off was found",
     "no_turns": "not measured: no turn in this take",
     "no_bouts": "not measured: nobody walked for long enough",
@@ -194,6 +204,9 @@ REASONS: Final[Mapping[str, str]] = {
     "opposite_foot_missing": "not measured: needs sensors on both feet",
     "no_double_support": "not measured: the feet were never on the floor together",
     "joint_missing": "not measured: a segment of this joint carries no sensor",
+    "estimator_bad": "withheld: the sensors contradict each other here",
+    "at_bound": "withheld: the leg model's knee rests on its limit",
+    "impossible": "withheld: nobody can walk like this",
     "gap": "not measured: the sensor was lost in every stride",
     "treadmill": "not measured: on a treadmill the belt's speed is needed, and gives speed and stride length",
     "no_foot_track": "not measured: no sensor on this foot",
@@ -222,6 +235,7 @@ REASONS: Final[Mapping[str, str]] = {
 EXCLUDED: Final[Mapping[str, str]] = {
     "incomplete": "incomplete",
     "turn": "in a turn",
+    "in_place": "on the spot",
     "near_turn": "next to a turn",
     "first": "first of a walk",
     "last": "last of a walk",
@@ -281,16 +295,19 @@ def _signed(value: float, digits: int = 1) -> str:
     return f"+{text}" if value > 0 and float(f"{value:.{digits}f}") else text
 
 
+NO_DIFFERENCE: Final = "no difference"
+
+
 def difference_words(left: float, right: float, term: Term) -> str:
     """Left against right in words: "left longer by 0.04 s", "no difference" where the printed values agree.
 
-    Angles are compared in whole degrees: tenths are far below what repeats between visits (clinic.md §2).
+    Angles are compared in whole degrees: tenths are far below what repeats between visits.
     """
     digits = 0 if term.unit == "°" else term.digits
     if term.unit != "°":
         left, right = round(left, digits), round(right, digits)
     shown = round(abs(left - right), digits)
     if shown == 0:
-        return "no difference"
+        return NO_DIFFERENCE
     unit = {"%": " points", "°": "°"}.get(term.unit, f"\u202f{term.unit}")
     return f"left {term.comparison[0 if left > right else 1]} by {number(shown, digits)}{unit}"

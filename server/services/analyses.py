@@ -6,11 +6,11 @@ import dataclasses
 import datetime as dt
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import Connection, insert, select, update
+from sqlalchemy import Connection, Select, func, insert, select, update
 
 from core.errors import ParameterError
 from server import audit
@@ -191,22 +191,31 @@ def get(c: Connection, analysis_id: str) -> Analysis:
     row = c.execute(_QUERY.where(analysis.c.id == analysis_id)).first()
     if row is None:
         raise NotFound("analysis", analysis_id)
-    return _analysis(c, row)
+    return _analyses(c, [row])[0]
 
 
 def of_session(c: Connection, session_id: str) -> list[Analysis]:
     """All analyses of a session, the one that counts first: last asked for, else newest."""
-    asked = (job.c.key == recording.c.wanted_key).desc()
-    query = _QUERY.where(session.c.id == session_id).order_by(
-        recording.c.created_at.desc(), asked, analysis.c.created_at.desc()
-    )
-    return [_analysis(c, row) for row in c.execute(query).all()]
+    rows = c.execute(_QUERY.where(session.c.id == session_id).order_by(*_COUNTS_FIRST)).all()
+    return _analyses(c, rows)
 
 
 def latest(c: Connection, session_id: str) -> Analysis | None:
     """The analysis a session's pages show, None before the first result."""
-    found = of_session(c, session_id)
-    return found[0] if found else None
+    return latest_of(c, [session_id]).get(session_id)
+
+
+def latest_of(c: Connection, session_ids: Collection[str] | Select[tuple[str]]) -> dict[str, Analysis]:
+    """`latest` of many sessions, by session, in two statements; a session without a result is left out.
+
+    Parameters
+    ----------
+    session_ids : ids, or the statement that selects them.
+    """
+    place = func.row_number().over(partition_by=session.c.id, order_by=_COUNTS_FIRST).label("place")
+    ranked = _joined(select(analysis.c.id, place)).where(session.c.id.in_(session_ids)).subquery()
+    rows = c.execute(_QUERY.where(analysis.c.id.in_(select(ranked.c.id).where(ranked.c.place == 1)))).all()
+    return {found.session_id: found for found in _analyses(c, rows)}
 
 
 def shown(c: Connection, session_id: str) -> Analysis:
@@ -225,19 +234,30 @@ def file_bytes(blobs: BlobStore, found: Analysis, name: str) -> bytes:
     return blobs.read(found.patient_id, found.files[name].sha256)
 
 
-_QUERY = (
-    select(analysis, recording.c.session_id, session.c.patient_id)
-    .join(recording, recording.c.id == analysis.c.recording_id)
-    .join(session, session.c.id == recording.c.session_id)
-    .join(job, job.c.id == analysis.c.job_id)
+def _joined(query: Select[Any]) -> Select[Any]:
+    return (
+        query.join(recording, recording.c.id == analysis.c.recording_id)
+        .join(session, session.c.id == recording.c.session_id)
+        .join(job, job.c.id == analysis.c.job_id)
+    )
+
+
+_QUERY = _joined(select(analysis, recording.c.session_id, session.c.patient_id))
+_COUNTS_FIRST = (
+    recording.c.created_at.desc(),
+    (job.c.key == recording.c.wanted_key).desc(),
+    analysis.c.created_at.desc(),
+    analysis.c.id,
 )
 
 
-def _analysis(c: Connection, row: Any) -> Analysis:
-    files = c.execute(
-        select(analysis_file).where(analysis_file.c.analysis_id == row.id).order_by(analysis_file.c.name)
-    )
-    return Analysis(**row._asdict(), files={f.name: Blob(f.sha256, f.size) for f in files})
+def _analyses(c: Connection, rows: Sequence[Any]) -> list[Analysis]:
+    """Analyses with their files, all read in one statement."""
+    files: dict[str, dict[str, Blob]] = {row.id: {} for row in rows}
+    query = select(analysis_file).where(analysis_file.c.analysis_id.in_(files))
+    for f in c.execute(query.order_by(analysis_file.c.name)) if files else ():
+        files[f.analysis_id][f.name] = Blob(f.sha256, f.size)
+    return [Analysis(**row._asdict(), files=files[row.id]) for row in rows]
 
 
 def completed(c: Connection, session_id: str, manifest: Mapping[str, Any] | None) -> dict[str, Any]:

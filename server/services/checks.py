@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 
 from sqlalchemy.exc import DatabaseError
 
 from core.errors import SagittalError
 from server import audit
-from server.services.sweep import referenced
+from server.services import custody, live_logs
+from server.services.references import referenced
+from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.storage.trash import Discarded, Trash
 
 
 @dataclass(frozen=True)
@@ -19,7 +23,7 @@ class Finding:
 
     Parameters
     ----------
-    area : database, files or audit.
+    area : database, files, live, trash or audit.
     message : what, and where.
     """
 
@@ -27,20 +31,52 @@ class Finding:
     message: str
 
 
-def check(db: Database, blobs: BlobStore) -> list[Finding]:
-    """Check the database's structure and keys, every referenced file by its hash, and the audit chain."""
+def check(db: Database, blobs: BlobStore, settings: Settings) -> list[Finding]:
+    """Check database, stored files by their hash, live logs, trash and audit chain."""
     try:
         found = [Finding("database", text) for text in db.problems()]
         with db.read() as c:
             used = sorted(referenced(c))
             found += [Finding("audit", text) for text in audit.problems(c)]
+            doubted = custody.doubt(c, settings)
     except DatabaseError as error:
         return [Finding("database", f"cannot be read ({error.orig}); restore it from a backup")]
+    if doubted is not None:
+        text = f"{doubted} No stored file is taken away until the right one is back or `sagittal accept`."
+        found.append(Finding("audit", text))
+    trash = list(Trash(settings.trash).files())
+    waiting = {(one.space, one.name) for one in trash}
     for space, sha256 in used:
         try:
             blobs.read(space, sha256)
         except SagittalError as error:
-            found.append(Finding("files", f"patient {space}: {error.message}"))
+            text = f"patient {space}: {error.message}"
+            if (space, sha256) in waiting:
+                text = f"patient {space}: {sha256[:12]}… lies in the trash; run `sagittal trash --restore`."
+            found.append(Finding("files", text))
         except OSError as error:
             found.append(Finding("files", f"patient {space}, file {sha256[:12]}…: {error.strerror}"))
+    return [*found, *_check_live(db, settings), *(f for one in trash for f in _check_discarded(one))]
+
+
+def _check_live(db: Database, settings: Settings) -> list[Finding]:
+    found = []
+    with db.read() as c:
+        for log in live_logs.logs(c, settings.live):
+            if not log.known:
+                text = f"the database knows nothing of {log.path.name} ({log.words}); see `sagittal adopt`."
+                found.append(Finding("live", text))
+            if log.damage is not None:
+                found.append(Finding("live", f"{log.path.name}: {log.damage.sentence}"))
+    for path in live_logs.originals(settings.live):
+        text = f"{path.name} is the original of a damaged log; remove it when nobody needs it any more."
+        found.append(Finding("live", text))
     return found
+
+
+def _check_discarded(one: Discarded) -> list[Finding]:
+    try:
+        whole = hashlib.sha256(one.path.read_bytes()).hexdigest() == one.name
+    except OSError as error:
+        return [Finding("trash", f"{one.path}: {error.strerror}")]
+    return [] if whole else [Finding("trash", f"{one.path} has changed on the disk.")]

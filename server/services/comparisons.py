@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
+from core.condition import differences, is_comparable
 from core.norms import Norms, norms_for
 from server.report.comparison import ComparedRow, compared_rows
 from server.report.numbers import Numbers
 from server.services import analyses, patients, programmes, reviews, sessions
 from server.services.errors import Conflict
-from server.services.histories import Analysed
+from server.services.histories import Analysed, kind_of
 from server.services.patients import Patient
 from server.services.sessions import Session
 from server.storage.blobs import BlobStore
@@ -27,15 +29,24 @@ class Pair:
     after: Analysed
 
     @property
+    def comparable(self) -> bool:
+        """Whether a difference can be called a change of the person."""
+        return is_comparable(self.before.condition, self.after.condition)
+
+    @property
     def cautions(self) -> tuple[str, ...]:
-        """Why a difference may come from how it was measured, in sentences."""
+        """Why a difference may come from how was walked or measured, in sentences."""
         said = []
         old, new = self.before, self.after
-        if old.session.protocol != new.session.protocol:
+        if unlike := differences(old.condition, new.condition):
             said.append(
-                f"The protocols differ: {old.session.protocol}, then {new.session.protocol}. Walking over "
-                "ground and on a treadmill differ by themselves."
+                f"The conditions differ: {'; '.join(unlike)}. What differs may come from that, so no "
+                "difference is called a change."
             )
+        elif old.session.feedback:
+            said.append("Both were walked with feedback, so no difference is called a change.")
+        elif unstated := new.condition.unstated:
+            said.append(f"Not stated in either session: {', '.join(unstated)}. They are taken to be alike.")
         if _sensors(old) != _sensors(new):
             said.append("Other segments carried sensors in the two sessions.")
         if old.found.config_sha256 != new.found.config_sha256:
@@ -64,22 +75,29 @@ def pair(c: Connection, session_id: str, other_id: str) -> Pair:
     return Pair(patients.get(c, both[0].session.patient_id), *both)
 
 
-def before(c: Connection, session: Session) -> Analysed | None:
-    """The analysed session of the same protocol that a session's own table is compared with.
+def before(c: Connection, session: Session, done: Sequence[Analysed]) -> Analysed | None:
+    """The analysed session walked under the same condition that a session's own table is compared with.
 
     It is the one that came last before it; for an assessment the assessment that did, so that a single
-    training does not stand for the course.
+    training does not stand for the course. None for a session with feedback, and none has feedback itself.
+
+    Parameters
+    ----------
+    done : the analysed sessions of the patient, oldest first (histories.analysed).
     """
+    this = next((a for a in done if a.session.id == session.id), None)
+    if this is None:
+        return None
     plans = programmes.of_patient(c, session.patient_id)
-    trainings = {v.session_id for plan in plans for v in plan.visits if v.kind == "training"}
-    for s in sessions.of_patient(c, session.patient_id):
-        if s.protocol != session.protocol or _moment(s) >= _moment(session):
+    planned = {v.session_id: v.kind for plan in plans for v in plan.visits}
+    kind = kind_of(session, planned.get(session.id))
+    for a in reversed(done):
+        s = a.session
+        if not is_comparable(a.condition, this.condition) or _moment(s) >= _moment(session):
             continue
-        if s.id in trainings and session.id not in trainings:
+        if kind == "assessment" and kind_of(s, planned.get(s.id)) == "training":
             continue
-        found = analyses.latest(c, s.id)
-        if found is not None:
-            return Analysed(s, found, reviews.edits_of(c, found.id))
+        return a
     return None
 
 
@@ -92,7 +110,7 @@ def rows(blobs: BlobStore, found: Pair) -> tuple[ComparedRow, ...]:
     old = reviews.numbers(blobs, found.before.found, found.before.edits)
     new = reviews.numbers(blobs, found.after.found, found.after.edits)
     known = norms(found.patient, found.after.session, new)
-    return compared_rows(old, new, known, found.patient.affected_side)
+    return compared_rows(old, new, known, found.patient.affected_side, comparable=found.comparable)
 
 
 def norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:

@@ -9,9 +9,10 @@ from typing import Final
 
 from sqlalchemy import Connection, select
 
+from core.condition import WalkingCondition
 from core.norms.controls import ControlGroup, ControlSession, control_group, mean_curves
 from core.parameters import cycle_curves
-from server.services import analyses, reviews, sessions
+from server.services import analyses, reviews
 from server.services.patients import Patient
 from server.services.sessions import Session
 from server.storage.blobs import BlobStore
@@ -20,7 +21,7 @@ from server.storage.tables import session as session_table
 
 NEAR_MPS: Final = 0.2
 """Controls who walk within this of a person are their reference: speed matters more than age
-(spec/clinic.md §2); our choice of width, about one SD of comfortable speed."""
+(docs/science/norms-and-scores.md, "Speed"); our choice of width, about one SD of comfortable speed."""
 
 
 @dataclass(frozen=True)
@@ -36,25 +37,33 @@ class ControlVisit:
 
 
 def visits(c: Connection, this: Patient, session: Session) -> tuple[ControlVisit, ...]:
-    """Visits of controls with the protocol of a session; nobody is a control of themselves."""
-    query = (
-        select(session_table.c.id, patient)
+    """Unaided visits of controls with the protocol of a session; nobody is a control of themselves.
+
+    The pace is theirs: of these visits those count that are as fast as the person (`group`).
+    """
+    theirs = (
+        select(session_table.c.id)
         .join(patient, patient.c.id == session_table.c.patient_id)
         .where(
             patient.c.is_control,
             patient.c.id != this.id,
             session_table.c.protocol == session.protocol,
         )
+    )
+    shown = analyses.latest_of(c, theirs)
+    edits = reviews.edits_of_all(c, [found.id for found in shown.values()])
+    query = (
+        select(session_table, patient.c.code, patient.c.sex, patient.c.birth_year)
+        .join(patient, patient.c.id == session_table.c.patient_id)
+        .where(session_table.c.id.in_(theirs))
         .order_by(session_table.c.id)
     )
-    made = []
-    for row in c.execute(query).all():
-        found = analyses.latest(c, row[0])
-        if found is not None:
-            day = sessions.get(c, row[0]).performed_on
-            edits = reviews.edits_of(c, found.id)
-            made.append(ControlVisit(row.code, row.sex, row.birth_year, day, found, edits))
-    return tuple(made)
+    return tuple(
+        ControlVisit(row.code, row.sex, row.birth_year, row.performed_on, found, edits[found.id])
+        for row in c.execute(query)
+        if (found := shown.get(row.id)) is not None
+        and WalkingCondition(aid=row.aid, orthosis=row.orthosis, feedback=row.feedback).is_unaided
+    )
 
 
 def group(blobs: BlobStore, known: Sequence[ControlVisit], speed_mps: float | None) -> ControlGroup | None:

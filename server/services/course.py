@@ -1,4 +1,4 @@
-"""The planned visits of a training programme, from the day of its first training (spec/clinic.md §4)."""
+"""The planned visits of a training programme from its first training on (docs/science/feedback.md)."""
 
 from __future__ import annotations
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees, hypot, inf
 from typing import TYPE_CHECKING
 
+from core.condition import USUAL, WalkingCondition
 from core.frames import Segment, Side
 from server.jobs.table import TableQueue
 from server.services import analyses, patients, prescriptions, recordings, sessions
@@ -49,7 +50,7 @@ class Visit:
     Parameters
     ----------
     script, seed : of core.simulate. days_ago : when. worn : sensors, None = all seven.
-    fails : a sensor and the second of the take from which on it is silent.
+    condition : how it is walked. fails : a sensor and the second of the take from which on it is silent.
     """
 
     person: Person
@@ -60,6 +61,7 @@ class Visit:
     note: str = ""
     worn: tuple[Segment, ...] | None = None
     fails: tuple[Segment, float] | None = None
+    condition: WalkingCondition = USUAL
 
 
 VOLUNTEER = Person("REF-004", "female", 1989, 1.70, "Simulated. Healthy volunteer, no complaints.")
@@ -76,7 +78,9 @@ FALLS = Person("GE-0317", "female", 1943, 1.62, "Simulated. Two falls in the las
 VISITS = (
     Visit(VOLUNTEER, "Reference walk, comfortable speed", "healthy", 3, 11),
     Visit(STROKE, "Discharge from rehabilitation", "hemi_mild", 2, 22, "After six weeks of gait training."),
-    Visit(NERVE, "Barefoot, without orthosis", "drop_foot", 5, 41),
+    Visit(
+        NERVE, "Barefoot, without orthosis", "drop_foot", 5, 41, condition=replace(USUAL, shoes="barefoot")
+    ),
     Visit(FALLS, "Falls clinic, corridor walk", "elderly", 6, 61, "Two sensors, feet only.", FEET),
     Visit(HIP, "Before surgery, short set-up", "antalgic", 8, 71, "Pelvis and feet.", ("pelvis", *FEET)),
     Visit(PARKINSON, "Medication review, on", "parkinson", 9, 51),
@@ -91,7 +95,9 @@ VISITS = (
         fails=("shank_l", 18.0),
     ),
     Visit(STROKE, "Admission to rehabilitation", "hemiparetic", 44, 21),
-    Visit(VOLUNTEER, "Course with turns, fast", "fast_with_turns", 31, 12),
+    Visit(
+        VOLUNTEER, "Course with turns, fast", "fast_with_turns", 31, 12, condition=replace(USUAL, pace="fast")
+    ),
 )
 """In the order of their analyses: the newest visit of each patient first."""
 
@@ -155,8 +161,11 @@ def _add(
     files: Mapping[str, bytes],
 ) -> None:
     day = now().date() - dt.timedelta(days=visit.days_ago)
+    said = visit.condition.stated
     with db.write() as c:
-        session = sessions.create(c, None, patient_id, title=visit.title, performed_on=day, note=visit.note)
+        session = sessions.create(
+            c, None, patient_id, title=visit.title, performed_on=day, note=visit.note, **said
+        )
     for name, content in files.items():
         with recordings.receive(db, blobs, settings, None, session.id, name) as upload:
             upload.write(content)

@@ -13,6 +13,7 @@ from contextlib import closing
 from math import pi
 from typing import TYPE_CHECKING, Any, Final
 
+from core.condition import USUAL
 from server.live.client import stream
 from server.live.pairing import pair
 from server.live.playback import Due, cut, hello_of, paced
@@ -54,7 +55,8 @@ def open_take(settings: Settings) -> str:
     """A session of the patient with an open take; returns its code."""
     with closing(Database(settings.database)) as db, db.write() as c:
         patient = next(p for p in patients.listing(c) if p.code == STROKE.code)
-        session = sessions.create(c, None, patient.id, title=TITLE, performed_on=now().date(), note="")
+        day = now().date()
+        session = sessions.create(c, None, patient.id, title=TITLE, performed_on=day, **USUAL.stated)
         return live.open_take(c, None, session.id)[1]
 
 

@@ -1,19 +1,28 @@
 """Removing a session or a patient for good: rows in one transaction, then the bytes; the audit remembers.
 
-`logs` is the folder of the live takes' logs (Settings.live). A running job of theirs loses its row, so its
-worker meets a closed fence and publishes nothing; what it may have written goes with the sweep.
+What was erased on purpose does not go to the trash, and what lay there of it goes, as do the old pages of the
+database's write-ahead log. A note in `erasing/` is written before the rows go and removed after the bytes: a
+crash between them is made good at the next start or sweep (`finish`). A running job of theirs loses its row,
+so its worker meets a closed fence and publishes nothing.
 """
 
 from __future__ import annotations
 
+import json
+import logging
+import re
+import sqlite3
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from sqlalchemy import Connection, delete, select, update
 
 from server import audit
 from server.services import patients, reviews, sessions
 from server.services.errors import Conflict
-from server.services.sweep import referenced, sweep
+from server.services.references import referenced
+from server.settings import Settings
 from server.storage import fs
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -24,6 +33,7 @@ from server.storage.tables import (
     job,
     live_event,
     live_take,
+    new_id,
     patient,
     planned_visit,
     prescription,
@@ -32,12 +42,19 @@ from server.storage.tables import (
     recording_file,
     session,
 )
+from server.storage.tables import audit as audit_table
+from server.storage.trash import Trash
+
+log = logging.getLogger(__name__)
+
+ERASED = "patient.erased"
+_ID = re.compile(r"[0-9a-f]{32}")
 
 
 def erase_patient(
     db: Database,
     blobs: BlobStore,
-    logs: Path,
+    settings: Settings,
     actor: audit.Actor | None,
     patient_id: str,
     *,
@@ -61,25 +78,24 @@ def erase_patient(
         c.execute(delete(programme).where(programme.c.patient_id == patient_id))
         c.execute(delete(prescription).where(prescription.c.patient_id == patient_id))
         c.execute(delete(patient).where(patient.c.id == patient_id))
-        audit.record(c, actor, "patient.erased", "patient", patient_id, {"sessions": found.sessions})
-    blobs.erase(patient_id)
-    _erase_logs(logs, takes)
+        audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": found.sessions})
+        _note(settings, spaces=[patient_id], takes=takes)
     reviews.forget()
-    db.fold()
+    finish(db, blobs, settings)
 
 
 def erase_session(
-    db: Database, blobs: BlobStore, logs: Path, actor: audit.Actor | None, session_id: str
+    db: Database, blobs: BlobStore, settings: Settings, actor: audit.Actor | None, session_id: str
 ) -> None:
     """Erase one session with its recordings and results; raises NotFound."""
     with db.write() as c:
         found = sessions.get(c, session_id)
-        own = {sha256 for space, sha256 in referenced(c, session_id) if space == found.patient_id}
+        own = _files_of(c, session_id, found.patient_id)
         takes = _erase_session_rows(c, session_id)
         audit.record(c, actor, "session.erased", "session", session_id, {"patient_id": found.patient_id})
-    _erase_logs(logs, takes)
+        _note(settings, files=sorted(own), takes=takes)
     reviews.forget()
-    sweep(db, blobs, grace_s=0.0, only={(found.patient_id, sha256) for sha256 in own})
+    finish(db, blobs, settings)
 
 
 def _erase_session_rows(c: Connection, session_id: str) -> list[str]:
@@ -101,6 +117,103 @@ def _erase_session_rows(c: Connection, session_id: str) -> list[str]:
     return takes
 
 
-def _erase_logs(folder: Path, takes: list[str]) -> None:
-    for take in takes:
-        fs.remove_file(folder / f"{take}.log")
+def finish(db: Database, blobs: BlobStore, settings: Settings) -> None:
+    """Remove the bytes of every erasure whose rows are gone; what cannot be removed is tried again later."""
+    for path in sorted(settings.erasing.glob("*.json")):
+        note = _read(path)
+        if note is None:
+            log.error("%s cannot be read; what it was to erase is not known any more", path)
+            continue
+        try:
+            # under the write lock: whoever wrote the note has either committed or given up
+            with db.write() as c:
+                _remove(c, blobs, settings, note)
+            is_gone = db.fold()
+        except (OSError, sqlite3.Error):
+            log.exception("what %s is to erase cannot be removed; it will be tried again", path.name)
+            continue
+        if not is_gone:
+            log.warning("what %s is to erase is still being read; it will be tried again", path.name)
+            continue
+        fs.remove_file(path)
+        fs.sync_folder(path.parent)
+
+
+def discard(db: Database, blobs: BlobStore, space: str, names: Iterable[str]) -> None:
+    """Remove files for good that were stored for something that has been erased meanwhile."""
+    with db.write() as c:
+        used = referenced(c)
+        for name in set(names):
+            if (space, name) not in used:
+                blobs.remove(space, name)
+
+
+def erased_spaces(c: Connection) -> set[str]:
+    """Ids of all patients that were erased, as the audit log has them."""
+    found = set(c.execute(select(audit_table.c.resource_id).where(audit_table.c.action == ERASED)).scalars())
+    return found - set(c.execute(select(patient.c.id)).scalars())
+
+
+def noted(settings: Settings) -> tuple[set[str], set[str]]:
+    """Patients and live takes of erasures that are not finished."""
+    notes = [note for path in settings.erasing.glob("*.json") if (note := _read(path)) is not None]
+    return {x for note in notes for x in note["spaces"]}, {x for note in notes for x in note["takes"]}
+
+
+def _files_of(c: Connection, session_id: str, patient_id: str) -> set[tuple[str, str]]:
+    """Every file of a session, also those that were taken out of it and may lie in the trash."""
+    added = select(audit_table.c.detail["sha256"].as_string()).where(
+        audit_table.c.action == "recording.file_added",
+        audit_table.c.detail["session_id"].as_string() == session_id,
+    )
+    earlier = {(patient_id, sha256) for sha256 in c.execute(added).scalars() if sha256}
+    return earlier | {one for one in referenced(c, session_id) if one[0] == patient_id}
+
+
+def _note(
+    settings: Settings,
+    *,
+    spaces: Iterable[str] = (),
+    files: Iterable[tuple[str, str]] = (),
+    takes: Iterable[str] = (),
+) -> None:
+    """Write durably what is about to be erased: ids and hashes only."""
+    fs.make_folder(settings.erasing)
+    content = {"spaces": list(spaces), "files": list(files), "takes": list(takes)}
+    fs.write_file(settings.erasing / f"{new_id()}.json", json.dumps(content).encode())
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    try:
+        note = json.loads(path.read_bytes())
+        spaces, takes = [str(x) for x in note["spaces"]], [str(x) for x in note["takes"]]
+        files = [(str(space), str(name)) for space, name in note["files"]]
+        if not all(map(_ID.fullmatch, [*spaces, *takes, *(space for space, _ in files)])):
+            return None
+    except FileNotFoundError:  # another process has just finished it
+        return {"spaces": [], "files": [], "takes": []}
+    except (ValueError, TypeError, KeyError):
+        return None
+    return {"spaces": spaces, "files": files, "takes": takes}
+
+
+def _remove(c: Connection, blobs: BlobStore, settings: Settings, note: dict[str, Any]) -> None:
+    """Remove what a note lists and no row needs; the rows are still there when the erasure was given up."""
+    trash = Trash(settings.trash)
+    there = set(c.execute(select(patient.c.id).where(patient.c.id.in_(note["spaces"]))).scalars())
+    for space in set(note["spaces"]) - there:
+        blobs.erase(space)
+        trash.remove(space)
+    used = referenced(c) if note["files"] else set()
+    for space, name in note["files"]:
+        if (space, name) not in used:
+            blobs.remove(space, name)
+            trash.remove(space, [name])
+    takes = set(c.execute(select(live_take.c.id).where(live_take.c.id.in_(note["takes"]))).scalars())
+    for take in set(note["takes"]) - takes:
+        for path in settings.live.glob(f"{take}.*"):
+            fs.remove_file(path)
+    for folder in (blobs.root, settings.live, *(blobs.root / space for space, _ in note["files"])):
+        if folder.is_dir():
+            fs.sync_folder(folder)
+    trash.tidy()

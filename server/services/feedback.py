@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -9,6 +10,7 @@ from typing import Final
 from sqlalchemy import Connection
 
 from core.change.limits import Limb
+from core.condition import is_alike
 from core.feedback import AnalysedStride, Cue, split
 from core.frames import Side
 from core.parameters import cycle_curves
@@ -17,11 +19,10 @@ from server.report import feedback as report
 from server.report.bundle import Bundle
 from server.report.feedback import FeedbackView
 from server.report.feedback_beside import Before, side_effects
-from server.services import analyses, patients, prescriptions, reviews, sessions
+from server.services import prescriptions, reviews
 from server.services.histories import Analysed
 from server.services.patients import Patient
 from server.services.prescriptions import Training
-from server.services.sessions import Session
 from server.storage.blobs import BlobStore
 
 REASONS: Final = {
@@ -47,7 +48,7 @@ class Gathered:
 
     Parameters
     ----------
-    this : None with a `reason`. before : the visit before with the same training.
+    this : None with a `reason`. before : the visit before with the same training, walked alike.
     """
 
     patient: Patient
@@ -56,25 +57,32 @@ class Gathered:
     reason: str | None = None
 
 
-def gather(c: Connection, session_id: str) -> Gathered:
-    """Read all that `view` needs; raises NotFound."""
-    session = sessions.get(c, session_id)
-    patient = patients.get(c, session.patient_id)
+def gather(c: Connection, patient: Patient, session_id: str, done: Sequence[Analysed]) -> Gathered:
+    """Read all that `view` needs of a session of this patient.
+
+    Parameters
+    ----------
+    done : the analysed sessions of the patient (histories.analysed).
+    """
+    at = {a.session.id: a for a in done}
     given = prescriptions.trainings(c, patient.id)
     here = [t for t in given if t.session_id == session_id]
     if not here:
         return Gathered(patient, None, reason="no_feedback")
-    this = _trained(c, session, here)
+    this = _analysed_take(at.get(session_id), here)
     if isinstance(this, str):
         return Gathered(patient, None, reason=this)
-    before = None
-    for other in reversed(given[: given.index(here[0])]):
-        if prescriptions.same_training(other.content, this.training.content):
-            found = _trained(c, sessions.get(c, other.session_id), [other])
-            if isinstance(found, Trained):
-                before = found
-                break
-    return Gathered(patient, this, before)
+    earlier = (
+        t
+        for t in reversed(given[: given.index(here[0])])
+        if prescriptions.same_training(t.content, this.content)
+        and _analysed_take(at.get(t.session_id), [t]) is t
+        and is_alike(at[t.session_id].condition, at[session_id].condition)
+    )
+    both = [this, *itertools.islice(earlier, 1)]
+    cues = prescriptions.cues(c, [t.take_id for t in both])
+    trained = [Trained(at[t.session_id], t, tuple(cues[t.take_id])) for t in both]
+    return Gathered(patient, trained[0], trained[1] if len(trained) == 2 else None)
 
 
 def view(blobs: BlobStore, gathered: Gathered) -> FeedbackView | None:
@@ -107,16 +115,14 @@ def _strides(blobs: BlobStore, trained: Trained) -> tuple[Bundle, tuple[Analysed
     return bundle, report.analysed_strides(bundle.strides, column)
 
 
-def _trained(c: Connection, session: Session, takes: Sequence[Training]) -> Trained | str:
+def _analysed_take(at: Analysed | None, takes: Sequence[Training]) -> Training | str:
     """The take that the analysis of a session is of, or the reason why there is none."""
-    found = analyses.latest(c, session.id)
-    if found is None:
+    if at is None:
         return "not_analysed"
-    take = next((t for t in takes if t.recording_id == found.recording_id), None)
-    if take is None:
-        return "not_analysed" if takes[-1].recording_id is None else "other_recording"
-    at = Analysed(session, found, reviews.edits_of(c, found.id))
-    return Trained(at, take, tuple(prescriptions.cues(c, [take.take_id])))
+    take = next((t for t in takes if t.recording_id == at.found.recording_id), None)
+    if take is not None:
+        return take
+    return "not_analysed" if takes[-1].recording_id is None else "other_recording"
 
 
 def _limb(patient: Patient, side: Side | None) -> Limb | None:

@@ -1,15 +1,18 @@
-"""All analysed visits of a patient with their numbers as they count, for trends over them."""
+"""All analysed visits of a patient with their numbers as they count, for trends over those walked alike."""
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 from sqlalchemy import Connection
 
+from core.condition import WalkingCondition, is_alike
 from core.norms import Norms, NormValue, norms_for, temporal_values
-from server.report.trends import Visit
+from server.report.trends import Visit, VisitKind
 from server.services import analyses, programmes, reviews, sessions
+from server.services.errors import NotFound
 from server.services.patients import Patient
 from server.services.programmes import Programme
 from server.services.sessions import Session
@@ -22,22 +25,23 @@ class History:
 
     Parameters
     ----------
-    protocol : what all of them walked; None without a visit. visits : analysed, oldest first.
-    others : protocol → analysed visits of another one. programmes : newest first.
+    condition : under which all of them were walked, some perhaps with feedback; None without a visit.
+    visits : analysed, oldest first. others : visits walked otherwise, by condition. programmes : newest
+    first.
     """
 
     patient: Patient
-    protocol: str | None
+    condition: WalkingCondition | None
     visits: tuple[Visit, ...]
-    others: dict[str, int]
+    others: tuple[OtherWalks, ...]
     programmes: tuple[Programme, ...]
 
     @property
     def norms(self) -> Norms | None:
-        """Of this person at the speed of the last visit; None without one."""
+        """Of this person at the speed of the last visit, if possible without feedback; None without any."""
         if not self.visits:
             return None
-        numbers = self.visits[-1].numbers
+        numbers = next((v for v in reversed(self.visits) if not v.feedback), self.visits[-1]).numbers
         speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
         return norms_for(self._age, self.patient.sex, speed, self.patient.height_m)  # type: ignore[arg-type]
 
@@ -54,6 +58,15 @@ class History:
 
 
 @dataclass(frozen=True)
+class OtherWalks:
+    """Analysed visits under another condition: how many, and the newest of them."""
+
+    condition: WalkingCondition
+    count: int
+    session_id: str
+
+
+@dataclass(frozen=True)
 class Analysed:
     """A session with the analysis that counts and its edits."""
 
@@ -61,31 +74,59 @@ class Analysed:
     found: analyses.Analysis
     edits: reviews.Edits
 
+    @property
+    def condition(self) -> WalkingCondition:
+        """How it was walked."""
+        return self.session.walked(_belt(self.found.manifest))
+
 
 def analysed(c: Connection, patient_id: str) -> list[Analysed]:
     """The sessions of a patient with a result, oldest first."""
-    done = []
-    for session in reversed(sessions.of_patient(c, patient_id)):
-        found = analyses.latest(c, session.id)
-        if found is not None:
-            done.append(Analysed(session, found, reviews.edits_of(c, found.id)))
-    return done
+    there = sessions.of_patient(c, patient_id)
+    shown = analyses.latest_of(c, [s.id for s in there])
+    edits = reviews.edits_of_all(c, [found.id for found in shown.values()])
+    return [
+        Analysed(s, found, edits[found.id]) for s in reversed(there) if (found := shown.get(s.id)) is not None
+    ]
+
+
+def baseline(done: Sequence[Analysed]) -> Analysed | None:
+    """The newest visit that says how somebody walks: at own pace where there is one, never with feedback.
+
+    Parameters
+    ----------
+    done : oldest first.
+    """
+    untold = [a for a in reversed(done) if not a.session.feedback]
+    return next((a for a in untold if a.condition.is_at_own_pace), untold[0] if untold else None)
 
 
 def history(
     blobs: BlobStore,
     patient: Patient,
-    done: list[Analysed],
-    plans: list[Programme],
+    done: Sequence[Analysed],
+    plans: Sequence[Programme],
     protocol: str | None = None,
+    like: str | None = None,
 ) -> History:
-    """Read the numbers of the visits of one protocol, that of the newest unless asked; IntegrityError."""
-    walked = Counter(a.session.protocol for a in done)
-    chosen = protocol or (done[-1].session.protocol if done else None)
+    """Read the numbers of the visits walked under one condition; raises IntegrityError, NotFound.
+
+    Parameters
+    ----------
+    protocol : only visits of this one. like : under the condition of this session; None = of `baseline`, else
+        of the newest visit.
+    """
+    asked = [a for a in done if protocol in {None, a.session.protocol}]
+    if like is None:
+        chosen = baseline(asked) or (asked[-1] if asked else None)
+    else:
+        chosen = next((a for a in done if a.session.id == like), None)
+        if chosen is None:
+            raise NotFound("analysed visit of this patient", like)
     planned = {v.session_id: v for plan in plans for v in plan.visits if v.session_id is not None}
     visits = []
-    for a in done:
-        if a.session.protocol != chosen:
+    for a in asked:
+        if chosen is None or not is_alike(a.condition, chosen.condition):
             continue
         plan = planned.get(a.session.id)
         visits.append(
@@ -94,13 +135,39 @@ def history(
                 a.session.performed_on,
                 a.session.title,
                 None if plan is None else plan.label,
-                "assessment" if plan is None else plan.kind,
-                a.session.protocol,
+                kind_of(a.session, None if plan is None else plan.kind),
+                a.condition,
                 reviews.numbers(blobs, a.found, a.edits),
             )
         )
-    others = {name: n for name, n in walked.items() if name != chosen}
-    return History(patient, chosen, tuple(visits), others, tuple(plans))
+    shown = {v.session_id for v in visits}
+    rest = [a for a in done if a.session.id not in shown]
+    condition = None if chosen is None else replace(chosen.condition, feedback=False)
+    return History(patient, condition, tuple(visits), _others(rest), tuple(plans))
+
+
+def kind_of(session: Session, planned: VisitKind | None) -> VisitKind:
+    """Whether a visit is judged: a walk with feedback is a training whatever was planned."""
+    if session.feedback:
+        return "training"
+    return planned or "assessment"
+
+
+def _others(rest: Sequence[Analysed]) -> tuple[OtherWalks, ...]:
+    """Visits by condition, that of the newest first."""
+    groups: list[list[Analysed]] = []
+    for a in reversed(rest):
+        alike = next((g for g in groups if is_alike(g[0].condition, a.condition)), None)
+        if alike is None:
+            groups.append([a])
+        else:
+            alike.append(a)
+    return tuple(OtherWalks(replace(g[0].condition, feedback=False), len(g), g[0].session.id) for g in groups)
+
+
+def _belt(manifest: Mapping[str, Any] | None) -> float | None:
+    speed = (manifest or {}).get("belt_speed_mps")
+    return None if speed is None else float(speed)
 
 
 def read(c: Connection, patient: Patient) -> tuple[list[Analysed], list[programmes.Programme]]:

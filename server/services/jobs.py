@@ -32,6 +32,14 @@ def listing(c: Connection, *, active_only: bool = False, limit: int = 100) -> li
     return [_listed(row) for row in c.execute(query)]
 
 
+def active(c: Connection) -> list[ListedJob]:
+    """All jobs that run or wait, those that run first, then the newest."""
+    query = _QUERY.where(job.c.state.in_(ACTIVE_STATES))
+    return [
+        _listed(row) for row in c.execute(query.order_by((job.c.state == "running").desc(), job.c.seq.desc()))
+    ]
+
+
 def of_session(c: Connection, session_id: str, *, kind: str | None = None) -> list[JobView]:
     """Jobs of one session, the newest first."""
     query = _QUERY.where(session.c.id == session_id).order_by(job.c.seq.desc())

@@ -41,6 +41,9 @@ CODE_LENGTH = 6
 CODE_LIFE = dt.timedelta(minutes=10)
 TOKEN_LIFE = dt.timedelta(hours=12)
 
+DAMAGED = "live_log_damaged"
+"""Code of the notice that a part of a take's log could not be read back."""
+
 COMMANDS = ("start", "stop", "mark", "undo_mark", "feedback", "level", "pause", "redo_calibration", "ghost")
 """What a therapist may do in a running take; each is kept as an event."""
 
@@ -300,6 +303,30 @@ def events(c: Connection, take_id: str) -> list[LiveEvent]:
         .order_by(live_event.c.seq)
     )
     return [LiveEvent(**row._asdict()) for row in c.execute(query)]
+
+
+def own_notice(code: str, text: str) -> dict[str, str]:
+    """Content of a notice that the server itself has to give, not the estimator."""
+    return {"code": code, "text": text, "severity": "bad", "from": "server"}
+
+
+def is_own_notice(content: Mapping[str, Any]) -> bool:
+    """Whether an event's content is one of `own_notice`."""
+    return content.get("from") == "server"
+
+
+def damages(c: Connection, session_id: str) -> list[str]:
+    """What was lost of a session's live takes because the disk damaged their logs, as sentences."""
+    query = (
+        select(live_event.c.content["text"].as_string())
+        .join(live_take, live_take.c.id == live_event.c.take_id)
+        .where(
+            live_take.c.session_id == session_id,
+            live_event.c.kind == "notice",
+            live_event.c.content["code"].as_string() == DAMAGED,
+        )
+    )
+    return list(c.execute(query.order_by(live_event.c.seq)).scalars())
 
 
 def takes_of(c: Connection, session_id: str) -> list[Take]:

@@ -15,7 +15,7 @@ from sqlalchemy import Connection, insert, select, update
 
 from server import audit
 from server.jobs.queue import JobQueue
-from server.services import analyses, live, recordings
+from server.services import analyses, erasure, live, live_training, recordings
 from server.services.errors import NotFound
 from server.settings import Settings
 from server.storage import fs, segments
@@ -62,16 +62,18 @@ def keep(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue, ta
         if take.recording_id is None and path.is_file():
             hello = _hello_of_data(path)
             if hello is not None:
-                blob = _copy(blobs, take.patient_id, path)
-                with db.write() as c:
-                    take = _publish(c, blobs, queue, take_id, blob, hello)
+                take = _store(db, blobs, queue, take, path, hello)
+            else:
+                _set_aside(db, take_id, path)
     except NotFound:
         return None
     return take.recording_id
 
 
 def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) -> list[str]:
-    """Finish what a crash left: store the logs of takes that are over, remove logs that belong to nothing.
+    """Finish what a crash left: store the logs of takes that are over.
+
+    A log of a take that the database does not know stays: it may be the right database that is missing.
 
     Returns
     -------
@@ -82,6 +84,9 @@ def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) 
     for path in sorted(settings.live.glob("*.log")):
         with db.read() as c:
             state = c.execute(select(live_take.c.state).where(live_take.c.id == path.stem)).scalar()
+        if state is None:
+            log.warning("the database knows nothing of %s; it is kept (see `sagittal adopt`)", path)
+            continue
         if state in OPEN_TAKE_STATES:
             waiting.append(path.stem)
             continue
@@ -92,6 +97,36 @@ def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) 
             # one take that cannot be stored must not keep the clinic closed; its log stays for the next start
             log.exception("live take %s could not be stored", path.stem)
     return waiting
+
+
+def _store(
+    db: Database, blobs: BlobStore, queue: JobQueue, take: live.Take, path: Path, hello: bytes
+) -> live.Take:
+    blob = _copy(blobs, take.patient_id, path)
+    try:
+        with db.write() as c:
+            return _publish(c, blobs, queue, take.id, blob, hello)
+    except NotFound:
+        # erased meanwhile: nothing of it may wait in the trash
+        erasure.discard(db, blobs, take.patient_id, [blob.sha256])
+        raise
+
+
+def _set_aside(db: Database, take_id: str, path: Path) -> None:
+    """Keep the log of a take without a readable sample when there is more in it than a crash leaves."""
+    damage = segments.find_damage(path, segments.readable(path))
+    if damage is None:
+        return
+    original = segments.keep_original(path)
+    log.warning("%s: %s Kept as %s.", path.name, damage.sentence, original)
+    notice = live.own_notice(live.DAMAGED, damage.sentence)
+    try:
+        with db.write() as c:
+            live.get(c, take_id)
+            live.add_event(c, None, take_id, "notice", None, notice)
+    except NotFound:
+        fs.remove_file(original)  # erased meanwhile
+        raise
 
 
 def _copy(blobs: BlobStore, space: str, path: Path) -> Blob:
@@ -145,6 +180,7 @@ def _publish(
     )
     c.execute(update(live_take).where(live_take.c.id == take_id).values(recording_id=recording_id))
     actor = _opener(c, take)
+    live_training.settle_feedback(c, actor, take)
     detail = {"session_id": take.session_id, "take_id": take_id, "sha256": blob.sha256, "size": blob.size}
     audit.record(c, actor, "recording.file_added", "recording", recording_id, detail)
     recordings.inspect(c, queue, actor, take.session_id)

@@ -6,17 +6,18 @@ A replay after a crash needs the same target and the same baseline, whatever is 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import Connection, select, update
 
 from core.errors import SagittalError
-from server.services import analyses, live, prescriptions
+from server import audit
+from server.services import analyses, live, prescriptions, sessions
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
-from server.storage.tables import live_event, live_take
+from server.storage.tables import live_event, live_take, session
 
 log = logging.getLogger(__name__)
 
@@ -56,6 +57,28 @@ def training_of(db: Database, blobs: BlobStore, take: live.Take) -> Training:
             c.execute(row.values(prescription_id=content["id"]))
     height, protocol = said.get("subject", {}).get("height_m"), said["protocol"]
     return Training(height, protocol, content["id"], content["prescription"], content["baseline"])
+
+
+def note_feedback(c: Connection, take_ids: Collection[str]) -> None:
+    """Note on the sessions of these takes that somebody walked with feedback."""
+    query = (
+        select(session.c.id)
+        .join(live_take, live_take.c.session_id == session.c.id)
+        .where(live_take.c.id.in_(take_ids), ~session.c.feedback)
+    )
+    for session_id in c.execute(query.distinct()).scalars().all():
+        sessions.change(c, None, session_id, {"feedback": True})
+
+
+def settle_feedback(c: Connection, actor: audit.Actor | None, take: live.Take) -> None:
+    """Where an earlier take of the session gave feedback, note whether this one did, which now counts.
+
+    Without such a take what a person said stays; cues that come later are noted by themselves.
+    """
+    given = prescriptions.cues(c, [t.id for t in live.takes_of(c, take.session_id)])
+    told = {of: any(cue.with_feedback for cue in cues) for of, cues in given.items()}
+    if any(told.values()):
+        sessions.change(c, actor, take.session_id, {"feedback": told[take.id]})
 
 
 def _prescribed(c: Connection, blobs: BlobStore, take: live.Take) -> dict[str, Any]:

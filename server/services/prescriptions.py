@@ -1,7 +1,7 @@
 """Prescriptions of biofeedback: written, replaced, ended, and made ready for a live take.
 
 A record never changes: to change it ends it and writes another, so that every take and its cues point to what
-was in force. One is in force at a time; one parameter is trained (spec/clinic.md §4).
+was in force. One is in force at a time; one parameter is trained (docs/feedback.md).
 """
 
 from __future__ import annotations
@@ -127,14 +127,17 @@ def for_take(c: Connection, blobs: BlobStore, session_id: str) -> tuple[Prescrip
     return content, _baseline(c, written, patient, walk, session_id)
 
 
-def cues(c: Connection, take_ids: Sequence[str]) -> list[Cue]:
-    """The cues of these takes in the order they were given."""
+def cues(c: Connection, take_ids: Sequence[str]) -> dict[str, list[Cue]]:
+    """The cues of each of these takes in the order they were given."""
     query = (
-        select(live_event.c.content)
+        select(live_event.c.take_id, live_event.c.content)
         .where(live_event.c.kind == "cue", live_event.c.take_id.in_(take_ids))
         .order_by(live_event.c.seq)
     )
-    return [Cue.from_json(content) for content in c.execute(query).scalars()]
+    given: dict[str, list[Cue]] = {take: [] for take in take_ids}
+    for take, content in c.execute(query):
+        given[take].append(Cue.from_json(content))
+    return given
 
 
 @dataclass(frozen=True)
@@ -239,9 +242,10 @@ def _mdc(patient: Patient, content: Prescription, walk: Walk | None, side: Side)
 def _last_level(c: Connection, own: Sequence[Training]) -> int | None:
     """Level of the last cue of the training proper; a block a visit opens with may have none yet."""
     for training in reversed(own):
-        given = [q for q in cues(c, [training.take_id]) if q.why_not not in {"baseline", "retention"}]
-        if given:
-            return given[-1].level
+        given = cues(c, [training.take_id])[training.take_id]
+        levels = [q.level for q in given if q.why_not not in {"baseline", "retention"}]
+        if levels:
+            return levels[-1]
     return None
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import datetime as dt
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from sqlalchemy import Connection, delete, insert, select, update
+from sqlalchemy import ColumnElement, Connection, delete, insert, select, update
 
 from server import audit
 from server.services import patients, sessions
@@ -116,16 +117,15 @@ def start(
 
 def get(c: Connection, programme_id: str) -> Programme:
     """One programme; raises NotFound."""
-    row = c.execute(select(programme).where(programme.c.id == programme_id)).first()
-    if row is None:
+    found = _programmes(c, programme.c.id == programme_id)
+    if not found:
         raise NotFound("programme", programme_id)
-    return _programme(c, row)
+    return found[0]
 
 
 def of_patient(c: Connection, patient_id: str) -> list[Programme]:
     """All programmes of a patient, the newest first."""
-    query = select(programme).where(programme.c.patient_id == patient_id)
-    return [_programme(c, row) for row in c.execute(query.order_by(programme.c.starts_on.desc())).all()]
+    return _programmes(c, programme.c.patient_id == patient_id)
 
 
 def change_visit(
@@ -200,10 +200,22 @@ def _planned(row: Any) -> PlannedVisit:
     return visit if visit.session_id is None else replace(visit, state="done")
 
 
-def _programme(c: Connection, row: Any) -> Programme:
-    query = _VISITS.where(planned_visit.c.programme_id == row.id).order_by(planned_visit.c.position)
-    visits = states(tuple(_planned(v) for v in c.execute(query)), now().date())
-    return Programme(**row._asdict(), words=COURSES[row.template].words, visits=visits)
+def _programmes(c: Connection, which: ColumnElement[bool]) -> list[Programme]:
+    """Programmes with their visits in one statement, the newest first; each has visits from its start on."""
+    theirs = _VISITS.add_columns(*(programme.c[name].label(f"of_{name}") for name in _OWN))
+    query = theirs.join(programme, programme.c.id == planned_visit.c.programme_id).where(which)
+    rows = c.execute(query.order_by(programme.c.starts_on.desc(), programme.c.id, planned_visit.c.position))
+    today = now().date()
+    found = []
+    for _, group in itertools.groupby(rows, key=lambda row: row.programme_id):
+        planned = list(group)
+        own = {name: getattr(planned[0], f"of_{name}") for name in _OWN}
+        visits = states(tuple(_planned(row) for row in planned), today)
+        found.append(Programme(**own, words=COURSES[own["template"]].words, visits=visits))
+    return found
+
+
+_OWN = ("id", "patient_id", "template", "starts_on", "created_at")
 
 
 def states(visits: tuple[PlannedVisit, ...], today: dt.date) -> tuple[PlannedVisit, ...]:

@@ -29,6 +29,7 @@ from server.settings import Settings
 from server.storage.blobs import Blob, BlobStore
 from server.storage.db import Database
 from server.storage.fs import SizeLimitError
+from server.storage.refusal import Refusal
 from server.storage.tables import job, new_id, now, patient, recording, recording_file, session
 
 INSPECT = "inspect"
@@ -81,9 +82,11 @@ def input_digest(files: Iterable[tuple[str, str]]) -> str:
 
 def current(c: Connection, session_id: str) -> Recording | None:
     """The session's newest recording, None before the first file; raises NotFound for the session."""
-    _patient_of(c, session_id)
     row = c.execute(_QUERY.where(session.c.id == session_id).order_by(*_NEWEST).limit(1)).first()
-    return None if row is None else _recording(c, row)
+    if row is None:
+        _patient_of(c, session_id)
+        return None
+    return _recording(c, row)
 
 
 def get(c: Connection, recording_id: str) -> Recording:
@@ -180,6 +183,10 @@ def file_bytes(c: Connection, blobs: BlobStore, recording_id: str, name: str) ->
 class receive:  # noqa: N801 - a verb: with receive(...) as upload
     """One file on its way into the current set; leaving without `keep` leaves nothing behind.
 
+    Parameters
+    ----------
+    size : bytes that are announced, 0 = not known; room for them is asked for before the first comes.
+
     Raises
     ------
     NotFound
@@ -196,6 +203,7 @@ class receive:  # noqa: N801 - a verb: with receive(...) as upload
         actor: audit.Actor | None,
         session_id: str,
         name: str,
+        size: int = 0,
     ) -> None:
         self._db, self._blobs, self._settings, self._actor = db, blobs, settings, actor
         self._session_id = session_id
@@ -203,12 +211,12 @@ class receive:  # noqa: N801 - a verb: with receive(...) as upload
         with db.read() as c:
             self._space = _patient_of(c, session_id)
             self._check_set(current(c, session_id), 0)
-        if shutil.disk_usage(blobs.root).free < settings.min_free_bytes:
-            raise DiskFull
+        require_room(blobs, settings, size)
         self._receiver = blobs.receive(self._space, settings.max_file_bytes)
 
     def write(self, data: bytes) -> None:
-        """Append bytes; raises TooLarge file_too_large."""
+        """Append bytes; raises TooLarge file_too_large, DiskFull."""
+        require_room(self._blobs, self._settings, len(data))
         try:
             self._receiver.write(data)
         except SizeLimitError as error:
@@ -261,12 +269,18 @@ class receive:  # noqa: N801 - a verb: with receive(...) as upload
 
 
 class DiskFull(ServiceError):  # noqa: N818 - the name of the HTTP status
-    """There is too little free space to take a file."""
+    """There is too little free space to take a file, and to go on working."""
 
     status = 507
 
     def __init__(self) -> None:
-        super().__init__("disk_full", "The server's disk is nearly full; ask the administrator to make room.")
+        super().__init__(Refusal.FULL.value, Refusal.FULL.sentence)
+
+
+def require_room(blobs: BlobStore, settings: Settings, size: int) -> None:
+    """Raise DiskFull when the disk cannot take so many bytes and keep the free space of the settings."""
+    if shutil.disk_usage(blobs.root).free - size < settings.min_free_bytes:
+        raise DiskFull
 
 
 def checked_name(name: str) -> str:

@@ -48,6 +48,7 @@ def read(
         affected=patient.affected_side,
         controls=controls.group(blobs, control_visits, speed),
     )
+    model = replace(model, condition=Analysed(session, found, edits).condition.words)
     if before is None:
         return bundle, model
     old, new = reviews.numbers(blobs, before.found, before.edits), reviews.numbers(blobs, found, edits)

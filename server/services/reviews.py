@@ -10,7 +10,7 @@ from __future__ import annotations
 import datetime as dt
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar
 
@@ -37,9 +37,9 @@ UNDO: Final = "undo"
 NOT_READ: Final = ("poses.parquet", signals.NAME)
 """Files that only the replay and the drawing of signals need."""
 
-TAKES_KEPT, RESULTS_KEPT, PARTS_KEPT, NUMBERS_KEPT, CONTROLS_KEPT = 3, 12, 24, 240, 500
+TAKES_KEPT, RESULTS_KEPT, PARTS_KEPT, NUMBERS_KEPT, CONTROLS_KEPT, VERDICTS_KEPT = 3, 12, 24, 240, 500, 5000
 """Finished analyses, results of edits, signals of one sensor and numbers kept in memory: those at work. Ten
-minutes are some 20 MB, 1 MB, 2 MB and 50 kB."""
+minutes are some 20 MB, 1 MB, 2 MB and 50 kB; a verdict is two words."""
 
 ACTIONS: Final = {
     "move_event": "event.moved",
@@ -108,21 +108,26 @@ class Take:
 
 def edits_of(c: Connection, analysis_id: str) -> Edits:
     """The live edits of an analysis."""
+    return edits_of_all(c, [analysis_id])[analysis_id]
+
+
+def edits_of_all(c: Connection, analysis_ids: Collection[str]) -> dict[str, Edits]:
+    """The live edits of many analyses by analysis, in one statement."""
     query = (
         select(rows, user.c.display_name)
         .join(user, user.c.id == rows.c.user_id, isouter=True)
-        .where(rows.c.analysis_id == analysis_id)
+        .where(rows.c.analysis_id.in_(analysis_ids))
         .order_by(rows.c.seq)
     )
-    made: list[MadeEdit] = []
-    version = 0
-    for row in c.execute(query):
-        version = row.seq
+    made: dict[str, list[MadeEdit]] = {found: [] for found in analysis_ids}
+    version = dict.fromkeys(made, 0)
+    for row in c.execute(query) if made else ():
+        version[row.analysis_id] = row.seq
         if row.kind == UNDO:
-            made.pop()
+            made[row.analysis_id].pop()
         else:
-            made.append(MadeEdit(row.seq, edit_of(row.content), row.display_name, row.at))
-    return Edits(version, tuple(made))
+            made[row.analysis_id].append(MadeEdit(row.seq, edit_of(row.content), row.display_name, row.at))
+    return {found: Edits(version[found], tuple(live)) for found, live in made.items()}
 
 
 def take(blobs: BlobStore, found: analyses.Analysis) -> Take:
@@ -175,6 +180,11 @@ def numbers(blobs: BlobStore, found: analyses.Analysis, edits: Edits) -> Numbers
     return _numbers.get((found.id, edits.key), read)
 
 
+def verdict(blobs: BlobStore, found: analyses.Analysis, edits: Edits) -> tuple[str, str]:
+    """Shape and word for the data of an analysis, as lists show it; raises IntegrityError."""
+    return _verdicts.get((found.id, edits.key), lambda: numbers(blobs, found, edits).verdict)
+
+
 def kept(key: tuple[str, ...], make_value: Callable[[], _Value]) -> _Value:
     """A part of a finished analysis that is looked at again and again, by a key that begins with its id."""
     value: _Value = _parts.get(key, make_value)
@@ -190,7 +200,7 @@ def control(
 
 def forget() -> None:
     """Keep nothing in memory: what is erased on disk must not stay here."""
-    for memory in (_takes, _results, _numbers, _controls, _parts):
+    for memory in (_takes, _results, _numbers, _controls, _parts, _verdicts):
         memory.clear()
 
 
@@ -319,4 +329,5 @@ _takes: _Kept[Take] = _Kept(TAKES_KEPT)
 _results: _Kept[Measured] = _Kept(RESULTS_KEPT)
 _numbers: _Kept[Numbers] = _Kept(NUMBERS_KEPT)
 _controls: _Kept[ControlSession] = _Kept(CONTROLS_KEPT)
+_verdicts: _Kept[tuple[str, str]] = _Kept(VERDICTS_KEPT)
 _parts: _Kept[Any] = _Kept(PARTS_KEPT)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, insert, select, update
+from sqlalchemy import Connection, case, exists, func, insert, select, update
 
-from core.frames import PROTOCOLS
+from core.condition import CHOICES, Footwear, Orthosis, WalkingAid, WalkingCondition, WalkingPace
+from core.frames import PROTOCOLS, Protocol
 from server import audit
 from server.services.errors import NotFound, ServiceError
 from server.storage.tables import (
@@ -24,7 +25,7 @@ from server.storage.tables import (
     session,
 )
 
-CHANGEABLE = frozenset({"title", "performed_on", "protocol", "height_m", "note"})
+CHANGEABLE = frozenset({"title", "performed_on", "protocol", "height_m", *CHOICES, "feedback", "note"})
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class Session:
     state : empty (no files), uploaded, running (a job is queued or running), done (has a result), failed (the
         last job failed and there is no result).
     height_m : measured at this visit, None = use the patient's.
+    pace, aid, orthosis, shoes : how it was walked (core/condition.py), None = not stated.
+    feedback : biofeedback was given; a live take sets it by itself.
     """
 
     id: str
@@ -43,11 +46,28 @@ class Session:
     patient_code: str
     title: str
     performed_on: dt.date
-    protocol: str
+    protocol: Protocol
     height_m: float | None
+    pace: WalkingPace | None
+    aid: WalkingAid | None
+    orthosis: Orthosis | None
+    shoes: Footwear | None
+    feedback: bool
     note: str
     created_at: dt.datetime
     state: str
+
+    def walked(self, belt_speed_mps: float | None = None) -> WalkingCondition:
+        """The condition of its take; the speed of a belt is in the manifest of its recording."""
+        return WalkingCondition(
+            self.pace,
+            self.aid,
+            self.orthosis,
+            self.shoes,
+            self.feedback,
+            self.protocol,
+            belt_speed_mps if self.protocol == "treadmill" else None,
+        )
 
 
 def create(
@@ -60,8 +80,14 @@ def create(
     protocol: str = "walk",
     height_m: float | None = None,
     note: str = "",
+    **condition: object,
 ) -> Session:
-    """Add a session; raises NotFound for the patient, ServiceError bad_value."""
+    """Add a session; raises NotFound for the patient, ServiceError bad_value.
+
+    Parameters
+    ----------
+    condition : pace, aid, orthosis, shoes, feedback as of `Session`; not stated without them.
+    """
     if c.execute(select(patient.c.id).where(patient.c.id == patient_id)).first() is None:
         raise NotFound("patient", patient_id)
     day = performed_on or now().date()
@@ -71,6 +97,7 @@ def create(
         "protocol": protocol,
         "height_m": height_m,
         "note": note,
+        **condition,
     }
     session_id = new_id()
     row = {"id": session_id, "patient_id": patient_id, "created_at": now(), **_checked(values)}
@@ -96,41 +123,42 @@ def get(c: Connection, session_id: str) -> Session:
     row = c.execute(_QUERY.where(session.c.id == session_id)).first()
     if row is None:
         raise NotFound("session", session_id)
-    return _session(c, row)
+    return Session(**row._asdict())
 
 
 def of_patient(c: Connection, patient_id: str) -> list[Session]:
     """All sessions of a patient, the newest day first."""
-    query = _QUERY.where(session.c.patient_id == patient_id)
-    rows = c.execute(query.order_by(session.c.performed_on.desc(), session.c.created_at.desc())).all()
-    return [_session(c, row) for row in rows]
+    query = _QUERY.where(session.c.patient_id == patient_id).order_by(*_NEWEST)
+    return [Session(**row._asdict()) for row in c.execute(query)]
 
 
-_QUERY = select(session, patient.c.code.label("patient_code")).join(
+def newest_of(c: Connection, patient_ids: Collection[str]) -> dict[str, Session]:
+    """The newest session of each of these patients by patient id; who has none is left out."""
+    place = func.row_number().over(partition_by=session.c.patient_id, order_by=_NEWEST)
+    ranked = (
+        select(session.c.id, place.label("place")).where(session.c.patient_id.in_(patient_ids)).subquery()
+    )
+    newest = select(ranked.c.id).where(ranked.c.place == 1)
+    found = (Session(**row._asdict()) for row in c.execute(_QUERY.where(session.c.id.in_(newest))))
+    return {s.patient_id: s for s in found}
+
+
+_NEWEST = (session.c.performed_on.desc(), session.c.created_at.desc(), session.c.id)
+
+_MINE = recording.c.session_id == session.c.id
+_JOBS = select(job.c.state).join(recording, recording.c.id == job.c.recording_id).where(_MINE)
+_STATE = case(
+    (_JOBS.where(job.c.state.in_(ACTIVE_STATES)).correlate(session).exists(), "running"),
+    (exists().where(analysis.c.recording_id == recording.c.id, _MINE).correlate(session), "done"),
+    (_JOBS.order_by(job.c.seq.desc()).limit(1).correlate(session).scalar_subquery() == "failed", "failed"),
+    (exists().where(recording_file.c.recording_id == recording.c.id, _MINE).correlate(session), "uploaded"),
+    else_="empty",
+)
+"""State of a session, in the statement that reads it: as many sessions as one likes cost no further one."""
+
+_QUERY = select(session, patient.c.code.label("patient_code"), _STATE.label("state")).join(
     patient, patient.c.id == session.c.patient_id
 )
-
-
-def _session(c: Connection, row: Any) -> Session:
-    return Session(**row._asdict(), state=_state(c, row.id))
-
-
-def _state(c: Connection, session_id: str) -> str:
-    mine = select(recording.c.id).where(recording.c.session_id == session_id).scalar_subquery()
-    jobs = c.execute(
-        select(job.c.state).where(job.c.recording_id.in_(mine)).order_by(job.c.seq.desc())
-    ).scalars()
-    states = list(jobs)
-    if any(state in ACTIVE_STATES for state in states):
-        return "running"
-    if c.execute(select(analysis.c.id).where(analysis.c.recording_id.in_(mine)).limit(1)).first():
-        return "done"
-    if states and states[0] == "failed":
-        return "failed"
-    has_files = c.execute(
-        select(recording_file.c.name).where(recording_file.c.recording_id.in_(mine)).limit(1)
-    ).first()
-    return "uploaded" if has_files else "empty"
 
 
 def _checked(values: Mapping[str, object]) -> dict[str, Any]:
@@ -142,6 +170,11 @@ def _checked(values: Mapping[str, object]) -> dict[str, Any]:
         raise ServiceError("bad_value", "A session's title has 1 to 200 characters.")
     if checked.get("protocol", PROTOCOLS[0]) not in PROTOCOLS:
         raise ServiceError("bad_value", f"The protocol is one of {', '.join(PROTOCOLS)}.")
+    for name, words in CHOICES.items():
+        if checked.get(name) is not None and checked[name] not in words:
+            raise ServiceError("bad_value", f"{name} is one of {', '.join(words)}, or null where not stated.")
+    if not isinstance(checked.get("feedback", False), bool):
+        raise ServiceError("bad_value", "feedback is true or false.")
     height = checked.get("height_m")
     if height is not None and not (isinstance(height, int | float) and 0.5 <= height <= 2.5):
         raise ServiceError("bad_value", f"Body height is {height}, expected 0.5 to 2.5 m.")

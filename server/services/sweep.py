@@ -1,4 +1,8 @@
-"""Removing stored files that no row refers to: cut uploads, results of lost claims, replaced files.
+"""Taking away stored files that no row refers to: cut uploads, results of lost claims, replaced files.
+
+They go to the trash for 30 days, because a database that was put back from a backup refers to few of them;
+after one went back in time nothing is taken away at all (services/custody.py). Only what nobody was ever
+promised (half received) and what was erased on purpose goes at once.
 
 A file may be young because somebody is about to refer to it, so only files older than a grace time go. They
 go while the write lock is held: a publisher either has committed (the reference is seen) or will find its
@@ -7,44 +11,71 @@ file gone in its own transaction (BlobStore.require) and fail cleanly.
 
 from __future__ import annotations
 
-from sqlalchemy import Connection, select, union
+import logging
 
-from server.storage.blobs import BlobStore
+from server.services import custody, erasure
+from server.services.references import referenced
+from server.settings import Settings
+from server.storage import fs
+from server.storage.blobs import INCOMING, BlobStore
 from server.storage.db import Database
-from server.storage.tables import analysis, analysis_file, patient, recording, recording_file, session
+from server.storage.tables import now
+from server.storage.trash import Trash
+
+log = logging.getLogger(__name__)
+
+AT_ONCE = 100
+"""Files moved under one write lock: nobody else can write meanwhile."""
 
 
-def sweep(db: Database, blobs: BlobStore, *, grace_s: float, only: set[tuple[str, str]] | None = None) -> int:
-    """Remove unreferenced files older than `grace_s`, of `only` these addresses or all; return how many."""
-    old = [f for f in blobs.files() if f.age_s >= grace_s and (only is None or (f.space, f.name) in only)]
-    if not old:
+def sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
+    """Move unreferenced files older than `settings.sweep_grace_s` to the trash and empty that of old ones.
+
+    Returns
+    -------
+    How many stored files were taken away; 0 when this database is in doubt.
+    """
+    erasure.finish(db, blobs, settings)
+    old = [f for f in blobs.files() if f.age_s >= settings.sweep_grace_s]
+    with db.read() as c:
+        doubted = custody.doubt(c, settings)
+        used, erased = referenced(c), erasure.erased_spaces(c)
+    if doubted is not None:
+        log.warning("no stored file is taken away: %s See `sagittal check`.", doubted)
         return 0
-    removed = 0
+    trash, at, taken = Trash(settings.trash), now(), 0
+    idle = [f for f in old if (f.space, f.name) not in used]
+    for group in (idle[i : i + AT_ONCE] for i in range(0, len(idle), AT_ONCE)):
+        kept = []
+        with db.write() as c:
+            used = referenced(c)
+            for stored in group:
+                if (stored.space, stored.name) in used or not stored.is_older(settings.sweep_grace_s):
+                    continue
+                taken += 1
+                if stored.space == INCOMING or stored.space in erased:
+                    fs.remove_file(stored.path)
+                else:
+                    kept.append(stored)
+            trash.take(kept, at)
+        if kept:
+            trash.settle(kept, at)
+            log.warning("%d stored files that nothing refers to are in %s now", len(kept), trash.root)
+    trash.expire(now())
+    return taken
+
+
+def put_back(db: Database, blobs: BlobStore, settings: Settings) -> int:
+    """Move missing files that a row refers to from the trash to their place; return how many."""
+    trash = Trash(settings.trash)
+    back = 0
     with db.write() as c:
         used = referenced(c)
-        for stored in old:
-            if (stored.space, stored.name) not in used and stored.is_older(grace_s):
-                blobs.remove(stored)
-                removed += 1
-    return removed
-
-
-def referenced(c: Connection, session_id: str | None = None) -> set[tuple[str, str]]:
-    """Every (space, sha256) that a row refers to, of one session or all."""
-    originals = (
-        select(patient.c.id, recording_file.c.sha256)
-        .join(session, session.c.patient_id == patient.c.id)
-        .join(recording, recording.c.session_id == session.c.id)
-        .join(recording_file, recording_file.c.recording_id == recording.c.id)
-    )
-    results = (
-        select(patient.c.id, analysis_file.c.sha256)
-        .join(session, session.c.patient_id == patient.c.id)
-        .join(recording, recording.c.session_id == session.c.id)
-        .join(analysis, analysis.c.recording_id == recording.c.id)
-        .join(analysis_file, analysis_file.c.analysis_id == analysis.c.id)
-    )
-    if session_id is not None:
-        originals = originals.where(session.c.id == session_id)
-        results = results.where(session.c.id == session_id)
-    return {(row[0], row[1]) for row in c.execute(union(originals, results))}
+        for one in list(trash.files()):
+            target = blobs.path(one.space, one.name)
+            if (one.space, one.name) in used and not target.is_file():
+                trash.put_back(one, target)
+                back += 1
+    if back:
+        trash.tidy()
+    return back

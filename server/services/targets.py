@@ -9,6 +9,7 @@ from typing import Final
 
 from sqlalchemy import Connection
 
+from core.condition import is_alike
 from core.feedback import Target
 from core.feedback.prescription import TargetSource
 from core.frames import SIDES, Side
@@ -19,6 +20,7 @@ from server.report.notes import GROUPS
 from server.report.numbers import Numbers
 from server.report.wording import NO_NORM
 from server.services import comparisons, controls, histories, reviews
+from server.services.histories import Analysed
 from server.services.patients import Patient
 from server.services.sessions import Session
 from server.storage.blobs import BlobStore
@@ -60,23 +62,25 @@ def last_walk(
     *,
     with_controls: bool = True,
 ) -> Walk | None:
-    """The newest analysed session of a person; None without one.
+    """The analysed walk that says how a person walks, never one with feedback; None without one.
+
+    Without `before` it is that of `histories.baseline`.
 
     Parameters
     ----------
-    before : only sessions of its protocol on its day or earlier, itself not. session_id : only this one.
-    with_controls : look for the clinic's own controls too.
+    before : the newest walked like this session, on its day or earlier, itself not. session_id : only this
+        one. with_controls : look for the clinic's own controls too.
     """
     found = [
         a
         for a in histories.analysed(c, patient.id)
         if a.session.protocol in {"walk", "treadmill"}
         and session_id in {None, a.session.id}
-        and (before is None or _earlier(a.session, before))
+        and (before is None or _earlier(a, before))
     ]
-    if not found:
+    last = histories.baseline(found)
+    if last is None:
         return None
-    last = found[-1]
     numbers = reviews.numbers(blobs, last.found, last.edits)
     speed = _mean(numbers, "gait_speed_mps", None)
     visits = controls.visits(c, patient, last.session) if with_controls else ()
@@ -98,7 +102,10 @@ def offer(walk: Walk | None, source: TargetSource, parameter: str, side: Side | 
     if source == "manual":
         return Offer(None, "Enter mean and SD.")
     if walk is None:
-        return Offer(None, "No walk of this person is analysed yet. Analyse one first, or enter a target.")
+        return Offer(
+            None,
+            "No walk of this person without feedback is analysed yet. Analyse one first, or enter a target.",
+        )
     if source == "norm":
         return _norm(walk, parameter)
     if source == "own_baseline":
@@ -179,7 +186,9 @@ def _together(sides: list[Parameter]) -> Parameter:
     return Parameter(first.name, None, n, mean, sqrt(squares / (n - 1)) if n > 1 else None, first.unit)
 
 
-def _earlier(a: Session, b: Session) -> bool:
-    if a.id == b.id or a.protocol != b.protocol:
+def _earlier(a: Analysed, b: Session) -> bool:
+    """Whether a visit came before this session and was walked like it; how fast its belt will run is open."""
+    own = a.session
+    if own.id == b.id or (own.performed_on, own.created_at) >= (b.performed_on, b.created_at):
         return False
-    return (a.performed_on, a.created_at) < (b.performed_on, b.created_at)
+    return is_alike(own.walked(), b.walked())

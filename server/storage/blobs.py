@@ -22,7 +22,8 @@ from server.storage import fs
 
 _HEX32 = re.compile(r"[0-9a-f]{32}")
 _HEX64 = re.compile(r"[0-9a-f]{64}")
-_INCOMING = "incoming"
+INCOMING = "incoming"
+"""The space of files that are being received, or were when their process died."""
 
 
 class IntegrityError(SagittalError):
@@ -66,7 +67,7 @@ class BlobStore:
 
     def __init__(self, root: Path) -> None:
         self.root = root
-        self._incoming = root / _INCOMING
+        self._incoming = root / INCOMING
         fs.make_folder(self._incoming)
 
     def receive(self, space: str, limit: int | None = None) -> Receiver:
@@ -78,6 +79,11 @@ class BlobStore:
         with self.receive(space) as receiver:
             receiver.write(content)
             return receiver.keep()
+
+    def probe(self) -> None:
+        """Write a page into the folder and remove it again; raises OSError."""
+        with self.receive("0" * 32) as receiver:
+            receiver.write(bytes(4096))
 
     def read(self, space: str, sha256: str) -> bytes:
         """Return the bytes, or raise IntegrityError (blob_missing, blob_damaged)."""
@@ -106,8 +112,10 @@ class BlobStore:
         return self.root / space / sha256
 
     def files(self) -> Iterator[StoredFile]:
-        """Every file of the store, half-received ones too (their space is 'incoming')."""
-        for folder in sorted(p for p in self.root.iterdir() if p.is_dir()):
+        """Every file of ours in the store, half-received ones too (their space is INCOMING)."""
+        for folder in sorted(self.root.iterdir()):
+            if not (folder.is_dir() and (folder.name == INCOMING or _HEX32.fullmatch(folder.name))):
+                continue
             for path in sorted(folder.iterdir()):
                 try:
                     age_s = time.time() - path.stat().st_mtime
@@ -115,9 +123,9 @@ class BlobStore:
                     continue
                 yield StoredFile(folder.name, path.name, path, age_s)
 
-    def remove(self, stored: StoredFile) -> None:
-        """Remove one file that nothing refers to."""
-        fs.remove_file(stored.path)
+    def remove(self, space: str, sha256: str) -> None:
+        """Remove one file for good; gone already is fine."""
+        fs.remove_file(self.path(space, sha256))
 
     def erase(self, space: str) -> None:
         """Remove a whole space."""

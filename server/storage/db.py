@@ -67,6 +67,12 @@ class Database:
             dangling = foreign_key_violations(c)
         return ([] if rows == ["ok"] else rows) + dangling
 
+    def probe(self) -> None:
+        """Commit a change of one page, without touching a table; raises OperationalError."""
+        with self.write() as c:
+            beats = c.exec_driver_sql("PRAGMA user_version").scalar_one()
+            c.exec_driver_sql(f"PRAGMA user_version = {(beats + 1) % 2**31}")
+
     def backup(self, target: Path) -> None:
         """Write a consistent copy while others read and write (a plain copy is unusable under WAL)."""
         with closing(self._plain()) as connection:
@@ -77,10 +83,14 @@ class Database:
         timeout = BUSY_TIMEOUT_MS / 1000
         return sqlite3.connect(self.path, timeout=timeout, isolation_level=None, check_same_thread=False)
 
-    def fold(self) -> None:
-        """Move the write-ahead log into the file and empty it, what was deleted is gone then."""
+    def fold(self) -> bool:
+        """Move the write-ahead log into the file and empty it, what was deleted is gone then.
+
+        False when somebody has been reading an older state all the time, so that the log had to stay.
+        """
         with closing(self._plain()) as connection:
-            connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+            busy = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()[0]
+        return not busy
 
     def close(self) -> None:
         """Close all connections; the last one to leave folds the write-ahead log into the file."""
@@ -101,6 +111,12 @@ class ChangeWatch:
         changed = version != self._seen
         self._seen = version
         return changed
+
+
+def highest_number(connection: Connection, table: str) -> int:
+    """The greatest number that a table which never gives one twice has given, 0 = none yet."""
+    query = "SELECT seq FROM sqlite_sequence WHERE name = ?"
+    return int(connection.exec_driver_sql(query, (table,)).scalar() or 0)
 
 
 def migration_engine(path: Path) -> Engine:

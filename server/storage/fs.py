@@ -11,6 +11,7 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import os
+import stat
 import uuid
 from pathlib import Path
 from types import TracebackType
@@ -51,6 +52,10 @@ class System:
     def mkdir(self, path: Path) -> None:
         """Make one folder for its owner only."""
         path.mkdir(mode=0o700, exist_ok=True)
+
+    def chmod(self, path: Path, mode: int) -> None:
+        """Change who may do what with a file."""
+        path.chmod(mode)
 
     def rmdir(self, path: Path) -> None:
         """Remove an empty folder."""
@@ -213,6 +218,29 @@ def make_folder(folder: Path) -> None:
     make_folder(folder.parent)
     system.mkdir(folder)
     sync_folder(folder.parent)
+
+
+def move_file(source: Path, target: Path) -> None:
+    """Give a file another name on the same file system, over whatever is there.
+
+    A power cut leaves it under one of both names; it is surely under the new one after `sync_folder` of both
+    folders, which the caller does once for many files.
+    """
+    make_folder(target.parent)
+    system.replace(source, target)
+
+
+def keep_private(path: Path) -> None:
+    """Make an empty file for its owner only; take everybody else's rights to one that exists.
+
+    What exists is not opened: closing it would end the locks that SQLite has on it in this process.
+    """
+    try:
+        system.close(system.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL))
+    except FileExistsError:
+        mode = stat.S_IMODE(path.stat().st_mode)
+        if mode & 0o077:
+            system.chmod(path, mode & 0o700)
 
 
 def remove_file(path: Path) -> None:

@@ -6,6 +6,7 @@ require_current(settings.database)  # in a worker: refuses instead of migrating
 
 from __future__ import annotations
 
+import contextlib
 import io
 import time
 from contextlib import closing
@@ -20,6 +21,7 @@ from sqlalchemy.exc import DatabaseError
 import server
 from server.storage import fs
 from server.storage.db import Database, migration_engine
+from server.storage.refusal import refusal_of
 
 INSTALLED = Path(server.__file__).parent / "migrations"
 SOURCE = Path(server.__file__).parent.parent / "migrations"
@@ -48,6 +50,9 @@ def current(database: Path) -> str | None:
         with engine.connect() as connection:
             return MigrationContext.configure(connection).get_current_revision()
     except DatabaseError as error:
+        refusal = refusal_of(error)
+        if refusal is not None:  # SQLite needs some room even to read
+            raise MigrationError(f"{database} cannot be opened. {refusal.sentence}") from error
         raise MigrationError(
             f"{database} cannot be read as a database ({error.orig}). Restore it from a backup "
             f"({database.parent / 'backups'} holds those made before upgrades)."
@@ -66,6 +71,7 @@ def upgrade(database: Path, *, target: str = "head", scripts: Path | None = None
     """
     config = configuration(database, scripts)
     fs.make_folder(database.parent)
+    _keep_private(database)
     at = _known(config, database)
     wanted = ScriptDirectory.from_config(config).as_revision_number(target)
     if at == wanted:
@@ -98,10 +104,19 @@ def _known(config: Config, database: Path) -> str | None:
     return at
 
 
+def _keep_private(database: Path) -> None:
+    """Let nobody else read it, also in a folder open to everybody; SQLite goes by the umask."""
+    logs = [database.with_name(database.name + end) for end in ("-wal", "-shm")]
+    for path in (database, *(log for log in logs if log.exists())):
+        with contextlib.suppress(PermissionError):  # of another owner, who decides
+            fs.keep_private(path)
+
+
 def _backup(database: Path, revision: str) -> Path:
     folder = database.parent / "backups"
     fs.make_folder(folder)
     target = folder / f"{revision}-{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}-{time.monotonic_ns()}.db"
+    fs.keep_private(target)
     with closing(Database(database)) as db:
         db.backup(target)
     fs.sync_file(target)

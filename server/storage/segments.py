@@ -7,13 +7,27 @@ that records are appended and synced in groups. What a crash leaves is the longe
 
 from __future__ import annotations
 
+import logging
+import mmap
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 from core.errors import InputError
-from core.formats.live_log import FILE_MARK, MOST_FRAME_BYTES, Record, record, scan_records
+from core.formats.live_log import (
+    FILE_MARK,
+    MOST_FRAME_BYTES,
+    RECORD_HEAD,
+    RECORD_STARTS,
+    Record,
+    is_whole_length,
+    record,
+    scan_records,
+)
 from server.storage import fs
+
+log = logging.getLogger(__name__)
 
 CHUNK: Final = 1 << 22
 """Bytes read at once."""
@@ -21,16 +35,34 @@ _LONGEST: Final = MOST_FRAME_BYTES + 64
 """No record is longer."""
 
 
+@dataclass(frozen=True)
+class Damage:
+    """What of a log cannot be read though it was written: `lost` bytes from `start` on; where it is kept."""
+
+    start: int
+    lost: int
+    original: Path | None = None
+
+    @property
+    def sentence(self) -> str:
+        """For the people of the session."""
+        return (
+            f"{self.lost} bytes of the live recording were damaged on the server's disk and are left out. "
+            "The original is kept; ask your administrator."
+        )
+
+
 class TakeLog:
     """A log that is open for appending.
 
     Parameters
     ----------
-    path : the file. size : its bytes, all of them whole records and synced.
+    path : the file. size : its bytes, all of them whole records and synced. damage : what was cut off of it.
     """
 
-    def __init__(self, path: Path, size: int) -> None:
+    def __init__(self, path: Path, size: int, damage: Damage | None = None) -> None:
         self.path = path
+        self.damage = damage
         self._file = fs.Growing(path, size)
         self._synced = size
 
@@ -84,6 +116,8 @@ def create(path: Path, hello: bytes) -> TakeLog:
 def recover(path: Path, see: Callable[[Record], None]) -> TakeLog | None:
     """Open a log whose writer has ended: its longest valid prefix stays, durably; the rest is cut off.
 
+    Of a damaged one a whole copy is kept, and `TakeLog.damage` says so.
+
     Parameters
     ----------
     see : gets every record that stays, in order.
@@ -97,16 +131,62 @@ def recover(path: Path, see: Callable[[Record], None]) -> TakeLog | None:
         see(one)
     if not size:
         return None
-    log = TakeLog(path, size)
+    damage = find_damage(path, size)
+    if damage is not None:
+        damage = replace(damage, original=keep_original(path))
+        log.warning("%s: %s Kept as %s.", path.name, damage.sentence, damage.original)
+    opened = TakeLog(path, size, damage)
     # also when nothing is cut: what a killed process wrote may still be in memory only, and the sender is
     # about to be told that it is kept
     try:
-        log.back()
+        opened.back()
         fs.sync_folder(path.parent)
     except OSError:
-        log.close()
+        opened.close()
         raise
-    return log
+    return opened
+
+
+def find_damage(path: Path, size: int) -> Damage | None:
+    """What lies behind the first `size` bytes of a log, when it is not just an end torn by a crash.
+
+    Damaged is a log with a whole record behind what cannot be read, or with a last record that has its whole
+    length and another content. A torn end is shorter, or ends in the zeros of blocks never written.
+    """
+    length = path.stat().st_size
+    if length <= size:
+        return None
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        if is_whole_length(data[size : size + RECORD_HEAD], length - size) and data[length - 1]:
+            return Damage(size, length - size)
+        for mark in RECORD_STARTS:
+            at = data.find(mark, size)
+            while at >= 0:
+                begin = at - RECORD_HEAD
+                if begin > size and scan_records(data[begin : begin + _LONGEST])[0]:
+                    return Damage(size, length - size)
+                at = data.find(mark, at + 1)
+    return None
+
+
+def readable(path: Path) -> int:
+    """How many of a log's bytes are whole records from its beginning on; 0 = not even the first."""
+    size = 0
+    for size, _ in records(path):  # noqa: B007 - the last one is used
+        pass
+    return size
+
+
+def keep_original(path: Path) -> Path:
+    """Copy a log durably to a name beside it that is free, and return that."""
+    number = 1
+    while (target := path.with_name(f"{path.stem}.{number}.damaged")).exists():
+        number += 1
+    with fs.Incoming(path.parent) as copy, path.open("rb") as file:
+        while chunk := file.read(CHUNK):
+            copy.write(chunk)
+        copy.keep(target)
+    return target
 
 
 def _head(path: Path, size: int) -> bytes:

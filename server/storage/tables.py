@@ -155,6 +155,12 @@ session = Table(
     Column("performed_on", Date, nullable=False),
     Column("protocol", String(32), nullable=False),
     Column("height_m", Float),
+    # how it was walked (core/condition.py); None: nobody stated it
+    Column("pace", String(32)),
+    Column("aid", String(32)),
+    Column("orthosis", String(32)),
+    Column("shoes", String(32)),
+    Column("feedback", Boolean, nullable=False, server_default=false()),
     Column("note", Text, nullable=False),
     Column("created_at", Utc, nullable=False),
     CheckConstraint("height_m BETWEEN 0.5 AND 2.5", name="height_m"),

@@ -30,6 +30,7 @@ def add_batch(
         opacity = np.append(opacity, np.full(len(opacity), PALE, np.float32))
         # trunk and head of both are in the same place
         legs = np.array([[tint != "body"] for tint in batch.tint], np.float32)
+        legs *= np.array(batch.ghostly, np.float32)[:, None]
         scale = np.concatenate((scale, legs * scale))
     return scene.add_batched_meshes_simple(
         name,

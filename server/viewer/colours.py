@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 Rgb = tuple[int, int, int]
-Tint = Literal["left", "right", "body", "joint"]
+Tint = Literal["left", "right", "body", "joint", "band"]
 
 TINTS: Final[Mapping[bool, Mapping[Tint, Rgb]]] = {
     False: {
@@ -16,15 +16,20 @@ TINTS: Final[Mapping[bool, Mapping[Tint, Rgb]]] = {
         "right": (0x00, 0x72, 0xB2),
         "body": (0x6B, 0x76, 0x82),
         "joint": (0xEC, 0xEE, 0xF1),
+        "band": (0xF4, 0xF6, 0xF8),
     },
     True: {
         "left": (0xF5, 0x87, 0x3A),
         "right": (0x56, 0xB4, 0xE9),
         "body": (0x6B, 0x76, 0x82),
         "joint": (0xEC, 0xEE, 0xF1),
+        "band": (0x12, 0x17, 0x1C),
     },
 }
-"""Dark → colours of the parts; the leg pairs are --left and --right of the page's tokens.css."""
+"""Dark → colours of the parts; the leg pairs are --left and --right of the page's tokens.css.
+
+The band is what a letter in the colour of its leg stands on.
+"""
 
 GHOST: Final[Mapping[bool, Rgb]] = {False: (0x5B, 0x7C, 0x99), True: (0x8F, 0xAE, 0xC8)}
 """Dark → colour of another visit, the grey-blue of its curves; legs are told by where they are."""

@@ -1,4 +1,4 @@
-"""A prepared motion as a viser scene: three batched meshes and two letters in a room that may move past."""
+"""A prepared motion as a viser scene: batched meshes in a room that may move past."""
 
 from __future__ import annotations
 
@@ -39,12 +39,6 @@ class Figure:
             self._ghost_batches = _add_ghost(scene, motion.ghost)
         self._ghost_shown = True
         self._ground = Ground(scene, ROOM, motion)
-        self._letters = {
-            side: scene.add_label(
-                f"{ROOM}/letter_{side}", side[0].upper(), font_screen_scale=1.3, anchor="center-left"
-            )
-            for side in motion.toes
-        }
         self.set_dark(dark)
         self.set_follow(True)
 
@@ -69,9 +63,6 @@ class Figure:
                 if valid:
                     put(handle, batch.wxyz[i], batch.position[i])
             self._pose_ghost(i, valid=valid)
-            for side, letter in self._letters.items():
-                letter.visible = valid and self._follow
-                letter.position = m.toes[side][i]
             self._room.bring(*(m.root[i] if self._follow else self._middle).tolist())
             self._ground.show(self._t_s, recent=self._follow)
         self._server.flush()
@@ -136,7 +127,7 @@ def _whole(motion: Motion) -> Shot:
 
 
 def _add_ghost(scene: viser.SceneApi, ghost: Ghost) -> list[tuple[Batch, viser.BatchedMeshHandle]]:
-    """The other visit, pale and without a shadow, on a node of its own."""
+    """The other visit, pale and without a shadow or letters, on a node of its own."""
     return [
         (
             batch,
@@ -145,7 +136,7 @@ def _add_ghost(scene: viser.SceneApi, ghost: Ghost) -> list[tuple[Batch, viser.B
                 *batch.mesh,
                 batch.wxyz[0],
                 batch.position[0],
-                batched_scales=batch.scale,
+                batched_scales=batch.scale * np.array(batch.ghostly, np.float32)[:, None],
                 batched_colors=linear(GHOST[False]),
                 opacity=PALE,
                 lod="off",
@@ -155,5 +146,5 @@ def _add_ghost(scene: viser.SceneApi, ghost: Ghost) -> list[tuple[Batch, viser.B
             ),
         )
         for name, batch in ghost.motion.batches.items()
-        if batch.tint
+        if any(batch.ghostly)
     ]

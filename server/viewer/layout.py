@@ -40,8 +40,14 @@ _NEUTRAL: Final = rotation.from_matrix(R_NEUTRAL)
 _BLOCK: Final = 512
 """Frames placed at a time: what is being worked on stays in the processor's cache."""
 
-Name = Literal["bones", "shoes", "balls", "toes", "soles"]
-"""Meshes by name, and two points of each foot: where its letter is written, the middle of its sole."""
+Name = Literal["bones", "shoes", "balls", "letters_left", "letters_right", "soles"]
+"""Meshes by name, and a point of each foot: the middle of its sole."""
+
+_BAND: Final = (0.068, 0.19)
+"""Radius and length, m, of the band around the shank that carries the letter of the side."""
+
+_SEEN_FROM: Final = np.radians(60.0)
+"""From front and right, where the camera stands at first (server/viewer/room.py)."""
 
 Vector = tuple[float, float, float]
 
@@ -73,6 +79,7 @@ class Batch:
     ----------
     wxyz : (m, k, 4). position : (m, k, 3) m, world. scale : (k, 3). tint : k colour roles.
     measured : k, False where no sensor supports the part and the estimator alone says where it is.
+    ghostly : k, False for what another visit laid over it does not show: a letter and its band.
     """
 
     mesh: shapes.Mesh
@@ -81,6 +88,7 @@ class Batch:
     scale: Single
     tint: tuple[Tint, ...]
     measured: tuple[bool, ...]
+    ghostly: tuple[bool, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +97,10 @@ class Placed:
 
     Parameters
     ----------
-    batches : name → copies of one mesh. toes, soles : side → (m, 3) m, world.
+    batches : name → copies of one mesh. soles : side → (m, 3) m, world.
     """
 
     batches: Mapping[str, Batch]
-    toes: Mapping[Side, Single]
     soles: Mapping[Side, Single]
 
 
@@ -124,7 +131,13 @@ class Layout:
         self._at = np.array(offset, np.float64).reshape(-1, 1, 3)
         self._moved = np.flatnonzero(self._at.any(axis=(1, 2)))
         self._arm = np.array([_swinging(x) for x in self._at[self._moved, 0]]).reshape(-1, 16, 3)
-        self._meshes = {"bones": shapes.bone(), "shoes": _shoe(body), "balls": shapes.ball()}
+        self._meshes = {
+            "bones": shapes.bone(),
+            "shoes": _shoe(body),
+            "balls": shapes.ball(),
+            "letters_left": _letter("left"),
+            "letters_right": _letter("right"),
+        }
         names: list[str] = [x.name for x in self._parts]
         ends = {
             name: max((k + 1 for k, x in enumerate(names) if x == name), default=0) for name in self._meshes
@@ -135,17 +148,15 @@ class Layout:
                 np.array([x.scale for x in self._parts[rows]], np.float32).reshape(-1, 3),
                 tuple(x.tint for x in self._parts[rows]),
                 tuple(x.segment in worn for x in self._parts[rows]),
+                tuple(x.tint != "band" and not name.startswith("letters") for x in self._parts[rows]),
             )
             for name, rows in self._rows.items()
         }
-        self._points: dict[str, dict[Side, int]] = {
-            name: {
-                side: k
-                for side in SIDES
-                for k, x in enumerate(self._parts)
-                if (x.name, x.tint) == (name, side)
-            }
-            for name in ("toes", "soles")
+        self._soles: dict[Side, int] = {
+            side: k
+            for side in SIDES
+            for k, x in enumerate(self._parts)
+            if (x.name, x.tint) == ("soles", side)
         }
 
     def place(self, q: Mapping[Segment, Floats], p: Mapping[Segment, Floats]) -> Placed:
@@ -171,7 +182,7 @@ class Layout:
                 name: Batch(self._meshes[name], wxyz[:, rows], position[:, rows], *self._look[name])
                 for name, rows in self._rows.items()
             },
-            *({side: position[:, k] for side, k in self._points[name].items()} for name in ("toes", "soles")),
+            {side: position[:, k] for side, k in self._soles.items()},
         )
 
 
@@ -194,6 +205,10 @@ def _parts(segments: Sequence[Segment], body: BodyModel) -> list[Part]:
     for side in SIDES:
         add("bones", THIGH[side], (0.058, 0.058, body.thigh), side, _DOWN)
         add("bones", SHANK[side], (0.045, 0.045, body.shank), side, _DOWN)
+    radius, length = _BAND
+    band = (0.0, -0.5 * (body.shank - length), 0.0)
+    for side in SIDES:
+        add("bones", SHANK[side], (radius, radius, length), "band", _DOWN, band)
     # the cones' axes are segment x, z, y: depth, width, length
     shoulders = (0.0, _SHOULDER_ABOVE_HIP * stature, 0.0)
     length, neck = (
@@ -210,8 +225,9 @@ def _parts(segments: Sequence[Segment], body: BodyModel) -> list[Part]:
     add("balls", "pelvis", (0.075, 0.075, body.hip_width / 2 + 0.02), "body")
     r, head = _HEAD_RADIUS * stature, (0.01, _HEAD_ABOVE_HIP * stature, 0.0)
     add("balls", "pelvis", (r * 0.92, r * 1.15, r * 0.82), "body", at=head, trunk=True)
+    add("letters_left", SHANK["left"], tint="left", turn=_DOWN, at=band)
+    add("letters_right", SHANK["right"], tint="right", turn=_DOWN, at=band)
     for side in SIDES:
-        add("toes", FOOT[side], tint=side, at=(0.75 * body.foot + 0.05, -0.5 * body.ankle_height, 0.0))
         add("soles", FOOT[side], tint=side, at=(0.25 * body.foot, -body.ankle_height, 0.0))
     return parts
 
@@ -238,6 +254,12 @@ def _swinging(at: Floats) -> Floats:
         for k, v in enumerate(np.eye(3), start=1):
             found[i, k] = 2.0 * np.cross(u, np.cross(v, at))
     return found.reshape(16, 3)
+
+
+@lru_cache(maxsize=2)
+def _letter(side: Side) -> shapes.Mesh:
+    radius, length = _BAND
+    return shapes.letter(side, radius + 0.002, length, 0.8 * length, _SEEN_FROM)
 
 
 @lru_cache(maxsize=32)

@@ -1,4 +1,4 @@
-"""What a live walk leaves on the floor: the last prints and seconds of the trails, and a letter at each foot.
+"""What a live walk leaves on the floor: the last prints and seconds of the trails.
 
 The rules are those of server/viewer/steps.py, applied as the frames come.
 """
@@ -35,7 +35,7 @@ _PIXELS, _OPACITY = 1.6, 0.6
 
 
 class LiveFloor:
-    """Prints, letters and trails in one scene.
+    """Prints and trails in one scene.
 
     Parameters
     ----------
@@ -119,16 +119,12 @@ class _Trail:
 
 
 class _Steps:
-    """Where one foot rested: shown when it first does, put right when the contact ends.
-
-    The letter of the side stands at the foot while that is on the floor; in swing it has none.
-    """
+    """Where one foot rested: shown when it first does, put right when the contact ends."""
 
     def __init__(self, scene: viser.SceneApi, side: Side, foot: float) -> None:
         self._position = np.zeros((PRINTS, 3), np.float32)
         self._wxyz = np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (PRINTS, 1))
         self._scale = np.zeros(PRINTS, np.float32)
-        self._reach = 0.5 * foot + 0.05
         self.node = scene.add_batched_meshes_simple(
             f"{ROOM}/prints_{side}",
             *shapes.footprint(foot, side),
@@ -140,13 +136,6 @@ class _Steps:
             lod="off",
             cast_shadow=False,
             receive_shadow=False,
-        )
-        self._letter = scene.add_label(
-            f"{ROOM}/letter_{side}",
-            side[0].upper(),
-            font_screen_scale=1.3,
-            anchor="center-left",
-            visible=False,
         )
         self._next = 0
         self._shown: int | None = None
@@ -198,7 +187,6 @@ class _Steps:
         elif np.isfinite(self._slowest):
             self._print()  # it never rested: its slowest moment is all there is
         self._shown, self._slowest = None, np.inf
-        self._letter.visible = False
 
     def _put(self, k: int) -> None:
         place, turn = self._rest[0], float(rotation.yaw(self._rest[1]))
@@ -208,6 +196,3 @@ class _Steps:
         if self._scale[k] == 0.0:
             self._scale[k] = 1.0
             self.node.batched_scales = self._scale
-        ahead = self._reach * np.array([np.cos(turn), np.sin(turn)])
-        self._letter.position = (*(place[:2] + ahead).tolist(), 2 * CLEAR_M)
-        self._letter.visible = True

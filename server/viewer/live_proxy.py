@@ -21,7 +21,7 @@ from core.body.kinematics import nominal_body
 from core.body.model import BodyModel
 from core.frames import Floats, Side
 from core.norms import adult_kinematics
-from server.api.context import Db, Id
+from server.api.context import Db, Id, OpenTrail
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -38,10 +38,16 @@ router = APIRouter(include_in_schema=False)
 
 @router.get("/sessions/{sid}/live/figure")
 async def figure(
-    request: Request, db: Db, sid: Id, who: Annotated[Identity, require(Action.RUN_LIVE)], dark: bool = False
+    request: Request,
+    db: Db,
+    trail: OpenTrail,
+    sid: Id,
+    who: Annotated[Identity, require(Action.RUN_LIVE)],
+    dark: bool = False,
 ) -> JSONResponse:
     """Open the live figure of a session."""
     body, norm = await asyncio.to_thread(_person, db, sid)
+    await asyncio.to_thread(trail.watched, who, "live.watched", "session", sid)
     hub: Hub = request.app.state.hub
     views: Views = request.app.state.views
 

@@ -38,7 +38,6 @@ class Motion:
     ----------
     t_s : (m,) s. valid : (m,) False where a sensor was lost: nothing is drawn.
     batches : name → copies of one mesh. root : (m, 2) m, smoothed path on the floor.
-    toes : side → (m, 3) where the letter of that side is written.
     prints, trails : side → where that foot rested, and its way; no trails unless `placed`.
     placed : positions are estimates of where the person was in the room, not only for the eye.
     facing : heading in rad at the first valid frame. ghost : another visit laid over it, None without.
@@ -48,7 +47,6 @@ class Motion:
     valid: Bools
     batches: Mapping[str, Batch]
     root: Single
-    toes: Mapping[Side, Single]
     prints: dict[Side, Prints]
     trails: dict[Side, Trail]
     placed: bool
@@ -114,7 +112,6 @@ def prepare(poses: Poses) -> Motion:
         valid=valid,
         batches=placed.batches,
         root=_smooth(root[:, :2], max(1, round(ROOT_WINDOW_S * rate))).astype(np.float32),
-        toes=placed.toes,
         prints={
             side: prints(t_s, valid, poses.contact[FOOT[side]][keep], path, q[FOOT[side]])
             for side, path in placed.soles.items()

@@ -6,11 +6,12 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Final
 
 import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
-from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.client import ClientConnection, connect, unix_connect
 from websockets.exceptions import ConnectionClosed
 
 ALLOWED: Final = frozenset({"ViewerCameraMessage"})
@@ -27,11 +28,11 @@ def subprotocols_of(ws: WebSocket) -> list[str]:
     return [p for p in ws.scope.get("subprotocols", []) if p.startswith("viser-v")]
 
 
-def upstream(port: int, subprotocols: list[str]) -> connect:
-    """Connection to the viser server on a loopback port; no proxy, compression or size limit between us."""
-    return connect(
-        f"ws://127.0.0.1:{port}",
-        subprotocols=subprotocols,  # type: ignore[arg-type]
+def upstream(socket: Path, subprotocols: list[str]) -> connect:
+    """Connection to the viser server on a socket; no proxy, compression or size limit between us."""
+    return unix_connect(
+        str(socket),
+        subprotocols=subprotocols,
         max_size=None,
         compression=None,
         proxy=None,

@@ -110,7 +110,7 @@ async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
         return
     with view.watched():
         try:
-            up = await upstream(view.port, subprotocols_of(ws))
+            up = await upstream(view.socket, subprotocols_of(ws))
         except (OSError, WebSocketException):
             await _say_gone(ws)
             return
@@ -182,6 +182,11 @@ async def _open(
             return this, _replayable(c, other)
 
     this, before = await asyncio.to_thread(latest)
+    for seen in (this, before):
+        if seen is not None:
+            await asyncio.to_thread(
+                ws.app.state.trail.watched, who, "replay.opened", "session", seen.session.id
+            )
     if this is None:
         raise Problem(404, "no_poses", "There is nothing to replay: no analysis has reached the poses yet.")
 

@@ -1,4 +1,4 @@
-"""The few meshes the figure is made of, each drawn many times: bone, ball, shoe, footprint.
+"""The few meshes the figure is made of, each drawn many times: bone, letter, ball, shoe, footprint.
 
 All are (vertices (n, 3) float32, faces (m, 3) uint32), outward facing, made once at import of the viewer.
 """
@@ -6,6 +6,7 @@ All are (vertices (n, 3) float32, faces (m, 3) uint32), outward facing, made onc
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +16,60 @@ from core.frames import Side
 Mesh = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
 
-def bone(sides: int = 28, tip: float = 0.74, cap: float = 0.09) -> Mesh:
+TIP = 0.74
+"""Radius of a bone at its end, relative to its base."""
+
+_STROKE = 0.16
+_STROKES: dict[Side, list[list[tuple[float, float]]]] = {
+    "left": [[(-0.16, 0.92), (-0.16, 0.08), (0.18, 0.08)]],
+    "right": [
+        [(-0.17, 0.08), (-0.17, 0.92), (0.03, 0.92), (0.13, 0.87), (0.17, 0.7), (0.13, 0.54), (0.03, 0.48)],
+        [(-0.17, 0.48), (0.03, 0.48)],
+        [(0.0, 0.48), (0.17, 0.08)],
+    ],
+}
+"""The letters L and R as lines, 1 high with the stroke, their feet at 0."""
+
+
+def bone(sides: int = 28, tip: float = TIP, cap: float = 0.09) -> Mesh:
     """Rounded cone along +z from 0 to 1: radius 1 at the base, `tip` at the end, caps `cap` long."""
     u = np.linspace(0.0, np.pi / 2, 7)
     base = [(np.sin(a), -cap * np.cos(a)) for a in u]
     end = [(tip * np.cos(a), 1.0 + cap * tip * np.sin(a)) for a in u]
     return _turned(base + end, sides)
+
+
+def letter(
+    side: Side, radius: float, length: float, height: float, turn: float = 0.0, copies: int = 4
+) -> Mesh:
+    """L or R, several times around a bone of this `radius` and `length` m, as it lies on it; feet at its end.
+
+    One of the copies faces whoever looks at the bone, the first one where it is looked at from `turn` rad
+    about its axis, 0 along x.
+    """
+    quads = np.concatenate([_stroke(line) for line in _STROKES[side]]) * height
+    along = 0.5 * (length - height) + height - quads[..., 1]
+    r = radius * (1.0 - (1.0 - TIP) * along / length)
+    vertices = []
+    for k in range(copies):
+        a = turn + 2 * np.pi * k / copies - quads[..., 0] / r
+        vertices.append(np.stack((r * np.cos(a), r * np.sin(a), along), axis=-1).reshape(-1, 3))
+    first = 4 * np.arange(copies * len(quads))[:, None]
+    faces = (first + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
+    return np.concatenate(vertices).astype(np.float32), faces.astype(np.uint32)
+
+
+def _stroke(line: Sequence[tuple[float, float]], step: float = 0.1) -> NDArray[np.float64]:
+    """Quads (n, 4, 2) along a line, counter-clockwise, short enough to be bent around a bone."""
+    quads = []
+    for start, end in pairwise(np.array(line)):
+        way = (end - start) / np.linalg.norm(end - start)
+        across = 0.5 * _STROKE * np.array([way[1], -way[0]])
+        over = 0.5 * _STROKE * way  # square ends close the corners
+        count = max(1, round(float(np.linalg.norm(end - start)) / step)) + 1
+        points = np.linspace(start - over, end + over, count + 1)
+        quads += [np.stack((a + across, b + across, b - across, a - across)) for a, b in pairwise(points)]
+    return np.array(quads)
 
 
 def ball(rings: int = 14, sides: int = 28) -> Mesh:

@@ -1,4 +1,4 @@
-"""The open 3D views: one viser server each, on loopback, stopped when nobody has looked for a while.
+"""The open 3D views: one viser server each, on its own socket, stopped when nobody has looked for a while.
 
 Separate server objects keep patients apart by structure: nothing is ever drawn into a shared scene. A view
 of a replay belongs to the sign-in that opened it; that of a live session is shared by all who may look at it.
@@ -14,17 +14,17 @@ import time
 import weakref
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-import rich
 import viser
-from viser._messages import ShareUrlRequest
 
 from core.errors import EstimationError
 from server.auth.roles import Action, Role, may
 from server.viewer.figure import Figure
 from server.viewer.live import LiveFigure
 from server.viewer.motion import Motion
+from server.viewer.scene_server import socket_of, start_scene_server, stop_scene_server
 
 IDLE_S = 30.0
 """A view without a viewer is stopped after this; a page reload comes back well within it."""
@@ -59,9 +59,9 @@ class View(Generic[Drawn]):
     let_go: Callable[[], None] | None = None
 
     @property
-    def port(self) -> int:
-        """Loopback port of the viser server."""
-        return int(self.server.get_port())
+    def socket(self) -> Path:
+        """Where the viser server listens."""
+        return socket_of(self.server)
 
     @contextlib.contextmanager
     def watched(self) -> Iterator[None]:
@@ -207,14 +207,14 @@ class Views:
         self._views.pop(view.id, None)
         if view.let_go is not None:
             view.let_go()
-        await asyncio.to_thread(view.server.stop)
+        await asyncio.to_thread(stop_scene_server, view.server)
 
 
 def _start(draw: Callable[[viser.ViserServer], Drawn]) -> tuple[viser.ViserServer, Drawn]:
-    """Start a viser server on a free loopback port and draw the figure in it."""
-    # viser prints a banner per server even when told not to be verbose
-    rich.get_console().quiet = True
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    # a client could ask for a public tunnel through a third party; the proxy drops the request, this one too
-    server._websock_server.unregister_handler(ShareUrlRequest)  # noqa: SLF001
-    return server, draw(server)
+    """Start a viser server and draw the figure in it."""
+    server = start_scene_server()
+    try:
+        return server, draw(server)
+    except BaseException:
+        stop_scene_server(server)
+        raise

@@ -1,4 +1,4 @@
-"""One-to-one matching of found and reference events (spec/fusion.md §5.7)."""
+"""One-to-one matching of found and reference events (docs/science/events.md, "Scoring")."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ by 12° or less, the turning ones by 29° or more."""
 @cache
 def table(name: str) -> tuple[list[str], Floats]:
     """Column names and numbers of a file with two header rows."""
-    rows = list(csv.reader(io.StringIO((data_folder("gaitmap_foot") / name).read_text())))
+    rows = list(csv.reader(io.StringIO(data_folder("gaitmap_foot", name).read_text())))
     return [f"{a}/{b}" for a, b in zip(rows[0], rows[1], strict=True)], np.array(rows[2:], np.float64)
 
 
@@ -78,7 +78,7 @@ def recording_of(x: Floats, rate_hz: float) -> Recording:
 @cache
 def reference_strides(side: Side) -> tuple[dict[str, str], ...]:
     """Rows of the stride list of one foot, times in samples."""
-    with (data_folder("gaitmap_foot") / "stride_events_sample.csv").open(newline="") as file:
+    with data_folder("gaitmap_foot", "stride_events_sample.csv").open(newline="") as file:
         return tuple(r for r in csv.DictReader(file) if r["foot"] == side)
 
 

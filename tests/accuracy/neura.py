@@ -21,6 +21,7 @@ from core.body.headings import agreed
 from core.body.tree import PRESETS
 from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording
+from core.events.result import StrideFlag
 from core.frames import FOOT, SIDES, SUFFIX, Floats, Segment, Side
 from core.fusion import estimate
 from core.fusion.orientations import Orientations
@@ -39,6 +40,9 @@ SHIPPED = PoseParams().erkf
 
 TURNING = np.radians(20.0)
 """Turn of the foot from one stance to the next beyond which a stride is a turning one."""
+
+STRAIGHT: frozenset[StrideFlag] = frozenset(("first", "last", "near_turn"))
+"""Flags of whole strides ahead: the product hardly counts them, both sides of a comparison walk them."""
 
 MARKERS: dict[Segment, tuple[str, ...]] = {
     "pelvis": ("LPSI", "RPSI"), "thigh_r": ("RTHI",), "shank_r": ("RTIB",), "foot_r": ("RHEE", "RTOE"),
@@ -147,8 +151,9 @@ def heading_against_vicon_deg(q: Floats) -> Floats:
     """Heading errors (7,) of the sensors relative to the pelvis', degrees, left positive.
 
     The turn about the vertical that lays a sensor's horizontal acceleration upon that of the markers next to
-    it, both below 3 Hz, over the whole walk, lag −2 to +6 samples (spec/real-data.md §3 "Heading"). On the
-    left this reference and the joints contradict each other by 7°, on the right they agree.
+    it, both below 3 Hz, over the whole walk, lag −2 to +6 samples
+    (docs/science/real-recordings.md, "Heading"). On the left this reference and the joints contradict each
+    other by 7°, on the right they agree.
     """
     from scipy.io import loadmat
     from scipy.signal import butter, sosfiltfilt

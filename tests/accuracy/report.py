@@ -1,34 +1,145 @@
-"""docs/accuracy.md: every accuracy test writes its section, the others stay as they are."""
+"""docs/accuracy.md: every accuracy test compares its section with what it has measured, or writes it anew.
+
+`pytest -m accuracy` compares, `pytest -m accuracy --write-figures` writes.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import fcntl
+import os
+import re
+from collections.abc import Callable, Sequence
+from itertools import zip_longest
+from pathlib import Path
+from typing import Final
 
 from tests.data import ROOT
 
-PATH = ROOT / "docs" / "accuracy.md"
-HEAD = """# Accuracy
+PATH: Final = ROOT / "docs" / "accuracy.md"
+WRITE: Final = "SAGITTAL_WRITE_FIGURES"
+"""Set in the environment by `--write-figures`, so that every test process knows."""
+HEAD: Final = """# Accuracy
 
-Written by `tests/accuracy` on real recordings (see `tests/data.py` for where they are). Do not edit: run
-`pytest tests/accuracy`. Each section names its limits; the tests fail beyond them."""
+Measured by `tests/accuracy` on real recordings (`SAGITTAL_DATA`) and on simulated people. Do not edit: run
+`pytest -m accuracy --write-figures`. Each section names its limits; the tests fail beyond them, and when a
+figure is not the one printed here."""
+
+IN_SHORT: Final = "In short"
+"""The first section: one row a figure."""
+FIGURES: Final = (
+    "Flexion of hip / knee / ankle, seven sensors: RMSE °",
+    "The same live",
+    "The same with three sensors (L7S)",
+    "The same with two sensors (L7S)",
+    "Hip flexion / rotation / adduction of Potter's walker: RMS °",
+    "Sagittal score (GPS), left / right °",
+    "Contact (IC) ms",
+    "Foot-off (TC) ms",
+    "Stride time ms",
+    "Stride length mm",
+    "Foot pitch at contact °",
+    "Steps of one lower-back sensor: F1",
+    "Live cue − final value, knee flexion °",
+)
+"""Rows of the first section, in this order."""
+
+_NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?")
 
 
 def record(section: str, header: Sequence[str], rows: Sequence[Sequence[str]], note: str = "") -> None:
-    """Replace one section of docs/accuracy.md by a table and a note."""
-    sections = _sections()
+    """Compare one section of docs/accuracy.md, a table and a note, with what was measured; or replace it.
+
+    Raises
+    ------
+    AssertionError
+        a word differs, or a number by more than one unit of its last printed digit.
+    """
     lines = [_line(header), _line(["---"] * len(header)), *(_line(row) for row in rows)]
-    sections[section] = "\n".join(lines) + (f"\n\n{note}" if note else "")
-    text = "\n\n".join([HEAD, *(f"## {name}\n\n{sections[name]}" for name in sorted(sections))]) + "\n"
-    if not PATH.exists() or PATH.read_text(encoding="utf-8") != text:
-        PATH.write_text(text, encoding="utf-8")
+    text = "\n".join(lines) + (f"\n\n{note}" if note else "")
+    if os.environ.get(WRITE):
+        _replace(section, lambda _: text)
+        return
+    printed = read_sections().get(section)
+    assert printed is not None, f"docs/accuracy.md has no section '{section}': {_HOW}"
+    differences = find_differences(printed, text)
+    assert not differences, f"docs/accuracy.md, '{section}': {_HOW}\n" + "\n".join(differences)
 
 
-def _sections() -> dict[str, str]:
+def record_in_short(figure: str, peer: str, ours: str, on: str) -> None:
+    """Compare one row of the first section of docs/accuracy.md with what was measured; or replace it.
+
+    Parameters
+    ----------
+    figure : one of FIGURES.
+    peer : what a paper or another program has, and which.
+    ours : what was measured here.
+    on : on which recordings.
+    """
+    rows = {row.split(" | ")[0]: row for row in read_sections().get(IN_SHORT, "").splitlines()[2:]}
+    key, row = f"| {figure}", _line((figure, peer, ours, on))
+    if os.environ.get(WRITE):
+        _replace(IN_SHORT, lambda text: _put_row(text, key, row))
+        return
+    assert key in rows, f"docs/accuracy.md does not have '{figure}': {_HOW}"
+    differences = find_differences(rows[key], row)
+    assert not differences, f"docs/accuracy.md, '{figure}': {_HOW}\n" + "\n".join(differences)
+
+
+def _put_row(text: str, key: str, row: str) -> str:
+    rows = {r.split(" | ")[0]: r for r in text.splitlines()[2:]} | {key: row}
+    head = ["figure", "paper or peer", "ours", "on what"]
+    order = [f"| {figure}" for figure in FIGURES]
+    lines = [_line(head), _line(["---"] * len(head)), *(rows[k] for k in order if k in rows)]
+    return "\n".join(lines)
+
+
+_HOW: Final = "run pytest -m accuracy --write-figures and look at what changed"
+
+
+def find_differences(printed: str, measured: str) -> list[str]:
+    """Lines of a section that say something else than what was measured, as `- printed`, `+ measured`.
+
+    Numbers may differ by one unit of their last digit: another processor rounds otherwise.
+    """
+    pairs = zip_longest(printed.strip().splitlines(), measured.strip().splitlines(), fillvalue="")
+    return [line for old, new in pairs if not _agree(old, new) for line in (f"- {old}", f"+ {new}")]
+
+
+def read_sections(path: Path = PATH) -> dict[str, str]:
     """Sections as they stand, title → body."""
-    if not PATH.exists():
+    if not path.exists():
         return {}
-    parts = PATH.read_text(encoding="utf-8").split("\n## ")[1:]
+    parts = path.read_text(encoding="utf-8").split("\n## ")[1:]
     return {title.strip(): body.strip() for title, _, body in (part.partition("\n") for part in parts)}
+
+
+def _replace(section: str, change: Callable[[str], str]) -> None:
+    # several test processes may write at once
+    with (ROOT / "pyproject.toml").open() as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        sections = read_sections()
+        sections[section] = change(sections.get(section, ""))
+        names = sorted(sections, key=lambda name: (name != IN_SHORT, name))
+        whole = "\n\n".join([HEAD, *(f"## {name}\n\n{sections[name]}" for name in names)]) + "\n"
+        if not PATH.exists() or PATH.read_text(encoding="utf-8") != whole:
+            PATH.write_text(whole, encoding="utf-8")
+
+
+def _agree(old: str, new: str) -> bool:
+    if _NUMBER.sub("#", old) != _NUMBER.sub("#", new):
+        return False
+    return all(
+        abs(_value(a) - _value(b)) <= 1.001 * max(_unit(a), _unit(b))
+        for a, b in zip(_NUMBER.findall(old), _NUMBER.findall(new), strict=True)
+    )
+
+
+def _value(number: str) -> float:
+    return float(number.replace("−", "-"))
+
+
+def _unit(number: str) -> float:
+    return 10.0 ** -len(number.partition(".")[2])
 
 
 def _line(cells: Sequence[str]) -> str:

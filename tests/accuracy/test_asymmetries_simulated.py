@@ -35,9 +35,9 @@ LIMITS: Final = {
     "step_width_m": 0.02,
 }
 """Largest error of left − right. Our choice, from what a foot's place (1 cm) and an angle (1°) are known to.
-A contact may be 25 ms off (spec/fusion.md §5.4), and where one foot lands gently it is so on that foot alone:
-one step gains and the other loses it. Shares that end at foot-off have as much again, as the feet leave the
-floor in different ways."""
+A contact may be 25 ms off (docs/science/events.md, "Limits on real walks"), and where one foot lands gently
+it is so on that foot alone: one step gains and the other loses it. Shares that end at foot-off have as much
+again, as the feet leave the floor in different ways."""
 
 SHOWN: Final = (
     "step_time_s", "step_length_m", "swing_pct", "push_pct", "knee_flexion_max_swing_deg",

@@ -35,10 +35,10 @@ SEEDS = (2, 3, 4)
 PLAIN = ErkfParams(
     states=9, acc_sd=0.05, gyr_sd=0.01, gyr_sd_of={}, impact=0.0, joint_axis_sd=0.05
 )  # fmt: skip
-"""What the ablations start from (spec/estimators.md §5): white noise alone."""
+"""What the ablations start from: white noise alone."""
 
 LIMITS = {"hip": (0.3, 0.4, 0.8), "knee": (0.3, 0.3, 0.5), "ankle": (0.3, 0.3, 0.5)}
-"""Flexion, adduction, rotation in degrees (§6.3)."""
+"""Flexion, adduction, rotation in degrees (docs/science/erkf.md, "Limits on simulated walks")."""
 
 SPEC = (
     ".11 .13 .36, .13 .14 .24, .08 .10 .15, .39, +.4 / 1.3, 2.5, -11.8",
@@ -61,7 +61,7 @@ def minute(seed: int) -> Take:
 
 @cache
 def on_skin() -> Take:
-    """Soft tissue of 3° and 10 mm, and a shank that turns by 8° as the knee bends (§5, realism)."""
+    """Soft tissue of 3° and 10 mm, and a shank that turns by 8° as the knee bends."""
     walker = Walker(tibial_rotation_rad=radians(8.0))
     return take_of(simulate(SHORT, walker, seed=2, setup=Setup(tissue=SoftTissue())))
 
@@ -108,7 +108,7 @@ def misaligned(tree: ImuTree) -> ImuTree:
 
 
 def test_every_correction_holds_what_the_paper_gave_it_for() -> None:
-    """Direction and size as in spec/estimators.md §5, where another walker was used."""
+    """Direction and size as in docs/science/erkf.md, "Departures from the paper"."""
     take = four_minutes()
 
     def varied(**changed: object) -> Score:
@@ -140,7 +140,7 @@ def test_every_correction_holds_what_the_paper_gave_it_for() -> None:
         "mounts and places. 9 states, σ_a 0.05 m/s², σ_ω 0.01 rad/s, σ_JA 0.05 rad, no impact rule unless "
         "said. Without joint centres the relative headings drift, without zero velocity the positions do; "
         "tilt changes nothing, the joint axis little where the knee is a hinge; Euler's rule costs flexion "
-        "at 100 Hz. ZARU is no loss here, against spec/estimators.md §3.6. The impact rule, which real shoes "
+        "at 100 Hz. ZARU is no loss here, as it was on another walker. The impact rule, which real shoes "
         "need, costs heading and gains strides.",
     )
     whole = found["all"]
@@ -170,8 +170,8 @@ def test_every_correction_holds_what_the_paper_gave_it_for() -> None:
 
 
 def test_live_offline_and_smoothed_keep_the_limits_of_the_specification() -> None:
-    """§6.3 and §6.6. The filter alone may have 0.3° of rotation more: the impact rule lets less be learned of
-    heading, which the smoother makes up for."""
+    """docs/science/erkf.md, "Limits on simulated walks". The filter alone may have 0.3° of rotation more: the
+    impact rule lets less be learned of heading, which the smoother makes up for."""
     takes = [minute(seed) for seed in SEEDS]
     bare = replace(OFFLINE, gyr_sd_of={})
     found = {
@@ -187,12 +187,12 @@ def test_live_offline_and_smoothed_keep_the_limits_of_the_specification() -> Non
         ["run", *HEADER],
         [
             *([name, *s.row()] for name, s in found.items()),
-            ["spec/estimators.md §6.6, filter, 310 s", *SPEC[0].split(", "), ""],
+            ["prototype, another walker, filter, 310 s", *SPEC[0].split(", "), ""],
             ["the same smoothed", *SPEC[1].split(", "), ""],
         ],
         "The shipped sets, the offline one without its allowance for soft tissue at the thighs, which these "
-        "sensors do not need. Largest of three walks of about 80 s, and one of four minutes. The figures of "
-        "the specification are of another walker, of true first positions, and without the impact rule.",
+        "sensors do not need. Largest of three walks of about 80 s, and one of four minutes. The "
+        "prototype's figures are of another walker, of true first positions, and without the impact rule.",
     )  # fmt: skip
     for name, s in found.items():
         if name.startswith("live"):
@@ -217,7 +217,7 @@ def test_live_offline_and_smoothed_keep_the_limits_of_the_specification() -> Non
 
 
 def test_calibration_is_the_accuracy_budget_not_the_filter() -> None:
-    """§0.6: 2° of mounting and 1 cm of joint centre cost ten times what the filter leaves. §0.4: the hinge
+    """2° of mounting and 1 cm of joint centre cost ten times what the filter leaves. The hinge
     axis hurts where the knee is none."""
     take, skin = minute(2), on_skin()
     wrong = misaligned(skin.tree)

@@ -1,6 +1,7 @@
 """The constrained estimators on neura_walk, from the sensors alone, scored as test_neura_walk.py does.
 
-Nothing was fitted here; the presets are those of spec/real-data.md §2.9, which were found on this recording.
+Nothing was fitted here; the presets are those of docs/science/erkf.md, "Parameters", which were found on this
+recording.
 """
 
 from __future__ import annotations
@@ -18,13 +19,14 @@ from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.pipeline import analyse
 from tests.accuracy.neura import BODY, HEIGHT_M, SHIPPED, angles_deg, healthy, stride_errors_m, take
-from tests.accuracy.report import record
+from tests.accuracy.report import record, record_in_short
 from tests.accuracy.test_neura_walk import scores
 from tests.walks import neura_recording
 
 FLEXION = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 
-# spec/real-data.md §7, right and left: offset removed (the ambitious ones for flexion), standing zeroed, r
+# docs/science/real-recordings.md, "Limits", right and left: offset removed (the ambitious ones for flexion),
+# standing zeroed, r
 OFFSET_REMOVED = {
     "hip_flexion": (2.3, 3.3), "knee_flexion": (2.8, 4.5), "ankle_dorsiflexion": (2.2, 2.5),
     "hip_adduction": (4.5, 3.6), "knee_adduction": (2.4, 4.4), "ankle_inversion": (5.3, 5.2),
@@ -76,7 +78,14 @@ def test_the_erkf_with_smoother_is_within_the_limits() -> None:
         f"strides against Vicon: {_told(strides)}; limit 2.5 ± 1.5 cm. From each foot's sensor alone: "
         f"{_told({s: lone_strides_cm(s) for s in SIDES})}; limit 2 ± 1 cm. Joint-centre residual "
         f"{residual.min():.0f} to {residual.max():.0f} mm, {int(made.run.track.refused.sum())} zero "
-        "velocities refused. The noise figures were found on this recording (spec/real-data.md §2.9).",
+        "velocities refused. The noise figures were found on this recording (docs/science/erkf.md).",
+    )
+    means = [np.mean([found[f"{name}_{end}"].offset_removed for end in "rl"]) for name in FLEXION]
+    record_in_short(
+        "Flexion of hip / knee / ankle, seven sensors: RMSE °",
+        "below 5 is called acceptable (McGinley 2009)",
+        " / ".join(f"{x:.1f}" for x in means),
+        "neura_walk, 1 person, offset removed, mean of both sides; noise figures were found on it",
     )
     for limits, value in ((OFFSET_REMOVED, "offset_removed"), (ZEROED, "zeroed")):
         for name, pair_of_limits in limits.items():
@@ -152,6 +161,13 @@ def test_l7s_from_three_and_two_sensors_is_within_the_limits() -> None:
         "Mean of both sides, offset removed, whole walk with its turn; the paper's figures are of nine "
         "people, per step of straight walking. A sparse mode: do not take stride lengths from it.",
     )
+    for worn, number, paper in (("3I", "three", "5.0 / 8.2 / 5.9"), ("2I", "two", "6.9 / 9.5 / 7.5")):
+        record_in_short(
+            f"The same with {number} sensors (L7S)",
+            f"{paper} (Sy 2021 Table V, 9 people)",
+            " / ".join(f"{rmse:.1f}" for rmse, _ in kept[worn]),
+            "neura_walk, 1 person, whole walk with its turn",
+        )
     for mode, (rmse_limits, r_limits) in L7S_LIMIT.items():
         for (rmse, r), rmse_limit, r_limit in zip(kept[mode], rmse_limits, r_limits, strict=True):
             assert rmse <= rmse_limit, mode

@@ -4,7 +4,7 @@ A sensor's start is turned about the vertical together with its forward axis, as
 would turn it. What then moves in the result is measured twice: where the sensors head relative to the
 pelvis', and how far the segments' forward axes come out from each other. Which way all of them together face
 no joint can tell (core/body/headings.py takes the median), so a turn they share is left out. Limits:
-spec/real-data.md §7.
+docs/science/real-recordings.md, "Limits".
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 The start is then tilt and heading from an orientation filter that ran back from the rest, velocity unknown,
 gyroscope biases of the rest. Scored on the same rows of the walk as the uncut take, limits of
-spec/real-data.md §7 for flexion and strides; a shorter rest and fewer steps also calibrate a little
-differently.
+docs/science/real-recordings.md, "Limits", for flexion and strides; a shorter rest and fewer steps also
+calibrate a little differently.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from tests.walks import cut, neura_walk
 CUTS_S = (11.6, 12.0, 12.5, 13.0)
 ROWS = slice(1350, 2080)
 LIMIT = {"hip_flexion": (2.8, 3.7), "knee_flexion": (3.3, 4.8), "ankle_dorsiflexion": (2.7, 2.7)}
-"""Offset removed, right and left (spec/real-data.md §7)."""
+"""Offset removed, right and left (docs/science/real-recordings.md, "Limits")."""
 
 LAG = 1
 """Samples IMU behind Vicon, of the uncut take."""

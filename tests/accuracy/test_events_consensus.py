@@ -69,7 +69,7 @@ def scores(name: str, detector: str, kind: EventKind) -> list[Score]:
 
 
 def test_zero_crossing_and_negative_peak_of_the_foot_are_where_the_specification_measured_them() -> None:
-    """spec/fusion.md §5.5: zero crossing −1±5 / +4±6 ms, negative peak +45 / +43 ms, minimum −8 / −4 ms."""
+    """docs/science/events.md: zero crossing −1±5, +4±6 ms, negative peak +45, +43 ms, minimum −8, −4 ms."""
     for zero, peak, leaving in zip(
         scores("gaitmap_foot", "mariani", "ic"),
         scores("gaitmap_foot", "perez_ibarra", "ic"),

@@ -1,7 +1,8 @@
 """Steps of one lower-back sensor against INDIP on mobgap_lowback, and against the feet on neura_walk.
 
-Nothing was fitted on these recordings: the scale of the Gaussian is the one written in the specification for
-Test5, the least prominence lies on a plateau (0.15 to 0.4 m/s² give the same F1).
+Nothing was fitted on these recordings: the scale of the Gaussian is 64 ms at the step time of Test5
+(docs/science/trunk-steps.md, "Parameters"), the least prominence lies on a plateau (0.15 to 0.4 m/s² give the
+same F1).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from core.events.steps import Steps
 from core.frames import SIDES, Floats
 from tests.accuracy.event_scoring import Score, match
 from tests.accuracy.mobgap import TRIALS, Period, periods, uniform
-from tests.accuracy.report import record
+from tests.accuracy.report import record, record_in_short
 from tests.accuracy.test_events_neura import heel_stops
 from tests.walks import neura_walk, only
 
@@ -139,6 +140,12 @@ def test_write_down_the_figures() -> None:
                 f"{len(sides) - sides.count(None)}",
             )
         )
+    record_in_short(
+        "Steps of one lower-back sensor: F1",
+        "–",
+        " / ".join(row[1] for row in rows),
+        "mobgap_lowback, 1 person: two short walks, daily life",
+    )
     record(
         "Steps of one lower-back sensor on mobgap_lowback",
         ("take", "F1", "steps/INDIP", "cadence/INDIP", "mean ms", "sd ms", "steps elsewhere", "foot told"),

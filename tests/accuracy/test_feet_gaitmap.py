@@ -21,7 +21,7 @@ from core.parameters.stance import FLAT_RAD, NAMES, stances
 from core.pipeline import analyse
 from core.shoe import Shoe
 from tests.accuracy.gaitmap import COPIES, MARKERS, MOCAP_RATE, RATE, recording_of, signals, table
-from tests.accuracy.report import record
+from tests.accuracy.report import record, record_in_short
 
 
 @cache
@@ -123,7 +123,7 @@ def lift_pct(side: Side, t: Floats, s: Stride) -> tuple[float, float]:
 
 
 def test_pitch_at_contact_and_foot_off_is_that_of_the_markers() -> None:
-    rows = []
+    rows, at_contact = [], []
     for side in SIDES:
         t, pitch = marker_pitch(side)
         for name, times in (
@@ -135,6 +135,14 @@ def test_pitch_at_contact_and_foot_off_is_that_of_the_markers() -> None:
             rows.append([side, name, str(len(ours)), f"{ours.mean():.1f}", spread(error, ".1f")])
             assert abs(error.mean()) < 3.0
             assert error.std() < 2.0
+            if name == "foot_pitch_ic_deg":
+                at_contact.append(f"{side} {spread(error, '.1f')}")
+    record_in_short(
+        "Foot pitch at contact °",
+        "–",
+        ", ".join(at_contact),
+        "gaitmap_foot, 1 person, against the markers of the shoe",
+    )
     record(
         "Pitch of the foot on gaitmap_foot",
         ["foot", "parameter", "strides", "degrees", "− markers"],

@@ -28,7 +28,8 @@ HEIGHT_M: Final = 1.7
 
 NEAR: Final = {"deg": 3.0, "": 0.08}
 """A value this near to its limit may fall on either side of it: the errors the values themselves are held to.
-Degrees: joint angles (spec/real-data.md §7); ratios: contacts to 25 ms of a swing (spec/fusion.md §5.4)."""
+Degrees: joint angles (docs/science/real-recordings.md, "Limits"); ratios: contacts to 25 ms of a swing
+(docs/science/events.md, "Limits on real walks")."""
 
 SCORE_DEG: Final = 0.8
 """Largest error of gps_sagittal of a side; ours, reached (0.5) + half."""

@@ -25,7 +25,7 @@ COPIES = ("imu_sample.csv", "imu_sample_not_rotated.csv")
 @cache
 def taken(copy: str, method: Method) -> tuple[Calibration, dict[str, Floats]]:
     """Calibration, and sine of the foot pitch (n,) of both feet."""
-    path = data_folder("gaitmap_foot") / copy
+    path = data_folder("gaitmap_foot", copy)
     columns = {
         segment: {kind: [f"{sensor}/{kind}_{axis}" for axis in "xyz"] for kind in ("acc", "gyr")}
         for segment, sensor in (("foot_l", "left_sensor"), ("foot_r", "right_sensor"))
@@ -59,7 +59,7 @@ def test_rest_at_the_end_is_used_and_forward_is_the_toe() -> None:
 
 
 def test_a_real_foot_has_the_shares_of_the_spec() -> None:
-    """ρ 0.886 and 0.915 over all straight walking (spec/fusion.md §2, oracles)."""
+    """ρ 0.886 and 0.915 over all straight walking (docs/science/calibration.md, "Parameters")."""
     calibration, _ = taken(COPIES[0], "gyro_pca")
     assert calibration.segments["foot_l"].score == pytest.approx(0.886, abs=0.03)
     assert calibration.segments["foot_r"].score == pytest.approx(0.915, abs=0.03)

@@ -119,6 +119,6 @@ def test_write_down_the_figures() -> None:
         ["run", *(f"eq 6 {a}: hip / knee / ankle flexion RMSE °" for a in get_args(Adjoint))],
         rows,
         "L7S-3I on one simulated walk there and back of 30 s, one change at a time, offset removed. The "
-        "reasons are in core/body/l7s_filter.py. On the simulator of spec/estimators.md §5 the sign in eq 18 "
+        "reasons are in core/body/l7s_filter.py. On the prototype's simulator the sign in eq 18 "
         "cost more (16 / 16 / 13), the height's variance too (34 / 18 / 31), that in eq 32 about the same.",
     )

@@ -16,7 +16,7 @@ from core.measure import Measured
 from core.online import LiveFrame
 from core.pipeline import analyse
 from core.simulate import simulate_scenario
-from tests.accuracy.report import record
+from tests.accuracy.report import record, record_in_short
 from tests.live_walks import live
 from tests.walks import simulated
 
@@ -92,6 +92,13 @@ def test_what_was_told_is_written_down_beside_what_was_found() -> None:
         told = found.live_difference
         numbers = f"{told.mean:+.3f} ± {told.sd:.3f}"
         rows.append((parameter, str(len(cues)), str(found.unmatched), str(found.left_out), numbers))
+    told = matched("knee_flexion_max_swing_deg")[1].live_difference
+    record_in_short(
+        "Live cue − final value, knee flexion °",
+        "–",
+        f"{told.mean:+.3f} ± {told.sd:.3f}",
+        f"simulated, {WHO}",
+    )
     record(
         "Live feedback",
         ("parameter", "cues", "no stride found", "stride does not count", "told minus final"),

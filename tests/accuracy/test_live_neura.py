@@ -1,7 +1,8 @@
 """The live chain on neura_walk: what a tablet would have shown, sample by sample, against Vicon and offline.
 
 The chain knows nothing that comes later, except that its calibration looks back at the walk so far. Limits
-are those of spec/real-data.md §7 for any pipeline; what the live set of that section reached is beside them.
+are those of docs/science/real-recordings.md, "Limits", for any pipeline; what a live set reached is beside
+them.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from core.online.erkf import live_params
 from core.online.still import Stillness
 from tests.accuracy.gaitmap import RATE
 from tests.accuracy.neura import stride_errors_m, take
-from tests.accuracy.report import record
+from tests.accuracy.report import record, record_in_short
 from tests.accuracy.test_gaitmap_strides import BODY, errors
 from tests.accuracy.test_gaitmap_strides import take as gaitmap_take
 from tests.accuracy.test_neura_walk import PLANES, Score, scores
@@ -137,6 +138,13 @@ def test_write_down_the_figures() -> None:
         f"(centred {gaitmap_mm(s, False).mean():+.0f} ± {gaitmap_mm(s, False).std():.0f})"
         for s in SIDES
     )
+    means = [np.mean([scored()[f"{name}_{end}"].offset_removed for end in "rl"]) for name in PLANES[0]]
+    record_in_short(
+        "The same live",
+        "–",
+        " / ".join(f"{x:.1f}" for x in means),
+        "neura_walk, 1 person, nothing smoothed",
+    )
     record(
         "Live on neura_walk",
         [
@@ -145,7 +153,7 @@ def test_write_down_the_figures() -> None:
             "offset removed °",
             "r",
             "limits",
-            "prototype of the spec",
+            "prototype",
         ],
         rows,
         f"Seven sensors, batches of ten samples; calibrated while walking ({began:.1f} s), then caught up. "

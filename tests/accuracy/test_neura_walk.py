@@ -1,9 +1,10 @@
 """Joint angles on neura_walk, from the sensor files alone, against frames of Vicon joint centres.
 
-Nothing from Vicon enters the estimate. Scoring as in spec/real-data.md §7: rows 1110 to 2080, one lag of −2
-to +6 samples for all joints, standing is rows 300 to 1000. "offset removed" is the standard deviation of the
-error, "standing zeroed" has the standing means of both sides subtracted. Frontal and transverse planes rest
-on single markers in the reference and are reported without a limit, except that hip adduction must follow.
+Nothing from Vicon enters the estimate. Scoring as in docs/science/real-recordings.md, "Limits": rows 1110 to
+2080, one lag of −2 to +6 samples for all joints, standing is rows 300 to 1000. "offset removed" is the
+standard deviation of the error, "standing zeroed" has the standing means of both sides subtracted. Frontal
+and transverse planes rest on single markers in the reference and are reported without a limit, except that
+hip adduction must follow.
 """
 
 from __future__ import annotations
@@ -120,7 +121,8 @@ def test_flexion_agrees_with_vicon_within_the_limits_on_both_sides() -> None:
 
 
 def test_adduction_shows_that_headings_are_right() -> None:
-    """Flexion is blind to axial mounting errors; adduction is not (real-data.md §0.6, limits §7 + 20 %)."""
+    """Flexion is blind to axial mounting errors; adduction is not
+    (docs/science/real-recordings.md, "Findings"; "Limits" + 20 %)."""
     _, found = scores(estimated())
     assert found["hip_adduction_r"].offset_removed <= 5.4
     assert found["hip_adduction_l"].offset_removed <= 4.3
@@ -169,7 +171,8 @@ def test_gyro_pca_is_a_working_alternative() -> None:
     "segment", ["pelvis", "thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r"]
 )
 def test_velocity_and_acceleration_find_the_same_walking_direction(segment: str) -> None:
-    """Two independent measures within the 15° beyond which a notice is due (real-data.md §3)."""
+    """Two independent measures within the 15° beyond which a notice is due
+    (docs/science/real-recordings.md, "Heading")."""
     facts = calibrate(neura_walk()).calibration.diagnostics[segment]
     assert isinstance(facts, dict)
     assert facts["source"] == "velocity"

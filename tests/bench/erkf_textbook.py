@@ -56,7 +56,7 @@ class Textbook:
         self.inject(d)
 
     def predict(self, k: int) -> None:
-        """Eq 8 to 14, with both ends of the step and the exact derivative."""
+        """Eq 8 to 15, with both ends of the step and the exact derivative."""
         dt, p, n = self.inputs.step_s[k], self.params, len(self.x)
         F, Q = [], []
         for i in range(n):
@@ -94,7 +94,7 @@ class Textbook:
         return slice(i * self.m + offset, i * self.m + offset + 3)
 
     def rows(self, k: int) -> list[tuple[Floats, Floats, float]]:
-        """H (r, N), residual (r,) and variance of every measurement of sample k (eq 15 to 26)."""
+        """H (r, N), residual (r,) and variance of every measurement of sample k (eq 28 to 35)."""
         p, N = self.params, len(self.P)
         R = to_matrix(self.x[:, 6:10])
         taken = [self.accepts(k, i) for i in range(len(self.x))]
@@ -137,7 +137,8 @@ class Textbook:
         return float(min(0.5 * (apart @ self.P @ apart) ** 2, 1.5) * levers @ levers)
 
     def accepts(self, k: int, i: int) -> bool:
-        """The gate on a zero velocity, and its rule of re-acceptance (spec/estimators.md §3.3)."""
+        """The gate on a zero velocity, and its rule of re-acceptance
+        (docs/science/erkf.md, "Zero velocity")."""
         if not self.inputs.contact[k, i]:
             self.refused[i] = 0
             return False

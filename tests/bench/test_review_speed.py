@@ -1,23 +1,32 @@
-"""How soon everything has followed an edit, on ten minutes of walking at 100 Hz."""
+"""How little it costs that everything follows an edit, on ten minutes of walking at 100 Hz.
+
+CPU time in pairs with a yardstick, never the clock on the wall: what else the machine does would decide, and
+where the program was new it did, because other tests' servers were compiling their filters.
+"""
 
 from __future__ import annotations
 
+import functools
 import statistics
 import sys
 import time
 from collections.abc import AsyncIterator
+from itertools import pairwise
+from typing import Any
 
-import httpx
 import pytest
 
 from core.edits import Edit
-from core.measure import measure
+from core.measure import Tracks, measure
+from server.pages import FRAGMENT
 from server.services import patients, sessions
+from tests.bench.pairs import cpu_s, in_pairs, plain_python
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic, open_clinic
 
 TAKE_S = 600.0
 LEAST_S = 590.0
+EDITS = 9
 
 
 @pytest.fixture(scope="module")
@@ -31,57 +40,66 @@ async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -
         yield running
 
 
+def moves() -> list[tuple[float, float]]:
+    """One contact moved by a millisecond again and again: where it lies, and where to."""
+    contact = walk.events(TAKE_S).times("left", "ic")[100]
+    places = [contact + 0.001 * i for i in range(EDITS + 1)]
+    return list(pairwise(places))
+
+
+def measure_with(tracks: Tracks, at: float, to: float) -> None:
+    """Measure the whole take with one contact moved."""
+    found = measure(tracks, [Edit("move_event", "left", at, "ic", to)])
+    assert len(found.strides.strides) > 1000
+
+
 @pytest.mark.bench
-def test_ten_minutes_are_measured_again_within_150_ms() -> None:
-    tracks = walk.tracks(TAKE_S)
-    contact = tracks.events.times("left", "ic")[100]
-    took = []
-    for i in range(9):
-        edit = Edit("move_event", "left", contact, "ic", contact + 0.001 * (i + 1))
-        began = time.process_time()
-        measured = measure(tracks, [edit])
-        took.append(time.process_time() - began)
-    assert len(measured.strides.strides) > 1000
-    sys.stdout.write(f"measure: median {1000 * statistics.median(took):.0f} ms of {len(took)}\n")
-    assert statistics.median(took) <= 0.150
+def test_ten_minutes_are_measured_again_for_eight_pieces_of_plain_python() -> None:
+    tracks, steps = walk.tracks(TAKE_S), moves()
+    contact, left = steps[0][0], iter(steps)
+    took, _, ratio = in_pairs(lambda: measure_with(tracks, contact, next(left)[1]), plain_python, EDITS)
+    sys.stdout.write(f"\nmeasure: {1000 * took:.0f} ms of CPU, {ratio:.1f} pieces of plain Python\n")
+    assert ratio <= 8.0
 
 
 @pytest.mark.bench
 @pytest.mark.anyio
-async def test_an_edit_is_answered_with_all_numbers_within_200_ms(clinic: Clinic) -> None:
+async def test_an_edit_and_all_its_numbers_cost_little_more_than_measuring_once(clinic: Clinic) -> None:
     with clinic.db.write() as c:
         patient = patients.create(c, None, code="P-1", height_m=1.75).id
         session = sessions.create(c, None, patient).id
     analysed.finish(clinic, patient, session, analysed.files(TAKE_S))
-    contact = walk.events(TAKE_S).times("left", "ic")[100]
     path = f"/api/v1/sessions/{session}"
     async with clinic.client("clinician", timeout=60) as client:
 
-        async def timed(method: str, address: str, **more: object) -> tuple[float, httpx.Response]:
-            began = time.perf_counter()
-            answer = await client.request(method, address, **more)  # type: ignore[arg-type]
+        async def spent(method: str, address: str, **more: Any) -> float:
+            began = time.process_time()
+            answer = await client.request(method, address, **more)
             assert answer.is_success, answer.text
-            return 1000 * (time.perf_counter() - began), answer
+            return time.process_time() - began
 
-        opened, page = await timed("GET", f"/sessions/{session}/timeline")
-        first, review = await timed("GET", f"{path}/edits")
-        edits, numbers, reports = [], [], []
-        at = contact
-        for i in range(9):
-            to = contact + 0.001 * (i + 1)
+        opened = await client.get(f"/sessions/{session}/timeline")
+        review = await client.get(f"{path}/edits")
+        assert opened.is_success
+        tracks, steps, rows = walk.tracks(TAKE_S), moves(), []
+        for at, to in steps:
             body = {"kind": "move_event", "side": "left", "event": "ic", "time_s": at, "to_s": to}
-            edits.append((await timed("POST", f"{path}/edits", json=body))[0])
-            numbers.append((await timed("GET", f"/sessions/{session}/timeline/numbers"))[0])
-            reports.append((await timed("GET", f"{path}/report"))[0])
-            at = to
-        undone, _ = await timed("DELETE", f"{path}/edits")
+            once = cpu_s(functools.partial(measure_with, tracks, steps[0][0], to))
+            edit = await spent("POST", f"{path}/edits", json=body)
+            numbers = await spent(
+                "GET", f"/sessions/{session}/timeline/numbers", headers={FRAGMENT: "numbers"}
+            )
+            report = await spent("GET", f"{path}/report")
+            rows.append((once, edit, numbers, report))
+        undone = await client.request("DELETE", f"{path}/edits")
+        assert undone.is_success
+    once, edit, numbers, report = (1000 * statistics.median(column) for column in zip(*rows, strict=True))
+    ratio = statistics.median((r[1] + r[2]) / r[0] for r in rows)
     sys.stdout.write(
-        f"page {opened:.0f} ms ({len(page.content)} bytes), review {first:.0f} ms "
-        f"({len(review.content)} bytes), edit {statistics.median(edits):.0f} ms, numbers "
-        f"{statistics.median(numbers):.0f} ms, report {statistics.median(reports):.0f} ms, undo "
-        f"{undone:.0f} ms\n"
+        f"\nCPU: measuring {once:.0f} ms, edit {edit:.0f} ms, numbers {numbers:.0f} ms, report {report:.0f} "
+        f"ms; edit and numbers {ratio:.2f} times measuring; page {len(opened.content)} bytes, review "
+        f"{len(review.content)} bytes\n"
     )
     assert review.json()["events"][-1]["time_s"] > LEAST_S
-    assert statistics.median(edits) <= 200.0
     assert len(review.content) <= 1_500_000
-    assert statistics.median(numbers) + statistics.median(edits) <= 1000.0
+    assert ratio <= 2.5

@@ -32,7 +32,7 @@ FLAGS = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-backgrou
          "--disable-component-update", "--disable-sync"]  # fmt: skip
 FLAT = [*FLAGS, "--disable-gpu"]
 SOLID = [*FLAGS, "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-"""Without 3D (fast 2D) and with software WebGL (viewer.md §8)."""
+"""Without 3D (fast 2D) and with software WebGL, which slows flat pages down to a few frames a second."""
 
 
 @dataclass(frozen=True)

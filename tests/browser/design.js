@@ -21,6 +21,10 @@
     const r = g.getBoundingClientRect();
     if (r.width && Math.min(r.width, r.height) < 43.5) small.push(`${g.getAttribute('aria-label')} ${Math.round(r.width)}x${Math.round(r.height)}`);
   }
+  // what a screen reader takes as one picture or one button must hold nothing to operate (axe: nested-interactive)
+  const nested = [];
+  for (const e of document.querySelectorAll('[role=img], button, a[href], [role=button]'))
+    if (e.querySelector('a[href], button, input, select, textarea, [tabindex]:not([tabindex="-1"])')) nested.push(`${e.tagName}.${e.getAttribute('class')}`);
   const scrolls = (e) => { for (let b = e; b; b = b.parentElement) if (['auto', 'scroll'].includes(getComputedStyle(b).overflowX)) return true; return false; };
   for (const e of document.querySelectorAll('main *')) {
     if (e.closest('svg, .tabs')) continue;
@@ -29,7 +33,7 @@
   }
   for (const e of document.querySelectorAll('.card'))
     if (e.scrollWidth > e.clientWidth + 1 && !scrolls(e)) clip.push((e.querySelector('h2') || {}).textContent || e.className);
-  return { sideways: Math.max(0, document.documentElement.scrollWidth - innerWidth), small, over, clip };
+  return { sideways: Math.max(0, document.documentElement.scrollWidth - innerWidth), small, over, clip, nested };
 },
   // Text under WCAG AA contrast (4.5:1, 3:1 from 24 px) or under 11 px.
   text: () => {

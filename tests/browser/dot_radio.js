@@ -2,7 +2,7 @@
 (() => {
   const uuid = (short) => `1517${short.toString(16)}-4947-11e9-8646-d663bd873d93`;
   const view = (bytes) => new DataView(Uint8Array.from(bytes).buffer);
-  // acceleration 0.1, −0.2, 9.8 m/s² and 1, 2, −3 °/s, after the clock: the vector of the specification's folder
+  // acceleration 0.1, −0.2, 9.8 m/s² and 1, 2, −3 °/s, after the clock, little endian
   const RATE = [0xcd, 0xcc, 0xcc, 0x3d, 0xcd, 0xcc, 0x4c, 0xbe, 0xcd, 0xcc, 0x1c, 0x41, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x40, 0, 0, 0x40, 0xc0];
 
   class Characteristic extends EventTarget {

@@ -105,8 +105,8 @@ def state(name: str = "streaming", tablet: str = "connected", **more: Any) -> st
     """Where the take stands."""
     return json.dumps(
         {"type": "state", "take": TAKE, "state": name, "tablet": tablet, "source": "dot", "count": 900,
-         "elapsed_s": 252, "marks": [], "ghost": None, "stale": False, "estimate": "ok", "recording": None,
-         "problem": None} | more
+         "elapsed_s": 252, "sensors": [], "marks": [], "ghost": None, "stale": False, "stopping": False,
+         "estimate": "ok", "recording": None, "problem": None} | more
     )  # fmt: skip
 
 

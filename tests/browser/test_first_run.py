@@ -7,12 +7,14 @@ import time
 from pathlib import Path
 
 import httpx
+import pytest
 from playwright.sync_api import Browser, expect
 
 from tests.browser.conftest import PASSWORD, serve
 from tests.browser.design import layout_faults, text_faults
 
 
+@pytest.mark.first
 def test_the_printed_address_makes_the_first_administrator_once(flat: Browser, tmp_path: Path) -> None:
     with serve(tmp_path) as server:
         address = _printed(tmp_path / "server.log")

@@ -8,7 +8,7 @@ from typing import Any
 
 import httpx
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.browser import feed, filling
 from tests.browser.conftest import RunningServer, is_ours
@@ -116,7 +116,7 @@ def test_the_strip_draws_zones_as_shapes_and_a_table_says_the_same(
     expect(rows.nth(1)).to_contain_text("no, faded out")
 
 
-def test_the_current_stride_grows_over_the_norm_and_follows_the_joint(
+def test_the_current_stride_grows_without_a_norm_of_another_zero_and_follows_the_joint(
     told: Opener, trained: tuple[str, str, str]
 ) -> None:
     this = told(f"/sessions/{trained[0]}/live")
@@ -127,29 +127,35 @@ def test_the_current_stride_grows_over_the_norm_and_follows_the_joint(
         this.say(feed.frame(112.02 + 0.03 * i))
         drawn.append(page.evaluate(PIXELS, ["stride-chart", "left"]))
     assert drawn[-1] > drawn[0]
-    assert page.evaluate(PIXELS, ["stride-chart", "norm"]) > 1000
+    assert page.evaluate(PIXELS, ["stride-chart", "norm"]) < 100, "what starts from standing has no band"
     drawing = "() => document.querySelector('stride-chart canvas').toDataURL()"
     before = page.evaluate(drawing)
     page.get_by_role("button", name="Hip").click()
     page.wait_for_timeout(150)
     assert page.evaluate(drawing) != before
-    expect(page.locator("[data-variable]")).to_have_text("Hip flexion")
+    expect(page.locator("[data-variable]")).to_have_text("Hip flexion, from standing")
 
 
 def test_charts_follow_the_theme(told: Opener, trained: tuple[str, str, str]) -> None:
     page = _therapist(told, trained[0])
-    light = page.evaluate(PIXELS, ["stride-chart", "norm"])
+    light = page.evaluate(PIXELS, ["stride-chart", "left"])
     page.emulate_media(color_scheme="dark")
     page.wait_for_timeout(150)
-    assert light > 1000
-    assert page.evaluate(PIXELS, ["stride-chart", "norm"]) > 1000
+    assert light > 100
+    assert page.evaluate(PIXELS, ["stride-chart", "left"]) > 100
 
 
-def test_a_slow_walk_has_no_norm_and_says_so(told: Opener, trained: tuple[str, str, str]) -> None:
-    this = told(f"/sessions/{trained[2]}/live")
-    this.say(feed.state(), *(feed.stride(n, "left", 0.4, speed=0.5) for n in range(4)), feed.frame(10.0))
-    expect(this.page.locator("[data-norm-note]")).to_contain_text("No speed-matched norm")
-    assert this.page.evaluate(PIXELS, ["stride-chart", "norm"]) < 100
+def test_left_against_right_is_said_of_four_strides_that_tell_them_apart_only(
+    told: Opener, trained: tuple[str, str, str]
+) -> None:
+    this = told(f"/sessions/{trained[0]}/live")
+    asymmetry = this.page.locator("[data-asymmetry]")
+    this.walk([0.53, 0.45, 0.52], ["in", "low", "in"])
+    expect(asymmetry).to_have_text("too few strides to compare")
+    this.say(feed.stride(6, "left", 0.495), feed.stride(7, "right", 0.57))
+    expect(asymmetry).to_have_text(re.compile("left shorter by 0.0"))
+    this.say(feed.stride(8, "left", 0.75), feed.stride(9, "right", 0.57))
+    expect(asymmetry).to_have_text("no clear difference")
 
 
 def test_old_data_cover_the_charts_until_new_ones_come(told: Opener, trained: tuple[str, str, str]) -> None:
@@ -163,6 +169,60 @@ def test_old_data_cover_the_charts_until_new_ones_come(told: Opener, trained: tu
     expect(cover).to_be_hidden()
     this.say(feed.frame(101.1, stale=True))
     expect(cover).to_be_visible()
+
+
+def test_after_stop_the_page_says_that_it_is_saving_not_that_data_are_missing(
+    told: Opener, trained: tuple[str, str, str]
+) -> None:
+    this = told(f"/sessions/{trained[0]}/live")
+    this.walk([0.53], ["in"])
+    page, cover = this.page, this.page.locator("[data-cover]")
+    held: list[Route] = []  # the server's answer to STOP is held back: the page must not wait for it
+    page.route("**/live/commands", lambda route: held.append(route))
+    page.get_by_role("button", name="STOP").click()
+    expect(cover).to_contain_text("Stopping… saving")
+    expect(page.locator("[data-rec]")).to_contain_text("Stopping… saving")
+    expect(cover).to_contain_text("The tablet sends what is left")
+    this.say(feed.frame(100.9, stale=True))
+    expect(cover).not_to_contain_text("Paused")
+    expect(page.locator("[data-spoken]")).to_contain_text("Stopping", timeout=30_000)
+
+
+def test_a_page_opened_after_stop_and_one_whose_stop_was_refused_say_what_is(
+    told: Opener, trained: tuple[str, str, str]
+) -> None:
+    this = told(f"/sessions/{trained[0]}/live")
+    this.say(feed.state(stopping=True), feed.feedback(), feed.frame(100.0))
+    expect(this.page.locator("[data-cover]")).to_contain_text("Stopping… saving")
+    this.page.close()
+    other = told(f"/sessions/{trained[0]}/live")
+    other.walk([0.53], ["in"])
+    other.page.get_by_role("button", name="STOP").click()  # the server knows of no take here
+    expect(other.page.locator("[data-note=problem]")).to_be_visible()
+    expect(other.page.locator("[data-rec]")).to_contain_text("Recording")
+    expect(other.page.locator("[data-cover]")).not_to_contain_text("Stopping")
+
+
+@pytest.mark.parametrize("size", [(820, 1180), (768, 1024), (701, 1000), (390, 844)])
+def test_nothing_of_the_live_page_is_cut_off_on_a_tablet_held_upright(
+    size: tuple[int, int], told: Opener, trained: tuple[str, str, str]
+) -> None:
+    this = told(f"/sessions/{trained[0]}/live", width=size[0], height=size[1])
+    this.walk([0.53, 0.45], ["in", "low"])
+    page = this.page
+    title = "Gait training with feedback, left leg first, after the pause"
+    page.locator(".live-top h1").evaluate("(h, title) => { h.lastChild.textContent = title; }", title)
+    mark = {"t_s": 93.0, "value": "lost balance near the door"}
+    this.say(feed.state(marks=[mark]), feed.frame(100.2))
+    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    boxes = page.evaluate(
+        """() => [...document.querySelectorAll('[data-do=stop], .live-bot .btn, .live-grid > *')]
+          .map((e) => [e.dataset.do ?? e.className, e.getBoundingClientRect()])
+          .filter(([name, r]) => r.width).map(([name, r]) => [name, r.left, r.right, r.height])"""
+    )
+    assert {"stop", "pause", "mark", "undo", "sound", "screen"} <= {name for name, *_ in boxes}
+    cut = [b for b in boxes if b[1] < 0 or b[2] > size[0] or b[3] < 44]
+    assert not cut
 
 
 def test_a_lost_tablet_is_said_and_stop_asks_before_leaving_data_there(
@@ -203,6 +263,21 @@ def test_calibration_says_what_is_waited_for(
     expect(this.page.locator(".checks tbody")).to_contain_text("still" if stage == "stand" else "moving")
     expect(this.page.locator("live-sensors")).to_contain_text("3 % lost")
     expect(this.page.locator("live-sensors")).to_contain_text("battery low")
+
+
+def test_clock_and_sensors_are_shown_before_the_estimator_has_said_anything(
+    told: Opener, trained: tuple[str, str, str]
+) -> None:
+    this = told(f"/sessions/{trained[0]}/live")
+    row = {"rate_hz": 60.0, "lost_pct": None, "still": None, "battery_pct": None, "state": "ok", "words": ""}
+    sensors = [{"id": "A1", "segment": "pelvis", **row}, {"id": "A2", "segment": "foot_l", **row}]
+    this.say(feed.state(estimate="preparing", elapsed_s=65.0, sensors=sensors))
+    expect(this.page.locator("[data-elapsed]")).to_contain_text("01:0")
+    expect(this.page.locator("live-sensors tbody tr")).to_have_count(2)
+    expect(this.page.locator("live-sensors [data-all]")).to_contain_text("2 of 2 good")
+    expect(this.page.locator("live-sensors tbody")).to_contain_text("60 Hz")
+    expect(this.page.locator(".checks tbody tr")).to_have_count(2)
+    expect(this.page.locator("live-calibration [data-say]")).to_contain_text("being recorded")
 
 
 def test_a_code_is_shown_in_two_groups_and_a_second_page_asks_for_a_new_one(

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.conftest import NAME, PASSWORD, RunningServer
-from tests.data import data_folder
+from tests.browser.conftest import NAME, PASSWORD, Filled, Opener, RunningServer
+from tests.browser.filling import add_session
+from tests.data import ROOT, data_folder
 
 SEGMENTS = {
     "00B40B91": "pelvis",
@@ -53,6 +57,52 @@ def test_eleven_files_become_a_session_page(solid: Browser, running: RunningServ
     assert page.locator(".kin path.ml").count() >= 8, "left mean curves"
     assert page.locator(".kin path.mr").count() >= 8, "right mean curves"
     context.close()
+
+
+def test_a_table_with_its_manifest_is_analysed_as_from_the_command_line(
+    opened: Opener, filled: Filled, running: RunningServer, tmp_path: Path
+) -> None:
+    table = data_folder("gaitmap_foot", "imu_sample.csv")
+    sides = {f"foot_{side[0]}": f"{side}_sensor" for side in ("left", "right")}
+    columns = {
+        foot: {kind: [f"{name}/{kind}_{axis}" for axis in "xyz"] for kind in ("acc", "gyr")}
+        for foot, name in sides.items()
+    }
+    entry = {
+        "file": table.name, "header_rows": 2, "index_column": True, "rate_hz": 204.8,
+        "acc_unit": "m/s2", "gyr_unit": "deg/s", "columns": columns,
+    }  # fmt: skip
+    manifest = tmp_path / "manifest.json"
+    manifest.write_text(
+        json.dumps({"subject": {"height_m": 1.76, "standing_width_m": 0.21}, "sources": [entry]})
+    )
+    with running.client() as client:
+        session = add_session(client, filled.patient, "Walk, a table")
+    page = opened(f"/sessions/{session}/upload")
+    page.locator("[data-files]").set_input_files([str(table), str(manifest)])
+    expect(page.locator("sensor-map")).to_be_visible(timeout=60_000)
+    for foot in sides:
+        expect(page.locator(f"tr[data-device={foot}] select")).to_have_value(foot)
+    # what the file's manifest measured is shown, so that a person can correct it
+    expect(page.get_by_label("Ankles apart while standing")).to_have_value("0.21")
+    page.locator("[data-analyse]").click()
+    page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), wait_until="commit")
+    expect(page.locator(".params").first).to_be_visible(timeout=180_000)
+    # long names and doubtful values leave room for every column, and a key number for its unit
+    page.set_viewport_size({"width": 1280, "height": 800})
+    boxes = page.locator(".scroll:has(.params), .kpi .v").evaluate_all(
+        "all => all.map(e => e.scrollWidth - e.clientWidth)"
+    )
+    assert len(boxes) > 4
+    assert max(boxes) <= 1, boxes
+
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "server.main", "analyse", str(table), "--manifest", str(manifest)]
+    subprocess.run([*command, "--out", str(out)], cwd=ROOT, check=True, capture_output=True)
+    with running.client() as client:
+        for name in ("events.csv", "strides.csv"):
+            served = client.get(f"/api/v1/sessions/{session}/{name}").raise_for_status().content
+            assert served == (out / name).read_bytes(), name
 
 
 def _sign_in(page: Page) -> None:

@@ -181,7 +181,8 @@ def test_facts_survive_short_and_holed_signals() -> None:
 
 
 def test_the_real_take_has_the_figures_of_the_specification(neura: Recording) -> None:
-    """Rest norm 9.83 to 9.95 (real-data.md), magnetic shares .00 .08/.30 .37/.36 (fusion.md §4.6)."""
+    """Rest norm 9.83 to 9.95, magnetic shares .00 .08/.30 .37/.36
+    (docs/science/quality.md, "Magnetic field")."""
     report = assess(neura, synchronise(neura))
     shares = {k: s.magnetic_pct for k, s in report.sensors.items()}
     expected = {"pelvis": 0, "thigh_l": 0, "thigh_r": 0, "shank_l": 8, "shank_r": 30, "foot_l": 37}
@@ -279,7 +280,8 @@ def test_the_report_is_plain_json(neura: Recording) -> None:
 
 
 def test_the_raw_gaitmap_copy_shows_its_clipped_heel_strikes() -> None:
-    """Heel strikes clip at ±16 g (real-data.md §0): found in the copy whose axes were not rotated."""
+    """Heel strikes clip at ±16 g (docs/science/quality.md, "Range"): found in the copy whose axes were not
+    rotated."""
     recording = gaitmap("imu_sample_not_rotated.csv")
     report = assess(recording, synchronise(recording))
     assert {(n.code, n.severity) for n in report.notices} == {("saturated", "info")}
@@ -296,3 +298,24 @@ def test_turning_on_the_spot_while_the_trunk_is_level_is_no_wrong_unit() -> None
     assert facts(acc, gyr, 100.0).still_gyro == pytest.approx(0.02 * 3**0.5)
     everywhere = np.full(still.shape, 1.0)
     assert facts(acc, everywhere, 100.0).still_gyro == pytest.approx(3**0.5)
+
+
+@pytest.mark.parametrize("until_s", [6.0, np.inf], ids=["before the walk", "all the time"])
+def test_a_pelvis_without_any_acceleration_is_described_all_the_same(until_s: float) -> None:
+    """Which leg is the left one is read from the pelvis."""
+    recording = simulate_scenario("comfortable", 0).recording
+    streams = {}
+    for i, (device, segment) in enumerate(recording.segments.items()):
+        s = recording.streams[device]
+        none = (s.t_s < until_s) & (segment == "pelvis")
+        acc = np.where(none[:, None], 0.0, s.acc)
+        streams[f"s{i}"] = replace(s, device_id=f"s{i}", source="x", acc=acc)
+    found = describe(Recording(streams, {}))
+    assert "gravity_removed" in [n.code for d in found.devices for n in d.notices]
+    assert json.dumps(found.to_json(), allow_nan=False)
+
+
+def test_infinite_samples_are_no_plateau() -> None:
+    acc = ACC.copy()
+    acc[100:110] = np.inf
+    assert saturation(acc, 10.0) == (0.0, None)

@@ -52,6 +52,13 @@ def test_the_norm_scores_zero() -> None:
         assert value(found, "gps_deg", "offset_removed", side) == pytest.approx(0.0, abs=1e-9)
 
 
+def test_three_strides_have_no_score() -> None:
+    reference = adult_reference().mean_deg
+    curves = session({v: dict.fromkeys(SIDES, reference[v] + 1.0) for v in NINE}, 3)
+    assert {s.value for s in scores(curves, dict.fromkeys(NAMES, 0.0)).scores} == {None}
+    assert scores(curves).find("gps_deg", "offset_removed", "left").reason == "too_few_strides"
+
+
 def test_without_goniometer_angles_there_is_no_raw_score_and_the_shape_scores_stay() -> None:
     found = scores(norm(offset=8.0))
     assert value(found, "gps_sagittal_deg", "offset_removed") == pytest.approx(0.0, abs=1e-9)
@@ -109,7 +116,7 @@ def test_pelvic_obliquity_entered_once_counts_up_on_one_side_and_down_on_the_oth
 
 def test_healthy_people_have_an_index_of_one_hundred_in_the_middle() -> None:
     """Mean 100 and sd 10 leave one out; with the person in the reference about 42/41 closer to it."""
-    found = [scores(session({v: {s: p[s][v] for s in SIDES} for v in NINE}, 2)) for p in people()]
+    found = [scores(session({v: {s: p[s][v] for s in SIDES} for v in NINE}, 4)) for p in people()]
     spread = adult_reference().spreads["offset_removed"]["gps_overall"]
     assert spread.sd_ln is not None
     indices = np.array([value(f, "gdi_star", "offset_removed") for f in found], np.float64)

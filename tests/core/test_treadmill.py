@@ -28,6 +28,7 @@ def walked(belt_speed_mps: float | None) -> Analysis:
     return analyse(replace(recording(), protocol="treadmill", belt_speed_mps=belt_speed_mps))
 
 
+@pytest.mark.slow
 def test_without_the_belts_speed_every_distance_is_withheld_with_the_reason() -> None:
     found = {p.name: p for p in walked(None).parameters}
     for name in (*NAMES, "total_distance_m"):
@@ -35,6 +36,7 @@ def test_without_the_belts_speed_every_distance_is_withheld_with_the_reason() ->
     assert "treadmill_belt" in {n.code for n in walked(None).notices}
 
 
+@pytest.mark.slow
 def test_the_belts_speed_gives_speed_and_stride_length_and_nothing_else() -> None:
     found = {(p.name, p.side): p for p in walked(BELT).parameters}
     assert found["gait_speed_mps", None].mean == pytest.approx(BELT)
@@ -46,6 +48,7 @@ def test_the_belts_speed_gives_speed_and_stride_length_and_nothing_else() -> Non
     assert {found[key].reason for key in found if key[0] in others} == {"treadmill"}
 
 
+@pytest.mark.slow
 def test_angles_and_times_are_those_of_the_same_steps_on_the_floor() -> None:
     floor = {(p.name, p.side): p.mean for p in analyse(recording()).parameters}
     belt = {(p.name, p.side): p.mean for p in walked(BELT).parameters}

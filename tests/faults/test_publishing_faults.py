@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -49,13 +50,13 @@ def test_an_upload_that_fails_anywhere_leaves_no_row_and_can_be_sent_again(
         return True
 
     def after(passed: bool) -> None:
-        assert checks.check(clinic.db, clinic.blobs) == []
+        assert checks.check(clinic.db, clinic.blobs, clinic.settings) == []
         with clinic.db.read() as c:
             names = [f.name for f in recordings.require_current(c, clinic.session.id).files]
         assert ("b.txt" in names) is passed
 
     assert fail_at_every_call(monkeypatch, upload, after) >= 5
-    assert sweep(clinic.db, clinic.blobs, grace_s=0.0) == 0
+    assert sweep(clinic.db, clinic.blobs, replace(clinic.settings, sweep_grace_s=0.0)) == 0
 
 
 def test_a_result_that_cannot_be_stored_fails_its_job_with_a_reason(
@@ -74,7 +75,7 @@ def test_a_result_that_cannot_be_stored_fails_its_job_with_a_reason(
 
     def after(passed: bool) -> None:
         assert len(clinic.results()) == int(passed)
-        assert checks.check(clinic.db, clinic.blobs) == []
+        assert checks.check(clinic.db, clinic.blobs, clinic.settings) == []
 
     try:
         assert fail_at_every_call(monkeypatch, work, after) >= 4
@@ -98,7 +99,7 @@ def test_a_file_swept_before_its_row_was_written_is_noticed(clinic: Clinic) -> N
         upload._receiver.keep = keep_and_lose  # type: ignore[method-assign, assignment]
         with pytest.raises(SagittalError, match="is not there"):
             upload.keep()
-    assert checks.check(clinic.db, clinic.blobs) == []
+    assert checks.check(clinic.db, clinic.blobs, clinic.settings) == []
 
 
 def write_notes(clinic: Clinic, times: int) -> None:

@@ -1,4 +1,4 @@
-"""Jobs survive the death of whoever works on them, with one visible result (service.md §b)."""
+"""Jobs survive the death of whoever works on them: one visible result (docs/operations.md, "One machine")."""
 
 from __future__ import annotations
 
@@ -73,6 +73,7 @@ def test_a_child_does_not_outlive_its_worker(clinic: Clinic, workers: Workers, b
     until(lambda: not alive(child))
 
 
+@pytest.mark.first
 def test_a_killed_child_is_replaced_by_the_same_worker(clinic: Clinic, workers: Workers) -> None:
     view, reached, gate = clinic.hold("second")
     until(reached.exists)

@@ -71,13 +71,21 @@ def files(duration_s: float = 12.0) -> Mapping[str, bytes]:
     return analysis_files(analysis(duration_s=duration_s))
 
 
-def finish(clinic: Clinic, patient_id: str, session_id: str, results: Mapping[str, bytes]) -> str:
+def finish(
+    clinic: Clinic,
+    patient_id: str,
+    session_id: str,
+    results: Mapping[str, bytes],
+    manifest: Mapping[str, Any] | None = None,
+) -> str:
     """Do what upload and worker do, with given results; returns the id of the analysis."""
     state = clinic.app.state
     with recordings.receive(clinic.db, state.blobs, clinic.settings, None, session_id, "walk.txt") as upload:
         upload.write(b"recording")
         upload.keep()
     with clinic.db.write() as c:
+        if manifest is not None:
+            recordings.set_manifest(c, None, session_id, manifest)
         analyses.submit(c, state.queue, None, session_id)
     claim = state.queue.claim("test", [recordings.ANALYSE])
     stored = {name: state.blobs.put(patient_id, content) for name, content in results.items()}

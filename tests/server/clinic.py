@@ -70,8 +70,8 @@ class Clinic:
 
 @contextlib.asynccontextmanager
 async def open_clinic(folder: Path, **settings: Any) -> AsyncIterator[Clinic]:
-    """Start an application on a folder and stop it again."""
-    options = Settings(data_dir=folder, **settings)
+    """Start an application on a folder and stop it again; estimators only if `live_workers` says so."""
+    options = Settings(data_dir=folder, **{"live_workers": 0, **settings})
     app = create_app(options)
     async with app.router.lifespan_context(app):
         yield Clinic(app, options)

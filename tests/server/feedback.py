@@ -29,15 +29,15 @@ def person(clinic: Clinic, **changes: Any) -> str:
         return patients.create(c, None, code=f"P-{new_id()[:8]}", **known).id
 
 
-def visit(clinic: Clinic, patient: str, days: int) -> str:
+def visit(clinic: Clinic, patient: str, days: int, **values: Any) -> str:
     """A session without anything in it."""
     with clinic.db.write() as c:
-        return sessions.create(c, None, patient, performed_on=DAY + dt.timedelta(days=days)).id
+        return sessions.create(c, None, patient, performed_on=DAY + dt.timedelta(days=days), **values).id
 
 
-def walked(clinic: Clinic, patient: str, days: int, duration_s: float = 24.0) -> str:
+def walked(clinic: Clinic, patient: str, days: int, duration_s: float = 24.0, **values: Any) -> str:
     """A session with a finished analysis of the kinematic walk."""
-    session = visit(clinic, patient, days)
+    session = visit(clinic, patient, days, **values)
     analysed.finish(clinic, patient, session, analysed.files(duration_s))
     return session
 

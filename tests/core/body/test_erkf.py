@@ -225,8 +225,8 @@ def test_the_smoother_equals_the_best_estimate_on_a_linear_problem() -> None:
     np.testing.assert_allclose(found, best, atol=1e-9)
 
 
-# spec/estimators.md §6.3: per seed, flexion / adduction / rotation of hip, knee, ankle in degrees. Ankle
-# rotation has .5 there; on the norm-like walker, which came after, seed 3 gives .52
+# docs/science/erkf.md, "Limits on simulated walks": per seed, flexion / adduction / rotation of hip, knee,
+# ankle in degrees. Ankle rotation has .5 there; on the norm-like walker, which came after, seed 3 gives .52
 LIMIT = {"hip": (0.3, 0.4, 0.8), "knee": (0.3, 0.3, 0.5), "ankle": (0.3, 0.3, 0.6)}
 NAMES = {
     "hip": ("hip_flexion", "hip_adduction", "hip_rotation"),
@@ -251,8 +251,9 @@ def test_smoothed_angles_and_strides_of_a_mixed_walk_are_within_the_limits(seed:
 
 
 def test_live_angles_and_strides_are_within_the_limits() -> None:
-    """Spec/estimators.md §6.3, live set, shipped preset; not zeroed on a standing that came before headings
-    had been found: the start takes all segments to face ahead, and toes point outwards."""
+    """docs/science/erkf.md, "Limits on simulated walks", live set, shipped preset; not zeroed on a standing
+    that came before headings had been found: the start takes all segments to face ahead, and toes point
+    outwards."""
     take = mixed_walk()
     track = filtered(take, LIVE)
     found = angles_of(take, track, zeroed=False)
@@ -267,7 +268,8 @@ def test_live_angles_and_strides_are_within_the_limits() -> None:
 
 
 def test_joint_centres_hold_the_body_together_and_zero_velocity_the_speed() -> None:
-    """The ablations of spec/estimators.md §0.4: what is switched off is what is lost."""
+    """What each correction holds (docs/science/erkf.md, "Departures from the paper"): what is switched off is
+    what is lost."""
     take = mixed_walk()
     with_all = filtered(take, LIVE)
     loose = filtered(take, replace(LIVE, joint_centre_sd=None))

@@ -118,6 +118,7 @@ def test_a_common_turn_of_the_start_changes_no_joint_angle() -> None:
             assert np.degrees(np.abs(a[name] - b[name]).max()) < 1e-6, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("params", [LIVE, OFFLINE], ids=["live", "offline"])
 @pytest.mark.parametrize(("angle", "within_1s", "left"), [(30.0, 3.0, 1.1), (60.0, 6.0, 2.0)])
 def test_headings_that_start_apart_come_together(
@@ -141,7 +142,8 @@ def test_headings_that_start_apart_come_together(
 def test_with_known_positions_they_come_together_at_the_first_step(
     params: ErkfParams, angle: float, sd: float
 ) -> None:
-    """The oracle of spec/estimators.md §6.3: below 3° within 1 s of the first toe-off, positions given."""
+    """docs/science/erkf.md, "Limits on simulated walks": below 3° within 1 s of the first toe-off, positions
+    given."""
     take = mixed_walk()
     wide = replace(params, start_heading_sd=radians(sd))
     start = turned_start(alternately(angle), wide)
@@ -179,6 +181,7 @@ def test_a_measured_heading_holds_the_common_one_and_leaves_angles_alone() -> No
         assert np.degrees(np.abs((a[name] - b[name])[late]).max()) < 1.0, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [30.0, 60.0, 90.0])
 def test_one_sensor_is_brought_back_from_up_to_ninety_degrees(angle: float) -> None:
     take = mixed_walk()
@@ -186,6 +189,7 @@ def test_one_sensor_is_brought_back_from_up_to_ninety_degrees(angle: float) -> N
     assert np.sqrt(np.mean(error[round(TOE_OFF_S * take.rate_hz) :] ** 2)) < 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0.0, 20.0, 60.0, 105.0, 150.0])
 def test_a_start_that_was_off_is_told_with_its_size(angle: float) -> None:
     """The smoother's first heading against the one taken: right within 10°, even where poses are not."""

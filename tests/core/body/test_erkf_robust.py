@@ -60,6 +60,7 @@ def remounted(take: Take, by: Floats) -> Take:
     return replace(take, tree=tree, inputs=replace(x, acc=rotate(by, x.acc), gyr=rotate(by, x.gyr)))
 
 
+@pytest.mark.slow
 def test_the_order_of_sensors_and_joints_does_not_matter() -> None:
     take = mixed_walk()
     order = [4, 0, 6, 2, 1, 5, 3]
@@ -80,7 +81,8 @@ def test_how_a_sensor_is_turned_on_its_segment_does_not_matter() -> None:
 
 
 def test_three_percent_of_lost_packets_cost_little() -> None:
-    """At random over all sensors, held and marked; limits of spec/estimators.md §6.3."""
+    """At random over all sensors, held and marked; limits of
+    docs/science/erkf.md, "Limits on simulated walks"."""
     take, rng = mixed_walk(), np.random.default_rng(3)
     gone = rng.random(take.inputs.valid.shape) < 0.03
     gone[: round(take.truth.zero[1] * take.rate_hz)] = False
@@ -101,7 +103,8 @@ def test_three_percent_of_lost_packets_cost_little() -> None:
 
 
 def test_samples_that_all_sensors_lack_are_stepped_over_by_their_time() -> None:
-    """A tenth of the instants taken out: the step's own Δt counts, not the rate (spec/estimators.md §3.3)."""
+    """A tenth of the instants taken out: the step's own Δt counts, not the rate
+    (docs/science/erkf.md, "Prediction")."""
     take, rng, x = mixed_walk(), np.random.default_rng(4), mixed_walk().inputs
     kept = np.flatnonzero((rng.random(len(x.step_s)) > 0.1) | (np.arange(len(x.step_s)) < 500))
     step = np.diff(np.cumsum(x.step_s)[kept], prepend=0.0)
@@ -152,6 +155,7 @@ def test_contacts_that_begin_early_and_end_late_shorten_strides_by_millimetres(
     assert np.sqrt(np.mean(found**2)) < 1.2 * most_m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("segment", "angle"), [("foot_l", "ankle_dorsiflexion_l"), ("shank_r", "knee_flexion_r")]
 )
@@ -165,7 +169,8 @@ def test_a_lost_sensor_is_predicted_and_comes_back(segment: str, angle: str) -> 
 
 
 def test_an_unnoticed_gap_of_a_foot_is_taken_up_again() -> None:
-    """Held samples that nobody marks: re-acceptance keeps the path within metres, not hundreds (§3.3)."""
+    """Held samples that nobody marks: re-acceptance keeps the path within metres, not hundreds
+    (docs/science/erkf.md, "Zero velocity")."""
     take = lost(mixed_walk(), "foot_l", 15.0, 15.3)
     still = mixed_walk().inputs
     unnoticed = replace(take, inputs=replace(take.inputs, valid=still.valid, contact=still.contact))
@@ -175,6 +180,7 @@ def test_an_unnoticed_gap_of_a_foot_is_taken_up_again() -> None:
     assert np.linalg.norm(track.p[-1, foot] - filtered(mixed_walk(), LIVE).p[-1, foot]) < 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("params", [LIVE, OFFLINE], ids=["live", "offline"])
 def test_ten_minutes_keep_the_covariance_symmetric_and_positive(params: ErkfParams) -> None:
     """60 000 steps; a row and a column pass that are not mirrored would be 2e-5 apart by then."""

@@ -78,7 +78,7 @@ def test_joint_centres_coincide_and_the_lower_foot_is_at_ankle_height() -> None:
 
 
 def test_two_feet_from_mid_walk_to_a_standing_end_keep_their_strides() -> None:
-    """Known biases give the strides of a standing start (spec/estimators.md §6.3: |bias| < 5, RMS < 6 mm)."""
+    """Known biases give the strides of a standing start (docs/science/erkf.md: |bias| < 5, RMS < 6 mm)."""
     take = mixed_walk()
     tree, inputs = feet_from_mid_walk(take)
     track, _ = smooth(start_state(tree, inputs, OFFLINE, bias_age_s=50.0), inputs, tree, OFFLINE)

@@ -114,6 +114,7 @@ def test_filling_looks_only_back() -> None:
         np.testing.assert_allclose(a[:n], b, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost_s", [2.0, 8.0, 20.0])
 @pytest.mark.parametrize("segment", ["pelvis", "thigh_l", "shank_r", "foot_l"])
 def test_a_sensor_lost_while_the_person_turns_comes_back_where_it_belongs(

@@ -41,6 +41,7 @@ def take(
     return calibrated, orientations, {s: degrees(x) for s, x in found.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", [{"thigh_l": 25.0}, {"shank_r": -20.0, "foot_l": 15.0}, {"pelvis": 20.0}])
 def test_a_wrong_forward_axis_is_found_by_its_size_and_sign(wrong: dict[Segment, float]) -> None:
     _, _, without = take(3, {})
@@ -52,6 +53,7 @@ def test_a_wrong_forward_axis_is_found_by_its_size_and_sign(wrong: dict[Segment,
         assert abs(change[segment]) < 4.0
 
 
+@pytest.mark.slow
 def test_a_good_calibration_is_left_nearly_as_it_is() -> None:
     for seed in (2, 3, 4):
         _, _, found = take(seed, {})

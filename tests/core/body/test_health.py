@@ -64,6 +64,7 @@ def test_a_right_set_up_is_not_accused(name: str, seed: int) -> None:
     assert worst([f for f in made.poses.health if f.name != "forward_axis_turned_deg"]) == "good"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("a", "b"), [("thigh_l", "thigh_r"), ("shank_l", "shank_r"), ("foot_l", "foot_r")])
 def test_exchanged_sides_do_not_hang_together(a: Segment, b: Segment) -> None:
     made = estimated(swapped(take(), a, b))
@@ -71,12 +72,14 @@ def test_exchanged_sides_do_not_hang_together(a: Segment, b: Segment) -> None:
     assert max(residuals(made).values()) > 30.0
 
 
+@pytest.mark.slow
 def test_exchanged_segments_of_one_leg_are_told() -> None:
     made = estimated(swapped(take(), "thigh_l", "shank_l"))
     assert worst(made.poses.health) != "good"
     assert codes(made) & {"sensors_do_not_hang_together", "heading_corrected"}
 
 
+@pytest.mark.slow
 def test_a_late_sensor_shows_in_its_joints() -> None:
     was = take().sensors["thigh_r"]
     acc, gyr = (np.roll(x, 30, axis=0).copy() for x in (was.acc, was.gyr))
@@ -85,6 +88,7 @@ def test_a_late_sensor_shows_in_its_joints() -> None:
     assert right > 2.0 * left
 
 
+@pytest.mark.slow
 def test_a_foot_that_never_rests_is_told() -> None:
     was = take().sensors["foot_l"]
     shaken = was.gyr + 1.5 * np.sin(2 * np.pi * 7.0 * take().t_s)[:, None] * (take().t_s > 8.0)[:, None]
@@ -94,6 +98,7 @@ def test_a_foot_that_never_rests_is_told() -> None:
     assert told.verdict == "bad"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost_s", [0.5, 8.0])
 def test_a_known_gap_is_bridged_told_and_recovered(lost_s: float) -> None:
     was = take().sensors["shank_r"]
@@ -113,6 +118,7 @@ def test_a_known_gap_is_bridged_told_and_recovered(lost_s: float) -> None:
         assert np.abs(apart).max() < 0.1
 
 
+@pytest.mark.slow
 def test_an_unnoticed_gap_never_gives_numbers_that_are_none() -> None:
     was = take().sensors["foot_r"]
     gap = (take().t_s >= 20.0) & (take().t_s < 20.3)
@@ -127,6 +133,7 @@ def test_an_unnoticed_gap_never_gives_numbers_that_are_none() -> None:
     assert np.linalg.norm(end) < 10.0
 
 
+@pytest.mark.slow
 def test_a_burst_of_no_numbers_is_a_gap() -> None:
     made = simulate_scenario("fast_with_turns", 3)
     device = next(d for d, s in made.recording.segments.items() if s == "shank_l")

@@ -124,7 +124,8 @@ def test_the_reset_keeps_the_covariance_symmetric_and_positive() -> None:
     assert np.linalg.eigvalsh(P)[0] > 0.0
 
 
-# spec/estimators.md §6.4: limits of RMSE (offset removed) and correlation of hip, knee and ankle flexion
+# docs/science/l7s.md, "Limits on simulated walks": limits of RMSE (offset removed) and correlation of hip,
+# knee and ankle flexion
 LIMITS = {
     "3I": ((8.0, 12.0, 9.0), (0.85, 0.70, 0.75)),
     "2I": ((12.0, 16.0, 11.0), (0.75, 0.60, 0.65)),
@@ -163,7 +164,7 @@ def test_the_share_of_straight_knees_does_not_depend_on_the_number_of_projection
         excess.append(max(diagnostics["excess_m"].values()))  # type: ignore[attr-defined]
     np.testing.assert_allclose(shares[1:], shares[:2], atol=0.02)
     assert 0.2 < np.mean(shares[1]) < 0.6
-    # what is left of the constraint does: spec/estimators.md §6.4 accepts 10 mm of one projection
+    # what is left of the constraint does: docs/science/l7s.md accepts 10 mm of one projection
     assert excess[0] < 0.01
     assert excess[1] < 3e-5
     assert excess[2] < 1e-8
@@ -185,6 +186,7 @@ def test_any_split_into_blocks_gives_the_same_bits() -> None:
         assert np.array_equal(end.P, state.P)
 
 
+@pytest.mark.slow
 def test_the_covariance_and_the_figure_after_ten_minutes_are_those_after_one() -> None:
     """Sy 2021 §V-D expects that long walks need a limit on the covariance; they do not."""
     calibrated, orientations, steps, _ = walk()

@@ -233,6 +233,7 @@ def test_a_loss_that_nobody_noticed_is_told_by_what_does_not_fit(estimator: Esti
     assert codes(made) & {"legs_do_not_fit", "zero_velocity_refused"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_burst_of_no_numbers_is_a_gap(estimator: Estimator) -> None:
     made = simulate_scenario("fast_with_turns", 3, worn=SEEN[estimator])
@@ -252,7 +253,12 @@ def test_a_burst_of_no_numbers_is_a_gap(estimator: Estimator) -> None:
         assert np.isfinite(done.poses.p[segment]).all()
         assert np.isfinite(done.poses.q[segment]).all()
     assert done.angles is not None
-    assert np.isnan(done.angles.angles["knee_flexion_r"][2005:2035]).all()
+    if estimator == "l7s_2i":
+        # two sensors do not find back: the legs come off their hinges, and nothing of them is shown
+        assert {"legs_do_not_fit", "angles_withheld"} <= {n.code for n in done.notices}
+        assert "knee_flexion_r" not in done.angles.angles
+    else:
+        assert np.isnan(done.angles.angles["knee_flexion_r"][2005:2035]).all()
 
 
 def test_a_number_that_is_none_inside_a_valid_sample_is_refused() -> None:

@@ -31,6 +31,7 @@ def codes(calibration: Calibration) -> set[str]:
     return {n.code for n in calibration.notices}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["comfortable", "slow", "fast_with_turns", "five_minutes"])
 def test_forward_is_found_on_every_segment(name: str) -> None:
     """Against the truth's axes, which at standing are turned out: feet by 10°, legs by a little."""
@@ -53,7 +54,7 @@ def test_gyro_bias_is_the_drawn_one() -> None:
 
 @pytest.mark.parametrize("method", ["walking_direction", "gyro_pca"])
 def test_any_mounting_gives_the_same_segment_frames(method: Method) -> None:
-    """The same signals in turned sensors: R_segment_sensor takes the turn up (spec/fusion.md §10.1–2)."""
+    """The same signals in turned sensors: R_segment_sensor takes the turn up."""
     recording, _ = simulated("comfortable")
     rng = np.random.default_rng(7)
     by: dict[Segment, Floats] = {s: normalise(rng.standard_normal(4)) for s in recording.sensors}

@@ -1,4 +1,5 @@
-"""The flexion axis by PCA: oracles of spec/fusion.md §2, sign rules, the alarm where there is no axis."""
+"""The flexion axis by PCA: oracles of docs/science/calibration.md, sign rules, the alarm where there is no
+axis."""
 
 from __future__ import annotations
 
@@ -24,7 +25,7 @@ def flexing(R_sensor_segment: Floats, n: int = 1000, seed: int = 0) -> tuple[Flo
 
 
 def test_any_mounting_is_found_within_the_oracle() -> None:
-    """300 random mountings: median 0.03°, largest 0.10° (spec/fusion.md §2), up to half a turn."""
+    """300 random mountings: median 0.03°, largest 0.10°, up to half a turn."""
     rng = np.random.default_rng(1)
     off = []
     for k in range(300):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,18 @@ def one(
     pair = parameter(name, before, side, unit), parameter(name, after, side, unit)
     (change,) = parameter_changes([pair[0]], [pair[1]], **more)  # type: ignore[arg-type]
     return change
+
+
+@pytest.mark.parametrize("few", ["before", "after"])
+def test_three_strides_are_no_change_whatever_they_measure(few: str) -> None:
+    strides = {"before": 20, "after": 20, few: 3}
+    old, new = (
+        replace(parameter("knee_flexion_rom_deg", v, "left"), n=strides[k])
+        for k, v in (("before", 40.0), ("after", 60.0))
+    )
+    (found,) = parameter_changes([old], [new])
+    assert (found.verdict, found.limit, found.reason) == (None, None, "too_few_strides")
+    assert (found.before, found.after, found.difference) == (40.0, 60.0, 20.0)
 
 
 @pytest.mark.parametrize(

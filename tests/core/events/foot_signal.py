@@ -8,7 +8,7 @@ from core.frames import R_NEUTRAL, Bools, Floats, Segment
 from core.fusion.orientations import Orientations
 from core.rotation import about, from_matrix, multiply
 
-# foot pitch over the gait cycle in degrees, a0, cos1, sin1, … (spec/patients.md §1, "pitch")
+# foot pitch over the gait cycle in degrees, a0, cos1, sin1, … (fitted to the healthy walker)
 SERIES = (
     -12.92, 20.98, 20.75, 9.70, -15.10, -2.76, -2.50, 1.19, -1.40, 0.23, -1.54, -0.18, -0.33, 0.69, -0.65,
 )  # fmt: skip

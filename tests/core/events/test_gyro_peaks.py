@@ -124,6 +124,7 @@ def test_there_are_five_presets_of_foot_and_shank() -> None:
     assert {p.segment for p in PRESETS.values()} == set(LIMB)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PEOPLE)
 @pytest.mark.parametrize("preset", sorted(PRESETS))
 def test_presets_find_the_contacts_of_simulated_people(name: str, preset: str) -> None:

@@ -48,6 +48,7 @@ def quicker(recording: UniformRecording, times: int) -> UniformRecording:
     return made(x.acc[::times].copy(), x.gyr[::times].copy() * times, recording.rate_hz)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WALKS)
 def test_every_walk_gives_its_steps_once(name: str) -> None:
     """Slow, fast, limping, shuffling, festinating: no step is doubled or halved, feet told are right."""

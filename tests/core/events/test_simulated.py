@@ -1,7 +1,7 @@
 """Contacts and temporal parameters against the exact truth of simulated walks.
 
-The rule sees the landing pitch peak that the simulator shapes to be at contact (spec/patients.md §3), so the
-small errors here say that the code is right, not how people land; tests/accuracy says that.
+The rule sees the landing pitch peak that the simulator shapes to be at contact (docs/science/simulation.md),
+so the small errors here say that the code is right, not how people land; tests/accuracy says that.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def walked(request: pytest.FixtureRequest) -> Walked:
 
 @pytest.mark.parametrize("source", ["of_truth", "of_chain"])
 def test_every_contact_is_found_and_none_is_invented(walked: Walked, source: str) -> None:
-    """Limits of spec/patients.md §6: no extras, IC ±10 ms in the mean; TC against the 5 mm lift."""
+    """docs/science/events.md, "Limits on real walks": none extra, IC ±10 ms; TC against the 5 mm lift."""
     found: GaitEvents = getattr(walked, source)
     for side in SIDES:
         truth = walked.simulation.truth.contacts[side]

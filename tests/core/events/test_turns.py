@@ -89,6 +89,7 @@ def test_one_foot_alone_tells_no_turns() -> None:
     assert found("fast_with_turns", "foot_l") == ()
 
 
+@pytest.mark.slow
 def test_a_turn_on_the_spot_is_found_and_a_straight_walk_has_none() -> None:
     assert len(found("five_minutes", "pelvis")) == 12
     for straight in ("slow", "comfortable", "elderly", "hemiparetic", "parkinson"):

@@ -28,10 +28,14 @@ def curves(values: Mapping[str, tuple[float, float]], strides: int = 10) -> Cycl
     )
 
 
-def sides(name: str, left: float | None, right: float | None, unit: str = "m") -> list[Parameter]:
+def sides(
+    name: str, left: float | None, right: float | None, unit: str = "m", n: int = 10, sd: float = 0.01
+) -> list[Parameter]:
     pair = zip(SIDES, (left, right), strict=True)
     return [
-        Parameter(name, s, 0 if v is None else 10, v, None, unit, "no_strides" if v is None else None)
+        Parameter(name, s, 0, None, None, unit, "no_strides")
+        if v is None
+        else Parameter(name, s, n, v, sd, unit)
         for s, v in pair
     ]
 
@@ -138,13 +142,31 @@ def test_a_ratio_belongs_to_the_larger_side() -> None:
     assert flag(even, "temporal_asymmetry", "left").note == "late_foot_off"
 
 
+def test_three_strides_of_a_side_are_held_against_no_limit() -> None:
+    found = flag(flags(None, sides("step_length_m", 0.50, 0.70, n=3)), "step_length_asymmetry", "right")
+    assert (found.exceeded, found.reason) == (None, "too_few_strides")
+    assert found.value == pytest.approx(1.4)
+    foot = sides("foot_pitch_ic_deg", -9.0, 20.0, "deg", n=3)
+    assert flag(flags(None, foot), "flat_contact", "left").reason == "too_few_strides"
+    stiff = flag(flags(curves({"knee_flexion": (20.0, 60.0)}, strides=3), []), "stiff_knee", "left")
+    assert (stiff.exceeded, stiff.reason) == (None, "too_few_strides")
+
+
+def test_a_difference_that_the_strides_leave_open_is_beyond_no_limit() -> None:
+    """0.50 ± 0.20 and 0.60 ± 0.20 m over ten strides: 95 % of the difference −0.29 … 0.09 m."""
+    open_ = flag(flags(None, sides("step_length_m", 0.50, 0.60, sd=0.2)), "step_length_asymmetry", "right")
+    assert (open_.exceeded, open_.marked, open_.reason) == (None, False, "sides_alike")
+    within = flag(flags(None, sides("step_length_m", 0.50, 0.52, sd=0.2)), "step_length_asymmetry", "right")
+    assert within.exceeded is False
+
+
 def test_a_step_of_no_length_has_no_ratio() -> None:
     found = flag(flags(None, sides("step_length_m", 0.5, -0.01)), "step_length_asymmetry", None)
     assert (found.value, found.exceeded, found.reason) == (None, None, "near_zero")
 
 
 def test_circumduction_is_held_against_own_controls_or_nothing() -> None:
-    """No table knows how far healthy feet swing out (spec/clinic.md §4 names none)."""
+    """No table knows how far healthy feet swing out: limits are own controls'."""
     wide = sides("circumduction_m", 0.12, 0.03)
     alone = flag(flags(None, wide), "circumduction", "left")
     assert (alone.value, alone.limit, alone.exceeded, alone.reason) == (0.12, None, None, "no_controls")

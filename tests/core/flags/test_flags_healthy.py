@@ -21,10 +21,10 @@ def test_one_healthy_side_in_twenty_at_most_passes_a_limit() -> None:
     judged: Counter[str] = Counter()
     for person in people():
         curves = CycleCurves(
-            {v: {s: np.radians(person[s][v])[np.newaxis] for s in SIDES} for v in person["left"]},
-            dict.fromkeys(SIDES, (0,)),
-            {s: np.ones(1, np.bool_) for s in SIDES},
-            {s: np.full(1, 62.0) for s in SIDES},
+            {v: {s: np.radians(np.tile(person[s][v], (4, 1))) for s in SIDES} for v in person["left"]},
+            dict.fromkeys(SIDES, (0, 1, 2, 3)),
+            {s: np.ones(4, np.bool_) for s in SIDES},
+            {s: np.full(4, 62.0) for s in SIDES},
         )
         for f in flags(curves, [], dict.fromkeys(NAMES, 0.0)):
             if f.exceeded is not None:

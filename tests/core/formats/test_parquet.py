@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 
 from core.errors import FormatError, Notice
 from core.formats import SourceFile, read_recording, write_recording
+from core.quality import describe
 from core.recording import ImuStream, Recording, Subject
 from core.shoe import Shoe
 from tests.core.formats.making import mt_file, signals, stream
@@ -60,7 +63,8 @@ def test_streams_of_any_length_and_rate_come_back_exact(
     def made(device: str, k: int, start: float, hz: float) -> ImuStream:
         acc = rng.normal(0, 10, (k, 3)).astype(np.float32).astype(np.float64)
         if holes:
-            acc[rng.random((k, 3)) < 0.2] = np.nan
+            # the first sample stays: a stream without one is left out
+            acc[1:][rng.random((k - 1, 3)) < 0.2] = np.nan
         return stream(device, acc, acc[:, ::-1].copy(), t_s=start + np.arange(k) / hz, rate_hz=hz)
 
     streams = {"a": made("a", n, 0.0, rate), "b": made("b", m, offset / 100, 100.0)}
@@ -103,3 +107,60 @@ def test_a_stored_take_is_uploaded_alone() -> None:
     with pytest.raises(FormatError) as e:
         read_recording([stored, mt_file("00B40C44")])
     assert e.value.code == "several_recordings"
+
+
+def changed(data: bytes, columns: dict[str, float], meta: dict[str, str] | None = None) -> SourceFile:
+    """The same file, whole columns set to one value, parts of its metadata to raw JSON."""
+    table = pq.read_table(pa.BufferReader(data))
+    for name, value in columns.items():
+        column = pa.array(np.full(len(table), value, np.float32))
+        table = table.set_column(table.column_names.index(name), name, column)
+    known = json.loads(table.schema.metadata[b"sagittal.recording"])
+    text = json.dumps({**known, **{key: f"@{key}@" for key in meta or {}}})
+    for key, raw in (meta or {}).items():
+        text = text.replace(f'"@{key}@"', raw)
+    sink = pa.BufferOutputStream()
+    pq.write_table(table.replace_schema_metadata({b"sagittal.recording": text.encode()}), sink)
+    return SourceFile.of_bytes("take.parquet", bytes(sink.getvalue().to_pybytes()))
+
+
+def two_sensors() -> bytes:
+    acc, gyr = signals(1000, still=400)
+    return write_recording(
+        Recording(
+            {"a": stream("a", acc, gyr), "b": stream("b", acc + 1, gyr)}, {"a": "foot_l", "b": "foot_r"}
+        )
+    )
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf], ids=str)
+def test_a_sensor_without_one_number_is_left_out_with_a_sentence(value: float) -> None:
+    found = read_recording([changed(two_sensors(), {"a.acc_y": value})])
+    assert tuple(found.streams) == ("b",)
+    assert ("sensor_missing", "a") in [(n.code, n.sensor) for n in found.notices]
+    describe(found).to_json()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf], ids=str)
+def test_a_gyroscope_without_one_number_counts_as_none(value: float) -> None:
+    found = read_recording([changed(two_sensors(), {"a.gyr_x": value})])
+    assert found.streams["a"].gyr is None
+    assert "missing_gyro" in [n.code for n in found.streams["a"].notices]
+    assert json.dumps(describe(found).to_json(), allow_nan=False)
+
+
+def test_a_file_without_one_number_is_refused_with_a_sentence() -> None:
+    with pytest.raises(FormatError, match="measured anything") as caught:
+        read_recording([changed(two_sensors(), {"a.acc_x": np.nan, "b.acc_z": np.inf})])
+    assert caught.value.code == "no_signal"
+
+
+@pytest.mark.parametrize("key", ["subject", "mounting", "notices", "sha256", "sensors", "protocol"])
+@pytest.mark.parametrize("ends", ["[]", "{}"])
+@pytest.mark.parametrize("depth", [50, 900, 20_000])
+def test_metadata_nested_without_end_is_refused_with_a_sentence(depth: int, ends: str, key: str) -> None:
+    deep = "[" * depth + "]" * depth if ends == "[]" else '{"a":' * depth + "1" + "}" * depth
+    with pytest.raises(FormatError) as caught:
+        read_recording([changed(two_sensors(), {}, {key: deep})])
+    assert caught.value.code == "bad_parquet"
+    assert len(caught.value.message) < 200

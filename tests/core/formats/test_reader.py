@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -24,11 +26,32 @@ def test_a_manifest_among_the_files_is_used() -> None:
     assert len(recording.sha256) == 3
 
 
-def test_a_given_manifest_wins_and_the_other_is_said() -> None:
-    inside = source("manifest.json", '{"sensors": {"00B40B91": "foot_l"}}')
-    recording = read_recording([mt_file(), inside], manifest_of({"sensors": {"00B40B91": "pelvis"}}))
-    assert dict(recording.segments) == {"00B40B91": "pelvis"}
-    assert [(n.code, n.severity) for n in recording.notices] == [("ignored_file", "info")]
+def test_a_given_manifest_is_completed_by_the_one_among_the_files() -> None:
+    inside = {
+        "subject": {"height_m": 1.8, "standing_width_m": 0.2},
+        "protocol": "treadmill",
+        "belt_speed_mps": 1.2,
+        "mounting": {"pelvis": "sacrum", "foot_l": "instep"},
+        "sensors": {"00B40B91": "foot_l"},
+        "sources": [{"file": "*.txt", "rate_hz": 50}],
+    }
+    given = manifest_of(
+        {
+            "subject": {"height_m": 1.7},
+            "mounting": {"pelvis": "belt"},
+            "sensors": {"00B40B91": "pelvis"},
+        }
+    )
+    files = [mt_file(), source("manifest.json", json.dumps(inside))]
+    recording = read_recording(files, given)
+    assert recording.segments == {"00B40B91": "pelvis"}
+    assert recording.streams["00B40B91"].rate_hz == 50.0
+    assert (recording.subject.height_m, recording.subject.standing_width_m) == (1.7, 0.2)
+    assert recording.mounting == {"pelvis": "belt", "foot_l": "instep"}
+    assert (recording.protocol, recording.belt_speed_mps) == ("treadmill", 1.2)
+    walk = read_recording(files, manifest_of({"protocol": "walk"}))
+    assert (walk.protocol, walk.belt_speed_mps) == ("walk", None)
+    assert walk.segments == {"00B40B91": "foot_l"}
 
 
 def test_two_manifests_or_a_broken_one_are_refused() -> None:

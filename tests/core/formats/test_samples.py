@@ -191,3 +191,37 @@ def test_both_gaitmap_copies_hold_the_same_norms() -> None:
             np.linalg.norm(b.streams[foot].acc, axis=1),
             atol=1e-6,
         )
+
+
+def ipol_manifest() -> bytes:
+    """Manifest of three tab-separated tables with one packet counter: two shoes and the low back."""
+    names = {kind: [f"{kind}_{axis}" for axis in "XYZ"] for kind in ("Acc", "Gyr", "Mag")}
+    columns = {"acc": names["Acc"], "gyr": names["Gyr"], "mag": names["Mag"]}
+    entry = {
+        "skip_rows": 1,
+        "separator": "\t",
+        "counter": {"column": "PacketCounter", "rate_hz": 100},
+        "acc_unit": "m/s2",
+        "gyr_unit": "rad/s",
+    }
+    places = {"*_lf.txt": "foot_l", "*_rf.txt": "foot_r", "*_lb.txt": "pelvis"}
+    sources = [{"file": file, "columns": {place: columns}, **entry} for file, place in places.items()]
+    return json.dumps({"sources": sources}).encode()
+
+
+@pytest.mark.parametrize("trial", ["11-1", "12-3", "13-2", "14-1"])
+def test_tables_with_lost_packets_keep_their_time(trial: str) -> None:
+    folder = data_folder("ipol_walks")
+    files = [SourceFile.of_path(path) for path in sorted(folder.glob(f"{trial}_*.txt"))]
+    recording = read_recording(files, parse_manifest(ipol_manifest()))
+    assert dict(recording.segments) == {"pelvis": "pelvis", "foot_l": "foot_l", "foot_r": "foot_r"}
+    counters = {}
+    for file, place in (("lf", "foot_l"), ("rf", "foot_r"), ("lb", "pelvis")):
+        rows = (folder / f"{trial}_{file}.txt").read_text().splitlines()[2:]
+        counters[place] = np.unique([float(row.split("\t")[0]) for row in rows])
+    first = min(counts[0] for counts in counters.values())
+    for place, counts in counters.items():
+        stream = recording.streams[place]
+        assert (stream.clock, stream.rate_hz) == ("counter", 100.0)
+        np.testing.assert_allclose(stream.t_s, (counts - first) / 100, atol=1e-9)
+    assert recording.streams["foot_l"].t_s[-1] == pytest.approx((counters["foot_l"][-1] - first) / 100)

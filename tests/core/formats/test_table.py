@@ -37,6 +37,94 @@ def test_the_separator_is_found(separator: str) -> None:
     assert (stream.clock, stream.rate_hz) == ("index", 100.0)
 
 
+@pytest.mark.parametrize("separator", ["\t", " "])
+def test_a_separator_of_tab_or_space_may_be_declared(separator: str) -> None:
+    stream = read(table(separator), separator=separator).streams["shank_l"]
+    np.testing.assert_allclose(stream.acc, ACC, rtol=1e-8)
+
+
+def test_columns_lined_up_with_several_spaces_are_read() -> None:
+    rows = ["".join(f"{v:14.6f}" for v in row) + " " for row in np.hstack([ACC, GYR])]
+    stream = read("\n".join(["  ax ay   az gx gy gz", *rows]), separator=" ").streams["shank_l"]
+    np.testing.assert_allclose(stream.acc, ACC, atol=1e-6)
+
+
+def test_times_that_hardly_differ_give_no_endless_rate() -> None:
+    rows = [f"{i * 5e-324},{row}" for i, row in enumerate(table().split("\n")[1:-1])]
+    text = "\n".join(["t,ax,ay,az,gx,gy,gz", *rows])
+    stream = read(text, rate_hz=None, time_column="t").streams["shank_l"]
+    assert stream.rate_hz == 100.0
+    assert [n.code for n in stream.notices] == ["rate_unknown"]
+
+
+COUNTER = {"rate_hz": None, "counter": {"column": "n", "rate_hz": 100}}
+
+
+def counted(counts: np.ndarray, rows: np.ndarray | None = None) -> str:
+    text = table().split("\n")
+    kept = text[1:-1] if rows is None else [text[1 + i] for i in rows]
+    lines = [f"{n:g},{row}" for n, row in zip(counts, kept, strict=True)]
+    return "\n".join(["n," + text[0], *lines]) + "\n"
+
+
+def test_lost_rows_of_a_counted_table_are_lost_time() -> None:
+    there = np.setdiff1d(np.arange(300), np.r_[50:55, 200:260])
+    stream = read(counted(there, there), **COUNTER).streams["shank_l"]
+    assert (stream.clock, stream.rate_hz) == ("counter", 100.0)
+    np.testing.assert_allclose(stream.t_s, there / 100, atol=1e-9)
+    np.testing.assert_allclose(stream.acc, ACC[there], rtol=1e-8)
+
+
+@pytest.mark.parametrize(("wrap", "start"), [(256, 200), (None, 65_500), (65_536, 65_400)])
+def test_the_counter_of_a_table_wraps(wrap: int | None, start: int) -> None:
+    counts = (start + np.arange(300)) % (wrap or 65_536)
+    counter = {"column": "n", "rate_hz": 100, "wrap": wrap} if wrap else COUNTER["counter"]
+    stream = read(counted(counts), rate_hz=None, counter=counter).streams["shank_l"]
+    np.testing.assert_allclose(stream.t_s, np.arange(300) / 100, atol=1e-9)
+
+
+def test_tables_that_share_a_counter_share_the_time() -> None:
+    files = [
+        source("l.csv", counted(np.arange(65_530, 65_830) % 65_536)),
+        source("r.csv", counted(np.arange(4, 304))),
+    ]
+    entry = SPEC | COUNTER
+    other = entry | {"file": "r.csv", "columns": {"shank_r": CHANNELS}}
+    streams = read_recording(files, manifest_of({"sources": [entry | {"file": "l.csv"}, other]})).streams
+    assert streams["shank_l"].t_s[0] == 0.0
+    assert streams["shank_r"].t_s[0] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("counts", "counter", "code", "words"),
+    [
+        (np.arange(300) * 2, {}, "bad_counter", "'n' goes up by 2 from row to row, expected 1"),
+        (np.arange(300), {"wrap": 256}, "bad_counter", "counts to 299, but counter.wrap is 256"),
+        (np.arange(300), {"wrap": 2}, "manifest_bad_value", "counter.wrap is 2"),
+        (np.arange(300), {"column": "N"}, "unknown_column", "counter.column: t.csv has no column 'N'"),
+        (np.arange(300), {"rate_hz": None}, "rate_missing", "counter.rate_hz is missing"),
+        (np.arange(300), {"rate_hz": 0.0}, "manifest_bad_value", "counter.rate_hz is 0"),
+        (np.arange(300), {"per_second": 3}, "manifest_unknown_key", "sources[0].counter.per_second"),
+    ],
+)
+def test_a_column_that_does_not_count_samples_is_said(
+    counts: np.ndarray, counter: dict[str, object], code: str, words: str
+) -> None:
+    entry = {"rate_hz": None, "counter": {"column": "n", "rate_hz": 100} | counter}
+    with pytest.raises((FormatError, ManifestError)) as e:
+        read(counted(counts), **entry)
+    assert e.value.code == code
+    assert words in e.value.message
+
+
+@pytest.mark.parametrize("more", [{"time_column": "n"}, {"rate_hz": 50}])
+def test_two_clocks_for_one_table_are_refused(more: dict[str, object]) -> None:
+    with pytest.raises(ManifestError) as e:
+        read(counted(np.arange(300)), **(COUNTER | more))
+    assert e.value.code == "manifest_bad_value"
+    assert "give one of them" in e.value.message
+
+
 def test_lines_before_the_header_and_its_absence_are_described() -> None:
     lines = ["comment", "more, of, it", *table().split("\n")]
     np.testing.assert_allclose(read("\n".join(lines), skip_rows=2).streams["shank_l"].acc, ACC, rtol=1e-8)

@@ -81,6 +81,7 @@ def test_any_mounting_gives_the_same_orientations() -> None:
         assert np.degrees(angle_between(q, other.q[segment]).max()) < 0.1, segment
 
 
+@pytest.mark.slow
 def test_relative_heading_drift_is_taken_out_over_a_long_walk() -> None:
     """Without the correction the same take fails the limit: the check can fail."""
     recording, truth = simulated("five_minutes", 1)

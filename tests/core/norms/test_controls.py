@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from core.frames import SIDES, Floats, Side
 from core.norms.controls import ControlSession, control_group, mean_curves
 from core.norms.profile import NINE
 from core.norms.values import Sex
+from core.parameters.kinematic import MEAN_ZERO
 from core.parameters.result import CycleCurves, Parameter
 from core.scores import scores
 from tests.wbds import people
@@ -59,6 +61,21 @@ def test_a_person_measured_often_counts_once() -> None:
     )
 
 
+def test_visits_of_too_few_strides_make_no_reference() -> None:
+    whole = [session(f"c{i}", 60.0 + i) for i in range(5)]
+    short = session("c5", 90.0)
+    short = replace(short, parameters=[replace(p, n=3) for p in short.parameters])
+    group, steady = control_group([*whole, short]).values, control_group(whole).values
+    assert {k: (v.mean, v.sd, v.n) for k, v in group.items()} == {
+        k: (v.mean, v.sd, v.n) for k, v in steady.items()
+    }
+    curves = CycleCurves(
+        {"knee_flexion": {"left": np.full((3, 101), 0.2)}}, {"left": (0, 1, 2)},
+        {"left": np.ones(3, np.bool_)}, {"left": np.full(3, 62.0)},
+    )  # fmt: skip
+    assert mean_curves(curves) == {}
+
+
 def test_fewer_than_five_people_are_no_group() -> None:
     group = control_group([session(f"c{i % 4}") for i in range(20)])
     assert (group.n, group.reason, dict(group.values), dict(group.bands)) == (4, "few_controls", {}, {})
@@ -89,10 +106,10 @@ def test_controls_score_raw_from_standing_because_they_stand_alike() -> None:
     assert group.reference.spreads["raw"]["gps_side"].mean_deg == pytest.approx(4.954, abs=0.001)
     person = people()[7]
     curves = CycleCurves(
-        {v: {s: np.radians(np.tile(person[s][v], (3, 1))) for s in SIDES} for v in NINE},
-        dict.fromkeys(SIDES, (0, 1, 2)),
-        {s: np.ones(3, np.bool_) for s in SIDES},
-        {s: np.full(3, 62.0) for s in SIDES},
+        {v: {s: np.radians(np.tile(person[s][v], (4, 1))) for s in SIDES} for v in NINE},
+        dict.fromkeys(SIDES, (0, 1, 2, 3)),
+        {s: np.ones(4, np.bool_) for s in SIDES},
+        {s: np.full(4, 62.0) for s in SIDES},
     )
     found = scores(curves, reference=group.reference)
     assert found.zero == "standing"
@@ -110,4 +127,6 @@ def test_the_band_of_controls_is_the_spread_of_single_sides() -> None:
     rows = [np.std([p[s]["knee_flexion"] for p in people()], axis=0, ddof=1) for s in SIDES]
     assert knee.sd_deg == pytest.approx(np.sqrt(np.mean(np.square(rows), axis=0)))
     assert knee.mean_deg[72] == pytest.approx(60.0, abs=2.0)
-    assert knee.comparable
+    assert {v: b.zero for v, b in group.bands.items()} == {
+        v: "stride_mean" if v in MEAN_ZERO else "standing" for v in NINE
+    }

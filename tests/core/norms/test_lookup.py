@@ -60,7 +60,7 @@ def test_differences_between_sides_compare_even_where_the_level_does_not() -> No
 
 
 def test_dimensionless_speed_makes_short_and_tall_people_alike() -> None:
-    """Hof 1996; spec/clinic.md §2 gives 0.29 and 0.43 as about 0.86 and 1.27 m/s on legs of 0.9 m."""
+    """Hof 1996; 0.29 and 0.43 are about 0.86 and 1.27 m/s on legs of 0.9 m."""
     leg = 0.53 * 1.698
     assert walking_speed(0.86, 1.698).dimensionless == pytest.approx(0.29, abs=0.002)
     assert walking_speed(1.27, 1.698).leg_m == pytest.approx(leg)
@@ -128,12 +128,9 @@ def test_levels_compare_only_where_the_anatomical_level_is_known() -> None:
     known = norms_for(30, "male", 1.2, anatomical=("knee_flexion", "pelvis_tilt"))
     assert known.place("knee_flexion_max_swing_deg", 61.08).z == pytest.approx(0.0)
     assert known.place("hip_flexion_min_deg", -8.0).reason == "not_comparable"
-    assert known.bands["pelvis_tilt"].comparable
     assert "depends on the protocol" in known.bands["knee_flexion"].note
     assert "depends on the protocol" in known.values["knee_flexion_max_swing_deg"].note
     assert known.values["knee_flexion_rom_deg"].note == ""
-    assert "zero differs" in known.bands["hip_flexion"].note
-    assert not standing.bands["pelvis_tilt"].comparable
 
 
 def test_every_norm_shown_has_source_group_and_number_or_none() -> None:

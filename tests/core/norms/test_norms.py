@@ -38,7 +38,7 @@ def test_nothing_else_is_shipped() -> None:
 
 
 def test_the_adult_knee_is_the_published_one() -> None:
-    """Every tenth percent as printed in spec/clinic.md §2."""
+    """Every tenth percent as computed from the strides when the table was made."""
     band = adult_kinematics(None).bands["knee_flexion"]
     printed = [2.2, 13.2, 9.6, 3.7, 1.5, 7.9, 33.6, 59.9, 48.7, 11.5, 1.4]
     assert np.round(band.mean_deg[::10], 1) == pytest.approx(printed, abs=0.051)
@@ -73,13 +73,12 @@ def test_no_band_where_no_reference_exists() -> None:
     assert angle_values(12).reason == "no_norm_for_age"
 
 
-def test_bands_say_what_may_be_compared() -> None:
+def test_every_band_says_its_zero_and_how_far_to_trust_it() -> None:
     bands = adult_kinematics(None).bands
-    assert {v for v, b in bands.items() if b.comparable and b.confidence == "normal"} == {
+    assert {b.zero for b in bands.values()} == {"anatomical"}
+    assert {v for v, b in bands.items() if b.confidence == "normal"} == {
         "hip_flexion", "knee_flexion", "ankle_dorsiflexion",
     }  # fmt: skip
-    assert {v for v, b in bands.items() if not b.comparable} == {"pelvis_tilt", "foot_progression"}
-    assert all("compare shapes" in b.note for b in bands.values() if b.comparable)
     assert all(b.note for b in bands.values())
 
 

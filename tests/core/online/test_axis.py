@@ -368,6 +368,7 @@ def test_takes_that_can_have_no_axis_are_refused_with_the_reason() -> None:
     assert slow.value.code == "sample_rate_too_low"
 
 
+@pytest.mark.bench
 def test_a_push_of_seven_sensors_costs_less_than_a_sixth_of_a_millisecond() -> None:
     warm()
     d = device(0, 100.0, ("pelvis", "thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r"))

@@ -161,6 +161,7 @@ def test_a_sensor_that_moves_is_named_and_nothing_begins() -> None:
     assert done.calibrator.view.stood_s == 0.0
 
 
+@pytest.mark.slow
 def test_redo_begins_anew_with_the_next_sample() -> None:
     recording, _ = scripted(
         (Stand(5.0), Straight(12.0, 0.6, 0.55), Stand(5.0), Straight(12.0, 0.6, 0.55), Stand(2.0))
@@ -273,6 +274,7 @@ def strapped_on(seed: int) -> UniformRecording:
     return replace(first, t_s=np.arange(n) / 100.0, sensors=sensors)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_strapping_sensors_on_is_no_walk(seed: int) -> None:
     done = run(joined(strapped_on(seed), walk()))
@@ -305,6 +307,7 @@ def test_a_sensor_turned_between_two_standings_makes_the_second_count() -> None:
     assert done.found[0].ok
 
 
+@pytest.mark.slow
 def test_a_take_in_which_hardly_anybody_walks_begins_anew() -> None:
     recording, _ = scripted((Stand(5.0), Straight(2.4, 0.6, 0.55), Stand(125.0)))
     done = run(recording, 500)

@@ -14,7 +14,7 @@ from core.body.feet import FootTracks
 from core.body.tree import PRESETS
 from core.events.result import GaitEvent, GaitEvents
 from core.formats.live_log import FILE_MARK, decode_batch, encode_batch, record, scan
-from core.frames import FOOT, Segment
+from core.frames import FOOT, SIDES, Segment
 from core.fusion.orientations import Orientations
 from core.measure import Measured, Tracks, measure
 from core.online import LiveFrame, LiveStride, Online
@@ -114,7 +114,7 @@ def same(a: Told, b: Told) -> None:
 
 
 @pytest.mark.parametrize("name", SETS)
-@pytest.mark.parametrize("sizes", [1, 7, (64, 3, 21, 1, 40), 200])
+@pytest.mark.parametrize("sizes", [pytest.param(1, marks=pytest.mark.slow), 7, (64, 3, 21, 1, 40), 200])
 def test_batches_of_any_size_give_the_same_bits(name: str, sizes: int | tuple[int, ...]) -> None:
     same(streamed(name)[1], told(live(worn(name), sizes)[1]))
 
@@ -135,6 +135,7 @@ def test_the_worn_sensors_decide_what_is_shown(name: str) -> None:
         assert max(heights) < 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", [5, 10])
 def test_a_redone_calibration_starts_at_the_next_sample_and_nothing_else_changes(sizes: int) -> None:
     take = simulated("comfortable", 1)[0]
@@ -169,6 +170,7 @@ def test_the_log_of_a_take_gives_the_same_bits_as_its_stream() -> None:
     same(told([f for f in sent if f]), told([f for f in replayed if f]))
 
 
+@pytest.mark.slow
 def test_an_event_is_told_in_the_push_that_brings_its_sample_and_soon() -> None:
     for name, take in (("simulated", simulated("comfortable", 1)[0]), ("neura_walk", neura_walk())):
         frames = live(take, 1)[1]
@@ -243,6 +245,7 @@ def compared(strides: Sequence[LiveStride], whole: Measured) -> int:
     return values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [n for n in SETS if n != "without feet"])
 def test_a_live_stride_has_the_figures_of_the_whole_take(name: str) -> None:
     run = recorded(worn(name))
@@ -253,10 +256,24 @@ def test_a_live_stride_has_the_figures_of_the_whole_take(name: str) -> None:
     assert compared(run.strides, whole) > 14 * len(complete)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("person", ["hemiparetic", "parkinson", "step_asym"])
 def test_it_has_them_of_other_gaits_too(person: str) -> None:
     run = recorded(simulated(person, 2)[0])
     assert compared(run.strides, measure(tracks(run))) > 500
+
+
+def test_the_stopping_stride_of_each_foot_is_told_again_as_not_counted() -> None:
+    """neura_walk stops and stands: what is known a moment too late is taken back."""
+    run = recorded(neura_walk())
+    whole = measure(tracks(run))
+    final = {s.n: s for s in run.strides}
+    for side in SIDES:
+        last = max((s for s in final.values() if s.side == side), key=lambda s: s.start_s)
+        assert (last.complete, last.counted) == (True, False)
+        assert "last" in last.flags
+    counts = {(s.side, s.start_s) for s in final.values() if s.counted}
+    assert counts <= {(s.side, s.start_s) for s in whole.strides.used()}
 
 
 def test_a_stride_is_told_at_once_and_again_with_its_distances() -> None:

@@ -58,6 +58,7 @@ def test_a_belts_speed_without_a_treadmill_is_refused() -> None:
     assert caught.value.code == "belt_speed_without_treadmill"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("segment", ["foot_r", "shank_l", "pelvis"])
 def test_a_lost_sensor_comes_back_into_the_figure(segment: Segment) -> None:
     """What hangs on it is withheld while it is away; a few steps later all is as if nothing had been."""
@@ -79,6 +80,7 @@ def test_a_lost_sensor_comes_back_into_the_figure(segment: Segment) -> None:
         assert not s.counted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [0.5, 1.0, 5.0])
 def test_feet_by_themselves_begin_anew_at_their_next_rest(seconds: float) -> None:
     """The tablet is out of reach for a while: nobody's samples come, one foot is in mid-swing."""
@@ -139,6 +141,7 @@ def slower(take: UniformRecording, rate_hz: float) -> UniformRecording:
     return replace(take, t_s=t_s, rate_hz=rate_hz, sensors={s: thin(x) for s, x in take.sensors.items()})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [60.0, 120.0])
 def test_sensors_of_another_rate_walk_the_same_strides(rate_hz: float) -> None:
     hundred = [s for s in recorded(walk()).strides if s.complete]
@@ -189,6 +192,7 @@ def test_contact_follows_the_events() -> None:
     assert set(state) == set(SIDES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("a", "b"), [("shank_l", "shank_r"), ("foot_l", "foot_r")])
 def test_exchanged_sensors_are_told_while_they_stream(a: Segment, b: Segment) -> None:
     take = walk()

@@ -1,4 +1,4 @@
-"""What peers' sources were seen to get wrong (spec/field.md §2): each is a test that ours does not."""
+"""What sources of other gait software were seen to get wrong: each is a test that ours does not."""
 
 from __future__ import annotations
 

@@ -24,6 +24,8 @@ from tests.walks import simulated
 
 RATE = 100.0
 T = np.arange(3000) / RATE
+SIZE = 0.3
+"""Of a wave that a knee can follow, rad."""
 
 
 def strides(n: int = 8, duration: float = 1.13, reason: str | None = None) -> Strides:
@@ -54,10 +56,10 @@ def angles(**named: Floats) -> JointAngles:
 
 
 def test_a_curve_is_the_angle_at_each_percent_of_the_cycle() -> None:
-    curves = cycle_curves(angles(knee_flexion_r=wave()), strides())
+    curves = cycle_curves(angles(knee_flexion_r=SIZE * wave()), strides())
     rows = curves.curves["knee_flexion"]["right"]
     assert rows.shape == (8, 101)
-    expected = np.sin(2 * np.pi * np.linspace(0, 1, 101))
+    expected = SIZE * np.sin(2 * np.pi * np.linspace(0, 1, 101))
     # linear interpolation of a sine: at most (2π·dt/T)²/8
     assert np.abs(rows - expected).max() <= (2 * np.pi / RATE / 1.13) ** 2 / 8 + 1e-9
     assert "left" not in curves.curves["knee_flexion"]
@@ -67,7 +69,9 @@ def test_a_curve_is_the_angle_at_each_percent_of_the_cycle() -> None:
 
 def test_row_i_belongs_to_the_stride_it_names() -> None:
     listed = strides()
-    curves = cycle_curves(angles(knee_flexion_l=wave(shift=0.565), knee_flexion_r=wave()), listed)
+    curves = cycle_curves(
+        angles(knee_flexion_l=SIZE * wave(shift=0.565), knee_flexion_r=SIZE * wave()), listed
+    )
     for side in ("left", "right"):
         named = [listed.strides[i] for i in curves.stride_index[side]]
         assert all(s.side == side for s in named)
@@ -75,7 +79,7 @@ def test_row_i_belongs_to_the_stride_it_names() -> None:
 
 
 def test_a_gap_empties_the_rows_that_touch_it_and_no_other() -> None:
-    knee = wave()
+    knee = SIZE * wave()
     knee[round((1.0 + 1.13 * 3.5) * RATE) : round((1.0 + 1.13 * 3.5) * RATE) + 15] = np.nan
     curves = cycle_curves(angles(knee_flexion_r=knee, hip_flexion_r=wave()), strides())
     lost = np.isnan(curves.curves["knee_flexion"]["right"])
@@ -88,14 +92,16 @@ def test_a_gap_empties_the_rows_that_touch_it_and_no_other() -> None:
 
 
 def test_the_mean_is_over_counted_strides_and_nothing_is_none() -> None:
-    curves = cycle_curves(angles(knee_flexion_r=wave() + 0.1 * T), strides())
+    curves = cycle_curves(angles(knee_flexion_r=SIZE * wave() + 0.1 * T), strides())
     mean = mean_curve(curves, "knee_flexion", "right")
     counted = curves.curves["knee_flexion"]["right"][curves.used["right"]]
     assert mean.n == 7
     assert mean.mean == pytest.approx(counted.mean(axis=0))
     assert mean.sd == pytest.approx(counted.std(axis=0, ddof=1))
     assert mean_curve(curves, "knee_flexion", "left").mean is None
-    nothing = mean_curve(cycle_curves(angles(knee_flexion_r=wave()), strides(0)), "knee_flexion", "right")
+    nothing = mean_curve(
+        cycle_curves(angles(knee_flexion_r=SIZE * wave()), strides(0)), "knee_flexion", "right"
+    )
     assert (nothing.mean, nothing.sd, nothing.n) == (None, None, 0)
 
 
@@ -129,7 +135,7 @@ def test_reasons_when_there_is_no_number() -> None:
     knee = np.full(3000, np.nan)
     all_lost = kinematic(cycle_curves(angles(knee_flexion_r=knee), strides()))
     assert {p.reason for p in all_lost if p.side == "right" and p.name.startswith("knee")} == {"gap"}
-    none_used = kinematic(cycle_curves(angles(knee_flexion_r=wave()), strides(reason="turn")))
+    none_used = kinematic(cycle_curves(angles(knee_flexion_r=SIZE * wave()), strides(reason="turn")))
     assert {p.reason for p in none_used if p.side == "right" and p.name.startswith("knee")} == {"no_strides"}
 
 
@@ -141,7 +147,7 @@ def test_foot_pitch_at_the_contacts() -> None:
     assert found["foot_pitch_tc_deg"]["right"] == pytest.approx(20.0 * np.sin(2 * np.pi * 0.62), abs=0.02)
     assert "left" not in found["foot_pitch_ic_deg"]
     table = per_stride_figures(
-        strides(), found | stride_figures(cycle_curves(angles(knee_flexion_r=wave()), strides()))
+        strides(), found | stride_figures(cycle_curves(angles(knee_flexion_r=SIZE * wave()), strides()))
     )
     assert table["foot_pitch_tc_deg"][1] is None
     assert table["foot_pitch_tc_deg"][0] == pytest.approx(found["foot_pitch_tc_deg"]["right"][0])
@@ -150,7 +156,7 @@ def test_foot_pitch_at_the_contacts() -> None:
 
 def test_all_parameters_in_one_table() -> None:
     take = orientations(RATE, {"foot_r": np.radians(20.0) * wave()})
-    found = gait_parameters(strides(), angles(knee_flexion_r=wave()), take)
+    found = gait_parameters(strides(), angles(knee_flexion_r=SIZE * wave()), take)
     keys = [(p.name, p.side) for p in found]
     assert len(set(keys)) == len(keys)
     assert {"stride_time_s", "cadence_spm", "knee_flexion_rom_deg", "foot_pitch_ic_deg"} <= {
@@ -160,6 +166,7 @@ def test_all_parameters_in_one_table() -> None:
     assert all(p.mean is None or np.isfinite(p.mean) for p in found)
 
 
+@pytest.mark.bench
 def test_ten_minutes_of_curves_are_cut_within_50_ms() -> None:
     n = 60000
     names = [f"{j}_{s}" for j in FIGURES_AND_OTHERS for s in "lr"]
@@ -225,7 +232,7 @@ def test_rotation_and_progression_have_the_side_that_goes_forward_or_inward() ->
 
 
 def test_the_simulated_pelvis_rotates_as_the_norm_it_was_made_from() -> None:
-    """spec/patients.md §1: rotation is the WBDS mean, antisymmetrised between the sides."""
+    """docs/science/simulation.md, "Target curves": rotation is the WBDS mean, antisymmetric between sides."""
     truth = simulated("healthy", 5)[1]
     there = dict.fromkeys(truth.q, np.ones(len(truth.t_s), bool))
     oriented = Orientations(truth.t_s, truth.rate_hz, truth.q, there, "truth")

@@ -103,6 +103,7 @@ def test_what_is_missing_has_its_own_reason() -> None:
     assert phases(joint=stiff)["mid_swing_pct"] == "tibia_not_vertical"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["comfortable", "hemiparetic"])
 def test_the_seven_phases_are_the_whole_stride(name: str) -> None:
     truth = simulate_scenario(name, 5).truth

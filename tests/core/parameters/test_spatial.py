@@ -14,7 +14,7 @@ from core.body.model import BodyModel
 from core.events.result import Stride, Strides
 from core.frames import FOOT, R_NEUTRAL, SIDES, Bools, Floats, Side
 from core.parameters.result import Parameter
-from core.parameters.spatial import BELT, NAMES, Surface, per_stride_spatial, spatial, spatial_rows
+from core.parameters.spatial import BELT, NAMES, Surface, in_place, per_stride_spatial, spatial, spatial_rows
 from core.rotation import about, from_matrix, multiply
 from core.simulate import Truth
 from tests.walks import simulated
@@ -128,6 +128,15 @@ def test_a_small_step_within_a_stance_does_not_move_the_flat_before_it() -> None
     assert before["stride_length_m"] == pytest.approx(1.3, abs=0.02)
 
 
+def test_a_foot_that_comes_down_where_it_was_made_no_stride() -> None:
+    """Marching on the spot has contacts like walking, and leads nowhere; on a belt every stride does."""
+    tracks = feet(length=0.02)
+    assert in_place(strides(), tracks) == frozenset(range(len(strides().strides)))
+    assert in_place(strides(), feet()) == in_place(strides(), None) == frozenset()
+    assert in_place(strides(), tracks, Surface("treadmill", 1.0)) == frozenset()
+    assert parameters(tracks)["stride_length_m", "left"].reason == "in_place"
+
+
 def test_drift_in_height_leaves_clearance_as_it_is() -> None:
     level, climbing = parameters(feet()), parameters(feet(climb=0.05))
     want = level["max_heel_clearance_m", "left"].mean
@@ -224,7 +233,7 @@ def test_an_affected_side_shows_in_sign_and_size() -> None:
     steps = {s: found["step_length_m", s].mean for s in SIDES}
     assert steps["left"] is not None
     assert steps["right"] is not None
-    # the paretic left steps longer, as its walker was made (spec/patients.md §3)
+    # the paretic left steps longer, as its walker was made (docs/science/simulation.md, "Virtual people")
     assert steps["left"] / steps["right"] > 1.1
     assert found["circumduction_m", "left"].mean == pytest.approx(0.14, abs=0.03)
     assert found["circumduction_m", "right"].mean == pytest.approx(0.03, abs=0.02)

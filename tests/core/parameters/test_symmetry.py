@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,12 +15,14 @@ from core.parameters.result import Parameter
 from core.parameters.symmetry import angle_pct, index_pct, phase_coordination, ratio, symmetries
 
 
-def of(name: str, left: float | None, right: float | None, unit: str) -> tuple[Parameter, ...]:
-    return (Parameter(name, "left", 12, left, None, unit), Parameter(name, "right", 12, right, None, unit))
+def of(
+    name: str, left: float | None, right: float | None, unit: str, n: int = 12, sd: float | None = None
+) -> tuple[Parameter, ...]:
+    return (Parameter(name, "left", n, left, sd, unit), Parameter(name, "right", n, right, sd, unit))
 
 
 def test_the_vector_of_the_literature() -> None:
-    """Non-paretic .39, paretic .25 (spec/clinic.md §3)."""
+    """Non-paretic .39, paretic .25: published (docs/science/phases-and-regularity.md, "Symmetry")."""
     assert ratio(0.39, 0.25) == pytest.approx(1.56)
     assert index_pct(0.39, 0.25) == pytest.approx(43.75)
     assert angle_pct(0.39, 0.25) == pytest.approx(-13.71, abs=0.005)
@@ -50,6 +54,31 @@ def test_an_index_keeps_the_side_it_turns_its_sign_with_it(a: float, b: float) -
     assert left.index_pct == pytest.approx(-right.index_pct)  # type: ignore[operator]
     assert left.angle_pct == pytest.approx(-right.angle_pct)  # type: ignore[operator]
     assert left.ratio == pytest.approx(1.0 / right.ratio)  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_fewer_than_four_strides_of_a_side_have_no_asymmetry(n: int) -> None:
+    left, right = of("step_length_m", 0.51, 0.60, "m", sd=0.01)
+    few = replace(right, n=n)
+    assert symmetries((left, few)) == symmetries((replace(left, n=n), right)) == ()
+    assert symmetries((left, replace(right, n=4)))
+
+
+def test_sides_differ_clearly_only_where_the_interval_of_the_difference_leaves_out_zero() -> None:
+    """Welch's interval of 0.60 ± 0.10 and 0.50 ± 0.05 of four strides: freedom 4.4, so 4."""
+    left, right = of("step_length_m", 0.60, 0.50, "m", n=4)
+    (open_,) = symmetries((replace(left, sd=0.10), replace(right, sd=0.05)))
+    half = 2.7764 * np.hypot(0.10, 0.05) / 2.0
+    assert open_.low == pytest.approx(0.1 - half, abs=1e-4)
+    assert open_.high == pytest.approx(0.1 + half, abs=1e-4)
+    assert not open_.clear
+    (plain,) = symmetries((replace(left, sd=0.02), replace(right, sd=0.02)))
+    assert plain.clear
+    (unknown,) = symmetries((left, right))
+    assert (unknown.low, unknown.clear) == (None, False)
+    (steady,) = symmetries(of("stride_length_m", 1.20, 1.10, "m", sd=0.0))
+    assert steady.low == steady.high == pytest.approx(0.1)
+    assert steady.clear
 
 
 def test_angles_have_a_difference_and_no_ratio() -> None:

@@ -148,6 +148,7 @@ def simulated(name: str) -> dict[str, float]:
     }
 
 
+@pytest.mark.slow
 def test_a_hemiparetic_pelvis_is_less_harmonic_than_a_healthy_one() -> None:
     healthy, affected = simulated("comfortable"), simulated("hemiparetic")
     for name in ("harmonic_ratio_v", "harmonic_ratio_ap", "step_regularity_ap", "step_regularity_v"):

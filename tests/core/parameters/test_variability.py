@@ -44,7 +44,7 @@ def test_variation_needs_ten_strides_and_is_marked_below_thirty(n: int, cv: bool
 
 
 def test_variation_of_one_value_is_not_perfect_steadiness() -> None:
-    """A CV of 0 for a lone stride reads as "perfect" (spec/field.md §2, defects)."""
+    """A CV of 0 for a lone stride reads as "perfect"."""
     assert cv_pct([1.1], "s") is None
     assert cv_pct([], "s") is None
     assert cv_pct([1.1] * 10, "s") == pytest.approx(0.0, abs=1e-9)

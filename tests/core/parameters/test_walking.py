@@ -51,6 +51,13 @@ def test_the_first_and_last_stride_of_a_bout_are_not_in_the_cadence() -> None:
     assert found["step_count"].mean == 9
 
 
+def test_a_walk_of_starting_and_stopping_steps_has_no_cadence() -> None:
+    found = named(step_parameters(steps(0.0, 0.9, 1.7, 2.2, 3.1)))
+    assert (found["cadence_spm"].mean, found["cadence_spm"].reason) == (None, "no_strides")
+    assert found["step_time_s"].reason == "no_strides"
+    assert found["step_count"].mean == 5
+
+
 def test_a_stop_is_no_step_time() -> None:
     walked = steps(*[0.5 * i for i in range(8)], *[6.0 + 0.5 * i for i in range(8)])
     assert walked.bouts[0].stops == ((3.5, 6.0),)

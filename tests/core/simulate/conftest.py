@@ -32,7 +32,7 @@ MIXED = (
     Arc(1.6, -2.0 * np.pi, 0.5, 0.56),
     Stand(3.0),
 )
-"""Straight, pivot, stop and two arcs (spec/patients.md §6 item 7)."""
+"""Straight, pivot, stop and two arcs (docs/science/simulation.md, "Limits on construction")."""
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ DAY = (
     Hold("sit", 3.0),
     Hold("stand", 3.0),
 )
-"""The take that spec/patients.md §5 measured."""
+"""The take of docs/science/simulation.md, "Chest"."""
 
 
 @pytest.fixture(scope="module")

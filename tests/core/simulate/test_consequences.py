@@ -56,7 +56,7 @@ def test_iron_beside_the_walkway_is_told_and_costs_nothing() -> None:
 def test_a_clock_that_lags_at_the_thighs_costs_what_the_specification_measured(
     late_s: float, expected: float
 ) -> None:
-    """spec/estimators.md §3.3 "Other robustness": 10 ms 1.1°, 20 ms 2.1° at hip and knee."""
+    """docs/science/simulation.md, "Devices": 10 ms 1.1°, 20 ms 2.1° at hip and knee."""
     made, found = told(replace(SHAKEN, lags=(Lag("thigh_l", late_s), Lag("thigh_r", late_s))))
     for name in ("hip_flexion_r", "knee_flexion_r"):
         assert error_deg(made, found, name) == pytest.approx(expected, abs=0.25)

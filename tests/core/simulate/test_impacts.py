@@ -28,7 +28,7 @@ def hard() -> Simulation:
 
 
 def test_bones_do_not_know_about_impacts(soft: Simulation, hard: Simulation) -> None:
-    """spec/patients.md §6 item 8."""
+    """docs/science/simulation.md, "Limits on construction"."""
     for segment, q in soft.truth.q.items():
         assert np.array_equal(q, hard.truth.q[segment])
         assert np.array_equal(soft.truth.p[segment], hard.truth.p[segment])
@@ -59,7 +59,8 @@ def _stride_maxima(simulation: Simulation, values: Floats) -> Floats:
 
 
 def test_shocks_of_a_healthy_walk_are_of_the_size_the_specification_measured(hard: Simulation) -> None:
-    """Median 97 m/s² (5 to 95 %: 61 to 127) at the foot, 23 at the pelvis (spec/patients.md §4)."""
+    """Median 97 m/s² (5 to 95 %: 61 to 127) at the foot, 23 at the pelvis
+    (docs/science/simulation.md, "Impacts")."""
     foot, pelvis = (np.linalg.norm(hard.ideal[s].acc, axis=1) for s in ("foot_l", "pelvis"))
     assert 75.0 < np.median(_stride_maxima(hard, foot)) < 120.0
     assert 18.0 < np.median(_stride_maxima(hard, pelvis)) < 28.0
@@ -94,7 +95,7 @@ def test_steps_on_the_spot_land_softly() -> None:
 
 
 def test_shocks_do_not_depend_on_the_grid(move_steadily: Callable[[float, float], Motion]) -> None:
-    """spec/patients.md §6 item 3, with shocks."""
+    """docs/science/simulation.md, "Limits on construction", with shocks."""
     rng = np.random.default_rng
     mount = draw_mounts(PLACES, 1.0, 0.0, rng(0))["foot_r"]
 
@@ -107,7 +108,7 @@ def test_shocks_do_not_depend_on_the_grid(move_steadily: Callable[[float, float]
 
 
 def test_hard_steps_leave_the_range_of_a_real_sensor_and_are_cut_off() -> None:
-    """spec/patients.md §1: at 200 Hz and twice the impact 0.3 % of the foot's samples."""
+    """docs/science/simulation.md, "Impacts": at 200 Hz and twice the impact 0.3 % of the foot's samples."""
     script = (Stand(3.0), Straight(24.0, 0.72, 0.5), Stand(3.0))
     made = simulate(script, FAST, 3, Setup(rate_hz=200.0, impacts=True))
     device = next(d for d, s in made.recording.segments.items() if s == "foot_r")

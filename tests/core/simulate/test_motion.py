@@ -25,7 +25,7 @@ NORM_LIMITS_DEG = {
     "pelvis_obliquity": 0.3,
     "pelvis_rotation": 0.3,
 }
-"""RMS from the WBDS adult mean (spec/patients.md §6 item 2)."""
+"""RMS from the WBDS adult mean (docs/science/simulation.md, "Limits on construction")."""
 
 NORM_CORRELATION = {"hip_flexion": 0.98, "knee_flexion": 0.98, "ankle_dorsiflexion": 0.90}
 
@@ -96,7 +96,7 @@ def test_curves_are_those_of_healthy_adults(steady_motion: Motion, side: Side) -
 
 
 def test_left_and_right_walk_alike(steady_motion: Motion) -> None:
-    """Half a stride apart, in the mirror (spec/estimators.md §6.2)."""
+    """Half a stride apart, in the mirror (docs/science/simulation.md, "Limits on construction")."""
     t, step = steady_motion.t_s, steady_motion.plan.typical_step_s
     angles = joint_angles(steady_motion.q)
     middle = (t > 12.0) & (t < 20.0)
@@ -113,7 +113,8 @@ def _peak_accelerations(motion: Motion) -> dict[str, float]:
 
 
 def test_accelerations_do_not_depend_on_the_grid(move_steadily: Callable[[float, float], Motion]) -> None:
-    """Paths are C³: a corner would grow with the rate (spec/patients.md §6 item 3)."""
+    """Paths are C³: a corner would grow with the rate
+    (docs/science/simulation.md, "Limits on construction")."""
     coarse, fine = (_peak_accelerations(move_steadily(rate, 1.75)) for rate in (400.0, 1600.0))
     for segment, value in coarse.items():
         assert fine[segment] == pytest.approx(value, rel=0.12), segment
@@ -127,7 +128,8 @@ def test_a_taller_person_walks_with_the_same_angles(move_steadily: Callable[[flo
 
 
 def test_strides_vary_as_healthy_ones_do() -> None:
-    """60 m: stride time CV 1 to 2 %, step length CV 2 to 3.2 % (spec/patients.md §6 item 4)."""
+    """60 m: stride time CV 1 to 2 %, step length CV 2 to 3.2 %
+    (docs/science/simulation.md, "Limits on construction")."""
     planned = plan((Stand(2.0), Straight(60.0, 0.64, 0.54), Stand(2.0)), Walker(), np.random.default_rng(5))
     times = np.array([s.time_s for s in planned.steps[2:-1] if s.side == "left"])
     lengths = np.array([s.step_m for s in planned.steps[1:-1]])

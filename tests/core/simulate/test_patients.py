@@ -1,4 +1,5 @@
-"""Each virtual person shows the signature of spec/patients.md §3, on several seeds."""
+"""Each virtual person shows the signature of docs/science/simulation.md, "Virtual people", on several
+seeds."""
 
 from __future__ import annotations
 
@@ -136,6 +137,7 @@ def test_every_person_has_a_signature_and_a_script() -> None:
     assert set(PATIENTS) <= set(SCRIPTS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SIGNATURES)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_signature_shows(name: str, seed: int) -> None:
@@ -146,7 +148,7 @@ def test_the_signature_shows(name: str, seed: int) -> None:
 
 @pytest.mark.parametrize("name", SIGNATURES)
 def test_every_person_can_turn_stop_and_walk_arcs(name: str) -> None:
-    """spec/patients.md §6 item 7."""
+    """docs/science/simulation.md, "Limits on construction"."""
     patient = PATIENTS[name]
     step, duration = patient.step_m, patient.step_s
     script: Script = (
@@ -167,7 +169,7 @@ def test_every_person_can_turn_stop_and_walk_arcs(name: str) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_contacts_of_healthy_walking_are_found_when_they_happen(seed: int) -> None:
-    """spec/patients.md §6 item 6."""
+    """docs/science/simulation.md, "Virtual people"."""
     for side in SIDES:
         ic = match(
             contacts("healthy", seed).times(side, "ic"),
@@ -180,7 +182,8 @@ def test_contacts_of_healthy_walking_are_found_when_they_happen(seed: int) -> No
 @pytest.mark.parametrize("name", SIGNATURES)
 @pytest.mark.parametrize("rising", [True, False])
 def test_the_rule_invents_nothing_and_finds_all_heel_contacts(name: str, rising: bool) -> None:
-    """In both ways of landing: the counts must not rest on the shaped pitch (spec/patients.md §3)."""
+    """In both ways of landing: the counts must not rest on the shaped pitch
+    (docs/science/simulation.md, "Swing foot")."""
     missed = total = 0
     for side in SIDES:
         true = walked(name, 5, rising).contacts[side].contact.tolist()
@@ -191,6 +194,7 @@ def test_the_rule_invents_nothing_and_finds_all_heel_contacts(name: str, rising:
         assert missed <= 0.02 * total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [n for n in SIGNATURES if n != "severe_shuffle"])
 def test_contacts_stay_in_place_on_estimated_orientations_with_shocks(name: str) -> None:
     """What an analysis sees: half a degree of error must not move the maximum of the pitch by 0.1 s."""
@@ -215,7 +219,8 @@ def test_a_severe_shuffle_is_refused_with_its_figure(seed: int) -> None:
 def test_a_landing_on_the_forefoot_has_no_largest_pitch_at_contact() -> None:
     """The pitch rises through contact until the foot is flat, so on a smooth foot the rule finds nothing.
 
-    The counts of spec/patients.md §3 for a drop foot come from the shake of its contact, not from the pitch.
+    The counts for a drop foot (docs/science/simulation.md, "Virtual people") come from the shake of its
+    contact, not from the pitch.
     """
     truth = walked("drop_foot", 5)
     found = contacts("drop_foot", 5)
@@ -230,7 +235,8 @@ def test_a_landing_on_the_forefoot_has_no_largest_pitch_at_contact() -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_lower_threshold_loses_the_contacts_of_a_drop_foot(seed: int) -> None:
-    """The forefoot touches down at s of about −0.13, below −0.1 (spec/patients.md §0.5, §6 item 6).
+    """The forefoot touches down at s of about −0.13, below −0.1
+    (docs/science/simulation.md, "Virtual people").
 
     What the rule finds instead is the still foot 0.1 to 0.4 s later: lost is what is not there within 60 ms.
     """

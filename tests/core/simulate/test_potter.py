@@ -33,7 +33,7 @@ def test_the_stance_foot_is_fixed_and_still_means_still(walk: PotterWalk) -> Non
 
 
 def test_strides_and_angles_are_the_paper_s(walk: PotterWalk) -> None:
-    """Stride 0.73 m at 0.33 m/s, half angle 11.44° (spec/estimators.md §2.1)."""
+    """Stride 0.73 m at 0.33 m/s, half angle 11.44° (docs/science/simulation.md, "Potter's walker")."""
     lengths, widths = walk.strides()
     assert len(lengths) == 2 * 5
     assert lengths == pytest.approx(STRIDE_M, abs=1e-12)
@@ -46,6 +46,7 @@ def test_strides_and_angles_are_the_paper_s(walk: PotterWalk) -> None:
         assert 11.44 < np.degrees(flexion.max()) < 15.0
 
 
+@pytest.mark.slow
 def test_the_signals_integrate_to_the_truth(walk: PotterWalk) -> None:
     dt = 1.0 / walk.rate_hz
     for i in range(3):

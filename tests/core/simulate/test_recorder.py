@@ -61,7 +61,8 @@ def test_a_lag_of_whole_samples_moves_them() -> None:
 
 
 def test_a_lag_survives_the_common_time_axis() -> None:
-    """Counters alone cannot show it: this is what makes it dangerous (spec/estimators.md §3.3, §7)."""
+    """Counters alone cannot show it: this is what makes it dangerous
+    (docs/science/simulation.md, "Devices")."""
     recording = simulate(SCRIPT, seed=4, setup=replace(EXACT, lags=(Lag("thigh_l", 0.02),))).recording
     plain = synchronise(simulate(SCRIPT, seed=4, setup=EXACT).recording)
     uniform = synchronise(recording)

@@ -65,7 +65,8 @@ def test_sensors_at_rest_read_gravity_upwards_and_no_rate(mixed: Simulation) -> 
 
 
 def test_a_flat_foot_reads_gravity_and_no_rate(mixed: Simulation) -> None:
-    """spec/patients.md §6 item 1; two samples at each end see the spline bend into the movement."""
+    """docs/science/simulation.md, "Limits on construction"; two samples at each end see the spline bend into
+    the movement."""
     for side in SIDES:
         flat = mixed.truth.flat[side].copy()
         for shift in (1, 2):
@@ -79,7 +80,7 @@ def test_a_flat_foot_reads_gravity_and_no_rate(mixed: Simulation) -> None:
 
 @pytest.mark.parametrize("impacts", [False, True])
 def test_increments_integrate_back_to_the_truth(impacts: bool) -> None:
-    """Limits of spec/estimators.md §6.2, shocks or not."""
+    """Limits of docs/science/simulation.md, "Signals", shocks or not."""
     script = (
         Stand(3.0),
         Straight(10.0, 0.6, 0.54),

@@ -38,7 +38,7 @@ def test_joints_close_and_the_foot_stands_still(squats: SquatSimulation) -> None
 
 
 def test_joints_move_as_the_specification_says(squats: SquatSimulation) -> None:
-    """spec/patients.md §5, there with a deepest squat of 1.04 times the depth; here of 1."""
+    """docs/science/simulation.md, "Squat", there with a deepest squat of 1.04 times the depth; here of 1."""
     angles = {name: np.degrees(values) for name, values in squats.truth.angles.items()}
     expected = {
         "knee_flexion_r": (5.0, 75.0),
@@ -56,7 +56,7 @@ def test_joints_move_as_the_specification_says(squats: SquatSimulation) -> None:
 
 
 def test_sensors_move_slowly(squats: SquatSimulation) -> None:
-    """|ω| ≤ 1.1 thigh, 0.8 shank, 0.65 pelvis, |a| ≤ 0.9 (spec/patients.md §5)."""
+    """|ω| ≤ 1.1 thigh, 0.8 shank, 0.65 pelvis, |a| ≤ 0.9 (docs/science/simulation.md, "Squat")."""
     rates: dict[Segment, float] = {"thigh_r": 1.1, "shank_r": 0.8, "pelvis": 0.65}
     for segment, most in rates.items():
         signals = squats.ideal[segment]

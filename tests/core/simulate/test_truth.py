@@ -10,7 +10,7 @@ from core.simulate import Simulation, angle_table, event_table, stride_table
 
 
 def test_truth_and_analysis_mean_the_same_angles(mixed: Simulation) -> None:
-    """Two derivations of spec/clinic.md §1, one here and one in core/angles.py."""
+    """Two derivations of docs/science/joint-angles.md, one here and one in core/angles.py."""
     truth = mixed.truth
     valid = {segment: np.ones(len(truth.t_s), bool) for segment in truth.q}
     orientations = Orientations(truth.t_s, truth.rate_hz, truth.q, valid, engine="truth")

@@ -34,6 +34,7 @@ def _session(
     return made
 
 
+@pytest.mark.slow
 async def test_the_earlier_session_comes_first_in_either_order(clinic: Clinic) -> None:
     patient = _patient(clinic)
     late, early = _session(clinic, patient, 30, duration_s=24.0), _session(clinic, patient, 0)
@@ -91,12 +92,13 @@ async def test_an_assessment_is_compared_with_an_assessment_and_a_training_with_
     assert [_since(r) for r in reports] == [None, pre, training, pre]
 
 
-async def test_another_protocol_is_said_to_be_in_the_way(clinic: Clinic) -> None:
+async def test_another_protocol_is_another_condition(clinic: Clinic) -> None:
     patient = _patient(clinic)
     walk, belt = _session(clinic, patient, 0), _session(clinic, patient, 7, protocol="treadmill")
     async with clinic.client("viewer") as client:
         found = (await client.get(f"{API}/sessions/{belt}/compare/{walk}")).json()
-    assert any("protocols differ" in caution for caution in found["cautions"])
+    assert not found["comparable"]
+    assert any("over ground, then treadmill" in caution for caution in found["cautions"])
 
 
 async def test_sessions_of_two_people_or_one_session_are_not_compared(clinic: Clinic) -> None:

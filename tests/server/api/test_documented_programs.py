@@ -24,6 +24,7 @@ PROGRAMS = dict(re.findall(r"```(bash|python)\n(.*?)```", (ROOT / "docs" / "api.
 RUNNERS = {"bash": ["bash", "-c"], "python": [sys.executable, "-c"]}
 
 
+@pytest.mark.slow
 async def test_the_programs_upload_analyse_and_download(tmp_path: Path) -> None:
     assert set(PROGRAMS) == set(RUNNERS)
     if shutil.which("curl") is None:

@@ -54,8 +54,10 @@ def _live(clinic: Clinic, session: str, given: Prescription, baseline: Baseline)
     return cues, found.recording_id
 
 
-async def _train(clinic: Clinic, patient: str, prescription: str, days: int) -> tuple[str, list[Cue]]:
-    session = feedback.walked(clinic, patient, days, 48.0)
+async def _train(
+    clinic: Clinic, patient: str, prescription: str, days: int, **values: Any
+) -> tuple[str, list[Cue]]:
+    session = feedback.walked(clinic, patient, days, 48.0, **values)
     with clinic.db.read() as c:
         given = prescriptions.for_take(c, clinic.app.state.blobs, session)
     assert given is not None
@@ -132,6 +134,17 @@ async def test_the_next_visit_is_held_against_the_end_of_the_last_training(clini
     assert kept["limit"] == 4.2
     assert "within the measurement error of 4.20" in kept["verdict"]
     assert "End of the last training" in page
+
+
+async def test_retention_is_held_against_the_last_training_walked_alike(clinic: Clinic) -> None:
+    patient = feedback.person(clinic)
+    prescription = await _prescribe(clinic, patient)
+    with_stick, _ = await _train(clinic, patient, prescription, 0, aid="stick", feedback=True)
+    await _train(clinic, patient, prescription, 3, aid="none", feedback=True)
+    last, _ = await _train(clinic, patient, prescription, 7, aid="stick", feedback=True)
+    async with clinic.client("viewer") as client:
+        answer = (await client.get(f"{API}/sessions/{last}/feedback")).json()
+    assert answer["retention"]["session_id"] == with_stick
 
 
 async def test_without_feedback_there_is_a_reason_and_no_section(clinic: Clinic) -> None:

@@ -56,7 +56,7 @@ async def test_a_change_ends_the_old_prescription_and_keeps_it(clinic: Clinic) -
     assert "Target: 62.0 ± 2.0\u202f%, entered" in listed[0]["words"]
     with clinic.db.read() as c:
         rows = c.execute(audit.select().where(audit.c.resource_id == patient).order_by(audit.c.seq)).all()
-    said = [(r.action, r.detail["parameter"]) for r in rows if r.action.startswith("prescription")]
+    said = [(r.action, r.detail["parameter"]) for r in rows if r.action.startswith("prescription.")]
     assert said == [
         ("prescription.written", "stance_pct"),
         ("prescription.ended", "stance_pct"),
@@ -84,7 +84,7 @@ async def test_a_prescription_is_ended_once(clinic: Clinic) -> None:
     [
         ({"parameter": "beauty"}, "Expected one of gait_speed_mps"),
         ({"target": {"source": "manual"}}, "Expected both numbers"),
-        ({"target": {"source": "norm"}}, "No walk of this person is analysed yet"),
+        ({"target": {"source": "norm"}}, "No walk of this person without feedback is analysed yet"),
         ({"schedule": {"shares_pct": [0, 100]}}, "Expected no share above the one before"),
         ({"schedule": {"speed": 1}}, "schedule.speed"),
         ({"band_sd": 0}, "band_sd is 0.0. Expected a number from 0.1 to 5"),

@@ -115,7 +115,7 @@ async def test_who_may_not_see_results_sees_no_trend(clinic: Clinic, patient: st
 async def test_a_patient_without_a_result_has_an_empty_trend(clinic: Clinic, patient: str) -> None:
     async with clinic.client("viewer") as client:
         answer = (await client.get(f"{API}/patients/{patient}/trends")).json()
-    assert answer == {"protocol": None, "visits": [], "trends": []}
+    assert answer == {"protocol": None, "condition": None, "visits": [], "others": [], "trends": []}
 
 
 async def test_a_planned_training_is_a_small_dot(clinic: Clinic, patient: str) -> None:

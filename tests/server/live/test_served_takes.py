@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
@@ -29,6 +30,7 @@ def opened(client: httpx.Client, session: str) -> tuple[dict[str, Any], str]:
     return paired, str(client.base_url).replace("http://", "ws://").rstrip("/") + paired["socket"]
 
 
+@pytest.mark.slow
 def test_a_finished_take_is_analysed_like_an_upload(tmp_path: Path) -> None:
     async def frames() -> AsyncIterator[bytes]:
         for due in walk():
@@ -55,6 +57,7 @@ def test_a_finished_take_is_analysed_like_an_upload(tmp_path: Path) -> None:
     assert 0.9 < strides["left"]["value"] < 1.2
 
 
+@pytest.mark.slow
 def test_sigterm_in_a_take_keeps_what_came_and_ends_within_ten_seconds_nothing_was_computed_there(
     tmp_path: Path,
 ) -> None:

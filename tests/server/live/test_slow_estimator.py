@@ -59,15 +59,15 @@ async def sleepy(
         return start(changed, *args, **options)
 
     monkeypatch.setattr(subprocess, "Popen", other)
-    async with open_clinic(tmp_path) as clinic, serve(clinic.app) as port:
+    async with open_clinic(tmp_path, live_workers=1) as clinic, serve(clinic.app) as port:
         pool = clinic.app.state.hub.pool
-        pool.start()
         async with asyncio.timeout(180):
             while not pool.is_ready:
                 await asyncio.sleep(0.05)
         yield clinic, port
 
 
+@pytest.mark.slow
 async def test_an_estimator_that_sleeps_delays_no_acknowledgement(
     clinic: Clinic, port: int, sleepy: tuple[Clinic, int]
 ) -> None:

@@ -55,6 +55,9 @@ async def test_a_take_from_hello_to_a_recording_of_the_same_bytes(clinic: Clinic
         log = log_path(clinic.settings.live, v.take)
         before = log.read_bytes()
         assert (await v.state())["state"] == "streaming"
+        assert not (await v.state())["stopping"]
+        (await v.http.post(f"{v.api}/commands", json={"command": "stop"})).raise_for_status()
+        assert (await v.state())["stopping"]
         await ws.send(finish_text(frames))
         recording_id = (await heard(ws, "finished"))["recording"]
     row = rows(clinic, v.take)

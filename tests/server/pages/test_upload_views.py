@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -42,7 +43,7 @@ RIGHT_WAY = {"P": "pelvis", "A": "foot_r", "B": "foot_l", "C": "shank_r"}
 
 
 def recording(devices: list[dict[str, Any]], manifest: Mapping[str, Any] | None = None) -> Recording:
-    found = {"devices": devices, "duration_s": 25.0, "height_m": None, "protocol": "walk", "notices": []}
+    found = {"devices": devices, "duration_s": 25.0, "protocol": "walk", "notices": []}
     return Recording("r", "s", "p", "ready", (), manifest, found, None, NOW)
 
 
@@ -105,3 +106,19 @@ def test_grave_notices_come_first_and_only_once() -> None:
     view = found_view(recording(noisy), {})
     assert [n["kind"] for n in view["notices"]] == ["bad", "warn", ""]
     assert [s["state"]["kind"] for s in view["sensors"]] == ["warn", "bad"]
+
+
+def test_files_that_were_not_used_are_one_list_beside_the_notices() -> None:
+    def about(code: str, name: str, severity: str) -> dict[str, Any]:
+        return {"code": code, "message": f"{name} …", "sensor": None, "t_s": None, "severity": severity}
+
+    found = recording(WALKER)
+    assert found.inspection is not None
+    notices = [
+        about("ignored_file", "README.md", "info"),
+        about("file_not_read", "angles.csv", "warning"),
+        about("gap", "pelvis", "warning"),
+    ]
+    view = found_view(replace(found, inspection={**found.inspection, "notices": notices}), {})
+    assert view["unused"] == ["README.md …", "angles.csv …"]
+    assert [n["message"] for n in view["notices"]] == ["pelvis …"]

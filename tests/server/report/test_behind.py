@@ -34,6 +34,9 @@ def test_a_number_is_the_mean_of_the_strides_it_opens_to(make_bundle: MakeBundle
     assert left_out
     assert all(s.excluded for s in left_out)
     assert number.svg.count("<circle") == len(number.strides)
+    # a picture (role=img) must hold nothing to operate
+    assert 'role="group"' in number.svg
+    assert 'role="img"' not in number.svg
     assert number.svg.count('href="timeline#t=') == len(number.strides)
 
 

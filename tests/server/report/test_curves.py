@@ -3,6 +3,7 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from defusedxml.ElementTree import fromstring
@@ -17,7 +18,10 @@ MakeBundle = Callable[..., Bundle]
 
 @pytest.fixture(scope="module")
 def knee(bundle: Bundle) -> ET.Element:
-    root: ET.Element = fromstring(cycle_svg(report_model(bundle).key_curve, x_unit=True))
+    assert bundle.angles is not None
+    entered = replace(bundle.angles, standing_deg={"knee_flexion_l": 0.0, "knee_flexion_r": 0.0})
+    shown = report_model(replace(bundle, angles=entered)).key_curve
+    root: ET.Element = fromstring(cycle_svg(shown, x_unit=True))
     return root
 
 

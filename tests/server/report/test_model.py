@@ -13,6 +13,7 @@ import pytest
 
 from core.errors import Notice
 from core.events.result import Strides
+from core.norms.lookup import norms_for
 from core.parameters.result import Parameter
 from server.report.bundle import Bundle
 from server.report.model import report_model
@@ -32,7 +33,8 @@ def rows_of(*parameters: Parameter) -> tuple[Row, ...]:
 
 
 def of(name: str, side: str | None, mean: float | None, reason: str | None = None) -> Parameter:
-    return Parameter(name, side, 12 if mean is not None else 0, mean, None, "s", reason)  # type: ignore[arg-type]
+    n, sd = (12, 0.001) if mean is not None else (0, None)
+    return Parameter(name, side, n, mean, sd, "s", reason)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -59,6 +61,37 @@ def test_words_agree_with_the_printed_numbers() -> None:
     assert found.difference == "left shorter by 0.01\u202fs"
 
 
+def test_what_the_strides_leave_open_is_no_difference() -> None:
+    """Left 0.60 ± 0.08, right 0.64 ± 0.08 m of twelve: 95 % of the difference is −0.11 … 0.03 m."""
+    sides = both("step_length_m", 0.60, 0.64)
+    open_ = row(rows_of(*(replace(p, sd=0.08) for p in sides)), "step_length_m")
+    assert (open_.difference, open_.symmetry_words) == ("no clear difference", "")
+    assert open_.symmetry is not None
+    assert not open_.symmetry.clear
+    tiny = row(
+        rows_of(*(replace(p, sd=0.003) for p in both("circumduction_m", 0.021, 0.022))), "circumduction_m"
+    )
+    assert tiny.difference == "no clear difference"
+    steady = (replace(p, sd=0.0) for p in both("circumduction_m", 0.021, 0.024))
+    assert row(rows_of(*steady), "circumduction_m").difference == "no clear difference", "known to 1 cm only"
+    assert row(rows_of(*sides), "step_length_m").difference == "left shorter by 0.04\u202fm"
+
+
+def test_three_strides_stand_with_their_number_and_are_compared_with_nothing() -> None:
+    sides = both("step_length_m", 0.51, 0.60)
+    norms = norms_for(40, "female", 1.2, 1.7)
+    (full,) = parameter_rows(sides, norms)
+    assert full.z_words
+    assert full.left is not None
+    assert full.left.few == ""
+    (few,) = parameter_rows([replace(sides[0], n=3), replace(sides[1], n=1, sd=None)], norms)
+    assert few.left is not None
+    assert few.right is not None
+    assert (few.left.text, few.left.few, few.right.few) == ("0.51", "3 strides", "1 stride")
+    assert (few.left.z, few.right.z, few.z_words, few.symmetry) == (None, None, "", None)
+    assert few.difference is None
+
+
 def test_a_missing_number_gives_its_reason_never_zero() -> None:
     both = rows_of(
         of("stance_pct", "left", None, "no_terminal_contact"),
@@ -69,7 +102,7 @@ def test_a_missing_number_gives_its_reason_never_zero() -> None:
     one = rows_of(of("stance_pct", "left", 61.0), of("stance_pct", "right", None, "no_strides"))[0]
     assert one.reason is None
     assert one.right is None
-    assert one.difference == "right not measured: no complete stride of this side"
+    assert one.difference == "right not measured: no stride of this side counts"
 
 
 def test_an_unknown_parameter_is_shown_under_its_own_name() -> None:
@@ -122,10 +155,8 @@ def test_a_stopped_analysis_is_a_report_too(make_bundle: MakeBundle) -> None:
     json.dumps(model.to_json(), allow_nan=False)
 
 
-def test_norm_stands_behind_comparable_curves_only(bundle: Bundle) -> None:
+def test_curves_say_their_zero_and_their_confidence(bundle: Bundle) -> None:
     panels = {p.variable.name: p for p in report_model(bundle, age=40).panels}
-    assert panels["knee_flexion"].norm is not None
-    assert panels["pelvis_tilt"].norm is None
     assert panels["pelvis_tilt"].reason is None
     assert panels["pelvis_rotation"].title == "Pelvic rotation, from its mean over the stride"
     assert panels["hip_rotation"].low_confidence
@@ -195,7 +226,7 @@ def test_sides_are_compared_in_numbers_and_words() -> None:
 
 
 def both(name: str, left: float, right: float, unit: str = "m") -> tuple[Parameter, Parameter]:
-    return Parameter(name, "left", 12, left, None, unit), Parameter(name, "right", 12, right, None, unit)
+    return Parameter(name, "left", 12, left, 0.01, unit), Parameter(name, "right", 12, right, 0.01, unit)
 
 
 def test_tables_have_a_csv_twin(bundle: Bundle) -> None:
@@ -207,6 +238,9 @@ def test_tables_have_a_csv_twin(bundle: Bundle) -> None:
     assert float(stance[0]["ratio_left_right"]) == pytest.approx(
         float(stance[0]["mean"]) / float(stance[1]["mean"])
     )
+    assert bundle.angles is not None
+    entered = replace(bundle.angles, standing_deg={"knee_flexion_l": 4.0, "knee_flexion_r": 3.0})
+    model = report_model(replace(bundle, angles=entered), age=40, sex="male")
     curves = list(csv.DictReader(io.StringIO(curves_csv(model).decode())))
     knee = [r for r in curves if r["variable"] == "knee_flexion" and r["side"] == "right"]
     assert len(knee) == 101

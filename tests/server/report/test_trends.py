@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import datetime as dt
 import re
+from dataclasses import replace
 
 import pytest
 from defusedxml import ElementTree
 
+from core.condition import USUAL
 from core.norms import norms_for, temporal_values
 from core.parameters.result import Parameter
 from server.report.change_words import change_words
@@ -28,10 +30,15 @@ def step(side: str, value: float) -> Parameter:
 
 
 def visit(
-    days: int, *parameters: Parameter, label: str | None = None, kind: VisitKind = "assessment"
+    days: int,
+    *parameters: Parameter,
+    label: str | None = None,
+    kind: VisitKind = "assessment",
+    feedback: bool = False,
 ) -> Visit:
     day = DAY + dt.timedelta(days=days)
-    return Visit(f"s{days}", day, "Walk", label, kind, "walk", Numbers(parameters, ()))
+    walked = replace(USUAL, feedback=feedback)
+    return Visit(f"s{days}", day, "Walk", label, kind, walked, Numbers(parameters, (), ("ok", "Good data")))
 
 
 def one(*visits: Visit, name: str = "gait_speed_mps") -> Trend:
@@ -57,6 +64,27 @@ def test_a_training_is_never_judged() -> None:
     assert line.latest is None
     assert line.change is None
     assert len(line.points) == 2
+
+
+def test_trainings_alone_are_no_base() -> None:
+    visits = [visit(d, speed(v), kind="training", label=f"T{d}") for d, v in ((0, 0.62), (2, 1.2))]
+    trend = one(*visits)
+    line = trend.lines[0]
+    assert (line.base, line.latest, line.mdc, line.mcid) == (None, None, None, None)
+    assert [p.change for p in line.points] == [None, None]
+    assert 'class="mdc"' not in trend_svg(trend, line, visits)
+
+
+def test_a_walk_with_feedback_is_a_small_mark_without_a_change() -> None:
+    visits = visit(0, speed(0.62)), visit(2, speed(1.2), kind="training", feedback=True), visit(9, speed(0.7))
+    trend = one(*visits)
+    line = trend.lines[0]
+    assert (line.base, line.latest) == (0, 2)
+    assert line.points[1].change is None
+    assert line.change is not None
+    assert line.change.after == 0.7
+    chart = trend_svg(trend, line, visits)
+    assert (chart.count('class="pl-b"'), chart.count('class="ps-b"')) == (2, 1)
 
 
 def test_the_band_stands_before_there_is_anything_to_compare() -> None:

@@ -5,14 +5,16 @@ from pathlib import Path
 
 import pytest
 
+from core.condition import is_comparable
 from core.pipeline import analyse
 from server.services import patients, prescriptions, sessions
-from server.services.demo_clinic import VISITS, fill, record
+from server.services.demo_clinic import STROKE, VISITS, VOLUNTEER, fill, record
 from server.settings import Settings
 from server.storage.db import Database
 from server.storage.migrate import upgrade
 
 
+@pytest.mark.slow
 def test_the_clinic_is_full_of_people_who_say_they_are_simulated(tmp_path: Path) -> None:
     settings = Settings(data_dir=tmp_path, min_free_bytes=0)
     upgrade(settings.database)
@@ -28,6 +30,13 @@ def test_the_clinic_is_full_of_people_who_say_they_are_simulated(tmp_path: Path)
     assert trained == ["NR-2107"], "somebody to walk live with feedback"
 
 
+def test_the_two_walks_of_the_volunteer_are_not_compared_and_those_of_the_patient_are() -> None:
+    walked = {p: [v.condition for v in VISITS if v.person is p] for p in (VOLUNTEER, STROKE)}
+    assert not is_comparable(*walked[VOLUNTEER])
+    assert is_comparable(*walked[STROKE])
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("script", "method", "reduced"),
     [

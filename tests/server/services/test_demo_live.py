@@ -1,11 +1,14 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from server.services import live, patients, prescriptions
+from core.condition import USUAL
+from core.feedback import Cue
+from server.services import live, patients, prescriptions, sessions
 from server.services.demo_clinic import PRESCRIBED
 from server.services.demo_live import open_take, training, walk
 from server.storage.blobs import BlobStore
@@ -19,6 +22,7 @@ def anyio_backend() -> str:
     return "asyncio"
 
 
+@pytest.mark.slow
 @pytest.mark.anyio
 async def test_the_demo_s_live_patient_walks_is_told_how_and_becomes_a_recording(tmp_path: Path) -> None:
     async with open_clinic(tmp_path, live_workers=1, min_free_bytes=0) as clinic, serve(clinic.app) as port:
@@ -38,9 +42,12 @@ async def test_the_demo_s_live_patient_walks_is_told_how_and_becomes_a_recording
                 with clinic.db.read() as c:
                     take = live.current(c, sid)
                     cues = [e for e in live.events(c, take.id) if e.kind == "cue"] if take else []
+                    walked = sessions.get(c, sid).walked()
                 if take is not None and take.recording_id is not None and len(cues) > 10:
                     break
                 await asyncio.sleep(0.2)
     assert take.state == "finished"
     assert take.problem is None
     assert {e.content["side"] for e in cues} == {"left"}
+    assert any(Cue.from_json(e.content).with_feedback for e in cues)
+    assert walked == replace(USUAL, feedback=True), "noted by the take itself"

@@ -3,7 +3,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -306,13 +306,9 @@ def test_erasing_a_patient_needs_the_code_and_leaves_only_the_trail(clinic: Clin
     claim = clinic.queue.claim("w", (recordings.INSPECT,))
     assert claim is not None
     with pytest.raises(Conflict) as caught:
-        erasure.erase_patient(
-            clinic.db, clinic.blobs, clinic.settings.live, clinic.who, patient_id, confirm="P-2"
-        )
+        erasure.erase_patient(clinic.db, clinic.blobs, clinic.settings, clinic.who, patient_id, confirm="P-2")
     assert caught.value.code == "not_confirmed"
-    erasure.erase_patient(
-        clinic.db, clinic.blobs, clinic.settings.live, clinic.who, patient_id, confirm="P-1"
-    )
+    erasure.erase_patient(clinic.db, clinic.blobs, clinic.settings, clinic.who, patient_id, confirm="P-1")
     assert {f.space for f in clinic.blobs.files()} == {other_id}
     assert not clinic.queue.finish(claim, lambda c: None)  # its worker finds the fence closed
     with clinic.db.read() as c:
@@ -324,7 +320,7 @@ def test_erasing_a_patient_needs_the_code_and_leaves_only_the_trail(clinic: Clin
             jobs.get(c, view.id)
         everything = str(c.execute(select(tables.audit)).all())
     assert "P-1" not in everything
-    assert checks.check(clinic.db, clinic.blobs) == []
+    assert checks.check(clinic.db, clinic.blobs, clinic.settings) == []
 
 
 def test_no_byte_of_an_erased_patient_is_left_in_the_data_folder(clinic: Clinic) -> None:
@@ -341,9 +337,32 @@ def test_no_byte_of_an_erased_patient_is_left_in_the_data_folder(clinic: Clinic)
 
     assert found()
     erasure.erase_patient(
-        clinic.db, clinic.blobs, clinic.settings.live, clinic.who, patient_id, confirm="CANARY-CODE"
+        clinic.db, clinic.blobs, clinic.settings, clinic.who, patient_id, confirm="CANARY-CODE"
     )
     assert found() == set()
+
+
+def test_no_byte_of_an_erased_session_is_left_and_who_reads_an_older_state_only_delays_it(
+    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.storage.db.BUSY_TIMEOUT_MS", 10)
+    patient_id = clinic.patient()
+    with clinic.db.write() as c:
+        session_id = sessions.create(c, clinic.who, patient_id, title="CANARY-TITLE").id
+        sessions.change(c, clinic.who, session_id, {"note": "CANARY-NOTE " * 500})
+    clinic.upload(session_id, "CANARY-FILE", b"CANARY-BYTES")
+    clinic.analyse(session_id, b"CANARY-RESULT")
+
+    def found() -> bool:
+        return any(b"CANARY" in p.read_bytes() for p in clinic.settings.data_dir.rglob("*") if p.is_file())
+
+    with clinic.db.read() as c:
+        sessions.get(c, session_id)
+        erasure.erase_session(clinic.db, clinic.blobs, clinic.settings, clinic.who, session_id)
+        assert found()
+    erasure.finish(clinic.db, clinic.blobs, clinic.settings)
+    assert not found()
+    assert not list(clinic.settings.erasing.iterdir())
 
 
 def test_erasing_a_session_keeps_the_files_another_one_shares(clinic: Clinic) -> None:
@@ -352,17 +371,17 @@ def test_erasing_a_session_keeps_the_files_another_one_shares(clinic: Clinic) ->
     clinic.upload(one, "a", b"shared")
     clinic.upload(one, "b", b"own")
     clinic.upload(two, "a", b"shared")
-    erasure.erase_session(clinic.db, clinic.blobs, clinic.settings.live, clinic.who, one)
+    erasure.erase_session(clinic.db, clinic.blobs, clinic.settings, clinic.who, one)
     assert [f.path.read_bytes() for f in clinic.blobs.files()] == [b"shared"]
-    assert checks.check(clinic.db, clinic.blobs) == []
+    assert checks.check(clinic.db, clinic.blobs, clinic.settings) == []
 
 
 def test_the_sweep_takes_only_old_files_that_nothing_refers_to(clinic: Clinic) -> None:
     session_id = clinic.session(clinic.patient())
     clinic.upload(session_id, "a", b"kept")
     orphan = clinic.blobs.put("f" * 32, b"of a lost claim")
-    assert sweep(clinic.db, clinic.blobs, grace_s=3600.0) == 0
-    assert sweep(clinic.db, clinic.blobs, grace_s=0.0) == 1
+    assert sweep(clinic.db, clinic.blobs, clinic.settings) == 0
+    assert sweep(clinic.db, clinic.blobs, replace(clinic.settings, sweep_grace_s=0.0)) == 1
     assert [f.path.read_bytes() for f in clinic.blobs.files()] == [b"kept"]
     with pytest.raises(SagittalError):
         clinic.blobs.require("f" * 32, orphan.sha256)
@@ -372,7 +391,7 @@ def test_the_check_finds_what_is_wrong(clinic: Clinic) -> None:
     session_id = clinic.session(clinic.patient())
     clinic.upload(session_id, "a", b"one")
     clinic.upload(session_id, "b", b"two")
-    assert checks.check(clinic.db, clinic.blobs) == []
+    assert checks.check(clinic.db, clinic.blobs, clinic.settings) == []
     files = list(clinic.blobs.files())
     files[0].path.write_bytes(b"onf")
     files[1].path.unlink()
@@ -381,7 +400,7 @@ def test_the_check_finds_what_is_wrong(clinic: Clinic) -> None:
         c.exec_driver_sql("DROP TRIGGER audit_no_delete")
         c.exec_driver_sql("UPDATE audit SET user_name = 'somebody else' WHERE seq = 1")
         c.exec_driver_sql("DELETE FROM audit WHERE seq = 3")
-    findings = checks.check(clinic.db, clinic.blobs)
+    findings = checks.check(clinic.db, clinic.blobs, clinic.settings)
     assert sorted(f.area for f in findings) == ["audit", "audit", "files", "files"]
 
 
@@ -394,7 +413,7 @@ def test_the_check_speaks_of_a_damaged_database_instead_of_failing(clinic: Clini
     content[4096 : len(content) // 2] = bytes(len(content) // 2 - 4096)
     path.write_bytes(content)
     with closing(Database(path)) as damaged:
-        findings = checks.check(damaged, clinic.blobs)
+        findings = checks.check(damaged, clinic.blobs, clinic.settings)
     assert {f.area for f in findings} == {"database"}
 
 

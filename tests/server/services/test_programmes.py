@@ -12,6 +12,7 @@ from sqlalchemy import select
 from server.services import erasure, patients, programmes, sessions
 from server.services.course import SIX_WEEKS
 from server.services.errors import Conflict, NotFound, ServiceError
+from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.migrate import upgrade
@@ -135,16 +136,17 @@ def test_a_programme_ends_without_its_sessions(db: Database) -> None:
 def test_erasing_a_session_opens_its_visit_again_and_erasing_the_patient_leaves_no_plan(
     db: Database, tmp_path: Path
 ) -> None:
-    blobs = BlobStore(tmp_path / "blobs")
+    settings = Settings(data_dir=tmp_path)
+    blobs = BlobStore(settings.blobs)
     patient = _patient(db)
     session = _session(db, patient)
     with db.write() as c:
         made = programmes.start(c, None, patient, starts_on=MONDAY)
         programmes.change_visit(c, None, made.visits[1].id, {"session_id": session})
-    erasure.erase_session(db, blobs, tmp_path / "live", None, session)
+    erasure.erase_session(db, blobs, settings, None, session)
     with db.read() as c:
         assert programmes.get(c, made.id).count("done") == 0
-    erasure.erase_patient(db, blobs, tmp_path / "live", None, patient, confirm="P-1")
+    erasure.erase_patient(db, blobs, settings, None, patient, confirm="P-1")
     with db.read() as c:
         assert c.execute(select(planned_visit)).first() is None
 

@@ -114,7 +114,7 @@ async def test_an_erased_session_is_erased_from_memory_too(clinic: Clinic) -> No
     session = session_of(clinic)
     make(clinic, session, MOVE)
     assert reviews._takes._values
-    erasure.erase_session(clinic.db, clinic.app.state.blobs, clinic.settings.live, None, session)
+    erasure.erase_session(clinic.db, clinic.app.state.blobs, clinic.settings, None, session)
     assert not reviews._takes._values
     assert not reviews._results._values
     with clinic.db.read() as c:

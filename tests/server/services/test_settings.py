@@ -32,6 +32,13 @@ def test_settings_survive_the_way_to_a_child_process(tmp_path: Path) -> None:
         ({}, {"SAGITTAL_WORKERS": "two"}, "SAGITTAL_WORKERS is 'two'"),
         ({}, {"SAGITTAL_LEASE_S": "0"}, "lease_s is 0"),
         ({}, {"SAGITTAL_BEHIND_TLS": "maybe"}, "SAGITTAL_BEHIND_TLS"),
+        (
+            {},
+            {"SAGITTAL_TRUSTED_PROXIES": "10.0.0.1,nginx"},
+            "trusted_proxies is 'nginx', expected",
+        ),
+        ({}, {"SAGITTAL_TRUSTED_PROXIES": "0.0.0.0/0"}, "not all of the internet"),
+        ({}, {"SAGITTAL_MAX_CONNECTIONS": "0"}, "max_connections is 0"),
     ],
 )
 def test_a_wrong_setting_is_named(given: dict[str, object], env: dict[str, str], words: str) -> None:

@@ -134,6 +134,7 @@ def _count_up(path: Path, writers: int) -> None:
     db.close()
 
 
+@pytest.mark.slow
 def test_fifty_concurrent_writers_lose_no_update(db: Database) -> None:
     add_patient(db, "a")
     with db.write() as c:

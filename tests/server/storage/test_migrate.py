@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -35,6 +36,22 @@ def downgrade():
         batch.drop_column("shoe")
     op.drop_table("extra")
 """
+
+
+def test_nobody_else_may_read_the_database_in_a_folder_that_was_there(tmp_path: Path) -> None:
+    tmp_path.chmod(0o755)
+    path = tmp_path / "sagittal.db"
+    migrate.upgrade(path)
+    path.chmod(0o644)  # of an earlier version
+    migrate.upgrade(path)
+    with closing(Database(path)) as db, db.write() as c:
+        c.exec_driver_sql("UPDATE patient SET note = ''")
+        files = [p for p in tmp_path.iterdir() if p.is_file()]
+        assert {(p.name, p.stat().st_mode & 0o777) for p in files} == {
+            (path.name + end, 0o600) for end in ("", "-wal", "-shm")
+        }
+    backup = migrate._backup(path, "x")
+    assert backup.stat().st_mode & 0o777 == 0o600
 
 
 def schema(path: Path) -> set[tuple[str, str, tuple[str, ...]]]:
@@ -120,6 +137,37 @@ def test_data_survive_up_and_down_and_a_backup_is_made_before(
     command.downgrade(migrate.configuration(path, scripts), head)
     assert counts(path) == (1, 2)
     assert migrate.upgrade(path, scripts=scripts) is not None
+    assert counts(path) == (1, 2)
+
+
+def test_earlier_sessions_have_no_condition_but_the_feedback_that_was_kept(tmp_path: Path) -> None:
+    path = tmp_path / "a.db"
+    config = migrate.configuration(path)
+    migrate.upgrade(path, target="0005")
+    fill(path)
+    cues = {"s0": {"shown": False, "why_not": "bandwidth"}, "s1": {"shown": False, "why_not": "probe"}}
+    at = "2026-01-01 00:00:00.000000"
+    with closing(sqlite3.connect(path)) as c:
+        for session, cue in cues.items():
+            c.execute(
+                "INSERT INTO recording (id, session_id, created_at) VALUES (?, ?, ?)",
+                (f"r{session}", session, at),
+            )
+            c.execute(
+                "INSERT INTO live_take (id, session_id, state, recording_id, created_at, finished_at) "
+                "VALUES (?, ?, 'finished', ?, ?, ?)",
+                (f"t{session}", session, f"r{session}", at, at),
+            )
+            c.execute(
+                "INSERT INTO live_event (take_id, kind, content, at) VALUES (?, 'cue', ?, ?)",
+                (f"t{session}", json.dumps(cue), at),
+            )
+        c.commit()
+    migrate.upgrade(path)
+    query = "SELECT id, pace, aid, orthosis, shoes, feedback FROM session ORDER BY id"
+    with closing(sqlite3.connect(path)) as c:
+        assert c.execute(query).fetchall() == [("s0", *[None] * 4, 1), ("s1", *[None] * 4, 0)]
+    command.downgrade(config, "0005")
     assert counts(path) == (1, 2)
 
 

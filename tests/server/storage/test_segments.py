@@ -177,3 +177,75 @@ def test_a_log_damaged_early_is_not_read_to_its_end(tmp_path: Path) -> None:
     finally:
         tracemalloc.stop()
     assert peak < 3 * segments.CHUNK
+
+
+def damage_of(path: Path, content: bytes) -> segments.Damage | None:
+    path.write_bytes(content)
+    log, _ = recovered(path)
+    assert log is not None
+    return log.damage
+
+
+def test_an_end_torn_by_a_crash_is_no_damage_and_leaves_no_copy(tmp_path: Path) -> None:
+    path = tmp_path / "t.log"
+    for cut in range(len(HEAD), len(WHOLE)):
+        assert damage_of(path, WHOLE[:cut]) is None
+    assert damage_of(path, WHOLE) is None
+    assert damage_of(path, WHOLE + bytes(5000)) is None
+    assert damage_of(path, HEAD + PIECES[0] + PIECES[1][:30] + bytes(len(PIECES[1]) - 30)) is None
+    assert [p.name for p in tmp_path.iterdir()] == ["t.log"]
+
+
+def test_one_flipped_bit_in_a_log_keeps_the_whole_original(tmp_path: Path) -> None:
+    path = tmp_path / "t.log"
+    last = ends()[-3]  # of the last batch only a changed content can be told from a torn end
+    for at in range(len(HEAD), last):
+        for kept in tmp_path.glob("*.damaged"):
+            kept.unlink()
+        hurt = WHOLE[:at] + bytes([WHOLE[at] ^ 0x10]) + WHOLE[at + 1 :]
+        found = damage_of(path, hurt)
+        start = max(e for e in ends() if e <= at)
+        assert found is not None
+        assert (found.start, found.lost) == (start, len(WHOLE) - start)
+        assert found.original == tmp_path / "t.1.damaged"
+        assert found.original.read_bytes() == hurt
+        assert path.read_bytes() == WHOLE[:start]
+
+
+def test_a_second_damage_does_not_overwrite_the_first_original(tmp_path: Path) -> None:
+    path = tmp_path / "t.log"
+    for at in (len(HEAD) + 60, len(HEAD) + 70):
+        damage_of(path, WHOLE[:at] + b"?" + WHOLE[at + 1 :])
+    assert sorted(p.name for p in tmp_path.glob("*.damaged")) == ["t.1.damaged", "t.2.damaged"]
+
+
+def test_a_damaged_log_whose_original_cannot_be_kept_is_not_cut(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Full(fs.System):
+        def write(self, fd: int, data: bytes | memoryview) -> int:
+            raise OSError(errno.ENOSPC, "full")
+
+    path = tmp_path / "t.log"
+    hurt = WHOLE[: len(HEAD) + 60] + b"?" + WHOLE[len(HEAD) + 61 :]
+    path.write_bytes(hurt)
+    monkeypatch.setattr(fs, "system", Full())
+    with pytest.raises(OSError, match="full"):
+        segments.recover(path, lambda _: None)
+    assert path.read_bytes() == hurt
+    assert [p.name for p in tmp_path.iterdir()] == ["t.log"]
+
+
+def test_damage_is_looked_for_in_a_long_log_without_reading_it_into_memory(tmp_path: Path) -> None:
+    path = tmp_path / "t.log"
+    with path.open("wb") as file:
+        file.write(HEAD + PIECES[0][:-1] + b"?")
+        for _ in range(20):
+            file.write(b"BSGL1 " * 500_000)
+        file.write(PIECES[1])
+    tracemalloc.start()
+    found = segments.find_damage(path, len(HEAD))
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert found is not None
+    assert most < 20e6

@@ -24,6 +24,7 @@ OPEN = """async ([sid, dark]) => new Promise((done, fail) => {
 })"""
 
 
+@pytest.mark.browser
 @pytest.mark.skipif(not CHROMIUM.exists(), reason=f"no browser: {CHROMIUM} is not installed")
 @pytest.mark.parametrize("dark", [False, True])
 def test_both_legs_are_seen_in_an_iframe(served: Ward, dark: bool) -> None:

@@ -96,6 +96,7 @@ def test_a_frame_sends_at_most_one_chunk_of_a_trail(server: viser.ViserServer, l
     assert max(lengths) < CHUNK
 
 
+@pytest.mark.bench
 def test_a_view_of_ten_minutes_is_ready_at_once(server: viser.ViserServer) -> None:
     poses = replace(walk.poses(600.0), method="erkf_smoothed")
     start = time.thread_time()

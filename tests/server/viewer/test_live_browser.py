@@ -22,8 +22,8 @@ OPEN = """async (sid) => {
   document.body.replaceChildren(frame);
 }"""
 EVERY_S = 0.1
-STAYS_PX = 2500
-"""Pixels of a side's print, trail and letter at most; a leg has far more beside them."""
+STAYS_PX = 1000
+"""Pixels of a side's print and trail at most; a leg has far more beside them."""
 
 
 class Walking:
@@ -46,6 +46,7 @@ class Walking:
         self._done.result(10)
 
 
+@pytest.mark.browser
 @pytest.mark.skipif(not CHROMIUM.exists(), reason=f"no browser: {CHROMIUM} is not installed")
 def test_both_legs_move_while_pictures_come_and_lose_their_colours_when_they_stop(
     served: Ward, loop: asyncio.AbstractEventLoop

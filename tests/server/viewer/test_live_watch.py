@@ -28,6 +28,9 @@ from tests.server.viewer.pictures import Leg, picture, stride
 
 NORM = {name: np.radians(band.mean_deg) for name, band in adult_kinematics(None).bands.items()}
 
+BONES = 8
+"""Of one figure: thighs, shanks, pelvis, trunk, and the bands with the letters."""
+
 
 class Bedside:
     """A figure and the watch that shows it."""
@@ -126,20 +129,20 @@ def test_a_picture_that_cannot_be_shown_disturbs_nobody_and_the_figure_turns_gre
 
 def test_the_ghost_follows_the_choice_of_the_therapist(bedside: Bedside) -> None:
     bedside.watch.see(picture(30))
-    assert len(bedside.bones) == 6
+    assert len(bedside.bones) == BONES
     bedside.ghost = "norm"
     bedside.watch.see(picture(31))
-    assert len(bedside.bones) == 12
-    assert bedside.bones[6:, 2].min() > 0.2
+    assert len(bedside.bones) == 2 * BONES
+    assert bedside.bones[BONES:, 2].min() > 0.2
     bedside.ghost = "better"
     bedside.watch.see(picture(32))
-    assert len(bedside.bones) == 6  # no strides yet
+    assert len(bedside.bones) == BONES  # no strides yet
     bedside.strides = (stride(0, Leg("left", 0.5)), stride(1, Leg("right")))
     bedside.watch.see(picture(33))
-    assert len(bedside.bones) == 12
+    assert len(bedside.bones) == 2 * BONES
     bedside.ghost = None
     bedside.watch.see(picture(34))
-    assert len(bedside.bones) == 6
+    assert len(bedside.bones) == BONES
 
 
 def reference(trained: Side | None = None, norm: dict[str, np.ndarray] = NORM) -> LiveReference:

@@ -9,9 +9,10 @@ import pytest
 from core import rotation
 from core.body.poses import Poses
 from core.errors import ParameterError
-from core.frames import FOOT, SIDES, Segment
+from core.frames import FOOT, SHANK, SIDES, Segment, Side
 from server.viewer.colours import TINTS, linear
 from server.viewer.motion import Motion, prepare
+from server.viewer.shapes import letter
 from tests.data import ROOT
 from tests.server import walk
 
@@ -105,7 +106,7 @@ def test_positions_that_are_for_the_eye_only_leave_no_trail() -> None:
 def test_what_no_sensor_supports_is_marked(method: str, measured: set[str]) -> None:
     seen = prepare(replace(walk.poses(3.0), method=method))
     thigh, shank, foot, pelvis = (x in measured for x in ("thigh", "shank", "foot", "pelvis"))
-    assert seen.batches["bones"].measured == (thigh, shank, thigh, shank, pelvis, pelvis)
+    assert seen.batches["bones"].measured == (thigh, shank, thigh, shank, shank, shank, pelvis, pelvis)
     assert seen.batches["shoes"].measured == (foot, foot)
     assert seen.measured == (thigh and pelvis)
 
@@ -132,8 +133,42 @@ def test_times_outside_are_held_at_the_ends(motion: Motion) -> None:
 )
 def test_any_subset_of_segments_makes_a_figure(segments: tuple[Segment, ...]) -> None:
     found = prepare(subset(walk.poses(), *segments))
-    assert set(found.toes) == {side for side in SIDES if FOOT[side] in segments}
+    for side in SIDES:
+        assert len(found.batches[f"letters_{side}"].tint) == (SHANK[side] in segments)
     assert sum(len(b.tint) for b in found.batches.values()) >= 1
+
+
+def test_the_letter_of_a_side_lies_on_its_own_shank_in_the_colour_of_the_leg(motion: Motion) -> None:
+    poses = walk.poses()
+    for side in SIDES:
+        batch = motion.batches[f"letters_{side}"]
+        assert batch.tint == (side,)
+        for i in range(0, len(motion.t_s), 7):  # at mid-stride too
+            knee, ankle = (poses.p[s][2 * i] for s in (SHANK[side], FOOT[side]))
+            points = np.array([transformed(motion, f"letters_{side}", 0, i, v) for v in batch.mesh[0][::9]])
+            along = (points - knee) @ (ankle - knee) / np.dot(ankle - knee, ankle - knee)
+            assert 0.2 < along.min() < along.max() < 0.8
+            beside = np.linalg.norm(points - knee - along[:, None] * (ankle - knee), axis=1)
+            assert 0.04 < beside.min() < beside.max() < 0.08
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_letter_faces_outwards_and_is_not_mirrored(side: Side) -> None:
+    vertices, faces = letter(side, 0.05, 0.14, 0.1)
+    a, b, c = (vertices[faces[:, k]].astype(float) for k in range(3))
+    normal, middle = np.cross(b - a, c - a), (a + b + c) / 3
+    assert (np.einsum("ij,ij->i", normal[:, :2], middle[:, :2]) > 0).all()
+    # seen from the front of the bone (+x), hanging (mesh z down): right is −y
+    front = middle[(middle[:, 0] > 0.02) & (abs(middle[:, 1]) < 0.03)]
+    area = np.linalg.norm(normal, axis=1)[(middle[:, 0] > 0.02) & (abs(middle[:, 1]) < 0.03)]
+    right, down = -front[:, 1], front[:, 2]
+    foot, head = down > 0.09, down < 0.05
+    if side == "left":  # a foot to the right, nothing at the head there
+        assert area[foot & (right > 0.005)].sum() > 0
+        assert area[head & (right > 0.005)].sum() == 0
+    else:  # a bowl at the head, to the right of the upright
+        assert area[head & (right > 0.005)].sum() > 0
+        assert area[head & (right < -0.005)].sum() > 0
 
 
 def test_no_pose_at_all_says_so() -> None:

@@ -1,12 +1,16 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import tempfile
 import threading
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
-from core.errors import EstimationError
+from core.errors import EstimationError, InputError
 from server.auth.roles import Role
 from server.viewer.motion import Motion
 from server.viewer.views import Views
@@ -36,11 +40,49 @@ async def test_same_tab_shares_and_other_sign_in_does_not(motion: Motion) -> Non
         assert loads == [1]
 
 
-async def test_a_view_listens_on_loopback_only(motion: Motion) -> None:
-    async with Views().running() as views:
+async def test_a_views_socket_is_for_this_user_alone_and_goes_with_it(motion: Motion) -> None:
+    async with Views(idle_s=0.0).running() as views:
         view = await views.open("login", "tab", "analysis", lambda: motion)
-        assert view.server.get_host() == "127.0.0.1"
-        assert view.port > 0
+        assert view.socket.is_socket()
+        folder = view.socket.parent.stat()
+        assert (folder.st_mode & 0o777, folder.st_uid) == (0o700, os.getuid())
+        await views.sweep()
+        assert not view.socket.parent.exists()
+
+
+@pytest.fixture
+def short_path() -> Iterator[Path]:
+    """An empty folder whose path leaves room for a socket's, which pytest's own may not."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder)
+
+
+async def test_a_figure_that_cannot_be_drawn_leaves_nothing_behind(
+    motion: Motion, short_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def draw(_server: object) -> NoReturn:
+        raise InputError("body_bad", "There is no body.")
+
+    monkeypatch.setattr(tempfile, "tempdir", str(short_path))
+    async with Views().running() as views:
+        threads = threading.active_count()
+        with pytest.raises(InputError):
+            await views.open_live(("live",), draw, lambda _view: None)
+        assert list(short_path.iterdir()) == []
+        assert threading.active_count() <= threads + 1  # the one that to_thread keeps
+
+
+@pytest.mark.parametrize(("folder", "why"), [("a" * 100, "too long"), ("missing/folder", "No such file")])
+async def test_a_folder_that_takes_no_sockets_is_told_and_not_waited_for(
+    motion: Motion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str, why: str
+) -> None:
+    (tmp_path / ("a" * 100)).mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / folder))
+    async with Views().running() as views:
+        with pytest.raises(EstimationError, match=f"{why}.*set TMPDIR") as told:
+            await views.open("login", "tab", "analysis", lambda: motion)
+    assert told.value.code == "no_place_for_views"
+    assert list(tmp_path.rglob("sagittal-view-*")) == []
 
 
 async def test_unwatched_views_stop_and_watched_ones_stay(motion: Motion) -> None:

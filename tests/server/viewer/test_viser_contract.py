@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import inspect
+import re
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 import pytest
 import viser
 from viser import _messages
+from viser.infra import _infra
 
 from server.viewer import pipe
 from server.viewer.batches import add_batch, put
@@ -40,6 +44,15 @@ async def test_a_view_has_no_handler_for_requests_to_share(motion: Motion) -> No
     async with Views().running() as views:
         view = await views.open("login", "tab", "analysis", lambda: motion)
         assert _messages.ShareUrlRequest not in view.server._websock_server._incoming_handlers
+
+
+def test_viser_asks_websockets_for_nothing_but_what_we_hand_it() -> None:
+    names = set(re.findall(r"\bwebsockets\.([a-z_.]*[a-z])", inspect.getsource(_infra.WebsockServer)))
+    handed = _infra.websockets
+    # the type of a connection is named in annotations only, which are not evaluated
+    for name in names - {"asyncio.server"}:
+        assert attrgetter(name)(handed) is not None, name
+    assert "asyncio.server.serve" in names
 
 
 def test_one_message_turns_and_places_a_batch_as_the_public_setters_would() -> None:

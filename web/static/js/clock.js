@@ -1,4 +1,4 @@
-// The one clock of a session page: 3D figure, charts, stride strip and time bar all follow it (viewer.md §4).
+// The one clock of a session page: 3D figure, charts, stride strip and time bar all follow it.
 const read = () => {
   const el = document.getElementById("replay-data");
   return el ? JSON.parse(el.textContent) : { duration_s: 0, strides: [], curves: {} };

@@ -48,7 +48,7 @@ class JobProgress extends HTMLElement {
     this.say(job.state === "queued" ? "Waiting for the worker" : step || job.message || "Working");
   }
 
-  // Stages before the current one are done, it runs, the rest wait; returns the step in words.
+  // Stages before the current one are done, it runs, the rest wait; returns its name.
   markStages(job) {
     const items = [...this.querySelectorAll("[data-stage]")];
     const at = items.findIndex((li) => li.dataset.stage === job.stage);
@@ -60,7 +60,7 @@ class JobProgress extends HTMLElement {
       li.querySelector(".state").className = `state ${now}`;
       li.querySelectorAll("[data-shape]").forEach((s) => (s.hidden = s.dataset.shape !== now));
     });
-    return `Step ${at + 1} of ${items.length}: ${items[at].textContent.trim()}`;
+    return items[at].textContent.trim(); // how far it is the bar alone says: stages differ in length
   }
 
   async cancel() {

@@ -1,7 +1,7 @@
 // <gait-view> shows the 3D figure (an iframe) and sends it the time; <time-bar> plays, pauses and seeks.
 import { clock } from "./clock.js";
 
-const RATE_MS = 33; // the figure is posed at most 30 times a second (viewer.md §3)
+const RATE_MS = 33; // the figure is posed at most 30 times a second (docs/data-flow.md, "The 3D figure")
 const RETRY_MS = [500, 1000, 2000, 5000];
 
 const isDark = () => getComputedStyle(document.documentElement).colorScheme.startsWith("dark");
@@ -60,7 +60,7 @@ class GaitView extends HTMLElement {
   }
 
   // The server answers with the address of this tab's private view; after a restart it is a new one, so the frame
-  // is loaded again rather than left to a client that only retries while it has focus (viewer.md §5).
+  // is loaded again rather than left to a client that only retries while it has focus.
   receive(message) {
     if (message.error) {
       this.refused = message.error.code !== "bad_message";

@@ -273,7 +273,7 @@ class TakeTimeline extends HTMLElement {
 
   // The numbers are written by the server, as on the other pages.
   async numbers() {
-    const answer = await fetch(`/sessions/${this.session}/timeline/numbers`, { credentials: "same-origin" });
+    const answer = await fetch(`/sessions/${this.session}/timeline/numbers`, { credentials: "same-origin", headers: { "X-Sagittal-Fragment": "numbers" } });
     if (!answer.ok) throw { title: "The numbers could not be loaded", detail: "Load the page again." };
     const page = new DOMParser().parseFromString(await answer.text(), "text/html");
     document.getElementById("numbers").replaceWith(page.getElementById("numbers"));

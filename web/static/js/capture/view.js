@@ -2,6 +2,7 @@
 import { grouped } from "./pairing.js";
 import { POSES } from "./sources/axes.js";
 import { SensorList } from "./sensors.js";
+import { STAND_S } from "../standing.js";
 import * as words from "./words.js";
 
 const ADD = { dot: "Add sensor", replay: "Other files" };
@@ -136,7 +137,7 @@ export class View {
     go.disabled = ["loading", "stuck", "pairing", "sending"].includes(state) || (state === "prepare" && !n);
     go.classList.toggle("stop", state === "running" && !paused);
     const keeps = `Nothing is lost if the network drops: ${words.hours(room)}.`;
-    const hints = { prepare: `Stand still for 5 seconds after the tone. ${keeps}`, running: keeps, sending: keeps };
+    const hints = { prepare: `Stand still for ${STAND_S} seconds after the tone. ${keeps}`, running: keeps, sending: keeps };
     set(this.part("hint"), hints[state] ?? "");
   }
 

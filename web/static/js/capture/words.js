@@ -1,12 +1,12 @@
 // What the page says: what to do now, and one sentence for what is wrong.
-const STILL_S = 5;
+import { STAND_S } from "../standing.js";
 
 // By the stage the server is at (its "state" messages); before the first one, by the time since the start.
 export function instruction(stage, elapsedS) {
-  switch (stage ?? (elapsedS < STILL_S ? "stand" : "recording")) {
+  switch (stage ?? (elapsedS < STAND_S ? "stand" : "recording")) {
     case "waiting": return { icon: "info", title: "Wait a moment", more: "The server waits for all sensors." };
     case "stand":
-      return { icon: "users", title: "Stand still", more: "Feet beside each other, arms at the sides, for 5 seconds." };
+      return { icon: "users", title: "Stand still", more: `Feet as in walking, arms at the sides, for ${STAND_S} seconds.` };
     case "walk": return { icon: "walk", title: "Walk straight on", more: "At your own pace, at least eight steps." };
     case "running":
       return { icon: "walk", title: "Go on", more: "The figure moves on the clinic's screen. Stop when the exercise is over." };

@@ -1,16 +1,20 @@
 // <live-calibration>: stand, then walk; what is waited for, how still each sensor is, what its axes came out as.
 import { cell, segmentCell, setState, shape, stateOf } from "./shapes.js";
+import { STAND_S } from "../standing.js";
 import { capital, number, say } from "./words.js";
 
-const STAND_S = 3; // core/online/calibrating.py: quiet for so long
 const STEPS = 8; // straight steps, or
 const WALK_S = 12; // seconds of walking
 
 const SAYS = {
+  preparing: "The walk is being recorded. Please stand still until the live estimate is ready.",
+  unknown: "The walk is being recorded, without a live estimate.",
   waiting: "Waiting until every sensor sends data.",
   stand: "Please stand still, feet as in walking, and look ahead.",
   walk: "Now walk straight on at a comfortable pace.",
 };
+
+const BEFORE = new Set(["preparing", "unknown", "waiting"]); // nobody has looked at how the person stands
 
 class LiveCalibration extends HTMLElement {
   connectedCallback() {
@@ -22,7 +26,7 @@ class LiveCalibration extends HTMLElement {
     const problem = view?.problem ?? null;
     say(this.querySelector("[data-say]"), SAYS[stage] ?? "Calibrated.");
     const stood = view?.stood_s ?? 0, walked = view?.walked_s ?? 0, steps = view?.steps ?? 0;
-    this.step("stand", stage === "stand" ? "run" : stage === "waiting" ? "none" : "ok", Math.min(1, stood / STAND_S),
+    this.step("stand", stage === "stand" ? "run" : BEFORE.has(stage) ? "none" : "ok", Math.min(1, stood / STAND_S),
       stage === "stand" ? `${number(Math.min(stood, STAND_S), 1)} of ${STAND_S} seconds` : `${STAND_S} seconds, feet as in walking`);
     this.step("walk", stage === "walk" ? "run" : "none", Math.max(Math.min(1, steps / STEPS), Math.min(1, walked / WALK_S)),
       stage === "walk" ? `${steps} of ${STEPS} steps, ${number(walked)} s` : `${STEPS} steps`);

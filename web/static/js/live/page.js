@@ -18,7 +18,7 @@ import { clock, number, say } from "./words.js";
 
 const data = JSON.parse(document.getElementById("live-data").textContent);
 const OVER = new Set(["finished", "closed"]);
-const SPOKEN_MS = 5000; // live values are read out at most so often (DESIGN.md §9)
+const SPOKEN_MS = 5000; // live values are read out at most so often
 
 class LivePage extends HTMLElement {
   connectedCallback() {
@@ -56,11 +56,11 @@ class LivePage extends HTMLElement {
     const on = (type, act) => this.feed.addEventListener(type, (e) => act(e.detail));
     on("state", (state) => this.state(state));
     on("frame", (frame) => this.frame(frame));
-    on("stride", (stride) => { this.chart.stride(stride); this.strip.changed(); this.norm(); });
+    on("stride", (stride) => { this.chart.stride(stride); this.strip.changed(); });
     on("cue", () => this.strip.changed());
     on("feedback", (state) => { this.feedback.show(state); this.top.paused(state); this.strip.state(state, this.feedback.next(state)); });
     on("notice", (notice) => this.notes.notice(notice));
-    on("fresh", (fresh) => this.fresh(fresh));
+    on("fresh", () => this.cover());
     on("line", (line) => { this.notes.line(line); this.figure.line(line); });
   }
 
@@ -74,7 +74,9 @@ class LivePage extends HTMLElement {
   }
 
   state(state) {
-    this.top.state(state);
+    this.stopping = this.stopping === state.take || state.stopping ? state.take : null; // pressed here, or known to the server
+    this.top.state({ ...state, stopping: Boolean(this.stopping) });
+    this.cover();
     if (state.ghost) this.ghost(state.ghost);
     this.notes.tablet(state);
     this.notes.estimate(state);
@@ -86,11 +88,20 @@ class LivePage extends HTMLElement {
     if (this.watched === undefined || (state.state === "streaming" && this.before !== "streaming")) whenOther(data, () => this.given());
     this.before = state.state;
     this.watched = state.take;
-    if (state.state === "streaming") this.view(this.feed.frame?.stage === "running" ? "run" : "calibrate");
-    else {
+    if (state.state === "streaming") {
+      this.view(this.feed.frame?.stage === "running" ? "run" : "calibrate");
+      if (!this.feed.frame) this.recorded(state);
+    } else {
       this.view("pair");
       this.pairing.state(state);
     }
+  }
+
+  // Until the estimator speaks, the recorder does: which sensors send, and that the walk is kept.
+  recorded(state) {
+    const sensors = inOrder(state.sensors ?? []);
+    this.sensors.show(sensors, data.segments);
+    this.calibration.show(state.estimate === "preparing" ? "preparing" : "unknown", null, sensors, data.segments);
   }
 
   frame(frame) {
@@ -112,19 +123,20 @@ class LivePage extends HTMLElement {
     this.strip.changed();
   }
 
-  // Stale: both charts are covered and the figure is grey, so that nobody reads the past as now.
-  fresh(fresh) {
-    const cover = this.querySelector("[data-cover]");
-    const stale = fresh === false;
-    cover.hidden = !stale;
+  // Stale or stopping: both charts are covered and the figure is grey, so that nobody reads the past as now.
+  cover() {
+    const stale = this.feed.fresh === false || Boolean(this.stopping);
+    this.querySelector("[data-cover]").hidden = !stale;
     this.figure.classList.toggle("stale", stale);
-    if (!stale) return clearInterval(this.staleClock);
+    clearInterval(this.staleClock);
+    if (!stale) return;
     const words = this.querySelector("[data-cover-words]");
+    say(this.querySelector("[data-cover-title]"), this.stopping ? "Stopping… saving" : "Paused: no new data");
     const tell = () => {
+      if (this.stopping) return say(words, this.feed.state?.tablet === "connected" ? "The tablet sends what is left. This takes a moment." : "The tablet does not answer. It keeps what it measured and sends it when it is back.");
       const lost = this.feed.line !== "open" ? "The line to the server is lost. " : this.feed.state?.tablet === "lost" ? "The tablet does not answer. " : "";
       say(words, `${lost}The last data came ${number(this.feed.age / 1000, 1)} s ago; feedback waits. The tablet keeps what it measures.`);
     };
-    clearInterval(this.staleClock);
     tell();
     this.staleClock = setInterval(tell, 500);
   }
@@ -133,19 +145,7 @@ class LivePage extends HTMLElement {
     const variable = data.variables.find((v) => v.name === name);
     for (const b of this.querySelectorAll("[data-joint]")) b.ariaPressed = String(b.dataset.joint === name);
     say(this.querySelector("[data-variable]"), variable.label);
-    this.variable = variable;
-    this.norm();
-  }
-
-  // No adult norm below 0.8 m/s: no band, and the page says so (DESIGN.md §6 rule 7).
-  norm() {
-    const speeds = this.feed.strides.slice(-10).map((s) => s.values?.[data.slow.parameter]).filter((v) => v !== null && v !== undefined);
-    const slow = speeds.length > 2 && speeds.reduce((a, b) => a + b, 0) / speeds.length < data.slow.below_mps;
-    say(this.querySelector("[data-norm-note]"), slow ? data.slow.words : data.norm_note);
-    if (this.shown === this.variable && this.slow === slow) return;
-    const changed = this.shown !== this.variable;
-    [this.shown, this.slow] = [this.variable, slow];
-    this.chart.show(slow ? { ...this.variable, norm: null } : this.variable, changed);
+    this.chart.show(variable);
   }
 
   press() {
@@ -186,8 +186,14 @@ class LivePage extends HTMLElement {
 
   // STOP acts at once; without the tablet the take is ended with what has arrived.
   stop() {
-    if (this.feed.state?.tablet === "connected") this.commands.send("stop");
-    else this.notes.withoutTablet();
+    if (this.feed.state?.tablet !== "connected") return this.notes.withoutTablet();
+    this.stopping = this.feed.state.take;
+    this.state(this.feed.state);
+    this.commands.send("stop").then((done) => {
+      if (done) return;
+      this.stopping = null; // it was refused: the walk goes on
+      this.state(this.feed.state);
+    });
   }
 
   // The moment is the press, not when the words are written.
@@ -206,7 +212,7 @@ class LivePage extends HTMLElement {
   speak() {
     if (this.dataset.view !== "run") return;
     const { delay } = this.feed;
-    const words = [this.feed.fresh === false ? "Paused, no new data" : "", this.querySelector("[data-in-zone]").textContent, delay === undefined || delay === null ? "" : `delay ${Math.round(delay)} milliseconds`];
+    const words = [this.stopping ? "Stopping, saving" : this.feed.fresh === false ? "Paused, no new data" : "", this.querySelector("[data-in-zone]").textContent, delay === undefined || delay === null ? "" : `delay ${Math.round(delay)} milliseconds`];
     say(this.querySelector("[data-spoken]"), words.filter(Boolean).join(", "));
   }
 }

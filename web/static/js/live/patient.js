@@ -121,7 +121,7 @@ class PatientScreen extends HTMLElement {
     return half > 0 ? (cue.value - (cue.zone_high + cue.zone_low) / 2) / half : 0;
   }
 
-  // A stride without feedback: everything but the road is dim (DESIGN.md §7.8).
+  // A stride without feedback: everything but the road is dim.
   alone() {
     this.dataset.faded = "";
     this.scene?.dim();

@@ -1,7 +1,7 @@
 // A canvas chart: sharp on every screen, coloured by the design tokens, drawn at most once per animation frame.
-// Heights and widths come from the stylesheet; a change of the theme draws again (DESIGN.md §6 rule 12).
+// Heights and widths come from the stylesheet; a change of the theme draws again.
 const NAMES = [
-  "surface", "ink", "ink-2", "ink-3", "axis", "grid", "zero", "norm", "norm-line", "left", "left-ink", "right",
+  "surface", "ink", "ink-2", "ink-3", "axis", "grid", "zero", "left", "left-ink", "right",
   "right-ink", "target", "target-line", "ok", "warn", "bad", "control", "accent", "line-2",
 ];
 export const FONT_PX = 11;

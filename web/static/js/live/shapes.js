@@ -1,4 +1,4 @@
-// States as shape and word (DESIGN.md §5): the shapes come from templates in the page, so there is one drawing of each.
+// States as shape and word: the shapes come from templates in the page, so there is one drawing of each.
 import { say } from "./words.js";
 
 export function shape(kind) {

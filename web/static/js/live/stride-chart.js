@@ -1,4 +1,4 @@
-// <stride-chart>: the stride being walked over the norm band, left solid, right dashed, the last strides thin.
+// <stride-chart>: the stride being walked with the last ones, left solid, right dashed, the last thin.
 import { DASH, MEAN_PX, Plot, THIN_PX, label, trace } from "./plot.js";
 import { SHORT, number, say } from "./words.js";
 
@@ -18,10 +18,10 @@ class StrideChart extends Plot {
     this.done = { left: [], right: [] };
   }
 
-  // variable: {name, label, range, ticks, up, down, norm: {mean, sd}|null}
-  show(variable, other = true) {
+  // variable: {name, label, range, ticks, up, down}, degrees from standing: the norm's zero is another
+  show(variable) {
     this.variable = variable;
-    if (other) this.samples = { left: [], right: [] };
+    this.samples = { left: [], right: [] };
     this.ask();
   }
 
@@ -84,7 +84,6 @@ class StrideChart extends Plot {
   }
 
   scale(g, X, Y, { colour, h, v }) {
-    if (v.norm) this.band(g, X, Y, v.norm, colour);
     g.lineWidth = 1;
     for (const a of v.ticks) {
       g.strokeStyle = a === 0 ? colour.zero : colour.grid;
@@ -93,20 +92,6 @@ class StrideChart extends Plot {
     }
     for (const p of TICKS) label(g, String(p), X(p), EDGE.top + h + 15, { colour: colour.axis, align: "center" });
     label(g, "% of gait cycle", X(100), EDGE.top + h + 30, { colour: colour.axis, align: "right" });
-  }
-
-  band(g, X, Y, { mean, sd }, colour) {
-    const at = (i) => X((100 * i) / (mean.length - 1));
-    g.fillStyle = colour.norm;
-    g.beginPath();
-    mean.forEach((m, i) => g.lineTo(at(i), Y(m + sd[i])));
-    for (let i = mean.length - 1; i >= 0; i--) g.lineTo(at(i), Y(mean[i] - sd[i]));
-    g.fill();
-    g.strokeStyle = colour["norm-line"];
-    g.lineWidth = 1.25;
-    g.setLineDash([1.5, 3]);
-    trace(g, mean.map((m, i) => [at(i), Y(m)]));
-    g.setLineDash([]);
   }
 
   strides(g, side, X, Y, colour) {

@@ -2,7 +2,7 @@
 import "./strip.js";
 import { SHOWN } from "./strip.js";
 import { fill, rowsOf } from "./strides-table.js";
-import { asymmetry, mean, say } from "./words.js";
+import { asymmetry, say } from "./words.js";
 
 export class StripCard {
   constructor(root, data, feed) {
@@ -47,7 +47,7 @@ export class StripCard {
     this.strip.show(rows, this.data.prescription ? this.zone(rows) : null, this.term?.digits ?? 2);
     const judged = rows.filter((r) => r.cue), inside = judged.filter((r) => r.kind === "in").length;
     say(this.root.querySelector("[data-in-zone]"), judged.length ? `${inside} of ${judged.length} in zone` : "");
-    const of = (side) => mean(this.feed.strides.filter((s) => s.counted && s.side === side).slice(-SHOWN / 2).map((s) => s.values?.[this.parameter]));
+    const of = (side) => this.feed.strides.filter((s) => s.counted && s.side === side).slice(-SHOWN / 2).map((s) => s.values?.[this.parameter]);
     say(this.root.querySelector("[data-asymmetry]"), asymmetry(of("left"), of("right"), this.term) ?? "");
     if (!this.root.querySelector("#strides-table").hidden) fill(this.root.querySelector("tbody"), rows, this.term);
     this.rows = rows;

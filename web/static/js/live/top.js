@@ -25,7 +25,7 @@ export class Top {
     const running = state.state === "streaming";
     this.now = running ? { elapsed: state.elapsed_s ?? 0, at: performance.now() } : null;
     this.at("rec").hidden = !running;
-    say(this.at("rec-word"), state.tablet === "connected" ? "Recording" : "On the tablet");
+    say(this.at("rec-word"), state.stopping ? "Stopping… saving" : state.tablet === "connected" ? "Recording" : "On the tablet");
     this.at("delay").hidden = !running;
     this.button("start").hidden = !(state.state === "open" && state.tablet === "connected");
     this.button("stop").hidden = !running;

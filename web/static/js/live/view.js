@@ -1,6 +1,6 @@
 // <live-view> shows the live figure of a session: viser's page in an iframe, loaded when it is first seen, again
 // when the theme changes and when the line to the server has come back. Viser's own client only tries again while
-// it has focus, which an iframe rarely has, so it is not waited for (viewer.md §5).
+// it has focus, which an iframe rarely has, so it is not waited for.
 const RETRY_MS = 5000;
 
 const isDark = () => getComputedStyle(document.documentElement).colorScheme.startsWith("dark");

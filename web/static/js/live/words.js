@@ -30,11 +30,34 @@ export function mean(values) {
   return known.length ? known.reduce((a, b) => a + b, 0) / known.length : null;
 }
 
-// Left against right in words: "left shorter by 0.05 m"; a difference that does not show in the digits is none.
-export function asymmetry(left, right, term) {
+const COMPARED = 4; // fewer strides of a side are compared with nothing, as in the report
+// Two-sided 95 % quantiles of Student's t for 1, 2, … degrees of freedom: two sides of ten strides have at most 18.
+const T95 = [
+  12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.16, 2.145, 2.131, 2.12, 2.11, 2.101,
+];
+
+// The strides say which side is larger: Welch's 95 % interval of the difference leaves out 0, as in the report.
+export function differ(left, right) {
+  const [a, b] = [left, right].map((x) => {
+    const m = mean(x);
+    return { m, of: x.reduce((sum, v) => sum + (v - m) ** 2, 0) / (x.length - 1) / x.length, n: x.length };
+  });
+  const between = a.of + b.of;
+  if (between === 0) return a.m !== b.m;
+  const freedom = Math.floor(between ** 2 / (a.of ** 2 / (a.n - 1) + b.of ** 2 / (b.n - 1)));
+  return Math.abs(a.m - b.m) > T95[Math.min(Math.max(freedom, 1), T95.length) - 1] * Math.sqrt(between);
+}
+
+// Left against right in words, of the values of single strides: "left shorter by 0.05 m"; a difference that does
+// not show in the digits is none, and one that the strides leave open is not said.
+export function asymmetry(lefts, rights, term) {
+  const [known, others] = [lefts, rights].map((x) => x.filter(Number.isFinite));
+  const [left, right] = [mean(known), mean(others)];
   if (left === null || right === null || !term) return null;
+  if (Math.min(known.length, others.length) < COMPARED) return "too few strides to compare";
   const text = number(Math.abs(left - right), term.digits);
   if (Number(text) === 0) return "left and right equal";
+  if (!differ(known, others)) return "no clear difference";
   const [more, less] = term.comparison;
   return `left ${left > right ? more : less} by ${withUnit(Math.abs(left - right), term)}`;
 }

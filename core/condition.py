@@ -1,0 +1,165 @@
+"""How a take was walked, as far as it is not the person: pace, feedback, aid, orthosis, shoes, floor or belt.
+
+A difference between two takes is a change of the person only where they were walked alike. `is_comparable`
+is that rule; every table, trend and baseline asks it. What nobody stated is None: it is like nothing but
+itself, and the words say so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal
+
+from core.frames import Protocol
+
+WalkingPace = Literal["comfortable", "slow", "fast"]
+WalkingAid = Literal[
+    "none", "stick", "four_point_stick", "crutch", "crutches", "frame", "rollator", "handrail", "person",
+    "harness",
+]  # fmt: skip
+Orthosis = Literal["none", "insole", "foot_lifter", "ankle_foot", "knee", "knee_ankle_foot", "stimulation"]
+Footwear = Literal["shoes", "orthopaedic_shoes", "socks", "barefoot"]
+
+CHOICES: Final[Mapping[str, Mapping[str, str]]] = {
+    "pace": {"comfortable": "own pace", "slow": "slow", "fast": "fast"},
+    "aid": {
+        "none": "no aid",
+        "stick": "stick",
+        "four_point_stick": "four-point stick",
+        "crutch": "one crutch",
+        "crutches": "two crutches",
+        "frame": "walking frame",
+        "rollator": "rollator",
+        "handrail": "handrail or bars",
+        "person": "a person's hand",
+        "harness": "weight support",
+    },
+    "orthosis": {
+        "none": "no orthosis",
+        "insole": "insoles",
+        "foot_lifter": "foot lifter",
+        "ankle_foot": "ankle-foot orthosis",
+        "knee": "knee orthosis",
+        "knee_ankle_foot": "knee-ankle-foot orthosis",
+        "stimulation": "electrical stimulation",
+    },
+    "shoes": {
+        "shoes": "shoes",
+        "orthopaedic_shoes": "orthopaedic shoes",
+        "socks": "socks",
+        "barefoot": "barefoot",
+    },
+}
+"""What a person states → its values in words."""
+
+PROTOCOL_WORDS: Final[Mapping[Protocol, str]] = {
+    "walk": "over ground",
+    "treadmill": "treadmill",
+    "squat": "squats",
+    "tug": "timed up and go",
+    "activity": "daily activity",
+}
+
+SAME_BELT_MPS: Final = 0.02
+"""Entered speeds of a belt that differ by less are one speed: the smallest step of a treadmill, 0.1 km/h, is
+0.028 m/s."""
+
+NOT_STATED: Final = "condition not stated"
+
+
+@dataclass(frozen=True)
+class WalkingCondition:
+    """The condition of a take.
+
+    Parameters
+    ----------
+    pace, aid, orthosis, shoes : of CHOICES; None = nobody stated it.
+    feedback : biofeedback was given while walking.
+    protocol : what was walked. belt_speed_mps : of its treadmill, None = not entered.
+    """
+
+    pace: WalkingPace | None = None
+    aid: WalkingAid | None = None
+    orthosis: Orthosis | None = None
+    shoes: Footwear | None = None
+    feedback: bool = False
+    protocol: Protocol = "walk"
+    belt_speed_mps: float | None = None
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """What people state of it, by the names of CHOICES."""
+        return {name: getattr(self, name) for name in CHOICES}
+
+    @property
+    def unstated(self) -> tuple[str, ...]:
+        """What of it nobody stated, by name."""
+        names = tuple(name for name, value in self.stated.items() if value is None)
+        belt = self.protocol == "treadmill" and self.belt_speed_mps is None
+        return (*names, "speed of the belt") if belt else names
+
+    @property
+    def is_at_own_pace(self) -> bool:
+        """Not asked to walk faster or slower, as far as anybody stated."""
+        return self.pace in {None, "comfortable"}
+
+    @property
+    def is_unaided(self) -> bool:
+        """Without feedback, aid and orthosis as far as anybody stated: what may serve others as reference."""
+        return not self.feedback and self.aid in {None, "none"} and self.orthosis in {None, "none"}
+
+    @property
+    def words(self) -> str:
+        """In words, "own pace, no aid, shoes"; an orthosis only where there is one."""
+        floor = [] if self.protocol == "walk" else [self._floor]
+        told = ["with feedback"] if self.feedback else []
+        said = {name: CHOICES[name].get(value or "") for name, value in self.stated.items()}
+        if not any(said.values()):
+            return ", ".join([*floor, NOT_STATED, *told])
+        if self.orthosis == "none":
+            del said["orthosis"]
+        return ", ".join([*floor, *(text or f"{name} not stated" for name, text in said.items()), *told])
+
+    @property
+    def _floor(self) -> str:
+        belt = "" if self.belt_speed_mps is None else f" at {self.belt_speed_mps:.2f}\u202fm/s"
+        return PROTOCOL_WORDS[self.protocol] + belt
+
+
+USUAL: Final = WalkingCondition("comfortable", "none", "none", "shoes")
+"""What a form is filled with before anybody says otherwise."""
+
+
+def is_alike(a: WalkingCondition, b: WalkingCondition) -> bool:
+    """Whether two takes were walked under the same condition, feedback aside."""
+    return not differences(replace(a, feedback=False), replace(b, feedback=False))
+
+
+def is_comparable(a: WalkingCondition, b: WalkingCondition) -> bool:
+    """Whether a difference between two takes can be called a change: walked alike, neither with feedback."""
+    return not a.feedback and not b.feedback and is_alike(a, b)
+
+
+def differences(a: WalkingCondition, b: WalkingCondition) -> tuple[str, ...]:
+    """How the condition of one take differs from that of a later one, in words: "own pace, then fast"."""
+    found = []
+    if a.protocol != b.protocol:
+        found.append(f"{PROTOCOL_WORDS[a.protocol]}, then {PROTOCOL_WORDS[b.protocol]}")
+    elif not _same_belt(a.belt_speed_mps, b.belt_speed_mps):
+        speeds = [
+            "unknown" if c.belt_speed_mps is None else f"{c.belt_speed_mps:.2f}\u202fm/s" for c in (a, b)
+        ]
+        found.append(f"speed of the belt {speeds[0]}, then {speeds[1]}")
+    for name, words in CHOICES.items():
+        values = [getattr(c, name) for c in (a, b)]
+        if values[0] != values[1]:
+            first, second = (words.get(v or "", f"{name} not stated") for v in values)
+            found.append(f"{first}, then {second}")
+    if a.feedback != b.feedback:
+        found.append("with feedback, then without" if a.feedback else "without feedback, then with")
+    return tuple(found)
+
+
+def _same_belt(a: float | None, b: float | None) -> bool:
+    return abs(a - b) < SAME_BELT_MPS if a is not None and b is not None else a is b

@@ -1,0 +1,186 @@
+"""An entry of the manifest's `sources`: how a file is cut into columns and what they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from types import MappingProxyType
+from typing import Final
+
+from core.errors import ManifestError
+from core.formats.json_tree import Node
+from core.frames import GRAVITY
+
+ACC_UNITS: Final[dict[str, float]] = {
+    "m/s2": 1.0,
+    "m/s^2": 1.0,
+    "m/s²": 1.0,
+    "g": GRAVITY,
+    "mg": GRAVITY / 1e3,
+}
+GYR_UNITS: Final[dict[str, float]] = {
+    "rad/s": 1.0,
+    "deg/s": 0.017453292519943295,
+    "°/s": 0.017453292519943295,
+}
+TIME_UNITS: Final[dict[str, float]] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+QUAT_ORDERS: Final = ("wxyz", "xyzw")
+_SMALLEST_WRAP: Final = 16
+"""A counter of fewer than 4 bits could not tell a lost stretch from none [our choice]."""
+
+
+@dataclass(frozen=True)
+class Channels:
+    """Column names of one sensor in a table; several header rows are joined by "/".
+
+    Parameters
+    ----------
+    acc, gyr, mag : three names each, x, y, z. quat : four names in the order the source declares.
+    """
+
+    acc: tuple[str, ...]
+    gyr: tuple[str, ...] | None = None
+    mag: tuple[str, ...] | None = None
+    quat: tuple[str, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Counter:
+    """A column of a table that counts samples, so that lost rows are lost time.
+
+    Parameters
+    ----------
+    column : its name; it goes up by 1 per sample. wrap : it starts again from 0 at this count, None = 16 bit
+        (32 bit when it shows more).
+    """
+
+    column: str
+    wrap: int | None = None
+
+
+@dataclass(frozen=True)
+class SourceSpec:
+    """How one file (or all files that match a pattern) is to be read; None = the file says so itself.
+
+    Parameters
+    ----------
+    file : name or pattern with * and ?, compared with the whole path and with its last part.
+    skip_rows : lines before the header. header_rows : lines of the header.
+    index_column : the first column is no signal.
+    rate_hz : nominal sampling rate. time_column, time_unit : where the time is; counter : what counts the
+        samples; without either the rate makes time.
+    gravity_included : False when the device has already removed gravity (not usable, said so).
+    columns : sensor id or segment → its columns; empty for formats that name their columns themselves.
+    quat_order : "wxyz" or "xyzw". frame : "sensor" or None.
+    """
+
+    file: str
+    skip_rows: int = 0
+    header_rows: int = 1
+    index_column: bool = False
+    separator: str | None = None
+    rate_hz: float | None = None
+    time_column: str | None = None
+    time_unit: str = "s"
+    counter: Counter | None = None
+    acc_unit: str | None = None
+    gyr_unit: str | None = None
+    mag_unit: str | None = None
+    gravity_included: bool = True
+    columns: Mapping[str, Channels] = field(default_factory=dict)
+    quat_order: str | None = None
+    frame: str | None = None
+
+    def covers(self, name: str) -> bool:
+        """Tell whether this entry speaks of the file `name`."""
+        last = name.replace("\\", "/").rsplit("/", 1)[-1]
+        return self.file in (name, last) or fnmatchcase(name, self.file) or fnmatchcase(last, self.file)
+
+
+_SOURCE_KEYS: Final = (
+    "file", "skip_rows", "header_rows", "index_column", "separator", "rate_hz", "time_column", "time_unit",
+    "counter", "acc_unit", "gyr_unit", "mag_unit", "gravity_included", "columns", "quat_order", "frame",
+)  # fmt: skip
+
+
+def read_source(node: Node) -> SourceSpec:
+    """One entry of the manifest's `sources`.
+
+    Raises
+    ------
+    ManifestError
+        manifest_unknown_key, manifest_bad_value, unknown_unit, unsupported_frame; with the place.
+    """
+    node.only(*_SOURCE_KEYS)
+    if node.text("file") is None:
+        raise ManifestError(
+            "manifest_bad_value", f"{node.path}.file is missing; give a file name or a pattern (*.txt)."
+        )
+    counter, rate = _counter(node)
+    frame = node.choice("frame", ("sensor",), "unsupported_frame")
+    columns = node.child("columns")
+    gravity = node.flag("gravity_included")
+    return SourceSpec(
+        file=node.string("file"),
+        skip_rows=node.count("skip_rows", 0, 1000),
+        header_rows=node.count("header_rows", 1, 10),
+        index_column=node.flag("index_column") or False,
+        separator=node.choice("separator", (",", ";", "\t", " ", "|"), "manifest_bad_value"),
+        rate_hz=rate,
+        time_column=node.text("time_column"),
+        time_unit=node.choice("time_unit", tuple(TIME_UNITS), "unknown_unit") or "s",
+        counter=counter,
+        acc_unit=node.choice("acc_unit", tuple(ACC_UNITS), "unknown_unit"),
+        gyr_unit=node.choice("gyr_unit", tuple(GYR_UNITS), "unknown_unit"),
+        mag_unit=node.text("mag_unit"),
+        gravity_included=True if gravity is None else gravity,
+        columns=MappingProxyType({k: _channels(columns.child(k)) for k in columns.keys}),
+        quat_order=node.choice("quat_order", QUAT_ORDERS, "manifest_bad_value"),
+        frame=frame,
+    )
+
+
+def _counter(node: Node) -> tuple[Counter | None, float | None]:
+    """What counts the samples of a table, if anything does, and samples per second."""
+    rate = _rate(node)
+    inner = node.child("counter")
+    if not inner.keys:
+        return None, rate
+    inner.only("column", "rate_hz", "wrap")
+    counted = _rate(inner)
+    if rate is not None and counted is not None and rate != counted:
+        raise ManifestError(
+            "manifest_bad_value",
+            f"{node.path} has rate_hz {rate:g} and counter.rate_hz {counted:g}; give one of them.",
+        )
+    if node.text("time_column") is not None:
+        raise ManifestError(
+            "manifest_bad_value", f"{node.path} has time_column and counter; give one of them as the clock."
+        )
+    wrap = inner.count("wrap", 0, 1 << 53) or None
+    if wrap is not None and wrap < _SMALLEST_WRAP:
+        raise ManifestError(
+            "manifest_bad_value",
+            f"{inner.path}.wrap is {wrap}; expected how many counts there are, 256 for one of 8 bits.",
+        )
+    return Counter(inner.string("column"), wrap), rate if counted is None else counted
+
+
+def _rate(node: Node) -> float | None:
+    rate = node.number("rate_hz")
+    if rate is not None and not 1.0 <= rate <= 10_000.0:
+        raise ManifestError(
+            "manifest_bad_value", f"{node.at('rate_hz')} is {rate:g}; expected 1 to 10000 samples/s."
+        )
+    return rate
+
+
+def _channels(node: Node) -> Channels:
+    node.only("acc", "gyr", "mag", "quat")
+    acc = node.names("acc", 3)
+    if acc is None:
+        raise ManifestError(
+            "manifest_bad_value", f"{node.path}.acc is missing; name three columns (x, y, z)."
+        )
+    return Channels(acc, node.names("gyr", 3), node.names("mag", 3), node.names("quat", 4))

@@ -1,0 +1,51 @@
+"""Sensors of a live take that do not measure: the rule of core/quality/stuck.py on the live axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from core.errors import Notice
+from core.frames import Segment
+from core.online.axis import UniformBlock
+from core.quality.stuck import CLIPPED, StuckParams, StuckWatch
+
+
+class StuckSensors:
+    """Marks samples of sensors that do not measure, and tells of each such sensor once.
+
+    Parameters
+    ----------
+    segments : in the order of the blocks' columns.
+    """
+
+    def __init__(
+        self, segments: Sequence[Segment], rate_hz: float, params: StuckParams | None = None
+    ) -> None:
+        self._segments, self._rate_hz = tuple(segments), rate_hz
+        self._watch = StuckWatch(len(self._segments), rate_hz, params)
+        self._told: set[tuple[int, int]] = set()
+        self.now: tuple[Segment, ...] = ()
+        """Segments whose sensor does not measure at the last sample."""
+
+    def push(self, block: UniformBlock) -> tuple[UniformBlock, list[Notice]]:
+        """Take the next samples; the same block, invalid where a sensor does not measure, and what is new."""
+        bad, back = self._watch.push(block.acc, block.gyr, block.valid)
+        self.now = tuple(s for s, x in zip(self._segments, bad[-1], strict=True) if x)
+        notices = []
+        for k, i in np.argwhere(back > 0).tolist():
+            fault = int(bad[k, i])
+            if (i, fault) not in self._told:
+                self._told.add((i, fault))
+                first_s = (block.first + k - int(back[k, i])) / self._rate_hz
+                notices.append(self._watch.describe(self._segments[i], i, fault, first_s))
+        measured = bad == 0
+        block = replace(
+            block,
+            valid=block.valid & measured,
+            interpolated=block.interpolated & measured,
+            out=~measured & (bad <= CLIPPED),
+        )
+        return block, notices

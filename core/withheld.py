@@ -1,0 +1,156 @@
+"""Angles and distances that a take's estimator cannot stand behind are not shown, and say why.
+
+An estimator measures how well its result hangs together (core/body/health.py). Where that is bad, the angles
+of the joint concerned still look like angles; they are taken out with the reason `estimator_bad`. So are
+the distances of a foot whose path does not fit its own rests, or whose chain does not hang together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from core.angles import SIGNS, JointAngles, joints
+from core.body.estimate import PoseEstimate
+from core.body.health import Finding
+from core.body.poses import Poses
+from core.errors import Notice
+from core.frames import FOOT, SIDES, SUFFIX, Oriented, Side
+from core.rest import runs
+
+BAD: Final = "estimator_bad"
+"""Reason of an angle whose estimator contradicts itself at that joint."""
+
+OF_JOINT: Final = ("joint_residual_mm",)
+"""Findings of a joint, "proximal-distal"."""
+
+OF_SEGMENT: Final = ("forward_axis_turned_deg", "start_heading_off_deg")
+"""Findings of a segment: its joints, and a pelvis's own angles."""
+
+OF_LEG: Final = ("leg_excess_mm", "hinge_mm", "longest_moving_s", "knee_straight_pct")
+"""Findings of a leg or its foot: what the model of the leg estimates of it."""
+
+OF_TAKE: Final = (
+    "feet_out_of_place_pct", "phase_off_pct", "toward_foot_mps2", "inner_foot_m", "pelvis_tilt_sd_deg",
+    "pelvis_rise_cm",
+)  # fmt: skip
+"""Findings of the whole take: all that the model of the legs estimates."""
+
+OF_PATH: Final = ("zero_velocity_refused_pct",)
+"""Findings of the path of a foot."""
+
+AFTER_GAP_S: Final = 10.0
+"""For so long after a loss what the model of the leg says of it is doubtful (core/body/l7s_health.py)."""
+
+
+def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> JointAngles:
+    """Take out angles of joints whose estimator is bad, and note what an estimated knee can rest on.
+
+    Parameters
+    ----------
+    poses : with the health of the run. orientations : of the sensors: when they were lost.
+
+    Returns
+    -------
+    JointAngles without them; `withheld` has their reasons, `bounds` the straight knee of a leg model, a
+    notice `angles_withheld` says which joints.
+    """
+    estimated = frozenset(map(str, angles.diagnostics.get("estimated", ())))  # type: ignore[call-overload]
+    bad = [f for f in poses.health if f.verdict == "bad"]
+    out = {name for f in bad for name in _concerned(f, estimated) if name in angles.angles}
+    kept = {name: x for name, x in angles.angles.items() if name not in out}
+    for f in bad:
+        side = _foot_side(f.of)
+        if f.name == "gap_s" and f.bad is not None and side is not None and FOOT[side] in orientations.valid:
+            long = _after_gaps(orientations, side, f.bad)
+            for name in kept:
+                if name in estimated and name.endswith(f"_{SUFFIX[side]}"):
+                    kept[name] = np.where(long, np.nan, kept[name])
+    bounds = {
+        name: float((-angles.zero_offset[name] + np.pi) % (2.0 * np.pi) - np.pi)
+        for name in kept
+        if poses.method.startswith("l7s") and name in estimated and name.startswith("knee_flexion")
+    }
+    notices = angles.notices
+    if out:
+        places = sorted({_place(name) for name in out})
+        message = (
+            f"Angles of {', '.join(places)} are withheld: the sensors contradict each other there. Check "
+            "sides, segments and mounting, then calibrate again."
+        )
+        notices = (*notices, Notice("angles_withheld", message))
+    return replace(
+        angles, angles=kept, withheld=dict.fromkeys(sorted(out), BAD), bounds=bounds, notices=notices
+    )
+
+
+def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
+    """Take out distances of feet whose paths the estimator cannot stand behind.
+
+    Returns
+    -------
+    PoseEstimate whose `feet` say so in `withheld`; a notice `distances_withheld` says which feet. On one
+    chain a joint that is wrong moves both feet.
+    """
+    feet = posed.feet
+    if feet is None:
+        return posed
+    bad = [f for f in posed.poses.health if f.verdict == "bad"]
+    chain = feet.linked and any(f.name in OF_JOINT or f.name in OF_SEGMENT for f in bad)
+    off = {f.of for f in bad if f.name in OF_PATH}
+    out = [side for side in SIDES if side in feet.p and (chain or FOOT[side] in off)]
+    if not out:
+        return posed
+    whose = "both feet" if len(out) > 1 else f"the {out[0]} foot"
+    message = (
+        f"Distances of {whose} are withheld: the path does not fit the sensors. Check sides, segments, "
+        "mounting and lost samples, then record again."
+    )
+    notices = (*posed.poses.notices, Notice("distances_withheld", message))
+    return replace(
+        posed,
+        poses=replace(posed.poses, notices=notices),
+        feet=replace(feet, withheld=dict.fromkeys(out, BAD)),
+    )
+
+
+def _concerned(f: Finding, estimated: frozenset[str]) -> Iterator[str]:
+    """Names of the angles that a bad finding spoils."""
+    of = f.of or ""
+    if f.name in OF_JOINT or f.name in OF_SEGMENT:
+        ends = set(of.split("-"))
+        for side in SIDES:
+            for joint, proximal, distal in joints(side):
+                # of a joint both ends are named, of a segment one
+                if ends <= {proximal, distal}:
+                    yield from (f"{base}_{SUFFIX[side]}" for base, _, _ in SIGNS[joint])
+        if of == "pelvis":
+            yield from ("pelvis_tilt", "pelvis_obliquity")
+    elif f.name in OF_LEG:
+        yield from (name for name in estimated if name.endswith(f"_{of[-1:]}"))
+    elif f.name in OF_TAKE:
+        yield from estimated
+
+
+def _foot_side(of: str | None) -> Side | None:
+    return next((side for side in SIDES if FOOT[side] == of), None)
+
+
+def _after_gaps(orientations: Oriented, side: Side, least_s: float) -> np.ndarray:
+    """Samples (n,) in a loss of a foot longer than `least_s` or within `AFTER_GAP_S` of its end."""
+    t_s, valid = orientations.t_s, orientations.valid[FOOT[side]]
+    long = np.zeros(len(valid), np.bool_)
+    for start, stop in runs(~valid):
+        end_s = float(t_s[stop - 1])
+        if end_s - float(t_s[start]) > least_s:
+            long |= (t_s >= t_s[start]) & (t_s <= end_s + AFTER_GAP_S)
+    return long
+
+
+def _place(name: str) -> str:
+    joint = name.split("_")[0]
+    side = next((side for side in SIDES if name.endswith(f"_{SUFFIX[side]}")), None)
+    return joint if side is None else f"the {side} {joint}"

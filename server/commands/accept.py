@@ -1,0 +1,34 @@
+"""`sagittal accept`: go on with this database, though it was emptied, put back or exchanged."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import closing
+from pathlib import Path
+
+from server.settings import load_settings
+
+
+def accept(data_dir: Path | None) -> int:
+    """Trust the database from now on; 1 when it cannot be used."""
+    from server.services import custody
+    from server.storage.db import Database
+    from server.storage.migrate import MigrationError, upgrade
+
+    settings = load_settings({"data_dir": data_dir})
+    try:
+        upgrade(settings.database)
+    except MigrationError as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    with closing(Database(settings.database)) as db:
+        doubted = custody.accept(db, settings)
+    if doubted is None:
+        sys.stdout.write("There was no doubt about this database; nothing is changed.\n")
+    else:
+        sys.stdout.write(
+            f"{doubted}\nIt is the right one from now on. Stored files that it does not know go to "
+            f"{settings.trash} and stay 30 days; live logs stay in {settings.live}.\n"
+        )
+    sys.stdout.flush()
+    return 0

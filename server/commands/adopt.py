@@ -1,0 +1,59 @@
+"""`sagittal adopt`: live recordings that the database does not know; give one to a session."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import closing
+from pathlib import Path
+
+from server.settings import Settings, load_settings
+
+
+def adopt(data_dir: Path | None, take: str | None, session: str | None) -> int:
+    """List the logs, or make `take` a recording of `session`; 1 when that is not possible."""
+    from server.services.errors import ServiceError
+    from server.storage.migrate import MigrationError, require_current
+
+    settings = load_settings({"data_dir": data_dir})
+    if (take is None) != (session is None):
+        sys.stderr.write("Give both a take and --session, or neither to list what can be adopted.\n")
+        return 2
+    try:
+        require_current(settings.database)
+        if take is None or session is None:
+            return _list(settings)
+        return _adopt(settings, take, session.rstrip("/").rsplit("/", 1)[-1])
+    except (MigrationError, ServiceError) as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+
+
+def _list(settings: Settings) -> int:
+    from server.services import live_logs
+    from server.storage.db import Database
+
+    with closing(Database(settings.database)) as db, db.read() as c:
+        strangers = [log for log in live_logs.logs(c, settings.live) if not log.known]
+    for log in strangers:
+        sys.stdout.write(f"{log.take_id}  {log.words}\n")
+    sys.stdout.write(
+        "Give one to a session: sagittal adopt TAKE --session ADDRESS-OF-ITS-PAGE\n"
+        if strangers
+        else "The database knows every live recording.\n"
+    )
+    sys.stdout.flush()
+    return 0
+
+
+def _adopt(settings: Settings, take: str, session: str) -> int:
+    from server.jobs.table import TableQueue
+    from server.services import live_logs
+    from server.storage.blobs import BlobStore
+    from server.storage.db import Database
+
+    with closing(Database(settings.database)) as db:
+        queue = TableQueue(db, settings.lease_s)
+        live_logs.adopt(db, BlobStore(settings.blobs), settings, queue, None, take, session)
+    sys.stdout.write(f"It is the newest recording of /sessions/{session} now and will be analysed.\n")
+    sys.stdout.flush()
+    return 0

@@ -1,0 +1,125 @@
+"""One folder of compiled filters per user and version of the filters, shared by every process of ours.
+
+numba compiles a filter at its first call, which takes up to a minute for all of them, and reads it from this
+folder ever after: command line, web server, workers, live estimators, demo and tests use the same one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+import core
+
+VARIABLE: Final = "NUMBA_CACHE_DIR"
+"""Environment variable from which numba takes its folder, when it is imported."""
+KEEP_S: Final = 60 * 24 * 3600.0
+"""A folder of another version that nobody has used for so long is removed."""
+
+_IMPORTED = re.compile(
+    r"^\s*(?:from|import)\s+(core(?:\.\w+)*)(?:\s+import\s+(?:\(([\w,\s]+)\)|([\w, ]+)))?", re.MULTILINE
+)
+
+
+def share_compile_cache(fallback: Path) -> Path:
+    """Choose the folder for this process and all it starts; call it before numba is imported.
+
+    Parameters
+    ----------
+    fallback : folder taken where the user's cache folder cannot be written (made when needed).
+
+    Returns
+    -------
+    The folder, which is now `NUMBA_CACHE_DIR` of this process. A folder that the environment already names is
+    kept as it is.
+    """
+    given = os.environ.get(VARIABLE)
+    folder = Path(given) if given else find_compile_cache(os.environ, fallback)
+    os.environ[VARIABLE] = str(folder)
+    return folder
+
+
+def has_compiled_filters() -> bool:
+    """Whether the folder of this process holds filters already, so that a start will not wait for them."""
+    return any(Path(os.environ[VARIABLE]).rglob("*.nbi"))
+
+
+def find_compile_cache(environment: Mapping[str, str], fallback: Path) -> Path:
+    """Return the user's folder for this version of the filters, made if need be; `fallback` if it cannot be.
+
+    Parameters
+    ----------
+    environment : `XDG_CACHE_HOME` and `HOME` are read from it.
+    fallback : folder taken where the user's cache folder belongs to somebody else or cannot be written.
+    """
+    version = fingerprint_filters(Path(core.__file__ or "").parent)
+    home = environment.get("XDG_CACHE_HOME") or os.path.join(environment.get("HOME", "/"), ".cache")  # noqa: PTH118
+    folder = Path(home) / "sagittal" / f"filters-{version}"
+    if not (Path(home).is_absolute() and _is_ours(folder)):
+        return fallback / f"filters-{version}"
+    _remove_old_versions(folder)
+    return folder
+
+
+def fingerprint_filters(package: Path) -> str:
+    """Return 12 hexadecimal digits that change with every source a compiled filter is made of.
+
+    numba looks at the time of one file only; a filter is compiled together with the functions and constants
+    of other modules, so every module that can be reached from a module with a filter counts.
+
+    Parameters
+    ----------
+    package : folder of the package `core`.
+    """
+    sources = {".".join(("core", *_parts(p, package))): p.read_bytes() for p in package.rglob("*.py")}
+    waiting = [name for name, text in sources.items() if b"njit" in text]
+    reached: set[str] = set()
+    while waiting:
+        name = waiting.pop()
+        if name not in reached and name in sources:
+            reached.add(name)
+            waiting.extend(_imports(sources[name].decode()))
+    digest = hashlib.sha256()
+    for name in sorted(reached):
+        digest.update(name.encode() + b"\0" + sources[name] + b"\0")
+    return digest.hexdigest()[:12]
+
+
+def _parts(path: Path, package: Path) -> tuple[str, ...]:
+    parts = path.relative_to(package).with_suffix("").parts
+    return parts[:-1] if parts[-1] == "__init__" else parts
+
+
+def _imports(source: str) -> Iterator[str]:
+    """Names that may be modules of core: the module after `from` and what is taken from it."""
+    for module, lines, line in _IMPORTED.findall(source):
+        yield module
+        yield from (f"{module}.{name.strip()}" for name in (lines or line).split(","))
+
+
+def _is_ours(folder: Path) -> bool:
+    """Make the folder; whether it is there, belongs to this user and can be written."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        # somebody else's folder may hold somebody else's machine code
+        if folder.stat().st_uid != os.getuid() or not os.access(folder, os.W_OK | os.X_OK):
+            return False
+        os.utime(folder)
+    except OSError:
+        return False
+    return True
+
+
+def _remove_old_versions(folder: Path) -> None:
+    limit = time.time() - KEEP_S
+    with suppress(OSError):
+        for other in folder.parent.glob("filters-*"):
+            if other != folder and other.stat().st_mtime < limit:
+                shutil.rmtree(other, ignore_errors=True)

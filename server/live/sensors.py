@@ -1,0 +1,47 @@
+"""What the recorder alone knows of the sensors of a take: shown until the estimator judges them (wire.py)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from core.formats.live_log import Hello
+from server.live.messages import BATTERY_WARN_PCT
+
+
+def sensor_rows(
+    hello: Hello, heard: Collection[int], battery: Mapping[str, float], *, silent: bool
+) -> list[dict[str, Any]]:
+    """Rows as `health` of a frame has them; what only an estimator can count is None.
+
+    Parameters
+    ----------
+    heard : streams of which samples have come. battery : sensor id → percent. silent : nothing comes now.
+    """
+    rows = []
+    for stream in hello.streams:
+        for sensor in stream.sensors:
+            percent = battery.get(sensor.id)
+            if sensor.segment is None:
+                state, words = "none", "not used"
+            elif stream.stream not in heard:
+                state, words = "none", "no data yet"
+            elif silent:
+                state, words = "bad", "silent"
+            elif percent is not None and percent < BATTERY_WARN_PCT:
+                state, words = "warn", "battery low"
+            else:
+                state, words = "ok", ""
+            rows.append(
+                {
+                    "id": sensor.id,
+                    "segment": sensor.segment,
+                    "rate_hz": stream.rate_hz,
+                    "lost_pct": None,
+                    "still": None,
+                    "battery_pct": percent,
+                    "state": state,
+                    "words": words,
+                }
+            )
+    return rows

@@ -1,0 +1,74 @@
+"""Whether the server can do its work: asked by monitors, answered by writing."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import ClassVar
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from server.settings import Settings
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from server.storage.migrate import MigrationError, require_current
+from server.storage.refusal import Refusal, refusal_of
+
+_WORDS = {
+    None: "cannot be written.",
+    Refusal.FULL: "cannot be written: the disk is full.",
+    Refusal.NOT_WRITABLE: "cannot be written: the disk refuses.",
+}
+
+
+class Readiness:
+    """The checks and their newest outcome; anybody may ask, so they are made at most every EVERY_S.
+
+    Parameters
+    ----------
+    settings, db, blobs : the installation. clock : monotonic seconds.
+    """
+
+    EVERY_S: ClassVar[float] = 5.0
+
+    def __init__(
+        self,
+        settings: Settings,
+        db: Database,
+        blobs: BlobStore,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._settings, self._db, self._blobs, self._clock = settings, db, blobs, clock
+        self._lock = threading.Lock()
+        self._checked_at: float | None = None
+        self._found: Mapping[str, str] = {}
+
+    def checks(self) -> Mapping[str, str]:
+        """What each part says: "ok", or a sentence about what does not work."""
+        with self._lock:
+            at = self._clock()
+            if self._checked_at is None or at - self._checked_at >= self.EVERY_S:
+                self._found = self._check()
+                self._checked_at = at
+            return self._found
+
+    def _check(self) -> dict[str, str]:
+        settings = self._settings
+        checks = {"database": "ok", "files": "ok", "schema": "ok", "disk": "ok"}
+        try:
+            self._db.probe()
+        except SQLAlchemyError as error:
+            checks["database"] = f"The database {_WORDS[refusal_of(error)]}"
+        try:
+            self._blobs.probe()
+        except OSError as error:
+            checks["files"] = f"The data folder {_WORDS[refusal_of(error)]}"
+        try:
+            require_current(settings.database)
+        except MigrationError as error:
+            checks["schema"] = str(error)
+        if shutil.disk_usage(settings.data_dir).free < settings.min_free_bytes:
+            checks["disk"] = f"Less than {settings.min_free_bytes} bytes are free; uploads are refused."
+        return checks

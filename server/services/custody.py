@@ -1,0 +1,84 @@
+"""Whether this database may say which stored files are needed; not after it was emptied or put back.
+
+refuse_strangers(settings)      # before the start: files are here and the database knows no patient
+doubt(c, settings)              # before any file is taken away: None, or why it is not
+accept(db, settings)            # somebody answers: this database is the right one (`sagittal accept`)
+"""
+
+from __future__ import annotations
+
+from contextlib import closing
+
+from sqlalchemy import Connection, func, select
+from sqlalchemy.exc import DatabaseError
+
+from server import audit
+from server.services import erasure
+from server.settings import Settings
+from server.storage.blobs import INCOMING, BlobStore
+from server.storage.db import Database
+from server.storage.high_water import gone_back, set_mark
+from server.storage.tables import audit as audit_table
+from server.storage.tables import patient
+
+ACCEPTED = "database.accepted"
+
+
+class StrangersError(RuntimeError):
+    """Stored files are here that the database knows nothing of; the message says what to do."""
+
+
+def refuse_strangers(settings: Settings) -> None:
+    """Raise StrangersError when files are here and the database is missing or knows no patient.
+
+    Creates no database; one that cannot be read is left to `storage.migrate`, which says so.
+    """
+    if not settings.database.exists():
+        text = _strangers(settings, erased=set())
+    else:
+        with closing(Database(settings.database)) as db:
+            try:
+                with db.read() as c:
+                    text = _strangers_of(c, settings)
+            except DatabaseError as error:
+                if "no such table" not in str(error.orig):
+                    return
+                text = _strangers(settings, erased=set())
+    if text is not None:
+        raise StrangersError(text)
+
+
+def doubt(c: Connection, settings: Settings) -> str | None:
+    """Why no stored file may be taken away on the word of this database, as a sentence; None = it may."""
+    return gone_back(c, settings.mark) or _strangers_of(c, settings)
+
+
+def accept(db: Database, settings: Settings) -> str | None:
+    """Trust this database from now on; returns what was doubted, None = nothing was."""
+    with db.write() as c:
+        doubted = doubt(c, settings)
+        if doubted is not None:
+            audit.record(c, None, ACCEPTED, "database", None, {"by": "console", "doubt": doubted})
+    set_mark(db, settings.mark)
+    return doubted
+
+
+def _strangers_of(c: Connection, settings: Settings) -> str | None:
+    if c.execute(select(func.count()).select_from(patient)).scalar_one():
+        return None
+    if c.execute(select(audit_table.c.seq).where(audit_table.c.action == ACCEPTED).limit(1)).first():
+        return None
+    return _strangers(settings, erasure.erased_spaces(c))
+
+
+def _strangers(settings: Settings, erased: set[str]) -> str | None:
+    spaces, takes = erasure.noted(settings)
+    leaving = erased | spaces | {INCOMING}
+    files = sum(1 for f in BlobStore(settings.blobs).files() if f.space not in leaving)
+    logs = sum(1 for p in settings.live.glob("*.log") if p.stem not in takes)
+    if not files and not logs:
+        return None
+    return (
+        f"The database in {settings.data_dir} knows no patient, but {files} stored files and {logs} live "
+        "logs are there. Put back its backup, or run `sagittal accept` to go on without them."
+    )

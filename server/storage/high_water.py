@@ -1,0 +1,150 @@
+"""How far the audit log has ever come, in a file beside the database: `audit.mark`.
+
+A database that was emptied, put back from a backup or cut at its end knows fewer rows, or others, than the
+mark says. Nobody may then take a file that this database does not know for a file that nobody needs.
+
+    gone_back(c, settings.mark)      # None, or a sentence: this is not the database that was here last
+    raise_mark(db, settings.mark)    # follow the log; leaves the mark alone when the database has gone back
+    set_mark(db, settings.mark)      # from now on this database is the right one
+
+The mark is written after the commit that it speaks of, so a crash leaves it at most behind, never ahead.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+import sqlite3
+import threading
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Final
+
+from sqlalchemy import Connection, select
+from sqlalchemy.exc import SQLAlchemyError
+
+from server.storage import fs
+from server.storage.db import Database
+from server.storage.tables import audit
+
+log = logging.getLogger(__name__)
+
+INTERVAL_S: Final = 5.0
+"""Pause between two looks of the keeper; each costs two syncs, and only when something was written."""
+_HASH: Final = re.compile(r"[0-9a-f]{64}")
+
+
+@dataclass(frozen=True)
+class HighWater:
+    """The newest audit row that was ever seen: its number, from 1, and its hash, 64 hex digits."""
+
+    seq: int
+    hash: str
+
+
+class DamagedMarkError(Exception):
+    """The file is there but is no mark."""
+
+
+def read_mark(path: Path) -> HighWater | None:
+    """The mark, None before the first; raises DamagedMarkError, OSError."""
+    try:
+        found = json.loads(path.read_bytes())
+        mark = HighWater(found["seq"], found["hash"])
+    except FileNotFoundError:
+        return None
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise DamagedMarkError(path.name) from error
+    if type(mark.seq) is not int or mark.seq < 1 or not _HASH.fullmatch(str(mark.hash)):
+        raise DamagedMarkError(path.name)
+    return mark
+
+
+def newest(c: Connection) -> HighWater | None:
+    """The last row of the audit log, None while there is none."""
+    row = c.execute(select(audit.c.seq, audit.c.hash).order_by(audit.c.seq.desc()).limit(1)).first()
+    return None if row is None else HighWater(row.seq, row.hash)
+
+
+def gone_back(c: Connection, path: Path) -> str | None:
+    """Why this is not the database that was here last, as a sentence; None when it is, or nobody can know.
+
+    Parameters
+    ----------
+    path : the mark. It may be ahead of `c` only when the database has lost rows.
+    """
+    try:
+        mark = read_mark(path)
+    except (DamagedMarkError, OSError) as error:
+        return f"{path.name} cannot be read ({error}), so nobody knows whether the audit log is whole."
+    if mark is None:
+        return None
+    last = newest(c)
+    if last is None or last.seq < mark.seq:
+        return (
+            f"The audit log ends at row {last.seq if last else 0}, but had reached row {mark.seq}: the "
+            "database is an older one, or its end was cut."
+        )
+    found = c.execute(select(audit.c.hash).where(audit.c.seq == mark.seq)).scalar()
+    if found != mark.hash:
+        return f"Audit row {mark.seq} is not the one that was here before: this is another database."
+    return None
+
+
+def raise_mark(db: Database, path: Path) -> bool:
+    """Write the newest row into the mark; False when the database has gone back and the mark stays."""
+    with db.read() as c:
+        if gone_back(c, path) is not None:
+            return False
+        last = newest(c)
+    _write(path, last)
+    return True
+
+
+def set_mark(db: Database, path: Path) -> None:
+    """Write the newest row into the mark, whatever it says now: somebody answers for this database."""
+    with db.read() as c:
+        last = newest(c)
+    _write(path, last)
+
+
+def _write(path: Path, last: HighWater | None) -> None:
+    if last is None:
+        fs.remove_file(path)
+        return
+    fs.write_file(path, json.dumps(asdict(last)).encode() + b"\n")
+
+
+class MarkKeeper:
+    """The thread that follows the audit log with the mark; one per data folder, in the web process."""
+
+    def __init__(self, db: Database, path: Path, interval_s: float = INTERVAL_S) -> None:
+        self._db, self._path, self._interval_s = db, path, interval_s
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="audit-mark", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Write the last mark and end."""
+        self._stop.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        with self._db.watch() as changes:
+            due = refused = last = False
+            while not last:
+                last = self._stop.wait(self._interval_s)
+                try:
+                    due = changes.changed() or due
+                    if due:
+                        raise_mark(self._db, self._path)
+                    due = refused = False
+                except (OSError, SQLAlchemyError, sqlite3.Error) as error:
+                    # a full disk must not end the clinic; the mark only lags, and follows later
+                    if not refused:
+                        log.warning("%s is not written (%s); trying again", self._path.name, error)
+                    refused = True

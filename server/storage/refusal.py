@@ -1,0 +1,58 @@
+"""When the disk refuses to be written: one reading of the errors of the system and of SQLite.
+
+if refusal_of(error) is not None: ...     # nothing was written; what is stored can still be read
+"""
+
+from __future__ import annotations
+
+import errno
+import sqlite3
+from enum import StrEnum
+
+from sqlalchemy.exc import DBAPIError
+
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
+"""Error numbers of a file system, a quota or a file that takes no more bytes."""
+
+
+class Refusal(StrEnum):
+    """Why the disk takes nothing; the value is the code of the problem."""
+
+    FULL = "disk_full"
+    NOT_WRITABLE = "disk_not_writable"
+
+    @property
+    def sentence(self) -> str:
+        """What a person is told."""
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    Refusal.FULL: "The server's disk is full, so nothing was saved. Ask the administrator to make room, "
+    "then try again.",
+    Refusal.NOT_WRITABLE: "The server's disk cannot be written, so nothing was saved. Ask the administrator "
+    "to repair it, then try again.",
+}
+
+_SQLITE = {
+    sqlite3.SQLITE_FULL: Refusal.FULL,
+    sqlite3.SQLITE_IOERR_SHMSIZE: Refusal.FULL,  # no room for the index of the write-ahead log
+    sqlite3.SQLITE_READONLY: Refusal.NOT_WRITABLE,
+    sqlite3.SQLITE_IOERR_WRITE: Refusal.NOT_WRITABLE,  # SQLite says FULL itself for ENOSPC
+    sqlite3.SQLITE_IOERR_TRUNCATE: Refusal.NOT_WRITABLE,
+}
+
+
+def refusal_of(error: BaseException) -> Refusal | None:
+    """Tell why the disk refused; None when the error is another one."""
+    if isinstance(error, DBAPIError):
+        error = error.orig or error
+    if isinstance(error, sqlite3.Error):
+        code = getattr(error, "sqlite_errorcode", None)
+        # an extended code is the primary one in its lowest byte
+        return None if code is None else _SQLITE.get(code) or _SQLITE.get(code & 0xFF)
+    if isinstance(error, OSError):
+        if error.errno in FULL:
+            return Refusal.FULL
+        return Refusal.NOT_WRITABLE if error.errno == errno.EROFS else None
+    return None

@@ -1,0 +1,189 @@
+"""Who looked at what, and who could not get in: the audit rows that no change carries in its transaction.
+
+    trail.opened(who, "report.opened", "session", sid)    # a row each time
+    trail.watched(who, "signals.opened", "session", sid)  # of what a page asks for again and again
+
+A disk that refuses to be written must not stop people from reading: rows wait in memory, each with its own
+time and a line in the log, and are written in order before the next row that is. When too many wait, nothing
+more is shown.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import datetime as dt
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from server import audit
+from server.auth.identity import Identity
+from server.storage.db import Database
+from server.storage.refusal import refusal_of
+from server.storage.tables import now
+
+log = logging.getLogger(__name__)
+
+QUIET_S: Final = 15 * 60.0
+"""What one sign-in watches is written down so often: of each resource and kind."""
+MOST_WAITING: Final = 10_000
+"""Rows kept in memory while the disk refuses, some 10 MB."""
+MOST_REFUSED: Final = 100
+"""Rows an hour about people who could not get in: somebody who guesses for a year fills 400 MB at most."""
+_HOUR_S: Final = 3600.0
+_RETRY_S: Final = 30.0
+_AT_ONCE: Final = 500
+"""Rows of one transaction; others want to write too."""
+_MOST_WATCHED: Final = 10_000
+
+
+@dataclass(frozen=True)
+class _Row:
+    actor: audit.Actor | None
+    action: str
+    resource: str
+    resource_id: str | None
+    detail: Mapping[str, Any]
+    at: dt.datetime = field(default_factory=now)
+
+
+class Trail:
+    """The way of those rows into the table `audit`; any thread may use it.
+
+    Parameters
+    ----------
+    db : the database. clock : monotonic seconds.
+    """
+
+    def __init__(self, db: Database, clock: Callable[[], float] = time.monotonic) -> None:
+        self._db = db
+        self._clock = clock
+        self._turn = threading.Lock()  # held while rows are written
+        self._guard = threading.Lock()  # held for moments
+        self._waiting: deque[_Row] = deque()
+        self._watched: dict[tuple[str, str, str | None], float] = {}
+        self._refused: deque[float] = deque()
+        self._uncounted = 0
+
+    def opened(
+        self,
+        who: Identity,
+        action: str,
+        resource: str,
+        resource_id: str | None,
+        detail: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Write down that somebody opened something, before it is shown.
+
+        Raises
+        ------
+        OperationalError
+            too many rows wait for the disk already, or the database is busy.
+        """
+        self._add(_Row(who, action, resource, resource_id, dict(detail or {})))
+
+    def watched(
+        self,
+        who: Identity,
+        action: str,
+        resource: str,
+        resource_id: str | None,
+        detail: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Do the same once in QUIET_S for each sign-in, action and resource; raises as `opened`."""
+        key = (who.login_id, action, resource_id)
+        at = self._clock()
+        with self._guard:
+            if at - self._watched.get(key, -QUIET_S) < QUIET_S:
+                return
+            if len(self._watched) >= _MOST_WATCHED:
+                self._watched = {k: t for k, t in self._watched.items() if at - t < QUIET_S}
+        self.opened(who, action, resource, resource_id, detail)
+        with self._guard:
+            self._watched[key] = at
+
+    def refused(self, action: str, resource: str, resource_id: str | None, address: str) -> None:
+        """Write down that somebody at an address could not get in; never raises for the disk.
+
+        What was typed is not kept: people type passwords into the field of the name. At most MOST_REFUSED
+        rows an hour; the next one says in `more` how many came between.
+        """
+        at = self._clock()
+        with self._guard:
+            while self._refused and self._refused[0] <= at - _HOUR_S:
+                self._refused.popleft()
+            if len(self._refused) >= MOST_REFUSED:
+                self._uncounted += 1
+                return
+            self._refused.append(at)
+            more, self._uncounted = self._uncounted, 0
+        detail = {"address": address[:64]} | ({"more": more} if more else {})
+        with contextlib.suppress(SQLAlchemyError):
+            self._add(_Row(None, action, resource, resource_id, detail))
+
+    def flush(self) -> bool:
+        """Write the rows that wait; whether none waits any more. Raises SQLAlchemyError but for a refusal."""
+        try:
+            self._write()
+        except Exception as error:
+            if refusal_of(error) is None:
+                raise
+        return not self._waiting
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[None]:
+        """Try again now and then while the block runs, and once more at its end."""
+        again = asyncio.create_task(self._again())
+        try:
+            yield
+        finally:
+            again.cancel()
+            await asyncio.gather(again, return_exceptions=True)
+            with contextlib.suppress(SQLAlchemyError):
+                await asyncio.to_thread(self.flush)
+            if self._waiting:
+                log.error("%d audit rows are in this log only: the disk refused them", len(self._waiting))
+
+    async def _again(self) -> None:
+        while True:
+            await asyncio.sleep(_RETRY_S)
+            if self._waiting:
+                with contextlib.suppress(SQLAlchemyError):
+                    await asyncio.to_thread(self.flush)
+
+    def _add(self, row: _Row) -> None:
+        if len(self._waiting) >= MOST_WAITING:
+            self._write()
+        self._waiting.append(row)
+        try:
+            self._write()
+        except Exception as error:
+            if refusal_of(error) is None:
+                with self._turn, contextlib.suppress(ValueError):
+                    self._waiting.remove(row)
+                raise
+            name = row.actor.name if row.actor else None
+            log.warning(
+                "an audit row waits for room on the disk: %s %s %s by %s",
+                row.action, row.resource, row.resource_id, name,
+            )  # fmt: skip
+
+    def _write(self) -> None:
+        """Write all rows in order; what was not committed goes on waiting."""
+        with self._turn:
+            while self._waiting:
+                rows = [self._waiting[i] for i in range(min(len(self._waiting), _AT_ONCE))]
+                with self._db.write() as c:
+                    for row in rows:
+                        audit.record(
+                            c, row.actor, row.action, row.resource, row.resource_id, row.detail, at=row.at
+                        )
+                for _ in rows:
+                    self._waiting.popleft()

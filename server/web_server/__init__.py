@@ -1,0 +1,1 @@
+"""How connections reach the application: the listening socket, their limits, and the proxies in front."""

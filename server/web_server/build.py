@@ -1,0 +1,33 @@
+"""Puts the web server together: uvicorn with our connections, limits and proxies."""
+
+from __future__ import annotations
+
+import uvicorn
+from starlette.types import ASGIApp
+
+from server.live.protocol import MOST_MESSAGE_BYTES
+from server.settings import Settings
+from server.web_server.connection import ConnectionLimits, limited
+from server.web_server.proxies import TrustedProxies
+
+GRACE_S = 4
+"""Time open requests (event streams, views) have to end after SIGTERM; all in all it ends within 10 s."""
+
+
+def build_server(app: ASGIApp, settings: Settings, limits: ConnectionLimits) -> uvicorn.Server:
+    """Return a server of an application; `run` it on sockets of `open_listener`."""
+    return uvicorn.Server(
+        uvicorn.Config(
+            TrustedProxies(app, settings.proxies) if settings.proxies else app,
+            log_level="warning",
+            access_log=False,
+            # the listener and the connections are made for these two
+            loop="asyncio",
+            http=limited(limits),
+            proxy_headers=False,
+            timeout_graceful_shutdown=GRACE_S,
+            ws_per_message_deflate=False,
+            # the largest message of any socket is a tablet's
+            ws_max_size=MOST_MESSAGE_BYTES,
+        )
+    )

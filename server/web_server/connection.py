@@ -1,0 +1,192 @@
+"""One HTTP connection with an end to its patience: half a request does not hold a connection for ever.
+
+uvicorn closes a connection that is idle between two requests, and only that. Here the head of a request has a
+time to come in, its body a least rate, and an answer that waits to be read must go on leaving. None of this
+says how long an answer may take: event streams and websockets are as old as their readers like. A body that
+we are slow to read is not the sender's fault.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import h11
+from uvicorn.protocols.http.h11_impl import STATUS_PHRASES, H11Protocol
+
+from server.web_server.listener import SeldomLog
+
+_full: Final = SeldomLog()
+
+
+@dataclass(frozen=True)
+class ConnectionLimits:
+    """What connections may take.
+
+    Parameters
+    ----------
+    most : connections at once; the next is answered 503 and closed.
+    head_s : time for the first line and the headers of a request.
+    body_s, body_bytes : of a body at least so many bytes come in each such time, or all that is left.
+    unread_s : some of an answer that fills all buffers is read in each such time.
+    """
+
+    most: int = 1000
+    head_s: float = 20.0
+    body_s: float = 60.0
+    body_bytes: int = 6000
+    unread_s: float = 60.0
+
+
+class TimedConnection(H11Protocol):
+    """uvicorn's HTTP/1.1 connection within limits; `limited` makes the class of a server."""
+
+    limits = ConnectionLimits()
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._awaited: Literal["head", "body"] | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._unread_timer: asyncio.TimerHandle | None = None
+        self._came = 0
+        self._held_back = False
+        self._upgraded = False
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take a connection, or refuse it when there are too many."""
+        super().connection_made(transport)
+        if len(self.connections) > self.limits.most:
+            _full.warn(f"{self.limits.most} connections are open, the most there may be: others are refused.")
+            self._refuse(503, "The server has too many connections. Try again in a minute.")
+        else:
+            self._watch()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the timers."""
+        self._stop_timer()
+        self._stop_unread_timer()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Take what came."""
+        self._came += len(data)
+        super().data_received(data)
+        self._watch()
+
+    def pause_writing(self) -> None:
+        """Wait until the client has read some of the answer, and not for ever."""
+        super().pause_writing()
+        self._watch_unread()
+
+    def resume_writing(self) -> None:
+        """Go on with the answer."""
+        super().resume_writing()
+        self._stop_unread_timer()
+
+    def on_response_complete(self) -> None:
+        """Go on to the next request."""
+        super().on_response_complete()
+        self._watch()
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        """Hand the connection to the websocket, which has pings of its own."""
+        self._upgraded = True
+        self._stop_unread_timer()
+        super().handle_websocket_upgrade(event)
+        # what is no handshake (a POST, a body, too many headers) is neither answered there nor given a time
+        if not self.transport.get_protocol().handshake_initiated:  # type: ignore[attr-defined]
+            self._refuse(400, "This is no websocket handshake: send a GET without a body and fewer headers.")
+
+    def _watch(self) -> None:
+        """Run the timer of what is awaited from the client now."""
+        awaited = self._what_is_awaited()
+        if awaited == self._awaited:
+            return
+        self._stop_timer()
+        self._awaited = awaited
+        if awaited == "head":
+            self._timer = self.loop.call_later(self.limits.head_s, self._head_is_late)
+        elif awaited == "body":
+            self._begin_window()
+
+    def _what_is_awaited(self) -> Literal["head", "body"] | None:
+        if self._upgraded or self.transport.is_closing():
+            return None
+        state = self.conn.their_state
+        if state is h11.SEND_BODY:
+            return "body"
+        # between two requests uvicorn's own timer runs
+        is_begun = self.cycle is None or bool(self.conn.trailing_data[0])
+        return "head" if state is h11.IDLE and is_begun else None
+
+    def _begin_window(self) -> None:
+        self._came = 0
+        self._held_back = self._is_held_back()
+        self._timer = self.loop.call_later(self.limits.body_s, self._end_window)
+
+    def _end_window(self) -> None:
+        if self._came >= self.limits.body_bytes or self._held_back or self._is_held_back():
+            self._begin_window()
+        else:
+            self._refuse(408, f"The body came too slowly: {self._came} bytes in {self.limits.body_s:g} s.")
+
+    def _watch_unread(self) -> None:
+        self._stop_unread_timer()
+        self._unread_timer = self.loop.call_later(
+            self.limits.unread_s, self._end_unread, self.transport.get_write_buffer_size()
+        )
+
+    def _end_unread(self, before: int) -> None:
+        # one answer may be long: on a slow line it leaves in many windows
+        if self.transport.get_write_buffer_size() < before:
+            self._watch_unread()
+        else:
+            self.transport.abort()
+
+    def _stop_unread_timer(self) -> None:
+        if self._unread_timer is not None:
+            self._unread_timer.cancel()
+            self._unread_timer = None
+
+    def _is_held_back(self) -> bool:
+        """Whether the client waits for us and not we for it."""
+        return self.flow.read_paused or self.cycle.waiting_for_100_continue
+
+    def _head_is_late(self) -> None:
+        if self.conn.trailing_data[0]:
+            self._refuse(408, f"The head of the request did not come within {self.limits.head_s:g} s.")
+        else:
+            self.transport.close()  # browsers open connections in advance, and an answer would puzzle them
+
+    def _refuse(self, status: int, detail: str) -> None:
+        """Answer as far as that is still possible and close."""
+        if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
+            headers = [
+                (b"content-type", b"text/plain; charset=utf-8"),
+                (b"content-length", str(len(detail)).encode()),
+                (b"connection", b"close"),
+            ]
+            for event in (
+                h11.Response(status_code=status, headers=headers, reason=STATUS_PHRASES[status]),
+                h11.Data(data=detail.encode("ascii")),
+                h11.EndOfMessage(),
+            ):
+                self.transport.write(self.conn.send(event) or b"")
+        if self.cycle is not None:
+            self.cycle.disconnected = True
+            self.cycle.message_event.set()
+        if self.transport.get_write_buffer_size():
+            self.transport.abort()  # who does not read would keep the rest here
+        else:
+            self.transport.close()
+
+    def _stop_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+
+def limited(limits: ConnectionLimits) -> type[TimedConnection]:
+    """The class of connections within these limits."""
+    return type("LimitedConnection", (TimedConnection,), {"limits": limits})

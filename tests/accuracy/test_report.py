@@ -1,0 +1,51 @@
+"""The check of the check: a figure that is not the printed one is found, one that rounds otherwise is not."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.accuracy import report
+from tests.accuracy.report import find_differences, read_sections, record
+
+ROW = "| hip flexion | 2.4/3.3 | 0.989 | −1.0 |"
+
+
+@pytest.mark.parametrize("other", ["| hip flexion | 2.4/3.2 | 0.990 | −0.9 |", ROW])
+def test_a_last_digit_may_round_otherwise(other: str) -> None:
+    assert find_differences(ROW, other) == []
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        ROW.replace("2.4", "2.6"),
+        ROW.replace("hip", "knee"),
+        ROW.replace("−1.0", "+1.0"),
+        ROW.replace("2.4/3.3", "2.4"),
+        "",
+    ],
+)
+def test_a_figure_or_word_that_differs_is_found(other: str) -> None:
+    assert find_differences(ROW, other) == [f"- {ROW}", f"+ {other}"]
+
+
+def test_a_row_more_is_found() -> None:
+    assert find_differences(ROW, f"{ROW}\n{ROW}") == ["- ", f"+ {ROW}"]
+
+
+def test_a_section_that_is_not_there_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(report.WRITE, raising=False)
+    if "Nowhere" in read_sections():
+        pytest.fail("the name is taken")
+    with pytest.raises(AssertionError, match="has no section 'Nowhere'"):
+        record("Nowhere", ["a"], [["1"]])
+
+
+def test_nothing_is_written_without_being_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(report.WRITE, raising=False)
+    before = report.PATH.read_bytes()
+    section, body = next(iter(read_sections().items()))
+    with pytest.raises(AssertionError, match=section):
+        record(section, ["figure"], [["no such thing"]])
+    assert report.PATH.read_bytes() == before
+    assert body

@@ -1,0 +1,33 @@
+"""Times in pairs: what is measured and its yardstick take turns, so that both meet the same machine."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any
+
+Work = Callable[[], Any]
+
+
+def cpu_s(work: Work) -> float:
+    """CPU seconds that this process spends on a piece of work, all its threads together."""
+    began = time.process_time()
+    work()
+    return time.process_time() - began
+
+
+def in_pairs(ours: Work, yardstick: Work, times: int = 7) -> tuple[float, float, float]:
+    """Median CPU seconds of both, and the median of `ours` over `yardstick` within each pair."""
+    pairs = [(cpu_s(ours), cpu_s(yardstick)) for _ in range(times)]
+    a, b = (statistics.median(column) for column in zip(*pairs, strict=True))
+    return a, b, statistics.median(x / y for x, y in pairs)
+
+
+def plain_python() -> int:
+    """A fixed piece of interpreted work, some 40 ms on a quiet core: what this machine can do right now."""
+    found: dict[int, tuple[float, float]] = {}
+    for i in range(100_000):
+        x = 0.5 * i
+        found[i % 1000] = (x, x * x - found.get((i + 1) % 1000, (0.0, 0.0))[0])
+    return len(found)

@@ -1,0 +1,71 @@
+"""What the chain hands from stage to stage."""
+
+from __future__ import annotations
+
+from math import degrees, radians
+
+import numpy as np
+import pytest
+
+from core import calibration
+from core.body.headings import turned
+from core.calibration import CalibrationParams, calibrate
+from core.calibration.result import CalibratedRecording
+from core.fusion import estimate
+from core.parameters.smoothness import NAME as SPARC
+from core.parameters.trunk import NAMES as TRUNK_NAMES
+from core.pipeline import Analysis, analyse
+from core.recording import UniformRecording
+from core.simulate import simulate_scenario
+
+OFF_DEG = 20.0
+
+OF_TRUNK = (*TRUNK_NAMES, SPARC)
+"""What is measured on the trunk's acceleration."""
+
+
+@pytest.fixture(scope="module")
+def right() -> Analysis:
+    """A simulated walk as the product analyses it."""
+    return analyse(simulate_scenario("comfortable", 0).recording)
+
+
+@pytest.fixture(scope="module")
+def off() -> Analysis:
+    """The same walk, the pelvis taken to face 20° to the left of where it does."""
+
+    def calibrate_wrongly(
+        recording: UniformRecording, params: CalibrationParams | None = None
+    ) -> CalibratedRecording:
+        good = calibrate(recording, params)
+        wrong, _ = turned(good, estimate(good), {"pelvis": radians(OFF_DEG)})
+        return wrong
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(calibration, "calibrate", calibrate_wrongly)
+        return analyse(simulate_scenario("comfortable", 0).recording)
+
+
+def test_the_trunk_of_a_pelvis_20_degrees_off_is_as_regular_as_of_one_that_is_not(
+    right: Analysis, off: Analysis
+) -> None:
+    assert any(n.code == "heading_corrected" and n.sensor == "pelvis" for n in off.notices)
+    assert right.tracks is not None
+    assert off.tracks is not None
+    was, now = right.tracks.trunk["pelvis"], off.tracks.trunk["pelvis"]
+    for axis in range(3):
+        assert np.corrcoef(was[:, axis], now[:, axis])[0, 1] > 0.995, axis
+    known, found = ({p.name: p.mean for p in x.parameters if p.name in OF_TRUNK} for x in (right, off))
+    assert set(found) == set(OF_TRUNK)
+    for name, value in found.items():
+        # a ratio of what repeats to what hardly does moves with the last degree
+        assert value == pytest.approx(known[name], rel=0.3 if "harmonic" in name else 0.02), name
+
+
+def test_the_mounting_that_is_told_is_the_one_that_was_used(right: Analysis, off: Analysis) -> None:
+    assert right.calibration is not None
+    assert off.calibration is not None
+    was = right.calibration.segments["pelvis"].R_segment_sensor
+    now = off.calibration.segments["pelvis"].R_segment_sensor
+    turn = degrees(np.arccos(np.clip((np.trace(was @ now.T) - 1.0) / 2.0, -1.0, 1.0)))
+    assert turn < 3.0

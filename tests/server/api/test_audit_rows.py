@@ -1,0 +1,277 @@
+"""Who looked at whose data: a walk over the table of routes, so that no route is forgotten."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import websockets
+
+from server import audit
+from server.auth.roles import Action
+from server.auth.routes import declared_actions
+from server.auth.tokens import token_hash
+from server.pages import FRAGMENT
+from server.services import patients, sessions
+from server.storage.tables import job
+from server.trail import MOST_REFUSED, QUIET_S, Trail
+from tests.server import analysed, walk
+from tests.server.clinic import PASSWORD, Clinic, open_clinic
+from tests.server.serving import serve
+
+pytestmark = pytest.mark.anyio
+
+API = "/api/v1"
+CONTACT = walk.events().times("left", "ic")[3]
+
+OF_NO_PATIENT = {
+    Action.SIGN_IN,
+    Action.SET_UP,
+    Action.CHECK_HEALTH,
+    Action.LOAD_ASSET,
+    Action.USE_ACCOUNT,
+    Action.READ_API,
+    Action.MANAGE_USERS,
+    Action.READ_AUDIT,
+    Action.PAIR,  # its row is "live.paired" (test_tablet.py)
+    Action.STREAM,  # a tablet sends, and is told nothing but numbers of batches
+}
+"""Routes of every other action show or change what belongs to a patient."""
+
+WITHOUT_A_ROW = {
+    "GET /": "leads to the list",
+    "GET /patients/{pid}/compare": "leads to the comparison",
+    "GET /views/{view_id}/": "of a view that the replay or the live figure opened, with their row",
+    "WEBSOCKET /views/{view_id}": "the same",
+    "GET /api/v1/jobs/{job_id}/events": "tells how far a job is, and of nobody",
+    "POST /api/v1/jobs/{job_id}/cancel": "of a job that is over nothing is cancelled",
+    "POST /api/v1/sessions/{session_id}/live/commands": "needs a tablet; kept as live events with the person",
+}
+
+QUERY = {
+    "GET /api/v1/patients/{patient_id}/targets": "?parameter=stance_pct",
+    "DELETE /api/v1/patients/{patient_id}": "?confirm=P-1",
+}
+
+TRAINING = {
+    "parameter": "stance_pct",
+    "side": "left",
+    "target": {"source": "manual", "mean": 62.0, "sd": 2.0},
+}
+EDIT = {"kind": "exclude_stride", "side": "left", "time_s": CONTACT + 0.5, "reason": "stumbled"}
+PATIENT, SESSION = f"{API}/patients/{{patient_id}}", f"{API}/sessions/{{session_id}}"
+CHANGES: dict[str, dict[str, Any]] = {
+    f"POST {API}/patients": {"json": {"code": "P-2"}},
+    f"PATCH {PATIENT}": {"json": {"note": "uses a stick"}},
+    f"POST {PATIENT}/sessions": {"json": {"title": "Walk"}},
+    f"POST {PATIENT}/programmes": {"json": {"starts_on": "2026-03-02"}},
+    f"PATCH {API}/planned-visits/{{visit_id}}": {"json": {"planned_on": "2026-03-05"}},
+    f"DELETE {API}/programmes/{{programme_id}}": {},
+    f"POST {PATIENT}/prescriptions": {"json": TRAINING},
+    f"POST {API}/prescriptions/{{prescription_id}}/end": {},
+    f"PATCH {SESSION}": {"json": {"title": "Walk"}},
+    f"POST {SESSION}/edits": {"json": EDIT},
+    f"DELETE {SESSION}/edits": {},
+    f"PUT {SESSION}/files/{{name:path}}": {"content": b"x"},
+    f"POST {SESSION}/files": {"files": {"files": ("c.txt", b"x")}},
+    f"DELETE {SESSION}/files/{{name:path}}": {},
+    f"PUT {SESSION}/manifest": {"json": {"sensors": {"A1": "pelvis"}}},
+    f"POST {SESSION}/inspections": {},
+    f"POST {SESSION}/analyses": {"json": {}},
+    f"POST {SESSION}/live": {},
+    f"POST {SESSION}/live/code": {},
+    f"POST {SESSION}/live/close": {},
+    f"DELETE {SESSION}": {},
+    f"DELETE {PATIENT}": {},
+}
+"""A valid request of every kind, in an order in which each can be carried out."""
+
+
+class Visits:
+    """A patient with two analysed sessions, and what the addresses of the routes need of them."""
+
+    def __init__(self, clinic: Clinic) -> None:
+        self.clinic = clinic
+        with clinic.db.write() as c:
+            patient = patients.create(c, None, code="P-1", height_m=1.75).id
+            this, other = (sessions.create(c, None, patient).id for _ in range(2))
+        analysed.finish(clinic, patient, other, analysed.files())
+        analysis = analysed.finish(clinic, patient, this, analysed.files())
+        with clinic.db.read() as c:
+            job_id = c.execute(job.select().limit(1)).one().id
+        self.values = {
+            "patient_id": patient,
+            "pid": patient,
+            "session_id": this,
+            "sid": this,
+            "other_id": other,
+            "other": other,
+            "analysis_id": analysis,
+            "job_id": job_id,
+        }
+        self.ids = {patient, this, other, analysis, job_id, None}
+
+    def address(self, route: str) -> str:
+        """The route with its parameters filled; fails for one that this test does not know."""
+        path = route.partition(" ")[2]
+        names = {"files": "walk.txt", "parameters": "stride_time_s", "signals": "foot_pitch"}
+        if path.startswith(f"{API}/analyses"):
+            names["files"] = "events.csv"
+
+        def value(found: re.Match[str]) -> str:
+            name = found[1]
+            return names[path[: found.start()].split("/")[-2]] if name == "name" else self.values[name]
+
+        return re.sub(r"\{(\w+)(?::path)?\}", value, path) + QUERY.get(route, "")
+
+    def newest(self) -> int:
+        return self.rows(1)[0].seq if self.rows(1) else 0
+
+    def rows(self, limit: int = 20) -> list[Any]:
+        with self.clinic.db.read() as c:
+            return audit.entries(c, limit=limit)
+
+    def rows_of(self, name: str, since: int) -> list[Any]:
+        """Rows about these visits by a person since a row."""
+        found = [r for r in self.rows() if r.seq > since and r.user_name == name]
+        return [r for r in found if r.resource_id in self.ids or r.resource == "recording"]
+
+
+@asynccontextmanager
+async def opened(folder: Path) -> AsyncIterator[Visits]:
+    async with open_clinic(folder, live_workers=0) as clinic:
+        yield Visits(clinic)
+
+
+def of_patients(clinic: Clinic) -> list[str]:
+    actions = declared_actions(clinic.app.routes)
+    return [route for route, action in actions.items() if action not in OF_NO_PATIENT]
+
+
+async def _look(v: Visits, route: str, port: int) -> None:
+    """Open a route with a fresh sign-in; whoever has looked a moment ago writes no second row."""
+    address = v.address(route)
+    if route.startswith("WEBSOCKET"):
+        cookie = {"Cookie": f"sid={v.clinic.token('clinician')}"}
+        origin = websockets.Origin(f"http://127.0.0.1:{port}")
+        url = f"ws://127.0.0.1:{port}{address}"
+        async with websockets.connect(url, origin=origin, additional_headers=cookie) as socket:
+            await socket.recv()
+        return
+    async with v.clinic.client("clinician") as client:
+        answer = await client.get(address, headers={FRAGMENT: "numbers"})
+    assert answer.status_code == 200, f"{route}: {answer.text}"
+
+
+async def test_every_route_that_shows_patient_data_leaves_an_audit_row(tmp_path: Path) -> None:
+    async with opened(tmp_path) as v, serve(v.clinic.app) as port:
+        routes = [r for r in of_patients(v.clinic) if r.split()[0] in {"GET", "WEBSOCKET"}]
+        assert len(routes) > 40
+        silent = []
+        for route in routes:
+            if route in WITHOUT_A_ROW:
+                continue
+            before = v.newest()
+            await _look(v, route, port)
+            if not v.rows_of("clinician", before):
+                silent.append(route)
+        assert silent == []
+
+
+async def test_every_route_that_changes_patient_data_leaves_an_audit_row(tmp_path: Path) -> None:
+    async with opened(tmp_path) as v:
+        routes = {r for r in of_patients(v.clinic) if r.split()[0] not in {"GET", "WEBSOCKET"}}
+        assert routes - set(WITHOUT_A_ROW) == set(CHANGES), "say what a request of this route needs"
+        silent = []
+        async with v.clinic.client("admin") as client:
+            for route, body in CHANGES.items():
+                before = v.newest()
+                answer = await client.request(route.split()[0], v.address(route), **body)
+                assert answer.status_code < 300, f"{route}: {answer.text}"
+                made = answer.json() if answer.content else {}
+                if "visits" in made:
+                    v.values |= {"programme_id": made["id"], "visit_id": made["visits"][0]["id"]}
+                if "content" in made:
+                    v.values["prescription_id"] = made["id"]
+                if not [r for r in v.rows() if r.seq > before and r.user_name == "admin"]:
+                    silent.append(route)
+        assert silent == []
+
+
+def test_no_route_without_a_row_is_excused_for_nothing(clinic: Clinic) -> None:
+    assert set(WITHOUT_A_ROW) <= set(of_patients(clinic))
+
+
+async def test_watching_is_one_row_of_each_sign_in_and_quarter_of_an_hour(tmp_path: Path) -> None:
+    time_s = 0.0
+    async with opened(tmp_path) as v:
+        v.clinic.app.state.trail = Trail(v.clinic.db, lambda: time_s)
+        path = v.address(f"GET {SESSION}/signals/{{name}}")
+
+        def rows() -> int:
+            return sum(r.action == "signals.opened" for r in v.rows(1000))
+
+        async with v.clinic.client("viewer") as client, v.clinic.client("viewer") as again:
+            for _ in range(5):
+                await client.get(path)
+            assert rows() == 1
+            await again.get(path)
+            assert rows() == 2
+            time_s += QUIET_S
+            await client.get(path)
+            assert rows() == 3
+
+
+async def _fail(clinic: Clinic, **person: str) -> None:
+    async with clinic.client() as client:
+        answer = await client.post(f"{API}/sign-in", json=person)
+        assert answer.status_code == 401
+
+
+async def test_a_failed_sign_in_is_a_row_without_what_was_typed(tmp_path: Path) -> None:
+    async with opened(tmp_path) as v:
+        known = v.clinic.user("viewer")
+        await _fail(v.clinic, name="viewer", password="swordfish-of-the-viewer")
+        await _fail(v.clinic, name="swordfish-as-a-name", password="x")
+        async with v.clinic.client() as client:
+            assert (await client.get("/sign-in/not-a-token")).status_code == 404
+            wrong = await client.post(f"{API}/live/pairings", json={"code": "ABCDEFGH"})
+            assert wrong.status_code == 404, wrong.text
+        async with v.clinic.client("viewer") as client:
+            change = {"current": "swordfish", "password": "a few unrelated words"}
+            assert (await client.post(f"{API}/account/password", json=change)).status_code == 403
+        rows = list(reversed(v.rows(5)))
+        assert [(r.action, r.resource_id, r.user_id, r.detail) for r in rows] == [
+            ("sign_in.failed", known, None, {"address": "127.0.0.1"}),
+            ("sign_in.failed", None, None, {"address": "127.0.0.1"}),
+            ("sign_in.failed", None, None, {"address": "127.0.0.1"}),
+            ("live.pairing_failed", None, None, {"address": "127.0.0.1"}),
+            ("sign_in.failed", known, None, {"address": "127.0.0.1"}),
+        ]
+        assert "swordfish" not in str(v.rows(1000))
+        person = {"name": "viewer", "password": PASSWORD}
+        async with v.clinic.client() as client:
+            assert (await client.post(f"{API}/sign-in", json=person)).status_code == 200
+            assert v.rows(1)[0].action == "sign_in"
+            assert token_hash(client.cookies["sid"]) not in str(v.rows(1))
+
+
+async def test_somebody_who_guesses_all_day_cannot_fill_the_disk(tmp_path: Path) -> None:
+    time_s = 0.0
+    async with opened(tmp_path) as v:
+        trail = Trail(v.clinic.db, lambda: time_s)
+
+        def told() -> list[dict[str, Any]]:
+            return [r.detail for r in v.rows(1000) if r.action == "sign_in.failed"]
+
+        for i in range(MOST_REFUSED + 50):
+            trail.refused("sign_in.failed", "user", None, f"2001:db8::{i:x}" + "x" * 1000)
+        assert len(told()) == MOST_REFUSED
+        assert max(len(d["address"]) for d in told()) <= 64
+        time_s += 3600.0
+        trail.refused("sign_in.failed", "user", None, "192.0.2.1")
+        assert told()[0] == {"address": "192.0.2.1", "more": 50}

@@ -1,0 +1,116 @@
+"""Many patients with many analysed visits in a clinic, written in bulk: what a page costs once it is full."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime as dt
+from collections.abc import Iterator, Mapping
+from contextvars import ContextVar
+from typing import Any
+
+from sqlalchemy import Engine, Table, event, insert
+
+from server.services.provenance import CODE_VERSION
+from server.storage.blobs import Blob
+from server.storage.tables import (
+    analysis,
+    analysis_file,
+    job,
+    new_id,
+    patient,
+    recording,
+    recording_file,
+    session,
+)
+from tests.server.clinic import Clinic
+
+FIRST_DAY = dt.date(2024, 1, 1)
+MORNING = dt.datetime(2024, 1, 1, 8, tzinfo=dt.UTC)
+
+TABLES = (patient, session, recording, recording_file, job, analysis, analysis_file)
+Rows = dict[Table, list[dict[str, Any]]]
+
+
+def fill(
+    clinic: Clinic,
+    patients: int,
+    visits: int,
+    results: Mapping[str, bytes] | None = None,
+    *,
+    controls: bool = False,
+) -> list[list[str]]:
+    """Add people who came on `visits` days each; returns the sessions of every person, oldest first.
+
+    Parameters
+    ----------
+    results : files of every visit's analysis; None = an analysis whose files nobody can open.
+    controls : the people serve as reference of the clinic.
+    """
+    rows: Rows = {table: [] for table in TABLES}
+    people = []
+    for _ in range(patients):
+        person = new_id()
+        rows[patient].append(
+            {"id": person, "code": f"C-{person[:12]}", "sex": "male", "birth_year": 1960, "height_m": 1.75,
+             "is_control": controls, "note": "", "created_at": MORNING}
+        )  # fmt: skip
+        blobs = clinic.app.state.blobs
+        stored = {name: blobs.put(person, content) for name, content in (results or {}).items()}
+        people.append([_visit(rows, person, day, stored) for day in range(visits)])
+    with clinic.db.write() as c:
+        for table, made in rows.items():
+            if made:
+                c.execute(insert(table), made)
+    return people
+
+
+def _visit(rows: Rows, person: str, day: int, stored: Mapping[str, Blob]) -> str:
+    sid, rid, jid, aid = (new_id() for _ in range(4))
+    at = MORNING + dt.timedelta(days=day)
+    mapped = {"sensors": {"A1": "pelvis"}}
+    rows[session].append(
+        {"id": sid, "patient_id": person, "title": "Walk", "performed_on": FIRST_DAY + dt.timedelta(days=day),
+         "protocol": "walk", "note": "", "created_at": at}
+    )  # fmt: skip
+    rows[recording].append(
+        {"id": rid, "session_id": sid, "manifest": mapped, "wanted_key": rid, "created_at": at}
+    )
+    rows[recording_file].append(
+        {"recording_id": rid, "name": "walk.txt", "size": 9, "sha256": "0" * 64, "added_at": at}
+    )
+    rows[job].append(
+        {"id": jid, "key": rid, "kind": "analyse", "recording_id": rid, "params": {}, "priority": 0,
+         "state": "done", "attempt": 1, "deaths": 0, "cancel_requested": False, "created_at": at,
+         "started_at": at, "finished_at": at}
+    )  # fmt: skip
+    rows[analysis].append(
+        {"id": aid, "recording_id": rid, "job_id": jid, "input_sha256": "0" * 64, "config_sha256": "0" * 64,
+         "code_version": CODE_VERSION, "manifest": mapped, "config": {}, "created_at": at}
+    )  # fmt: skip
+    rows[analysis_file] += [
+        {"analysis_id": aid, "name": name, "size": blob.size, "sha256": blob.sha256}
+        for name, blob in stored.items()
+    ]
+    return sid
+
+
+@contextlib.contextmanager
+def statements() -> Iterator[list[str]]:
+    """Every statement that what is asked meanwhile sends, BEGIN left out; not those of other threads."""
+    sent: list[str] = []
+
+    def note(c: object, cursor: object, statement: str, *rest: object) -> None:
+        if _asking.get() and not statement.startswith("BEGIN"):
+            sent.append(statement)
+
+    event.listen(Engine, "before_cursor_execute", note)
+    token = _asking.set(True)
+    try:
+        yield sent
+    finally:
+        _asking.reset(token)
+        event.remove(Engine, "before_cursor_execute", note)
+
+
+_asking: ContextVar[bool] = ContextVar("asking", default=False)
+"""Goes with a request into the threads that answer it, and not into those of the server itself."""

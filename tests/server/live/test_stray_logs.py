@@ -1,0 +1,204 @@
+"""Live logs that are damaged, or that the database does not know: kept, said, and given back."""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from core.formats.live_log import FILE_MARK, hello_json, record
+from server.live.hub import Hub
+from server.live.room import Room
+from server.live.take import LiveTake
+from server.main import main
+from server.services import checks, jobs, live, live_logs, live_recordings, recordings, sessions
+from server.services.errors import Conflict
+from server.settings import Settings
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from tests.live_clinic import PATIENCE_S, heard, new_session, visit
+from tests.live_takes import HELLO, frame, stored
+from tests.server.clinic import Clinic, open_clinic
+from tests.server.serving import serve
+
+pytestmark = pytest.mark.anyio
+
+FRAMES = [frame(i) for i in range(20)]
+STRAY = "a" * 32
+WHOLE = FILE_MARK + record("H", hello_json(HELLO)) + b"".join(record("B", one) for one in FRAMES)
+
+
+def put_stray(folder: Path, content: bytes = WHOLE) -> Path:
+    path = live_recordings.log_path(folder / "live", STRAY)
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(content)
+    return path
+
+
+def findings(settings: Settings) -> list[str]:
+    with closing(Database(settings.database)) as db:
+        found = checks.check(db, BlobStore(settings.blobs), settings)
+    return [f"{f.area}: {f.message}" for f in found]
+
+
+def flip(path: Path, at: int) -> bytes:
+    """Change one bit, as a disk does, and return what is there now."""
+    content = bytearray(path.read_bytes())
+    content[at] ^= 1
+    path.write_bytes(content)
+    return bytes(content)
+
+
+async def interrupted(folder: Path) -> tuple[Clinic, str, str]:
+    """Stop a server in the middle of a take; session and take."""
+    async with (
+        open_clinic(folder, live_workers=0) as clinic,
+        serve(clinic.app) as port,
+        visit(clinic, port) as v,
+        v.tablet() as ws,
+    ):
+        await heard(ws, "welcome")
+        for one in FRAMES:
+            await ws.send(one)
+        path = live_recordings.log_path(clinic.settings.live, v.take)
+        async with asyncio.timeout(PATIENCE_S):
+            while not path.exists() or len(stored(path)) < len(FRAMES):
+                await asyncio.sleep(0.02)
+    return clinic, v.session, v.take
+
+
+async def test_a_log_that_the_database_does_not_know_is_kept_listed_and_adopted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    async with open_clinic(tmp_path, live_workers=0) as clinic:
+        session = new_session(clinic)
+    path = put_stray(tmp_path)
+    async with open_clinic(tmp_path, live_workers=0) as clinic:
+        assert path.read_bytes() == WHOLE
+        assert f"knows nothing of {path}" in caplog.text
+        [said] = findings(clinic.settings)
+        assert said.startswith(f"live: the database knows nothing of {path.name}")
+        assert "3 sensors, 20 batches" in said
+
+        capsys.readouterr()
+        data = ["--data", str(tmp_path)]
+        assert main(["adopt", *data]) == 0
+        assert STRAY in capsys.readouterr().out
+        assert main(["adopt", *data, STRAY, "--session", f"http://127.0.0.1:8000/sessions/{session}"]) == 0
+        assert f"/sessions/{session}" in capsys.readouterr().out
+        assert not path.exists()
+        with clinic.db.read() as c:
+            made = recordings.require_current(c, session)
+            take = live.get(c, STRAY)
+        assert (take.state, take.recording_id, take.count) == ("closed", made.id, 20)
+        [file] = made.files
+        with clinic.db.read() as c:
+            patient = sessions.get(c, session).patient_id
+        assert clinic.app.state.blobs.read(patient, file.sha256) == WHOLE
+        with clinic.db.read() as c:
+            assert recordings.ANALYSE in {view.kind for view in jobs.of_session(c, session)}
+        assert findings(clinic.settings) == []
+        assert main(["adopt", *data]) == 0
+        assert "knows every live recording" in capsys.readouterr().out
+
+
+async def test_what_cannot_be_adopted_is_refused_with_a_sentence_and_left(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    async with open_clinic(tmp_path, live_workers=0) as clinic:
+        session = new_session(clinic)
+        data = ["adopt", "--data", str(tmp_path)]
+        empty = put_stray(tmp_path, b"no log at all")
+        for words, why in (
+            ([*data, STRAY], "Give both"),
+            ([*data, "--session", session], "Give both"),
+            ([*data, "b" * 32, "--session", session], "no live log"),
+            ([*data, "../sagittal", "--session", session], "no live log"),
+            ([*data, STRAY, "--session", session], "holds no sample"),
+        ):
+            assert main(words) != 0
+            assert why in capsys.readouterr().err
+        assert empty.read_bytes() == b"no log at all"
+        put_stray(tmp_path)
+        assert main([*data, STRAY, "--session", "c" * 32]) == 1
+        assert "no session" in capsys.readouterr().err
+        here = (clinic.db, clinic.app.state.blobs, clinic.settings, clinic.app.state.queue, None)
+        live_logs.adopt(*here, STRAY, session)
+        path = put_stray(tmp_path)
+        with pytest.raises(Conflict, match="belongs to a session already"):
+            live_logs.adopt(*here, STRAY, session)
+        assert path.read_bytes() == WHOLE
+
+
+@pytest.mark.parametrize("broken", ["copy", "publish"])
+async def test_an_adoption_that_dies_half_way_is_finished_by_the_next_start(
+    tmp_path: Path, broken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def dies(*_: object) -> None:
+        raise RuntimeError("the power is gone")
+
+    async with open_clinic(tmp_path, live_workers=0) as clinic:
+        session = new_session(clinic)
+        path = put_stray(tmp_path)
+        here = (clinic.db, clinic.app.state.blobs, clinic.settings, clinic.app.state.queue, None)
+        with monkeypatch.context() as patch:
+            patch.setattr(f"server.services.live_recordings._{broken}", dies)
+            with pytest.raises(RuntimeError):
+                live_logs.adopt(*here, STRAY, session)
+        assert path.read_bytes() == WHOLE
+    async with open_clinic(tmp_path, live_workers=0) as clinic:
+        assert not path.exists()
+        with clinic.db.read() as c:
+            assert live.get(c, STRAY).recording_id == recordings.require_current(c, session).id
+
+
+async def test_a_damaged_log_keeps_its_original_and_the_session_says_so(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    clinic, session, take = await interrupted(tmp_path)
+    path = live_recordings.log_path(clinic.settings.live, take)
+    hurt = flip(path, path.stat().st_size // 2)
+    [said] = findings(clinic.settings)
+    assert said.startswith(f"live: {take}.log: ")
+    assert "bytes of the live recording were damaged" in said
+    users = clinic.users
+    async with open_clinic(tmp_path, live_workers=0) as clinic:
+        clinic.users = users
+        original = path.with_name(f"{take}.1.damaged")
+        assert original.read_bytes() == hurt
+        assert 0 < len(stored(path)) < len(FRAMES)
+        assert "were damaged on the server's disk" in caplog.text
+        async with clinic.client("clinician") as http:
+            async with asyncio.timeout(PATIENCE_S):
+                while "A part of the live recording is lost" not in (
+                    page := (await http.get(f"/sessions/{session}")).text
+                ):
+                    await asyncio.sleep(0.05)
+        assert "were damaged on the server&#39;s disk" in page
+        [said] = findings(clinic.settings)
+        assert original.name in said
+        hub: Hub = clinic.app.state.hub
+        row = hub.rows.take(take)
+        again = LiveTake(hub, row, Room(), *hub.rows.prepare(row))
+        assert again._seen["notice"] == 0  # or the estimator's first notice would be taken for told
+        async with clinic.client("clinician") as http:
+            assert (await http.delete(f"/api/v1/sessions/{session}")).status_code == 204
+        assert not original.exists()
+        assert findings(clinic.settings) == []
+
+
+async def test_a_log_without_a_readable_sample_is_not_thrown_away(tmp_path: Path) -> None:
+    clinic, session, take = await interrupted(tmp_path)
+    path = live_recordings.log_path(clinic.settings.live, take)
+    hurt = flip(path, len(FILE_MARK) + 20)
+    with closing(Database(clinic.settings.database)) as db, db.write() as c:
+        live.end(c, None, take, "closed", count=0)
+    async with open_clinic(tmp_path, live_workers=0) as clinic:
+        assert not path.exists()
+        assert path.with_name(f"{take}.1.damaged").read_bytes() == hurt
+        with clinic.db.read() as c:
+            [text] = live.damages(c, session)
+        assert "were damaged" in text
+        assert any(".1.damaged" in said for said in findings(clinic.settings))

@@ -1,0 +1,149 @@
+"""What pages say to a therapist: the same thing in every place, once, and nothing that is not so."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+
+from core.body.model import NOMINAL_HEIGHT_M
+from core.online.calibrating import CalibratingParams
+from tests.data import ROOT
+from tests.server import analysed
+from tests.server.clinic import Clinic, open_clinic
+
+pytestmark = pytest.mark.anyio
+
+
+@pytest.fixture(scope="module")
+def anyio_backend() -> str:
+    return "asyncio"
+
+
+@pytest.fixture(scope="module")
+async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
+    async with open_clinic(tmp_path_factory.mktemp("pages")) as running:
+        yield running
+
+
+async def visit(clinic: Clinic, code: str, **changed: Any) -> tuple[str, str]:
+    """Patient and session of an analysed walk; `changed` parts of its analysis.json."""
+    async with clinic.client("admin") as client:
+        patient = (await client.post("/api/v1/patients", json={"code": code})).json()["id"]
+        session = (await client.post(f"/api/v1/patients/{patient}/sessions", json={"title": "Walk"})).json()
+    files = dict(analysed.files())
+    found = json.loads(files["analysis.json"])
+    for key, value in changed.items():
+        found[key] = {**found[key], **value} if isinstance(value, dict) else value
+    files["analysis.json"] = json.dumps(found).encode()
+    analysed.finish(clinic, patient, session["id"], files)
+    return patient, session["id"]
+
+
+async def page(clinic: Clinic, path: str, role: str = "admin") -> str:
+    async with clinic.client(role) as client:
+        answer = await client.get(path)
+    assert answer.status_code == 200, answer.text
+    return answer.text
+
+
+def row_of(html: str, code: str) -> str:
+    rows = (m.group() for m in re.finditer(r"<tr data-href.*?</tr>", html, re.DOTALL))
+    return next(row for row in rows if code in row)
+
+
+@pytest.mark.parametrize(
+    ("code", "changed", "kind", "word"),
+    [
+        ("Q-GOOD", {"warnings": []}, "ok", "Good data"),
+        ("Q-USABLE", {"quality": {"level": "usable"}, "warnings": []}, "warn", "Usable, see notices"),
+        ("Q-POOR", {"quality": {"level": "poor"}, "warnings": []}, "bad", "Poor data"),
+        ("Q-APART", {"estimator": {"verdict": "bad"}, "warnings": []}, "bad", "Sensors disagree"),
+        ("Q-NONE", {"parameters": [], "warnings": []}, "bad", "No strides"),
+    ],
+)
+async def test_every_list_says_of_a_session_what_its_own_page_says(
+    clinic: Clinic, code: str, changed: dict[str, Any], kind: str, word: str
+) -> None:
+    patient, session = await visit(clinic, code, **changed)
+    assert f'class="badge {kind}"' in await page(clinic, f"/sessions/{session}")
+    shape = re.compile(rf'class="state {kind}">.*?{word}', re.DOTALL)
+    assert shape.search(row_of(await page(clinic, "/patients"), code))
+    assert shape.search(row_of(await page(clinic, f"/patients/{patient}"), session))
+
+
+async def test_a_result_that_cannot_be_read_does_not_take_the_list_of_patients_away(clinic: Clinic) -> None:
+    patient, _ = await visit(clinic, "Q-LOST")
+    stored = [p for p in (clinic.settings.data_dir / "blobs" / patient).rglob("*") if p.is_file()]
+    assert stored
+    for blob in stored:
+        blob.chmod(0o600)
+        blob.write_bytes(b"damaged")
+    assert "Cannot be read" in row_of(await page(clinic, "/patients"), "Q-LOST")
+
+
+async def test_who_may_not_see_results_sees_no_verdict_on_them(clinic: Clinic) -> None:
+    await visit(clinic, "Q-HIDDEN", quality={"level": "poor"})
+    assert "Poor data" not in row_of(await page(clinic, "/patients", "assistant"), "Q-HIDDEN")
+
+
+async def test_the_session_page_does_not_repeat_what_the_upload_page_said_of_files(clinic: Clinic) -> None:
+    notices = [
+        {"code": code, "message": f"{code} was told.", "sensor": None, "t_s": None, "severity": severity}
+        for code, severity in (
+            ("ignored_file", "info"),
+            ("file_not_read", "warning"),
+            ("file_given_twice", "info"),
+            ("duplicate_stream", "info"),
+            ("gap", "warning"),
+        )
+    ]
+    _, session = await visit(clinic, "Q-FILES", warnings=notices)
+    html = await page(clinic, f"/sessions/{session}")
+    assert [n["code"] for n in notices if f"{n['code']} was told." in html] == ["gap"]
+    _, session = await visit(clinic, "Q-FILES-2", warnings=notices[:-1])
+    assert 'class="badge ok"' in await page(clinic, f"/sessions/{session}")
+
+
+async def test_the_numbers_after_an_edit_are_no_page_of_their_own(clinic: Clinic) -> None:
+    _, session = await visit(clinic, "Q-NUMBERS")
+    address = f"/sessions/{session}/timeline/numbers"
+    async with clinic.client("admin") as client:
+        answer = await client.get(address)
+        assert (answer.status_code, answer.headers["location"]) == (
+            303,
+            f"/sessions/{session}/timeline#numbers",
+        )
+        whole = await client.get(f"/sessions/{session}/timeline")
+        part = await client.get(address, headers={"X-Sagittal-Fragment": "numbers"})
+    assert 'id="numbers"' in whole.text
+    assert part.status_code == 200
+    assert part.text.lstrip().startswith('<div class="tl-numbers" id="numbers">')
+
+
+async def test_every_page_assumes_the_same_height(clinic: Clinic) -> None:
+    async with clinic.client("admin") as client:
+        patient = (await client.post("/api/v1/patients", json={"code": "Q-HEIGHT"})).json()["id"]
+    words = f"without it {NOMINAL_HEIGHT_M:.2f} m is assumed"
+    assert words in (await page(clinic, f"/patients/{patient}/sessions/new")).lower()
+    templates = ROOT / "web" / "templates"
+    said = {p.name: re.findall(r"\d\.\d\d m\b", p.read_text()) for p in templates.glob("*.html")}
+    assert not {name: heights for name, heights in said.items() if heights}, "written by hand"
+    assert "ASSUMED_HEIGHT ~ ' is assumed" in (templates / "upload.html").read_text()
+
+
+def test_tablet_and_therapist_are_told_to_stand_as_long_as_the_server_waits() -> None:
+    static = ROOT / "web" / "static" / "js"
+    (told,) = re.findall(r"STAND_S = (\d+)", (static / "standing.js").read_text())
+    assert float(told) == CalibratingParams().stand_s
+    by_hand = [
+        path.name
+        for path in (*static.rglob("*.js"), *(ROOT / "web" / "templates").glob("*.html"))
+        if re.search(r"\d seconds", path.read_text())
+    ]
+    assert by_hand == []
+    shown = [p.name for p in static.rglob("*.js") if "${STAND_S} seconds" in p.read_text()]
+    assert sorted(shown) == ["calibration.js", "view.js", "words.js"]

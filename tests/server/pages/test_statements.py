@@ -1,0 +1,142 @@
+"""How many SQL statements a page takes in a full clinic: a number that no patient and no visit raises."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
+
+import pytest
+from fastapi.routing import APIRoute
+from sqlalchemy import insert, select
+
+from core.feedback import Baseline, Cue
+from server import capture_pages, live_pages, number_pages, pages, prescription_pages, visit_pages
+from server.pages import FRAGMENT
+from server.services import live, prescriptions, programmes, sessions
+from server.storage.tables import analysis, live_take, new_id, recording
+from tests.server import analysed, crowd
+from tests.server.clinic import Clinic, open_clinic
+
+pytestmark = pytest.mark.anyio
+
+MOST = 20
+MANY = 30
+"""Of everything that a page of the full clinic lists or looks through."""
+
+ROUTERS = (pages, visit_pages, number_pages, prescription_pages, capture_pages, live_pages)
+PAGES = sorted(r.path for part in ROUTERS for r in part.router.routes if isinstance(r, APIRoute))
+QUERIES = {"/patients/{pid}/compare": "?visit={sid}&visit={other}"}
+ANSWERS = {
+    "/": 303,
+    "/patients/{pid}/compare": 303,
+    "/set-up/{token}": 404,
+}
+"""Where a page answers something else than itself."""
+
+TRAINED = {
+    "parameter": "stance_pct",
+    "side": "left",
+    "target": {"source": "manual", "mean": 64.0, "sd": 1.0},
+    "schedule": {"kind": "every"},
+}
+
+
+@pytest.fixture(scope="module")
+def anyio_backend() -> str:
+    return "asyncio"
+
+
+@pytest.fixture(scope="module")
+async def full(
+    tmp_path_factory: pytest.TempPathFactory, anyio_backend: str
+) -> AsyncIterator[tuple[Clinic, Mapping[str, str]]]:
+    """A clinic in which there is much of everything, and what stands for the parts of its addresses."""
+    async with open_clinic(tmp_path_factory.mktemp("full")) as clinic:
+        results = analysed.files()
+        crowd.fill(clinic, MANY, 2, results, controls=True)
+        ((*earlier, last),) = crowd.fill(clinic, 1, MANY, results)
+        _train(clinic, earlier, last)
+        for i in range(MANY):
+            clinic.user("viewer", f"viewer-{i}")
+        with clinic.db.read() as c:
+            pid = sessions.get(c, last).patient_id
+        yield (
+            clinic,
+            {"pid": pid, "sid": last, "other": earlier[-1], "name": "stance_pct", "token": "x" * 43},
+        )
+
+
+def _train(clinic: Clinic, earlier: list[str], last: str) -> None:
+    """A patient on many programmes with many prescriptions, empty visits and takes with cues."""
+    cue = Cue(1, "left", 2.0, 3.0, 64.0, 0.0, "in", True, None, 0, 63.0, 65.0)
+    with clinic.db.write() as c:
+        of = sessions.get(c, last)
+        for i in range(MANY):
+            sessions.create(c, None, of.patient_id, performed_on=of.performed_on - dt.timedelta(days=1))
+            written = prescriptions.write(c, clinic.app.state.blobs, None, of.patient_id, TRAINED)
+            programmes.start(c, None, of.patient_id, starts_on=dt.date(2010 + i, 1, 4))
+        took = c.execute(
+            select(recording.c.id).join(analysis).where(recording.c.session_id == last)
+        ).scalar_one()
+        began = {
+            "id": written.id,
+            "prescription": written.content.to_json(),
+            "baseline": Baseline().to_json(),
+        }
+        for sid in (*earlier, last):
+            take = new_id()
+            row = {"id": take, "session_id": sid, "state": "finished", "prescription_id": written.id}
+            # what the earlier takes became is not what was analysed: each is looked at and passed over
+            became = took if sid == last else None
+            c.execute(
+                insert(live_take).values(
+                    **row, recording_id=became, created_at=of.created_at, finished_at=of.created_at
+                )
+            )
+            live.add_event(c, None, take, "prescription", None, began)
+            live.add_event(c, None, take, "cue", cue.t_s, {"type": "cue", **cue.to_json()})
+
+
+async def asked(clinic: Clinic, path: str, answer: int = 200) -> list[str]:
+    """Statements that a page takes, once whoever asks is signed in."""
+    async with clinic.client("admin") as client:
+        await client.get("/account")
+        with crowd.statements() as sent:
+            given = await client.get(path, headers={FRAGMENT: "numbers"})
+    assert given.status_code == answer, given.text
+    assert sent, "not even who asks was looked up"
+    return sent
+
+
+async def test_the_patient_list_takes_as_few_statements_for_500_patients_as_for_two(tmp_path: Path) -> None:
+    async with open_clinic(tmp_path / "small") as clinic:
+        crowd.fill(clinic, 2, 1)
+        small = await asked(clinic, "/patients")
+    async with open_clinic(tmp_path / "full") as clinic:
+        crowd.fill(clinic, 500, 20)
+        full = await asked(clinic, "/patients")
+    assert len(full) == len(small) <= MOST
+
+
+@pytest.mark.parametrize("page", PAGES)
+async def test_no_page_takes_more_statements_than_20(
+    full: tuple[Clinic, Mapping[str, str]], page: str
+) -> None:
+    clinic, values = full
+    path = (page + QUERIES.get(page, "")).format(**values)
+    sent = await asked(clinic, path, ANSWERS.get(page, 200))
+    assert len(sent) <= MOST, "\n\n".join(sent)
+
+
+async def test_a_session_page_takes_as_few_statements_for_200_control_visits_as_for_six(
+    tmp_path: Path,
+) -> None:
+    results = analysed.files()
+    async with open_clinic(tmp_path) as clinic:
+        ((sid,),) = crowd.fill(clinic, 1, 1, results)
+        crowd.fill(clinic, 6, 1, results, controls=True)
+        few = await asked(clinic, f"/sessions/{sid}")
+        crowd.fill(clinic, 50, 4, {"analysis.json": results["analysis.json"]}, controls=True)
+        many = await asked(clinic, f"/sessions/{sid}")
+    assert len(many) == len(few) <= MOST
