@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.conftest import Filled, Opener, RunningServer
-from tests.browser.filling import add_session, upload
+from tests.browser.filling import add, add_session, upload
 from tests.data import data_folder
 
 SIZES = ((1280, 800), (820, 1180), (390, 844))
@@ -62,7 +62,7 @@ def test_forms_in_cards_keep_their_distance_from_the_edge(
 
 
 def test_the_one_question_comes_first_and_unused_files_are_folded(
-    opened: Opener, filled: Filled, running: RunningServer
+    opened: Opener, running: RunningServer
 ) -> None:
     folder = data_folder("neura_walk")
     packed = io.BytesIO()
@@ -70,7 +70,8 @@ def test_the_one_question_comes_first_and_unused_files_are_folded(
         for path in sorted(p for p in Path(folder).rglob("*") if p.is_file()):
             z.write(path, f"neura_walk/{path.relative_to(folder)}")
     with running.client() as client:
-        session = add_session(client, filled.patient, "Walk, the whole folder")
+        patient = add(client, "/patients", code="FOLDER")["id"]
+        session = add_session(client, patient, "Walk, the whole folder")
         upload(client, session, {"neura_walk.zip": packed.getvalue()})
     for width, height in SIZES:
         page = opened(f"/sessions/{session}/upload", width=width, height=height)

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.conftest import NAME, PASSWORD, Filled, Opener, RunningServer
-from tests.browser.filling import add_session
+from tests.browser.conftest import NAME, PASSWORD, Opener, RunningServer
+from tests.browser.filling import add, add_session
 from tests.data import ROOT, data_folder
 
 SEGMENTS = {
@@ -60,7 +60,7 @@ def test_eleven_files_become_a_session_page(solid: Browser, running: RunningServ
 
 
 def test_a_table_with_its_manifest_is_analysed_as_from_the_command_line(
-    opened: Opener, filled: Filled, running: RunningServer, tmp_path: Path
+    opened: Opener, running: RunningServer, tmp_path: Path
 ) -> None:
     table = data_folder("gaitmap_foot", "imu_sample.csv")
     sides = {f"foot_{side[0]}": f"{side}_sensor" for side in ("left", "right")}
@@ -77,7 +77,8 @@ def test_a_table_with_its_manifest_is_analysed_as_from_the_command_line(
         json.dumps({"subject": {"height_m": 1.76, "standing_width_m": 0.21}, "sources": [entry]})
     )
     with running.client() as client:
-        session = add_session(client, filled.patient, "Walk, a table")
+        patient = add(client, "/patients", code="TABLE")["id"]
+        session = add_session(client, patient, "Walk, a table")
     page = opened(f"/sessions/{session}/upload")
     page.locator("[data-files]").set_input_files([str(table), str(manifest)])
     expect(page.locator("sensor-map")).to_be_visible(timeout=60_000)

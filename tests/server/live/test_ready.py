@@ -100,7 +100,8 @@ async def test_clock_and_sensors_are_told_before_the_estimator_is_ready(
     assert {row["id"]: row["segment"] for row in told["sensors"]} == worn
     assert {row["state"] for row in told["sensors"]} == {"ok"}
     assert {row["lost_pct"] for row in told["sensors"]} == {None}, "nobody has counted yet: not zero"
-    assert told["elapsed_s"] == pytest.approx(told["count"] * BATCH_S, abs=BATCH_S)
+    # a batch may arrive between counting and looking at the clock
+    assert told["elapsed_s"] == pytest.approx(told["count"] * BATCH_S, abs=2 * BATCH_S)
     assert told["elapsed_s"] - BATCH_S <= marked["marks"][0]["t_s"] <= polled["elapsed_s"] + BATCH_S
 
 

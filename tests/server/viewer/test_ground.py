@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -94,14 +93,6 @@ def test_a_frame_sends_at_most_one_chunk_of_a_trail(server: viser.ViserServer, l
         scene.figure.pose(t_s)
         lengths += [len(scene[f"/room/ground/trail_{s}_rest"].points) for s in ("left", "right")]
     assert max(lengths) < CHUNK
-
-
-@pytest.mark.bench
-def test_a_view_of_ten_minutes_is_ready_at_once(server: viser.ViserServer) -> None:
-    poses = replace(walk.poses(600.0), method="erkf_smoothed")
-    start = time.thread_time()
-    Figure(server, prepare(poses))
-    assert time.thread_time() - start < 0.2
 
 
 def test_where_positions_are_for_the_eye_only_there_are_prints_and_no_trail(
