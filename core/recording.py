@@ -1,7 +1,7 @@
 """What was recorded: frozen objects, checked once at construction, SI units.
 
 `Recording` is what the files say (each sensor on its own clock); `UniformRecording` is the same take on
-one time axis with a validity mask per sensor (made by core/timeline.py). All later stages work on the latter.
+one time axis with a validity mask per sensor (made by core/timeline). All later stages work on the latter.
 """
 
 from __future__ import annotations

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.frames import Bools, Protocol, Segment
-from core.online.axis import UniformBlock
 from core.recording import SensorSignals, Subject, UniformRecording
+from core.timeline.live import UniformBlock
 
 
 @dataclass(frozen=True)

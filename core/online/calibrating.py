@@ -21,11 +21,11 @@ from core.calibration.walking import moving_mask
 from core.errors import Notice, SagittalError
 from core.frames import Bools, Floats, Segment
 from core.online.attempt import Attempt, Wearer
-from core.online.axis import UniformBlock
 from core.online.calibrated import LiveCalibration, MountingParams, finished
 from core.online.frame import CalibrationView, SegmentCheck, Stage
 from core.online.standing import StandingNow, last_part, standing_now, upwards
 from core.recording import UniformRecording
+from core.timeline.live import UniformBlock
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,6 @@ from core.formats.live_log import Batch, Hello
 from core.frames import GRAVITY, R_NEUTRAL, Protocol, Segment
 from core.fusion.orientations import Orientations
 from core.online.attempt import Wearer
-from core.online.axis import AxisParams, OnlineAxis, UniformBlock
-from core.online.axis import warm as warm_axis
 from core.online.calibrated import LiveCalibration
 from core.online.calibrated import warm as warm_calibration
 from core.online.calibrating import CalibratingParams, LiveCalibrator
@@ -29,13 +27,15 @@ from core.parameters.spatial import Surface
 from core.quality.stuck import warm as warm_stuck
 from core.recording import SensorSignals, Subject, UniformRecording, check_belt
 from core.rotation import from_matrix
+from core.timeline.live import LiveAxis, LiveAxisParams, UniformBlock
+from core.timeline.live import warm as warm_axis
 
 
 @dataclass(frozen=True)
 class OnlineParams:
     """Parameters of every stage."""
 
-    axis: AxisParams = field(default_factory=AxisParams)
+    axis: LiveAxisParams = field(default_factory=LiveAxisParams)
     calibrating: CalibratingParams = field(default_factory=CalibratingParams)
     chain: ChainParams = field(default_factory=ChainParams)
 
@@ -65,7 +65,7 @@ class Online:
     ) -> None:
         check_belt(belt_speed_mps, protocol)
         self.params = params or OnlineParams()
-        self._axis = OnlineAxis(hello, self.params.axis)
+        self._axis = LiveAxis(hello, self.params.axis)
         self._surface = Surface(protocol, belt_speed_mps)
         self._calibrating = LiveCalibrator(
             Wearer(self._axis.segments, self._axis.rate_hz, subject or Subject(), protocol, mounting or {}),
@@ -89,7 +89,7 @@ class Online:
             return None
         block, stuck = self._stuck.push(block)
         rests = self._still.push(block.acc, block.gyr, block.valid)[-1, :, 1]
-        notices = [*self._axis.notices(), *stuck]
+        notices = [*self._axis.drain_notices(), *stuck]
         outcomes: list[Outcome] = []
         start = 0
         if self.chain is None:

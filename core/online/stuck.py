@@ -9,8 +9,8 @@ import numpy as np
 
 from core.errors import Notice
 from core.frames import Segment
-from core.online.axis import UniformBlock
 from core.quality.stuck import CLIPPED, StuckParams, StuckWatch
+from core.timeline.live import UniformBlock
 
 
 class StuckSensors:

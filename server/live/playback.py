@@ -28,7 +28,7 @@ from core.frames import Floats
 from core.recording import ImuStream, Recording
 
 ON_GRID: Final = 0.01
-"""Largest distance from the grid in samples, as core/timeline.py takes it."""
+"""Largest distance from the grid in samples, as core/timeline takes it."""
 
 
 @dataclass(frozen=True)

@@ -22,11 +22,11 @@ from core.calibration.result import CalibratedRecording, Calibration
 from core.frames import Segment
 from core.fusion import estimate
 from core.online.attempt import Wearer
-from core.online.axis import UniformBlock
 from core.online.calibrated import LiveCalibration, warm
 from core.online.calibrating import LiveCalibrator
 from core.recording import UniformRecording
 from core.rotation import from_matrix, log
+from core.timeline.live import UniformBlock
 from tests.accuracy.report import record
 from tests.walks import neura_walk, simulated
 

@@ -18,13 +18,13 @@ from core.calibration import calibrate
 from core.frames import Segment
 from core.fusion import estimate
 from core.online.attempt import Wearer
-from core.online.axis import UniformBlock
 from core.online.calibrated import LiveCalibration
 from core.online.calibrating import LiveCalibrator
 from core.online.frame import CalibrationView, Stage
 from core.recording import Subject, UniformRecording
 from core.rotation import conjugate, exp, multiply, rotate
 from core.simulate import Arc, Pivot, Stand, Straight
+from core.timeline.live import UniformBlock
 from tests.walks import cut, lost, neura_walk, only, scripted, simulated
 
 Seen = tuple[int, Stage, CalibrationView]

@@ -16,18 +16,18 @@ from core.errors import Notice, SignalError
 from core.formats import SourceFile, read_recording
 from core.formats.live_log import Batch, SensorInfo, StreamInfo
 from core.frames import Bools, Floats, Segment
-from core.online.axis import OnlineAxis, UniformBlock, warm
 from core.recording import UniformRecording
 from core.timeline import synchronise
+from core.timeline.live import LiveAxis, UniformBlock, warm
 from tests.live import Device, LiveTake, Samples, send, shared
 from tests.walks import cut, neura_recording
 
 FEET: tuple[Segment, ...] = ("foot_l", "foot_r")
 
 
-def laid(take: LiveTake) -> tuple[UniformBlock, tuple[Notice, ...], OnlineAxis]:
+def laid(take: LiveTake) -> tuple[UniformBlock, tuple[Notice, ...], LiveAxis]:
     """All blocks of a take as one."""
-    axis = OnlineAxis(take.hello)
+    axis = LiveAxis(take.hello)
     blocks = [block for b in take.batches if (block := axis.push(b)) is not None]
     expected = 0
     for block in blocks:
@@ -44,7 +44,7 @@ def laid(take: LiveTake) -> tuple[UniformBlock, tuple[Notice, ...], OnlineAxis]:
     )
     assert np.isfinite(whole.acc).all()
     assert np.isfinite(whole.gyr).all()
-    return whole, axis.notices(), axis
+    return whole, axis.drain_notices(), axis
 
 
 def of_file(take: LiveTake) -> UniformRecording:
@@ -255,7 +255,7 @@ def test_an_own_clock_that_drifts_stays_within_its_drift() -> None:
 def test_a_silent_stream_is_passed_over_and_returns() -> None:
     quiet = without(device(1, 100.0, ("foot_r",)), slice(600, 900))
     take = send([device(0, 100.0, ("foot_l",)), quiet])
-    axis = OnlineAxis(take.hello)
+    axis = LiveAxis(take.hello)
     reached = []
     for b in take.batches:
         axis.push(b)
@@ -331,7 +331,7 @@ def test_a_sender_that_slept_leaves_a_gap() -> None:
 
 def test_no_clock_makes_more_samples_than_a_file_could_be_analysed_with() -> None:
     clean = device(0, 100.0, FEET, 2.0)
-    axis = OnlineAxis(send([clean]).hello)
+    axis = LiveAxis(send([clean]).hello)
     made = 0
     for k in range(60):
         at = k * 599_000_000
@@ -361,10 +361,10 @@ def test_takes_that_can_have_no_axis_are_refused_with_the_reason() -> None:
     d = device(0, 100.0, ("foot_l",))
     unworn = replace(d.info, sensors=(SensorInfo("a", None),))
     with pytest.raises(SignalError) as none:
-        OnlineAxis(send([replace(d, info=unworn)]).hello)
+        LiveAxis(send([replace(d, info=unworn)]).hello)
     assert none.value.code == "no_mapping"
     with pytest.raises(SignalError) as slow:
-        OnlineAxis(send([device(0, 30.0, FEET)]).hello)
+        LiveAxis(send([device(0, 30.0, FEET)]).hello)
     assert slow.value.code == "sample_rate_too_low"
 
 
@@ -375,7 +375,7 @@ def test_a_push_of_seven_sensors_costs_less_than_a_sixth_of_a_millisecond() -> N
     take = send([d])
     spent = []
     for _ in range(5):
-        axis = OnlineAxis(take.hello)
+        axis = LiveAxis(take.hello)
         start = perf_counter()
         for b in take.batches:
             axis.push(b)

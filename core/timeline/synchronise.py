@@ -1,4 +1,4 @@
-"""Packet counters and device clocks → ONE uniform axis and a validity mask per sensor.
+"""The sensors of a file on one uniform axis.
 
 Every sensor is laid on the axis of the take by its own times: samples that fall on it are copied bit for bit,
 others are interpolated linearly. Holes of up to 0.1 s are interpolated and flagged, longer ones are invalid
@@ -7,37 +7,13 @@ and hold the last value (docs/science/timeline.md, "Rule").
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from core.errors import Notice, SignalError
 from core.frames import Bools, Floats, Segment
 from core.recording import ImuStream, Recording, SensorSignals, UniformRecording
-
-
-@dataclass(frozen=True)
-class TimelineParams:
-    """Limits of the common axis.
-
-    Parameters
-    ----------
-    max_gap_s : longest missing stretch that is interpolated (docs/science/timeline.md, "Parameters").
-    min_rate_hz : below, contacts cannot be found (docs/science/timeline.md, "Parameters").
-    min_duration_s : shorter takes cannot hold 1 s of rest and two strides [our choice].
-    min_share : a sensor that lasts less than this share of the median duration does not cut the take for the
-        others; it is invalid where it has no samples [our choice].
-    max_stretch : samples of the axis per recorded sample; beyond, the clock must have jumped [our choice].
-    on_grid : largest distance from the axis, in samples, at which a sample counts as lying on it.
-    """
-
-    max_gap_s: float = 0.1
-    min_rate_hz: float = 40.0
-    min_duration_s: float = 5.0
-    min_share: float = 0.9
-    max_stretch: float = 20.0
-    on_grid: float = 0.01
+from core.timeline.grid import lay_signal
+from core.timeline.params import TimelineParams
 
 
 def synchronise(recording: Recording, params: TimelineParams | None = None) -> UniformRecording:
@@ -86,8 +62,7 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
             f"{most} were recorded: "
             "the counter or time column jumps. Export the recording again.",
         )
-    axis = start + np.arange(n) / rate
-    sensors = {segment: _on_axis(s, axis, rate, params) for segment, s in usable.items()}
+    sensors = {segment: _lay_sensor(s, start, n, rate, params) for segment, s in usable.items()}
     return UniformRecording(
         t_s=np.arange(n) / rate,
         rate_hz=rate,
@@ -199,80 +174,37 @@ def _common_range(
     return start, end, notices
 
 
-def _on_axis(s: ImuStream, axis: Floats, rate: float, params: TimelineParams) -> SensorSignals:
-    """One sensor on the axis."""
+def _lay_sensor(
+    s: ImuStream, start_s: float, samples: int, rate: float, params: TimelineParams
+) -> SensorSignals:
+    """One sensor on the axis of so many samples."""
     assert s.gyr is not None  # noqa: S101 - sensors without gyroscope were set aside
-    good = complete(s.acc) & complete(s.gyr)
+    good = is_complete(s.acc) & is_complete(s.gyr)
     if not good.any():
         raise SignalError(
             "bad_signal",
             f"Sensor {s.device_id} has no sample with both acceleration and angular rate; export it again.",
             sensor=s.device_id,
         )
-    t = s.t_s[good]
-    place = Place.find(t, axis, s.rate_hz, rate, params)
-    return SensorSignals(
-        device_id=s.device_id,
-        acc=place.values(s.acc[good]),
-        gyr=place.values(s.gyr[good]),
-        mag=_magnetometer(s, axis, rate, params),
-        valid=place.valid,
-        interpolated=place.filled,
-    )
+    channels = np.concatenate((s.acc[good], s.gyr[good]), axis=1)
+    (acc, gyr), valid, filled = lay_signal(s.t_s[good], channels, start_s, samples, s.rate_hz, rate, params)
+    mag = _lay_magnetometer(s, start_s, samples, rate, params)
+    return SensorSignals(s.device_id, acc, gyr, mag, valid, filled)
 
 
-def _magnetometer(s: ImuStream, axis: Floats, rate: float, params: TimelineParams) -> Floats | None:
+def _lay_magnetometer(
+    s: ImuStream, start_s: float, samples: int, rate: float, params: TimelineParams
+) -> Floats | None:
     """The magnetometer has its own holes and never makes a sample invalid; None when mostly missing."""
     if s.mag is None:
         return None
-    good = complete(s.mag)
+    good = is_complete(s.mag)
     if np.count_nonzero(good) < 0.5 * len(good):
         return None
-    return Place.find(s.t_s[good], axis, s.rate_hz, rate, params).values(s.mag[good])
+    values, _, _ = lay_signal(s.t_s[good], s.mag[good], start_s, samples, s.rate_hz, rate, params)
+    return np.asarray(values[0])
 
 
-@dataclass(frozen=True, eq=False)
-class Place:
-    """Where the axis lies between the good samples of a sensor.
-
-    Parameters
-    ----------
-    before : (n,) index of the last sample at or before each axis point. share : (n,) way to the next, 0 to 1.
-    """
-
-    before: NDArray[np.intp]
-    share: Floats
-    valid: Bools
-    filled: Bools
-
-    @classmethod
-    def find(cls, t: Floats, axis: Floats, own_rate: float, rate: float, params: TimelineParams) -> Place:
-        """Find it for good-sample times t (m,), strictly increasing."""
-        slack = params.on_grid / rate
-        before = np.searchsorted(t, axis + slack, side="right") - 1
-        outside = before < 0
-        before = np.clip(before, 0, len(t) - 1)
-        after = np.minimum(before + 1, len(t) - 1)
-        hole = t[after] - t[before]
-        share = np.where(hole > 0, (axis - t[before]) / np.where(hole > 0, hole, 1.0), 0.0)
-        on_sample = (np.abs(axis - t[before]) <= slack) & ~outside
-        share[on_sample] = 0.0
-        past = (before == len(t) - 1) & ~on_sample
-        step = 1.0 / own_rate
-        missing = hole - step
-        filled = ~on_sample & ~outside & ~past & (missing > 0.5 * step)
-        too_long = filled & (missing > params.max_gap_s + 0.5 * step)
-        share = np.where(too_long | outside | past, 0.0, share)
-        valid = ~(too_long | outside | past)
-        return cls(before, share, valid, filled & valid)
-
-    def values(self, x: Floats) -> Floats:
-        """Signal x (m, c) of the good samples on the axis, (n, c); invalid points hold the last."""
-        base = x[self.before]
-        following = x[np.minimum(self.before + 1, len(x) - 1)]
-        return base + self.share[:, None] * (following - base)
-
-
-def complete(x: Floats) -> Bools:
+def is_complete(x: Floats) -> Bools:
     """Rows (n,) of x (n, c) without a missing value."""
     return np.asarray(np.isfinite(x).all(axis=1), np.bool_)

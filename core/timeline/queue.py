@@ -1,4 +1,4 @@
-"""One stream before it is laid on the axis: what its clock has said, and what waits for the clock."""
+"""One stream of a live take before it is laid on the axis: its clock so far, and batches that wait for it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LONGEST_SPAN_US: Final = 1_000_000
 """A sender may gather samples for so long; a stream is not overdue while its usual batch can be gathered."""
 
 
-class Line:
+class StreamQueue:
     """The worn sensors of one stream."""
 
     def __init__(self, info: StreamInfo) -> None:

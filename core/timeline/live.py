@@ -1,7 +1,7 @@
 """Batches of several device clocks → ONE uniform axis, sample by sample.
 
-The rules are those of core/timeline.py: highest rate, common start, samples on the axis copied, others
-interpolated, holes of up to 0.1 s filled. A point is given out once every stream has what it needs for it, so
+The rules are those of a file: highest rate, common start, samples on the axis copied, others interpolated,
+holes of up to 0.1 s filled. A point is given out once every stream has what it needs for it, so
 on a clean take the axis equals that of the finished file bit for bit. What a file needs no rule for: a stream
 that falls silent is passed over, its sensors are invalid until it returns.
 """
@@ -17,13 +17,13 @@ from core.errors import Notice, SignalError
 from core.formats.live_clock import LiveClock, sample_times_us
 from core.formats.live_log import Batch, Hello, SensorInfo, StreamInfo, decode_batch, encode_batch
 from core.frames import Bools, Floats, Segment
-from core.online.line import Line
-from core.online.rows import Rows
-from core.timeline import TimelineParams
+from core.timeline.buffer import SampleBuffer
+from core.timeline.params import TimelineParams
+from core.timeline.queue import StreamQueue
 
 
 @dataclass(frozen=True)
-class AxisParams:
+class LiveAxisParams:
     """Limits of the live axis.
 
     Parameters
@@ -53,7 +53,7 @@ class UniformBlock:
     ----------
     first : index of the first one on the axis; blocks follow each other without a hole.
     t_s : (T,) seconds from the first sample of the axis, as `UniformRecording.t_s`.
-    acc, gyr : (T, n, 3) m/s², rad/s of the n worn sensors in the order of `OnlineAxis.segments`; finite
+    acc, gyr : (T, n, 3) m/s², rad/s of the n worn sensors in the order of `LiveAxis.segments`; finite
         everywhere, invalid samples hold the last value (0 before the first).
     valid : (T, n) measured or interpolated over ≤ 0.1 s. interpolated : (T, n) filled.
     out : (T, n) of a sensor that was found not to measure and is left out for good; None = nobody looked.
@@ -71,7 +71,7 @@ class UniformBlock:
         return len(self.t_s)
 
 
-class OnlineAxis:
+class LiveAxis:
     """The axis of a live take: a pure function of its batches in order.
 
     Parameters
@@ -83,25 +83,25 @@ class OnlineAxis:
     SignalError `no_mapping`, `sample_rate_too_low`, as `synchronise`.
     """
 
-    def __init__(self, hello: Hello, params: AxisParams | None = None) -> None:
-        self.params = params or AxisParams()
+    def __init__(self, hello: Hello, params: LiveAxisParams | None = None) -> None:
+        self.params = params or LiveAxisParams()
         self._clock = LiveClock(hello)
         self._rates = {s.stream: s.rate_hz for s in hello.streams}
-        lines = [Line(info) for info in hello.streams]
-        self._lines = {line.stream: line for line in lines if line.ids}
+        queues = [StreamQueue(info) for info in hello.streams]
+        self._queues = {q.stream: q for q in queues if q.ids}
         self.segments: tuple[Segment, ...] = tuple(x.segment for x in hello.sensors if x.segment is not None)
         """Worn segments in the order of the block's columns."""
-        self.rate_hz = _rate(list(self._lines.values()), hello, self.params.timeline)
-        lines = list(self._lines.values())
-        self._rows = Rows(
-            [len(x.ids) for x in lines], [x.rate_hz for x in lines], self.rate_hz, self.params.timeline
+        self.rate_hz = _common_rate(list(self._queues.values()), hello, self.params.timeline)
+        queues = list(self._queues.values())
+        self._buffer = SampleBuffer(
+            [len(x.ids) for x in queues], [x.rate_hz for x in queues], self.rate_hz, self.params.timeline
         )
         self._origin: tuple[int, int] | None = None  # stream and device time of the very first sample
         self._origin_us = 0
         self._start_s: float | None = None
         self._next = 0
         self._sent: tuple[int, int] | None = None  # smallest and largest sending time so far, µs
-        self._told: dict[tuple[str, int], Notice] = {}
+        self._notified: dict[tuple[str, int], Notice] = {}
         self._fresh: list[Notice] = []
 
     @property
@@ -118,25 +118,25 @@ class OnlineAxis:
         self._sent = min(earliest, batch.sent_us), max(latest, batch.sent_us)
         if self._origin is None:
             self._origin = batch.stream, int(t_us[0])
-        line = self._lines.get(batch.stream)
-        if line is not None:
-            if self._jumps(line, int(t_us[0]), batch.sent_us):
+        queue = self._queues.get(batch.stream)
+        if queue is not None:
+            if self._is_jump(queue, int(t_us[0]), batch.sent_us):
                 return None
-            if line.hold(t_us, batch):
-                self._tell(
-                    "out_of_order", line, "sent samples that run backwards in time; they are left out."
+            if queue.hold(t_us, batch):
+                self._notify(
+                    "out_of_order", queue, "sent samples that run backwards in time; they are left out."
                 )
         if self._start_s is None and not self._begin():
             return None
-        for i, x in enumerate(self._lines.values()):
+        for i, x in enumerate(self._queues.values()):
             if x.held and (offset := self._clock.offset_us(x.stream)) is not None:
                 for t_us, samples in x.held:
-                    self._rows.append(i, t_us, offset - self._origin_us, samples, x.columns)
+                    self._buffer.append(i, t_us, offset - self._origin_us, samples, x.columns)
                 x.held = []
         return self._emit()
 
-    def notices(self) -> tuple[Notice, ...]:
-        """What is new to be said since the last call."""
+    def drain_notices(self) -> tuple[Notice, ...]:
+        """Notices since the last call."""
         fresh, self._fresh = tuple(self._fresh), []
         return fresh
 
@@ -144,16 +144,16 @@ class OnlineAxis:
         """Fix origin and start once all streams are there, or those that came in time; False before that."""
         assert self._sent is not None  # noqa: S101 - set before the first call
         assert self._origin is not None  # noqa: S101
-        heard = [x for x in self._lines.values() if x.held and self._clock.offset_us(x.stream) is not None]
+        heard = [x for x in self._queues.values() if x.held and self._clock.offset_us(x.stream) is not None]
         late = self._sent[1] - self._sent[0] > self.params.wait_s * 1e6
         stream, first_us = self._origin
         offset = self._clock.offset_us(stream, final=not late)
-        if not heard or offset is None or (len(heard) < len(self._lines) and not late):
+        if not heard or offset is None or (len(heard) < len(self._queues) and not late):
             return False
         self._origin_us = first_us + offset
-        for x in self._lines.values():
+        for x in self._queues.values():
             if x not in heard:
-                self._tell("sensor_missing", x, "sent nothing so far; the take goes on without it.")
+                self._notify("sensor_missing", x, "sent nothing so far; the take goes on without it.")
         starts = [x.first_us + (self._clock.offset_us(x.stream) or 0) - self._origin_us for x in heard]
         self._start_s = float(max(starts) * 1e-6)
         return True
@@ -162,47 +162,47 @@ class OnlineAxis:
         """Lay what is known on the axis."""
         assert self._start_s is not None  # noqa: S101 - set before the first call
         assert self._sent is not None  # noqa: S101
-        p, last_s = self.params, self._rows.last_s
+        p, last_s = self.params, self._buffer.last_s
         furthest = last_s.max()
-        due = [x.overdue_s(self._sent[1]) <= p.silent_s for x in self._lines.values()]
+        due = [x.overdue_s(self._sent[1]) <= p.silent_s for x in self._queues.values()]
         live = np.array(due) & (last_s >= furthest - p.behind_s)
         if not live.any():
             live = last_s == furthest  # the senders' clocks are of no use
-        until = self._rows.until(live)
+        until = self._buffer.until(live)
         # a little less than `on_grid`, so that rounding never gives out a point that its sample is not on
         past = int(np.floor((until - self._start_s) * self.rate_hz + 0.9 * p.timeline.on_grid)) + 1
         if past <= self._next:
             return None
         first, self._next = self._next, past
         t_s = np.arange(first, past) / self.rate_hz
-        return UniformBlock(first, t_s, *self._rows.lay(first, past, self._start_s))
+        return UniformBlock(first, t_s, *self._buffer.lay(first, past, self._start_s))
 
-    def _jumps(self, line: Line, first_us: int, sent_us: int) -> bool:
+    def _is_jump(self, queue: StreamQueue, first_us: int, sent_us: int) -> bool:
         """Tell whether a batch is too far ahead of its stream to be believed."""
-        ahead_s = line.ahead_s(first_us)
-        allowed = max(0.0, line.overdue_s(sent_us)) + self.params.jump_s
-        stretch = self.params.timeline.max_stretch * line.samples / line.rate_hz + self.params.longest_s
-        if ahead_s <= min(allowed, self.params.longest_s) and line.whole_s(first_us) <= stretch:
+        ahead_s = queue.ahead_s(first_us)
+        allowed = max(0.0, queue.overdue_s(sent_us)) + self.params.jump_s
+        stretch = self.params.timeline.max_stretch * queue.samples / queue.rate_hz + self.params.longest_s
+        if ahead_s <= min(allowed, self.params.longest_s) and queue.whole_s(first_us) <= stretch:
             return False
-        self._tell("clock_jump", line, "has a clock that jumps; batches beyond the jump are left out.")
+        self._notify("clock_jump", queue, "has a clock that jumps; batches beyond the jump are left out.")
         return True
 
-    def _tell(self, code: str, line: Line, what: str) -> None:
+    def _notify(self, code: str, queue: StreamQueue, what: str) -> None:
         """Say something of a stream once."""
-        if (code, line.stream) in self._told:
+        if (code, queue.stream) in self._notified:
             return
-        notice = Notice(code, f"{', '.join(line.ids)} {what}", line.ids[0], self._next / self.rate_hz)
-        self._told[code, line.stream] = notice
+        notice = Notice(code, f"{', '.join(queue.ids)} {what}", queue.ids[0], self._next / self.rate_hz)
+        self._notified[code, queue.stream] = notice
         self._fresh.append(notice)
 
 
-def _rate(lines: Sequence[Line], hello: Hello, params: TimelineParams) -> float:
-    if not lines:
+def _common_rate(queues: Sequence[StreamQueue], hello: Hello, params: TimelineParams) -> float:
+    if not queues:
         named = ", ".join(x.id for x in hello.sensors)
         raise SignalError(
             "no_mapping", f"No sensor is worn on a segment; say which one is where (sensors: {named})."
         )
-    slowest = min(lines, key=lambda x: x.rate_hz)
+    slowest = min(queues, key=lambda x: x.rate_hz)
     if slowest.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
@@ -210,13 +210,13 @@ def _rate(lines: Sequence[Line], hello: Hello, params: TimelineParams) -> float:
             "needed to find foot contacts. Set it to 60 Hz or more.",
             sensor=slowest.ids[0],
         )
-    return max(x.rate_hz for x in lines)
+    return max(x.rate_hz for x in queues)
 
 
 def warm() -> None:
     """Compile or load the kernels, for samples that look into a frame as decoded ones do."""
     hello = Hello("", "cli", (StreamInfo(0, 100.0, "shared", (SensorInfo("", "pelvis"),)),))
-    axis = OnlineAxis(hello)
+    axis = LiveAxis(hello)
     for seq in range(2):
         at = 10_000 * seq
         axis.push(decode_batch(encode_batch(Batch(0, seq, at, at, np.zeros((1, 1, 9), np.float32)))))
