@@ -18,15 +18,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 import web
-from server import (
-    capture_pages,
-    live_pages,
-    number_pages,
-    pages,
-    prescription_pages,
-    problems,
-    visit_pages,
-)
+from server import capture_pages, live_pages, number_pages, pages, prescription_pages, visit_pages
 from server.api import (
     analyses,
     audit_log,
@@ -45,24 +37,24 @@ from server.api import (
     trends,
     users,
 )
-from server.api.body_limit import BodyLimit
+from server.api import live_feed as live_feed
 from server.api.documents import openapi
 from server.auth.access import require
-from server.auth.csrf import CrossSiteGuard
-from server.auth.headers import SecurityHeaders
-from server.auth.hosts import HostGuard
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.auth.routes import declared_actions
 from server.auth.sessions import Logins
 from server.auth.throttle import Throttle
-from server.compression import Compression
+from server.http import problems
+from server.http.body_limit import BodyLimit
+from server.http.compression import Compression
+from server.http.cross_site import CrossSiteGuard
+from server.http.headers import SecurityHeaders
+from server.http.hosts import HostGuard
 from server.jobs.feed import JobFeed
 from server.jobs.table import TableQueue
-from server.live import feed as live_feed
 from server.live import tablet
 from server.live.hub import Hub
-from server.readiness import Readiness
 from server.services import custody, erasure
 from server.services.custody import refuse_strangers
 from server.services.provenance import CODE_VERSION
@@ -71,6 +63,7 @@ from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.high_water import MarkKeeper
 from server.storage.migrate import upgrade
+from server.storage.readiness import Readiness
 from server.trail import Trail
 from server.viewer import live_proxy, proxy
 

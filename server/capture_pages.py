@@ -8,8 +8,8 @@ from starlette.responses import Response
 
 from server.auth.access import require
 from server.auth.roles import Action
+from server.http.problems import TEMPLATES
 from server.page_views import SEGMENT_NAMES
-from server.problems import TEMPLATES
 from server.services.live import ALPHABET, CODE_LENGTH
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)

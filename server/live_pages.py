@@ -9,10 +9,10 @@ from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
 from server import live_views
-from server.api.context import Db, Id
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Db, Id
 from server.services import patients, sessions
 from server.shell import opened, page
 

@@ -25,7 +25,7 @@ def _run(command: str, given: dict[str, object]) -> int:
     # numba and the web stack take seconds to import: each command loads only what it needs
     from importlib import import_module
 
-    from server.compile_cache import share_compile_cache
+    from server.processes.compile_cache import share_compile_cache
     from server.settings import SettingsError, load_settings
 
     try:

@@ -9,10 +9,10 @@ from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
 from server import session_views
-from server.api.context import Blobs, Db, Id
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Blobs, Db, Id
 from server.services import analyses, reports, reviews
 from server.shell import opened, page
 

@@ -10,13 +10,13 @@ from starlette.responses import Response
 
 from core.condition import USUAL
 from server import audit, page_views, prescription_views, session_views, upload_views, visit_views
-from server.api.context import Blobs, Db, Id, OpenTrail
 from server.auth import accounts, one_time
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.passwords import MIN_LENGTH
 from server.auth.roles import Action, Role
-from server.problems import TEMPLATES
+from server.context import Blobs, Db, Id, OpenTrail
+from server.http.problems import TEMPLATES
 from server.services import (
     analyses,
     comparisons,

@@ -69,7 +69,7 @@ class Settings:
     sweep_grace_s: float = 3600.0
     idle_minutes: float = 15.0
     absolute_hours: float = 12.0
-    task_modules: tuple[str, ...] = ("server.jobs.tasks",)
+    task_modules: tuple[str, ...] = ("server.worker.tasks",)
 
     def __post_init__(self) -> None:
         _require(0 <= self.port <= 65535, "port", self.port, "0 to 65535 (0 = any free port)")

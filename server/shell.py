@@ -10,7 +10,7 @@ from core.condition import CHOICES
 from server import page_views
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.problems import TEMPLATES
+from server.http.problems import TEMPLATES
 from server.services.provenance import CODE_VERSION
 from server.storage.db import Database
 from server.trail import Trail

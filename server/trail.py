@@ -19,12 +19,11 @@ import time
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from sqlalchemy.exc import SQLAlchemyError
 
 from server import audit
-from server.auth.identity import Identity
 from server.storage.db import Database
 from server.storage.refusal import refusal_of
 from server.storage.tables import now
@@ -42,6 +41,14 @@ _RETRY_S: Final = 30.0
 _AT_ONCE: Final = 500
 """Rows of one transaction; others want to write too."""
 _MOST_WATCHED: Final = 10_000
+
+
+class SignedIn(audit.Actor, Protocol):
+    """Who looks at something: a person and the sign-in through which the request came."""
+
+    @property
+    def login_id(self) -> str:
+        """Row of `login_session`."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +81,7 @@ class Trail:
 
     def opened(
         self,
-        who: Identity,
+        who: SignedIn,
         action: str,
         resource: str,
         resource_id: str | None,
@@ -91,7 +98,7 @@ class Trail:
 
     def watched(
         self,
-        who: Identity,
+        who: SignedIn,
         action: str,
         resource: str,
         resource_id: str | None,

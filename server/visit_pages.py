@@ -11,11 +11,11 @@ from starlette.responses import Response
 
 from core.frames import Protocol
 from server import visit_views
-from server.api.context import Blobs, Db, Id
+from server.api.schemas import HexId
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.schemas import HexId
+from server.context import Blobs, Db, Id
 from server.services import comparisons, histories, patients, programmes, sessions
 from server.services.course import SIX_WEEKS
 from server.shell import opened, page

@@ -12,7 +12,7 @@ from typing import Final
 import hypothesis
 import pytest
 
-from server.compile_cache import has_compiled_filters, share_compile_cache
+from server.processes.compile_cache import has_compiled_filters, share_compile_cache
 from tests.accuracy.report import WRITE
 
 # before anything imports numba: every process that a test starts inherits it

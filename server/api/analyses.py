@@ -7,13 +7,13 @@ from typing import Annotated
 from fastapi import APIRouter
 from starlette.responses import Response
 
-from server import schemas
-from server.api.context import Blobs, Db, Id, OpenTrail, Queue
+from server.api import schemas
 from server.api.documents import refusals
 from server.api.downloads import attachment
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Blobs, Db, Id, OpenTrail, Queue
 from server.jobs.queue import JobView
 from server.services import analyses, recordings, sessions
 

@@ -7,11 +7,12 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query
 from sqlalchemy import Row
 
-from server import audit, schemas
-from server.api.context import Db
+from server import audit
+from server.api import schemas
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Db
 
 router = APIRouter(prefix="/audit", tags=["audit"])
 

@@ -8,13 +8,13 @@ from fastapi import APIRouter
 from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
-from server import trend_schemas
-from server.api.context import Blobs, Db, Id, OpenTrail
+from server.api import trend_schemas
 from server.api.documents import refusals
 from server.api.downloads import BINARY, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Blobs, Db, Id, OpenTrail
 from server.report.columns import plain
 from server.report.comparison import comparison_csv
 from server.services import comparisons

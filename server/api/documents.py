@@ -7,8 +7,8 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from server.problems import MEDIA_TYPE
-from server.schemas import ProblemDetails
+from server.api.schemas import ProblemDetails
+from server.http.problems import MEDIA_TYPE
 
 _WORDS = {
     "400": "The request cannot be read, or its host name is not ours",

@@ -12,14 +12,14 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 
-from server import schemas
-from server.api.context import Blobs, Config, Db, Id, OpenTrail
+from server.api import schemas
 from server.api.documents import refusals
 from server.api.downloads import BINARY, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.problems import Problem
+from server.context import Blobs, Config, Db, Id, OpenTrail
+from server.http.problems import Problem
 from server.services import recordings
 
 router = APIRouter(prefix="/sessions/{session_id}/files", tags=["files"])

@@ -11,12 +11,12 @@ from fastapi import APIRouter, Query
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
-from server import schemas
-from server.api import context
-from server.api.context import Db, Id, OpenTrail
+from server import context
+from server.api import schemas
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Db, Id, OpenTrail
 from server.jobs.feed import JobFeed
 from server.jobs.queue import JobView
 from server.services import jobs

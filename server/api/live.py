@@ -7,12 +7,12 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 
-from server import live_schemas as schemas
-from server.api.context import Db, Failures, Id, LiveHub, OpenTrail, address_of
+from server.api import live_schemas as schemas
 from server.api.documents import PUBLIC, refusals
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Db, Failures, Id, LiveHub, OpenTrail, address_of
 from server.services import live, sessions
 
 router = APIRouter(tags=["live"])

@@ -6,12 +6,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from server import schemas
-from server.api.context import Blobs, Config, Db, Id, LiveHub, OpenTrail
+from server.api import schemas
 from server.api.documents import refusals
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Blobs, Config, Db, Id, LiveHub, OpenTrail
 from server.services import erasure, patients, programmes, sessions
 
 router = APIRouter(prefix="/patients", tags=["patients"])

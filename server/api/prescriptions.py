@@ -9,17 +9,17 @@ from starlette.responses import Response
 
 from core.feedback import PARAMETERS
 from core.feedback.prescription import SOURCES
-from server import feedback_schemas as schemas
-from server.api.context import Blobs, Db, Id, OpenTrail
+from server.api import feedback_schemas as schemas
 from server.api.documents import refusals
 from server.api.downloads import BINARY, attachment
+from server.api.schemas import Side
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.problems import Problem
+from server.context import Blobs, Db, Id, OpenTrail
+from server.http.problems import Problem
 from server.report.feedback_words import prescription_words
 from server.report.tables import feedback_csv
-from server.schemas import Side
 from server.services import feedback, histories, patients, prescriptions, sessions, targets
 from server.services.prescriptions import Written
 from server.storage.db import Database

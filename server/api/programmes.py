@@ -6,12 +6,12 @@ from typing import Annotated
 
 from fastapi import APIRouter
 
-from server import schemas
-from server.api.context import Db, Id, OpenTrail
+from server.api import schemas
 from server.api.documents import refusals
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Db, Id, OpenTrail
 from server.services import patients, programmes
 
 router = APIRouter(tags=["programmes"])

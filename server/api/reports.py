@@ -7,12 +7,12 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path
 from starlette.responses import Response
 
-from server import schemas
-from server.api.context import Blobs, Db, Id, OpenTrail
+from server.api import schemas
 from server.api.downloads import BINARY, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Blobs, Db, Id, OpenTrail
 from server.report.model import ReportModel
 from server.report.tables import curves_csv, parameters_csv
 from server.services import (

@@ -10,13 +10,13 @@ from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
 from core.edits import edit_of
-from server import review_schemas as schemas
-from server.api.context import Blobs, Db, Id, OpenTrail
+from server.api import review_schemas as schemas
 from server.api.documents import refusals
 from server.api.downloads import BINARY, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Blobs, Db, Id, OpenTrail
 from server.report.exports import events_csv, parameter_row, strides_csv
 from server.report.wording import excluded_words
 from server.services import analyses, reviews, signals

@@ -14,8 +14,8 @@ from sqlalchemy.exc import OperationalError
 from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, RedirectResponse
 
-from server import audit, schemas
-from server.api.context import Db, Failures, OpenLogins, OpenTrail, address_of
+from server import audit
+from server.api import schemas
 from server.api.documents import PUBLIC, refusals
 from server.auth import accounts, one_time
 from server.auth.access import require
@@ -25,7 +25,8 @@ from server.auth.passwords import hash_password
 from server.auth.roles import POLICY, Action, Role
 from server.auth.sessions import Logins
 from server.auth.tokens import token_hash
-from server.problems import SENTENCES, Problem
+from server.context import Db, Failures, OpenLogins, OpenTrail, address_of
+from server.http.problems import SENTENCES, Problem
 from server.storage.refusal import refusal_of
 from server.trail import Trail
 

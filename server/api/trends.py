@@ -11,17 +11,17 @@ from starlette.responses import Response
 
 from core.condition import WalkingCondition
 from core.frames import Protocol
-from server import trend_schemas
-from server.api.context import Blobs, Db, Id, OpenTrail
+from server.api import trend_schemas
 from server.api.downloads import BINARY, attachment
+from server.api.schemas import HexId
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Blobs, Db, Id, OpenTrail
 from server.report.change_words import change_words
 from server.report.columns import plain
 from server.report.tables import trends_csv
 from server.report.trends import Line, Trend, names_in, trends
-from server.schemas import HexId
 from server.services import histories, patients
 from server.services.histories import History
 from server.storage.blobs import BlobStore

@@ -7,14 +7,15 @@ from typing import Annotated, Any
 from fastapi import APIRouter
 from sqlalchemy import Row
 
-from server import audit, schemas
-from server.api.context import Db, Id, OpenLogins
+from server import audit
+from server.api import schemas
 from server.api.documents import refusals
 from server.auth import accounts
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.passwords import hash_password
 from server.auth.roles import Action
+from server.context import Db, Id, OpenLogins
 
 router = APIRouter(prefix="/users", tags=["users"])
 Admin = Annotated[Identity, require(Action.MANAGE_USERS)]

@@ -10,7 +10,7 @@ from starlette.requests import HTTPConnection
 from server.auth.cookie import read_token
 from server.auth.identity import Identity
 from server.auth.roles import PUBLIC, Action
-from server.problems import SENTENCES, Problem
+from server.http.problems import SENTENCES, Problem
 
 
 class Door:

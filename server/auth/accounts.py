@@ -10,7 +10,7 @@ from sqlalchemy.exc import IntegrityError
 from server.auth.passwords import verify_password
 from server.auth.roles import Role
 from server.auth.throttle import Throttle
-from server.problems import Problem
+from server.http.problems import Problem
 from server.storage.db import Database
 from server.storage.tables import new_id, now, user
 from server.trail import Trail

@@ -7,7 +7,7 @@ import datetime as dt
 from sqlalchemy import Connection, delete, func, insert, select, update
 
 from server.auth.tokens import new_token, token_hash
-from server.problems import Problem
+from server.http.problems import Problem
 from server.storage.tables import now, one_time_token, user
 
 LIFE = dt.timedelta(hours=24)

@@ -7,7 +7,7 @@ import time
 from collections import defaultdict, deque
 from collections.abc import Callable
 
-from server.problems import Problem
+from server.http.problems import Problem
 
 WINDOW_S = 15 * 60.0
 MAX_PER_PAIR = 10

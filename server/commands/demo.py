@@ -14,7 +14,7 @@ from pathlib import Path
 from sqlalchemy import func, select
 
 from server.commands.serve import run, say
-from server.compile_cache import has_compiled_filters
+from server.processes.compile_cache import has_compiled_filters
 from server.settings import load_settings
 from server.storage.db import Database
 
@@ -26,7 +26,7 @@ def demo(port: int | None) -> int:
     from server.auth import accounts, one_time
     from server.auth.passwords import hash_password
     from server.auth.roles import Role
-    from server.jobs.runner import environment
+    from server.processes.environment import make_environment
 
     with tempfile.TemporaryDirectory(prefix="sagittal-demo-") as folder:
         settings = load_settings(
@@ -36,7 +36,7 @@ def demo(port: int | None) -> int:
 
         def start(*module: str) -> None:
             command = [sys.executable, "-m", *module]
-            helpers.append(subprocess.Popen(command, env=environment(settings)))  # noqa: S603 - our own
+            helpers.append(subprocess.Popen(command, env=make_environment(settings)))  # noqa: S603 - our own
 
         def announce(address: str) -> None:
             with closing(Database(settings.database)) as db, db.write() as c:
@@ -47,9 +47,9 @@ def demo(port: int | None) -> int:
             say(f"Open {address}/sign-in/{token}")
             say("(signs you in once; everything is simulated and is removed when you stop with Ctrl-C)")
             # simulating takes seconds of computing: never in the web process
-            start("server.services.demo_clinic")
+            start("server.demo.clinic")
             _report(settings.database)
-            start("server.services.demo_live", address)
+            start("server.demo.live", address)
             say("One of the patients is walking live now: the first in the list of patients.")
 
         try:
@@ -62,7 +62,7 @@ def demo(port: int | None) -> int:
 
 def _report(database: Path) -> None:
     """Say on the console what is being waited for, until every session is analysed."""
-    from server.services.demo_clinic import VISITS
+    from server.demo.clinic import VISITS
     from server.services.recordings import ANALYSE
     from server.storage.tables import job
 

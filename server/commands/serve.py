@@ -34,7 +34,7 @@ def serve(data_dir: Path | None, host: str | None, port: int | None, workers: in
 def run(settings: Settings, announce: Callable[[str], None]) -> int:
     """Run web server and workers; `announce` gets the address once requests are answered."""
     from server.app import create_app
-    from server.jobs.supervisor import Workers
+    from server.processes.supervisor import Workers
     from server.services.custody import StrangersError, refuse_strangers
     from server.storage import fs
     from server.storage.migrate import MigrationError, upgrade

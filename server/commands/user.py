@@ -18,7 +18,7 @@ def user(data_dir: Path | None, name: str, role: str) -> int:
     from server.auth import accounts
     from server.auth.passwords import hash_password
     from server.auth.roles import Role
-    from server.problems import Problem
+    from server.http.problems import Problem
     from server.storage.db import Database
     from server.storage.migrate import upgrade
     from server.storage.tables import user as table

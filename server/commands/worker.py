@@ -11,8 +11,8 @@ from server.settings import load_settings
 
 def worker(data_dir: Path | None) -> int:
     """Work until SIGTERM or Ctrl-C; 1 when the database is not of this version."""
-    from server.jobs.worker import run_worker
     from server.storage.migrate import MigrationError
+    from server.worker.worker import run_worker
 
     start_log()
     try:

@@ -18,7 +18,6 @@ from math import ceil
 from multiprocessing.connection import Connection
 
 from core.errors import SagittalError
-from server.jobs.lifeline import die_with, when_parent_ends
 from server.live import follower
 from server.live.follower import Follower
 from server.live.messages import (
@@ -34,6 +33,7 @@ from server.live.messages import (
     decode_order,
     encode,
 )
+from server.processes.lifeline import die_with, when_parent_ends
 from server.settings import load_settings
 
 log = logging.getLogger("server.live.estimator")

@@ -17,7 +17,6 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from server.jobs.runner import environment
 from server.live.messages import (
     Begin,
     Charge,
@@ -30,6 +29,7 @@ from server.live.messages import (
     decode_report,
     encode,
 )
+from server.processes.environment import make_environment
 from server.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -247,7 +247,7 @@ class _Worker:
         with theirs:
             self.process = subprocess.Popen(  # noqa: S603 - our own module; a fork takes milliseconds
                 [sys.executable, "-m", "server.live.estimator", str(theirs.fileno()), str(os.getpid())],
-                env=environment(self._pool.settings),
+                env=make_environment(self._pool.settings),
                 stdin=subprocess.PIPE,
                 pass_fds=[theirs.fileno()],
             )

@@ -10,22 +10,21 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
 import msgspec
 
 from server.live import protocol
 from server.live.intake import Answer, Ended
+from server.live.journal import Journal
 from server.live.messages import STALE_S, Begin, Charge, Command, Item, Picture
+from server.live.pool import Pool
 from server.live.protocol import ProtocolError
 from server.live.recorder import Recorder
 from server.live.room import Room
 from server.live.sensors import sensor_rows
 from server.services.live import LiveEvent, Take, is_own_notice
 from server.services.live_training import Training
-
-if TYPE_CHECKING:
-    from server.live.hub import Hub
 
 STEERING: Final = frozenset({"feedback", "level", "pause", "stale", "redo_calibration"})
 """Commands that change what the estimator says; each holds from a batch on."""
@@ -44,6 +43,27 @@ class Line(Protocol):
 
     def shut(self, code: int, reason: str) -> None:
         """Close."""
+
+
+class TakeHouse(Protocol):
+    """What a take needs of the registry it belongs to (server/live/hub.py)."""
+
+    @property
+    def pool(self) -> Pool:
+        """The estimator processes."""
+
+    @property
+    def journal(self) -> Journal:
+        """Where events are kept."""
+
+    def note_started(self, take: LiveTake) -> None:
+        """The first batch of this take has come."""
+
+    def note_ended(self, take: LiveTake, end: Ended) -> None:
+        """The end of this take is on the disk."""
+
+    def tell_state(self, take: LiveTake) -> None:
+        """Tell the browsers where this take stands."""
 
 
 @dataclass(frozen=True)
@@ -90,13 +110,14 @@ class LiveTake:
 
     Parameters
     ----------
-    row : as stored when it was entered. earlier : its events so far, after a restart of the server.
+    house : the registry it belongs to. row : as stored when it was entered.
+    earlier : its events so far, after a restart of the server.
     """
 
     recorder: Recorder
 
     def __init__(
-        self, hub: Hub, row: Take, room: Room, training: Training, earlier: Iterable[LiveEvent]
+        self, house: TakeHouse, row: Take, room: Room, training: Training, earlier: Iterable[LiveEvent]
     ) -> None:
         self.id = row.id
         self.session_id = row.session_id
@@ -112,7 +133,7 @@ class LiveTake:
         self.estimate = "preparing"
         self.t_s: float | None = None
         self.stage: str | None = None
-        self._hub = hub
+        self._house = house
         self._seen: Counter[str] = Counter()
         self.steered = Steered()
         for event in earlier:
@@ -130,16 +151,16 @@ class LiveTake:
         answer = self.recorder.offer(message)
         if answer.keep is not None and self.state != "streaming" and answer.keep[0] == "B":
             self.state = "streaming"
-            self._hub.note_started(self)
+            self._house.note_started(self)
         if answer.keep is not None and answer.keep[0] == "F":
             self.steered.stopping = True
-            self._hub.tell_state(self)
+            self._house.tell_state(self)
         return answer
 
     def charge(self, percent: Mapping[str, float]) -> None:
         """Show the battery."""
         self._battery |= percent
-        self._hub.pool.send(Charge(self.id, dict(percent)))
+        self._house.pool.send(Charge(self.id, dict(percent)))
 
     # the recorder's listener
 
@@ -148,10 +169,10 @@ class LiveTake:
         self.grown_at = time.monotonic()
         before, self._size = self._size, size
         if size < before:
-            self._hub.pool.follow(self.id)
+            self._house.pool.follow(self.id)
         else:
-            self._hub.pool.grow(self.id, size)
-        if self.steered.stale and not self._hub.pool.follows(self.id):
+            self._house.pool.grow(self.id, size)
+        if self.steered.stale and not self._house.pool.follows(self.id):
             self.mind_silence(False)
 
     def acknowledged(self, below: int) -> None:
@@ -161,7 +182,7 @@ class LiveTake:
 
     def ended(self, end: Ended) -> None:
         """The end is on the disk."""
-        self._hub.note_ended(self, end)
+        self._house.note_ended(self, end)
 
     def failed(self, error: ProtocolError) -> None:
         """The disk refuses."""
@@ -191,7 +212,7 @@ class LiveTake:
             content["before"] = self.recorder.next_seq
         self.steered.see(self.id, name, t_s, content)
         if name in STEERING:
-            self._hub.pool.send(self.steered.commands[-1])
+            self._house.pool.send(self.steered.commands[-1])
         return content
 
     def show(self, picture: Picture) -> None:
@@ -228,7 +249,7 @@ class LiveTake:
             content = msgspec.json.decode(item.body)
             for name in ("type", "late"):
                 content.pop(name, None)
-            self._hub.journal.add(self.id, item.kind, item.t_s, content)
+            self._house.journal.add(self.id, item.kind, item.t_s, content)
 
     def look(self, now: float) -> None:
         """Notice silence."""
@@ -240,7 +261,7 @@ class LiveTake:
         if stale != self.steered.stale:
             content = self.steer("stale", stale, self.t_s)
             if self.training.prescription is not None:
-                self._hub.journal.add(self.id, "stale", self.t_s, content)
+                self._house.journal.add(self.id, "stale", self.t_s, content)
 
     def standing(self) -> dict[str, Any]:
         """The state for the browsers: clock and sensors are the recorder's, whoever estimates or not."""
@@ -259,7 +280,7 @@ class LiveTake:
             "ghost": self.steered.ghost,
             "stale": self.steered.stale,
             "stopping": self.steered.stopping,
-            "estimate": self.estimate if self._hub.pool.follows(self.id) else "none",
+            "estimate": self.estimate if self._house.pool.follows(self.id) else "none",
             "recording": self.recording_id,
             "problem": self.problem,
         }

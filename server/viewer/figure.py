@@ -7,10 +7,9 @@ import viser
 
 from server.viewer.batches import PALE, add_batch, colours, put
 from server.viewer.colours import GHOST, linear
-from server.viewer.ghost import Ghost
 from server.viewer.ground import Ground
 from server.viewer.layout import Batch
-from server.viewer.motion import Motion
+from server.viewer.motion import Ghost, Motion
 from server.viewer.room import FLOOR_M, FOV_RAD, ROOM, Room, Shot, near, turned
 
 

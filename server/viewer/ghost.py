@@ -8,39 +8,20 @@ figure is in no such stride there is no ghost.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats
-
-if TYPE_CHECKING:
-    from server.viewer.motion import Motion
+from server.viewer.motion import Ghost, Motion
 
 SPAN_S: Final = 1.0
 """The way of the person over this time says where the walk goes: about a stride, so that sway does not."""
 
 STANDS_M: Final = 0.15
 """A shorter way in that time has no direction; on a treadmill the facing of the beginning stands for it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Ghost:
-    """Another motion, matched frame by frame.
-
-    Parameters
-    ----------
-    frames : (m,) frame of `motion` for each frame of the figure, −1 where there is none.
-    turn : (m,) rad about the vertical, and place : (m, 2) m, that bring it to where the figure is.
-    """
-
-    motion: Motion
-    frames: NDArray[np.int64]
-    turn: Floats
-    place: Floats
 
 
 def ghost_of(figure: Motion, strides: Strides, other: Motion, other_strides: Strides) -> Ghost | None:

@@ -21,10 +21,10 @@ from core.body.kinematics import nominal_body
 from core.body.model import BodyModel
 from core.frames import Floats, Side
 from core.norms import adult_kinematics
-from server.api.context import Db, Id, OpenTrail
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.context import Db, Id, OpenTrail
 from server.live.hub import Hub
 from server.services import patients, sessions
 from server.storage.db import Database

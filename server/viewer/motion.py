@@ -10,13 +10,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core import rotation
 from core.body.model import BodyModel
 from core.body.poses import Poses
 from core.errors import ParameterError
 from core.frames import FOOT, Bools, Floats, Segment, Side
-from server.viewer.ghost import Ghost
 from server.viewer.layout import Batch, Layout
 from server.viewer.steps import Prints, Single, Trail, prints, trail
 
@@ -77,6 +77,22 @@ class Motion:
         if i == len(self.t_s):
             return i - 1
         return i if self.t_s[i] - t_s < t_s - self.t_s[i - 1] else i - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """Another motion, matched frame by frame.
+
+    Parameters
+    ----------
+    frames : (m,) frame of `motion` for each frame of the figure, −1 where there is none.
+    turn : (m,) rad about the vertical, and place : (m, 2) m, that bring it to where the figure is.
+    """
+
+    motion: Motion
+    frames: NDArray[np.int64]
+    turn: Floats
+    place: Floats
 
 
 def prepare(poses: Poses) -> Motion:

@@ -10,17 +10,15 @@ from pathlib import Path
 from typing import Final
 
 import msgspec
+from starlette.status import WS_1008_POLICY_VIOLATION
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from websockets.asyncio.client import ClientConnection, connect, unix_connect
 from websockets.exceptions import ConnectionClosed
 
+from server.auth.sessions import CHECK_EVERY_S
+
 ALLOWED: Final = frozenset({"ViewerCameraMessage"})
 """Types of messages a browser may send to viser; everything else, such as a request to share, is dropped."""
-
-CHECK_EVERY_S: Final = 10.0
-"""How often an open connection asks whether its sign-in still holds."""
-
-POLICY_VIOLATION: Final = 1008
 
 
 def subprotocols_of(ws: WebSocket) -> list[str]:
@@ -54,7 +52,7 @@ async def carry(ws: WebSocket, up: ClientConnection, is_open: Callable[[], bool]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        code, reason = (POLICY_VIOLATION, "not_signed_in") if over else _close_code(up)
+        code, reason = (WS_1008_POLICY_VIOLATION, "not_signed_in") if over else _close_code(up)
         # the browser may be gone already
         with contextlib.suppress(RuntimeError, WebSocketDisconnect):
             await ws.close(code, reason)

@@ -28,6 +28,7 @@ import viser
 from fastapi import APIRouter, FastAPI, Query, Request, WebSocket
 from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
+from starlette.status import WS_1008_POLICY_VIOLATION
 from starlette.websockets import WebSocketDisconnect
 from websockets.exceptions import WebSocketException
 
@@ -35,7 +36,7 @@ from core.errors import SagittalError
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.problems import Problem, as_problem
+from server.http.problems import Problem, as_problem
 from server.report.bundle import read_poses
 from server.services import analyses, comparisons, reviews, sessions
 from server.services.histories import Analysed
@@ -43,7 +44,7 @@ from server.storage.blobs import BlobStore
 from server.viewer.figure import Figure
 from server.viewer.ghost import ghost_of
 from server.viewer.motion import Motion, prepare
-from server.viewer.pipe import POLICY_VIOLATION, Activity, carry, subprotocols_of, until_over, upstream
+from server.viewer.pipe import Activity, carry, subprotocols_of, until_over, upstream
 from server.viewer.views import View, Views
 
 CONTENT_POLICY = (
@@ -165,7 +166,7 @@ async def replay(
         await asyncio.gather(cursor, over, return_exceptions=True)
         if ended:
             with contextlib.suppress(RuntimeError, WebSocketDisconnect):
-                await ws.close(POLICY_VIOLATION, "not_signed_in")
+                await ws.close(WS_1008_POLICY_VIOLATION, "not_signed_in")
 
 
 async def _open(

@@ -10,8 +10,8 @@ from typing import Any
 import httpx
 
 from core.online import warm
-from server.services.demo_clinic import PRESCRIBED
-from server.services.demo_live import training, walk
+from server.demo.clinic import PRESCRIBED
+from server.demo.live import training, walk
 from tests.service import served
 
 SPEED = 6.0

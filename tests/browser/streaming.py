@@ -13,8 +13,8 @@ from uuid import uuid4
 from playwright.sync_api import Page
 
 from core.simulate import Simulation
-from server.services import demo_live
-from server.services.demo_clinic import STROKE
+from server.demo import live as demo_live
+from server.demo.clinic import STROKE
 from tests.browser import filling
 from tests.browser.conftest import RunningServer
 

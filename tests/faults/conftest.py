@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from server.jobs.supervisor import Workers
+from server.processes.supervisor import Workers
 from tests.faults.clinic import Clinic, alive
 
 

@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 
 from server import audit, trail
-from server.readiness import Readiness
 from server.services import patients, sessions
 from server.settings import Settings
 from server.storage import fs
 from server.storage.db import Database
 from server.storage.migrate import MigrationError, upgrade
+from server.storage.readiness import Readiness
 from server.storage.tables import now
 from tests.faults.failing import FailingSystem
 from tests.faults.small_disk import full, mounted, run

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import pytest
 
-from server.jobs.runner import environment
 from server.live import client
 from server.live.client import Report, stream
 from server.live.pairing import pair
+from server.processes.environment import make_environment
 from server.services import live, recordings
 from server.services.live_recordings import log_path
 from tests.data import ROOT
@@ -41,7 +41,7 @@ class Server:
         settings = replace(clinic.settings, port=self.port, workers=0, live_workers=0)
         self.forker = subprocess.Popen(
             [sys.executable, "-m", "tests.faults.forked_server"],
-            env=environment(settings) | {"PYTHONPATH": str(ROOT)},
+            env=make_environment(settings) | {"PYTHONPATH": str(ROOT)},
             cwd=ROOT,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

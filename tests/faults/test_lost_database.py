@@ -16,8 +16,6 @@ from pathlib import Path
 import pytest
 
 from server import audit
-from server.jobs.task import load
-from server.jobs.worker import Worker
 from server.main import main
 from server.services import checks, custody, erasure, recordings, sessions
 from server.services.sweep import sweep
@@ -28,6 +26,8 @@ from server.storage.db import Database
 from server.storage.high_water import raise_mark
 from server.storage.migrate import upgrade
 from server.storage.trash import KEPT, Trash
+from server.worker.task import load
+from server.worker.worker import Worker
 from tests.data import ROOT
 from tests.faults.clinic import Clinic
 from tests.faults.failing import FailingSystem

@@ -10,11 +10,11 @@ from dataclasses import replace
 import pytest
 
 from core.errors import SagittalError
-from server.jobs.task import load
-from server.jobs.worker import Worker
 from server.services import checks, recordings
 from server.services.sweep import sweep
 from server.storage import fs
+from server.worker.task import load
+from server.worker.worker import Worker
 from tests.faults.clinic import Clinic
 from tests.faults.failing import FailingSystem
 

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from server.jobs.runner import environment
+from server.processes.environment import make_environment
 from tests.data import ROOT
 from tests.faults.clinic import Clinic, alive, until
 
@@ -32,7 +32,7 @@ COMMAND = [
 def serving(clinic: Clinic) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """A real server and its address."""
     process = subprocess.Popen(
-        COMMAND, env=environment(clinic.settings), cwd=ROOT, stdout=subprocess.PIPE, text=True
+        COMMAND, env=make_environment(clinic.settings), cwd=ROOT, stdout=subprocess.PIPE, text=True
     )
     assert process.stdout is not None
     try:
@@ -74,7 +74,7 @@ def test_a_second_server_on_the_same_folder_refuses(clinic: Clinic) -> None:
     with serving(clinic) as (server, address):
         second = subprocess.run(
             COMMAND,
-            env=environment(clinic.settings),
+            env=make_environment(clinic.settings),
             cwd=ROOT,
             capture_output=True,
             text=True,

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from server.jobs.runner import environment
-from server.jobs.supervisor import Workers
+from server.processes.environment import make_environment
+from server.processes.supervisor import Workers
 from server.settings import Settings
 from tests.faults.clinic import Clinic, alive, until
 from tests.faults.tiny_tasks import STAGES
@@ -183,7 +183,7 @@ def test_stopping_gives_the_job_back_unharmed(clinic: Clinic, workers: Workers) 
 def test_a_killed_server_takes_worker_and_child_along_and_the_next_one_goes_on(clinic: Clinic) -> None:
     script = textwrap.dedent("""
         import sys, time
-        from server.jobs.supervisor import Workers
+        from server.processes.supervisor import Workers
         from server.settings import load_settings
         workers = Workers(load_settings())
         workers.start()
@@ -192,7 +192,7 @@ def test_a_killed_server_takes_worker_and_child_along_and_the_next_one_goes_on(c
     """)
     server = subprocess.Popen(
         [sys.executable, "-c", script],
-        env=environment(clinic.settings),
+        env=make_environment(clinic.settings),
         stdout=subprocess.PIPE,
         text=True,
     )

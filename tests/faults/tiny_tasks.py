@@ -18,9 +18,9 @@ from sqlalchemy import Connection
 from core.errors import SignalError
 from core.formats.source import SourceFile
 from server.jobs.queue import Claim
-from server.jobs.task import Progress, Task, register
 from server.services import analyses
 from server.storage.blobs import Blob
+from server.worker.task import Progress, Task, register
 
 STAGES = ("first", "second", "third")
 

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from core.simulate import Stand, Straight, mt_files, simulate
-from server.jobs.supervisor import Workers
+from server.processes.supervisor import Workers
 from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio

@@ -9,7 +9,7 @@ import httpx
 import pytest
 
 from core.simulate import Stand, Straight, mt_files, simulate
-from server.jobs.supervisor import Workers
+from server.processes.supervisor import Workers
 from tests.server.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio

@@ -192,7 +192,7 @@ async def test_commands_are_checked_kept_and_shown(clinic: Clinic, port: int) ->
 async def test_ending_the_sign_in_ends_the_feed(
     clinic: Clinic, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.live.feed.CHECK_EVERY_S", 0.05)
+    monkeypatch.setattr("server.api.live_feed.CHECK_EVERY_S", 0.05)
     async with visit(clinic, port) as v:
         token = clinic.token("clinician")
         url = f"ws://127.0.0.1:{port}/sessions/{v.session}/live/feed"

@@ -12,7 +12,7 @@ from sqlalchemy import text
 from core.errors import SagittalError, SignalError
 from server.auth.access import require
 from server.auth.roles import Action
-from server.problems import Problem, as_problem
+from server.http.problems import Problem, as_problem
 from server.services.errors import NotFound
 from server.storage import db
 from tests.server.clinic import Clinic, open_clinic

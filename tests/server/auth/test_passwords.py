@@ -7,7 +7,7 @@ import pytest
 from server.auth import passwords
 from server.auth.passwords import MAX_LENGTH, hash_password, verify_password
 from server.auth.throttle import MAX_PER_ACCOUNT, MAX_PER_ADDRESS, MAX_PER_PAIR, WINDOW_S, Throttle
-from server.problems import Problem
+from server.http.problems import Problem
 from tests.server.clinic import PASSWORD, password_hash
 
 

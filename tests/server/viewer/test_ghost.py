@@ -14,8 +14,8 @@ from core.body.poses import Poses
 from core.frames import SIDES, Side
 from server.viewer.colours import GHOST, linear
 from server.viewer.figure import Figure
-from server.viewer.ghost import Ghost, ghost_of, heading
-from server.viewer.motion import Motion, prepare
+from server.viewer.ghost import ghost_of, heading
+from server.viewer.motion import Ghost, Motion, prepare
 from tests.server import walk
 
 TURN = np.radians(70.0)

@@ -18,12 +18,9 @@ from sqlalchemy import Connection
 from sqlalchemy.exc import SQLAlchemyError
 
 from core.errors import SagittalError
-from server.jobs.lifeline import when_parent_ends
-from server.jobs.messages import Failure, Input, Order, Ready, Result, Stage
 from server.jobs.queue import Claim, Hold, JobQueue
-from server.jobs.runner import Child, ChildDiedError
 from server.jobs.table import TableQueue
-from server.jobs.task import TASKS, Task, load
+from server.processes.lifeline import when_parent_ends
 from server.services import erasure
 from server.services.sweep import sweep
 from server.settings import Settings, load_settings
@@ -31,8 +28,11 @@ from server.storage.blobs import Blob, BlobStore
 from server.storage.db import Database
 from server.storage.migrate import require_current
 from server.storage.tables import new_id
+from server.worker.messages import Failure, Input, Order, Ready, Result, Stage
+from server.worker.runner import Child, ChildDiedError
+from server.worker.task import TASKS, Task, load
 
-log = logging.getLogger("server.jobs.worker")
+log = logging.getLogger("server.worker.worker")
 
 IDLE_S = 0.2
 """Pause between two looks for work; a look is one read of an index."""

@@ -12,17 +12,18 @@ from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, WebSocket
+from starlette.status import WS_1008_POLICY_VIOLATION
 from starlette.websockets import WebSocketDisconnect
 
 from core.errors import SagittalError
-from server.api.context import Id
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.auth.sessions import CHECK_EVERY_S
+from server.context import Id
 from server.live.hub import Hub
 from server.live.room import Viewer
 from server.services import sessions
-from server.viewer.pipe import CHECK_EVERY_S, POLICY_VIOLATION
 
 router = APIRouter(include_in_schema=False)
 
@@ -60,7 +61,7 @@ async def feed(ws: WebSocket, sid: Id, who: Annotated[Identity, require(Action.R
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             if tasks[2].done():
                 with contextlib.suppress(RuntimeError, WebSocketDisconnect):
-                    await ws.close(POLICY_VIOLATION, "not_signed_in")
+                    await ws.close(WS_1008_POLICY_VIOLATION, "not_signed_in")
         finally:
             for task in tasks:
                 task.cancel()

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from sqlalchemy import Connection
 
 from server.jobs.queue import Claim
-from server.jobs.task import Progress, Task, register
 from server.services import analyses, recordings
 from server.storage.blobs import Blob
+from server.worker.task import Progress, Task, register
 
 if TYPE_CHECKING:
     from core.formats.source import SourceFile

@@ -1,6 +1,6 @@
 """The computing process: warm, killable, limited in memory, without a connection to the database.
 
-Started by server/jobs/runner.py as `python -m server.jobs.child <socket> <parent pid>`.
+Started by server/worker/runner.py as `python -m server.worker.child <socket> <parent pid>`.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from multiprocessing.connection import Connection
 
 from core.errors import SagittalError
 from core.formats.source import SourceFile
-from server.jobs.lifeline import die_with, when_parent_ends
-from server.jobs.messages import Failure, Input, Order, Ready, Result, Stage, decode_order, encode
-from server.jobs.task import TASKS, load
+from server.processes.lifeline import die_with, when_parent_ends
 from server.settings import load_settings
 from server.storage.blobs import BlobStore
+from server.worker.messages import Failure, Input, Order, Ready, Result, Stage, decode_order, encode
+from server.worker.task import TASKS, load
 
-log = logging.getLogger("server.jobs.child")
+log = logging.getLogger("server.worker.child")
 
 
 def main() -> None:

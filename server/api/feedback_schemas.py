@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints
 
-from server.schemas import HexId, Request, Response, Side
+from server.api.schemas import HexId, Request, Response, Side
 
 # limits of the numbers are those of core.feedback.Prescription, whose sentences say what was expected
 Number = Annotated[float, Field(allow_inf_nan=False)]

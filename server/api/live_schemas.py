@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints
 
-from server.schemas import HexId, Request, Response
+from server.api.schemas import HexId, Request, Response
 
 
 class OpenedTake(Response):

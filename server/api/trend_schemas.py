@@ -6,7 +6,7 @@ import datetime as dt
 from typing import Any, Literal
 
 from core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
-from server.schemas import Response
+from server.api.schemas import Response
 
 
 class Condition(Response):

@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 
-from server.jobs.runner import environment
+from server.processes.environment import make_environment
 from server.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -63,8 +63,8 @@ class Workers:
         return len(self.pids) == self._settings.workers
 
     def _spawn(self) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "server.jobs.worker"]
-        env = environment(self._settings)
+        command = [sys.executable, "-m", "server.worker.worker"]
+        env = make_environment(self._settings)
         return subprocess.Popen(command, env=env, stdin=subprocess.PIPE)  # noqa: S603 - our own module
 
     def _watch(self) -> None:

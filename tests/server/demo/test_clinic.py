@@ -7,8 +7,8 @@ import pytest
 
 from core.condition import is_comparable
 from core.pipeline import analyse
+from server.demo.clinic import STROKE, VISITS, VOLUNTEER, fill, record
 from server.services import patients, prescriptions, sessions
-from server.services.demo_clinic import STROKE, VISITS, VOLUNTEER, fill, record
 from server.settings import Settings
 from server.storage.db import Database
 from server.storage.migrate import upgrade

@@ -8,11 +8,11 @@ import pytest
 import websockets
 from starlette.types import Receive, Scope, Send
 
-from server.auth.csrf import CrossSiteGuard
-from server.auth.headers import SecurityHeaders
-from server.auth.hosts import HostGuard
 from server.auth.roles import PUBLIC
 from server.auth.routes import declared_actions
+from server.http.cross_site import CrossSiteGuard
+from server.http.headers import SecurityHeaders
+from server.http.hosts import HostGuard
 from tests.server.clinic import Clinic
 from tests.server.serving import serve
 

@@ -14,11 +14,11 @@ from math import pi
 from typing import TYPE_CHECKING, Any, Final
 
 from core.condition import USUAL
+from server.demo.clinic import STROKE
 from server.live.client import stream
 from server.live.pairing import pair
 from server.live.playback import Due, cut, hello_of, paced
 from server.services import live, patients, sessions
-from server.services.demo_clinic import STROKE
 from server.settings import Settings, load_settings
 from server.storage.db import Database
 from server.storage.tables import now

@@ -112,7 +112,7 @@ PRESCRIBED: tuple[Person, Mapping[str, object]] = (
         "schedule": {"kind": "fading", "strides_per_share": 60, "probe_every": 30, "probe_strides": 6},
     },
 )
-"""Who is trained in live walks, and how: longer strides (server/services/demo_live.py)."""
+"""Who is trained in live walks, and how: longer strides (server/demo/live.py)."""
 
 
 def record(visit: Visit) -> Simulation:

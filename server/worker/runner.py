@@ -7,29 +7,14 @@ import socket
 import subprocess
 import sys
 from multiprocessing.connection import Connection
-from pathlib import Path
 
-import server
-from server.compile_cache import share_compile_cache
-from server.jobs.messages import Order, Reply, decode_reply, encode
+from server.processes.environment import make_environment
 from server.settings import Settings
-
-ONE_THREAD = dict.fromkeys(
-    ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
-)
-"""One job computes on one core: same numbers every time, and the web process keeps the other."""
+from server.worker.messages import Order, Reply, decode_reply, encode
 
 
 class ChildDiedError(Exception):
     """The child is gone without an answer."""
-
-
-def environment(settings: Settings) -> dict[str, str]:
-    """What a process of ours inherits: settings, the path to our code, one thread, a lasting kernel cache."""
-    root = str(Path(server.__file__).parent.parent)
-    path = os.pathsep.join(p for p in (root, os.environ.get("PYTHONPATH")) if p)
-    share_compile_cache(settings.cache)
-    return {**os.environ, **settings.environment(), **ONE_THREAD, "PYTHONPATH": path}
 
 
 class Child:
@@ -39,8 +24,8 @@ class Child:
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
-                [sys.executable, "-m", "server.jobs.child", str(theirs.fileno()), str(os.getpid())],
-                env=environment(settings),
+                [sys.executable, "-m", "server.worker.child", str(theirs.fileno()), str(os.getpid())],
+                env=make_environment(settings),
                 stdin=subprocess.PIPE,
                 pass_fds=[theirs.fileno()],
             )

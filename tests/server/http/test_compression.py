@@ -13,7 +13,7 @@ import httpx
 import pytest
 from starlette.types import Receive, Scope, Send
 
-from server.compression import LONG_BYTES, Compression, accepts_gzip
+from server.http.compression import LONG_BYTES, Compression, accepts_gzip
 from server.services import analyses, patients, recordings, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic, open_clinic

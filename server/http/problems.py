@@ -23,7 +23,7 @@ from starlette.websockets import WebSocket, WebSocketState
 
 import web
 from core.errors import SagittalError
-from server.auth.headers import add_security_headers
+from server.http.headers import add_security_headers
 from server.storage.refusal import refusal_of
 
 log = logging.getLogger(__name__)

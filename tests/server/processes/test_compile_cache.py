@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from server.compile_cache import (
+from server.processes.compile_cache import (
     KEEP_S,
     find_compile_cache,
     fingerprint_filters,
     share_compile_cache,
 )
-from server.jobs.runner import environment
+from server.processes.environment import make_environment
 from server.settings import Settings
 from tests.data import ROOT
 
@@ -36,8 +36,8 @@ def _newcomer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def test_two_data_folders_share_what_has_been_compiled(tmp_path: Path) -> None:
-    first = environment(Settings(data_dir=tmp_path / "one"))["NUMBA_CACHE_DIR"]
-    second = environment(Settings(data_dir=tmp_path / "two"))["NUMBA_CACHE_DIR"]
+    first = make_environment(Settings(data_dir=tmp_path / "one"))["NUMBA_CACHE_DIR"]
+    second = make_environment(Settings(data_dir=tmp_path / "two"))["NUMBA_CACHE_DIR"]
     assert first == second
     assert Path(first).parent == tmp_path / "caches" / "sagittal"
 
@@ -50,7 +50,7 @@ def test_a_second_process_compiles_nothing_again(tmp_path: Path) -> None:
     )
     said = []
     for name in ("one", "two"):
-        env = {**environment(Settings(data_dir=tmp_path / name)), "PYTHONPATH": str(ROOT)}
+        env = {**make_environment(Settings(data_dir=tmp_path / name)), "PYTHONPATH": str(ROOT)}
         done = subprocess.run(
             [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True
         )

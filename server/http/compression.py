@@ -6,7 +6,7 @@ Not compressed are event streams (an event must not wait for the next), files to
 Compression lets somebody who listens to the encrypted line, and makes a browser ask again and again with
 guesses of his own in the address, find out what else the page says, from its length alone (BREACH). For this
 the requests must start on a page of his: browsers mark those as cross-site, and they get no compression. No
-page carries a token against forgery (auth/csrf.py goes by the same marks), and the cookie is in no page.
+page carries a token against forgery (cross_site.py goes by the same marks), and the cookie is in no page.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, Final
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.auth.csrf import is_cross_site
+from server.http.cross_site import is_cross_site
 
 LEVEL: Final = 5
 """A session page of 144 kB: 29 kB in 2.4 ms; level 9 takes twice as long for 28, level 1 half for 36."""

@@ -8,9 +8,9 @@ import pytest
 
 from core.condition import USUAL
 from core.feedback import Cue
+from server.demo.clinic import PRESCRIBED
+from server.demo.live import open_take, training, walk
 from server.services import live, patients, prescriptions, sessions
-from server.services.demo_clinic import PRESCRIBED
-from server.services.demo_live import open_take, training, walk
 from server.storage.blobs import BlobStore
 from server.storage.tables import session
 from tests.server.clinic import open_clinic

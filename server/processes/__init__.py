@@ -1,0 +1,1 @@
+"""Starting our own processes, talking to them and ending them."""

@@ -1,0 +1,23 @@
+"""What every process of ours inherits from the one that starts it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import server
+from server.processes.compile_cache import share_compile_cache
+from server.settings import Settings
+
+ONE_THREAD = dict.fromkeys(
+    ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
+"""One job computes on one core: same numbers every time, and the web process keeps the other."""
+
+
+def make_environment(settings: Settings) -> dict[str, str]:
+    """Return the environment of a child process: settings, path to our code, one thread, kernel cache."""
+    root = str(Path(server.__file__).parent.parent)
+    path = os.pathsep.join(p for p in (root, os.environ.get("PYTHONPATH")) if p)
+    share_compile_cache(settings.cache)
+    return {**os.environ, **settings.environment(), **ONE_THREAD, "PYTHONPATH": path}
