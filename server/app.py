@@ -18,7 +18,6 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 import web
-from server import capture_pages, live_pages, number_pages, pages, prescription_pages, visit_pages
 from server.api import (
     analyses,
     audit_log,
@@ -27,6 +26,7 @@ from server.api import (
     health,
     jobs,
     live,
+    live_feed,
     patients,
     prescriptions,
     programmes,
@@ -37,7 +37,6 @@ from server.api import (
     trends,
     users,
 )
-from server.api import live_feed as live_feed
 from server.api.documents import openapi
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -55,6 +54,7 @@ from server.jobs.feed import JobFeed
 from server.jobs.table import TableQueue
 from server.live import tablet
 from server.live.hub import Hub
+from server.pages import routes as pages
 from server.services import custody, erasure
 from server.services.custody import refuse_strangers
 from server.services.provenance import CODE_VERSION
@@ -148,12 +148,7 @@ def create_app(settings: Settings) -> FastAPI:
         api,
         sign_in.address_router,
         health.router,
-        pages.router,
-        visit_pages.router,
-        number_pages.router,
-        prescription_pages.router,
-        capture_pages.router,
-        live_pages.router,
+        *pages.ROUTERS,
         live_feed.router,
         proxy.router,
         live_proxy.router,

@@ -64,7 +64,9 @@ OpenTrail = Annotated[Trail, Depends(_trail)]
 OpenLogins = Annotated[Logins, Depends(_logins)]
 Failures = Annotated[Throttle, Depends(_throttle)]
 
-Id = Annotated[str, Path(pattern=r"^[0-9a-f]{32}$", description="32 hex digits")]
+HEX_ID = r"^[0-9a-f]{32}$"
+"""How an identifier looks."""
+Id = Annotated[str, Path(pattern=HEX_ID, description="32 hex digits")]
 
 
 def address_of(connection: HTTPConnection) -> str:

@@ -125,7 +125,11 @@ def test_import_contracts_hold_and_a_planted_violation_breaks_them(tmp_path: Pat
     assert clean.returncode == 0, clean.stdout
     errors = tmp_path / "core" / "errors.py"
     errors.write_text(errors.read_text("utf-8") + "\nimport core.angles\nimport server.settings\n")
+    tables = tmp_path / "server" / "storage" / "tables.py"
+    tables.write_text(tables.read_text("utf-8") + "\nimport server.pages.shell\n")
     broken = linted(tmp_path)
     assert broken.returncode == 1
     assert "core: data walks in one direction BROKEN" in broken.stdout
     assert "core knows nothing of server, web and the world outside BROKEN" in broken.stdout
+    assert "server: a room uses the rooms below it BROKEN" in broken.stdout
+    assert "server: no circle of modules BROKEN" in broken.stdout

@@ -6,7 +6,6 @@ import logging
 import sqlite3
 from collections.abc import Mapping
 from http import HTTPStatus
-from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
@@ -17,18 +16,16 @@ from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException as AnyHttpException
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
-from starlette.templating import Jinja2Templates
 from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketState
 
-import web
 from core.errors import SagittalError
 from server.http.headers import add_security_headers
+from server.http.templates import TEMPLATES
 from server.storage.refusal import refusal_of
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
-TEMPLATES = Jinja2Templates(Path(web.__file__).parent / "templates")
 
 
 # all other exceptions go on to the server, which logs them

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, func, select
 
 from server import audit
 from server.jobs.queue import VIEW_COLUMNS, JobQueue, JobView, job_view
@@ -38,6 +38,11 @@ def active(c: Connection) -> list[ListedJob]:
     return [
         _listed(row) for row in c.execute(query.order_by((job.c.state == "running").desc(), job.c.seq.desc()))
     ]
+
+
+def count_active(c: Connection) -> int:
+    """How many jobs wait or run."""
+    return c.execute(select(func.count()).select_from(job).where(job.c.state.in_(ACTIVE_STATES))).scalar_one()
 
 
 def of_session(c: Connection, session_id: str, *, kind: str | None = None) -> list[JobView]:

@@ -96,6 +96,11 @@ def get(c: Connection, patient_id: str) -> Patient:
     return Patient(**row._asdict())
 
 
+def count(c: Connection) -> int:
+    """How many patients there are."""
+    return c.execute(select(func.count()).select_from(patient)).scalar_one()
+
+
 def listing(c: Connection, *, search: str = "", limit: int = 200, offset: int = 0) -> list[Patient]:
     """Patients whose code or note contains `search` (any case), the latest visit first."""
     query = _listing().order_by(_LAST_VISIT.desc().nulls_last(), patient.c.created_at.desc(), patient.c.id)
@@ -116,7 +121,7 @@ _LAST_VISIT = (
 
 
 def _listing() -> Any:
-    count = (
+    visits = (
         select(func.count())
         .select_from(session)
         .where(session.c.patient_id == patient.c.id)
@@ -131,7 +136,9 @@ def _listing() -> Any:
         .correlate(patient)
         .exists()
     )
-    return select(patient, count.label("sessions"), _LAST_VISIT.label("last_visit"), running.label("running"))
+    return select(
+        patient, visits.label("sessions"), _LAST_VISIT.label("last_visit"), running.label("running")
+    )
 
 
 def _checked(values: Mapping[str, object]) -> dict[str, Any]:

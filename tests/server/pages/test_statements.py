@@ -11,8 +11,8 @@ from fastapi.routing import APIRoute
 from sqlalchemy import insert, select
 
 from core.feedback import Baseline, Cue
-from server import capture_pages, live_pages, number_pages, pages, prescription_pages, visit_pages
-from server.pages import FRAGMENT
+from server.pages.routes import ROUTERS
+from server.pages.timeline import FRAGMENT
 from server.services import live, prescriptions, programmes, sessions
 from server.storage.tables import analysis, live_take, new_id, recording
 from tests.server import analysed, crowd
@@ -24,8 +24,7 @@ MOST = 20
 MANY = 30
 """Of everything that a page of the full clinic lists or looks through."""
 
-ROUTERS = (pages, visit_pages, number_pages, prescription_pages, capture_pages, live_pages)
-PAGES = sorted(r.path for part in ROUTERS for r in part.router.routes if isinstance(r, APIRoute))
+PAGES = sorted(r.path for router in ROUTERS for r in router.routes if isinstance(r, APIRoute))
 QUERIES = {"/patients/{pid}/compare": "?visit={sid}&visit={other}"}
 ANSWERS = {
     "/": 303,

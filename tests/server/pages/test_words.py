@@ -8,7 +8,7 @@ import re
 import pytest
 
 from core.pipeline import STAGES
-from server.session_views import STAGE_NAMES
+from server.pages.session_context import STAGE_NAMES
 from web.words import day, filesize, moment, number, pattern, seconds
 
 

@@ -5,20 +5,13 @@ from __future__ import annotations
 from fastapi import Request
 from starlette.responses import Response
 
-from core.body.model import NOMINAL_HEIGHT_M
-from core.condition import CHOICES
-from server import page_views
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.http.problems import TEMPLATES
+from server.http.templates import TEMPLATES
+from server.services import jobs
 from server.services.provenance import CODE_VERSION
 from server.storage.db import Database
 from server.trail import Trail
-from web.words import FILTERS
-
-TEMPLATES.env.filters.update(FILTERS)
-TEMPLATES.env.globals["conditions"] = CHOICES
-TEMPLATES.env.globals["ASSUMED_HEIGHT"] = f"{NOMINAL_HEIGHT_M:.2f} m"
 
 NAVIGATION = (
     ("patients", "people", "Patients", "/patients", Action.READ_PATIENT),
@@ -29,24 +22,24 @@ NAVIGATION = (
 """Rail entries: page, icon, word, address, and what one must be allowed to do to see it."""
 
 
-def opened(request: Request, who: Identity, resource: str, resource_id: str) -> None:
+def record_opening(request: Request, who: Identity, resource: str, resource_id: str) -> None:
     """Write down that somebody looked at it."""
     trail: Trail = request.app.state.trail
     trail.opened(who, f"{resource}.opened", resource, resource_id)
 
 
-def listed(request: Request, who: Identity, resource: str) -> None:
+def record_listing(request: Request, who: Identity, resource: str) -> None:
     """Write down that somebody looks at the list of all."""
     trail: Trail = request.app.state.trail
     trail.watched(who, f"{resource}.listed", resource, None)
 
 
-def page(
+def render_page(
     request: Request, db: Database, who: Identity, template: str, here: str, **context: object
 ) -> Response:
     """Render a page; `here` = its entry in the navigation."""
     with db.read() as c:
-        running = page_views.running_jobs(c)
+        running = jobs.count_active(c)
     shell = {
         "nav": NAVIGATION,
         "here": here,

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from server.pages.upload import fits_movement, view_inspection
 from server.services.recordings import Recording
-from server.upload_views import agrees, found_view
 
 NOW = dt.datetime(2026, 11, 18, tzinfo=dt.UTC)
 
@@ -52,13 +52,13 @@ def chosen(view: Mapping[str, Any]) -> dict[str, str | None]:
 
 
 def test_a_leg_without_a_known_side_is_tried_and_asked_for() -> None:
-    view = found_view(recording(WALKER), {})
+    view = view_inspection(recording(WALKER), {})
     assert chosen(view) == {"P": "pelvis", "A": "foot_l", "B": "foot_r", "C": "shank_l"}
     assert view["ask_sides"]
 
 
 def test_an_earlier_visit_that_fits_the_movement_is_taken_over_without_a_question() -> None:
-    view = found_view(recording(WALKER), RIGHT_WAY)
+    view = view_inspection(recording(WALKER), RIGHT_WAY)
     assert chosen(view) == RIGHT_WAY
     assert not view["ask_sides"]
 
@@ -74,20 +74,20 @@ def test_an_earlier_visit_that_fits_the_movement_is_taken_over_without_a_questio
     ],
 )
 def test_an_earlier_visit_that_contradicts_the_movement_is_not(earlier: dict[str, str | None]) -> None:
-    assert not agrees(WALKER, earlier)
-    assert found_view(recording(WALKER), earlier)["ask_sides"]
+    assert not fits_movement(WALKER, earlier)
+    assert view_inspection(recording(WALKER), earlier)["ask_sides"]
 
 
 def test_what_a_person_has_set_goes_before_everything() -> None:
     manifest = {"sensors": {"A": "foot_l", "B": None}}
-    view = found_view(recording(WALKER, manifest), RIGHT_WAY)
+    view = view_inspection(recording(WALKER, manifest), RIGHT_WAY)
     assert chosen(view)["A"] == "foot_l"
     assert chosen(view)["B"] is None
 
 
 def test_copies_are_said_in_one_sentence_and_not_used() -> None:
     devices = [*WALKER, device("A2", duplicate_of="A"), device("B2", duplicate_of="B")]
-    view = found_view(recording(devices), {})
+    view = view_inspection(recording(devices), {})
     assert chosen(view)["A2"] is None
     (notice,) = view["notices"]
     assert notice["title"] == "2 sensors are copies of others"
@@ -103,7 +103,7 @@ def test_grave_notices_come_first_and_only_once() -> None:
         device("A", notices=[notice("some_info", "info"), notice("units", "warning")]),
         device("B", has_gyro=False, notices=[notice("units", "warning"), notice("no_gyro", "error")]),
     ]
-    view = found_view(recording(noisy), {})
+    view = view_inspection(recording(noisy), {})
     assert [n["kind"] for n in view["notices"]] == ["bad", "warn", ""]
     assert [s["state"]["kind"] for s in view["sensors"]] == ["warn", "bad"]
 
@@ -119,6 +119,6 @@ def test_files_that_were_not_used_are_one_list_beside_the_notices() -> None:
         about("file_not_read", "angles.csv", "warning"),
         about("gap", "pelvis", "warning"),
     ]
-    view = found_view(replace(found, inspection={**found.inspection, "notices": notices}), {})
+    view = view_inspection(replace(found, inspection={**found.inspection, "notices": notices}), {})
     assert view["unused"] == ["README.md …", "angles.csv …"]
     assert [n["message"] for n in view["notices"]] == ["pelvis …"]

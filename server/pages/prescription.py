@@ -1,16 +1,28 @@
-"""What the pages show of feedback prescriptions: the card of a patient, and the form."""
+"""The page on which feedback is prescribed, and the card of a patient."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+from starlette.responses import Response
 
 from core.feedback import PARAMETERS, Prescription
 from core.frames import Side
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db, Id
+from server.pages.shell import record_opening, render_page
 from server.report.feedback_words import prescription_words, title
 from server.report.wording import TERMS
+from server.services import patients, prescriptions
 from server.services.prescriptions import Written
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 FIRST: Final = "step_length_m"
 """Trained unless something else is chosen: the length of steps is what most studies train."""
@@ -23,6 +35,7 @@ MODES: Final = (
     ("tone", "Tone", "outside the zone, louder and higher with the error"),
     ("tick", "Tick", "at every contact of the foot"),
 )
+
 SOURCES: Final = (
     ("norm", "Norm", "healthy people at this person's speed"),
     ("own_better_side", "Own better side", "the other side in the last walk"),
@@ -32,7 +45,7 @@ SOURCES: Final = (
 
 
 @dataclass(frozen=True)
-class Card:
+class PrescriptionCard:
     """The prescription in force, in words, and the ones that ended, newest first."""
 
     now: Written | None
@@ -41,20 +54,8 @@ class Card:
     ended: tuple[tuple[str, Written], ...]
 
 
-def card(written: Sequence[Written]) -> Card:
-    """The card of a patient's page."""
-    now = next((w for w in written if w.ended_at is None), None)
-    lines = () if now is None else tuple(x for x in prescription_words(now.content) if x[0] in ON_CARD)
-    return Card(
-        now,
-        "" if now is None else title(now.content),
-        lines,
-        tuple((title(w.content), w) for w in written if w.ended_at is not None),
-    )
-
-
 @dataclass(frozen=True)
-class Choice:
+class TrainableParameter:
     """A parameter that can be trained."""
 
     name: str
@@ -63,16 +64,46 @@ class Choice:
     digits: int
 
 
-def choices() -> list[tuple[str, list[Choice]]]:
+@router.get("/patients/{pid}/prescription")
+def show_prescription(
+    request: Request, db: Db, pid: Id, who: Annotated[Identity, require(Action.RUN_LIVE)]
+) -> Response:
+    """Write a prescription, filled with the one in force."""
+    with db.read() as c:
+        patient = patients.get(c, pid)
+        now = prescriptions.in_force(c, pid)
+    record_opening(request, who, "patient", pid)
+    return render_page(
+        request, db, who, "prescription.html", "patients",
+        patient=patient, now=now, f=fill_form(now, patient.affected_side),
+        groups=list_trainable(), modes=MODES, sources=SOURCES,
+    )  # fmt: skip
+
+
+def make_card(written: Sequence[Written]) -> PrescriptionCard:
+    """The card of a patient's page."""
+    now = next((w for w in written if w.ended_at is None), None)
+    lines = () if now is None else tuple(x for x in prescription_words(now.content) if x[0] in ON_CARD)
+    return PrescriptionCard(
+        now,
+        "" if now is None else title(now.content),
+        lines,
+        tuple((title(w.content), w) for w in written if w.ended_at is not None),
+    )
+
+
+def list_trainable() -> list[tuple[str, list[TrainableParameter]]]:
     """What can be trained under the headings of the parameter table."""
-    groups: dict[str, list[Choice]] = {}
+    groups: dict[str, list[TrainableParameter]] = {}
     for name, term in TERMS.items():
         if name in PARAMETERS:
-            groups.setdefault(term.group, []).append(Choice(name, term.label, term.unit, term.digits))
+            groups.setdefault(term.group, []).append(
+                TrainableParameter(name, term.label, term.unit, term.digits)
+            )
     return list(groups.items())
 
 
-def starting_point(now: Written | None, affected: Side | None) -> Prescription:
+def fill_form(now: Written | None, affected: Side | None) -> Prescription:
     """What the form is filled with: the prescription in force, else the defaults for this person."""
     if now is not None:
         return now.content

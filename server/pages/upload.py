@@ -1,21 +1,32 @@
-"""What the upload page shows: the files, what was found in them, which sensor is probably where."""
+"""The upload page: the files, what was found in them, which sensor is probably where."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Annotated, Any, Final
 from urllib.parse import quote
 
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
+from starlette.responses import Response
 
 from core.frames import SEGMENTS
-from server.page_views import SEGMENT_NAMES, job_dict
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db, Id
+from server.pages.job_views import view_job
+from server.pages.shell import record_opening, render_page
+from server.pages.words import SEGMENT_NAMES
 from server.report.bundle import ABOUT_FILES
-from server.services import histories
+from server.services import histories, patients, recordings, sessions
 from server.services.patients import Patient
 from server.services.recordings import Recording
 from server.services.sessions import Session
 from web.words import number, seconds
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 SEGMENT_CHOICES: Final = (("", "Not used"), *((s, SEGMENT_NAMES[s]) for s in SEGMENTS))
 
@@ -24,6 +35,7 @@ CLOCK_WORDS: Final = {
     "device": "each sensor's own clock",
     "index": "row number",
 }
+
 BASIS_WORDS: Final = {
     "manifest": "As set before. Change what is not right.",
     "remembered": "As at this patient's last visit with these sensors. Check it.",
@@ -31,6 +43,7 @@ BASIS_WORDS: Final = {
     "label": "Guessed from the names. Change what is not right.",
     "movement": "Guessed from how each sensor moves.",
 }
+
 KINDS: Final = {"error": "bad", "warning": "warn", "info": ""}
 """Severity of a notice → its look."""
 
@@ -48,7 +61,20 @@ GONIOMETER: Final = (
 DUPLICATE: Final = "duplicate_stream"
 
 
-def upload_view(c: Connection, this: Recording | None, s: Session, p: Patient) -> dict[str, Any]:
+@router.get("/sessions/{sid}/upload")
+def show_upload(
+    request: Request, db: Db, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+) -> Response:
+    """Upload files, see what was found in them, say which sensor is where."""
+    with db.read() as c:
+        session = sessions.get(c, sid)
+        patient = patients.get(c, session.patient_id)
+        view = view_upload(c, recordings.current(c, sid), session, patient)
+    record_opening(request, who, "session", sid)
+    return render_page(request, db, who, "upload.html", "patients", session=session, patient=patient, **view)
+
+
+def view_upload(c: Connection, this: Recording | None, s: Session, p: Patient) -> dict[str, Any]:
     """Files of the session, the waiting inspection, what was found."""
     files = [
         {"name": f.name, "size": f.size, "href": f"/api/v1/sessions/{s.id}/files/{quote(f.name)}"}
@@ -64,11 +90,11 @@ def upload_view(c: Connection, this: Recording | None, s: Session, p: Patient) -
         problem = {"title": "These files could not be read", "message": look.error_message}
     return {
         "files": files,
-        "inspect_job": job_dict(look) if look is not None and waiting else None,
+        "inspect_job": view_job(look) if look is not None and waiting else None,
         "problem": problem,
         "found": None
         if this is None or this.inspection is None or waiting
-        else found_view(this, remembered(c, s)),
+        else view_inspection(this, find_remembered(c, s)),
         "segments": SEGMENT_CHOICES,
         "said": _said({"subject": found.get("subject") or {}}) | _said({**manifest, "subject": measured}),
         "goniometer": GONIOMETER,
@@ -89,7 +115,7 @@ def _paths(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, obj
             yield f"{before}{key}", value
 
 
-def remembered(c: Connection, s: Session) -> Mapping[str, str | None]:
+def find_remembered(c: Connection, s: Session) -> Mapping[str, str | None]:
     """Which sensor sat where at this patient's other visits, the newest analysed one that says so."""
     for other in reversed(histories.analysed(c, s.patient_id)):
         if other.session.id == s.id:
@@ -100,7 +126,7 @@ def remembered(c: Connection, s: Session) -> Mapping[str, str | None]:
     return {}
 
 
-def agrees(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, str | None]) -> bool:
+def fits_movement(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, str | None]) -> bool:
     """Whether a remembered mapping covers these sensors and does not contradict how they move now."""
     own = {d["device_id"] for d in devices}
     worn = {device for device, segment in sensors.items() if segment}
@@ -119,7 +145,7 @@ def agrees(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, str | Non
     return all(len(found) <= 1 for found in sides.values()) and not sides[1] & sides[2]
 
 
-def found_view(this: Recording, earlier: Mapping[str, str | None]) -> dict[str, Any]:
+def view_inspection(this: Recording, earlier: Mapping[str, str | None]) -> dict[str, Any]:
     """What the inspection found: facts, sensors with their most likely segment, notices.
 
     Parameters
@@ -129,7 +155,7 @@ def found_view(this: Recording, earlier: Mapping[str, str | None]) -> dict[str, 
     found: Mapping[str, Any] = this.inspection or {}
     devices: Sequence[Mapping[str, Any]] = found["devices"]
     said: Mapping[str, str | None] = (this.manifest or {}).get("sensors") or {}
-    past = earlier if not said and agrees(devices, earlier) else {}
+    past = earlier if not said and fits_movement(devices, earlier) else {}
     chosen = {d["device_id"]: _segment(d, said, past) for d in devices}
     guessed = any(basis == "movement" for _, basis in chosen.values())
     known = {basis for segment, basis in chosen.values() if segment and basis}

@@ -1,17 +1,27 @@
-"""What the live pages start with, as plain values: scales of curves, terms, prescription."""
+"""The live pages: the screen of the therapist and that of the patient; what moves comes by the feed."""
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Annotated, Any, Final
 from urllib.parse import urlsplit
 
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
+from starlette.responses import Response
 
-from server.page_views import PROTOCOL_NAMES, SEGMENT_NAMES
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db, Id
+from server.pages.shell import record_opening, render_page
+from server.pages.words import PROTOCOL_NAMES, SEGMENT_NAMES
 from server.report.wording import TERMS, VARIABLES, ZERO_WORDS, Variable
-from server.services import prescriptions
+from server.services import patients, prescriptions, sessions
 from server.services.patients import Patient
 from server.services.sessions import Session
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 JOINTS: Final = {"hip_flexion": "Hip", "knee_flexion": "Knee", "ankle_dorsiflexion": "Ankle"}
 """Variables of the current stride → the word on the button; the sagittal plane, which live is sure of."""
@@ -28,8 +38,34 @@ UNPRESCRIBED: Final = (
 
 LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 
+Therapist = Annotated[Identity, require(Action.RUN_LIVE)]
 
-def live_view(c: Connection, session: Session, patient: Patient, *, capture: str) -> dict[str, Any]:
+
+@router.get("/sessions/{sid}/live")
+def show_live(request: Request, db: Db, sid: Id, who: Therapist) -> Response:
+    """Pair the tablet, calibrate, watch the walk and steer the feedback."""
+    with db.read() as c:
+        session = sessions.get(c, sid)
+        patient = patients.get(c, session.patient_id)
+        view = view_live(c, session, patient, capture=str(request.base_url) + "capture")
+    record_opening(request, who, "session", sid)
+    return render_page(request, db, who, "live.html", "patients", session=session, patient=patient, **view)
+
+
+@router.get("/sessions/{sid}/live/patient")
+def show_patient_screen(request: Request, db: Db, sid: Id, who: Therapist) -> Response:
+    """One target and one picture, for the person who walks."""
+    with db.read() as c:
+        session = sessions.get(c, sid)
+        patient = patients.get(c, session.patient_id)
+        view = view_patient_screen(c, session)
+    record_opening(request, who, "session", sid)
+    return render_page(
+        request, db, who, "live-patient.html", "patients", session=session, patient=patient, **view
+    )
+
+
+def view_live(c: Connection, session: Session, patient: Patient, *, capture: str) -> dict[str, Any]:
     """The therapist's page; `capture` = address of the page the tablet opens."""
     shown = [v for v in VARIABLES if v.name in JOINTS]
     return {
@@ -49,7 +85,7 @@ def live_view(c: Connection, session: Session, patient: Patient, *, capture: str
     }
 
 
-def patient_view(c: Connection, session: Session) -> dict[str, Any]:
+def view_patient_screen(c: Connection, session: Session) -> dict[str, Any]:
     """The patient's screen."""
     return {
         "live": {

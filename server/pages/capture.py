@@ -1,4 +1,4 @@
-"""The page a tablet opens to send sensors to a session: no sign-in; a short code pairs it with one take."""
+"""The page that turns a phone or tablet into the source of a live take; it is open to who has its code."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from starlette.responses import Response
 
 from server.auth.access import require
 from server.auth.roles import Action
-from server.http.problems import TEMPLATES
-from server.page_views import SEGMENT_NAMES
+from server.http.templates import TEMPLATES
+from server.pages.words import SEGMENT_NAMES
 from server.services.live import ALPHABET, CODE_LENGTH
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -19,7 +19,7 @@ PLACES = ("chest", "pelvis", "thigh_r", "thigh_l", "shank_r", "shank_l", "foot_r
 
 
 @router.get("/capture", dependencies=[require(Action.PAIR)])
-def capture(request: Request) -> Response:
+def show_capture(request: Request) -> Response:
     """Pair, place the sensors, record; knows no patient before the code is entered."""
     context = {
         "alphabet": ALPHABET,

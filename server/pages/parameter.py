@@ -8,19 +8,19 @@ from fastapi import APIRouter, Path, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from server import session_views
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Blobs, Db, Id
+from server.pages.session_context import read_context
+from server.pages.shell import record_opening, render_page
 from server.services import analyses, reports, reviews
-from server.shell import opened, page
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 @router.get("/sessions/{sid}/parameters/{name}")
-def parameter(
+def show_parameter(
     request: Request,
     db: Db,
     blobs: Blobs,
@@ -30,11 +30,11 @@ def parameter(
 ) -> Response:
     """One parameter of a session with every stride behind it."""
     with db.read() as c:
-        context = session_views.base(c, sid)
+        context = read_context(c, sid)
         found = analyses.shown(c, sid)
         edits = reviews.edits_of(c, found.id)
     number = reports.behind_number(
         blobs, found, edits, context["patient"], context["session"], name, context["controls"]
     )
-    opened(request, who, "session", sid)
-    return page(request, db, who, "parameter.html", "patients", number=number, **context)
+    record_opening(request, who, "session", sid)
+    return render_page(request, db, who, "parameter.html", "patients", number=number, **context)

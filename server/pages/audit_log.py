@@ -1,0 +1,34 @@
+"""Who opened or changed what."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse
+from starlette.responses import Response
+
+from server import audit
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db
+from server.pages.shell import render_page
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+AUDIT_ROWS = 100
+
+
+@router.get("/audit")
+def show_audit_log(
+    request: Request,
+    db: Db,
+    who: Annotated[Identity, require(Action.READ_AUDIT)],
+    before: Annotated[int | None, Query(ge=1, le=2**53)] = None,
+) -> Response:
+    """Who opened or changed what, the newest first."""
+    with db.read() as c:
+        rows = audit.entries(c, before=before, limit=AUDIT_ROWS)
+    older = rows[-1].seq if len(rows) == AUDIT_ROWS else None
+    return render_page(request, db, who, "audit.html", "audit", rows=rows, older=older)

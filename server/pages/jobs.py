@@ -1,0 +1,65 @@
+"""What is being computed, and what was."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+from sqlalchemy import Connection
+from starlette.responses import Response
+
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db
+from server.pages.job_views import follow_few, view_job
+from server.pages.shell import record_listing, render_page
+from server.services import jobs
+from web.words import seconds
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+JOBS_SHOWN: Final = 100
+
+JOB_WORDS: Final[Mapping[str, tuple[str, str]]] = {
+    "queued": ("none", "Waiting"),
+    "running": ("run", "Running"),
+    "done": ("ok", "Done"),
+    "failed": ("bad", "Failed"),
+    "cancelled": ("none", "Cancelled"),
+}
+
+KIND_WORDS: Final = {"inspect": "Reading the files", "analyse": "Analysis"}
+
+
+@router.get("/jobs")
+def show_jobs(request: Request, db: Db, who: Annotated[Identity, require(Action.READ_JOB)]) -> Response:
+    """What is being computed, and what was."""
+    with db.read() as c:
+        rows = list_jobs(c)
+    record_listing(request, who, "job")
+    return render_page(request, db, who, "jobs.html", "jobs", jobs=rows)
+
+
+def list_jobs(c: Connection) -> list[dict[str, Any]]:
+    """The newest jobs, each with its visit."""
+    rows = []
+    for listed in jobs.listing(c, limit=JOBS_SHOWN):
+        view = listed.job
+        shape, word = JOB_WORDS[view.state]
+        ended = view.started_at and view.finished_at
+        visit = {"id": listed.session_id, "code": listed.patient_code, "title": listed.session_title}
+        rows.append(
+            view_job(view)
+            | {
+                "shape": shape,
+                "word": word,
+                "what": KIND_WORDS.get(view.kind, view.kind),
+                "took": seconds((view.finished_at - view.started_at).total_seconds()) if ended else None,  # type: ignore[operator]
+                "session": visit if listed.session_id else None,
+            }
+        )
+    follow_few(rows)
+    return rows

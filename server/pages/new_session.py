@@ -1,0 +1,39 @@
+"""The form of a new visit."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+from starlette.responses import Response
+
+from core.condition import USUAL
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db, Id
+from server.pages.shell import record_opening, render_page
+from server.pages.words import PROTOCOLS
+from server.services import patients, programmes
+from server.storage.tables import now
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+
+@router.get("/patients/{pid}/sessions/new")
+def show_new_session(
+    request: Request, db: Db, pid: Id, who: Annotated[Identity, require(Action.CREATE_SESSION)]
+) -> Response:
+    """Ask for protocol, date, height and walking condition of a new visit."""
+    today = now().date()
+    with db.read() as c:
+        patient = patients.get(c, pid)
+        plans = programmes.of_patient(c, pid)
+    record_opening(request, who, "patient", pid)
+    open_visits = [v for plan in plans[:1] for v in plan.visits if v.session_id is None]
+    return render_page(
+        request, db, who, "session-new.html", "patients",
+        patient=patient, protocols=PROTOCOLS, today=today.isoformat(), open_visits=open_visits,
+        near=plans[0].near(today) if plans else None, usual=USUAL,
+    )  # fmt: skip

@@ -1,0 +1,70 @@
+"""The list of patients."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse
+from sqlalchemy import Connection
+from starlette.responses import Response
+
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Blobs, Db
+from server.pages.job_views import find_active_jobs, follow_few
+from server.pages.shell import record_listing, render_page
+from server.pages.visit_state import judge_visit
+from server.pages.words import describe_person
+from server.services import analyses, live, patients, reviews, sessions
+from server.services.patients import Patient
+from server.storage.blobs import BlobStore
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+PATIENTS_SHOWN = 200
+
+
+@router.get("/patients")
+def show_patients(
+    request: Request,
+    db: Db,
+    blobs: Blobs,
+    who: Annotated[Identity, require(Action.READ_PATIENT)],
+    q: Annotated[str, Query(max_length=200)] = "",
+) -> Response:
+    """All patients, the latest visit first."""
+    with db.read() as c:
+        found = patients.listing(c, search=q, limit=PATIENTS_SHOWN)
+        rows = list_patients(c, blobs, found, results=who.may(Action.READ_RESULT))
+        total = patients.count(c)
+    record_listing(request, who, "patient")
+    return render_page(request, db, who, "patients.html", "patients", patients=rows, query=q, total=total)
+
+
+def view_patient(p: Patient) -> dict[str, Any]:
+    """A patient with sex and age in words."""
+    return {**vars(p), "who": describe_person(p.sex, p.birth_year)}
+
+
+def list_patients(
+    c: Connection, blobs: BlobStore, found: Sequence[Patient], *, results: bool
+) -> list[dict[str, Any]]:
+    """Rows of the patients list, each with the state of its latest visit; with `results`, of its data."""
+    rows = []
+    streaming = {take.patient_id: take.session_id for take in live.streaming(c)}
+    newest = sessions.newest_of(c, [p.id for p in found])
+    running = find_active_jobs(c, lambda j: j.patient_id)
+    shown = analyses.latest_of(c, [s.id for s in newest.values()]) if results else {}
+    edits = reviews.edits_of_all(c, [a.id for a in shown.values()])
+    for p in found:
+        if p.id in newest:
+            last = judge_visit(blobs, newest[p.id], shown.get(newest[p.id].id), edits)
+        else:
+            last = {"kind": "none", "text": "No session yet"}
+        row = {"visits": p.sessions, "last": p.last_visit, "job": running.get(p.id), "status": last}
+        rows.append(view_patient(p) | row | {"live": streaming.get(p.id)})
+    follow_few([row["job"] for row in rows])
+    return rows

@@ -1,0 +1,49 @@
+"""All pages."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+
+from server.pages import (
+    account,
+    audit_log,
+    capture,
+    compare,
+    data,
+    jobs,
+    live,
+    new_session,
+    parameter,
+    patient,
+    patients,
+    prescription,
+    programme,
+    session,
+    sign_in,
+    timeline,
+    trends,
+    upload,
+    users,
+)
+
+ROUTERS: tuple[APIRouter, ...] = (
+    account.router,
+    audit_log.router,
+    capture.router,
+    compare.router,
+    data.router,
+    jobs.router,
+    live.router,
+    new_session.router,
+    parameter.router,
+    patient.router,
+    patients.router,
+    prescription.router,
+    programme.router,
+    session.router,
+    sign_in.router,
+    timeline.router,
+    trends.router,
+    upload.router,
+    users.router,
+)

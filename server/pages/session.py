@@ -1,0 +1,218 @@
+"""The report of a session: the overview, all curves, and the sheets of paper."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse, RedirectResponse
+from starlette.responses import Response
+
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Blobs, Db, Id
+from server.pages.charts import COLUMNS, KEY_HEIGHT, PAGE_HEIGHTS, PAPER_HEIGHTS, draw_chart
+from server.pages.session_context import read_context
+from server.pages.shell import record_opening, render_page
+from server.pages.words import PROTOCOL_NAMES, describe_person
+from server.report import level
+from server.report.curves import strip_svg
+from server.report.model import ReportModel
+from server.report.table import Row
+from server.services import analyses, comparisons, feedback, histories, reports, reviews
+from server.services.patients import Patient
+from server.services.sessions import Session
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from web.words import day, seconds
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+SEVERITIES: Final = ("bad", "warn", "info")
+
+NO_STRIDE_CODES: Final = ("foot_missing", "no_strides", "few_steps")
+"""Notices that explain a take without strides."""
+
+SECONDARY: Final = (
+    "Parts of stance and swing",
+    "Walking and turning",
+    "Regularity of the trunk",
+    "Support in seconds",
+)
+"""Groups for those who look closer: folded on the page, not on paper."""
+
+NOT_ON_PAPER: Final = ("swing_pct", "swing_time_s", "turning_angle_deg")
+"""What the rest of a stride leaves, and what a straight walk has none of."""
+
+SHOWN: Final = (
+    "problem",
+    "quality",
+    "kpis",
+    "strides",
+    "duration_s",
+    "norm_note",
+    "norm_source",
+    "curve_notes",
+    "used",
+    "replay",
+    "condition",
+    "profile",
+    "limits",
+)
+"""Members of ReportModel that templates use as they are."""
+
+
+@router.get("/sessions/{sid}")
+def show_overview(
+    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+) -> Response:
+    """Is the data good, how does this person walk."""
+    return _show_report(request, db, blobs, sid, who, "session.html")
+
+
+@router.get("/sessions/{sid}/kinematics")
+def show_kinematics(
+    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+) -> Response:
+    """All cycle curves with the replay."""
+    return _show_report(request, db, blobs, sid, who, "kinematics.html")
+
+
+@router.get("/sessions/{sid}/print")
+def show_print(
+    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+) -> Response:
+    """Two sheets of A4 for the browser's own print."""
+    return _show_report(request, db, blobs, sid, who, "print.html", paper=True)
+
+
+def _show_report(
+    request: Request,
+    db: Database,
+    blobs: BlobStore,
+    sid: str,
+    who: Identity,
+    template: str,
+    *,
+    paper: bool = False,
+) -> Response:
+    with db.read() as c:
+        context = read_context(c, sid)
+        patient = context["patient"]
+        done = histories.analysed(c, patient.id) if who.may(Action.READ_RESULT) else []
+        this = next((a for a in done if a.session.id == sid), None)
+        if this is not None:
+            context["before"] = comparisons.before(c, this.session, done)
+            trained = feedback.gather(c, patient, sid, done)
+    if this is None and paper:
+        return RedirectResponse(f"/sessions/{sid}", status_code=303)
+    if this is not None:
+        context["report"] = view_report(blobs, this.found, this.edits, context, paper=paper)
+        context["feedback"] = feedback.view(blobs, trained)
+    record_opening(request, who, "session", sid)
+    return render_page(request, db, who, template, "patients", **context)
+
+
+def view_report(
+    blobs: BlobStore,
+    found: analyses.Analysis,
+    edits: reviews.Edits,
+    context: Mapping[str, Any],
+    *,
+    paper: bool,
+) -> dict[str, Any]:
+    """The report of an analysis with its charts drawn, for the page or for paper."""
+    patient, session = context["patient"], context["session"]
+    bundle, model = reports.read(
+        blobs, found, edits, patient, session, context.get("before"), context["controls"]
+    )
+    last_row = len(model.panels) - COLUMNS
+    heights = PAPER_HEIGHTS if paper else PAGE_HEIGHTS
+    curves = [draw_chart(p, heights[i >= last_row], x_unit=i >= last_row) for i, p in enumerate(model.panels)]
+    used, total = sum(model.used.values()), len(model.strides)
+    return {
+        **{name: getattr(model, name) for name in SHOWN},
+        "groups": select_groups(model, paper=paper),
+        "since": None if paper else model.since,
+        "not_compared": _not_compared(session, model),
+        "more": [(name, rows) for name, rows in model.groups if name in SECONDARY],
+        "missing": [
+            (r.title, r.reason.removeprefix("not measured: "))
+            for name, rows in model.groups
+            for r in rows
+            if r.reason and name not in SECONDARY
+        ],
+        "warnings": _notices(model),
+        "curves": curves,
+        "key_curve": draw_chart(model.key_curve, KEY_HEIGHT, x_unit=True),
+        "strip": strip_svg(bundle.strides, model.duration_s) if model.strides else "",
+        "stride_words": f"{used} of {total} used",
+        "empty_reason": explain_emptiness(model),
+        "identity": _identity(patient, session, model.condition),
+        "provenance_line": f"Sagittal {found.code_version} · settings {found.config_sha256[:8]} · "
+        f"input {found.input_sha256[:8]} · {day(found.created_at)}",
+        "has_poses": "poses.parquet" in found.files,
+    }
+
+
+def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[Row, ...]]]:
+    """The parameter table; empty when not one number was found, because then one sentence says more.
+
+    On paper only what was measured has a row; `missing` says the rest in one line.
+    """
+    groups = [(name, rows) for name, rows in model.groups if name not in SECONDARY]
+    if all(row.reason for _, rows in groups for row in rows):
+        return []
+    if not paper:
+        return groups
+    # a level from the anatomical zero says more than the same one from standing
+    known = {level.from_standing(r.name) for name, rows in groups if name == level.GROUP for r in rows}
+    left_out = {*NOT_ON_PAPER, *known}
+    short = (
+        (name, tuple(r for r in rows if r.reason is None and r.name not in left_out)) for name, rows in groups
+    )
+    return [(name, rows) for name, rows in short if rows]
+
+
+def explain_emptiness(model: ReportModel) -> str:
+    """Say why an analysis has no strides to show."""
+    causes = [w.message for code in NO_STRIDE_CODES for w in model.warnings if w.code == code]
+    read = f"{seconds(model.duration_s)} of data were read, but no complete stride was seen in them."
+    asked = "Is a sensor on each foot, and is it the one the mapping says?"
+    return model.problem or " ".join([read, *(causes or [asked])])
+
+
+def _notices(model: ReportModel) -> list[dict[str, Any]]:
+    """Notices by severity; those of one kind share a box, what stopped the analysis has its own place."""
+    boxes: dict[tuple[str, str], dict[str, Any]] = {}
+    for w in sorted(model.warnings, key=lambda w: SEVERITIES.index(w.kind)):
+        if w.message == model.problem:
+            continue
+        box = boxes.setdefault((w.kind, w.code), {"kind": w.kind, "title": w.title, "messages": []})
+        if box["messages"]:
+            box["title"] = w.code.replace("_", " ").capitalize()
+        box["messages"].append(w.message)
+    return list(boxes.values())
+
+
+def _not_compared(session: Session, model: ReportModel) -> str | None:
+    """Why the table has no column of change, None where it has."""
+    if model.since is not None:
+        return None
+    if session.feedback:
+        return "Walked with feedback: shown, not compared with other visits."
+    return f"No earlier visit in this condition to compare with: {model.condition}."
+
+
+def _identity(patient: Patient, session: Session, condition: str) -> list[tuple[str, str]]:
+    height = session.height_m or patient.height_m
+    return [
+        ("Code", patient.code),
+        ("Age, sex", describe_person(patient.sex, patient.birth_year) or "not given"),
+        ("Height", f"{height:.2f} m" if height else "not given"),
+        ("Protocol", PROTOCOL_NAMES.get(session.protocol, session.protocol)),
+        ("Walked", condition),
+        ("Date", day(session.performed_on)),
+    ]

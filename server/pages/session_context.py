@@ -1,0 +1,43 @@
+"""What every page of a session needs: the visit, its patient, the newest job, the live take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from sqlalchemy import Connection
+
+from server.pages.job_views import find_newest_job, view_job
+from server.services import controls, live, patients, sessions
+
+STAGE_NAMES: Final[Mapping[str, str]] = {
+    "reading": "Read the files",
+    "timeline": "Lay all sensors on one time axis",
+    "quality": "Check the data",
+    "calibration": "Calibrate: how each sensor sits on its segment",
+    "orientation": "Find the orientation of each segment",
+    "events": "Find contacts and strides",
+    "poses": "Build the figure",
+    "angles": "Compute joint angles",
+    "parameters": "Compute parameters",
+}
+"""Stages of an analysis in order → what each does, in words; core.pipeline itself takes seconds to import."""
+
+
+def read_context(c: Connection, session_id: str) -> dict[str, Any]:
+    """Session, patient, recording and the newest job: what every page of a session needs."""
+    session = sessions.get(c, session_id)
+    patient = patients.get(c, session.patient_id)
+    job = find_newest_job(c, session_id)
+    take = live.current(c, session_id)
+    return {
+        "session": session,
+        "patient": patient,
+        "controls": controls.visits(c, patient, session),
+        "recording": session.state != "empty",
+        "job": None if job is None else view_job(job),
+        "stages": list(STAGE_NAMES.items()),
+        "live_now": take.state if take is not None and take.is_open else None,
+        "damages": live.damages(c, session_id),
+        "report": None,
+    }

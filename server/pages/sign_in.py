@@ -1,0 +1,41 @@
+"""The pages of who is not signed in yet: the door, and the first account."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse, RedirectResponse
+from starlette.responses import Response
+
+from server.auth import one_time
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.passwords import MIN_LENGTH
+from server.auth.roles import Action
+from server.context import Db
+from server.http.templates import TEMPLATES
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+
+@router.get("/")
+def go_home(who: Annotated[Identity, require(Action.READ_PATIENT)]) -> Response:
+    """Go to the patients."""
+    return RedirectResponse("/patients", status_code=303)
+
+
+@router.get("/sign-in", dependencies=[require(Action.SIGN_IN)])
+def show_sign_in(request: Request, next: Annotated[str, Query(max_length=2000)] = "/patients") -> Response:  # noqa: A002 - the name in the address
+    """Ask for name and password."""
+    local = next if next.startswith("/") and next[1:2] not in {"/", "\\"} else "/patients"
+    return TEMPLATES.TemplateResponse(request, "sign-in.html", {"next": local})
+
+
+@router.get("/set-up/{token}", dependencies=[require(Action.SET_UP)])
+def show_set_up(request: Request, db: Db, token: str) -> Response:
+    """Make the first account, from the address printed at the first start."""
+    with db.read() as c:
+        valid = one_time.is_valid(c, token, "set_up")
+    context = {"token": token, "valid": valid, "min_password": MIN_LENGTH}
+    return TEMPLATES.TemplateResponse(request, "set-up.html", context, status_code=200 if valid else 404)

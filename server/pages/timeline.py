@@ -1,0 +1,85 @@
+"""Strides, events and signals over time, to look at and to correct."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse, RedirectResponse
+from starlette.responses import Response
+
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Blobs, Db, Id, OpenTrail
+from server.http.templates import TEMPLATES
+from server.pages.charts import KEY_HEIGHT, draw_chart
+from server.pages.session import explain_emptiness, select_groups
+from server.pages.session_context import read_context
+from server.pages.shell import record_opening, render_page
+from server.services import analyses, reports, reviews, signals
+from server.storage.blobs import BlobStore
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+FRAGMENT = "x-sagittal-fragment"
+"""Header by which the page's own script asks for a part of it."""
+
+
+@router.get("/sessions/{sid}/timeline")
+def show_timeline(
+    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+) -> Response:
+    """Strides, events and signals over time, to look at and to correct."""
+    with db.read() as c:
+        context = read_context(c, sid)
+        latest = analyses.latest(c, sid)
+        edits = reviews.Edits() if latest is None else reviews.edits_of(c, latest.id)
+    if latest is not None:
+        context["numbers"] = view_numbers(blobs, latest, edits, context)
+        context["lanes"] = [vars(lane) for lane in signals.lanes(blobs, latest)]
+        context["fixed_because"] = reviews.take(blobs, latest).fixed_because
+        context["editable"] = context["fixed_because"] is None and who.may(Action.REVIEW)
+    record_opening(request, who, "session", sid)
+    return render_page(request, db, who, "timeline.html", "patients", **context)
+
+
+@router.get("/sessions/{sid}/timeline/numbers")
+def show_numbers(
+    request: Request,
+    db: Db,
+    blobs: Blobs,
+    trail: OpenTrail,
+    sid: Id,
+    who: Annotated[Identity, require(Action.READ_RESULT)],
+) -> Response:
+    """The part of the timeline page that follows an edit; asked for in another way, the page itself."""
+    if FRAGMENT not in request.headers:
+        return RedirectResponse(f"/sessions/{sid}/timeline#numbers", status_code=303)
+    with db.read() as c:
+        context = read_context(c, sid)
+        latest = analyses.shown(c, sid)
+        edits = reviews.edits_of(c, latest.id)
+    trail.watched(who, "numbers.opened", "session", sid)
+    numbers = view_numbers(blobs, latest, edits, context)
+    return TEMPLATES.TemplateResponse(request, "_numbers.html", {"numbers": numbers})
+
+
+def view_numbers(
+    blobs: BlobStore, found: analyses.Analysis, edits: reviews.Edits, context: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What of the report stands beside the timeline and changes with every edit."""
+    _, model = reports.read(
+        blobs, found, edits, context["patient"], context["session"], None, context["controls"]
+    )
+    return {
+        "groups": select_groups(model, paper=False),
+        "norm_note": model.norm_note,
+        "key_curve": draw_chart(model.key_curve, KEY_HEIGHT, x_unit=True),
+        "used": model.used,
+        "norm_source": model.norm_source,
+        "stride_words": f"{sum(model.used.values())} of {len(model.strides)} used",
+        "replay": {**model.replay, "curves": {}},
+        "empty_reason": explain_emptiness(model),
+    }

@@ -1,0 +1,180 @@
+"""Figures over the visits of a patient."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse
+from starlette.responses import Response
+
+from core.frames import Protocol
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import HEX_ID, Blobs, Db, Id
+from server.pages.shell import record_opening, render_page
+from server.report.change_words import change_words, term_of
+from server.report.notes import GROUPS
+from server.report.trend_chart import Ahead, trend_svg
+from server.report.trends import PRIMARY, Line, Trend, Visit, names_in, trends
+from server.report.wording import number
+from server.services import histories, patients
+from server.services.histories import History
+from web.words import day
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+Shown = Annotated[
+    list[Annotated[str, Query(max_length=64)]], Query(alias="show", max_length=100, default_factory=list)
+]
+
+TEASERS: Final = ("gait_speed_mps", "step_length_m", "knee_flexion_rom_deg", "stride_time_s")
+"""On the patient's page: the first of these that was measured."""
+
+
+@router.get("/patients/{pid}/trends")
+def show_trends(
+    request: Request,
+    db: Db,
+    blobs: Blobs,
+    pid: Id,
+    who: Annotated[Identity, require(Action.READ_RESULT)],
+    show: Shown,
+    protocol: Protocol | None = None,
+    like: Annotated[str | None, Query(pattern=HEX_ID)] = None,
+) -> Response:
+    """Figures over the visits of a patient."""
+    with db.read() as c:
+        patient = patients.get(c, pid)
+        done, plans = histories.read(c, patient)
+    history = histories.history(blobs, patient, done, plans, protocol, like)
+    record_opening(request, who, "patient", pid)
+    view = view_trends(history, show)
+    return render_page(request, db, who, "trends.html", "patients", patient=patient, trends=view)
+
+
+def list_ahead(history: History) -> list[Ahead]:
+    """Assessments of the newest programme that are still to come."""
+    plans = history.programmes[:1]
+    return [
+        Ahead(v.label, v.planned_on)
+        for plan in plans
+        for v in plan.visits
+        if v.kind == "assessment" and v.state in {"next", "planned"}
+    ]
+
+
+def draw_teaser(history: History) -> dict[str, Any] | None:
+    """The first figure of the trends, once there is something to compare."""
+    there = [n for n in names_in(history.visits) if n in TEASERS]
+    if len(history.visits) < 2 or not there:
+        return None
+    name = min(there, key=TEASERS.index)
+    found = trends(history.visits, [name], history.norms, history.usual, history.patient.affected_side)
+    return _shown(history, found, height=168)
+
+
+def view_trends(history: History, chosen: Sequence[str]) -> dict[str, Any]:
+    """The trends page: charts of the chosen figures, the choice, limits with sources, and the table."""
+    there = names_in(history.visits)
+    names = [n for n in there if n in chosen] or [n for n in PRIMARY if n in there]
+    found = trends(history.visits, names, history.norms, history.usual, history.patient.affected_side)
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for name in there:
+        term = term_of(name)
+        groups.setdefault(term.group, []).append(
+            {"name": name, "title": term.label, "unit": term.unit, "on": name in names}
+        )
+    return {
+        **_shown(history, found, height=196),
+        "groups": list(groups.items()),
+        "query": "&".join(f"show={name}" for name in names),
+        "condition": None if history.condition is None else history.condition.words,
+        "like": history.visits[-1].session_id if history.visits else None,
+        "others": [(o.session_id, o.condition.words, o.count) for o in history.others],
+        "visits": [_column(v) for v in history.visits],
+        "rows": [row for trend in found for row in _rows(trend, history.visits)],
+    }
+
+
+def _shown(history: History, found: Sequence[Trend], height: int) -> dict[str, Any]:
+    coming = list_ahead(history)
+    lines = [(t, line) for t in found for line in t.lines]
+    sources: dict[str, list[str]] = {}
+    for t, line in lines:
+        change = line.change
+        for sentence in () if change is None else change_words(change).limits:
+            sources.setdefault(sentence, []).append(t.term.label)
+    norms: dict[str, list[str]] = {}
+    for t in found:
+        if t.norm is not None:
+            norms.setdefault(f"{GROUPS.get(t.norm.group, t.norm.group)} ({t.norm.source})", []).append(
+                t.term.label
+            )
+    return {
+        "figures": [_figure(t, line, history.visits, coming, height) for t, line in lines],
+        "limits": [(", ".join(dict.fromkeys(labels)), s) for s, labels in sources.items()],
+        "norms": [(", ".join(labels), s) for s, labels in norms.items()],
+        "has_mdc": any(line.mdc is not None for _, line in lines),
+        "has_mcid": any(line.mcid is not None for _, line in lines),
+        "has_training": any(v.kind == "training" for v in history.visits),
+    }
+
+
+def _figure(
+    trend: Trend, line: Line, visits: Sequence[Visit], coming: Sequence[Ahead], height: int
+) -> dict[str, Any]:
+    change = line.change
+    base = None if line.base is None else visits[line.points[line.base].visit]
+    return {
+        "title": trend.term.label,
+        "unit": trend.term.unit,
+        "side": line.side,
+        "svg": trend_svg(trend, line, visits, coming, height),
+        "words": None if change is None else change_words(change),
+        "since": None if base is None else base.label or day(base.performed_on),
+        "waiting": _waiting(line),
+    }
+
+
+def _waiting(line: Line) -> str:
+    """What is said as long as there are not two assessments."""
+    return "no assessment yet" if line.base is None else "one assessment so far"
+
+
+def _column(v: Visit) -> dict[str, Any]:
+    return {
+        "href": f"/sessions/{v.session_id}",
+        "label": v.label,
+        "day": v.performed_on,
+        "training": None if v.kind == "assessment" else "with feedback" if v.feedback else "training",
+    }
+
+
+def _rows(trend: Trend, visits: Sequence[Visit]) -> list[dict[str, Any]]:
+    """A row per side: the value of every visit, then the verdict."""
+    rows = []
+    for line in trend.lines:
+        by_visit = {p.visit: p for p in line.points}
+        cells = []
+        for i in range(len(visits)):
+            p = by_visit.get(i)
+            mark = "" if p is None or p.change is None else change_words(p.change).mark
+            text = None if p is None else number(p.value, trend.term.digits)
+            cells.append({"text": text, "mark": mark})
+        change = line.change
+        rows.append(
+            {
+                "title": trend.term.label,
+                "unit": trend.term.unit,
+                "side": line.side,
+                "first": line is trend.lines[0],
+                "span": len(trend.lines),
+                "cells": cells,
+                "words": None if change is None else change_words(change),
+                "waiting": _waiting(line),
+            }
+        )
+    return rows

@@ -1,0 +1,33 @@
+"""Who may sign in, and as what."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+from starlette.responses import Response
+
+from server.auth import accounts
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.passwords import MIN_LENGTH
+from server.auth.roles import Action, Role
+from server.context import Db
+from server.pages.shell import render_page
+from server.pages.words import ROLE_WORDS
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+
+@router.get("/users")
+def show_users(request: Request, db: Db, who: Annotated[Identity, require(Action.MANAGE_USERS)]) -> Response:
+    """Who may sign in, and as what."""
+    with db.read() as c:
+        rows = accounts.everyone(c)
+    roles = [(role.value, ROLE_WORDS[role]) for role in Role]
+    options = [(role.value, role.value) for role in Role]
+    return render_page(
+        request, db, who, "users.html", "users",
+        users=rows, roles=roles, role_options=options, min_password=MIN_LENGTH,
+    )  # fmt: skip

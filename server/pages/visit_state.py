@@ -1,0 +1,41 @@
+"""What a list says of a visit: a shape and a word."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from core.errors import FormatError
+from server.services import analyses, reviews, sessions
+from server.storage.blobs import BlobStore, IntegrityError
+
+STATES: Final[Mapping[str, tuple[str, str]]] = {
+    "empty": ("none", "No recording yet"),
+    "uploaded": ("warn", "Check sensors"),
+    "running": ("run", "Analysing"),
+    "done": ("ok", "Analysed"),
+    "failed": ("bad", "Not analysable"),
+}
+"""State of a session → shape and word."""
+
+
+def describe_state(state: str) -> dict[str, str]:
+    """Shape and word of a session's state."""
+    kind, text = STATES[state]
+    return {"kind": kind, "text": text}
+
+
+def judge_visit(
+    blobs: BlobStore,
+    s: sessions.Session,
+    shown: analyses.Analysis | None,
+    edits: Mapping[str, reviews.Edits],
+) -> dict[str, str]:
+    """What a list says of a session: of one that is analysed how good its data are, as its own page does."""
+    if s.state != "done" or shown is None or "analysis.json" not in shown.files:
+        return describe_state(s.state)
+    try:
+        kind, text = reviews.verdict(blobs, shown, edits[shown.id])
+    except (IntegrityError, FormatError):  # its own page says what is wrong; the others stay in reach
+        kind, text = "bad", "Cannot be read"
+    return {"kind": kind, "text": text}
