@@ -15,7 +15,7 @@ from server import audit
 from server.auth.roles import Action
 from server.auth.routes import declared_actions
 from server.auth.tokens import token_hash
-from server.pages import FRAGMENT
+from server.pages.timeline import FRAGMENT
 from server.services import patients, sessions
 from server.storage.tables import job
 from server.trail import MOST_REFUSED, QUIET_S, Trail
