@@ -19,7 +19,7 @@ from core import angles, body, calibration, fusion, quality, timeline
 from core.angles import JointAngles
 from core.body.estimate import PoseEstimate, PoseParams, estimate_poses
 from core.body.feet import FootTracks
-from core.body.l7s import free_acceleration
+from core.body.l7s.poses import free_acceleration
 from core.body.poses import Poses
 from core.body.walking_frame import in_walking_frame
 from core.calibration import CalibrationParams

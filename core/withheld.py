@@ -43,7 +43,7 @@ OF_PATH: Final = ("zero_velocity_refused_pct",)
 """Findings of the path of a foot."""
 
 AFTER_GAP_S: Final = 10.0
-"""For so long after a loss what the model of the leg says of it is doubtful (core/body/l7s_health.py)."""
+"""For so long after a loss what the model of the leg says of it is doubtful (core/body/l7s/health.py)."""
 
 
 def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> JointAngles:

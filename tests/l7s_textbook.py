@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from core.body.l7s_filter import L7sInputs, L7sParams, L7sState, Worn, start
-from core.body.l7s_legs import LegModel
+from core.body.l7s.filter import L7sInputs, L7sParams, L7sState, Worn, start
+from core.body.l7s.legs import LegModel
 from core.frames import Floats
 
 EYE = np.eye(3)
@@ -52,7 +52,7 @@ def phi_of(xi: Floats) -> Floats:
 
 
 class Textbook:
-    """One step after the other: eq 3 to 5, 9 to 12, 28 to 31 as core/body/l7s_filter.py corrects them."""
+    """One step after the other: eq 3 to 5, 9 to 12, 28 to 31 as core/body/l7s/filter.py corrects them."""
 
     shares: ClassVar[tuple[float, float, float]] = (1.0, -0.5, -0.5)
     """Of pelvis, left and right foot in the row of the mid-pelvis (eq 18)."""

@@ -16,19 +16,20 @@ import numpy as np
 from core.body.apart import legs_apart
 from core.body.choice import WHOLE, Estimator, Requested, choose
 from core.body.corrected import corrected_signals
-from core.body.erkf import ErkfParams, erkf_inputs
-from core.body.erkf_health import erkf_health, erkf_notices
-from core.body.erkf_poses import figure, foot_tracks, refined, run_erkf
-from core.body.erkf_start import start_state
+from core.body.erkf.filter import erkf_inputs
+from core.body.erkf.headings import agreed, findings, told
+from core.body.erkf.health import erkf_health, erkf_notices
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.poses import figure, foot_tracks, refined, run_erkf
+from core.body.erkf.smoother import smooth
+from core.body.erkf.start import start_state
 from core.body.feet import FootTracks
-from core.body.headings import agreed, findings, told
 from core.body.kinematics import forward_kinematics
-from core.body.l7s import free_acceleration, l7s_poses
-from core.body.l7s_filter import L7sParams
-from core.body.l7s_health import l7s_health, l7s_notices
+from core.body.l7s.filter import L7sParams
+from core.body.l7s.health import l7s_health, l7s_notices
+from core.body.l7s.poses import free_acceleration, l7s_poses
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.poses import Poses
-from core.body.smoother import smooth
 from core.body.still import FOOT_STILL, still_samples
 from core.body.tree import PRESETS, person_tree
 from core.calibration.result import CalibratedRecording

@@ -9,7 +9,7 @@ from typing import Protocol
 import numba
 import numpy as np
 
-from core.body.erkf_params import ErkfParams
+from core.body.erkf.params import ErkfParams
 from core.body.model import BodyModel
 from core.body.tree import person_tree
 from core.calibration.result import SegmentCalibration

@@ -1,11 +1,11 @@
-"""What a lost sensor is taken to measure, sample by sample: the rules of core/body/gaps.py with a memory."""
+"""What a lost sensor is taken to measure, sample by sample: core/body/erkf/gaps.py with a memory."""
 
 from __future__ import annotations
 
 import numba
 import numpy as np
 
-from core.body.gaps import HOLD_S, POSTURE_S, carrier, guides
+from core.body.erkf.gaps import HOLD_S, POSTURE_S, carrier, guides
 from core.body.tree import ImuTree
 from core.frames import GRAVITY, Bools, Floats
 from core.rotation import conjugate, multiply, to_matrix

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from core.body import nominal_body
 from core.body.apart import legs_apart
 from core.body.choice import WHOLE, possible
-from core.body.erkf_params import ErkfParams
+from core.body.erkf.headings import agreed, told
+from core.body.erkf.params import ErkfParams
 from core.body.estimate import warm as warm_erkf
-from core.body.headings import agreed, told
 from core.body.model import BodyModel
 from core.calibration import CalibrationParams
 from core.calibration.result import CalibratedRecording

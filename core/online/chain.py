@@ -14,8 +14,8 @@ import numpy as np
 
 from core.attitude import AttitudeParams
 from core.body.choice import WHOLE, possible
-from core.body.erkf import ErkfParams
-from core.body.l7s_filter import L7sParams
+from core.body.erkf.params import ErkfParams
+from core.body.l7s.filter import L7sParams
 from core.errors import Notice
 from core.events.flags import StrideParams
 from core.events.foot_pitch import FootPitchParams

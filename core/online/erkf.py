@@ -16,11 +16,11 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.erkf import ErkfInputs, links_of, new_record, noise_of
-from core.body.erkf_kernel import CONTACT, INVALID, STILL, forward
-from core.body.erkf_params import ErkfParams
-from core.body.erkf_start import start_state
-from core.body.gaps import HOLD_S
+from core.body.erkf.filter import ErkfInputs, links_of, new_record, noise_of
+from core.body.erkf.gaps import HOLD_S
+from core.body.erkf.kernel import CONTACT, INVALID, STILL, forward
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.start import start_state
 from core.body.tree import ImuTree
 from core.frames import Bools, Floats
 from core.online.still import ROLLING_MPS
@@ -28,10 +28,10 @@ from core.rotation import exp, multiply, rotate
 
 HEADING_SD: Final = radians(2.0)
 """Of each segment's heading while standing, where forward axes were made to agree with the joints on the walk
-before (core/body/headings.py): they face ahead then, by calibration. Anything from 0.5° to 2° is alike; with
-the 30° of a start that knows nothing the filter turns them again, and the angles' zero of standing with them:
-1.4° of knee rotation on neura_walk, nothing else. The smoothed headings of the calibration walk are no better
-start."""
+before (core/body/erkf/headings.py): they face ahead then, by calibration. Anything from 0.5° to 2° is alike;
+with the 30° of a start that knows nothing the filter turns them again, and the angles' zero of standing with
+them: 1.4° of knee rotation on neura_walk, nothing else. The smoothed headings of the calibration walk are no
+better start."""
 
 
 UP: Final = np.array([0.0, 0.0, 1.0])

@@ -8,8 +8,8 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.l7s_filter import L7sInputs, L7sParams, L7sState, L7sTrack, Worn, filter_block, start
-from core.body.l7s_legs import BODIES, HIP_SIDE, LEGS, M_LEG, LegModel
+from core.body.l7s.filter import L7sInputs, L7sParams, L7sState, L7sTrack, Worn, filter_block, start
+from core.body.l7s.legs import BODIES, HIP_SIDE, LEGS, M_LEG, LegModel
 from core.body.model import BodyModel
 from core.calibration.result import SegmentCalibration
 from core.errors import EstimationError, Notice

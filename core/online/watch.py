@@ -7,7 +7,7 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.erkf_health import RESIDUAL_MM, TOLD
+from core.body.erkf.health import RESIDUAL_MM, TOLD
 from core.body.tree import ImuTree
 from core.errors import Notice
 from core.frames import Bools, Floats

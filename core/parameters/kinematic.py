@@ -67,7 +67,7 @@ AT_BOUND: Final = "at_bound"
 """Reason of a figure that is the end of what an estimator allows in most strides."""
 
 BOUND_DEG: Final = 0.2
-"""A leg at its full length leaves the knee within this of straight (core/body/l7s.py)."""
+"""A leg at its full length leaves the knee within this of straight (core/body/l7s/poses.py)."""
 
 FOOT_PITCH: Final = ("foot_pitch_ic_deg", "foot_pitch_tc_deg")
 """Sole to floor at the contacts, toes up positive, 0 at standing."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from core.body.erkf import ErkfTrack
+from core.body.erkf.filter import ErkfTrack
 from core.frames import FOOT, Floats
 from core.rotation import yaw
-from tests.core.body.erkf_walks import SEGMENTS, Take, angles_of
+from tests.core.body.erkf.walks import SEGMENTS, Take, angles_of
 
 JOINTS = {
     "hip": ("hip_flexion", "hip_adduction", "hip_rotation"),

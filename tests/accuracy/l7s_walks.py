@@ -14,8 +14,8 @@ from math import pi, radians
 import numpy as np
 
 from core.angles import joint_angles
-from core.body.l7s import free_acceleration, l7s_poses
-from core.body.l7s_filter import Adjoint, L7sParams, Worn
+from core.body.l7s.filter import Adjoint, L7sParams, Worn
+from core.body.l7s.poses import free_acceleration, l7s_poses
 from core.body.model import BodyModel
 from core.body.poses import Poses
 from core.body.still import FOOT_STILL, still_samples

@@ -14,10 +14,10 @@ import numpy as np
 from core.angles import joint_angles
 from core.body import BodyModel
 from core.body.corrected import corrected_signals
-from core.body.erkf import ErkfParams
-from core.body.erkf_poses import ErkfRun, refined, run_erkf
+from core.body.erkf.headings import agreed
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.poses import ErkfRun, refined, run_erkf
 from core.body.estimate import PoseParams
-from core.body.headings import agreed
 from core.body.tree import PRESETS
 from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording

@@ -13,16 +13,17 @@ from math import pi, radians
 
 import numpy as np
 
-from core.body.erkf import ErkfParams, filter_block
-from core.body.erkf_start import start_state
-from core.body.smoother import smooth
+from core.body.erkf.filter import filter_block
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.smoother import smooth
+from core.body.erkf.start import start_state
 from core.body.tree import ImuTree
 from core.frames import Floats
 from core.rotation import about, conjugate, exp, multiply, rotate
 from core.simulate import Arc, Pivot, Setup, SoftTissue, Stand, Straight, Walker, simulate
 from tests.accuracy.erkf_scoring import HEADER, Score, largest, score
 from tests.accuracy.report import record
-from tests.core.body.erkf_walks import SEGMENTS, Take, take_of
+from tests.core.body.erkf.walks import SEGMENTS, Take, take_of
 
 LAP = (
     Straight(12.8, 0.64, 0.54), Arc(1.5, pi, 0.52, 0.56), Straight(10.0, 0.5, 0.6), Pivot(-pi, 0.7, 0.55),

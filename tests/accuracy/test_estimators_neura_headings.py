@@ -3,7 +3,7 @@
 A sensor's start is turned about the vertical together with its forward axis, as a wrong walking direction
 would turn it. What then moves in the result is measured twice: where the sensors head relative to the
 pelvis', and how far the segments' forward axes come out from each other. Which way all of them together face
-no joint can tell (core/body/headings.py takes the median), so a turn they share is left out. Limits:
+no joint can tell (core/body/erkf/headings.py takes the median), so a turn they share is left out. Limits:
 docs/science/real-recordings.md, "Limits".
 """
 
@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.headings import turned
+from core.body.erkf.headings import turned
 from core.frames import Floats, Segment
 from core.rotation import conjugate, multiply
 from tests.accuracy.neura import (

@@ -21,10 +21,11 @@ import pytest
 
 from core import events
 from core.body import contact_mask, forward_kinematics
-from core.body.erkf import ErkfParams, filter_block
-from core.body.erkf_health import REFUSED_PCT, RESIDUAL_MM
-from core.body.erkf_start import start_state
-from core.body.headings import turned
+from core.body.erkf.filter import filter_block
+from core.body.erkf.headings import turned
+from core.body.erkf.health import REFUSED_PCT, RESIDUAL_MM
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.start import start_state
 from core.calibration import calibrate
 from core.calibration.gyro_pca import about_vertical
 from core.calibration.result import CalibratedRecording

@@ -19,9 +19,10 @@ import pytest
 from core import calibration, fusion
 from core.body import BodyModel
 from core.body.corrected import corrected_signals
-from core.body.erkf import ErkfParams, ErkfTrack, erkf_inputs, filter_block
-from core.body.erkf_poses import ErkfRun, run_erkf
-from core.body.erkf_start import start_state
+from core.body.erkf.filter import ErkfTrack, erkf_inputs, filter_block
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.poses import ErkfRun, run_erkf
+from core.body.erkf.start import start_state
 from core.body.still import FOOT_STILL, still_samples
 from core.body.tree import person_tree
 from core.calibration.result import CalibratedRecording

@@ -16,9 +16,9 @@ import pytest
 
 from core.angles import joint_angles
 from core.body import nominal_body
-from core.body.erkf import ErkfParams
-from core.body.erkf_poses import refined, run_erkf
-from core.body.headings import agreed, turned
+from core.body.erkf.headings import agreed, turned
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.poses import refined, run_erkf
 from core.body.tree import PRESETS
 from core.calibration import calibrate
 from core.frames import Segment

@@ -12,9 +12,9 @@ from typing import Final, get_args
 
 import numpy as np
 
-from core.body.l7s import inputs_of
-from core.body.l7s_filter import Adjoint, L7sParams, filter_block, start
-from core.body.l7s_legs import LegModel, solve_legs
+from core.body.l7s.filter import Adjoint, L7sParams, filter_block, start
+from core.body.l7s.legs import LegModel, solve_legs
+from core.body.l7s.poses import inputs_of
 from core.body.poses import Poses
 from core.frames import FOOT, SIDES, Floats
 from core.rotation import from_matrix
@@ -119,6 +119,6 @@ def test_write_down_the_figures() -> None:
         ["run", *(f"eq 6 {a}: hip / knee / ankle flexion RMSE °" for a in get_args(Adjoint))],
         rows,
         "L7S-3I on one simulated walk there and back of 30 s, one change at a time, offset removed. The "
-        "reasons are in core/body/l7s_filter.py. On the prototype's simulator the sign in eq 18 "
+        "reasons are in core/body/l7s/filter.py. On the prototype's simulator the sign in eq 18 "
         "cost more (16 / 16 / 13), the height's variance too (34 / 18 / 31), that in eq 32 about the same.",
     )

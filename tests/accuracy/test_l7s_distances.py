@@ -16,10 +16,10 @@ from typing import Final, get_args
 import numpy as np
 import pytest
 
-from core.body.erkf import ErkfParams
-from core.body.erkf_poses import foot_tracks, refined, run_erkf
-from core.body.l7s import free_acceleration, l7s_poses
-from core.body.l7s_filter import Worn
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.poses import foot_tracks, refined, run_erkf
+from core.body.l7s.filter import Worn
+from core.body.l7s.poses import free_acceleration, l7s_poses
 from core.body.model import BodyModel
 from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording

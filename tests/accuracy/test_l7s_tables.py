@@ -15,9 +15,9 @@ from typing import Final, get_args
 import numpy as np
 import pytest
 
-from core.body.l7s import free_acceleration, l7s_poses
-from core.body.l7s_filter import Adjoint, L7sParams, Worn
-from core.body.l7s_legs import BODIES
+from core.body.l7s.filter import Adjoint, L7sParams, Worn
+from core.body.l7s.legs import BODIES
+from core.body.l7s.poses import free_acceleration, l7s_poses
 from core.body.poses import Poses
 from core.calibration import calibrate
 from core.frames import FOOT, SHANK, SIDES, Floats, Segment, Side

@@ -2,7 +2,7 @@
 
 The mistake is made on the recording, then the product's chain runs. Vicon only tells how wrong angles are.
 With seven sensors the joints show a mistake (test_estimators_neura_wrong.py); here no joint has two sensors,
-and what shows it is how people walk (core/body/l7s_checks.py). Limits there were set on simulation and on
+and what shows it is how people walk (core/body/l7s/checks.py). Limits there were set on simulation and on
 this walk, right and with the feet exchanged.
 """
 

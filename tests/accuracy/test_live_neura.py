@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from core.body.corrected import corrected_signals
-from core.body.erkf import erkf_inputs, filter_block
-from core.body.erkf_start import start_state
+from core.body.erkf.filter import erkf_inputs, filter_block
+from core.body.erkf.start import start_state
 from core.body.tree import person_tree
 from core.events import detect
 from core.events.result import GaitEvent

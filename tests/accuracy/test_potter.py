@@ -8,8 +8,9 @@ from math import radians
 
 import numpy as np
 
-from core.body.erkf import ErkfInputs, ErkfParams, filter_block
-from core.body.erkf_start import start_state
+from core.body.erkf.filter import ErkfInputs, filter_block
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.start import start_state
 from core.body.tree import walker3
 from core.frames import SIDES, Floats
 from core.rotation import conjugate, multiply, to_matrix

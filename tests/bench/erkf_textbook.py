@@ -1,7 +1,7 @@
 """The ErKF as the paper writes it: whole matrices F, H and G, one stacked update per step, in plain numpy.
 
-The measurements, noise and rules are those of core/body/erkf.py, none of its code: what the compiled loops
-must equal and beat. Equation numbers: Potter 2021.
+The measurements, noise and rules are those of core/body/erkf/filter.py, none of its code: what the compiled
+loops must equal and beat. Equation numbers: Potter 2021.
 """
 
 from __future__ import annotations
@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import block_diag
 
-from core.body.erkf import ErkfInputs, ErkfParams, ErkfState
+from core.body.erkf.filter import ErkfInputs, ErkfState
+from core.body.erkf.params import ErkfParams
 from core.body.tree import ImuTree
 from core.frames import GRAVITY, Floats
 from core.rotation import exp, multiply, to_matrix

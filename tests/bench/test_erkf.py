@@ -15,11 +15,12 @@ from typing import Final
 import numpy as np
 import pytest
 
-from core.body.erkf import ErkfInputs, ErkfParams, ErkfTrack, filter_block
-from core.body.erkf_start import start_state
-from core.body.smoother import smooth
+from core.body.erkf.filter import ErkfInputs, ErkfTrack, filter_block
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.smoother import smooth
+from core.body.erkf.start import start_state
 from tests.bench.erkf_textbook import Textbook
-from tests.core.body.erkf_walks import mixed_walk
+from tests.core.body.erkf.walks import mixed_walk
 
 pytestmark = pytest.mark.bench
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from core import calibration
-from core.body.headings import turned
+from core.body.erkf.headings import turned
 from core.calibration import CalibrationParams, calibrate
 from core.calibration.result import CalibratedRecording
 from core.fusion import estimate

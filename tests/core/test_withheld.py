@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from core.angles import JointAngles
-from core.body.erkf_health import REFUSED_PCT
+from core.body.erkf.health import REFUSED_PCT
 from core.body.estimate import PoseEstimate
 from core.body.health import Finding, worst
 from core.events.result import Stride, Strides

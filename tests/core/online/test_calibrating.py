@@ -12,8 +12,8 @@ import pytest
 from core.body import nominal_body
 from core.body.apart import legs_apart
 from core.body.choice import WHOLE
-from core.body.erkf_params import ErkfParams
-from core.body.headings import agreed
+from core.body.erkf.headings import agreed
+from core.body.erkf.params import ErkfParams
 from core.calibration import calibrate
 from core.frames import Segment
 from core.fusion import estimate

@@ -8,8 +8,8 @@ import pytest
 
 from core.angles import joint_angles
 from core.body import BodyModel
-from core.body.gaps import bridged
-from core.body.l7s_legs import M_LEG, LegModel, solve_legs
+from core.body.erkf.gaps import bridged
+from core.body.l7s.legs import M_LEG, LegModel, solve_legs
 from core.body.still import AT_REST, FOOT_STILL, still_samples
 from core.body.tree import PRESETS, person_tree
 from core.frames import GRAVITY, Bools, Floats

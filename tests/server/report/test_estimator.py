@@ -69,7 +69,6 @@ def test_the_choice_offers_what_the_sensors_allow_and_marks_what_ran() -> None:
 
 
 def test_every_estimator_and_quantity_of_the_core_has_words() -> None:
-    from core.body import erkf_health, l7s_health  # noqa: F401 (their findings are named in QUANTITIES)
     from core.body.choice import ESTIMATORS
 
     assert set(CHOICES) == set(ESTIMATORS)

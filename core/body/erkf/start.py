@@ -17,7 +17,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.erkf import ErkfInputs, ErkfParams, ErkfState
+from core.body.erkf.filter import ErkfInputs, ErkfState
+from core.body.erkf.params import ErkfParams
 from core.body.tree import ImuTree, Joint
 from core.frames import Floats
 from core.rotation import from_matrix, rotate, to_matrix

@@ -7,15 +7,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.body.erkf import ErkfParams, filter_block
-from core.body.erkf_predict import GAMMA, A, C, D, S, back, move, propagate
-from core.body.erkf_start import start_state
-from core.body.smoother import smooth
+from core.body.erkf.filter import filter_block
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.predict import GAMMA, A, C, D, S, back, move, propagate
+from core.body.erkf.smoother import smooth
+from core.body.erkf.start import start_state
+from core.body.erkf.updates import (
+    GYRO_BIAS,
+    VELOCITY,
+    correct,
+    heading_rows,
+    joint_rows,
+    known_rows,
+    tilt_rows,
+)
 from core.body.tree import ImuTree
-from core.body.updates import GYRO_BIAS, VELOCITY, correct, heading_rows, joint_rows, known_rows, tilt_rows
 from core.frames import Floats
 from core.rotation import exp, log, multiply, normalise, to_matrix
-from tests.core.body.erkf_walks import (
+from tests.core.body.erkf.walks import (
     angle_errors_deg,
     angles_of,
     filtered,
@@ -191,7 +200,7 @@ def test_the_smoother_equals_the_best_estimate_on_a_linear_problem() -> None:
         states=9, acc_sd=0.5, gyr_sd=1e-9, gyr_sd_of={}, impact=0.0, gate=None, tilt_sd=None,
         start_tilt_sd=1e-9, start_heading_sd=1e-9, start_velocity_sd=0.3,
     )  # fmt: skip
-    from core.body.erkf import ErkfInputs
+    from core.body.erkf.filter import ErkfInputs
 
     acc = np.array([0.0, 0.0, 9.80665]) + rng.normal(0.0, 0.5, (n, 1, 3))
     contact = np.zeros((n, 1), bool)

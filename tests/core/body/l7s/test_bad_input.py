@@ -12,9 +12,9 @@ import pytest
 from core.body.choice import Estimator
 from core.body.estimate import PoseEstimate, PoseParams
 from core.body.health import Verdict
-from core.body.l7s import free_acceleration, inputs_of, l7s_poses
-from core.body.l7s_filter import filter_block, start
-from core.body.l7s_legs import LegModel
+from core.body.l7s.filter import filter_block, start
+from core.body.l7s.legs import LegModel
+from core.body.l7s.poses import free_acceleration, inputs_of, l7s_poses
 from core.body.model import BodyModel
 from core.calibration import calibrate
 from core.errors import EstimationError, SagittalError, SignalError
@@ -24,8 +24,8 @@ from core.pipeline import PipelineConfig, analyse
 from core.recording import Recording, SensorSignals, UniformRecording
 from core.rotation import about, multiply, rotate
 from core.simulate import simulate_scenario
+from tests.core.body.l7s.test_poses import still_feet
 from tests.core.body.test_estimate import FEET, PELVIS_FEET, estimated
-from tests.core.body.test_l7s import still_feet
 from tests.walks import cut, lost, only, simulated
 
 SEEN = {"l7s_3i": PELVIS_FEET, "l7s_2i": FEET}

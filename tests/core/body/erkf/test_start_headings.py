@@ -9,14 +9,15 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from core.body.erkf import ErkfParams, ErkfState, ErkfTrack, filter_block
-from core.body.erkf_health import START_HEADING_DEG, erkf_health, erkf_notices
-from core.body.erkf_poses import ErkfRun
-from core.body.erkf_start import start_state
-from core.body.smoother import smooth
+from core.body.erkf.filter import ErkfState, ErkfTrack, filter_block
+from core.body.erkf.health import START_HEADING_DEG, erkf_health, erkf_notices
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.poses import ErkfRun
+from core.body.erkf.smoother import smooth
+from core.body.erkf.start import start_state
 from core.frames import Floats
 from core.rotation import about, multiply, rotate, to_matrix, yaw
-from tests.core.body.erkf_walks import SEGMENTS, Take, angles_of, mixed_walk
+from tests.core.body.erkf.walks import SEGMENTS, Take, angles_of, mixed_walk
 
 LIVE, OFFLINE = ErkfParams.live(), ErkfParams.offline()
 TOE_OFF_S = 6.5

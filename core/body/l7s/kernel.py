@@ -1,12 +1,12 @@
-"""The compiled step of L7S: predict, one stacked update, projections; core/body/l7s_filter.py explains it."""
+"""The compiled step of L7S: predict, one stacked update, projections; core/body/l7s/filter.py explains it."""
 
 from __future__ import annotations
 
 import numba
 import numpy as np
 
-from core.body.l7s_constraints import project
-from core.body.l7s_updates import VELOCITY, N, apply_row, inject, reset
+from core.body.l7s.constraints import project
+from core.body.l7s.updates import VELOCITY, N, apply_row, inject, reset
 from core.body.se3 import log_so3
 from core.frames import Floats
 

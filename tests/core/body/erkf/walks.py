@@ -9,9 +9,10 @@ from math import pi
 import numpy as np
 
 from core.angles import joint_angles
-from core.body.erkf import ErkfInputs, ErkfParams, ErkfTrack, erkf_inputs, filter_block
-from core.body.erkf_start import start_state
-from core.body.smoother import smooth
+from core.body.erkf.filter import ErkfInputs, ErkfTrack, erkf_inputs, filter_block
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.smoother import smooth
+from core.body.erkf.start import start_state
 from core.body.tree import PRESETS, ImuTree, person_tree
 from core.frames import FOOT, GRAVITY, Floats, Segment
 from core.fusion.orientations import Orientations

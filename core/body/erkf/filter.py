@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.body.erkf_kernel import CONTACT, INVALID, STILL, Links, Noise, Record, forward
-from core.body.erkf_params import ErkfParams as ErkfParams
-from core.body.gaps import bridged
+from core.body.erkf.gaps import bridged
+from core.body.erkf.kernel import CONTACT, INVALID, STILL, Links, Noise, Record, forward
+from core.body.erkf.params import ErkfParams
 from core.body.still import AT_REST, FOOT_STILL, still_samples
 from core.body.tree import ImuTree
 from core.errors import EstimationError, ParameterError, SignalError

@@ -10,8 +10,8 @@ import pytest
 
 from core import calibration, fusion
 from core.body import nominal_body
-from core.body.erkf import ErkfParams
-from core.body.headings import agreed, findings, heading_errors, turned
+from core.body.erkf.headings import agreed, findings, heading_errors, turned
+from core.body.erkf.params import ErkfParams
 from core.body.tree import PRESETS
 from core.calibration.result import CalibratedRecording
 from core.frames import R_NEUTRAL, Segment

@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from core.body.erkf_poses import ErkfRun
-from core.body.erkf_start import parts
+from core.body.erkf.poses import ErkfRun
+from core.body.erkf.start import parts
 from core.body.health import LONGEST_MOVING_S, Finding, longest_run_s
 from core.errors import Notice, Severity
 from core.frames import Floats

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.body.erkf import ErkfInputs, ErkfParams, ErkfState, ErkfTrack, filter_block, new_record, run_block
-from core.body.erkf_kernel import backward
+from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, filter_block, new_record, run_block
+from core.body.erkf.kernel import backward
+from core.body.erkf.params import ErkfParams
 from core.body.tree import ImuTree
 from core.errors import ParameterError
 from core.rotation import rotate

@@ -7,13 +7,14 @@ from math import degrees
 
 import numpy as np
 
-from core.body.erkf import ErkfInputs, ErkfParams
-from core.body.erkf_start import chain_positions, start_state
-from core.body.smoother import smooth
+from core.body.erkf.filter import ErkfInputs
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.smoother import smooth
+from core.body.erkf.start import chain_positions, start_state
 from core.body.tree import PRESETS, ImuTree
 from core.frames import Floats
 from core.rotation import multiply, rotate
-from tests.core.body.erkf_walks import SEGMENTS, Take, mixed_walk
+from tests.core.body.erkf.walks import SEGMENTS, Take, mixed_walk
 
 OFFLINE = ErkfParams.offline()
 MID_WALK_S = 10.0

@@ -12,9 +12,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.erkf_predict import back, move, propagate, reset_before
-from core.body.so3 import FAST, matrix, turn
-from core.body.updates import (
+from core.body.erkf.predict import back, move, propagate, reset_before
+from core.body.erkf.updates import (
     GYRO_BIAS,
     VELOCITY,
     back_correct,
@@ -25,6 +24,7 @@ from core.body.updates import (
     known_rows,
     tilt_rows,
 )
+from core.body.so3 import FAST, matrix, turn
 from core.frames import Bools, Floats
 
 INVALID, CONTACT, STILL = 1, 2, 4

@@ -8,12 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.erkf import ErkfParams, erkf_inputs
-from core.body.gaps import HOLD_S, bridged
+from core.body.erkf.filter import erkf_inputs
+from core.body.erkf.gaps import HOLD_S, bridged
+from core.body.erkf.params import ErkfParams
 from core.body.tree import ImuTree
 from core.frames import GRAVITY, Bools, Floats, Segment
 from core.rotation import rotate
-from tests.core.body.erkf_walks import SEGMENTS, Take, mixed_walk, smoothed
+from tests.core.body.erkf.walks import SEGMENTS, Take, mixed_walk, smoothed
 
 PEOPLE = ErkfParams.people()
 FROM_S = 15.0

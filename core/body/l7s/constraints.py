@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from core.body.l7s_updates import N, inject
+from core.body.l7s.updates import N, inject
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

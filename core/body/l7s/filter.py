@@ -25,7 +25,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from core.body.l7s_legs import HIP_SIDE, LEGS, LegModel
+from core.body.l7s.legs import HIP_SIDE, LEGS, LegModel
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.errors import EstimationError, ParameterError
 from core.frames import FOOT, R_NEUTRAL, Bools, Floats
@@ -142,7 +142,7 @@ def filter_block(
     ------
     EstimationError `bad_signal` when an input is not finite, `l7s_diverged` when a constraint cannot be met.
     """
-    from core.body import l7s_kernel
+    from core.body.l7s import kernel
 
     params = params or L7sParams()
     R = np.ascontiguousarray(inputs.R, np.float64)
@@ -163,7 +163,7 @@ def filter_block(
         )
     now = L7sState(*(np.array(x, np.float64, order="C") for x in vars(state).values()))
     track = L7sTrack(np.empty((n, 3, 3, 3)), np.empty((n, 3, 3)), np.empty((n, 3, 3)), np.empty((n, SIZE)))
-    failed = l7s_kernel.run(
+    failed = kernel.run(
         now.R, now.p, now.v, now.P, now.since, R, acc, step, inputs.worn == "3I", 1.0 / rate_hz,
         np.array([0.5 * model.hip_width, 0.5 * model.foot, model.thigh + model.shank]),
         np.array([model.hip_height, model.foot_height]),

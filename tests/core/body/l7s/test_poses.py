@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from core.angles import joint_angles
-from core.body.l7s import free_acceleration, inputs_of, l7s_poses
-from core.body.l7s_constraints import constraint_rows
-from core.body.l7s_filter import L7sInputs, L7sParams, Worn, filter_block, start
-from core.body.l7s_legs import LegModel
-from core.body.l7s_updates import inject, reset
+from core.body.l7s.constraints import constraint_rows
+from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start
+from core.body.l7s.legs import LegModel
+from core.body.l7s.poses import free_acceleration, inputs_of, l7s_poses
+from core.body.l7s.updates import inject, reset
 from core.body.model import BodyModel
 from core.body.poses import Poses
 from core.body.se3 import right_jacobian

@@ -17,11 +17,12 @@ from typing import Final
 import numpy as np
 
 from core.body.corrected import corrected_signals
-from core.body.erkf import ErkfParams, erkf_inputs
-from core.body.erkf_start import start_state
+from core.body.erkf.filter import erkf_inputs
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.smoother import smooth
+from core.body.erkf.start import start_state
 from core.body.health import Finding
 from core.body.model import BodyModel
-from core.body.smoother import smooth
 from core.body.tree import person_tree
 from core.calibration.result import CalibratedRecording
 from core.errors import Notice, Severity

@@ -1,4 +1,4 @@
-"""Seven poses from three IMUs or two by Sy's L7S; the filter is in core/body/l7s_filter.py.
+"""Seven poses from three IMUs or two by Sy's L7S; the filter is in core/body/l7s/filter.py.
 
 A sparse mode of visibly lower accuracy: never take stride lengths from it where anything better is worn
 (docs/science/l7s.md, "Limits").
@@ -12,10 +12,10 @@ from typing import Final
 
 import numpy as np
 
-from core.body.l7s_checks import longest_gaps, walking_checks
-from core.body.l7s_filter import L7sInputs, L7sParams, L7sState, L7sTrack, Worn, filter_block, start, warm
-from core.body.l7s_health import l7s_health, told
-from core.body.l7s_legs import BODIES, LEGS, LegModel, solve_legs
+from core.body.l7s.checks import longest_gaps, walking_checks
+from core.body.l7s.filter import L7sInputs, L7sParams, L7sState, L7sTrack, Worn, filter_block, start, warm
+from core.body.l7s.health import l7s_health, told
+from core.body.l7s.legs import BODIES, LEGS, LegModel, solve_legs
 from core.body.model import BodyModel
 from core.body.poses import Poses
 from core.calibration.result import CalibratedRecording
@@ -61,7 +61,7 @@ def l7s_poses(
     length, so that the knee is a bound and no measurement; `hinge_m`, `excess_m`, largest residuals of the
     constraints; `step_share`; `foot_turned_rad`, mean angle from measured to reported.
     At the end: `position_sd_m` by body, `min_eigenvalue` of P. By sensor: `gap_s`, the longest loss.
-    And those of `walking_checks`. Health and notices as of l7s_health.py; a notice `foot_never_still` when a
+    And those of `walking_checks`. Health and notices as of health.py; a notice `foot_never_still` when a
     foot has no step.
 
     Raises

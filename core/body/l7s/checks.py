@@ -3,7 +3,7 @@
 With two or three sensors no joint has two, so that nothing contradicts a wrong one by itself. What can be
 held against it is how people walk: feet take turns, stay under their hips, the outer foot goes further in a
 turn, and the pelvis falls away from the foot it stands on. All figures were looked at on the simulated walks
-of core/simulate and on neura_walk, right and with sensors exchanged; limits are in l7s_health.py.
+of core/simulate and on neura_walk, right and with sensors exchanged; limits are in health.py.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import Final
 import numpy as np
 
 from core.body.health import longest_run_s
-from core.body.l7s_filter import L7sInputs, L7sTrack
-from core.body.l7s_legs import LegModel
+from core.body.l7s.filter import L7sInputs, L7sTrack
+from core.body.l7s.legs import LegModel
 from core.frames import Bools, Floats, Segment
 
 OUTWARD: Final = (-0.5, 2.0)

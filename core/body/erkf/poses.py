@@ -9,13 +9,14 @@ from typing import cast
 import numpy as np
 
 from core.body.corrected import corrected_signals
-from core.body.erkf import ErkfInputs, ErkfParams, ErkfState, ErkfTrack, erkf_inputs
-from core.body.erkf_start import start_state
+from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, erkf_inputs
+from core.body.erkf.params import ErkfParams
+from core.body.erkf.smoother import smooth
+from core.body.erkf.start import start_state
 from core.body.feet import FootTracks
 from core.body.kinematics import incomplete_legs
 from core.body.model import BodyModel
 from core.body.poses import Poses
-from core.body.smoother import smooth
 from core.body.tree import ImuTree, person_tree
 from core.calibration.result import CalibratedRecording
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
