@@ -52,8 +52,8 @@ class JointAngles:
         Zero is the mean over the calibration's standing window.
     zero_offset : name → rad that was subtracted (the raw standing angle).
     zero : "standing" (the only zero so far).
-    standing_deg : angles of that standing by goniometer, where somebody entered them (`core.standing`);
-        `core.anatomical` adds them back.
+    standing_deg : angles of that standing by goniometer, where somebody entered them; see
+        `core.standing_angles`, and `core.parameters.anatomical_zero`, which adds them back.
     headings : "pelvis", "foot_l", "foot_r" → (n,) rad about the vertical, left positive, unwrapped, from a
         zero of its own; only of segments with a sensor. Its course over a stride means something.
     withheld : angles that were taken out again → reason (`core.withheld`).

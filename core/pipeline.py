@@ -15,7 +15,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from core import angles, body, calibration, fusion, quality, timeline
+from core import angles, body, calibration, quality, timeline
 from core.angles import JointAngles
 from core.body.estimate import PoseEstimate, PoseParams, estimate_poses
 from core.body.feet import FootTracks
@@ -31,7 +31,7 @@ from core.events.lumbar import LumbarParams, about_up, detect_steps, trunk_senso
 from core.events.result import GaitEvents, Strides
 from core.events.turns import TurnParams, body_yaw_rate, turns
 from core.frames import FOOT, SIDES, Segment
-from core.fusion import MahonyParams
+from core.fusion.mahony import MahonyParams, estimate_orientations
 from core.fusion.orientations import Orientations
 from core.measure import Measured, Tracks, measure
 from core.parameters.result import Parameter
@@ -216,7 +216,7 @@ def _run_stages(
     # the poses say what could not be had for want of a sensor that failed
     calibrated = replace(calibrated, recording=whole)
     start("orientation")
-    orientations = fusion.estimate(calibrated, config.fusion)
+    orientations = estimate_orientations(calibrated, config.fusion)
     reached["orientations"] = orientations
     start("events")
     found = _contacts(orientations, config)

@@ -16,7 +16,7 @@ import numpy as np
 from core.errors import Notice, ParameterError, SignalError
 from core.frames import PROTOCOLS, SEGMENTS, Bools, Floats, Protocol, Segment
 from core.shoe import Shoe
-from core.standing import check_standing
+from core.standing_angles import check_standing
 
 
 def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], where: str) -> None:
@@ -65,7 +65,7 @@ class Subject:
     ----------
     height_m : body height, 0.5 to 2.5 m.
     standing_width_m : between the middles of the ankles while standing at the beginning, 0 to 0.8 m.
-    standing_angles_deg : joint angles in that standing by goniometer, names as `core.standing.NAMES`.
+    standing_angles_deg : joint angles in that standing by goniometer, names as `core.standing_angles.NAMES`.
     shoe : the shape of its sole.
     """
 

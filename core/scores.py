@@ -16,7 +16,6 @@ from typing import Final
 
 import numpy as np
 
-from core.anatomical import anatomical_curves
 from core.events.result import COMPARED
 from core.frames import SIDES, Side
 from core.norms.adults import adult_reference
@@ -34,6 +33,7 @@ from core.norms.profile import (
     side_profile,
 )
 from core.norms.tables import wbds_group
+from core.parameters.anatomical_zero import anatomical_curves
 from core.parameters.kinematic import MEAN_ZERO, MeanCurve, mean_curve
 from core.parameters.result import CycleCurves
 from core.parameters.variability import TOO_FEW
@@ -119,7 +119,7 @@ def scores(
 
     Parameters
     ----------
-    curves : from standing. standing_deg : goniometer angles in standing (`core.anatomical`).
+    curves : from standing. standing_deg : goniometer angles in standing (`core.parameters.anatomical_zero`).
     reference : None = 42 healthy adults. estimated : variables no two sensors measure; they are not scored.
     age : years; below 18 there is no score against adults (`no_norm_for_age`). None = an adult.
     """

@@ -8,7 +8,6 @@ from math import degrees, radians
 
 import numpy as np
 
-from core.attitude import AttitudeParams, orientation
 from core.calibration.anterior import Anterior, Method, Walk, anterior
 from core.calibration.gyro_pca import about_vertical, sagittal_angle
 from core.calibration.heading import HeadingParams, Part, step_time
@@ -25,6 +24,7 @@ from core.calibration.walking import (
 )
 from core.errors import CalibrationError, Notice
 from core.frames import R_NEUTRAL, Bools, Floats, Segment
+from core.fusion.attitude import AttitudeParams, orientation
 from core.recording import UniformRecording
 from core.rest import RestParams, Window
 from core.rotation import conjugate, from_matrix, rotate

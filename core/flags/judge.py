@@ -8,13 +8,13 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.anatomical import anatomical_curves
 from core.events.result import COMPARED
 from core.flags.rules import CURVES, RULES, SWING_TO_STANCE, Beyond, Kind, Rule
 from core.frames import SIDES, Side
 from core.norms.lookup import Norms
 from core.norms.speed import walking_speed
 from core.norms.tables import WBDS, wbds_group
+from core.parameters.anatomical_zero import anatomical_curves
 from core.parameters.flats import OTHER
 from core.parameters.kinematic import stride_figures
 from core.parameters.result import CycleCurves, Parameter
@@ -95,7 +95,8 @@ def flags(
     Parameters
     ----------
     curves : from standing; None without joint angles. parameters : of the session.
-    standing_deg : goniometer angles in standing (`core.standing`). height_m : makes speed dimensionless.
+    standing_deg : goniometer angles in standing (`core.standing_angles`). height_m : m, makes speed
+        dimensionless.
     controls : own control group (`ControlGroup.norms`) for rules whose limit is theirs.
     age : years; below 18 limits made of the adult norms are not held against anybody. None = an adult.
 

@@ -1,6 +1,1 @@
-"""CalibratedRecording → Orientations."""
-
-from core.attitude import warm
-from core.fusion.mahony import MahonyParams, estimate
-
-__all__ = ["MahonyParams", "estimate", "warm"]
+"""CalibratedRecording → Orientations: the attitude of each sensor, then relative headings without drift."""

@@ -1,7 +1,7 @@
 """The default engine: Mahony 2008, six axes, gyro bias frozen from rest, started from standing.
 
 At standing every segment faces forward by convention, so the calibration itself is the start: the sensor's
-orientation in W at rest is R_neutral R_segment_sensor. From there the filter of core/attitude.py runs to both
+orientation in W at rest is R_neutral R_segment_sensor. From there the filter of attitude.py runs to both
 ends of the take. What remains is the turn about the vertical that no accelerometer sees; drift.py treats it.
 """
 
@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from core.attitude import AttitudeParams, orientation
 from core.calibration.result import CalibratedRecording, SegmentCalibration
 from core.errors import EstimationError
 from core.frames import R_NEUTRAL, Bools, Floats, Segment
+from core.fusion.attitude import AttitudeParams, orientation
 from core.fusion.drift import DriftParams, remove_relative_drift
 from core.fusion.orientations import Orientations
 from core.recording import SensorSignals
@@ -28,7 +28,9 @@ class MahonyParams:
     drift: DriftParams = field(default_factory=DriftParams)
 
 
-def estimate(calibrated: CalibratedRecording, params: MahonyParams | None = None) -> Orientations:
+def estimate_orientations(
+    calibrated: CalibratedRecording, params: MahonyParams | None = None
+) -> Orientations:
     """Orientation of every calibrated segment in the common world W (x = facing at standing).
 
     Parameters

@@ -2,7 +2,7 @@
 
 The reference angles are anatomical, ours are zero at the person's own standing. A band may stand behind a
 curve only where both are measured from the same zero, so every band says its own; curves of a person whose
-standing was read with a goniometer have that of the reference (`core.anatomical`).
+standing was read with a goniometer have that of the reference (`core.parameters.anatomical_zero`).
 """
 
 from __future__ import annotations

@@ -68,8 +68,8 @@ def norms_for(
     ----------
     age : years; None = all adults, and nobody for times and distances. sex : None = nobody for these.
     speed_mps : walking speed. height_m : makes it dimensionless.
-    anatomical : variables whose anatomical level is known on both sides (`core.anatomical`); figures of the
-        others compare in range only.
+    anatomical : variables whose anatomical level is known on both sides
+        (`core.parameters.anatomical_zero`); figures of the others compare in range only.
     """
     speed = None if speed_mps is None else walking_speed(speed_mps, height_m)
     at = None if speed is None else speed.equivalent_mps

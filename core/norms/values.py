@@ -100,7 +100,7 @@ class NormValues:
 def angle_values(age: float | None, anatomical: Collection[str] = ()) -> NormValues:
     """Reference of the angle parameters for an adult of this age (None = all adults).
 
-    Ranges compare always, levels of the variables in `anatomical` (`core.anatomical`) only.
+    Ranges compare always, levels of the variables in `anatomical` (`core.parameters.anatomical_zero`) only.
     """
     group = wbds_group(age)
     if group is None:

@@ -16,8 +16,8 @@ from core.calibration import CalibrationParams
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError, Notice
 from core.frames import Segment
-from core.fusion import MahonyParams, estimate
-from core.fusion import warm as warm_attitude
+from core.fusion.attitude import warm as warm_attitude
+from core.fusion.mahony import MahonyParams, estimate_orientations
 from core.fusion.orientations import Orientations
 from core.online.frame import SegmentCheck
 from core.recording import UniformRecording
@@ -80,12 +80,12 @@ def finished(
 
     Raises
     ------
-    EstimationError of `core.fusion.estimate`.
+    EstimationError of `core.fusion.mahony.estimate_orientations`.
     """
     recording = calibrated.recording
     subject = recording.subject
     body, assumed = nominal_body(subject.height_m, subject.standing_width_m, subject.shoe)
-    calibrated, orientations = legs_apart(calibrated, estimate(calibrated, params.fusion), body)
+    calibrated, orientations = legs_apart(calibrated, estimate_orientations(calibrated, params.fusion), body)
     notices = [*calibrated.calibration.notices, *assumed]
     turned: dict[Segment, float] = {}
     linked = tuple(s for s in WHOLE if s in calibrated.calibration.segments)

@@ -12,7 +12,6 @@ from typing import Final
 
 import numpy as np
 
-from core.attitude import AttitudeParams
 from core.body.choice import WHOLE, possible
 from core.body.erkf.params import ErkfParams
 from core.body.l7s.filter import L7sParams
@@ -21,6 +20,7 @@ from core.events.flags import StrideParams
 from core.events.foot_pitch import FootPitchParams
 from core.events.result import GaitEvent
 from core.frames import Bools, Floats, Segment, Side
+from core.fusion.attitude import AttitudeParams
 from core.online.body import Estimator, Filtered, FootPaths, Placed, Raw, worn_feet
 from core.online.calibrated import LiveCalibration
 from core.online.contacts import Attitudes, Contacts

@@ -1,7 +1,7 @@
 """Orientation of single sensors and the contacts of the feet, told in the push in which they are known.
 
-The same filter and rule as offline (core/attitude.py, core/events/foot_pitch.py), run forward only from
-standing: the foot's pitch needs neither heading nor the other sensors.
+The same filter and rule as offline (core/fusion/attitude.py, core/events/foot_pitch.py), run forward only
+from standing: the foot's pitch needs neither heading nor the other sensors.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from core.attitude import AttitudeParams, attitude_kernel
 from core.calibration.result import SegmentCalibration
 from core.errors import SignalError
 from core.events.detection import KINDS, SOURCE
 from core.events.foot_pitch import FootPitchParams, FootPitchState, push
 from core.events.result import GaitEvent
 from core.frames import FOOT, R_NEUTRAL, SIDES, Bools, Floats, Segment, Side
+from core.fusion.attitude import AttitudeParams, attitude_kernel
 from core.rotation import from_matrix
 
 

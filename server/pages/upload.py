@@ -56,7 +56,7 @@ GONIOMETER: Final = (
     ("ankle_dorsiflexion_l", "Dorsiflexion, left"),
     ("ankle_dorsiflexion_r", "Dorsiflexion, right"),
 )
-"""Standing angles that the page asks for; the manifest takes the others too (core/standing.py)."""
+"""Standing angles that the page asks for; the manifest takes the others too (core/standing_angles.py)."""
 
 DUPLICATE: Final = "duplicate_stream"
 

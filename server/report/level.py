@@ -6,13 +6,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Final
 
-from core.anatomical import anatomical_parameters, standing_name
 from core.events.result import Strides
 from core.frames import SIDES
 from core.norms import Norms
+from core.parameters.anatomical_zero import anatomical_parameters, standing_name
 from core.parameters.result import CycleCurves
 from core.parameters.rows import Column
-from core.standing import JOINTS, PELVIS
+from core.standing_angles import JOINTS, PELVIS
 from server.report.table import Row, parameter_rows
 
 GROUP = "Angles from the anatomical zero"

@@ -12,13 +12,13 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.anatomical import anatomical_variables
 from core.errors import Notice
 from core.flags import flags
 from core.frames import SIDES, Floats, Side
 from core.norms.controls import ControlGroup
 from core.norms.lookup import Norms, norms_for
 from core.parameters import cycle_curves
+from core.parameters.anatomical_zero import anatomical_variables
 from core.parameters.result import CycleCurves
 from core.scores import Scores, scores
 from server.report.bundle import Bundle

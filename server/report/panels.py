@@ -8,12 +8,12 @@ from typing import Final
 
 import numpy as np
 
-from core.anatomical import anatomical_variables, standing_offset_deg
 from core.frames import SIDES, Floats, Side
 from core.norms import NormBand
 from core.norms.kinematics import Zero
 from core.norms.lookup import Norms
 from core.parameters import mean_curve
+from core.parameters.anatomical_zero import anatomical_variables, standing_offset_deg
 from core.parameters.kinematic import MEAN_ZERO
 from core.parameters.result import CycleCurves
 from server.report.bundle import Bundle

@@ -45,9 +45,9 @@ def _publish_analysis(
 def _warm() -> None:
     """Import readers and pipeline, compile the kernels or load them from the cache."""
     import server.report.exports  # noqa: F401
-    from core import attitude
     from core.body import estimate
     from core.events import foot_pitch
+    from core.fusion import attitude
 
     attitude.warm()
     foot_pitch.warm()

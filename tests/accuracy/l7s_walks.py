@@ -22,7 +22,7 @@ from core.body.still import FOOT_STILL, still_samples
 from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording
 from core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.recording import UniformRecording
 from core.rotation import about, angle_between, multiply, rotate, to_matrix
@@ -93,7 +93,7 @@ def steps_of(calibrated: CalibratedRecording) -> dict[Side, Bools]:
 def trial_of(recording: UniformRecording, truth: Truth) -> Trial:
     """A take as L7S meets it."""
     calibrated = calibrate(recording)
-    orientations = estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     return Trial(
         calibrated, orientations, free_acceleration(calibrated, orientations), steps_of(calibrated), truth
     )

@@ -23,7 +23,7 @@ from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording
 from core.events.result import StrideFlag
 from core.frames import FOOT, SIDES, SUFFIX, Floats, Segment, Side
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import from_matrix, multiply, rotate
 from tests.data import data_folder
@@ -82,7 +82,7 @@ class Chain:
 def take() -> tuple[CalibratedRecording, Orientations]:
     """The walk calibrated, and its orientations from six axes."""
     calibrated = calibrate(neura_walk())
-    return calibrated, estimate(calibrated)
+    return calibrated, estimate_orientations(calibrated)
 
 
 def chain(

@@ -15,7 +15,7 @@ import pytest
 
 from core.calibration import calibrate
 from core.frames import SIDES, Floats, Side
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from tests.accuracy.neura import RATE, Chain, chain, healthy, true_strides
 from tests.accuracy.report import record
 from tests.accuracy.test_neura_walk import reference
@@ -34,7 +34,7 @@ LAG = 1
 def cut_at(start_s: float) -> Chain:
     recording = cut(neura_walk(), start_s, neura_walk().t_s[-1])
     calibrated = calibrate(recording)
-    return chain(calibrated, estimate(calibrated))
+    return chain(calibrated, estimate_orientations(calibrated))
 
 
 def offset_removed(made: Chain, name: str, first: int) -> float:

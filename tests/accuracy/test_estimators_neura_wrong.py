@@ -31,7 +31,7 @@ from core.calibration.gyro_pca import about_vertical
 from core.calibration.result import CalibratedRecording
 from core.calibration.standing import vertical_frame
 from core.frames import FOOT, SIDES, Floats, Segment, Side
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.recording import SensorSignals, UniformRecording
 from core.rest import samples
@@ -86,7 +86,7 @@ class Result:
 
 def calibrated(recording: UniformRecording) -> Calibrated:
     found = calibrate(recording)
-    return found, estimate(found)
+    return found, estimate_orientations(found)
 
 
 def swapped(a: Segment, b: Segment) -> Calibrated:

@@ -12,11 +12,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import calibration, fusion, timeline
+from core import calibration, timeline
 from core.events.consensus import all_detectors, consensus
 from core.events.gyro_peaks import PRESETS, RECONSTRUCTION, gyro_peak_events
 from core.events.result import EventKind, GaitEvents
 from core.frames import SIDES
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from tests.accuracy.event_scoring import Score, match
 from tests.accuracy.gaitmap import COPIES, RATE, recording_of, reference_strides, resampled
@@ -34,7 +35,7 @@ def take(name: str) -> Orientations:
         uniform = timeline.synchronise(recording_of(resampled(COPIES[0], RATE), RATE))
     else:
         uniform = neura_walk() if name == "neura_walk" else simulated(name)[0]
-    return fusion.estimate(calibration.calibrate(uniform))
+    return estimate_orientations(calibration.calibrate(uniform))
 
 
 @cache

@@ -12,9 +12,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import calibration, events, fusion, timeline
+from core import calibration, events, timeline
 from core.events.result import EventKind, GaitEvents, Strides
 from core.frames import SIDES, Floats, Side
+from core.fusion.mahony import estimate_orientations
 from tests.accuracy.event_scoring import Score, match
 from tests.accuracy.gaitmap import COPIES, RATE, recording_of, reference_strides, resampled
 from tests.accuracy.report import record, record_in_short
@@ -27,7 +28,7 @@ def found(name: str, rate_hz: float) -> tuple[GaitEvents, Strides]:
     """Events and strides by the product's chain; only the manifest tells it about the file."""
     recording = recording_of(resampled(name, rate_hz), rate_hz)
     calibrated = calibration.calibrate(timeline.synchronise(recording))
-    orientations = fusion.estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     contacts = events.detect(orientations)
     return contacts, events.stride_list(contacts, orientations, calibrated.calibration.turning)
 

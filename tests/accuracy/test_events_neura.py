@@ -16,11 +16,12 @@ from functools import cache
 
 import numpy as np
 
-from core import calibration, events, fusion, timeline
+from core import calibration, events, timeline
 from core.errors import Notice
 from core.events.result import GaitEvents, Strides
 from core.formats import SourceFile, parse_manifest, read_recording
 from core.frames import SIDES, SUFFIX, Floats, Side
+from core.fusion.mahony import estimate_orientations
 from tests.accuracy.event_scoring import match
 from tests.accuracy.report import record
 from tests.data import data_folder
@@ -44,7 +45,7 @@ def found() -> tuple[GaitEvents, Strides, tuple[Notice, ...]]:
     ]
     manifest = parse_manifest(json.dumps({"sensors": SENSORS}).encode())
     calibrated = calibration.calibrate(timeline.synchronise(read_recording(files, manifest)))
-    orientations = fusion.estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     contacts = events.detect(orientations)
     strides = events.stride_list(contacts, orientations, calibrated.calibration.turning)
     return contacts, strides, contacts.notices + strides.notices

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from core import calibration, events, fusion, timeline
+from core import calibration, events, timeline
 from core.frames import SIDES
+from core.fusion.mahony import estimate_orientations
 from core.simulate import simulate_scenario
 from tests.accuracy.event_scoring import match
 from tests.accuracy.report import record
@@ -20,7 +21,9 @@ def test_no_contact_is_missed_or_invented_on_any_script() -> None:
     rows = []
     for name in SCENARIOS:
         simulation = simulate_scenario(name, seed=1)
-        orientations = fusion.estimate(calibration.calibrate(timeline.synchronise(simulation.recording)))
+        orientations = estimate_orientations(
+            calibration.calibrate(timeline.synchronise(simulation.recording))
+        )
         found = events.detect(orientations)
         for side in SIDES:
             truth = simulation.truth.contacts[side]

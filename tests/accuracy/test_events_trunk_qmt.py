@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from core import calibration, fusion
+from core import calibration
 from core.events import detect
 from core.events.lumbar import about_up, detect_steps
 from core.events.result import GaitEvents
 from core.events.turns import turns
 from core.frames import SIDES, Segment, Side
+from core.fusion.mahony import estimate_orientations
 from core.recording import SensorSignals, Subject, UniformRecording
 from tests.accuracy.event_scoring import Score, match
 from tests.accuracy.report import record
@@ -48,7 +49,9 @@ def take(worn: tuple[tuple[Segment, str], ...]) -> UniformRecording:
 @cache
 def feet() -> GaitEvents:
     return detect(
-        fusion.estimate(calibration.calibrate(take((("foot_l", "foot_left"), ("foot_r", "foot_right")))))
+        estimate_orientations(
+            calibration.calibrate(take((("foot_l", "foot_left"), ("foot_r", "foot_right"))))
+        )
     )
 
 

@@ -14,7 +14,7 @@ from core.calibration.calibrate import CalibrationParams
 from core.calibration.result import Calibration
 from core.formats import SourceFile, parse_manifest, read_recording
 from core.frames import Floats
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.rotation import rotate
 from core.timeline import synchronise
 from tests.data import data_folder
@@ -38,7 +38,7 @@ def taken(copy: str, method: Method) -> tuple[Calibration, dict[str, Floats]]:
     recording = read_recording([SourceFile(path.name, path.stat().st_size, path.read_bytes)], manifest)
     calibrated = calibrate(synchronise(recording), CalibrationParams(method=method))
     toe = np.array([1.0, 0.0, 0.0])
-    found = estimate(calibrated)
+    found = estimate_orientations(calibrated)
     return calibrated.calibration, {s: rotate(q, toe)[:, 2] for s, q in found.q.items()}
 
 

@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import calibration, fusion
+from core import calibration
 from core.body import BodyModel
 from core.body.corrected import corrected_signals
 from core.body.erkf.filter import ErkfTrack, erkf_inputs, filter_block
@@ -27,6 +27,7 @@ from core.body.still import FOOT_STILL, still_samples
 from core.body.tree import person_tree
 from core.calibration.result import CalibratedRecording
 from core.frames import FOOT, GRAVITY, SIDES, Floats, Side
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.parameters import spatial_rows
 from core.pipeline import Analysis, analyse
@@ -70,7 +71,7 @@ def errors(p: Floats, side: Side, rate_hz: float) -> Found:
 def take(copy: str = COPIES[0], half_rate: bool = False) -> tuple[CalibratedRecording, Orientations]:
     x, rate = (block_mean(copy), RATE / 2) if half_rate else (signals(copy), RATE)
     calibrated = calibration.calibrate(synchronise(recording_of(x, rate)))
-    return calibrated, fusion.estimate(calibrated)
+    return calibrated, estimate_orientations(calibrated)
 
 
 @cache

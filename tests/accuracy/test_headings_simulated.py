@@ -22,7 +22,7 @@ from core.body.erkf.poses import refined, run_erkf
 from core.body.tree import PRESETS
 from core.calibration import calibrate
 from core.frames import Segment
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.rest import samples
 from tests.accuracy.report import record
 from tests.walks import rms_deg, simulated
@@ -43,7 +43,7 @@ def errors(walk: tuple[str, int], wrong: str, agree: bool) -> dict[str, float]:
     recording, truth = simulated(*walk)
     calibrated = calibrate(recording)
     by = {s: radians(x) for s, x in WRONG[wrong].items()}
-    calibrated, orientations = turned(calibrated, estimate(calibrated), by)
+    calibrated, orientations = turned(calibrated, estimate_orientations(calibrated), by)
     body, _ = nominal_body(recording.subject.height_m)
     whole, params = PRESETS["lower_body7"], ErkfParams.offline()
     if agree:

@@ -24,7 +24,7 @@ from core.body.model import BodyModel
 from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording
 from core.frames import FOOT, SIDES, SUFFIX, Floats, Side
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.simulate import Truth
 from tests.accuracy.l7s_walks import steps_of
@@ -115,7 +115,7 @@ def simulated_walk(name: str, seed: int) -> Walk:
         if abs(s.turn_rad) < TURNING and s.length_m > 0.7 * typical:
             at = np.searchsorted(flats[s.side], [100.0 * s.start_s, 100.0 * s.end_s])
             strides.append((s.side, int(flats[s.side][at[0]]), int(flats[s.side][at[1]])))
-    made = paths(calibrated, estimate(calibrated), truth.body)
+    made = paths(calibrated, estimate_orientations(calibrated), truth.body)
     return Walk(name, {s: truth.p[FOOT[s]][:n] for s in SIDES}, flats, strides, made)
 
 

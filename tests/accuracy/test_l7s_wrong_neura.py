@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 import pytest
 
-from core import calibration, events, fusion
+from core import calibration, events
 from core.body import contact_mask
 from core.body.choice import Estimator
 from core.body.estimate import PoseParams, estimate_poses
@@ -24,6 +24,7 @@ from core.body.health import Finding, worst
 from core.body.tree import PRESETS
 from core.errors import SagittalError
 from core.frames import SIDES, Segment
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.recording import SensorSignals, UniformRecording
 from tests.accuracy.l7s_walks import FLEXION
@@ -115,7 +116,7 @@ def result(name: str, estimator: Estimator) -> Result | str:
     take = CASES[name][0](only(neura_walk(), *WORN[estimator]))
     try:
         calibrated = calibration.calibrate(take)
-        orientations = fusion.estimate(calibrated)
+        orientations = estimate_orientations(calibrated)
         found = events.detect(orientations)
         contacts = {s: contact_mask(take.t_s, found.times(s, "ic"), found.times(s, "tc")) for s in SIDES}
         made = estimate_poses(calibrated, orientations, contacts, BODY, PoseParams(estimator=estimator))

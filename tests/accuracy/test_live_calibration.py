@@ -20,7 +20,7 @@ from core.body.tree import PRESETS
 from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording, Calibration
 from core.frames import Segment
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.online.attempt import Wearer
 from core.online.calibrated import LiveCalibration, warm
 from core.online.calibrating import LiveCalibrator
@@ -82,7 +82,7 @@ def offline(name: str) -> CalibratedRecording:
     recording = take(name)
     calibrated = calibrate(recording)
     body, _ = nominal_body(recording.subject.height_m, recording.subject.standing_width_m)
-    calibrated, orientations = legs_apart(calibrated, estimate(calibrated), body)
+    calibrated, orientations = legs_apart(calibrated, estimate_orientations(calibrated), body)
     return agreed(calibrated, orientations, body, SEGMENTS, ErkfParams.people())[0]
 
 

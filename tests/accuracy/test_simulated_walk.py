@@ -10,7 +10,7 @@ import pytest
 from core.angles import JointAngles, joint_angles
 from core.calibration import calibrate
 from core.frames import Floats
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from tests.accuracy.report import record
 from tests.walks import rms_deg, simulated
 
@@ -30,7 +30,7 @@ def errors(name: str, seed: int) -> dict[str, Floats]:
     """Error (n,) in rad of every angle."""
     recording, truth = simulated(name, seed)
     calibrated = calibrate(recording)
-    angles: JointAngles = joint_angles(estimate(calibrated), calibrated.calibration.zero)
+    angles: JointAngles = joint_angles(estimate_orientations(calibrated), calibrated.calibration.zero)
     true = truth.zeroed()
     n = min(len(recording.t_s), len(truth.t_s))
     return {k: (x[:n] - true[k][:n] + np.pi) % (2 * np.pi) - np.pi for k, x in angles.angles.items()}

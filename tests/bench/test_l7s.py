@@ -15,7 +15,7 @@ from core.body.l7s.poses import free_acceleration, inputs_of
 from core.body.still import FOOT_STILL, still_samples
 from core.calibration import calibrate
 from core.frames import FOOT, SIDES
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from tests.l7s_textbook import textbook
 from tests.walks import simulated
 
@@ -37,7 +37,7 @@ def walk(worn: Worn) -> tuple[L7sInputs, LegModel]:
     """Inputs of a simulated walk."""
     recording, truth = simulated("comfortable", 2)
     calibrated = calibrate(recording)
-    orientations = estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     steps = {}
     for side in SIDES:
         x = recording.sensors[FOOT[side]]

@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from core.attitude import AttitudeParams, AttitudeState, advance, warm
 from core.calibration import calibrate
-from core.fusion import estimate
+from core.fusion.attitude import AttitudeParams, AttitudeState, advance, warm
+from core.fusion.mahony import estimate_orientations
 from core.recording import UniformRecording
 from tests.walks import simulated
 
@@ -58,13 +58,13 @@ def test_calibration_and_fusion_cost_at_most_twenty_filter_runs_of_vqf() -> None
     vqf = pytest.importorskip("vqf", reason="vqf is a test extra without a wheel for this Python")
     recording: UniformRecording = simulated("five_minutes")[0]
     calibrated = calibrate(recording)
-    estimate(calibrated)
+    estimate_orientations(calibrated)
 
     def theirs() -> None:
         for x in recording.sensors.values():
             vqf.VQF(1 / RATE).updateBatch(np.ascontiguousarray(x.gyr), np.ascontiguousarray(x.acc))
 
-    stages, unit = best(lambda: estimate(calibrate(recording)), 3), best(theirs, 3)
+    stages, unit = best(lambda: estimate_orientations(calibrate(recording)), 3), best(theirs, 3)
     samples = len(recording.t_s) * len(recording.sensors)
     ratio = stages / unit
     print(f"\ncalibrate + estimate {stages:.2f} s for {samples} samples, vqf {unit:.2f} s, ratio {ratio:.1f}")

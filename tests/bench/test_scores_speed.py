@@ -14,7 +14,7 @@ from core.norms import norms_for
 from core.norms.profile import NINE
 from core.parameters.result import CycleCurves
 from core.scores import scores
-from core.standing import NAMES
+from core.standing_angles import NAMES
 
 pytestmark = pytest.mark.bench
 

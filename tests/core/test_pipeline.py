@@ -11,7 +11,7 @@ from core import calibration
 from core.body.erkf.headings import turned
 from core.calibration import CalibrationParams, calibrate
 from core.calibration.result import CalibratedRecording
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.parameters.smoothness import NAME as SPARC
 from core.parameters.trunk import NAMES as TRUNK_NAMES
 from core.pipeline import Analysis, analyse
@@ -38,7 +38,7 @@ def off() -> Analysis:
         recording: UniformRecording, params: CalibrationParams | None = None
     ) -> CalibratedRecording:
         good = calibrate(recording, params)
-        wrong, _ = turned(good, estimate(good), {"pelvis": radians(OFF_DEG)})
+        wrong, _ = turned(good, estimate_orientations(good), {"pelvis": radians(OFF_DEG)})
         return wrong
 
     with pytest.MonkeyPatch.context() as patch:

@@ -15,7 +15,7 @@ from core.norms.profile import NINE, SAGITTAL
 from core.parameters.kinematic import MEAN_ZERO
 from core.parameters.result import CycleCurves
 from core.scores import Scores, scores
-from core.standing import NAMES
+from core.standing_angles import NAMES
 from tests.wbds import people
 
 

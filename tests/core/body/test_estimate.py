@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import calibration, events, fusion
+from core import calibration, events
 from core.angles import joint_angles
 from core.body import contact_mask, nominal_body
 from core.body.choice import possible
@@ -16,6 +16,7 @@ from core.body.estimate import PoseEstimate, PoseParams, estimate_poses
 from core.body.tree import PRESETS
 from core.errors import EstimationError
 from core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
+from core.fusion.mahony import estimate_orientations
 from core.recording import UniformRecording
 from core.simulate import Truth
 from tests.walks import only, simulated
@@ -27,7 +28,7 @@ FEET = PRESETS["feet2"]
 
 def estimated(take: UniformRecording, params: PoseParams | None = None) -> PoseEstimate:
     calibrated = calibration.calibrate(take)
-    orientations = fusion.estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     found = events.detect(orientations)
     contacts = {s: contact_mask(take.t_s, found.times(s, "ic"), found.times(s, "tc")) for s in SIDES}
     body, _ = nominal_body(take.subject.height_m, take.subject.standing_width_m)
@@ -171,7 +172,7 @@ def test_an_unasked_estimator_that_fails_gives_way_to_the_next() -> None:
     take = simulated("fast_with_turns", 3)[0]
     body, _ = nominal_body(None)
     calibrated = calibration.calibrate(take)
-    orientations = fusion.estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     broken = replace(body, thigh=-0.4)
     made = estimate_poses(calibrated, orientations, {}, broken)
     assert made.poses.reduced == "estimator_failed"

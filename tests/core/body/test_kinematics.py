@@ -12,7 +12,7 @@ from core.body.kinematics import sole_points
 from core.body.poses import Poses
 from core.calibration import calibrate
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Side
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import rotate
 from core.simulate import Truth
@@ -119,7 +119,7 @@ def test_without_contacts_the_lower_foot_carries() -> None:
 def test_from_sensors_to_a_figure_on_a_simulated_walk() -> None:
     recording, truth = simulated("comfortable")
     poses = forward_kinematics(
-        estimate(calibrate(recording)), truth.body, true_contacts(truth, recording.t_s)
+        estimate_orientations(calibrate(recording)), truth.body, true_contacts(truth, recording.t_s)
     )
     walked = float(np.linalg.norm((truth.p["pelvis"][-1] - truth.p["pelvis"][0])[:2]))
     assert float(np.linalg.norm(poses.p["pelvis"][-1, :2])) == pytest.approx(walked, rel=0.06)
@@ -130,7 +130,7 @@ def test_from_sensors_to_a_figure_on_a_simulated_walk() -> None:
 def test_a_missing_segment_leaves_its_leg_out_with_a_reason() -> None:
     recording, _ = simulated("comfortable")
     kept = only(recording, "pelvis", "thigh_l", "shank_l", "foot_l", "thigh_r", "foot_r")
-    poses = forward_kinematics(estimate(calibrate(kept)), BODY)
+    poses = forward_kinematics(estimate_orientations(calibrate(kept)), BODY)
     assert set(poses.p) == {"pelvis", "thigh_l", "shank_l", "foot_l"}
     assert [n.code for n in poses.notices] == ["figure_incomplete"]
     assert "shank_r" in poses.notices[0].message
@@ -149,7 +149,7 @@ def test_one_leg_alone_still_walks_forward() -> None:
 
 def test_feet_alone_make_no_figure_but_a_reason() -> None:
     recording, _ = simulated("comfortable")
-    poses = forward_kinematics(estimate(calibrate(only(recording, "foot_l", "foot_r"))), BODY)
+    poses = forward_kinematics(estimate_orientations(calibrate(only(recording, "foot_l", "foot_r"))), BODY)
     assert poses.p == {}
     assert poses.method == "none"
     assert "figure_incomplete" in {n.code for n in poses.notices}

@@ -11,7 +11,7 @@ from core.calibration import CalibrationParams, calibrate
 from core.calibration.anterior import Method
 from core.calibration.result import CalibratedRecording
 from core.errors import SagittalError
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.recording import UniformRecording
 from core.simulate import simulate_scenario
 from core.timeline import synchronise
@@ -41,7 +41,7 @@ def test_any_piece_with_any_sensors_ends_in_a_result_or_a_code(seed: int) -> Non
         assert calibrated.code in CODES
         assert len(calibrated.message) > 30
         return
-    orientations = estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     angles = joint_angles(orientations, calibrated.calibration.zero)
     poses = forward_kinematics(orientations, nominal_body(None)[0])
     assert all(np.isfinite(q).all() for q in orientations.q.values())
@@ -55,7 +55,7 @@ def test_flexion_is_right_at_any_sampling_rate(rate_hz: float) -> None:
     take = simulate_scenario("slow", 3, rate_hz=rate_hz)
     recording, truth = synchronise(take.recording), take.truth
     calibrated = calibrate(recording)
-    angles = joint_angles(estimate(calibrated), calibrated.calibration.zero).angles
+    angles = joint_angles(estimate_orientations(calibrated), calibrated.calibration.zero).angles
     n = min(len(recording.t_s), len(truth.t_s))
     for name in ("hip_flexion_l", "knee_flexion_r", "ankle_dorsiflexion_l"):
         assert rms_deg(angles[name][:n] - truth.zeroed()[name][:n]) < 1.5

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from core import calibration, fusion
+from core import calibration
 from core.errors import CalibrationError
 from core.events.consensus import all_detectors, consensus
 from core.events.lumbar import detect_steps
 from core.frames import SIDES
+from core.fusion.mahony import estimate_orientations
 from core.recording import UniformRecording
 from core.simulate.script import Stand, Straight
 from core.simulate.truth import Truth
@@ -26,7 +27,7 @@ def walk(step_m: float, step_s: float) -> tuple[UniformRecording, Truth]:
 @pytest.mark.parametrize(("step_m", "step_s"), CADENCES)
 def test_the_feet_are_found_at_any_cadence(step_m: float, step_s: float) -> None:
     recording, truth = walk(step_m, step_s)
-    detectors = all_detectors(fusion.estimate(calibration.calibrate(recording)))
+    detectors = all_detectors(estimate_orientations(calibration.calibrate(recording)))
     for events in (detectors["foot_pitch"], consensus(detectors)):
         for side in SIDES:
             result = match(events.times(side, "ic"), truth.contacts[side].contact.tolist(), 0.15)

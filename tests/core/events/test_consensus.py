@@ -7,11 +7,12 @@ from functools import cache
 
 import pytest
 
-from core import calibration, fusion
+from core import calibration
 from core.events import detect
 from core.events.consensus import all_detectors, consensus, with_confidence
 from core.events.result import GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES
+from core.fusion.mahony import estimate_orientations
 from tests.accuracy.event_scoring import match
 from tests.walks import simulated
 
@@ -27,7 +28,7 @@ def contacts(*times: float, source: str = "a") -> GaitEvents:
 
 @cache
 def detectors(name: str) -> dict[str, GaitEvents]:
-    return all_detectors(fusion.estimate(calibration.calibrate(simulated(name)[0])))
+    return all_detectors(estimate_orientations(calibration.calibrate(simulated(name)[0])))
 
 
 def test_contacts_that_all_saw_have_full_confidence_and_the_leads_time() -> None:
@@ -86,7 +87,7 @@ def test_simulated_people_are_found_whole_or_said_to_be_led_by_another_detector(
 
 
 def test_with_feet_alone_the_shuffle_stays_refused() -> None:
-    take = fusion.estimate(calibration.calibrate(simulated("severe_shuffle")[0]))
+    take = estimate_orientations(calibration.calibrate(simulated("severe_shuffle")[0]))
     feet = replace(take, q={s: take.q[s] for s in FOOT.values()})
     agreed = consensus(all_detectors(feet))
     assert agreed.events == ()
@@ -94,7 +95,7 @@ def test_with_feet_alone_the_shuffle_stays_refused() -> None:
 
 
 def test_the_foot_pitch_events_keep_their_times_with_confidence() -> None:
-    take = fusion.estimate(calibration.calibrate(simulated("comfortable")[0]))
+    take = estimate_orientations(calibration.calibrate(simulated("comfortable")[0]))
     lead = detect(take)
     told = with_confidence(all_detectors(take))
     assert [(e.time_s, e.kind, e.side) for e in told.events] == [

@@ -8,10 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import calibration, fusion
+from core import calibration
 from core.errors import SignalError
 from core.events.gyro_peaks import LIMB, PRESETS, GyroPeakParams, gyro_peak_events, sagittal_rate
 from core.frames import R_NEUTRAL, SIDES, Floats
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import about, from_matrix, multiply
 from tests.accuracy.event_scoring import match
@@ -50,7 +51,7 @@ def shanks(rate: Floats, heading: float = 0.0) -> Orientations:
 
 @cache
 def walked(name: str) -> Orientations:
-    return fusion.estimate(calibration.calibrate(simulated(name)[0]))
+    return estimate_orientations(calibration.calibrate(simulated(name)[0]))
 
 
 T = np.arange(1500) / RATE

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from core import calibration, events, fusion, timeline
+from core import calibration, events, timeline
 from core.events.result import GaitEvents, Stride, Strides
 from core.frames import SIDES
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.parameters import stride_values, temporal
 from core.simulate import Simulation, simulate_scenario
@@ -41,7 +42,7 @@ def walked(request: pytest.FixtureRequest) -> Walked:
         truth.t_s, truth.rate_hz, truth.q, {s: np.ones(n, np.bool_) for s in truth.q}, "truth"
     )
     calibrated = calibration.calibrate(timeline.synchronise(simulation.recording))
-    orientations = fusion.estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     found = events.detect(orientations)
     strides = events.stride_list(found, orientations, calibrated.calibration.turning)
     return Walked(simulation, events.detect(exact), found, strides)

@@ -9,7 +9,7 @@ import numpy as np
 from core.flags import flags
 from core.frames import SIDES
 from core.parameters.result import CycleCurves
-from core.standing import NAMES
+from core.standing_angles import NAMES
 from tests.wbds import people
 
 OFTEN = {"knee_hyperextension": 0.15}

@@ -13,8 +13,9 @@ from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError
 from core.frames import R_NEUTRAL, Floats, Segment
-from core.fusion import MahonyParams, estimate, warm
+from core.fusion.attitude import warm
 from core.fusion.drift import DriftParams
+from core.fusion.mahony import MahonyParams, estimate_orientations
 from core.rest import samples
 from core.rotation import about, angle_between, from_matrix, mean, multiply, normalise, rotate, yaw
 from tests.walks import lost, only, rms_deg, simulated, turned
@@ -32,7 +33,7 @@ def test_warm_compiles_without_a_recording() -> None:
 
 def test_at_standing_every_segment_faces_forward_and_stands_upright() -> None:
     take = calibrated()
-    found = estimate(take)
+    found = estimate_orientations(take)
     for segment, q in found.q.items():
         standing = mean(q[samples(take.calibration.zero, 100.0)])
         R = angle_between(standing, normalise(_neutral()))
@@ -45,7 +46,7 @@ def _neutral() -> Floats:
 
 def test_quaternions_are_unit_finite_and_deterministic() -> None:
     take = calibrated()
-    once, again = estimate(take), estimate(take)
+    once, again = estimate_orientations(take), estimate_orientations(take)
     for segment, q in once.q.items():
         assert np.abs(np.linalg.norm(q, axis=1) - 1).max() < 1e-9
         assert np.array_equal(q, again.q[segment])
@@ -56,7 +57,7 @@ def test_inclination_follows_the_truth_within_a_degree() -> None:
     """Long axis of the shank against the truth, both relative to standing, over 5 min."""
     recording, truth = simulated("five_minutes")
     take = calibrate(recording)
-    found = estimate(take)
+    found = estimate_orientations(take)
     n = min(len(recording.t_s), len(truth.t_s))
     part = samples(take.calibration.zero, 100.0)
     for segment in ("shank_l", "shank_r"):
@@ -76,7 +77,10 @@ def test_any_mounting_gives_the_same_orientations() -> None:
     recording, _ = simulated("comfortable")
     rng = np.random.default_rng(3)
     by: dict[Segment, Floats] = {s: normalise(rng.standard_normal(4)) for s in recording.sensors}
-    one, other = estimate(calibrate(recording)), estimate(calibrate(turned(recording, by)))
+    one, other = (
+        estimate_orientations(calibrate(recording)),
+        estimate_orientations(calibrate(turned(recording, by))),
+    )
     for segment, q in one.q.items():
         assert np.degrees(angle_between(q, other.q[segment]).max()) < 0.1, segment
 
@@ -86,7 +90,7 @@ def test_relative_heading_drift_is_taken_out_over_a_long_walk() -> None:
     """Without the correction the same take fails the limit: the check can fail."""
     recording, truth = simulated("five_minutes", 1)
     take = calibrate(recording)
-    held, free = estimate(take), estimate(take, NO_DRIFT)
+    held, free = estimate_orientations(take), estimate_orientations(take, NO_DRIFT)
     n = min(len(recording.t_s), len(truth.t_s))
 
     def worst(q: Mapping[Segment, Floats]) -> float:
@@ -109,14 +113,14 @@ def test_relative_heading_drift_is_taken_out_over_a_long_walk() -> None:
 def test_drift_correction_leaves_a_short_walk_alone() -> None:
     take = calibrated("slow")
     params = replace(NO_DRIFT, drift=DriftParams(reference_s=300.0))
-    for segment, q in estimate(take, params).q.items():
-        assert np.array_equal(q, estimate(take, NO_DRIFT).q[segment])
+    for segment, q in estimate_orientations(take, params).q.items():
+        assert np.array_equal(q, estimate_orientations(take, NO_DRIFT).q[segment])
 
 
 def test_drift_correction_does_not_change_flexion() -> None:
     take = calibrated("five_minutes")
-    held = joint_angles(estimate(take), take.calibration.zero).angles
-    free = joint_angles(estimate(take, NO_DRIFT), take.calibration.zero).angles
+    held = joint_angles(estimate_orientations(take), take.calibration.zero).angles
+    free = joint_angles(estimate_orientations(take, NO_DRIFT), take.calibration.zero).angles
     for name in ("knee_flexion_l", "knee_flexion_r"):
         assert rms_deg(held[name] - free[name]) < 1.0
 
@@ -125,7 +129,7 @@ def test_a_lost_sensor_is_masked_and_comes_back() -> None:
     recording, truth = simulated("comfortable")
     broken = lost(recording, "shank_l", 15.0, 20.0)
     take = calibrate(broken)
-    found = estimate(take)
+    found = estimate_orientations(take)
     assert not found.valid["shank_l"][1500:2000].any()
     assert found.valid["shank_l"][2000:].all()
     angles = joint_angles(found, take.calibration.zero)
@@ -140,10 +144,10 @@ def test_a_lost_sensor_is_masked_and_comes_back() -> None:
 def test_a_lost_pelvis_finds_its_heading_again_and_leaves_the_legs_alone() -> None:
     """The gap covers a turn, so that a held heading would be far off."""
     recording, truth = simulated("fast_with_turns")
-    whole = estimate(calibrate(recording))
+    whole = estimate_orientations(calibrate(recording))
     turning = np.flatnonzero(calibrate(recording).calibration.turning) / 100.0
     take = calibrate(lost(recording, "pelvis", float(turning[0]) - 0.2, float(turning[0]) + 3.0))
-    found = estimate(take)
+    found = estimate_orientations(take)
     late = slice(round(100 * turning[0]) + 600, round(100 * truth.stands[-1][0]))
     thighs: tuple[Segment, ...] = ("thigh_l", "thigh_r")
     for thigh in thighs:
@@ -154,8 +158,8 @@ def test_a_lost_pelvis_finds_its_heading_again_and_leaves_the_legs_alone() -> No
 
 def test_feet_alone_are_estimated_as_in_the_full_set() -> None:
     recording, _ = simulated("slow")
-    alone = estimate(calibrate(only(recording, "foot_l", "foot_r")))
-    full = estimate(calibrate(recording))
+    alone = estimate_orientations(calibrate(only(recording, "foot_l", "foot_r")))
+    full = estimate_orientations(calibrate(recording))
     for segment in ("foot_l", "foot_r"):
         assert rms_deg(_pitch(alone.q[segment]) - _pitch(full.q[segment])) < 2.0
 
@@ -164,5 +168,5 @@ def test_nothing_calibrated_is_an_error() -> None:
     take = calibrated()
     empty = replace(take.calibration, segments={})
     with pytest.raises(EstimationError) as caught:
-        estimate(CalibratedRecording(take.recording, empty))
+        estimate_orientations(CalibratedRecording(take.recording, empty))
     assert caught.value.code == "no_segment"

@@ -16,7 +16,7 @@ from core.body.erkf.headings import agreed
 from core.body.erkf.params import ErkfParams
 from core.calibration import calibrate
 from core.frames import Segment
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.online.attempt import Wearer
 from core.online.calibrated import LiveCalibration
 from core.online.calibrating import LiveCalibrator
@@ -114,7 +114,7 @@ def test_it_is_the_offline_calibration_of_the_same_samples() -> None:
     part = cut(walk(), 0.0, found.past / 100.0)
     calibrated = calibrate(part)
     body, _ = nominal_body(part.subject.height_m, part.subject.standing_width_m, part.subject.shoe)
-    calibrated, orientations = legs_apart(calibrated, estimate(calibrated), body)
+    calibrated, orientations = legs_apart(calibrated, estimate_orientations(calibrated), body)
     offline, _, turned = agreed(calibrated, orientations, body, WHOLE, ErkfParams.people())
     assert found.turned == turned
     for segment, mounted in offline.calibration.segments.items():

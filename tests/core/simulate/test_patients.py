@@ -10,11 +10,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core import calibration, events, fusion
+from core import calibration, events
 from core.events import FootPitchParams
 from core.events.foot_pitch import pitch_signal
 from core.events.result import GaitEvents
 from core.frames import SIDES, SUFFIX
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import angle_between
 from core.simulate import (
@@ -120,7 +121,7 @@ def walked(name: str, seed: int, rising: bool = True) -> Truth:
 def recorded(name: str, seed: int = 5) -> tuple[Simulation, Orientations]:
     """The named walk as sensors see it, shocks included, and the orientations an analysis makes of it."""
     made = simulate_scenario(name, seed)
-    return made, fusion.estimate(calibration.calibrate(synchronise(made.recording)))
+    return made, estimate_orientations(calibration.calibrate(synchronise(made.recording)))
 
 
 @cache

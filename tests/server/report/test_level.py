@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from core.anatomical import anatomical_variables
 from core.norms import Norms, norms_for
 from core.parameters import cycle_curves
+from core.parameters.anatomical_zero import anatomical_variables
 from core.parameters.result import CycleCurves
 from server.report.bundle import Bundle
 from server.report.level import GROUP, level_rows

@@ -16,7 +16,7 @@ from core.norms.controls import ControlSession, control_group, mean_curves
 from core.norms.kinematics import adult_kinematics
 from core.parameters import cycle_curves
 from core.parameters.kinematic import MEAN_ZERO
-from core.standing import NAMES, PELVIS
+from core.standing_angles import NAMES, PELVIS
 from server.report.bundle import Bundle
 from server.report.model import ReportModel, report_model
 from server.report.panels import CurvePanel, same_zero

@@ -8,13 +8,14 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from core import calibration, fusion
+from core import calibration
 from core.body import nominal_body
 from core.body.erkf.headings import agreed, findings, heading_errors, turned
 from core.body.erkf.params import ErkfParams
 from core.body.tree import PRESETS
 from core.calibration.result import CalibratedRecording
 from core.frames import R_NEUTRAL, Segment
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rest import samples
 from core.rotation import about, angle_between, from_matrix, to_matrix
@@ -35,7 +36,7 @@ def take(
         mount = to_matrix(about(1, radians(angle))) @ was.R_segment_sensor
         segments[segment] = replace(was, R_segment_sensor=mount)
     calibrated = replace(calibrated, calibration=replace(calibrated.calibration, segments=segments))
-    orientations = fusion.estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     body, _ = nominal_body(recording.subject.height_m)
     found = heading_errors(calibrated, orientations, body, WHOLE, ErkfParams.offline())
     return calibrated, orientations, {s: degrees(x) for s, x in found.items()}
@@ -76,7 +77,7 @@ def test_nobody_walking_means_nothing_is_found() -> None:
     calibrated = calibration.calibrate(recording)
     still = replace(calibrated, calibration=replace(calibrated.calibration, walking=()))
     body, _ = nominal_body(recording.subject.height_m)
-    assert heading_errors(still, fusion.estimate(calibrated), body, WHOLE, ErkfParams.offline()) == {}
+    assert heading_errors(still, estimate_orientations(calibrated), body, WHOLE, ErkfParams.offline()) == {}
 
 
 def test_passes_are_repeated_until_a_large_error_is_gone() -> None:

@@ -19,7 +19,7 @@ from core.body.model import BodyModel
 from core.calibration import calibrate
 from core.errors import EstimationError, SagittalError, SignalError
 from core.frames import FOOT, SIDES, Floats, Segment
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.pipeline import PipelineConfig, analyse
 from core.recording import Recording, SensorSignals, UniformRecording
 from core.rotation import about, multiply, rotate
@@ -168,7 +168,7 @@ def test_calibration_finds_forward_of_a_foot_sensor_put_on_backwards(estimator: 
 def test_a_foot_that_faces_backwards_after_calibration_is_refused(estimator: Estimator) -> None:
     recording = take(estimator)
     calibrated = calibrate(recording)
-    orientations = estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     turned = {**orientations.q, "foot_r": multiply(about(2, np.pi), orientations.q["foot_r"])}
     with pytest.raises(EstimationError) as error:
         l7s_poses(
@@ -187,7 +187,7 @@ def test_feet_whose_headings_disagree_are_told(
     estimator: Estimator, off_deg: float, verdict: Verdict
 ) -> None:
     calibrated = calibrate(take(estimator))
-    orientations = estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     acceleration, turn = free_acceleration(calibrated, orientations), about(2, np.radians(off_deg))
     q = {**orientations.q, "foot_l": multiply(turn, orientations.q["foot_l"])}
     moved = {**acceleration, "foot_l": rotate(turn, acceleration["foot_l"])}
@@ -263,7 +263,7 @@ def test_a_burst_of_no_numbers_is_a_gap(estimator: Estimator) -> None:
 
 def test_a_number_that_is_none_inside_a_valid_sample_is_refused() -> None:
     calibrated = calibrate(take("l7s_3i"))
-    orientations = estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     model = LegModel.of(BodyModel.from_height(1.75))
     acceleration = free_acceleration(calibrated, orientations)
     inputs = inputs_of(orientations, acceleration, still_feet(calibrated), model, "3I").part(slice(0, 60))
@@ -283,7 +283,7 @@ def test_a_missing_sensor_is_named(missing: Segment) -> None:
         estimated(kept, PoseParams(estimator="l7s_3i"))
     assert asked.value.code == "estimator_impossible"
     calibrated = calibrate(recording)
-    orientations = estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     without = replace(orientations, q={s: q for s, q in orientations.q.items() if s != missing})
     with pytest.raises(EstimationError) as given:
         l7s_poses(
@@ -338,7 +338,7 @@ def test_a_protocol_in_which_the_pelvis_sinks_is_told(estimator: Estimator, prot
 def test_a_squat_that_no_protocol_announced_is_told(depth_m: float, verdict: Verdict) -> None:
     recording = take("l7s_3i")
     calibrated = calibrate(recording)
-    orientations = estimate(calibrated)
+    orientations = estimate_orientations(calibrated)
     acceleration = dict(free_acceleration(calibrated, orientations))
     share = np.clip((recording.t_s - 2.0) / 3.0, 0.0, 1.0)
     sunk = depth_m * 64.0 * share**3 * (1.0 - share) ** 3

@@ -22,7 +22,7 @@ from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError, ParameterError
 from core.frames import FOOT, SIDES, Bools, Floats, Side
-from core.fusion import estimate
+from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import about, exp, multiply, to_matrix
 from core.simulate import Truth
@@ -48,7 +48,7 @@ def still_feet(calibrated: CalibratedRecording) -> dict[Side, Bools]:
 def walk() -> tuple[CalibratedRecording, Orientations, dict[Side, Bools], Truth]:
     recording, truth = simulated("comfortable", 2)
     calibrated = calibrate(recording)
-    return calibrated, estimate(calibrated), still_feet(calibrated), truth
+    return calibrated, estimate_orientations(calibrated), still_feet(calibrated), truth
 
 
 def poses_of(worn: Worn, params: L7sParams | None = None) -> Poses:

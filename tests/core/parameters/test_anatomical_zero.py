@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.anatomical import anatomical_curves, anatomical_parameters, anatomical_variables
 from core.errors import ParameterError
 from core.frames import SIDES, Floats, Side
+from core.parameters.anatomical_zero import anatomical_curves, anatomical_parameters, anatomical_variables
 from core.parameters.result import CycleCurves
 
 

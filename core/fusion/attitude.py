@@ -9,8 +9,8 @@ Mahony, Hamel and Pflimlin 2008 (IEEE TAC 53(5)), eq 32 with k_I = 0: q̇ = ½ q
   away. The bias is the mean over rest. Heading is only as good as the
   gyroscope.
 
-The module sits beside core/rest.py because calibration needs tilt to find the walking direction and fusion
-needs it for the result; both run this one filter.
+Calibration needs tilt to find the walking direction and fusion needs it for the result; both run this one
+filter, so the module knows nothing of calibration.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ import pytest
 
 from core.angles import SIGNS
 from core.errors import ParameterError
-from core.standing import JOINTS, NAMES, check_standing
+from core.standing_angles import JOINTS, NAMES, check_standing
 
 
 def test_every_angle_of_the_exports_may_be_entered() -> None:

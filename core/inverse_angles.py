@@ -1,4 +1,4 @@
-"""Joint angles → how the segments are turned: the inverse of core.angles.
+"""Joint angles → segment orientations: the inverse of core.angles.
 
 R_distal = R_proximal Rz(a) Rx(b) Ry(c) down the leg, R_pelvis = R_neutral Ry(rotation) Rx(b) Rz(tilt), with
 the signs of core.angles. Angles over a cycle are named without side, as in the curves of core.parameters and

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.attitude import AttitudeParams, AttitudeState, advance, orientation
 from core.errors import EstimationError, ParameterError
 from core.frames import GRAVITY, Bools, Floats
+from core.fusion.attitude import AttitudeParams, AttitudeState, advance, orientation
 from core.rotation import about, angle_between, conjugate, exp, multiply, rotate
 
 RATE = 100.0

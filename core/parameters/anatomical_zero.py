@@ -11,7 +11,7 @@ import numpy as np
 from core.frames import SIDES, SUFFIX, Floats, Side
 from core.parameters.kinematic import FIGURES, is_level, kinematic
 from core.parameters.result import CycleCurves, Parameter
-from core.standing import JOINTS, PELVIS, check_standing
+from core.standing_angles import JOINTS, PELVIS, check_standing
 
 
 def anatomical_curves(curves: CycleCurves, standing_deg: Mapping[str, float]) -> CycleCurves:
@@ -19,7 +19,7 @@ def anatomical_curves(curves: CycleCurves, standing_deg: Mapping[str, float]) ->
 
     Parameters
     ----------
-    curves : from standing. standing_deg : goniometer angles in standing, `core.standing.NAMES`.
+    curves : from standing. standing_deg : goniometer angles in standing, `core.standing_angles.NAMES`.
 
     Raises
     ------

@@ -7,8 +7,8 @@ import pytest
 
 from core.angles import SIGNS, cardan_zxy, joints, pelvis_angles
 from core.frames import SIDES, Floats, Side
+from core.inverse_angles import leg_orientations, pelvis_orientation
 from core.norms import adult_kinematics
-from core.posture import leg_orientations, pelvis_orientation
 from core.rotation import conjugate, multiply, rotate
 
 
