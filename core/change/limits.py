@@ -14,6 +14,8 @@ from typing import Final, Literal
 
 import numpy as np
 
+from core.parameters.catalogue import CATALOGUE
+
 Limb = Literal["affected", "unaffected"]
 
 FEWEST: Final = 5
@@ -79,13 +81,13 @@ def detectable(name: str, baseline: float, limb: Limb | None = None) -> ChangeLi
     baseline : value before; speed has limits by how fast somebody walked.
     limb : None = no side is affected: the larger limit of the two.
     """
-    if name == "gait_speed_mps":
+    entry = CATALOGUE.get(name)
+    key = None if entry is None else entry.change
+    if key == "speed":
         return next(limit for below, limit in _SPEED if baseline < below)
-    if name in _BY_LIMB:
-        return _of_limb(_BY_LIMB[name][0], limb)
-    if name.endswith("_pct") and name.removesuffix("_pct") in _TEMPORAL:
-        return _TIMES
-    return _MDC.get(name)
+    if key in _BY_LIMB:
+        return _of_limb(_BY_LIMB[key][0], limb)
+    return None if key is None else _MDC[key]
 
 
 def detectable_ratio(name: str) -> ChangeLimit | None:
@@ -95,9 +97,11 @@ def detectable_ratio(name: str) -> ChangeLimit | None:
 
 def relevant(name: str, limb: Limb | None = None) -> ChangeLimit | None:
     """MCID of a parameter or score; None where no source has one."""
-    if name in _BY_LIMB:
-        return _of_limb(_BY_LIMB[name][1], limb)
-    return _MCID.get(name)
+    entry = CATALOGUE.get(name)
+    key = name if entry is None else entry.change
+    if key in _BY_LIMB:
+        return _of_limb(_BY_LIMB[key][1], limb)
+    return None if key is None else _MCID.get(key)
 
 
 def _mdc95(sem: float) -> float:
@@ -120,26 +124,14 @@ _SPEED: Final = (
 """Speed below → limit."""
 
 _KESAR: Final = "Kesar et al. 2011 (Gait Posture 33:314), treadmill"
-_TIMES: Final = ChangeLimit(4.2, _CHRONIC, f"{_KESAR}: the largest of its temporal limits, 3.2 to 4.2 %")
-_TEMPORAL: Final = (
-    "stance", "swing", "single_support", "double_support", "initial_double_support",
-    "terminal_double_support",
-)  # fmt: skip
-_ANGLE: Final = ChangeLimit(11.5, _CHRONIC, f"{_KESAR}: the largest of its joint angles, 3.8 to 11.5°")
 _MDC: Final = {
-    "step_length_m": ChangeLimit(0.067, _CHRONIC, f"{_KESAR}, affected side"),
-    "hip_flexion_min_deg": ChangeLimit(11.5, _CHRONIC, _KESAR),
-    "hip_flexion_ic_deg": _ANGLE,
-    "knee_flexion_ic_deg": _ANGLE,
-    "knee_flexion_max_loading_deg": _ANGLE,
-    "knee_flexion_min_stance_deg": _ANGLE,
-    "knee_flexion_max_swing_deg": _ANGLE,
-    "ankle_dorsiflexion_ic_deg": _ANGLE,
-    "ankle_dorsiflexion_max_stance_deg": _ANGLE,
-    "ankle_dorsiflexion_min_deg": _ANGLE,
-    "ankle_dorsiflexion_max_swing_deg": _ANGLE,
+    "step_length": ChangeLimit(0.067, _CHRONIC, f"{_KESAR}, affected side"),
+    "hip_extension": ChangeLimit(11.5, _CHRONIC, _KESAR),
+    "angle": ChangeLimit(11.5, _CHRONIC, f"{_KESAR}: the largest of its joint angles, 3.8 to 11.5°"),
+    "share": ChangeLimit(4.2, _CHRONIC, f"{_KESAR}: the largest of its temporal limits, 3.2 to 4.2 %"),
 }
-"""Angles of which only the range of all limits was read take its largest."""
+"""`ParameterEntry.change` → limit. Angles and shares of which only the range of all limits was read take its
+largest."""
 
 _GUZIK_KNEE: Final = "Guzik et al. 2020 (J Clin Med 9:3305)"
 _GUZIK_HIP: Final = "Guzik et al. 2021 (Front Neurol 12:700190)"
@@ -154,10 +146,10 @@ def _from_sem(affected: float, unaffected: float, source: str) -> tuple[ChangeLi
 
 
 _BY_LIMB: Final = {
-    "knee_flexion_rom_deg": (_from_sem(1.86, 5.63, _GUZIK_KNEE), _pair(8.48, 6.81, _GUZIK_KNEE)),
-    "hip_flexion_rom_deg": (_from_sem(1.56, 1.04, _GUZIK_HIP), _pair(5.81, 2.86, _GUZIK_HIP)),
+    "knee_range": (_from_sem(1.86, 5.63, _GUZIK_KNEE), _pair(8.48, 6.81, _GUZIK_KNEE)),
+    "hip_range": (_from_sem(1.56, 1.04, _GUZIK_HIP), _pair(5.81, 2.86, _GUZIK_HIP)),
 }
-"""Parameter → MDC and MCID of the affected and the unaffected limb."""
+"""`ParameterEntry.change` → MDC and MCID of the affected and the unaffected limb."""
 
 _RATIO: Final = "Lewek & Randall 2011 (J Neurol Phys Ther 35:116), comfortable speed, affected / unaffected"
 _RATIOS: Final = {
@@ -167,6 +159,7 @@ _RATIOS: Final = {
 }
 
 _MCID: Final = {
-    "gait_speed_mps": ChangeLimit(0.16, "people in the first months after stroke", "Tilson et al. 2010"),
+    "speed": ChangeLimit(0.16, "people in the first months after stroke", "Tilson et al. 2010"),
     "gps_deg": ChangeLimit(1.6, "children", "Baker et al. 2012"),
 }
+"""`ParameterEntry.change`, or the name of a score → limit."""

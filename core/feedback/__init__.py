@@ -6,7 +6,6 @@ from core.feedback.baseline import Baseline
 from core.feedback.cue import Cue, FeedbackState, GuardState, SideEffect, Summary, Tone
 from core.feedback.engine import Command, FeedbackEngine
 from core.feedback.prescription import (
-    PARAMETERS,
     Guard,
     Prescription,
     Progression,
@@ -18,7 +17,6 @@ from core.feedback.stride import StrideLike
 from core.feedback.summary import AnalysedStride, FeedbackSplit, split
 
 __all__ = [
-    "PARAMETERS",
     "AnalysedStride",
     "Baseline",
     "Command",

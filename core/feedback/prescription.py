@@ -14,15 +14,7 @@ from typing import Final, Literal, get_args
 from core.errors import ParameterError
 from core.feedback.fields import Fields
 from core.frames import SIDES, Side
-from core.parameters.kinematic import FIGURES, FOOT_PITCH
-from core.parameters.temporal import NAMES as TEMPORAL
-
-DISTANCES: Final = (
-    "gait_speed_mps", "stride_length_m", "step_length_m", "step_width_m", "circumduction_m",
-    "max_heel_clearance_m", "min_toe_clearance_m", "toe_out_deg",
-)  # fmt: skip
-PARAMETERS: Final[tuple[str, ...]] = (*DISTANCES, *TEMPORAL, *FIGURES, *FOOT_PITCH)
-"""Parameters of a single stride that can be trained."""
+from core.parameters.catalogue import list_trainable
 
 TargetSource = Literal["norm", "own_better_side", "own_baseline", "manual"]
 Mode = Literal["bar", "zone", "tone", "tick"]
@@ -179,7 +171,7 @@ class Prescription:
 def _prescription(data: Mapping[str, object]) -> Prescription:
     f = Fields("prescription", data)
     target = _target(f.part("target"))
-    parameter = f.choice("parameter", PARAMETERS)
+    parameter = f.choice("parameter", list_trainable())
     side = f.choice("side", (*SIDES, None), None)
     modes = tuple(dict.fromkeys(f.choices("modes", MODES, ("bar",))))
     made = Prescription(

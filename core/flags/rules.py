@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 from core.norms.tables import WBDS, rows
 from core.norms.values import single_side_sd
-from core.parameters.kinematic import CurveFigure
+from core.parameters.catalogue import CurveFigure, list_curve_figures
 
 Kind = Literal["value", "difference", "ratio"]
 Beyond = Literal["above", "below"]
@@ -46,15 +46,11 @@ class Rule:
 
 CURVES: Final[Mapping[str, CurveFigure]] = {
     "knee_flexion_peak_swing_deg": CurveFigure("knee_flexion", "max", 60, 85),
-    "knee_flexion_min_stance_deg": CurveFigure("knee_flexion", "min", 20, 60),
-    "knee_flexion_rom_deg": CurveFigure("knee_flexion", "range"),
-    "hip_flexion_min_deg": CurveFigure("hip_flexion", "min"),
-    "hip_flexion_rom_deg": CurveFigure("hip_flexion", "range"),
-    "ankle_dorsiflexion_max_swing_deg": CurveFigure("ankle_dorsiflexion", "max", 75, 100),
-    "ankle_dorsiflexion_rom_deg": CurveFigure("ankle_dorsiflexion", "range"),
     "pelvis_obliquity_max_swing_deg": CurveFigure("pelvis_obliquity", "max", 60, 100),
+    **list_curve_figures(),
 }
-"""What is read from the cycle curves, in the windows of docs/science/flags.md, "Rules"."""
+"""What rules may read from the cycle curves: figures of their own (docs/science/flags.md, "Rules") and the
+angle parameters."""
 
 SWING_TO_STANCE: Final = "swing_to_stance"
 """Swing time over stance time of a side; its ratio between the sides is the overall temporal symmetry of

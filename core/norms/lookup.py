@@ -9,13 +9,13 @@ from core.norms.kinematics import NormBand, adult_kinematics
 from core.norms.place import Place, place, place_difference
 from core.norms.speed import WalkingSpeed, walking_speed
 from core.norms.values import (
-    ANGLES,
     NormValue,
     Pace,
     Sex,
     angle_values,
     comfortable_speed,
     expected_at_speed,
+    is_angle,
     pace_of,
     temporal_values,
 )
@@ -47,7 +47,7 @@ class Norms:
 
     def place(self, name: str, value: float | None) -> Place:
         """Where a value of a parameter stands."""
-        reason = self.reason if name in ANGLES else self.timing_reason
+        reason = self.reason if is_angle(name) else self.timing_reason
         return place(value, self.values.get(name), reason or "no_norm")
 
     def place_difference(self, name: str, left: float | None, right: float | None) -> Place:

@@ -45,11 +45,6 @@ class WalkingSpeed:
         """Reference people walked as slowly as this."""
         return self.equivalent_mps >= SLOW_MPS
 
-    @property
-    def from_comfortable_sd(self) -> float:
-        """Standard deviations above the speed of the adults of the angle norms."""
-        return (self.equivalent_mps - WBDS_MPS[0]) / WBDS_MPS[1]
-
 
 def walking_speed(speed_mps: float, height_m: float | None = None) -> WalkingSpeed:
     """Relate a speed to the legs that made it; leg length by Winter's fractions of the height."""

@@ -10,41 +10,10 @@ from typing import Final, Literal, cast
 from core.frames import GRAVITY
 from core.norms.speed import WBDS_MPS
 from core.norms.tables import LEVEL, WBDS, WBDS_N, rows, wbds_group
+from core.parameters.catalogue import CATALOGUE, NormKey
 
 Sex = Literal["female", "male"]
 Pace = Literal["slow", "normal", "fast"]
-
-ANGLES: Final[Mapping[str, str]] = {
-    "hip_flexion_ic_deg": "hip_flexion_IC",
-    "hip_flexion_min_deg": "hip_extension_peak",
-    "hip_flexion_rom_deg": "hip_sagittal_ROM",
-    "knee_flexion_ic_deg": "knee_flexion_IC",
-    "knee_flexion_max_loading_deg": "knee_flexion_loading_peak(0-30%)",
-    "knee_flexion_min_stance_deg": "knee_min_stance(20-60%)",
-    "knee_flexion_max_swing_deg": "knee_flexion_swing_peak",
-    "knee_flexion_rom_deg": "knee_sagittal_ROM",
-    "ankle_dorsiflexion_ic_deg": "ankle_IC",
-    "ankle_dorsiflexion_max_stance_deg": "ankle_DF_stance_peak",
-    "ankle_dorsiflexion_min_deg": "ankle_PF_peak",
-    "ankle_dorsiflexion_max_swing_deg": "ankle_DF_swing_peak(75-100%)",
-    "ankle_dorsiflexion_rom_deg": "ankle_ROM",
-}
-"""Our parameter → row of kinematic_parameters_wbds.csv."""
-
-TEMPORAL: Final[Mapping[str, str]] = {
-    "stride_time_s": "stride_time_s",
-    "step_time_s": "step_time_s",
-    "stance_pct": "stance_pct",
-    "swing_pct": "swing_pct",
-    "double_support_pct": "double_support_pct",
-    "single_support_pct": "single_support_pct",
-    "cadence_spm": "cadence_steps_min",
-    "stride_length_m": "stride_length_m",
-    "step_length_m": "step_length_m",
-    "step_width_m": "stride_width_m",
-    "gait_speed_mps": "speed_m_s",
-}
-"""Our parameter → parameter of spatiotemporal_age_sex.csv."""
 
 _NOT_LEVEL = "Not comparable: measured from the person's own standing, the reference is anatomical."
 _BAND = "The range defines the pace class, it is not mean ± SD."
@@ -56,14 +25,8 @@ _FOOT_OFF = (
 _WIDTH = "Not comparable: a walkway measures between the heels, we between the ankles, which is wider."
 """Heels lie 5 to 6 cm behind the ankles: with toes out by 7 to 10° that is 1 to 2 cm, half a reference sd."""
 
-_NOT_COMPARABLE: Final[Mapping[str, str]] = {
-    "step_width_m": _WIDTH,
-    "stance_pct": _FOOT_OFF,
-    "swing_pct": _FOOT_OFF,
-    "double_support_pct": _FOOT_OFF,
-    "single_support_pct": _FOOT_OFF,
-}
-"""Parameter → why a walkway's reference says nothing about ours."""
+_DIFFERS: Final[Mapping[str | None, str]] = {None: "", "ankles": _WIDTH, "foot_off": _FOOT_OFF}
+"""What is measured differently (`NormKey.differs`) → why the reference says nothing about ours."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +60,21 @@ class NormValues:
     reason: str | None = None
 
 
+def list_norm_keys(table: Literal["angles", "walkway"]) -> dict[str, NormKey]:
+    """Parameters of the catalogue with a reference in a table, and their rows there."""
+    return {
+        name: entry.norm
+        for name, entry in CATALOGUE.items()
+        if entry.norm is not None and entry.norm.table == table
+    }
+
+
+def is_angle(name: str) -> bool:
+    """The reference of a parameter is that of the adults of the cycle curves."""
+    entry = CATALOGUE.get(name)
+    return entry is not None and entry.norm is not None and entry.norm.table == "angles"
+
+
 def angle_values(age: float | None, anatomical: Collection[str] = ()) -> NormValues:
     """Reference of the angle parameters for an adult of this age (None = all adults).
 
@@ -108,8 +86,8 @@ def angle_values(age: float | None, anatomical: Collection[str] = ()) -> NormVal
     column = "all" if group == "adult_21_84" else group
     table = {r["parameter"]: r for r in rows("kinematic_parameters_wbds")}
     values = {}
-    for name, key in ANGLES.items():
-        row = table[key]
+    for name, key in list_norm_keys("angles").items():
+        row = table[key.row]
         comparable = name.endswith("_rom_deg") or any(name.startswith(f"{v}_") for v in anatomical)
         values[name] = NormValue(
             name=name,
@@ -140,11 +118,11 @@ def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -
         return NormValues(reason="age_unknown" if age is None else "sex_unknown")
     table = {r["parameter"]: r for r in _people(age, sex) if r["pace"] == pace}
     values = {}
-    for name, key in TEMPORAL.items():
-        if key not in table:
+    for name, key in list_norm_keys("walkway").items():
+        if key.row not in table:
             continue
-        row = table[key]
-        note = _BAND if row["kind"] != "mean_sd" else _NOT_COMPARABLE.get(name, "")
+        row = table[key.row]
+        note = _BAND if row["kind"] != "mean_sd" else _DIFFERS[key.differs]
         first, last = row["age_min"], row["age_max"]
         ages = f"{first} years" if first == last else f"{first} to {last} years"
         values[name] = NormValue(

@@ -14,8 +14,8 @@ from core.body.feet import FootTracks
 from core.events.result import Stride, Strides
 from core.frames import Bools, Floats, Segment
 from core.online.frame import NOT_YET
+from core.parameters.catalogue import list_curve_figures
 from core.parameters.kinematic import (
-    FIGURES,
     FOOT_PITCH,
     cycle_curves,
     foot_pitch,
@@ -67,7 +67,8 @@ def early_figures(stride: Stride, span: Span, surface: Surface) -> Figures:
     curves = cycle_curves(span.angles or NO_ANGLES, one)
     found |= flat.rows[0]
     found |= phase_rows(one, flat, span.angles, pitch, span.feet)[0]
-    worn = dict.fromkeys(FIGURES, "joint_missing") | dict.fromkeys(FOOT_PITCH, "no_foot_sensor")
+    read_from = list_curve_figures()
+    worn = dict.fromkeys(read_from, "joint_missing") | dict.fromkeys(FOOT_PITCH, "no_foot_sensor")
     found |= worn | {"turning_angle_deg": "gap"}
     read = {**stride_figures(curves), **turning_angle(one), **foot_pitch(span, one, pitch)}
     for name, sides in read.items():
@@ -75,7 +76,7 @@ def early_figures(stride: Stride, span: Span, surface: Surface) -> Figures:
         if values is not None and len(values):
             value = float(values[0])
             reason = "no_terminal_contact" if name == FOOT_PITCH[1] and stride.tc_s is None else "gap"
-            if name in FIGURES and (why := curves.why.get(FIGURES[name].variable, {}).get(stride.side)):
+            if name in read_from and (why := curves.why.get(read_from[name].variable, {}).get(stride.side)):
                 reason = why
             found[name] = value if isfinite(value) else reason
     if surface.protocol == "treadmill" or span.feet is None or stride.side not in span.feet.p:

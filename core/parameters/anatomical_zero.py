@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from core.frames import SIDES, SUFFIX, Floats, Side
-from core.parameters.kinematic import FIGURES, is_level, kinematic
+from core.parameters.catalogue import list_curve_figures
+from core.parameters.kinematic import is_level, kinematic
 from core.parameters.result import CycleCurves, Parameter
 from core.standing_angles import JOINTS, PELVIS, check_standing
 
@@ -56,13 +57,13 @@ def anatomical_parameters(curves: CycleCurves, standing_deg: Mapping[str, float]
 
     Names are those of the parameters from standing; ranges, which have no zero, are not repeated.
     """
-    level = anatomical_curves(curves, standing_deg)
+    level, figures = anatomical_curves(curves, standing_deg), list_curve_figures()
     return tuple(
         p
         for p in kinematic(level)
         if p.side is not None
         and is_level(p.name)
-        and p.side in level.curves.get(FIGURES[p.name].variable, {})
+        and p.side in level.curves.get(figures[p.name].variable, {})
     )
 
 

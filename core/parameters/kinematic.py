@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
 from core.angles import JointAngles
 from core.events.result import Strides
 from core.frames import FOOT, SIDES, SUFFIX, Bools, Floats, Oriented, Segment, Side
+from core.parameters.catalogue import CATALOGUE, CurveFigure, list_curve_figures
 from core.parameters.plausible import IMPOSSIBLE, LEAST_KNEE
 from core.parameters.resample import resample
 from core.parameters.result import CycleCurves, Parameter
@@ -29,38 +30,10 @@ MEAN_ZERO: Final = ("pelvis_rotation", "foot_progression")
 """Variables whose zero is their own mean over each stride: they have a shape and no level."""
 
 
-@dataclass(frozen=True)
-class CurveFigure:
-    """A statistic of one curve between two percentages of the cycle, both included."""
-
-    variable: str
-    statistic: Literal["at", "max", "min", "range"]
-    start_pct: int = 0
-    end_pct: int = 100
-
-
-FIGURES: Final[Mapping[str, CurveFigure]] = {
-    "hip_flexion_ic_deg": CurveFigure("hip_flexion", "at"),
-    "hip_flexion_min_deg": CurveFigure("hip_flexion", "min"),
-    "hip_flexion_rom_deg": CurveFigure("hip_flexion", "range"),
-    "knee_flexion_ic_deg": CurveFigure("knee_flexion", "at"),
-    "knee_flexion_max_loading_deg": CurveFigure("knee_flexion", "max", 0, 30),
-    "knee_flexion_min_stance_deg": CurveFigure("knee_flexion", "min", 20, 60),
-    "knee_flexion_max_swing_deg": CurveFigure("knee_flexion", "max", 50, 100),
-    "knee_flexion_rom_deg": CurveFigure("knee_flexion", "range"),
-    "ankle_dorsiflexion_ic_deg": CurveFigure("ankle_dorsiflexion", "at"),
-    "ankle_dorsiflexion_max_stance_deg": CurveFigure("ankle_dorsiflexion", "max", 0, 60),
-    "ankle_dorsiflexion_min_deg": CurveFigure("ankle_dorsiflexion", "min"),
-    "ankle_dorsiflexion_max_swing_deg": CurveFigure("ankle_dorsiflexion", "max", 75, 100),
-    "ankle_dorsiflexion_rom_deg": CurveFigure("ankle_dorsiflexion", "range"),
-}
-"""Parameter name → how it is read from the cycle curve."""
-
-
 def is_level(name: str) -> bool:
     """The parameter is a joint angle with a zero, not a range: how the person stood is part of it."""
-    figure = FIGURES.get(name)
-    return figure is not None and figure.statistic != "range"
+    entry = CATALOGUE.get(name)
+    return entry is not None and entry.curve is not None and entry.curve.statistic != "range"
 
 
 AT_BOUND: Final = "at_bound"
@@ -160,11 +133,16 @@ def mean_curve(curves: CycleCurves, variable: str, side: Side) -> MeanCurve:
 
 
 def stride_figures(
-    curves: CycleCurves, figures: Mapping[str, CurveFigure] = FIGURES
+    curves: CycleCurves, figures: Mapping[str, CurveFigure] | None = None
 ) -> dict[str, dict[Side, Floats]]:
-    """Angle parameters of every stride: name → side → (strides,) degrees, NaN where undefined."""
+    """Angle parameters of every stride: name → side → (strides,) degrees, NaN where undefined.
+
+    Parameters
+    ----------
+    figures : name → what is read from the curves; None = those of the catalogue.
+    """
     values: dict[str, dict[Side, Floats]] = {}
-    for name, figure in figures.items():
+    for name, figure in (list_curve_figures() if figures is None else figures).items():
         for side, rows in curves.curves.get(figure.variable, {}).items():
             part = np.degrees(rows[:, figure.start_pct : figure.end_pct + 1])
             if figure.statistic == "at":
@@ -224,14 +202,15 @@ def kinematic(
     without a value a reason: "joint_missing" (a segment carries no sensor), "no_strides", "gap", "at_bound"
     (in most strides), "estimator_bad", "impossible".
     """
-    figures: dict[str, Mapping[Side, Floats]] = {name: {} for name in FIGURES}
+    read = list_curve_figures()
+    figures: dict[str, Mapping[Side, Floats]] = {name: {} for name in read}
     figures |= stride_figures(curves)
     figures |= more or {}
     parameters = []
     for side in SIDES:
         used = curves.used[side]
         for name, sides in figures.items():
-            variable = FIGURES[name].variable if name in FIGURES else name
+            variable = read[name].variable if name in read else name
             why = curves.why.get(variable, {}).get(side)
             if side not in sides:
                 reason = why or "joint_missing"
@@ -249,7 +228,8 @@ def kinematic(
 
 def _at_bound(curves: CycleCurves, name: str, side: Side, values: Floats) -> Bools:
     """Figures (strides,) in degrees that are the bound of a leg model and no measurement."""
-    figure = FIGURES.get(name)
+    entry = CATALOGUE.get(name)
+    figure = None if entry is None else entry.curve
     bound = None if figure is None else curves.bounds.get(figure.variable, {}).get(side)
     if figure is None or bound is None or figure.statistic == "range":
         return np.zeros(len(values), np.bool_)

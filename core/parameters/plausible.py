@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import inf, radians
+from math import radians
 from typing import Final
+
+from core.parameters.catalogue import CATALOGUE
 
 IMPOSSIBLE: Final = "impossible"
 """Reason of a value that was found and is not told."""
-
-LIMITS: Final[Mapping[str, tuple[float, float]]] = {
-    "step_time_s": (0.2, inf),
-    "cadence_spm": (0.0, 240.0),
-}
-"""Parameter → least and greatest value. Sprinters take up to 290 steps a minute, nobody walks at 240."""
 
 LEAST_KNEE: Final = radians(-20.0)
 """Knee flexion from the anatomical zero: beyond, a knee that walks is torn. From standing it is asked for
@@ -22,5 +17,5 @@ where nobody entered the standing angle: who stands with bent knees walks with t
 
 def impossible(name: str, value: float) -> bool:
     """Tell whether no person can have this value of a parameter."""
-    low, high = LIMITS.get(name, (-inf, inf))
-    return value < low or value > high
+    entry = CATALOGUE.get(name)
+    return entry is not None and (value < entry.plausible[0] or value > entry.plausible[1])

@@ -8,8 +8,9 @@ from math import isfinite, isnan
 
 from core.events.result import Strides
 from core.frames import SIDES, Floats, Side
+from core.parameters.catalogue import unit_of
 from core.parameters.result import Parameter
-from core.parameters.variability import summary, unit_of
+from core.parameters.variability import summary
 
 Value = float | str
 """A figure of one stride, or the code of the reason why it has none."""

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from core.body.feet import FootTracks
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Protocol, Side
+from core.parameters.catalogue import list_names
+from core.parameters.catalogue.entry import DISTANCES
 from core.parameters.clearance import SoleHeights, over_floor, sole_heights, toe_clearance
 from core.parameters.flats import OTHER, Places, places
 from core.parameters.result import Parameter
@@ -27,20 +29,8 @@ from core.parameters.variability import summary
 from core.recording import UniformRecording
 from core.rotation import yaw
 
-NAMES: Final[tuple[str, ...]] = (
-    "gait_speed_mps",
-    "stride_length_m",
-    "step_length_m",
-    "step_width_m",
-    "circumduction_m",
-    "max_heel_clearance_m",
-    "min_toe_clearance_m",
-    "toe_out_deg",
-)
+NAMES: Final[tuple[str, ...]] = (*list_names(DISTANCES, of="stride"), "toe_out_deg")
 """Per-side parameters in the order of the tables."""
-
-BELT: Final = ("gait_speed_mps", "stride_length_m")
-"""What the belt's speed gives on a treadmill; everything else needs the room."""
 
 STEP_M: Final = 0.05
 """Two rests of a foot closer than this are one place (our choice: below the error of a stride)."""

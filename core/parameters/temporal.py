@@ -8,39 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isnan
-from typing import Final
+from math import inf, isnan
 
 import numpy as np
 
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats
-from core.parameters.plausible import IMPOSSIBLE, LIMITS, impossible
+from core.parameters.catalogue import CATALOGUE, unit_of
+from core.parameters.plausible import IMPOSSIBLE, impossible
 from core.parameters.result import Parameter
 from core.parameters.rows import Column, as_column
-from core.parameters.variability import summary, unit_of
-
-NAMES: Final[tuple[str, ...]] = (
-    "stride_time_s",
-    "step_time_s",
-    "stance_time_s",
-    "stance_pct",
-    "swing_time_s",
-    "swing_pct",
-    "initial_double_support_s",
-    "initial_double_support_pct",
-    "terminal_double_support_s",
-    "terminal_double_support_pct",
-    "double_support_s",
-    "double_support_pct",
-    "single_support_s",
-    "single_support_pct",
-)
-"""Per-side parameters in the order of the tables."""
+from core.parameters.variability import summary
 
 
 def stride_values(stride: Stride) -> dict[str, float | None]:
-    """Temporal parameters of one stride by name (`NAMES`), s or % of the stride; None where undefined."""
+    """Temporal parameters of one stride by name, s or % of the stride; None where undefined."""
     return {name: None if isnan(v := float(x[0])) else v for name, x in temporal_values((stride,)).items()}
 
 
@@ -50,7 +32,7 @@ def per_stride(strides: Strides) -> dict[str, Column]:
 
 
 def temporal_values(strides: Sequence[Stride]) -> dict[str, Floats]:
-    """Temporal parameters (strides,) by name (`NAMES`), s or % of the stride; NaN where undefined."""
+    """Temporal parameters (strides,) by name, s or % of the stride; NaN where undefined."""
     start, tc, end, opposite_tc, opposite_ic = np.array(
         [(s.start_s, s.tc_s, s.end_s, s.opposite_tc_s, s.opposite_ic_s) for s in strides], np.float64
     ).reshape(-1, 5).T  # fmt: skip
@@ -76,9 +58,9 @@ def temporal_values(strides: Sequence[Stride]) -> dict[str, Floats]:
 def possible_values(strides: Sequence[Stride]) -> dict[str, Floats]:
     """As `temporal_values`; NaN also where no person can have the value."""
     found = temporal_values(strides)
-    for name, (low, high) in LIMITS.items():
-        if name in found:
-            x = found[name]
+    for name, x in found.items():
+        low, high = CATALOGUE[name].plausible
+        if (low, high) != (-inf, inf):
             found[name] = np.where((x < low) | (x > high), np.nan, x)
     return found
 

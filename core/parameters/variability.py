@@ -6,7 +6,7 @@ up and down, so that it is the least uncertainty there is, not all of it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import sqrt
@@ -16,6 +16,7 @@ import numpy as np
 
 from core.events.result import COMPARED
 from core.frames import Side
+from core.parameters.catalogue import name_counted
 from core.parameters.result import Parameter
 
 CV_STRIDES: Final = 10
@@ -27,44 +28,13 @@ STEADY_STRIDES: Final = 30
 CONFIDENCE: Final = 0.95
 """Of the interval of the mean."""
 
-UNITS: Final[Mapping[str, str]] = {
-    "mps": "m/s",
-    "spm": "steps/min",
-    "deg": "deg",
-    "pct": "%",
-    "dps": "deg/s",
-    "min": "min",
-    "m": "m",
-    "s": "s",
-}
-"""Last part of a parameter's name → its unit; "" has none."""
-
-
-COUNTED: Final[Mapping[str, str]] = {
-    "cadence_spm": "steps",
-    "total_distance_m": "feet",
-    "step_count": "steps",
-    "walking_bout_count": "bouts",
-    "walking_duration_min": "bouts",
-    "turn_count": "turns",
-    "turn_angle_deg": "turns",
-    "turn_duration_s": "turns",
-    "turn_peak_velocity_dps": "turns",
-}
-"""What a parameter is the mean of, where not of strides."""
-
 TOO_FEW: Final = "too_few_strides"
 """Reason of a comparison that is not made for want of strides."""
 
 
 def comparable(p: Parameter) -> bool:
     """Enough strides, or steps, to be held against the other side, a norm, a limit or another visit."""
-    return p.n >= COMPARED or COUNTED.get(p.name, "steps") != "steps"
-
-
-def unit_of(name: str) -> str:
-    """Unit of a parameter, "" for a ratio."""
-    return UNITS.get(name.rpartition("_")[2], "")
+    return p.n >= COMPARED or name_counted(p.name) not in {"strides", "steps"}
 
 
 def summary(

@@ -10,10 +10,11 @@ import numpy as np
 from core.events.bouts import Bout
 from core.events.steps import EDGE_STEPS, Steps
 from core.events.turns import Turn
+from core.parameters.catalogue import unit_of
 from core.parameters.plausible import IMPOSSIBLE, impossible
 from core.parameters.result import Parameter
 from core.parameters.temporal import cadence
-from core.parameters.variability import summary, unit_of
+from core.parameters.variability import summary
 from core.rest import Window
 
 

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query
 from starlette.responses import Response
 
-from core.feedback import PARAMETERS
 from core.feedback.prescription import SOURCES
+from core.parameters.catalogue import list_trainable
 from server.api import feedback_schemas as schemas
 from server.api.documents import refusals
 from server.api.downloads import BINARY, attachment
@@ -72,9 +72,10 @@ def read_targets(
     side: Annotated[Side | None, Query(description="that is trained; none = both")] = None,
 ) -> list[dict[str, Any]]:
     """What each source gives as target of a parameter for this person, or why it gives nothing."""
-    if parameter not in PARAMETERS:
+    trainable = list_trainable()
+    if parameter not in trainable:
         raise Problem(
-            422, "bad_value", f"'{parameter}' cannot be trained; expected one of {', '.join(PARAMETERS)}."
+            422, "bad_value", f"'{parameter}' cannot be trained; expected one of {', '.join(trainable)}."
         )
     with db.read() as c:
         walk = targets.last_walk(c, blobs, patients.get(c, patient_id))

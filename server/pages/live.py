@@ -10,13 +10,14 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
+from core.parameters.catalogue import CATALOGUE
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id
 from server.pages.shell import record_opening, render_page
 from server.pages.words import PROTOCOL_NAMES, SEGMENT_NAMES
-from server.report.wording import TERMS, VARIABLES, ZERO_WORDS, Variable
+from server.report.wording import VARIABLES, ZERO_WORDS, Variable
 from server.services import patients, prescriptions, sessions
 from server.services.patients import Patient
 from server.services.sessions import Session
@@ -79,7 +80,7 @@ def view_live(c: Connection, session: Session, patient: Patient, *, capture: str
             "variables": [_variable(v) for v in shown],
             "segments": SEGMENT_NAMES,
             "terms": _terms(),
-            "choices": [name for name in UNPRESCRIBED if name in TERMS],
+            "choices": UNPRESCRIBED,
             "prescription": _prescribed(c, patient.id),
         },
     }
@@ -115,7 +116,15 @@ def _variable(v: Variable) -> dict[str, Any]:
 
 
 def _terms() -> dict[str, Any]:
+    """The catalogue of parameters as the live pages read it."""
     return {
-        name: {"label": t.label, "unit": t.unit, "digits": t.digits, "comparison": t.comparison}
-        for name, t in TERMS.items()
+        e.name: {
+            "label": e.label,
+            "unit": e.printed_unit,
+            "digits": e.digits,
+            "comparison": e.comparison,
+            "everyday": e.everyday,
+            "is_length": e.is_length,
+        }
+        for e in CATALOGUE.values()
     }

@@ -10,6 +10,7 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
+from core.parameters.catalogue import CATALOGUE
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -22,7 +23,6 @@ from server.pages.shell import record_opening, render_page
 from server.pages.trends import draw_teaser
 from server.pages.visit_state import judge_visit
 from server.report.exports import parameter_row
-from server.report.wording import TERMS
 from server.services import analyses, histories, live, patients, prescriptions, reviews, sessions
 from server.storage.blobs import BlobStore
 from server.storage.tables import now
@@ -31,8 +31,9 @@ from web.words import number
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 KEY_PARAMETERS: Final = tuple(
-    {"name": name, "label": TERMS[name].label, "unit": TERMS[name].unit, "digits": TERMS[name].digits}
+    {"name": e.name, "label": e.label, "unit": e.printed_unit, "digits": e.digits}
     for name in ("cadence_spm", "stride_time_s", "stance_pct", "knee_flexion_rom_deg")
+    for e in (CATALOGUE[name],)
 )
 """Columns of the results by visit."""
 

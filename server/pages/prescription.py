@@ -10,15 +10,15 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
-from core.feedback import PARAMETERS, Prescription
+from core.feedback import Prescription
 from core.frames import Side
+from core.parameters.catalogue import CATALOGUE, list_trainable
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id
 from server.pages.shell import record_opening, render_page
 from server.report.feedback_words import prescription_words, title
-from server.report.wording import TERMS
 from server.services import patients, prescriptions
 from server.services.prescriptions import Written
 
@@ -76,7 +76,7 @@ def show_prescription(
     return render_page(
         request, db, who, "prescription.html", "patients",
         patient=patient, now=now, f=fill_form(now, patient.affected_side),
-        groups=list_trainable(), modes=MODES, sources=SOURCES,
+        groups=group_trainable(), modes=MODES, sources=SOURCES,
     )  # fmt: skip
 
 
@@ -92,14 +92,12 @@ def make_card(written: Sequence[Written]) -> PrescriptionCard:
     )
 
 
-def list_trainable() -> list[tuple[str, list[TrainableParameter]]]:
+def group_trainable() -> list[tuple[str, list[TrainableParameter]]]:
     """What can be trained under the headings of the parameter table."""
     groups: dict[str, list[TrainableParameter]] = {}
-    for name, term in TERMS.items():
-        if name in PARAMETERS:
-            groups.setdefault(term.group, []).append(
-                TrainableParameter(name, term.label, term.unit, term.digits)
-            )
+    for name in list_trainable():
+        e = CATALOGUE[name]
+        groups.setdefault(e.group, []).append(TrainableParameter(name, e.label, e.printed_unit, e.digits))
     return list(groups.items())
 
 

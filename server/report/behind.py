@@ -9,12 +9,12 @@ from typing import Final
 
 from core.events.result import Strides
 from core.frames import SIDES, Side
+from core.parameters.catalogue import CATALOGUE
 from core.parameters.rows import Column
 from server.report.columns import plain
-from server.report.definitions import DEFINITIONS
 from server.report.level import from_standing
 from server.report.table import Row
-from server.report.wording import TERMS, excluded_words, number
+from server.report.wording import excluded_words, number
 
 HEIGHT: Final = 220
 TOP, BOTTOM = 12, 24
@@ -74,7 +74,7 @@ def behind(row: Row, strides: Strides, column: Column | None, duration_s: float)
     ----------
     column : the figure of every stride of the list, None where it is not one of strides.
     """
-    digits = TERMS[row.name].digits if row.name in TERMS else 2
+    digits = CATALOGUE[row.name].digits if row.name in CATALOGUE else 2
     values = () if column is None else tuple(
         StrideValue(
             index=i,
@@ -88,7 +88,8 @@ def behind(row: Row, strides: Strides, column: Column | None, duration_s: float)
         )
         for i, (s, v) in enumerate(zip(strides.strides, column, strict=True))
     )  # fmt: skip
-    definition = DEFINITIONS.get(from_standing(row.name) or row.name, "")
+    entry = CATALOGUE.get(from_standing(row.name) or row.name)
+    definition = "" if entry is None else entry.definition
     if from_standing(row.name) is not None:
         definition = definition.replace(STANDING, "from the anatomical zero")
     return Behind(row, definition, values, _chart(row, values, duration_s))
@@ -114,7 +115,7 @@ def _chart(row: Row, values: Sequence[StrideValue], duration_s: float) -> str:
     if row.norm_mean is not None and row.norm_sd is not None:
         top, foot = y(row.norm_mean + row.norm_sd), y(row.norm_mean - row.norm_sd)
         parts.append(f'<rect class="band" x="0" width="100%" y="{top:.1f}" height="{foot - top:.1f}"/>')
-    digits = max(TERMS[row.name].digits, 1) if row.name in TERMS else 2
+    digits = max(CATALOGUE[row.name].digits, 1) if row.name in CATALOGUE else 2
     for k in range(TICKS):
         at = low + pad + (high - low - 2 * pad) * k / (TICKS - 1)
         parts.append(f'<line class="g" x1="0" x2="100%" y1="{y(at):.1f}" y2="{y(at):.1f}"/>')

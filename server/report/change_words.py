@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from core.change import UNLIKE, Change
+from core.parameters.catalogue import CATALOGUE
 from core.parameters.variability import TOO_FEW
-from server.report.wording import TERMS, Term, number, title_of
+from server.report.wording import Term, number, parameter_term, title_of
 
 VERDICTS: Final[Mapping[str, str]] = {
     "within_measurement_error": "within measurement error",
@@ -52,8 +53,9 @@ class ChangeWords:
 
 def term_of(name: str, unit: str = "") -> Term:
     """How a figure is called; one without wording shows its own name."""
-    if name in TERMS:
-        return replace(TERMS[name], label=title_of(name, TERMS[name].label))
+    if name in CATALOGUE:
+        term = parameter_term(name)
+        return replace(term, label=title_of(name, term.label))
     known = SCORE_TERMS.get(name)
     shown = "°" if unit == "deg" else unit
     return known or Term(name, shown, "Other", 2, (0.0, 1.0), ("larger", "smaller"))

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 from core.change import Change, parameter_changes, unjudged
 from core.frames import Side
 from core.norms import Norms, NormValue
+from core.parameters.catalogue import CATALOGUE
 from server.report.change_words import SCORE_TERMS, ChangeWords, change_words, term_of
 from server.report.exports import write_csv
 from server.report.numbers import Numbers
 from server.report.table import Row
 from server.report.trends import figures
-from server.report.wording import TERMS, number, reason_words
+from server.report.wording import number, reason_words
 
 Group = tuple[str, tuple[Row, ...]]
 
@@ -44,7 +45,7 @@ def changes(
     """What changed of every figure that either session has, in the order of the table."""
     known: Mapping[str, NormValue] = {} if norms is None else norms.values
     there = {(p.name, p.side) for n in (before, after) for p in figures(n) if p.mean is not None}
-    order = {name: i for i, name in enumerate((*TERMS, *SCORE_TERMS))}
+    order = {name: i for i, name in enumerate((*CATALOGUE, *SCORE_TERMS))}
     found = [
         c
         for c in parameter_changes(figures(before), figures(after), affected, known)

@@ -17,7 +17,7 @@ from server.report.feedback_beside import Before, Effect, Retention, effects, re
 from server.report.feedback_chart import feedback_svg
 from server.report.feedback_rows import Row, row, signed
 from server.report.feedback_words import digits_of, prescription_words, quantity, target_words, title
-from server.report.wording import TERMS, Term, number
+from server.report.wording import Term, number, parameter_term
 
 KINDS: Final[tuple[tuple[Kind, str, bool], ...]] = (
     ("baseline", "Before feedback, first strides", False),
@@ -120,7 +120,7 @@ def feedback_view(
     ----------
     before : the visit whose end the retention block is held against. limb : of the trained side.
     """
-    term = TERMS[content.parameter]
+    term = parameter_term(content.parameter)
     rows = tuple(
         row(kind, label, part, split.kinds.get(kind, Summary()), digits_of(content))
         for kind, label, part in KINDS

@@ -6,7 +6,8 @@ from typing import Final
 
 from core.feedback import Prescription
 from core.frames import Side
-from server.report.wording import TERMS, Term, number
+from core.parameters.catalogue import CATALOGUE
+from server.report.wording import Term, number, parameter_term
 
 SOURCE_WORDS: Final = {
     "norm": "healthy people at this person's speed",
@@ -25,7 +26,7 @@ NBSP: Final = "\u202f"
 
 def title(content: Prescription) -> str:
     """ "Step length, left"."""
-    return f"{TERMS[content.parameter].label}, {side_words(content.side)}"
+    return f"{CATALOGUE[content.parameter].label}, {side_words(content.side)}"
 
 
 def side_words(side: Side | None) -> str:
@@ -41,13 +42,13 @@ def quantity(value: float, term: Term, digits: int | None = None) -> str:
 
 def digits_of(content: Prescription) -> int:
     """Decimals of values beside the target: one more than the table has where its sd would hardly show."""
-    digits, sd = TERMS[content.parameter].digits, content.target.sd
+    digits, sd = CATALOGUE[content.parameter].digits, content.target.sd
     return digits + 1 if sd is not None and sd < 5.0 * 10.0**-digits else digits
 
 
 def target_words(content: Prescription) -> str:
     """ "0.62 ± 0.05 m, adults …"."""
-    t, term = content.target, TERMS[content.parameter]
+    t, term = content.target, parameter_term(content.parameter)
     if t.mean is None or t.sd is None:
         return SOURCE_WORDS[t.source]
     digits = digits_of(content)
@@ -119,7 +120,7 @@ def _ends(content: Prescription) -> str:
 
 
 def _watched(content: Prescription) -> str:
-    g, term = content.guard, TERMS[content.parameter]
+    g, term = content.guard, parameter_term(content.parameter)
     said = []
     if content.side is not None:
         limit = "its MDC" if g.other_change is None else quantity(g.other_change, term)

@@ -9,7 +9,7 @@ import numpy as np
 
 from core.norms.controls import ControlGroup
 from core.norms.lookup import Norms
-from core.norms.values import ANGLES
+from core.norms.values import is_angle
 from server.report.bundle import Bundle
 from server.report.estimator import estimator_view
 from server.report.panels import DRAWN_STRIDES, CurvePanel
@@ -35,7 +35,7 @@ def norm_note(
         sentences.append(NO_NORM.get(norms.reason, norms.reason))
     used = any(p.norm is not None and p.norm.zero == "anatomical" for p in panels)
     band = next(iter(norms.bands.values()), None)
-    if band is not None and (used or any(r.norm is not None and r.name in ANGLES for r in rows)):
+    if band is not None and (used or any(r.norm is not None and is_angle(r.name) for r in rows)):
         who = GROUPS.get(band.group, band.group)
         sentences.append(
             f"Norm: {band.n} {who}, overground at their comfortable 1.25 ± 0.16 m/s, mean ± 1 SD "
@@ -44,7 +44,7 @@ def norm_note(
     if norms.timing_reason is not None and norms.timing_reason != norms.reason:
         sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
     elif shown := [
-        r for r in rows if r.norm is not None and r.name not in (*ANGLES, SPEED) and r.unit != "°"
+        r for r in rows if r.norm is not None and r.name != SPEED and not is_angle(r.name) and r.unit != "°"
     ]:
         sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
     if any(r.name == SPEED and r.norm is not None for r in rows):

@@ -9,17 +9,18 @@ from typing import Final
 from core.frames import Side
 from core.norms.kinematics import Zero
 from core.norms.lookup import Norms
+from core.parameters.catalogue import CATALOGUE, name_counted
 from core.parameters.result import Parameter
 from core.parameters.symmetry import Symmetry, symmetries
-from core.parameters.variability import COUNTED, comparable
+from core.parameters.variability import comparable
 from server.report.change_words import ChangeWords
 from server.report.curves import range_svg
 from server.report.wording import (
     NO_DIFFERENCE,
-    TERMS,
     Term,
     difference_words,
     number,
+    parameter_term,
     reason_words,
     symmetry_words,
     title_of,
@@ -129,8 +130,8 @@ def parameter_rows(
     found: dict[str, dict[str | None, Parameter]] = {}
     for p in parameters:
         found.setdefault(p.name, {})[p.side] = p
-    known = [name for name in TERMS if name in found]
-    other = [name for name in found if name not in TERMS]
+    known = [name for name in CATALOGUE if name in found]
+    other = [name for name in found if name not in CATALOGUE]
     rows = (_row(name, found[name], norms, affected, zero) for name in (*known, *other))
     return tuple(_unsure(r) if any(r.name.startswith(f"{v}_") for v in estimated) else r for r in rows)
 
@@ -144,7 +145,8 @@ def grouped(rows: Sequence[Row]) -> tuple[tuple[str, tuple[Row, ...]], ...]:
 def _row(
     name: str, sides: Mapping[str | None, Parameter], norms: Norms, affected: Side | None, zero: Zero
 ) -> Row:
-    term, norm = TERMS.get(name) or _unknown(name, sides), norms.values.get(name)
+    term = parameter_term(name) if name in CATALOGUE else _unknown(name, sides)
+    norm = norms.values.get(name)
     both, left, right = (_cell(sides.get(side), term, norms) for side in (None, "left", "right"))
     missing = both is None and left is None and right is None
     symmetry = next(iter(symmetries(tuple(sides.values()), affected)), None)
@@ -215,7 +217,7 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> Cell | None:
         return None
     digits = max(term.digits, 1)
     spread = "" if p.sd is None else f" ± {number(p.sd, _sd_digits(term))}"
-    what = COUNTED.get(p.name, "strides")
+    what = name_counted(p.name)
     told = [f"{number(p.mean, digits)}{spread}\u202f{term.unit}, mean ± SD of {p.n} {what}"]
     ci = None if p.ci_low is None or p.ci_high is None else (p.ci_low, p.ci_high)
     if ci is not None:

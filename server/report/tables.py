@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 from core.change import Change
 from core.feedback.summary import kind_of
+from core.parameters.catalogue import unit_of
 from core.parameters.kinematic import POINTS
-from core.parameters.variability import unit_of
 from server.report.exports import write_csv
 from server.report.feedback import FeedbackView
 from server.report.model import ReportModel

@@ -17,10 +17,11 @@ from core.change.limits import Limb
 from core.condition import WalkingCondition
 from core.frames import SIDES, Side
 from core.norms import Norms, NormValue
+from core.parameters.catalogue import CATALOGUE
 from core.parameters.result import Parameter
 from server.report.change_words import SCORE_TERMS, term_of
 from server.report.numbers import Numbers
-from server.report.wording import TERMS, Term
+from server.report.wording import Term
 
 VisitKind = Literal["assessment", "training"]
 
@@ -118,7 +119,7 @@ class Trend:
 def names_in(visits: Sequence[Visit]) -> tuple[str, ...]:
     """Figures with a value in any visit, in the order of the table."""
     found = {p.name for visit in visits for p in figures(visit.numbers) if p.mean is not None}
-    known = (*TERMS, *SCORE_TERMS)
+    known = (*CATALOGUE, *SCORE_TERMS)
     return (*(n for n in known if n in found), *sorted(found.difference(known)))
 
 

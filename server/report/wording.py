@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from core.parameters.catalogue import CATALOGUE, Comparison
 from core.parameters.kinematic import is_level
 from core.parameters.symmetry import Symmetry
 
@@ -67,19 +68,9 @@ Ranges are those customary in gait reports, wider where an angle from standing g
 """
 
 
-Comparison = tuple[str, str]
-"""What the left side is when its value is larger, and when it is smaller."""
-
-_TIME: Final[Comparison] = ("longer", "shorter")
-_SIZE: Final[Comparison] = ("larger", "smaller")
-_FLEX: Final[Comparison] = ("more flexed", "straighter")
-_ANKLE: Final[Comparison] = ("more dorsiflexed", "more plantarflexed")
-_TOES: Final[Comparison] = ("toes higher", "toes lower")
-
-
 @dataclass(frozen=True)
 class Term:
-    """A parameter in the table.
+    """A parameter or a score as the table shows it.
 
     Parameters
     ----------
@@ -95,88 +86,11 @@ class Term:
     comparison: Comparison
 
 
-_WAY, _TIMING, _PHASES = "Speed and distance", "Timing", "Phases of the stride"
-_SUPPORT = "Support in seconds"
-_HIP_KNEE, _ANKLE_FOOT = "Hip and knee angles", "Ankle and foot angles"
-_PARTS, _TRUNK = "Parts of stance and swing", "Regularity of the trunk"
-_WALKING = "Walking and turning"
+def parameter_term(name: str) -> Term:
+    """How the table shows a parameter of the catalogue; KeyError for any other."""
+    e = CATALOGUE[name]
+    return Term(e.label, e.printed_unit, e.group, e.digits, e.scale, e.comparison)
 
-_WIDTH: Final[Comparison] = ("wider", "narrower")
-_HEIGHT: Final[Comparison] = ("higher", "lower")
-_OUT: Final[Comparison] = ("turned out more", "turned out less")
-_TURN: Final[Comparison] = ("more to the left", "more to the right")
-
-TERMS: Final[Mapping[str, Term]] = {
-    "gait_speed_mps": Term("Gait speed", "m/s", _WAY, 2, (0, 2), _SIZE),
-    "stride_length_m": Term("Stride length", "m", _WAY, 2, (0.2, 1.8), _TIME),
-    "step_length_m": Term("Step length", "m", _WAY, 2, (0, 1), _TIME),
-    "step_width_m": Term("Step width", "m", _WAY, 2, (-0.05, 0.35), _WIDTH),
-    "circumduction_m": Term("Circumduction", "m", _WAY, 3, (0, 0.2), _SIZE),
-    "max_heel_clearance_m": Term("Heel clearance, most", "m", _WAY, 2, (0, 0.5), _HEIGHT),
-    "min_toe_clearance_m": Term("Toe clearance, least in swing", "m", _WAY, 3, (-0.02, 0.12), _HEIGHT),
-    "total_distance_m": Term("Distance walked", "m", _WAY, 1, (0, 100), _SIZE),
-    "cadence_spm": Term("Cadence", "steps/min", _TIMING, 0, (40, 150), _SIZE),
-    "pci_pct": Term("Phase coordination index", "%", _TIMING, 1, (0, 15), _SIZE),
-    "stride_time_s": Term("Stride time", "s", _TIMING, 2, (0.7, 2.1), _TIME),
-    "step_time_s": Term("Step time", "s", _TIMING, 2, (0.3, 1.1), _TIME),
-    "stance_time_s": Term("Stance time", "s", _TIMING, 2, (0.4, 1.6), _TIME),
-    "swing_time_s": Term("Swing time", "s", _TIMING, 2, (0.2, 0.8), _TIME),
-    "stance_pct": Term("Stance", "%", _PHASES, 1, (50, 80), _TIME),
-    "swing_pct": Term("Swing", "%", _PHASES, 1, (20, 50), _TIME),
-    "double_support_pct": Term("Double support", "%", _PHASES, 1, (0, 55), _TIME),
-    "initial_double_support_pct": Term("Initial double support", "%", _PHASES, 1, (0, 30), _TIME),
-    "terminal_double_support_pct": Term("Terminal double support", "%", _PHASES, 1, (0, 30), _TIME),
-    "single_support_pct": Term("Single support", "%", _PHASES, 1, (15, 50), _TIME),
-    "loading_pct": Term("Loading, of stance", "%", _PARTS, 1, (0, 40), _TIME),
-    "foot_flat_pct": Term("Foot flat, of stance", "%", _PARTS, 1, (20, 90), _TIME),
-    "push_pct": Term("Heel-off to foot-off, of stance", "%", _PARTS, 1, (0, 60), _TIME),
-    "mid_stance_pct": Term("Mid stance", "%", _PARTS, 1, (0, 40), _TIME),
-    "terminal_stance_pct": Term("Terminal stance", "%", _PARTS, 1, (0, 30), _TIME),
-    "initial_swing_pct": Term("Initial swing", "%", _PARTS, 1, (0, 30), _TIME),
-    "mid_swing_pct": Term("Mid swing", "%", _PARTS, 1, (0, 25), _TIME),
-    "terminal_swing_pct": Term("Terminal swing", "%", _PARTS, 1, (0, 30), _TIME),
-    "hip_flexion_ic_deg": Term("Hip flexion at contact", "°", _HIP_KNEE, 1, (-10, 60), _FLEX),
-    "hip_flexion_min_deg": Term("Hip flexion, least", "°", _HIP_KNEE, 1, (-40, 30), _FLEX),
-    "hip_flexion_rom_deg": Term("Hip flexion range", "°", _HIP_KNEE, 1, (0, 70), _SIZE),
-    "knee_flexion_ic_deg": Term("Knee flexion at contact", "°", _HIP_KNEE, 1, (-20, 40), _FLEX),
-    "knee_flexion_max_loading_deg": Term("Knee flexion, loading peak", "°", _HIP_KNEE, 1, (-10, 50), _FLEX),
-    "knee_flexion_min_stance_deg": Term("Knee flexion, least in stance", "°", _HIP_KNEE, 1, (-20, 40), _FLEX),
-    "knee_flexion_max_swing_deg": Term("Knee flexion, swing peak", "°", _HIP_KNEE, 1, (10, 90), _FLEX),
-    "knee_flexion_rom_deg": Term("Knee flexion range", "°", _HIP_KNEE, 1, (0, 90), _SIZE),
-    "ankle_dorsiflexion_ic_deg": Term("Dorsiflexion at contact", "°", _ANKLE_FOOT, 1, (-30, 30), _ANKLE),
-    "ankle_dorsiflexion_max_stance_deg": Term(
-        "Dorsiflexion, stance peak", "°", _ANKLE_FOOT, 1, (-20, 40), _ANKLE
-    ),
-    "ankle_dorsiflexion_min_deg": Term("Dorsiflexion, least", "°", _ANKLE_FOOT, 1, (-50, 20), _ANKLE),
-    "ankle_dorsiflexion_max_swing_deg": Term(
-        "Dorsiflexion, swing peak", "°", _ANKLE_FOOT, 1, (-30, 30), _ANKLE
-    ),
-    "ankle_dorsiflexion_rom_deg": Term("Dorsiflexion range", "°", _ANKLE_FOOT, 1, (0, 60), _SIZE),
-    "foot_pitch_ic_deg": Term("Foot pitch at contact", "°", _ANKLE_FOOT, 1, (-30, 45), _TOES),
-    "foot_pitch_tc_deg": Term("Foot pitch at foot-off", "°", _ANKLE_FOOT, 1, (-90, 10), _TOES),
-    "toe_out_deg": Term("Toe-out, from standing", "°", _ANKLE_FOOT, 1, (-25, 25), _OUT),
-    "turning_angle_deg": Term("Turn of the foot in a stride", "°", _ANKLE_FOOT, 1, (-15, 15), _TURN),
-    "step_count": Term("Steps", "", _WALKING, 0, (0, 1000), _SIZE),
-    "walking_bout_count": Term("Walks without a long break", "", _WALKING, 0, (0, 10), _SIZE),
-    "walking_duration_min": Term("Time walked", "min", _WALKING, 1, (0, 10), _TIME),
-    "turn_count": Term("Turns", "", _WALKING, 0, (0, 20), _SIZE),
-    "turn_angle_deg": Term("Angle of a turn", "°", _WALKING, 0, (0, 360), _SIZE),
-    "turn_duration_s": Term("Time for a turn", "s", _WALKING, 1, (0, 6), _TIME),
-    "turn_peak_velocity_dps": Term("Fastest in a turn", "°/s", _WALKING, 0, (0, 300), _SIZE),
-    "harmonic_ratio_v": Term("Harmonic ratio, vertical", "", _TRUNK, 2, (0, 6), _SIZE),
-    "harmonic_ratio_ap": Term("Harmonic ratio, forward", "", _TRUNK, 2, (0, 6), _SIZE),
-    "harmonic_ratio_ml": Term("Harmonic ratio, sideways", "", _TRUNK, 2, (0, 6), _SIZE),
-    "step_regularity_v": Term("Regularity of steps, vertical", "", _TRUNK, 2, (0, 1), _SIZE),
-    "step_regularity_ap": Term("Regularity of steps, forward", "", _TRUNK, 2, (0, 1), _SIZE),
-    "stride_regularity_v": Term("Regularity of strides, vertical", "", _TRUNK, 2, (0, 1), _SIZE),
-    "stride_regularity_ap": Term("Regularity of strides, forward", "", _TRUNK, 2, (0, 1), _SIZE),
-    "stride_sparc": Term("Smoothness of a stride (SPARC)", "", _TRUNK, 2, (-6, -1), _SIZE),
-    "double_support_s": Term("Double support time", "s", _SUPPORT, 2, (0, 0.8), _TIME),
-    "initial_double_support_s": Term("Initial double support time", "s", _SUPPORT, 2, (0, 0.4), _TIME),
-    "terminal_double_support_s": Term("Terminal double support time", "s", _SUPPORT, 2, (0, 0.4), _TIME),
-    "single_support_s": Term("Single support time", "s", _SUPPORT, 2, (0.2, 0.8), _TIME),
-}
-"""Parameter name → how the table shows it, in the order of the table."""
 
 ZERO_WORDS: Final[Mapping[str, str]] = {
     "anatomical": "anatomical",

@@ -14,7 +14,7 @@ from core.feedback import Target
 from core.feedback.prescription import TargetSource
 from core.frames import SIDES, Side
 from core.norms import Norms, NormValue
-from core.norms.values import ANGLES
+from core.norms.values import is_angle
 from core.parameters.result import Parameter
 from server.report.notes import GROUPS
 from server.report.numbers import Numbers
@@ -137,7 +137,7 @@ def _norm(walk: Walk, parameter: str) -> Offer:
         found = own.values[parameter]
     if found is not None:
         return Offer(Target("norm", found.mean, found.sd, _words(found), walk.session.id))
-    reason = norms.reason if parameter in ANGLES else norms.timing_reason
+    reason = norms.reason if is_angle(parameter) else norms.timing_reason
     if reason is not None:
         said = NO_NORM.get(reason, reason)
     else:

@@ -17,7 +17,8 @@ from core.events.result import Stride, Strides
 from core.frames import Segment
 from core.measure import measure
 from core.online.figures import Span, early_figures
-from core.parameters.kinematic import FIGURES, cycle_curves, kinematic
+from core.parameters.catalogue import list_curve_figures
+from core.parameters.kinematic import cycle_curves, kinematic
 from core.parameters.spatial import GROUND, NAMES
 from core.parameters.temporal import per_stride, temporal
 from core.pipeline import Analysis, analyse
@@ -101,7 +102,7 @@ def test_what_was_withheld_stays_so_in_files_pages_and_after_an_edit() -> None:
     assert bundle.angles.withheld == found.angles.withheld
     header = files["strides.csv"].decode().splitlines()[0].split(",")
     rows = [line.split(",") for line in files["strides.csv"].decode().splitlines()[1:]]
-    for name in FIGURES:
+    for name in list_curve_figures():
         if name.startswith(("knee_", "hip_")) and name in header:
             assert not any(row[header.index(name)] for row in rows), name
     again = measure(read_tracks(files["tracks.parquet"], bundle.events, bundle.angles))

@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 
 from core.errors import ParameterError
-from core.feedback import PARAMETERS, Baseline, Cue, Prescription, Tone
-from core.parameters.kinematic import FIGURES, FOOT_PITCH
+from core.feedback import Baseline, Cue, Prescription, Tone
+from core.parameters.catalogue import CATALOGUE, list_curve_figures, list_trainable
+from core.parameters.catalogue.entry import PHASES, SUPPORT, TIMING
+from core.parameters.kinematic import FOOT_PITCH
 from core.parameters.spatial import NAMES as SPATIAL
-from core.parameters.temporal import NAMES as TEMPORAL
 from tests.feedback import prescription
 
 
@@ -40,7 +41,8 @@ def test_what_is_left_out_has_its_default() -> None:
 
 
 def test_every_parameter_of_a_stride_can_be_trained() -> None:
-    assert set(PARAMETERS) == {*SPATIAL, *TEMPORAL, *FIGURES, *FOOT_PITCH}
+    times = {n for n, e in CATALOGUE.items() if e.of == "stride" and e.group in {TIMING, PHASES, SUPPORT}}
+    assert set(list_trainable()) == {*SPATIAL, *times, *list_curve_figures(), *FOOT_PITCH}
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,7 @@ import pytest
 from core.frames import SIDES, Floats
 from core.norms import adult_kinematics, angle_values, expected_at_speed, temporal_values
 from core.norms.tables import rows
-from core.parameters.kinematic import FIGURES
-from core.parameters.temporal import NAMES
+from core.parameters.catalogue import CATALOGUE, list_curve_figures
 from tests.data import data_folder
 from tests.wbds import people
 
@@ -84,7 +83,7 @@ def test_every_band_says_its_zero_and_how_far_to_trust_it() -> None:
 
 def test_angle_references_exist_for_our_angle_parameters_and_only_ranges_compare() -> None:
     values = angle_values(30).values
-    assert set(values) == set(FIGURES)
+    assert set(values) == set(list_curve_figures())
     assert {n for n, v in values.items() if v.comparable} == {
         "hip_flexion_rom_deg", "knee_flexion_rom_deg", "ankle_dorsiflexion_rom_deg",
     }  # fmt: skip
@@ -105,7 +104,8 @@ def test_temporal_references_by_age_and_sex() -> None:
     man = temporal_values(25.5, "male").values
     assert man["stride_time_s"].mean == pytest.approx(1.135)
     assert not man["gait_speed_mps"].comparable, "the band of a pace class is not a spread"
-    assert set(woman) & set(NAMES) == {
+    of_strides = {name for name, e in CATALOGUE.items() if e.of == "stride" and e.unit in {"s", "%"}}
+    assert set(woman) & of_strides == {
         "stride_time_s", "step_time_s", "stance_pct", "swing_pct", "double_support_pct", "single_support_pct",
     }  # fmt: skip
 
@@ -144,7 +144,7 @@ def test_expected_step_length_and_cadence_at_a_speed() -> None:
 def test_a_single_side_spreads_more_than_the_mean_of_both() -> None:
     """The table's sd is of the mean of both sides; ours of one side, recomputed from the strides."""
     values = angle_values(None).values
-    for name, figure in FIGURES.items():
+    for name, figure in list_curve_figures().items():
         part = slice(figure.start_pct, figure.end_pct + 1)
         read = FIGURE[figure.statistic]
         both = np.array([[read(p[s][figure.variable][part]) for s in SIDES] for p in people()])

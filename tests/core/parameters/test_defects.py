@@ -14,10 +14,10 @@ from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Side
 from core.measure import measure
 from core.parameters import stride_values, temporal
+from core.parameters.catalogue import unit_of
 from core.parameters.result import Parameter
 from core.parameters.spatial import spatial_rows
 from core.parameters.symmetry import symmetries
-from core.parameters.variability import unit_of
 from core.simulate import simulate_scenario
 from tests.true_walks import true_tracks
 

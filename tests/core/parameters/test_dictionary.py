@@ -1,17 +1,17 @@
-"""docs/parameters.md and the table know every parameter there is, and none that there is not."""
+"""The catalogue and docs/parameters.md know every parameter there is, and none that there is not."""
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from core.measure import measure
+from core.parameters.catalogue import CATALOGUE
 from core.simulate import simulate_scenario
-from server.report.wording import REASONS, TERMS
-from tests.data import ROOT
+from server.report.wording import REASONS
+from tests.parameter_page import PAGE, render_page
 from tests.true_walks import true_tracks
 
 
@@ -23,15 +23,18 @@ def names() -> set[str]:
     return {p.name for p in measure(whole).parameters} | {"step_count"}
 
 
-def test_every_parameter_is_written_down(names: set[str]) -> None:
-    text = (ROOT / "docs" / "parameters.md").read_text(encoding="utf-8")
-    cells = re.findall(r"^\| (`[^|]+`) \|", text, re.MULTILINE)
-    written = {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}
-    assert written == names
+def test_the_catalogue_knows_what_is_measured_and_nothing_else(names: set[str]) -> None:
+    assert set(CATALOGUE) == names
 
 
-def test_every_parameter_has_words(names: set[str]) -> None:
-    assert names <= set(TERMS)
+def test_the_document_has_the_tables_of_the_catalogue() -> None:
+    text = PAGE.read_text("utf-8")
+    assert render_page(text) == text, "write them: python -m tests.parameter_page"
+
+
+def test_a_table_without_a_group_is_found() -> None:
+    with pytest.raises(ValueError, match="Beauty"):
+        render_page(PAGE.read_text("utf-8") + "\n<!-- catalogue: Beauty -->\n<!-- end -->\n")
 
 
 def test_every_reason_has_words() -> None:

@@ -16,7 +16,8 @@ from core.frames import SIDES, Bools, Floats, Side
 from core.fusion.orientations import Orientations
 from core.norms import adult_kinematics
 from core.parameters import cycle_curves, foot_pitch, gait_parameters, kinematic, mean_curve
-from core.parameters.kinematic import FIGURES, per_stride_figures, stride_figures
+from core.parameters.catalogue import list_curve_figures
+from core.parameters.kinematic import per_stride_figures, stride_figures
 from core.parameters.result import CycleCurves
 from tests.core.events.foot_signal import orientations
 from tests.data import data_folder
@@ -201,7 +202,7 @@ def test_our_figures_are_those_of_the_reference_table() -> None:
             row = np.array([float(r[f"p{i}"]) for i in range(101)])
             people.setdefault(r["variable"], {}).setdefault(r["subject"], []).append(row)
     reference = angle_values(None).values
-    for name, figure in FIGURES.items():
+    for name, figure in list_curve_figures().items():
         sides = []
         for rows in people[figure.variable].values():
             curves = CycleCurves(

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import pytest
 
+from core.parameters.catalogue import CATALOGUE
 from server.report.behind import behind
 from server.report.bundle import read_columns
-from server.report.definitions import DEFINITIONS
 from server.report.exports import strides_csv
 from server.report.level import level_column
 from server.report.model import report_model
-from server.report.wording import TERMS
 from tests.server import walk
 from tests.server.report.conftest import MakeBundle
 
 
 def test_every_parameter_of_the_table_is_defined_in_a_sentence() -> None:
-    assert set(TERMS) == set(DEFINITIONS)
-    assert all(text[0].isupper() or text[0].isdigit() for text in DEFINITIONS.values())
-    assert all(text.endswith(".") for text in DEFINITIONS.values())
+    definitions = [entry.definition for entry in CATALOGUE.values()]
+    assert all(text[0].isupper() or text[0].isdigit() for text in definitions)
+    assert all(text.endswith(".") for text in definitions)
 
 
 def test_a_number_is_the_mean_of_the_strides_it_opens_to(make_bundle: MakeBundle) -> None:
@@ -45,7 +44,7 @@ def test_a_figure_of_the_take_has_no_strides(make_bundle: MakeBundle) -> None:
     rows = {r.name: r for _, group in report_model(bundle).groups for r in group}
     number = behind(rows["cadence_spm"], bundle.strides, None, 12.0)
     assert (number.strides, number.svg) == ((), "")
-    assert number.to_json()["definition"] == DEFINITIONS["cadence_spm"]
+    assert number.to_json()["definition"] == CATALOGUE["cadence_spm"].definition
 
 
 def test_columns_come_back_from_the_stride_table() -> None:

@@ -19,7 +19,7 @@ from server.report.bundle import Bundle
 from server.report.model import report_model
 from server.report.table import Row, parameter_rows
 from server.report.tables import curves_csv, parameters_csv
-from server.report.wording import TERMS, VARIABLES, difference_words, place_words
+from server.report.wording import VARIABLES, difference_words, parameter_term, place_words
 
 MakeBundle = Callable[..., Bundle]
 
@@ -50,7 +50,7 @@ def of(name: str, side: str | None, mean: float | None, reason: str | None = Non
     ],
 )
 def test_difference_is_said_in_words(name: str, left: float, right: float, words: str) -> None:
-    assert difference_words(left, right, TERMS[name]) == words
+    assert difference_words(left, right, parameter_term(name)) == words
 
 
 def test_words_agree_with_the_printed_numbers() -> None:

@@ -3,7 +3,7 @@ import { Feed } from "./feed.js";
 import { whenOther } from "./given.js";
 import { Bar } from "./patient-bar.js";
 import { Path } from "./patient-path.js";
-import { HELD, LENGTHS, ends, wayTo, what } from "./patient-words.js";
+import { HELD, ends, wayTo, what } from "./patient-words.js";
 import { Sound } from "./sound.js";
 import { say } from "./words.js";
 
@@ -49,13 +49,13 @@ class PatientScreen extends HTMLElement {
     for (const scene of this.querySelectorAll("[data-scene]")) scene.setAttribute("hidden", "");
     this.scene = null;
     if (!this.given) return;
-    const { side, parameter } = this.given;
-    const name = this.modes.has("zone") && LENGTHS.has(parameter) ? "path" : "bar";
+    const { side } = this.given, isLength = this.term?.is_length ?? false;
+    const name = this.modes.has("zone") && isLength ? "path" : "bar";
     this.dataset.picture = name;
     const scene = this.querySelector(`[data-scene=${name}]`);
     scene.removeAttribute("hidden");
     this.titles = scene.querySelector("[data-title]");
-    const options = { side, lengths: LENGTHS.has(parameter), words: ends(this.term) };
+    const options = { side, lengths: isLength, words: ends(this.term) };
     this.scene = name === "path" ? new Path(scene, options, this) : new Bar(scene, options);
     this.scene.dim();
     say(this.querySelector("[data-what]"), what(this.given, this.term));

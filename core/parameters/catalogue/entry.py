@@ -1,0 +1,150 @@
+"""What the catalogue says of a parameter, and the words that several of them share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf
+from typing import Final, Literal
+
+Need = Literal[
+    "foot_sensor", "foot_path", "foot_off", "other_foot", "linked_feet", "standing_width", "shoe",
+    "hip", "knee", "ankle", "pelvis_sensor", "forward",
+]  # fmt: skip
+
+NEEDS: Final[Mapping[Need, str]] = {
+    "foot_sensor": "a sensor on the foot",
+    "foot_path": "the path of the foot",
+    "foot_off": "foot-off",
+    "other_foot": "contacts of both feet",
+    "linked_feet": "sensors on both legs and the pelvis",
+    "standing_width": "how far apart the ankles stand",
+    "shoe": "the shape of the shoe",
+    "hip": "sensors on pelvis and thigh",
+    "knee": "sensors on thigh and shank",
+    "ankle": "sensors on shank and foot",
+    "pelvis_sensor": "a sensor on the pelvis",
+    "forward": "the direction of walking",
+}
+"""What a parameter cannot be measured without, beside contacts, in words."""
+
+Scope = Literal["stride", "take"]
+"""A parameter of every stride, by side, or of the whole take only."""
+
+Comparison = tuple[str, str]
+"""What a value is when it is the larger one, and when it is the smaller one."""
+
+DURATION: Final[Comparison] = ("longer", "shorter")
+SIZE: Final[Comparison] = ("larger", "smaller")
+FLEXION: Final[Comparison] = ("more flexed", "straighter")
+DORSIFLEXION: Final[Comparison] = ("more dorsiflexed", "more plantarflexed")
+TOES: Final[Comparison] = ("toes higher", "toes lower")
+WIDTH: Final[Comparison] = ("wider", "narrower")
+HEIGHT: Final[Comparison] = ("higher", "lower")
+TOE_OUT: Final[Comparison] = ("turned out more", "turned out less")
+TURN: Final[Comparison] = ("more to the left", "more to the right")
+
+DISTANCES: Final = "Speed and distance"
+TIMING: Final = "Timing"
+PHASES: Final = "Phases of the stride"
+PARTS: Final = "Parts of stance and swing"
+HIP_AND_KNEE: Final = "Hip and knee angles"
+ANKLE_AND_FOOT: Final = "Ankle and foot angles"
+WALKING: Final = "Walking and turning"
+TRUNK: Final = "Regularity of the trunk"
+SUPPORT: Final = "Support in seconds"
+
+UNITS: Final[Mapping[str, tuple[str, str]]] = {
+    "mps": ("m/s", "m/s"),
+    "spm": ("steps/min", "steps/min"),
+    "deg": ("deg", "°"),
+    "pct": ("%", "%"),
+    "dps": ("deg/s", "°/s"),
+    "min": ("min", "min"),
+    "m": ("m", "m"),
+    "s": ("s", "s"),
+}
+"""Last part of a parameter's name → its unit in files, and as printed."""
+
+
+@dataclass(frozen=True)
+class CurveFigure:
+    """A statistic of one cycle curve between two percentages of the stride, both included."""
+
+    variable: str
+    statistic: Literal["at", "max", "min", "range"]
+    start_pct: int = 0
+    end_pct: int = 100
+
+
+@dataclass(frozen=True)
+class NormKey:
+    """Where the reference of a parameter stands (core/norms/values.py).
+
+    Parameters
+    ----------
+    table : "angles" of the adults of the cycle curves, "walkway" by age and sex. row : its name there.
+    differs : what is measured differently, so that values cannot be compared: "foot_off" or "ankles".
+    """
+
+    table: Literal["angles", "walkway"]
+    row: str
+    differs: Literal["foot_off", "ankles"] | None = None
+
+
+@dataclass(frozen=True)
+class ParameterEntry:
+    """Everything that is said of one parameter, wherever it is shown.
+
+    Parameters
+    ----------
+    name : field term that ends with its unit. label : as printed. group : heading in tables.
+    digits : decimals as printed. scale : fixed ends of its range bar, in its unit.
+    comparison : words for the larger and the smaller of two values. definition : one or two plain sentences.
+    needs : what it cannot be measured without, beside contacts.
+    of : "stride" = of every stride, by side; "take" = of the whole take only.
+    counted : what it is the mean of.
+    curve : how it is read from a cycle curve; such a parameter needs no code of its own.
+    trainable : a prescription may train it. everyday : what a patient reads in place of the label.
+    is_length : the patient's screen may show it as a way on the floor.
+    plausible : least and greatest value that a person can have; beyond, it is an error of detection.
+    norm : its reference, None without one. change : its limits of change (core/change/limits.py), None
+        where no source has one.
+    """
+
+    name: str
+    label: str
+    group: str
+    digits: int
+    scale: tuple[float, float]
+    comparison: Comparison
+    definition: str
+    needs: tuple[Need, ...] = ()
+    of: Scope = "stride"
+    counted: Literal["strides", "steps", "feet", "bouts", "turns"] = "strides"
+    curve: CurveFigure | None = None
+    trainable: bool = False
+    everyday: str = ""
+    is_length: bool = False
+    plausible: tuple[float, float] = (-inf, inf)
+    norm: NormKey | None = None
+    change: str | None = None
+
+    @property
+    def unit(self) -> str:
+        """Unit in files, "" for a ratio or a number of things."""
+        return unit_of(self.name)
+
+    @property
+    def printed_unit(self) -> str:
+        """Unit as printed."""
+        return UNITS.get(_ending(self.name), ("", ""))[1]
+
+
+def unit_of(name: str) -> str:
+    """Unit of any figure by the ending of its name, "" for a ratio."""
+    return UNITS.get(_ending(name), ("", ""))[0]
+
+
+def _ending(name: str) -> str:
+    return name.rpartition("_")[2]

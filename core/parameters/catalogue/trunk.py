@@ -1,0 +1,98 @@
+"""Regularity and smoothness of the trunk (core/parameters/trunk.py, smoothness.py)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from core.parameters.catalogue.entry import SIZE, TRUNK, ParameterEntry
+
+ENTRIES: Final = (
+    ParameterEntry(
+        "harmonic_ratio_v",
+        label="Harmonic ratio, vertical",
+        group=TRUNK,
+        digits=2,
+        scale=(0, 6),
+        comparison=SIZE,
+        definition="Even over odd harmonics of the vertical acceleration of the trunk in a stride.",
+        needs=("pelvis_sensor",),
+        of="take",
+    ),
+    ParameterEntry(
+        "harmonic_ratio_ap",
+        label="Harmonic ratio, forward",
+        group=TRUNK,
+        digits=2,
+        scale=(0, 6),
+        comparison=SIZE,
+        definition="Even over odd harmonics of the forward acceleration of the trunk in a stride.",
+        needs=("pelvis_sensor", "forward"),
+        of="take",
+    ),
+    ParameterEntry(
+        "harmonic_ratio_ml",
+        label="Harmonic ratio, sideways",
+        group=TRUNK,
+        digits=2,
+        scale=(0, 6),
+        comparison=SIZE,
+        definition="Odd over even harmonics of the sideways acceleration of the trunk in a stride.",
+        needs=("pelvis_sensor", "forward"),
+        of="take",
+    ),
+    ParameterEntry(
+        "step_regularity_v",
+        label="Regularity of steps, vertical",
+        group=TRUNK,
+        digits=2,
+        scale=(0, 1),
+        comparison=SIZE,
+        definition="Autocorrelation of the trunk's vertical acceleration at one step.",
+        needs=("pelvis_sensor",),
+        of="take",
+    ),
+    ParameterEntry(
+        "step_regularity_ap",
+        label="Regularity of steps, forward",
+        group=TRUNK,
+        digits=2,
+        scale=(0, 1),
+        comparison=SIZE,
+        definition="Autocorrelation of the trunk's forward acceleration at one step.",
+        needs=("pelvis_sensor", "forward"),
+        of="take",
+    ),
+    ParameterEntry(
+        "stride_regularity_v",
+        label="Regularity of strides, vertical",
+        group=TRUNK,
+        digits=2,
+        scale=(0, 1),
+        comparison=SIZE,
+        definition="Autocorrelation of the trunk's vertical acceleration at one stride.",
+        needs=("pelvis_sensor",),
+        of="take",
+    ),
+    ParameterEntry(
+        "stride_regularity_ap",
+        label="Regularity of strides, forward",
+        group=TRUNK,
+        digits=2,
+        scale=(0, 1),
+        comparison=SIZE,
+        definition="Autocorrelation of the trunk's forward acceleration at one stride.",
+        needs=("pelvis_sensor", "forward"),
+        of="take",
+    ),
+    ParameterEntry(
+        "stride_sparc",
+        label="Smoothness of a stride (SPARC)",
+        group=TRUNK,
+        digits=2,
+        scale=(-6, -1),
+        comparison=SIZE,
+        definition="Spectral arc length of the trunk's acceleration in a stride: nearer to 0 is smoother.",
+        needs=("pelvis_sensor", "forward"),
+        of="take",
+    ),
+)
