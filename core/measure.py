@@ -13,7 +13,7 @@ from core.angles import JointAngles
 from core.body.feet import FootTracks
 from core.edits import Edit, edited_events, edited_strides
 from core.errors import Notice
-from core.events.bouts import Bout, bouts_of
+from core.events.bouts import Bout, BoutParams, bouts_of
 from core.events.flags import StrideParams, with_flag
 from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
@@ -42,7 +42,7 @@ class Tracks:
     turning : (n,) mask of the calibration, None if not known.
     feet : paths of the feet, None where no distance can be measured. angles : None when not reached.
     trunk : pelvis, chest → (n, 3) acceleration free of gravity, forward, left, up (m/s²): core/walking_frame.
-    params : of the stride list.
+    params : of the stride list. bout_params : of the walking bouts of the feet's contacts.
     rests : windows of standing still, None if not known. turns : of the body. steps : of a trunk sensor,
         where no foot carries one; they are not edited.
     """
@@ -58,6 +58,7 @@ class Tracks:
     trunk: Mapping[Segment, Floats] = field(default_factory=dict)
     surface: Surface = field(default_factory=Surface)
     params: StrideParams = field(default_factory=StrideParams)
+    bout_params: BoutParams = field(default_factory=BoutParams)
     rests: tuple[Window, ...] | None = None
     turns: tuple[Turn, ...] = ()
     steps: Steps | None = None
@@ -113,7 +114,7 @@ def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
     figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk)
     # contacts, found or set by a person, say more than the trunk
     steps = None if events.events else tracks.steps
-    bouts = bouts_of(events, tracks.rests) if steps is None else steps.bouts
+    bouts = bouts_of(events, tracks.rests, tracks.bout_params) if steps is None else steps.bouts
     first = figures.parameters if steps is None else _of_steps(tracks, steps, figures.parameters)
     parameters = first + bout_parameters(bouts) + turn_parameters(tracks.turns)
     return Measured(events, strides, parameters, figures.columns, bouts, tracks.turns, steps)

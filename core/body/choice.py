@@ -29,12 +29,14 @@ class Choice:
     Parameters
     ----------
     segments : with a working sensor, in the order of docs/science/erkf.md. failed : without.
-    possible : estimators, best first. reduced : see `Poses.reduced`.
+    possible : estimators, best first. order : those to try, of them; the one asked for alone.
+    reduced : see `Poses.reduced`.
     """
 
     segments: tuple[Segment, ...]
     failed: tuple[Segment, ...]
     possible: tuple[Estimator, ...]
+    order: tuple[Estimator, ...]
     reduced: str | None
     notices: tuple[Notice, ...]
 
@@ -85,7 +87,8 @@ def choose(
             "record again."
         )
         notices.append(Notice("sensor_failed", message, sensor=s))
-    return Choice(working, failed, found, reduced, tuple(notices))
+    order = found if requested == "auto" else (requested,)
+    return Choice(working, failed, found, order, reduced, tuple(notices))
 
 
 def _impossible(requested: Requested, working: tuple[Segment, ...]) -> str:

@@ -1,4 +1,4 @@
-"""Orientations → Poses by the best estimator that the worn sensors allow, and the paths of the feet.
+"""Mounted sensors → Poses by the best estimator that they allow, and the paths of the feet.
 
 Seven sensors: ErKF with smoother (Potter 2021). Pelvis and feet, or feet alone: L7S (Sy 2021) for the figure,
 and an unlinked ErKF for each foot, because stride lengths are never taken from L7S
@@ -8,16 +8,15 @@ and an unlinked ErKF for each foot, because stride lengths are never taken from 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Final, get_args
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
-from core.body.apart import legs_apart
-from core.body.choice import WHOLE, Estimator, Requested, choose
+from core.body.choice import WHOLE, Estimator
 from core.body.corrected import corrected_signals
 from core.body.erkf.filter import erkf_inputs
-from core.body.erkf.headings import agreed, findings, told
+from core.body.erkf.headings import findings, told
 from core.body.erkf.health import erkf_health, erkf_notices
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.poses import figure, foot_tracks, refined, run_erkf
@@ -25,15 +24,16 @@ from core.body.erkf.smoother import smooth
 from core.body.erkf.start import start_state
 from core.body.feet import FootTracks
 from core.body.kinematics import forward_kinematics
-from core.body.l7s.filter import L7sParams
 from core.body.l7s.health import l7s_health, l7s_notices
 from core.body.l7s.poses import free_acceleration, l7s_poses
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
+from core.body.mounting import MountedSensors
+from core.body.pose_params import PoseParams
 from core.body.poses import Poses
 from core.body.still import FOOT_STILL, still_samples
 from core.body.tree import PRESETS, person_tree
 from core.calibration.result import CalibratedRecording
-from core.errors import EstimationError, Notice, ParameterError
+from core.errors import EstimationError, Notice
 from core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
 from core.fusion.orientations import Orientations
 
@@ -50,87 +50,49 @@ SENSORS: Final[Mapping[str, tuple[Segment, ...]]] = {
 """What these see when they are asked for by name: the point is what so few sensors tell."""
 
 
-@dataclass(frozen=True)
-class PoseParams:
-    """Parameters of `estimate_poses`.
-
-    Parameters
-    ----------
-    estimator : "auto" picks by what is worn.
-    least_valid : share of the take a sensor must be there for (our choice).
-
-    Raises
-    ------
-    ParameterError `unknown_estimator`.
-    """
-
-    estimator: Requested = "auto"
-    erkf: ErkfParams = field(default_factory=ErkfParams.people)
-    l7s: L7sParams = field(default_factory=L7sParams)
-    least_valid: float = 0.5
-
-    def __post_init__(self) -> None:
-        known = get_args(Requested)
-        if self.estimator not in known:
-            raise ParameterError(
-                "unknown_estimator",
-                f"'{self.estimator}' is no estimator; expected one of {', '.join(known)}.",
-            )
-
-
 @dataclass(frozen=True, eq=False)
 class PoseEstimate:
-    """What the stage gives.
+    """What the stage poses gives.
 
     Parameters
     ----------
-    calibrated : the recording with the mountings that the orientations belong to: legs apart, forward axes
-        agreed with the joints. Whatever follows takes these, never those that went in.
     orientations : of the segments with a working sensor, refined where the ErKF ran: what angles are of.
     poses : the figure. feet : None when no foot sensor works.
     """
 
-    calibrated: CalibratedRecording
     orientations: Orientations
     poses: Poses
     feet: FootTracks | None
 
 
 def estimate_poses(
-    calibrated: CalibratedRecording,
-    orientations: Orientations,
-    contacts: Mapping[Side, Bools],
-    body: BodyModel,
-    params: PoseParams | None = None,
+    mounted: MountedSensors, contacts: Mapping[Side, Bools], params: PoseParams
 ) -> PoseEstimate:
     """Estimate the poses of a take.
 
     Parameters
     ----------
+    mounted : of the stage mounting, made with the same parameters.
     contacts : side → (n,) foot on the floor, from the events.
 
     Raises
     ------
-    EstimationError `estimator_impossible` when the one asked for cannot run on these sensors; its own errors
-    when it was asked for by name. Unasked, an estimator that fails gives way to the next possible one, with a
-    notice `estimator_failed`.
+    EstimationError of an estimator that was asked for by name. Unasked, an estimator that fails gives way to
+    the next possible one, with a notice `estimator_failed`.
     """
-    params = params or PoseParams()
-    calibrated, orientations = legs_apart(calibrated, orientations, body)
-    choice = choose(calibrated, orientations, params.estimator, params.least_valid)
+    choice = mounted.choice
     used = tuple(s for s in choice.segments if s in SENSORS.get(params.estimator, choice.segments))
-    take = _Take(calibrated, _without(orientations, set(WHOLE) - set(used)), contacts, body, params)
-    order = choice.possible if params.estimator == "auto" else (params.estimator,)
+    take = _Take(mounted, _without(mounted.orientations, set(WHOLE) - set(used)), contacts, params)
     notices, reduced = list(choice.notices), choice.reduced
-    if calibrated.recording.protocol == "treadmill":
+    if mounted.calibrated.recording.protocol == "treadmill":
         notices.append(Notice("treadmill_belt", ON_A_BELT, severity="info"))
     made = None
-    for estimator in order:
+    for estimator in choice.order:
         try:
             made = take.run(estimator, used)
             break
         except EstimationError as error:
-            if estimator == order[-1]:
+            if estimator == choice.order[-1]:
                 raise
             message = f"{estimator} cannot estimate this take, the next one is used. {error.message}"
             notices.append(Notice("estimator_failed", message, error.sensor, error.t_s))
@@ -163,11 +125,18 @@ def estimate_poses(
 class _Take:
     """The arguments of `estimate_poses`, the failed sensors taken out of the orientations."""
 
-    calibrated: CalibratedRecording
+    mounted: MountedSensors
     orientations: Orientations
     contacts: Mapping[Side, Bools]
-    body: BodyModel
     params: PoseParams
+
+    @property
+    def calibrated(self) -> CalibratedRecording:
+        return self.mounted.calibrated
+
+    @property
+    def body(self) -> BodyModel:
+        return self.mounted.body
 
     def run(self, estimator: Estimator, segments: tuple[Segment, ...]) -> PoseEstimate:
         if estimator == "erkf":
@@ -184,29 +153,28 @@ class _Take:
         )
         notices = (*poses.notices, *l7s_notices(self.calibrated.recording.protocol))
         poses = replace(poses, health=l7s_health(poses), notices=notices)
-        return PoseEstimate(self.calibrated, self.orientations, poses, None)
+        return PoseEstimate(self.orientations, poses, None)
 
     def chain(self, segments: tuple[Segment, ...]) -> PoseEstimate:
-        """ErKF and smoother, once the forward axes agree."""
-        calibrated, orientations, errors = agreed(
-            self.calibrated, self.orientations, self.body, segments, self.params.erkf
-        )
-        run = run_erkf(calibrated, orientations, self.body, segments, self.params.erkf)
-        orientations = refined(run, orientations)
+        """ErKF and smoother."""
+        if self.mounted.failure is not None:
+            raise self.mounted.failure
+        run = run_erkf(self.calibrated, self.orientations, self.body, segments, self.params.erkf)
+        orientations = refined(run, self.orientations)
         poses = figure(run, orientations, self.contacts, self.body)
-        health = erkf_health(run)
+        health, turned = erkf_health(run), self.mounted.turned_rad
         poses = replace(
             poses,
-            health=(*health, *findings(errors)),
-            notices=(*poses.notices, *erkf_notices(run, health), *told(errors)),
-            diagnostics={"heading_error_rad": errors},
+            health=(*health, *findings(turned)),
+            notices=(*poses.notices, *erkf_notices(run, health), *told(turned)),
+            diagnostics={"heading_error_rad": turned},
         )
-        return PoseEstimate(calibrated, orientations, poses, foot_tracks(run, orientations, self.body))
+        return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body))
 
     def anchored(self) -> PoseEstimate:
         """Orientations as they are, a figure by forward kinematics."""
-        poses = forward_kinematics(self.orientations, self.body, self.contacts)
-        return PoseEstimate(self.calibrated, self.orientations, poses, None)
+        poses = forward_kinematics(self.orientations, self.body, self.contacts, self.params.anchor)
+        return PoseEstimate(self.orientations, poses, None)
 
     def steps(self) -> dict[Side, Bools]:
         """When each foot is still."""

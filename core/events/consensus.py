@@ -10,15 +10,15 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from core.errors import Notice
+from core.errors import Notice, ParameterError
 from core.events.detection import detect
 from core.events.foot_pitch import FootPitchParams
-from core.events.gyro_peaks import LIMB, PRESETS, gyro_peak_events
+from core.events.gyro_peaks import LIMB, GyroPeakPresets, gyro_peak_events
 from core.events.result import EventKind, GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES, Side
 
@@ -37,9 +37,14 @@ class ConsensusParams:
     Parameters
     ----------
     presets : gyro-peak detectors beside the foot-pitch rule: one of the foot, two of the shank.
+    gyro_peaks : the rules of each of those that can be named.
     window_s : contacts of one foot this close, after the median distance is taken off, are one.
     pair_s, pairs : detectors' contacts this close make the median distance, from so many of them.
     least : a contact needs this share of the votes, and more than it without the lead's.
+
+    Raises
+    ------
+    ParameterError : `unknown_detector`.
     """
 
     presets: tuple[str, ...] = ("mariani", "gouwanda", "catalfamo")
@@ -47,6 +52,15 @@ class ConsensusParams:
     pair_s: float = 0.25
     pairs: int = 3
     least: float = 0.5
+    gyro_peaks: GyroPeakPresets = field(default_factory=GyroPeakPresets)
+
+    def __post_init__(self) -> None:
+        known = self.gyro_peaks.by_name
+        if unknown := [name for name in self.presets if name not in known]:
+            raise ParameterError(
+                "unknown_detector",
+                f"There is no detector '{unknown[0]}'; expected one of {', '.join(known)}.",
+            )
 
 
 @dataclass(frozen=True)
@@ -64,8 +78,9 @@ def all_detectors(
     """What every detector finds whose sensors are worn, the leading foot-pitch rule first."""
     params = params or ConsensusParams()
     found = {"foot_pitch": detect(orientations, foot_pitch)}
+    presets = params.gyro_peaks.by_name
     for name in params.presets:
-        preset = PRESETS[name]
+        preset = presets[name]
         if any(LIMB[preset.segment][side] in orientations.q for side in SIDES):
             found[name] = gyro_peak_events(orientations, orientations.rate_hz, preset)
     return found

@@ -11,7 +11,7 @@ papers.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from math import radians
 from types import MappingProxyType
@@ -63,24 +63,36 @@ class GyroPeakParams:
     min_rate_hz: float = 40.0
 
 
-PRESETS: Final[Mapping[str, GyroPeakParams]] = MappingProxyType(
-    {
-        p.name: p
-        for p in (
-            # shank, zero crossing with heuristics, TC ≥ 100 ms after IC, 350 ms refractory
-            GyroPeakParams("gouwanda", "shank", "zero_cross", refractory_s=0.35, wait_s=0.1),
-            # shank, IC = minimum after the swing peak, TC = later minimum below a threshold
-            GyroPeakParams("catalfamo", "shank", "neg_peak", wait_s=0.3),
-            # shank, swing peak, IC = first negative minimum, 300 ms wait, TC = next minimum
-            GyroPeakParams("maqbool", "shank", "neg_peak", "deepest", wait_s=0.3, low_pass_hz=10.0),
-            # foot pitch rate around mid-swing
-            GyroPeakParams("mariani", "foot", "zero_cross"),
-            # foot, amplitude threshold between stance and swing
-            GyroPeakParams("perez_ibarra", "foot", "neg_peak", swing_rad_s=radians(150.0)),
-        )
-    }
-)
-"""Reconstructions of published detectors (docs/science/events.md, "Presets"), by the first author's name."""
+@dataclass(frozen=True)
+class GyroPeakPresets:
+    """Reconstructions of published detectors (docs/science/events.md, "Presets"), by the first author's name.
+
+    Parameters
+    ----------
+    gouwanda : shank, zero crossing with heuristics, TC ≥ 100 ms after IC, 350 ms refractory.
+    catalfamo : shank, IC = minimum after the swing peak, TC = later minimum below a threshold.
+    maqbool : shank, swing peak, IC = first negative minimum, 300 ms wait, TC = next minimum.
+    mariani : foot pitch rate around mid-swing.
+    perez_ibarra : foot, amplitude threshold between stance and swing.
+    """
+
+    gouwanda: GyroPeakParams = GyroPeakParams(
+        "gouwanda", "shank", "zero_cross", refractory_s=0.35, wait_s=0.1
+    )
+    catalfamo: GyroPeakParams = GyroPeakParams("catalfamo", "shank", "neg_peak", wait_s=0.3)
+    maqbool: GyroPeakParams = GyroPeakParams(
+        "maqbool", "shank", "neg_peak", "deepest", wait_s=0.3, low_pass_hz=10.0
+    )
+    mariani: GyroPeakParams = GyroPeakParams("mariani", "foot", "zero_cross")
+    perez_ibarra: GyroPeakParams = GyroPeakParams(
+        "perez_ibarra", "foot", "neg_peak", swing_rad_s=radians(150.0)
+    )
+
+    @property
+    def by_name(self) -> Mapping[str, GyroPeakParams]:
+        """Name → rules of the detector, in the order above."""
+        return MappingProxyType({f.name: getattr(self, f.name) for f in fields(self)})
+
 
 RECONSTRUCTION: Final = "reconstruction"
 """What a preset is called wherever its name is shown."""

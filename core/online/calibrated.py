@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from core.body import nominal_body
-from core.body.apart import legs_apart
-from core.body.choice import WHOLE, possible
-from core.body.erkf.headings import agreed, told
+from core.body.erkf.headings import told
 from core.body.erkf.params import ErkfParams
 from core.body.estimate import warm as warm_erkf
 from core.body.model import BodyModel
+from core.body.mounting import mount_sensors
+from core.body.pose_params import PoseParams
 from core.calibration import CalibrationParams
 from core.calibration.result import CalibratedRecording
-from core.errors import EstimationError, Notice
+from core.errors import Notice
 from core.frames import Segment
 from core.fusion.attitude import warm as warm_attitude
 from core.fusion.mahony import MahonyParams, estimate_orientations
@@ -83,27 +82,22 @@ def finished(
     EstimationError of `core.fusion.mahony.estimate_orientations`.
     """
     recording = calibrated.recording
-    subject = recording.subject
-    body, assumed = nominal_body(subject.height_m, subject.standing_width_m, subject.shoe)
-    calibrated, orientations = legs_apart(calibrated, estimate_orientations(calibrated, params.fusion), body)
-    notices = [*calibrated.calibration.notices, *assumed]
-    turned: dict[Segment, float] = {}
-    linked = tuple(s for s in WHOLE if s in calibrated.calibration.segments)
-    if possible(linked)[:1] == ("erkf",):
-        try:
-            calibrated, orientations, turned = agreed(calibrated, orientations, body, linked, params.erkf)
-            notices += told(turned)
-        except EstimationError as error:
-            notices.append(Notice(error.code, error.message, error.sensor))
+    # every sensor with a sample counts: which of them last, nobody knows yet
+    every = PoseParams(erkf=params.erkf, least_valid=0.0)
+    mounted = mount_sensors(calibrated, estimate_orientations(calibrated, params.fusion), every)
+    calibrated, failure = mounted.calibrated, mounted.failure
+    notices = [*calibrated.calibration.notices, *mounted.assumed, *told(mounted.turned_rad)]
+    if failure is not None:
+        notices.append(Notice(failure.code, failure.message, failure.sensor))
     notices += _missing(recording, [s for s in worn if s not in out])
     checks = tuple(_check(s, calibrated, notices) for s in worn)
     return LiveCalibration(
         calibrated=calibrated,
-        orientations=orientations,
+        orientations=mounted.orientations,
         first=first,
         past=first + len(recording.t_s),
-        body=body,
-        turned=turned,
+        body=mounted.body,
+        turned=mounted.turned_rad,
         checks=checks,
         notices=tuple(notices),
         ok=all(c.method is not None and all(n.severity == "info" for n in c.notices) for c in checks),

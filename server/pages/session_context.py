@@ -17,6 +17,7 @@ STAGE_NAMES: Final[Mapping[str, str]] = {
     "calibration": "Calibrate: how each sensor sits on its segment",
     "orientation": "Find the orientation of each segment",
     "events": "Find contacts and strides",
+    "mounting": "Align the sensors by the joints they share",
     "poses": "Build the figure",
     "angles": "Compute joint angles",
     "parameters": "Compute parameters",

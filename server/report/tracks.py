@@ -17,7 +17,7 @@ import pyarrow as pa
 from core.angles import JointAngles
 from core.body.feet import FootTracks
 from core.body.model import BodyModel
-from core.events.bouts import Bout
+from core.events.bouts import Bout, BoutParams
 from core.events.flags import StrideParams
 from core.events.result import GaitEvents
 from core.events.steps import Step, Steps
@@ -55,6 +55,7 @@ def tracks_parquet(tracks: Tracks) -> bytes:
         "schema": SCHEMA,
         "rate_hz": tracks.rate_hz,
         "params": dataclasses.asdict(tracks.params),
+        "bout_params": dataclasses.asdict(tracks.bout_params),
         "surface": dataclasses.asdict(tracks.surface),
         "rests": tracks.rests,
         "turns": [dataclasses.asdict(t) for t in tracks.turns],
@@ -90,6 +91,7 @@ def read_tracks(data: bytes, events: GaitEvents, angles: JointAngles | None) -> 
         trunk={s: _gathered(table, f"{s}_acc", "xyz") for s in trunk},
         surface=_made(Surface, meta["surface"]),
         params=_made(StrideParams, meta["params"]),
+        bout_params=_made(BoutParams, meta.get("bout_params", {})),
         rests=None if meta.get("rests") is None else tuple((a, b) for a, b in meta["rests"]),
         turns=tuple(_made(Turn, t) for t in meta.get("turns", ())),
         steps=None if meta.get("steps") is None else _steps(meta["steps"]),

@@ -17,7 +17,7 @@ from core.body.corrected import corrected_signals
 from core.body.erkf.headings import agreed
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.poses import ErkfRun, refined, run_erkf
-from core.body.estimate import PoseParams
+from core.body.pose_params import PoseParams
 from core.body.tree import PRESETS
 from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording

@@ -14,7 +14,7 @@ import pytest
 
 from core import calibration, timeline
 from core.events.consensus import all_detectors, consensus
-from core.events.gyro_peaks import PRESETS, RECONSTRUCTION, gyro_peak_events
+from core.events.gyro_peaks import RECONSTRUCTION, GyroPeakPresets, gyro_peak_events
 from core.events.result import EventKind, GaitEvents
 from core.frames import SIDES
 from core.fusion.mahony import estimate_orientations
@@ -25,6 +25,8 @@ from tests.accuracy.report import record
 from tests.accuracy.test_events_gaitmap import reference as mocap
 from tests.accuracy.test_events_neura import heel_stops
 from tests.walks import neura_walk, simulated
+
+PRESETS = GyroPeakPresets().by_name
 
 PATIENTS = ("comfortable", "slow", "hemiparetic", "drop_foot", "parkinson", "severe_shuffle", "elderly")
 

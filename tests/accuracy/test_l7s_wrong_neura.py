@@ -19,8 +19,10 @@ import pytest
 from core import calibration, events
 from core.body import contact_mask
 from core.body.choice import Estimator
-from core.body.estimate import PoseParams, estimate_poses
+from core.body.estimate import estimate_poses
 from core.body.health import Finding, worst
+from core.body.mounting import mount_sensors
+from core.body.pose_params import PoseParams
 from core.body.tree import PRESETS
 from core.errors import SagittalError
 from core.frames import SIDES, Segment
@@ -119,7 +121,9 @@ def result(name: str, estimator: Estimator) -> Result | str:
         orientations = estimate_orientations(calibrated)
         found = events.detect(orientations)
         contacts = {s: contact_mask(take.t_s, found.times(s, "ic"), found.times(s, "tc")) for s in SIDES}
-        made = estimate_poses(calibrated, orientations, contacts, BODY, PoseParams(estimator=estimator))
+        params = PoseParams(estimator=estimator)
+        mounted = replace(mount_sensors(calibrated, orientations, params), body=BODY)
+        made = estimate_poses(mounted, contacts, params)
     except SagittalError as error:
         return error.code
     q = dict(made.poses.q)

@@ -20,7 +20,7 @@ SCRIPT = """
 import json, sys, time
 from math import pi
 from pathlib import Path
-from core.body.estimate import PoseParams
+from core.body.pose_params import PoseParams
 from core.pipeline import PipelineConfig, analyse
 from core.simulate import Arc, Stand, Straight, simulate
 

@@ -134,11 +134,12 @@ def test_distances_of_a_foot_that_refuses_its_own_rests_are_withheld_of_it_alone
     found = sparse()
     assert found.poses is not None
     assert found.feet is not None
+    assert found.orientations is not None
     assert not found.feet.withheld
     refused = Finding("zero_velocity_refused_pct", "foot_l", 42.0, *REFUSED_PCT)
     assert refused.verdict == "bad"
     poses = replace(found.poses, health=(refused,))
-    made = withhold_distances(PoseEstimate(None, None, poses, found.feet))  # type: ignore[arg-type]
+    made = withhold_distances(PoseEstimate(found.orientations, poses, found.feet))
     assert made.feet is not None
     assert made.feet.withheld == {"left": "estimator_bad"}
     assert found.tracks is not None

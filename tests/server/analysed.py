@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from core.calibration.result import Calibration, SegmentCalibration
+from core.body.estimate import PoseEstimate
+from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
 from core.errors import Notice
 from core.events.foot_pitch import pitch_signal
 from core.frames import FOOT, SIDES, Segment
+from core.fusion.orientations import Orientations
 from core.measure import measure
 from core.pipeline import Analysis
 from core.quality import QualityReport
-from core.recording import SensorSignals, Subject, UniformRecording
+from core.recording import Recording, SensorSignals, Subject, UniformRecording
 from server.report.exports import analysis_files
 from server.services import analyses, recordings
 from tests.server import walk
@@ -35,28 +38,33 @@ def analysis(*, duration_s: float = 12.0, reached: bool = True) -> Analysis:
         sensors[FOOT[side]] = _sensor(f"F-{side}", turning)
     problem = None if reached else Notice("no_rest", "No rest found.", severity="error")
     mounted = SegmentCalibration(np.eye(3), np.array([0.01, 0.0, np.nan]), 9.8, "walking_direction", 0.9)
-    return Analysis(
-        recording=UniformRecording(tracks.t_s, 100.0, sensors, Subject(1.75), "walk", {}),
-        quality=QualityReport("good", (), duration_s, 100.0, MappingProxyType({}), ((0.0, 2.0),), ()),
-        calibration=Calibration(
-            dict.fromkeys(sensors, mounted),
-            ((0.0, 2.0),),
-            ((2.0, 9.0),),
-            (0.0, 2.0),
-            np.zeros(n, bool),
-            "walking_direction",
-        )
-        if reached
-        else None,
-        orientations=None,
-        poses=walk.poses(duration_s) if reached else None,
-        feet=None,
-        angles=tracks.angles if reached else None,
+    lost = Notice("gap", "0.3 s lost.", "pelvis", 1.0)
+    uniform = UniformRecording(tracks.t_s, 100.0, sensors, Subject(1.75), "walk", {}, notices=(lost,))
+    calibration = Calibration(
+        dict.fromkeys(sensors, mounted),
+        ((0.0, 2.0),),
+        ((2.0, 9.0),),
+        (0.0, 2.0),
+        np.zeros(n, bool),
+        "walking_direction",
+    )
+    orientations = Orientations(tracks.t_s, 100.0, dict(tracks.q), dict(tracks.valid), "mahony")
+    found = Analysis(
+        source=Recording({}, {}, sha256={"a.txt": "ff"}),
+        version="1",
+        uniform=uniform,
+        report=QualityReport("good", (), duration_s, 100.0, MappingProxyType({}), ((0.0, 2.0),), ()),
         problem=problem,
-        notices=(Notice("gap", "0.3 s lost.", "pelvis", 1.0), *(() if problem is None else (problem,))),
-        provenance={"input_sha256": {"a.txt": "ff"}, "version": "1"},
-        tracks=tracks if reached else None,
-        measured=measure(tracks) if reached else None,
+    )
+    if not reached:
+        return found
+    return replace(
+        found,
+        calibrated=CalibratedRecording(uniform, calibration),
+        posed=PoseEstimate(orientations, walk.poses(duration_s), None),
+        angles=tracks.angles,
+        tracks=tracks,
+        measured=measure(tracks),
     )
 
 

@@ -10,9 +10,11 @@ import pytest
 
 from core import calibration, events
 from core.angles import joint_angles
-from core.body import contact_mask, nominal_body
+from core.body import contact_mask
 from core.body.choice import possible
-from core.body.estimate import PoseEstimate, PoseParams, estimate_poses
+from core.body.estimate import PoseEstimate, estimate_poses
+from core.body.mounting import MountedSensors, mount_sensors
+from core.body.pose_params import PoseParams
 from core.body.tree import PRESETS
 from core.errors import EstimationError
 from core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
@@ -26,13 +28,16 @@ PELVIS_FEET = PRESETS["feet_pelvis3"]
 FEET = PRESETS["feet2"]
 
 
-def estimated(take: UniformRecording, params: PoseParams | None = None) -> PoseEstimate:
+def mounted(take: UniformRecording, params: PoseParams) -> MountedSensors:
     calibrated = calibration.calibrate(take)
-    orientations = estimate_orientations(calibrated)
-    found = events.detect(orientations)
+    return mount_sensors(calibrated, estimate_orientations(calibrated), params)
+
+
+def estimated(take: UniformRecording, params: PoseParams | None = None) -> PoseEstimate:
+    params = params or PoseParams()
+    found = events.detect(estimate_orientations(calibration.calibrate(take)))
     contacts = {s: contact_mask(take.t_s, found.times(s, "ic"), found.times(s, "tc")) for s in SIDES}
-    body, _ = nominal_body(take.subject.height_m, take.subject.standing_width_m)
-    return estimate_poses(calibrated, orientations, contacts, body, params)
+    return estimate_poses(mounted(take, params), contacts, params)
 
 
 @cache
@@ -169,17 +174,31 @@ def test_an_estimator_that_lacks_its_sensors_says_which_it_needs() -> None:
 
 
 def test_an_unasked_estimator_that_fails_gives_way_to_the_next() -> None:
-    take = simulated("fast_with_turns", 3)[0]
-    body, _ = nominal_body(None)
-    calibrated = calibration.calibrate(take)
-    orientations = estimate_orientations(calibrated)
-    broken = replace(body, thigh=-0.4)
-    made = estimate_poses(calibrated, orientations, {}, broken)
+    sensors = mounted(simulated("fast_with_turns", 3)[0], PoseParams())
+    broken = replace(sensors, body=replace(sensors.body, thigh=-0.4))
+    made = estimate_poses(broken, {}, PoseParams())
     assert made.poses.reduced == "estimator_failed"
     assert [n.code for n in made.poses.notices].count("estimator_failed") >= 1
     assert "thigh" in made.poses.notices[0].message
     assert made.feet is None
     assert "foot_paths_failed" in {n.code for n in made.poses.notices}
+
+
+def test_without_an_answer_of_the_joints_the_next_estimator_is_used() -> None:
+    sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
+    assert set(sensors.turned_rad) == set(WHOLE)
+    failed = replace(sensors, failure=EstimationError("filter_diverged", "It diverged."))
+    made = estimate_poses(failed, {}, PoseParams())
+    assert made.poses.reduced == "estimator_failed"
+    assert made.poses.method == "l7s_3i"
+    assert "erkf cannot estimate this take" in made.poses.notices[0].message
+
+
+def test_only_where_the_erkf_runs_forward_axes_are_turned_by_the_joints() -> None:
+    take = simulated("fast_with_turns", 3)[0]
+    for params in (PoseParams(estimator="l7s_3i"), PoseParams(estimator="stance_foot_anchor")):
+        assert not mounted(take, params).turned_rad
+    assert not mounted(only(take, *FEET), PoseParams()).turned_rad
 
 
 def test_segment_names_are_known() -> None:

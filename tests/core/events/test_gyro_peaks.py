@@ -10,13 +10,15 @@ import pytest
 
 from core import calibration
 from core.errors import SignalError
-from core.events.gyro_peaks import LIMB, PRESETS, GyroPeakParams, gyro_peak_events, sagittal_rate
+from core.events.gyro_peaks import LIMB, GyroPeakParams, GyroPeakPresets, gyro_peak_events, sagittal_rate
 from core.frames import R_NEUTRAL, SIDES, Floats
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import about, from_matrix, multiply
 from tests.accuracy.event_scoring import match
 from tests.walks import simulated
+
+PRESETS = GyroPeakPresets().by_name
 
 RATE = 100.0
 PEOPLE = (

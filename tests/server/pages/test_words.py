@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from core.pipeline import STAGES
+from core.pipeline import WALK
 from server.pages.session_context import STAGE_NAMES
 from web.words import day, filesize, moment, number, pattern, seconds
 
@@ -45,4 +45,4 @@ def test_a_code_as_a_pattern_matches_itself_only(code: str) -> None:
 
 
 def test_every_stage_of_the_pipeline_has_words_in_its_order() -> None:
-    assert list(STAGE_NAMES) == ["reading", *(name for name, _ in STAGES)]
+    assert list(STAGE_NAMES) == ["reading", *(stage.name for stage in WALK)]

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from core.body.choice import Estimator
-from core.body.estimate import PoseEstimate, PoseParams
+from core.body.estimate import PoseEstimate
 from core.body.health import Verdict
 from core.body.l7s.filter import filter_block, start
 from core.body.l7s.legs import LegModel
 from core.body.l7s.poses import free_acceleration, inputs_of, l7s_poses
 from core.body.model import BodyModel
+from core.body.pose_params import PoseParams
 from core.calibration import calibrate
 from core.errors import EstimationError, SagittalError, SignalError
 from core.frames import FOOT, SIDES, Floats, Segment

@@ -1,0 +1,76 @@
+"""How the sensors sit, once more, as the whole body shows it: standing width, and joints that must meet.
+
+Calibration finds each sensor's mounting on its own. Two things only the body as a whole tells: how far legs
+lean that stand wider or closer than the hips (apart.py), and which forward axes do not fit the joints
+(headings.py). Live and from a file it is the same function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from core.body.apart import legs_apart
+from core.body.choice import Choice, choose
+from core.body.erkf.headings import agreed
+from core.body.kinematics import nominal_body
+from core.body.model import BodyModel
+from core.body.pose_params import PoseParams
+from core.calibration.result import CalibratedRecording
+from core.errors import EstimationError, Notice
+from core.frames import Segment
+from core.fusion.orientations import Orientations
+
+
+@dataclass(frozen=True, eq=False)
+class MountedSensors:
+    """A take whose mountings are final: whatever follows takes these, never those of the calibration.
+
+    Parameters
+    ----------
+    calibrated : the recording with these mountings. orientations : with them, each sensor on its own.
+    body : lengths and standing width. assumed : notices of lengths that nobody gave.
+    choice : the sensors that work and what they allow.
+    turned_rad : segment → how far its forward axis was turned; empty where the ErKF is not the estimator.
+    failure : the joints could not be asked, so the ErKF cannot run either.
+    """
+
+    calibrated: CalibratedRecording
+    orientations: Orientations
+    body: BodyModel
+    assumed: tuple[Notice, ...]
+    choice: Choice
+    turned_rad: Mapping[Segment, float] = field(default_factory=dict)
+    failure: EstimationError | None = None
+
+
+def mount_sensors(
+    calibrated: CalibratedRecording, orientations: Orientations, params: PoseParams
+) -> MountedSensors:
+    """Lean the legs by the standing width, and turn forward axes until the joints agree.
+
+    Parameters
+    ----------
+    calibrated, orientations : of the stages calibration and orientation.
+
+    Raises
+    ------
+    EstimationError `estimator_impossible` when the estimator asked for cannot run on these sensors; those of
+    `headings` when the ErKF was asked for by name.
+    """
+    subject = calibrated.recording.subject
+    body, assumed = nominal_body(subject.height_m, subject.standing_width_m, subject.shoe)
+    calibrated, orientations = legs_apart(calibrated, orientations, body)
+    choice = choose(calibrated, orientations, params.estimator, params.least_valid)
+    mounted = MountedSensors(calibrated, orientations, body, assumed, choice)
+    if choice.order[:1] != ("erkf",):
+        return mounted
+    try:
+        calibrated, orientations, turned = agreed(
+            calibrated, orientations, body, choice.segments, params.erkf
+        )
+    except EstimationError as error:
+        if choice.order == ("erkf",):
+            raise
+        return replace(mounted, failure=error)
+    return replace(mounted, calibrated=calibrated, orientations=orientations, turned_rad=turned)

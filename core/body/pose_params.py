@@ -1,0 +1,42 @@
+"""Parameters of the stages mounting and poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import get_args
+
+from core.body.choice import Requested
+from core.body.erkf.params import ErkfParams
+from core.body.kinematics import AnchorParams
+from core.body.l7s.filter import L7sParams
+from core.errors import ParameterError
+
+
+@dataclass(frozen=True)
+class PoseParams:
+    """Parameters of `mount_sensors` and `estimate_poses`.
+
+    Parameters
+    ----------
+    estimator : "auto" picks by what is worn.
+    least_valid : share of the take a sensor must be there for (our choice).
+    anchor : of the figure without a filter.
+
+    Raises
+    ------
+    ParameterError `unknown_estimator`.
+    """
+
+    estimator: Requested = "auto"
+    erkf: ErkfParams = field(default_factory=ErkfParams.people)
+    l7s: L7sParams = field(default_factory=L7sParams)
+    anchor: AnchorParams = field(default_factory=AnchorParams)
+    least_valid: float = 0.5
+
+    def __post_init__(self) -> None:
+        known = get_args(Requested)
+        if self.estimator not in known:
+            raise ParameterError(
+                "unknown_estimator",
+                f"'{self.estimator}' is no estimator; expected one of {', '.join(known)}.",
+            )

@@ -1,0 +1,14 @@
+"""The whole chain: Recording → Analysis, in named stages.
+
+`config` has the parameters of every stage, `analysis` what the stages give, `stages` the stages themselves,
+`recipes` their order. The same code serves the command line, the worker and the tests.
+"""
+
+from core.pipeline.analysis import Analysis
+from core.pipeline.config import PipelineConfig
+from core.pipeline.recipes import TRUNK_ONLY, WALK, Progress, analyse, resume
+from core.pipeline.stages import PipelineStage
+
+__all__ = [
+    "TRUNK_ONLY", "WALK", "Analysis", "PipelineConfig", "PipelineStage", "Progress", "analyse", "resume",
+]  # fmt: skip

@@ -1,0 +1,165 @@
+"""What the stages give: one record, one field per stage, and what is read from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final, TypeVar
+
+from core.angles import JointAngles
+from core.body.estimate import PoseEstimate
+from core.body.feet import FootTracks
+from core.body.mounting import MountedSensors
+from core.body.poses import Poses
+from core.calibration.result import CalibratedRecording, Calibration
+from core.errors import Notice, ParameterError
+from core.events.result import GaitEvents, Strides
+from core.events.steps import Steps
+from core.events.turns import Turn
+from core.fusion.orientations import Orientations
+from core.measure import Measured, Tracks
+from core.parameters.result import Parameter
+from core.pipeline.config import PipelineConfig
+from core.quality import QualityReport
+from core.recording import Recording, UniformRecording
+
+SCHEMA: Final = 1
+"""Version of the Analysis bundle and of analysis.json."""
+
+Result = TypeVar("Result")
+
+
+def require_stage(result: Result | None, stage: str) -> Result:
+    """The result of a stage that another one needs.
+
+    Raises
+    ------
+    ParameterError : `stage_not_reached`.
+    """
+    if result is None:
+        raise ParameterError("stage_not_reached", f"The stage '{stage}' gave no result.")
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class DetectedContacts:
+    """What the stage `events` gives.
+
+    Parameters
+    ----------
+    turns : of the body. steps : of a trunk sensor, None where the feet's contacts are known or none is worn.
+    """
+
+    events: GaitEvents
+    turns: tuple[Turn, ...]
+    steps: Steps | None
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """Everything one take gave; what was not reached is None and `problem` says why.
+
+    A stage sets its own field and none of another stage, so that the chain can go on from any stage
+    (`core.pipeline.resume`). Users read the properties.
+
+    Parameters
+    ----------
+    source : as read from the files.
+    uniform : stage timeline; samples of sensors that do not measure are not valid.
+    report : stage quality.
+    calibrated : stage calibration, with the mountings that each sensor shows on its own.
+    fused : stage orientation, with those mountings.
+    contacts : stage events.
+    mounted : stage mounting; None also for a single trunk sensor.
+    posed : stage poses.
+    angles : stage angles.
+    tracks : stage parameters, what strides and parameters are measured on, and after an edit are measured on
+        again.
+    measured : stage parameters.
+    problem : the error that stopped the chain, None when every stage ran. stopped_at : that stage's name.
+    """
+
+    source: Recording
+    config: PipelineConfig = field(default_factory=PipelineConfig)
+    version: str = ""
+    uniform: UniformRecording | None = None
+    report: QualityReport | None = None
+    calibrated: CalibratedRecording | None = None
+    fused: Orientations | None = None
+    contacts: DetectedContacts | None = None
+    mounted: MountedSensors | None = None
+    posed: PoseEstimate | None = None
+    angles: JointAngles | None = None
+    tracks: Tracks | None = None
+    measured: Measured | None = None
+    problem: Notice | None = None
+    stopped_at: str | None = None
+
+    @property
+    def recording(self) -> UniformRecording:
+        """The take on its common time axis; every analysis that `analyse` returns has it."""
+        return require_stage(self.uniform, "timeline")
+
+    @property
+    def quality(self) -> QualityReport:
+        """The quality report; every analysis that `analyse` returns has it."""
+        return require_stage(self.report, "quality")
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """Mountings as they were used in the end: with the legs apart and the forward axes of the joints."""
+        last = self.calibrated if self.mounted is None else self.mounted.calibrated
+        return None if last is None else last.calibration
+
+    @property
+    def orientations(self) -> Orientations | None:
+        """As the angles take them: refined where the pose estimator does so."""
+        return self.fused if self.posed is None else self.posed.orientations
+
+    @property
+    def poses(self) -> Poses | None:
+        """The figure."""
+        return None if self.posed is None else self.posed.poses
+
+    @property
+    def feet(self) -> FootTracks | None:
+        """Paths of the feet that distances are measured on; None without a foot sensor."""
+        return None if self.posed is None else self.posed.feet
+
+    @property
+    def events(self) -> GaitEvents | None:
+        """Contacts as detected."""
+        return None if self.measured is None else self.measured.events
+
+    @property
+    def strides(self) -> Strides | None:
+        """The stride list."""
+        return None if self.measured is None else self.measured.strides
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters, empty when no events were reached."""
+        return () if self.measured is None else self.measured.parameters
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """All notices of all stages, each once."""
+        detected = None if self.contacts is None else self.contacts.events
+        speaking = (
+            self.source, self.uniform, self.report, self.calibration, self.orientations, detected,
+            self.measured, self.poses, self.angles,
+        )  # fmt: skip
+        found = [notice for part in speaking if part is not None for notice in part.notices]
+        found += () if self.mounted is None else self.mounted.assumed
+        found += () if self.problem is None else (self.problem,)
+        return tuple(dict.fromkeys(found))
+
+    @property
+    def provenance(self) -> Mapping[str, object]:
+        """sha256 of the input by file, digest of the parameters, version of the code."""
+        return {
+            "input_sha256": dict(self.source.sha256),
+            "parameters_sha256": self.config.digest,
+            "version": self.version,
+            "schema": SCHEMA,
+        }

@@ -1,0 +1,70 @@
+"""Parameters of every stage in one frozen record, and their hash."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from core.body.pose_params import PoseParams
+from core.calibration import CalibrationParams
+from core.errors import ParameterError
+from core.events import FootPitchParams, StrideParams
+from core.events.bouts import BoutParams
+from core.events.consensus import ConsensusParams
+from core.events.lumbar import LumbarParams
+from core.events.turns import TurnParams
+from core.fusion.mahony import MahonyParams
+from core.quality import QualityParams
+from core.quality.stuck import StuckParams
+from core.timeline import TimelineParams
+
+Detector = Literal["foot_pitch", "consensus"]
+"""Whose contacts count: the foot-pitch rule's own, or what most detectors agree on."""
+
+
+@dataclass(frozen=True)
+class PipelineConfig:
+    """Parameters of every stage; its hash is part of each result's provenance.
+
+    No stage takes a parameter that is not in here (tests/core/pipeline/test_config.py).
+
+    Parameters
+    ----------
+    detector : the foot-pitch rule has the smallest error and refuses feet that hardly pitch; the consensus
+        finds those by the shanks (tests/accuracy/test_events_consensus.py).
+    bouts : of the feet's contacts; those of a trunk sensor's steps are `lumbar.bouts`.
+
+    Raises
+    ------
+    ParameterError : `unknown_detector`.
+    """
+
+    timeline: TimelineParams = field(default_factory=TimelineParams)
+    stuck: StuckParams = field(default_factory=StuckParams)
+    quality: QualityParams = field(default_factory=QualityParams)
+    calibration: CalibrationParams = field(default_factory=CalibrationParams)
+    fusion: MahonyParams = field(default_factory=MahonyParams)
+    events: FootPitchParams = field(default_factory=FootPitchParams)
+    detector: Detector = "foot_pitch"
+    consensus: ConsensusParams = field(default_factory=ConsensusParams)
+    lumbar: LumbarParams = field(default_factory=LumbarParams)
+    turns: TurnParams = field(default_factory=TurnParams)
+    poses: PoseParams = field(default_factory=PoseParams)
+    strides: StrideParams = field(default_factory=StrideParams)
+    bouts: BoutParams = field(default_factory=BoutParams)
+
+    def __post_init__(self) -> None:
+        if self.detector not in get_args(Detector):
+            raise ParameterError(
+                "unknown_detector",
+                f"Detector '{self.detector}' is not one of {', '.join(get_args(Detector))}.",
+            )
+
+    @property
+    def digest(self) -> str:
+        """sha256 over all parameters; equal parameters give equal digests."""
+        text = json.dumps(dataclasses.asdict(self), sort_keys=True, default=str)
+        return hashlib.sha256(text.encode()).hexdigest()

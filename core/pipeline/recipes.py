@@ -1,0 +1,158 @@
+"""The order of the stages, and the loop that runs them.
+
+A recipe is a tuple of stages. Which one a take goes through is decided by its working sensors, once the
+signals were judged; another one for another movement is another tuple here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+from core.errors import Notice, ParameterError, SagittalError
+from core.pipeline.analysis import Analysis
+from core.pipeline.config import PipelineConfig
+from core.pipeline.stages import (
+    ANGLES,
+    CALIBRATION,
+    EVENTS,
+    MOUNTING,
+    ORIENTATION,
+    PARAMETERS,
+    POSES,
+    QUALITY,
+    TIMELINE,
+    TRUNK,
+    TRUNK_EVENTS,
+    TRUNK_PARAMETERS,
+    PipelineStage,
+)
+from core.quality.stuck import working
+from core.recording import Recording
+
+Progress = Callable[[str, float], None]
+"""Called with the stage that starts and the share of the work done before it, 0 to 1."""
+
+SIGNALS: Final = (TIMELINE, QUALITY)
+"""What every recipe begins with: afterwards it is known which sensors work."""
+
+WALK: Final = (*SIGNALS, CALIBRATION, ORIENTATION, EVENTS, MOUNTING, POSES, ANGLES, PARAMETERS)
+"""Walking with sensors on the legs, or on legs and trunk."""
+
+TRUNK_ONLY: Final = (*SIGNALS, TRUNK_EVENTS, TRUNK_PARAMETERS)
+"""Walking with sensors on the trunk alone: steps, bouts and turns, no angles."""
+
+
+def say_nothing(stage: str, share: float) -> None:
+    """Progress that nobody follows."""
+
+
+def analyse(
+    recording: Recording,
+    config: PipelineConfig | None = None,
+    progress: Progress = say_nothing,
+    version: str = "",
+) -> Analysis:
+    """Run all stages on one recording.
+
+    Parameters
+    ----------
+    recording : streams with their segments, as core.formats reads them.
+    config : parameters of the stages; None = the defaults.
+    progress : called before each stage.
+    version : of the code, kept in the provenance.
+
+    Raises
+    ------
+    SagittalError
+        When not even a common time axis can be made. Later stages never raise: what stops them is
+        `Analysis.problem`.
+    """
+    return _run_from(Analysis(recording, config or PipelineConfig(), version), 0, progress)
+
+
+def choose_recipe(analysis: Analysis) -> tuple[PipelineStage, ...]:
+    """The recipe of the sensors that work; the stages timeline and quality have run."""
+    return TRUNK_ONLY if all(s in TRUNK for s in working(analysis.recording).sensors) else WALK
+
+
+def run_stages(analysis: Analysis, stages: Sequence[PipelineStage], progress: Progress) -> Analysis:
+    """Run stages in order; after a problem only what measures what is there.
+
+    Raises
+    ------
+    SagittalError of the first stage, without whose result there is nothing to keep.
+    """
+    for stage in stages:
+        if analysis.problem is not None and not stage.runs_after_problem:
+            continue
+        progress(stage.name, stage.share)
+        before = analysis.problem
+        try:
+            analysis = stage.run(analysis, analysis.config)
+        except SagittalError as error:
+            if analysis.uniform is None:
+                raise
+            problem = Notice(error.code, error.message, error.sensor, error.t_s, severity="error")
+            analysis = replace(analysis, problem=problem)
+        if analysis.problem is not before:
+            analysis = replace(analysis, stopped_at=stage.name)
+    return analysis
+
+
+def resume(
+    analysis: Analysis,
+    stage: str,
+    config: PipelineConfig | None = None,
+    progress: Progress = say_nothing,
+) -> Analysis:
+    """Run an analysis again from one stage on; the results before it are taken as they are.
+
+    Parameters
+    ----------
+    stage : name of the first stage that runs again.
+    config : other parameters for it and the stages behind it; None = as before.
+
+    Returns
+    -------
+    what `analyse` with that config gives, to the bit.
+
+    Raises
+    ------
+    ParameterError : `unknown_stage`; `stage_not_reached` when a stage before it gave no result;
+        `earlier_parameters` when the config changes a stage before it.
+    """
+    config = config or analysis.config
+    recipe = choose_recipe(analysis)
+    names = [s.name for s in recipe]
+    if stage not in names:
+        raise ParameterError("unknown_stage", f"No stage '{stage}'; expected one of {', '.join(names)}.")
+    first = names.index(stage)
+    before, again = recipe[:first], recipe[first:]
+    missing = [s.name for s in before if any(getattr(analysis, name) is None for name in s.results)]
+    if missing and not again[0].runs_after_problem:
+        raise ParameterError(
+            "stage_not_reached",
+            f"The analysis cannot go on at '{stage}': {missing[0]} gave no result. Resume from there.",
+        )
+    changed = [
+        name for s in before for name in s.reads if getattr(config, name) != getattr(analysis.config, name)
+    ]
+    if changed:
+        raise ParameterError(
+            "earlier_parameters",
+            f"{', '.join(changed)} belong to stages before '{stage}'. Resume from an earlier one.",
+        )
+    forgotten: dict[str, Any] = dict.fromkeys(name for s in again for name in s.results)
+    if analysis.stopped_at in names[first:]:
+        forgotten |= {"problem": None, "stopped_at": None}
+    return _run_from(replace(analysis, config=config, **forgotten), first, progress)
+
+
+def _run_from(analysis: Analysis, first: int, progress: Progress) -> Analysis:
+    """Run the stages from this place in the recipe on; which recipe it is, the signals' stages decide."""
+    analysis = run_stages(analysis, SIGNALS[first:], progress)
+    analysis = run_stages(analysis, choose_recipe(analysis)[max(first, len(SIGNALS)) :], progress)
+    progress("done", 1.0)
+    return analysis

@@ -1,0 +1,236 @@
+"""The stages of the chain: each takes what was reached and the parameters, and adds what it gives.
+
+A stage is a pure function (Analysis, PipelineConfig) → Analysis that sets its own field. What it cannot do it
+raises as a SagittalError; recipes.py keeps what was reached before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from core import angles, body, calibration, quality, timeline
+from core.body.estimate import estimate_poses
+from core.body.l7s.poses import free_acceleration
+from core.body.mounting import mount_sensors
+from core.body.walking_frame import in_walking_frame
+from core.events.consensus import all_detectors, consensus, with_confidence
+from core.events.lumbar import about_up, detect_steps, trunk_sensor
+from core.events.result import GaitEvents
+from core.events.turns import body_yaw_rate, turns
+from core.frames import FOOT, SIDES, Floats, Segment
+from core.fusion.mahony import estimate_orientations
+from core.fusion.orientations import Orientations
+from core.measure import Tracks, measure
+from core.parameters.spatial import surface_of
+from core.pipeline.analysis import Analysis, DetectedContacts, require_stage
+from core.pipeline.config import PipelineConfig
+from core.quality.stuck import mark_stuck, working
+from core.withheld import withhold, withhold_distances
+
+TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
+"""Segments whose acceleration tells how regular the gait is."""
+
+
+@dataclass(frozen=True)
+class PipelineStage:
+    """One step of a recipe.
+
+    Parameters
+    ----------
+    name : as progress and pages tell it. share : of a typical run that lies before it, 0 to 1.
+    run : (Analysis, PipelineConfig) → Analysis with `results` set; raises SagittalError.
+    results : fields of Analysis that it sets. reads : fields of PipelineConfig that it takes.
+    runs_after_problem : also when an earlier stage could not go on; it takes what was reached.
+    """
+
+    name: str
+    share: float
+    run: Callable[[Analysis, PipelineConfig], Analysis]
+    results: tuple[str, ...]
+    reads: tuple[str, ...] = ()
+    runs_after_problem: bool = False
+
+
+def lay_on_one_axis(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """All sensors on one time axis; samples of a sensor that does not measure are not valid."""
+    uniform = timeline.synchronise(analysis.source, config.timeline)
+    return replace(analysis, uniform=mark_stuck(uniform, config.stuck))
+
+
+def judge_signals(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """The quality report; an error among its notices is the problem of the analysis."""
+    uniform = analysis.recording
+    report = quality.assess(analysis.source, uniform, config.quality, working(uniform).sensors)
+    problem = next((n for n in report.notices if n.severity == "error"), None)
+    return replace(analysis, report=report, problem=problem)
+
+
+def calibrate_sensors(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """How each working sensor sits on its segment."""
+    calibrated = calibration.calibrate(working(analysis.recording), config.calibration)
+    # the poses say what could not be had for want of a sensor that failed
+    return replace(analysis, calibrated=replace(calibrated, recording=analysis.recording))
+
+
+def orient_segments(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """Orientation of every segment on its own."""
+    calibrated = require_stage(analysis.calibrated, "calibration")
+    return replace(analysis, fused=estimate_orientations(calibrated, config.fusion))
+
+
+def detect_contacts(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """Contacts of the feet, turns of the body, and steps of the trunk where no contact was found."""
+    fused, uniform = require_stage(analysis.fused, "orientation"), working(analysis.recording)
+    events = _contacts(fused, config)
+    alone = not events.events and trunk_sensor(uniform) is not None
+    contacts = DetectedContacts(
+        events,
+        turns(*body_yaw_rate(fused, uniform.rate_hz), uniform.rate_hz, config.turns),
+        detect_steps(uniform, config.lumbar) if alone else None,
+    )
+    return replace(analysis, contacts=contacts)
+
+
+def detect_trunk_steps(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """Steps and turns of a single trunk sensor: they need neither rest nor calibration."""
+    uniform = working(analysis.recording)
+    steps = detect_steps(uniform, config.lumbar)
+    signals = uniform.sensors[steps.source]
+    _, yaw_rate = about_up(signals, uniform.rate_hz, config.lumbar)
+    found = turns(yaw_rate, signals.valid, uniform.rate_hz, config.turns)
+    return replace(analysis, contacts=DetectedContacts(GaitEvents(()), found, steps))
+
+
+def mount_on_segments(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """Mountings as standing width and joints show them; everything behind takes these."""
+    calibrated = require_stage(analysis.calibrated, "calibration")
+    mounted = mount_sensors(calibrated, require_stage(analysis.fused, "orientation"), config.poses)
+    return replace(analysis, mounted=mounted)
+
+
+def build_figure(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """Poses of the segments and paths of the feet; distances that cannot be stood behind are withheld."""
+    mounted = require_stage(analysis.mounted, "mounting")
+    events, t_s = require_stage(analysis.contacts, "events").events, analysis.recording.t_s
+    contacts = {
+        side: body.contact_mask(t_s, events.times(side, "ic"), events.times(side, "tc")) for side in SIDES
+    }
+    return replace(analysis, posed=withhold_distances(estimate_poses(mounted, contacts, config.poses)))
+
+
+def compute_angles(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """Joint angles; those that the estimator cannot stand behind are withheld."""
+    posed, mounted = require_stage(analysis.posed, "poses"), require_stage(analysis.mounted, "mounting")
+    standing = analysis.recording.subject.standing_angles_deg
+    zero = mounted.calibrated.calibration.zero
+    joint = angles.joint_angles(posed.orientations, zero, posed.poses, standing)
+    return replace(analysis, angles=withhold(joint, posed.poses, posed.orientations))
+
+
+def measure_walk(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """Strides and parameters of what was reached; nothing before the contacts are known."""
+    fused, contacts, calibrated = analysis.fused, analysis.contacts, analysis.calibration
+    if fused is None or contacts is None or calibrated is None:
+        return analysis
+    uniform, complete = analysis.recording, analysis.angles is not None
+    feet = [s for s in FOOT.values() if s in fused.q]
+    # a foot whose sensor failed keeps what it had
+    better = analysis.orientations if complete and analysis.orientations is not None else fused
+    tracks = Tracks(
+        t_s=uniform.t_s,
+        rate_hz=uniform.rate_hz,
+        events=contacts.events,
+        q={s: better.q.get(s, fused.q[s]) for s in feet},
+        valid={s: fused.valid[s] for s in feet},
+        turning=calibrated.turning,
+        feet=analysis.feet if complete else None,
+        angles=analysis.angles,
+        trunk=_trunk_acceleration(analysis) if complete else {},
+        surface=surface_of(uniform),
+        params=config.strides,
+        bout_params=config.bouts,
+        rests=calibrated.rest,
+        turns=contacts.turns,
+        steps=contacts.steps,
+    )
+    return replace(analysis, tracks=tracks, measured=measure(tracks))
+
+
+def measure_trunk(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """Parameters of the steps of a single trunk sensor."""
+    contacts, uniform = analysis.contacts, analysis.recording
+    if contacts is None or contacts.steps is None:
+        return analysis
+    source = contacts.steps.source
+    signals = uniform.sensors[source]
+    vertical, _ = about_up(signals, uniform.rate_hz, config.lumbar)
+    # which way is forward nobody knows without a calibration
+    upwards = np.full((len(vertical), 3), np.nan)
+    upwards[:, 2] = np.where(signals.valid, vertical, np.nan)
+    tracks = Tracks(
+        t_s=uniform.t_s,
+        rate_hz=uniform.rate_hz,
+        events=contacts.events,
+        q={},
+        valid={},
+        surface=surface_of(uniform),
+        params=config.strides,
+        bout_params=config.bouts,
+        trunk={source: upwards},
+        turns=contacts.turns,
+        steps=contacts.steps,
+    )
+    return replace(analysis, tracks=tracks, measured=measure(tracks))
+
+
+def _contacts(orientations: Orientations, config: PipelineConfig) -> GaitEvents:
+    """Contacts of the chosen detector, each with the share of all detectors that saw it.
+
+    Without a foot sensor there is no foot-pitch rule: the shanks' detectors agree among themselves.
+    """
+    found = all_detectors(orientations, config.events, config.consensus)
+    feet = any(s in orientations.q for s in FOOT.values())
+    agree = with_confidence if feet and config.detector == "foot_pitch" else consensus
+    return agree(found, config.consensus)
+
+
+def _trunk_acceleration(analysis: Analysis) -> dict[Segment, Floats]:
+    """Segment → (n, 3) acceleration free of gravity, forward, left, up, m/s²; NaN = not measured."""
+    mounted, posed = analysis.mounted, analysis.posed
+    if mounted is None or posed is None:
+        return {}
+    orientations = posed.orientations
+    acceleration = free_acceleration(mounted.calibrated, orientations)
+    return {
+        s: np.where(
+            orientations.valid[s][:, None],
+            in_walking_frame(acceleration[s], orientations.q[s], analysis.recording.rate_hz),
+            np.nan,
+        )
+        for s in TRUNK
+        if s in orientations.q
+    }
+
+
+TIMELINE: Final = PipelineStage("timeline", 0.0, lay_on_one_axis, ("uniform",), ("timeline", "stuck"))
+QUALITY: Final = PipelineStage("quality", 0.03, judge_signals, ("report",), ("quality",))
+CALIBRATION: Final = PipelineStage("calibration", 0.05, calibrate_sensors, ("calibrated",), ("calibration",))
+ORIENTATION: Final = PipelineStage("orientation", 0.1, orient_segments, ("fused",), ("fusion",))
+EVENTS: Final = PipelineStage(
+    "events", 0.14, detect_contacts, ("contacts",), ("events", "detector", "consensus", "lumbar", "turns")
+)
+TRUNK_EVENTS: Final = PipelineStage("events", 0.14, detect_trunk_steps, ("contacts",), ("lumbar", "turns"))
+MOUNTING: Final = PipelineStage("mounting", 0.15, mount_on_segments, ("mounted",), ("poses",))
+POSES: Final = PipelineStage("poses", 0.4, build_figure, ("posed",), ("poses",))
+ANGLES: Final = PipelineStage("angles", 0.95, compute_angles, ("angles",))
+PARAMETERS: Final = PipelineStage(
+    "parameters", 0.98, measure_walk, ("tracks", "measured"), ("strides", "bouts"), runs_after_problem=True
+)
+TRUNK_PARAMETERS: Final = PipelineStage(
+    "parameters", 0.98, measure_trunk, ("tracks", "measured"), ("lumbar", "strides", "bouts"),
+    runs_after_problem=True,
+)  # fmt: skip

@@ -1,0 +1,97 @@
+"""The configuration: every parameter of every stage is in it, in its hash, and of some stage."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import pkgutil
+import typing
+from collections.abc import Iterator
+
+import pytest
+
+import core
+from core.errors import ParameterError
+from core.events.consensus import ConsensusParams
+from core.pipeline import TRUNK_ONLY, WALK, PipelineConfig
+
+ELSEWHERE = ("core.online", "core.simulate")
+"""Samples as they come have a configuration of their own (`OnlineParams`), so has a simulation."""
+
+LIVE = "Live"
+"""So begin the names of those that stand beside their twin for files."""
+
+
+def declared() -> Iterator[type]:
+    """Every dataclass of parameters that a module of core defines."""
+    for module in pkgutil.walk_packages(core.__path__, "core."):
+        if module.name.startswith(ELSEWHERE):
+            continue
+        found = importlib.import_module(module.name)
+        for name, kind in vars(found).items():
+            if not name.endswith("Params") or name.startswith(LIVE) or not isinstance(kind, type):
+                continue
+            if kind.__module__ == module.name:
+                yield kind
+
+
+def reachable(kind: type) -> set[type]:
+    """The dataclass and those of its fields, their fields, and so on."""
+    hints = typing.get_type_hints(kind)
+    below = {hints[f.name] for f in dataclasses.fields(kind) if dataclasses.is_dataclass(hints[f.name])}
+    return {kind}.union(*(reachable(k) for k in below))
+
+
+def leaves(value: object) -> Iterator[tuple[str, ...]]:
+    """Paths of all plain values of a configuration."""
+    if not dataclasses.is_dataclass(value):
+        yield ()
+        return
+    for f in dataclasses.fields(value):
+        yield from ((f.name, *path) for path in leaves(getattr(value, f.name)))
+
+
+def test_parameters_of_every_stage_are_in_the_config() -> None:
+    kinds = set(declared())
+    assert len(kinds) > 20
+    assert {k.__name__ for k in kinds - reachable(PipelineConfig)} == set()
+    assert all(k.__dataclass_params__.frozen for k in kinds)  # type: ignore[attr-defined]
+
+
+def test_every_part_of_the_config_is_read_by_a_stage_that_says_so() -> None:
+    read = {name for stage in (*WALK, *TRUNK_ONLY) for name in stage.reads}
+    assert read == {f.name for f in dataclasses.fields(PipelineConfig)}
+
+
+def test_every_single_parameter_changes_the_hash() -> None:
+    config = PipelineConfig()
+    paths = [p for p in leaves(config) if p not in (("detector",), ("poses", "estimator"))]
+    numbers = [p for p in paths if isinstance(value_at(config, p), int | float) and p]
+    assert len(numbers) > 100
+    digests = set()
+    for path in numbers:
+        try:
+            digests.add(shifted(config, path).digest)
+        except ParameterError:
+            continue
+    assert config.digest not in digests
+    assert len(digests) > 100
+    assert PipelineConfig().digest == config.digest
+
+
+def value_at(value: typing.Any, path: tuple[str, ...]) -> typing.Any:
+    return value_at(getattr(value, path[0]), path[1:]) if path else value
+
+
+def shifted(value: typing.Any, path: tuple[str, ...]) -> typing.Any:
+    """The configuration with one number a millionth larger, a switch turned."""
+    if not path:
+        return not value if isinstance(value, bool) else value * (1 + 1e-6) + 1e-9
+    return dataclasses.replace(value, **{path[0]: shifted(getattr(value, path[0]), path[1:])})
+
+
+def test_a_detector_that_does_not_exist_is_named() -> None:
+    with pytest.raises(ParameterError, match="no detector 'marianni'; expected one of gouwanda"):
+        ConsensusParams(presets=("marianni",))
+    with pytest.raises(ParameterError, match="not one of foot_pitch, consensus"):
+        PipelineConfig(detector="best")  # type: ignore[arg-type]

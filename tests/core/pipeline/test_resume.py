@@ -1,0 +1,114 @@
+"""The chain from a stage on: it gives what the whole chain gives, to the bit."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.errors import ParameterError
+from core.events.flags import StrideParams
+from core.frames import Segment
+from core.pipeline import TRUNK_ONLY, WALK, Analysis, PipelineConfig, analyse, resume
+from core.recording import Recording
+from core.simulate import simulate_scenario
+
+OTHER = PipelineConfig(strides=StrideParams(edge_strides=2))
+
+
+@cache
+def take(*worn: Segment) -> Recording:
+    return simulate_scenario("comfortable", 1, worn=worn or None).recording
+
+
+@cache
+def whole(*worn: Segment) -> Analysis:
+    return analyse(take(*worn))
+
+
+def same(x: Any, y: Any) -> bool:
+    """Equal to the bit, arrays and all."""
+    if isinstance(x, np.ndarray):
+        return x.dtype == y.dtype and np.array_equal(x, y, equal_nan=x.dtype.kind == "f")
+    if dataclasses.is_dataclass(x) and not isinstance(x, type):
+        return type(x) is type(y) and all(same(getattr(x, f.name), getattr(y, f.name)) for f in fields(x))
+    if hasattr(x, "items"):
+        return list(x) == list(y) and all(same(x[k], y[k]) for k in x)
+    if isinstance(x, list | tuple):
+        return len(x) == len(y) and all(same(a, b) for a, b in zip(x, y, strict=True))
+    return bool(x == y) or (x != x and y != y)
+
+
+def fields(x: Any) -> tuple[Any, ...]:
+    return dataclasses.fields(x)
+
+
+def test_the_comparison_sees_a_bit() -> None:
+    a = whole("pelvis")
+    assert a.uniform is not None
+    later = dataclasses.replace(a.uniform, t_s=np.nextafter(a.uniform.t_s, 99.0))
+    assert same(a, a)
+    assert not same(a, dataclasses.replace(a, uniform=later))
+
+
+@pytest.mark.parametrize("stage", [s.name for s in WALK])
+def test_resumed_at_any_stage_is_the_whole(stage: str) -> None:
+    worn: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
+    assert whole(*worn).problem is None
+    assert same(resume(whole(*worn), stage), whole(*worn))
+
+
+def test_seven_sensors_resumed_where_their_mountings_are_found_are_the_whole() -> None:
+    assert same(resume(whole(), "mounting"), whole())
+
+
+@pytest.mark.parametrize("stage", [s.name for s in TRUNK_ONLY])
+def test_a_trunk_sensor_resumed_at_any_stage_is_the_whole(stage: str) -> None:
+    assert same(resume(whole("pelvis"), stage), whole("pelvis"))
+
+
+def test_with_other_parameters_it_is_what_the_chain_gives_with_those() -> None:
+    worn: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
+    again = resume(whole(*worn), "parameters", OTHER)
+    assert same(again, analyse(take(*worn), OTHER))
+    assert again.provenance != whole(*worn).provenance
+    assert again.strides != whole(*worn).strides
+
+
+def test_parameters_of_an_earlier_stage_cannot_be_changed_on_the_way() -> None:
+    other = PipelineConfig(detector="consensus")
+    with pytest.raises(ParameterError, match="detector belong to stages before 'poses'") as caught:
+        resume(whole("pelvis", "foot_l", "foot_r"), "poses", other)
+    assert caught.value.code == "earlier_parameters"
+
+
+def test_a_stage_that_does_not_exist_is_named() -> None:
+    with pytest.raises(ParameterError, match="No stage 'squat'; expected one of timeline, quality") as caught:
+        resume(whole("pelvis"), "squat")
+    assert caught.value.code == "unknown_stage"
+
+
+def test_progress_tells_the_stages_that_run() -> None:
+    told: list[str] = []
+    resume(whole("pelvis", "foot_l", "foot_r"), "poses", progress=lambda stage, share: told.append(stage))
+    assert told == ["poses", "angles", "parameters", "done"]
+
+
+def test_after_a_problem_only_what_was_reached_is_measured_again() -> None:
+    config = PipelineConfig()
+    config = dataclasses.replace(config, poses=dataclasses.replace(config.poses, estimator="erkf"))
+    stopped = analyse(take("pelvis", "foot_l", "foot_r"), config)
+    assert stopped.problem is not None
+    assert stopped.problem.code == "estimator_impossible"
+    assert stopped.stopped_at == "mounting"
+    assert stopped.strides is not None
+    assert same(resume(stopped, "parameters"), stopped)
+    assert same(resume(stopped, "mounting"), stopped)
+    with pytest.raises(ParameterError, match="mounting gave no result") as caught:
+        resume(stopped, "poses")
+    assert caught.value.code == "stage_not_reached"
+    mended = resume(stopped, "mounting", PipelineConfig())
+    assert same(mended, whole("pelvis", "foot_l", "foot_r"))
