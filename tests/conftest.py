@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -14,6 +16,8 @@ import pytest
 
 from server.processes.compile_cache import has_compiled_filters, share_compile_cache
 from tests.accuracy.report import WRITE
+from tests.compiling import compile_filters
+from tests.passed import Passed
 
 # before anything imports numba: every process that a test starts inherits it
 share_compile_cache(Path(tempfile.gettempdir()) / "sagittal-tests")
@@ -26,14 +30,23 @@ hypothesis.settings.load_profile("sagittal")
 
 MARKED: Final = ("accuracy", "bench", "browser", "faults")
 """Folders of long tests; each is a mark of the same name."""
+FIRST: Final = "pytest.mark.first"
+"""Written in the files of long folders that have a test for every run; the others are not even imported then."""
 ORDER: Final = ("core", "server", "test_", "accuracy", "acceptance", "faults", "browser", "bench")
 """Which tests come first: what a change breaks is seen in the first seconds."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option that lets accuracy tests write docs/accuracy.md."""
+    """Add the options of our own."""
     parser.addoption(
         "--write-figures", action="store_true", help="write docs/accuracy.md instead of comparing with it"
+    )
+    parser.addoption(
+        "--passed",
+        type=Path,
+        metavar="FILE",
+        help="leave out the tests that FILE names, and add to it those that pass: together, several runs with "
+        "the same FILE run every test once",
     )
 
 
@@ -43,6 +56,8 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ[WRITE] = "1"
     if config.option.markexpr == _usual_marks(config) and any(map(_names_a_file, _named(config))):
         config.option.markexpr = ""
+    if config.getoption("--passed"):
+        config.pluginmanager.register(Passed(config.getoption("--passed")))
 
 
 def _named(config: pytest.Config) -> list[str]:
@@ -69,8 +84,26 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         return
     sys.stdout.write("Compiling the filters (once for you and this version, about a minute) …\n")
     sys.stdout.flush()
-    command = [sys.executable, "-c", "from core.online import warm; warm()"]
-    subprocess.run(command, cwd=Path(__file__).parent.parent, check=True)
+    compile_filters()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[object]:
+    """Do not look for garbage while thousands of tests are made, nor among them afterwards."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Do not import a file of a long folder when the usual marks leave out all its tests."""
+    if config.option.markexpr != _usual_marks(config) or collection_path.suffix != ".py":
+        return None
+    room = collection_path.relative_to(Path(__file__).parent).parts[0]
+    return True if room in MARKED and FIRST not in collection_path.read_text("utf-8") else None
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -151,12 +151,17 @@ def _told(frame: LiveFrame, block: UniformBlock, chain: Chain, outcomes: Sequenc
     )
 
 
-def warm() -> None:
-    """Compile or load every kernel of the chain, so that the first take does not wait for it."""
+def warm(sets: Sequence[str] = ("lower_body7", "feet_pelvis3", "feet2")) -> None:
+    """Compile or load every kernel of the chain, so that the first take does not wait for it.
+
+    Parameters
+    ----------
+    sets : names of the sets of sensors, as in `core.recording.PRESETS`, whose filters are wanted.
+    """
     warm_axis()
     warm_stuck()
     warm_calibration()
-    for worn in (PRESETS["lower_body7"], PRESETS["feet_pelvis3"], PRESETS["feet2"]):
+    for worn in (PRESETS[name] for name in sets):
         chain = Chain(_standing(worn), worn)
         acc = np.tile([0.0, GRAVITY, 0.0], (10, len(worn), 1))
         chain.push(acc, np.zeros_like(acc), np.ones(acc.shape[:2], np.bool_))
