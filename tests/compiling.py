@@ -7,9 +7,6 @@ import sys
 
 from tests.data import ROOT
 
-PARTS = (("lower_body7",), ("feet_pelvis3", "feet2"))
-"""Sets of sensors whose filters have the least in common: about as long either."""
-
 
 def compile_filters() -> None:
     """Fill the folder of compiled filters that `server.compile_cache` names.
@@ -19,8 +16,12 @@ def compile_filters() -> None:
     subprocess.CalledProcessError
         a filter does not compile.
     """
-    programs = [[sys.executable, "-c", f"from core.online import warm; warm({sets})"] for sets in PARTS]
-    running = [subprocess.Popen(program, cwd=ROOT) for program in programs]
+    running = [
+        subprocess.Popen(
+            [sys.executable, "-c", f"from core.online.session import {name}; {name}()"], cwd=ROOT
+        )
+        for name in ("warm", "warm_rest")
+    ]
     for process in running:
         if process.wait():
             raise subprocess.CalledProcessError(process.returncode, process.args)

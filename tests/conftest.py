@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -31,7 +30,7 @@ hypothesis.settings.load_profile("sagittal")
 MARKED: Final = ("accuracy", "bench", "browser", "faults")
 """Folders of long tests; each is a mark of the same name."""
 FIRST: Final = "pytest.mark.first"
-"""Written in the files of long folders that have a test for every run; the others are not even imported then."""
+"""Written in the files of long folders that have a test for every run; the others are not imported then."""
 ORDER: Final = ("core", "server", "test_", "accuracy", "acceptance", "faults", "browser", "bench")
 """Which tests come first: what a change breaks is seen in the first seconds."""
 
@@ -45,8 +44,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--passed",
         type=Path,
         metavar="FILE",
-        help="leave out the tests that FILE names, and add to it those that pass: together, several runs with "
-        "the same FILE run every test once",
+        help="leave out the tests that FILE names, and add those that pass: several runs with one FILE "
+        "run every test once",
     )
 
 

@@ -1,6 +1,6 @@
 """Several runs that share the work: each leaves out what has passed before.
 
-`.ci/run` runs first what a newcomer runs, then the rest with the recordings, then all that has not passed yet.
+`.ci/run` runs first what a newcomer runs, then the rest with the recordings, then what has not passed.
 A test is left out only when it has passed, so none is lost, whatever marks and folders say.
 """
 

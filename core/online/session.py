@@ -151,20 +151,28 @@ def _told(frame: LiveFrame, block: UniformBlock, chain: Chain, outcomes: Sequenc
     )
 
 
-def warm(sets: Sequence[str] = ("lower_body7", "feet_pelvis3", "feet2")) -> None:
-    """Compile or load every kernel of the chain, so that the first take does not wait for it.
+def warm() -> None:
+    """Compile or load every kernel of the chain, so that the first take does not wait for it."""
+    warm_calibration()
+    _warm_chain(PRESETS["lower_body7"])
+    warm_rest()
 
-    Parameters
-    ----------
-    sets : names of the sets of sensors, as in `core.recording.PRESETS`, whose filters are wanted.
+
+def warm_rest() -> None:
+    """Compile or load what the filter of seven sensors is no part of.
+
+    A second process may do that while the first is at that filter, which takes longer than all the rest.
     """
     warm_axis()
     warm_stuck()
-    warm_calibration()
-    for worn in (PRESETS[name] for name in sets):
-        chain = Chain(_standing(worn), worn)
-        acc = np.tile([0.0, GRAVITY, 0.0], (10, len(worn), 1))
-        chain.push(acc, np.zeros_like(acc), np.ones(acc.shape[:2], np.bool_))
+    _warm_chain(PRESETS["feet_pelvis3"])
+    _warm_chain(PRESETS["feet2"])
+
+
+def _warm_chain(worn: tuple[Segment, ...]) -> None:
+    chain = Chain(_standing(worn), worn)
+    acc = np.tile([0.0, GRAVITY, 0.0], (10, len(worn), 1))
+    chain.push(acc, np.zeros_like(acc), np.ones(acc.shape[:2], np.bool_))
 
 
 def _standing(worn: tuple[Segment, ...], samples: int = 150, rate_hz: float = 100.0) -> LiveCalibration:

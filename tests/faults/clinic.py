@@ -26,14 +26,14 @@ PATIENCE_S = 60.0
 T = TypeVar("T")
 
 
-def until(look: Callable[[], T | None]) -> T:
-    limit = time.monotonic() + PATIENCE_S
+def until(look: Callable[[], T | None], patience_s: float = PATIENCE_S) -> T:
+    limit = time.monotonic() + patience_s
     while time.monotonic() < limit:
         found = look()
         if found:
             return found
         time.sleep(0.02)
-    raise AssertionError(f"waited {PATIENCE_S:g} s in vain for {look}")
+    raise AssertionError(f"waited {patience_s:g} s in vain for {look}")
 
 
 def alive(pid: int) -> bool:
@@ -82,12 +82,12 @@ class Clinic:
         gate = self.folder / f"gate-{stage}"
         return self.submit(hold_at=stage, reached=str(reached), gate=str(gate)), reached, gate
 
-    def ended(self, view: JobView) -> JobView:
+    def ended(self, view: JobView, patience_s: float = PATIENCE_S) -> JobView:
         def look() -> JobView | None:
             found = self.queue.get(view.id)
             return found if found is not None and found.finished else None
 
-        return until(look)
+        return until(look, patience_s)
 
     def row(self, view: JobView) -> Any:
         with self.db.read() as c:

@@ -165,6 +165,7 @@ def test_half_received_files_and_what_is_not_ours_are_no_recordings(tmp_path: Pa
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(b"z")
     custody.refuse_strangers(Settings(data_dir=tmp_path))
+    assert (tmp_path / "blobs" / "incoming" / "x.tmp").read_bytes() == b"z"
 
 
 def test_nothing_is_swept_with_an_emptied_database(full: Clinic) -> None:

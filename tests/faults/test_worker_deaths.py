@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import textwrap
-import time
+import threading
 from pathlib import Path
 
 import pytest
@@ -125,11 +125,9 @@ def test_cancel_stops_the_child_within_two_seconds(clinic: Clinic, workers: Work
     child = int(reached.read_text())
     with clinic.db.write() as c:
         asked = clinic.queue.cancel(c, view.id)
-    began = time.monotonic()
     assert asked is not None
     assert (asked.state, asked.cancel_requested) == ("running", True)
-    assert clinic.ended(view).state == "cancelled"
-    assert time.monotonic() - began < 2.0
+    assert clinic.ended(view, patience_s=2.0).state == "cancelled"
     assert not alive(child)
     assert clinic.results() == []
 
@@ -140,9 +138,7 @@ def test_cancel_stops_a_child_that_never_speaks(clinic: Clinic, workers: Workers
     until(lambda: clinic.row(view).stage == STAGES[-1])
     with clinic.db.write() as c:
         clinic.queue.cancel(c, view.id)
-    began = time.monotonic()
-    assert clinic.ended(view).state == "cancelled"
-    assert time.monotonic() - began < 2.0
+    assert clinic.ended(view, patience_s=2.0).state == "cancelled"
 
 
 @pytest.mark.parametrize(
@@ -172,9 +168,10 @@ def test_stopping_gives_the_job_back_unharmed(clinic: Clinic, workers: Workers) 
     view, reached, _ = clinic.hold("second")
     until(reached.exists)
     child = int(reached.read_text())
-    began = time.monotonic()
-    workers.stop()
-    assert time.monotonic() - began < 10.0
+    stopping = threading.Thread(target=workers.stop)
+    stopping.start()
+    stopping.join(10.0)
+    assert not stopping.is_alive()
     assert not alive(child)
     row = clinic.row(view)
     assert (row.state, row.deaths, row.worker) == ("queued", 0, None)

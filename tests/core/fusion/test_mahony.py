@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from core.angles import joint_angles
+from core.attitude import attitude_kernel
 from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError
@@ -29,6 +30,7 @@ def calibrated(name: str = "comfortable") -> CalibratedRecording:
 
 def test_warm_compiles_without_a_recording() -> None:
     warm()
+    assert attitude_kernel.signatures
 
 
 def test_at_standing_every_segment_faces_forward_and_stands_upright() -> None:

