@@ -15,6 +15,7 @@ from core.recording import Recording, UniformRecording
 from core.rotation import about, rotate
 from core.simulate import simulate_scenario
 from tests.core.body.test_estimate import estimated
+from tests.marks import slow_beyond
 from tests.walks import simulated
 
 
@@ -54,7 +55,8 @@ def test_the_longest_run_is_found_wherever_it_lies() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "seed"), [("fast_with_turns", 2), ("comfortable", 3), ("hemiparetic", 4), ("drop_foot", 5)]
+    ("name", "seed"),
+    slow_beyond(1, [("comfortable", 3), ("fast_with_turns", 2), ("hemiparetic", 4), ("drop_foot", 5)]),
 )
 def test_a_right_set_up_is_not_accused(name: str, seed: int) -> None:
     made = estimated(take(seed, name))
@@ -154,6 +156,7 @@ def test_a_burst_of_no_numbers_is_a_gap() -> None:
     assert np.isnan(done.angles.angles["knee_flexion_l"]).any()
 
 
+@pytest.mark.slow
 def test_a_foot_sensor_put_on_backwards_walks_all_the_same_or_is_told() -> None:
     was = take().sensors["foot_l"]
     half = about(2, np.pi)

@@ -14,6 +14,7 @@ from core.events.result import GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES
 from core.fusion.mahony import estimate_orientations
 from tests.accuracy.event_scoring import match
+from tests.marks import slow_beyond
 from tests.walks import simulated
 
 PEOPLE = (
@@ -75,7 +76,7 @@ def test_confidence_alone_adds_and_takes_away_nothing() -> None:
     assert [e.confidence for e in alone.events] == [None] * 3
 
 
-@pytest.mark.parametrize("name", PEOPLE)
+@pytest.mark.parametrize("name", slow_beyond(4, PEOPLE))
 def test_simulated_people_are_found_whole_or_said_to_be_led_by_another_detector(name: str) -> None:
     agreed = consensus(detectors(name))
     truth = simulated(name)[1]

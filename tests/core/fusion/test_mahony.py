@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from core.angles import joint_angles
-from core.attitude import attitude_kernel
 from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError
 from core.frames import R_NEUTRAL, Floats, Segment
-from core.fusion.attitude import warm
+from core.fusion.attitude import attitude_kernel, warm
 from core.fusion.drift import DriftParams
 from core.fusion.mahony import MahonyParams, estimate_orientations
 from core.rest import samples

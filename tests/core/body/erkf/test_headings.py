@@ -80,6 +80,7 @@ def test_nobody_walking_means_nothing_is_found() -> None:
     assert heading_errors(still, estimate_orientations(calibrated), body, WHOLE, ErkfParams.offline()) == {}
 
 
+@pytest.mark.slow
 def test_passes_are_repeated_until_a_large_error_is_gone() -> None:
     calibrated, orientations, without = take(3, {})
     body, _ = nominal_body(calibrated.recording.subject.height_m)

@@ -6,6 +6,7 @@ from itertools import pairwise
 from math import degrees
 
 import numpy as np
+import pytest
 
 from core.body.erkf.filter import ErkfInputs
 from core.body.erkf.params import ErkfParams
@@ -78,6 +79,7 @@ def test_joint_centres_coincide_and_the_lower_foot_is_at_ankle_height() -> None:
     assert np.isclose(ankles.min(), take.tree.origin[FEET[0], 2])
 
 
+@pytest.mark.slow
 def test_two_feet_from_mid_walk_to_a_standing_end_keep_their_strides() -> None:
     """Known biases give the strides of a standing start (docs/science/erkf.md: |bias| < 5, RMS < 6 mm)."""
     take = mixed_walk()

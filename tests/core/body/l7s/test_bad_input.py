@@ -27,6 +27,7 @@ from core.rotation import about, multiply, rotate
 from core.simulate import simulate_scenario
 from tests.core.body.l7s.test_poses import still_feet
 from tests.core.body.test_estimate import FEET, PELVIS_FEET, estimated
+from tests.marks import slow_beyond
 from tests.walks import cut, lost, only, simulated
 
 SEEN = {"l7s_3i": PELVIS_FEET, "l7s_2i": FEET}
@@ -72,10 +73,10 @@ ACCUSING = {
 @pytest.mark.parametrize("estimator", BOTH)
 @pytest.mark.parametrize(
     ("name", "seed"),
-    [
+    slow_beyond(2, [
         ("comfortable", 2), ("slow", 4), ("fast_with_turns", 3), ("hemiparetic", 3), ("drop_foot", 5),
         ("antalgic", 3), ("crouch", 4), ("parkinson", 2), ("elderly", 5),
-    ],
+    ]),
 )  # fmt: skip
 def test_a_right_set_up_is_not_accused(name: str, seed: int, estimator: Estimator) -> None:
     made = run(only(simulated(name, seed)[0], *SEEN[estimator]), estimator)
@@ -354,7 +355,7 @@ def test_a_squat_that_no_protocol_announced_is_told(depth_m: float, verdict: Ver
     assert ("pelvis_rises" in {n.code for n in poses.notices}) == (depth_m > 0.0)
 
 
-@pytest.mark.parametrize("name", ["slow", "fast_with_turns", "hemiparetic"])
+@pytest.mark.parametrize("name", slow_beyond(1, ["slow", "fast_with_turns", "hemiparetic"]))
 def test_the_rise_of_the_pelvis_is_the_true_one(name: str) -> None:
     recording, truth = simulated(name, 3)
     height = truth.p["pelvis"][:, 2]
