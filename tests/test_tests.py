@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ CLOCKS = {"monotonic", "perf_counter", "process_time", "thread_time", "monotonic
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
+@cache
 def modules() -> dict[Path, ast.Module]:
     return {path: ast.parse(path.read_text("utf-8")) for path in sorted(TESTS.rglob("*.py"))}
 
@@ -46,7 +48,8 @@ def find_checking_names(trees: Iterable[ast.Module]) -> set[str]:
     """Functions of tests and their helpers that assert, directly or by what they call."""
     found = [f for tree in trees for f in functions(tree)]
     names = EXPECT | {f.name for f in found if asserts(f)}
-    while more := {f.name for f in found if f.name not in names and called(f) & names}:
+    calls = [(f.name, called(f)) for f in found]
+    while more := {name for name, of in calls if name not in names and of & names}:
         names |= more
     return names
 
@@ -68,6 +71,8 @@ def find_limits_in_seconds(tree: ast.Module) -> list[str]:
         if any("bench" in ast.unparse(decorator) for decorator in f.decorator_list):
             continue
         names: set[str] = set()
+        if not called(f) & CLOCKS:
+            continue
         for node in ast.walk(f):
             if isinstance(node, ast.Assign) and _is_duration(node.value, names):
                 names |= {n.id for t in node.targets for n in ast.walk(t) if isinstance(n, ast.Name)}
