@@ -18,6 +18,7 @@ from core.body.estimate import PoseEstimate
 from core.body.health import Finding
 from core.body.poses import Poses
 from core.errors import Notice
+from core.estimators import BY_METHOD
 from core.frames import FOOT, SIDES, SUFFIX, Oriented, Side
 from core.rest import runs
 
@@ -69,10 +70,12 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
             for name in kept:
                 if name in estimated and name.endswith(f"_{SUFFIX[side]}"):
                     kept[name] = np.where(long, np.nan, kept[name])
+    estimator = BY_METHOD.get(poses.method)
+    modelled = estimator is not None and estimator.leg_model
     bounds = {
         name: float((-angles.zero_offset[name] + np.pi) % (2.0 * np.pi) - np.pi)
         for name in kept
-        if poses.method.startswith("l7s") and name in estimated and name.startswith("knee_flexion")
+        if modelled and name in estimated and name.startswith("knee_flexion")
     }
     notices = angles.notices
     if out:

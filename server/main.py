@@ -62,9 +62,9 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--estimator",
         default="auto",
-        help="auto, erkf, l7s_3i, l7s_2i, stance_foot_anchor (docs/estimators.md)",
+        help="pose estimator; auto = the best for the sensors worn (docs/estimators.md lists them)",
     )
-    p.add_argument("--config", type=Path, help='JSON: parameters by stage, {"poses": {"estimator": "erkf"}}')
+    p.add_argument("--config", type=Path, help='JSON: parameters by stage, {"poses": {"least_valid": 0.7}}')
     p = add("replay", "Stream a recording to a server as a tablet would (docs/live-protocol.md).")
     p.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of one take")
     p.add_argument("--to", required=True, metavar="URL", help="address of the server, http://host:port")

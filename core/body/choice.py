@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final, Literal, get_args
+from typing import Final
 
 import numpy as np
 
 from core.body.tree import PRESETS
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError, Notice
-from core.frames import FOOT, SHANK, SIDES, THIGH, Segment
+from core.estimators import AUTO, BY_NAME, ERKF, L7S_2I, L7S_3I, ORIENTATIONS_ONLY, Estimator, Requested
+from core.frames import Segment
 from core.fusion.orientations import Orientations
-
-Estimator = Literal["erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
-Requested = Literal["auto", "erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
-
-ESTIMATORS: Final[tuple[Estimator, ...]] = get_args(Estimator)
 
 WHOLE: Final = PRESETS["lower_body7"]
 
@@ -44,16 +40,12 @@ class Choice:
 def possible(segments: Iterable[Segment]) -> tuple[Estimator, ...]:
     """Estimators that can run on these segments, the one taken by default first."""
     worn = set(segments)
-    leg = "pelvis" in worn and any({THIGH[s], SHANK[s], FOOT[s]} <= worn for s in SIDES)
-    found: list[Estimator] = []
-    if worn >= set(PRESETS["feet_pelvis3"]):
-        found.append("l7s_3i")
-    if worn >= set(PRESETS["feet2"]):
-        found.append("l7s_2i")
-    if leg:
+    found = [e.name for e in (L7S_3I, L7S_2I) if e.runs_on(worn)]
+    if ERKF.runs_on(worn):
         # every angle of a whole body is measured; of one leg it is, but the other then has none at all
-        found.insert(0 if worn >= set(WHOLE) else len(found), "erkf")
-        found.append("stance_foot_anchor")
+        found.insert(0 if worn >= set(WHOLE) else len(found), ERKF.name)
+    if ORIENTATIONS_ONLY.runs_on(worn):
+        found.append(ORIENTATIONS_ONLY.name)
     return tuple(found)
 
 
@@ -75,10 +67,10 @@ def choose(
     working = tuple(s for s in WHOLE if share.get(s, 0.0) >= max(least_valid, 1e-9))
     failed = tuple(s for s in worn if s not in working)
     found = possible(working)
-    if requested != "auto" and requested not in found:
+    if requested != AUTO and requested not in found:
         raise EstimationError("estimator_impossible", _impossible(requested, working))
     hoped = possible(worn)[:1]
-    reduced = "sensor_failed" if requested == "auto" and hoped != found[:1] else None
+    reduced = "sensor_failed" if requested == AUTO and hoped != found[:1] else None
     notices = []
     for s in failed:
         message = (
@@ -87,17 +79,12 @@ def choose(
             "record again."
         )
         notices.append(Notice("sensor_failed", message, sensor=s))
-    order = found if requested == "auto" else (requested,)
+    order = found if requested == AUTO else (requested,)
     return Choice(working, failed, found, order, reduced, tuple(notices))
 
 
 def _impossible(requested: Requested, working: tuple[Segment, ...]) -> str:
-    need = {
-        "erkf": "the pelvis and a whole leg (thigh, shank, foot)",
-        "l7s_3i": "the pelvis and both feet",
-        "l7s_2i": "both feet",
-        "stance_foot_anchor": "the pelvis and a whole leg (thigh, shank, foot)",
-    }[requested]
+    need = BY_NAME[requested].needs
     return (
         f"The estimator {requested} needs sensors on {need}; working: {', '.join(working) or 'none'}. "
         "Choose another estimator."

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from core.body.choice import WHOLE, Estimator
+from core.body.choice import WHOLE
 from core.body.corrected import corrected_signals
 from core.body.erkf.filter import erkf_inputs
 from core.body.erkf.headings import findings, told
@@ -31,9 +31,10 @@ from core.body.mounting import MountedSensors
 from core.body.pose_params import PoseParams
 from core.body.poses import Poses
 from core.body.still import FOOT_STILL, still_samples
-from core.body.tree import PRESETS, person_tree
+from core.body.tree import person_tree
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError, Notice
+from core.estimators import BY_NAME, ERKF, L7S_3I, NO_FIGURE, ORIENTATIONS_ONLY, Estimator
 from core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
 from core.fusion.orientations import Orientations
 
@@ -41,13 +42,6 @@ ON_A_BELT: Final = (
     "On a treadmill a foot on the belt does not rest in the room, as the estimator takes it to. Positions "
     "are those on a belt of constant speed; distances are given only where the belt's speed was entered."
 )
-
-
-SENSORS: Final[Mapping[str, tuple[Segment, ...]]] = {
-    "l7s_3i": PRESETS["feet_pelvis3"],
-    "l7s_2i": PRESETS["feet2"],
-}
-"""What these see when they are asked for by name: the point is what so few sensors tell."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +75,10 @@ def estimate_poses(
     the next possible one, with a notice `estimator_failed`.
     """
     choice = mounted.choice
-    used = tuple(s for s in choice.segments if s in SENSORS.get(params.estimator, choice.segments))
+    asked = BY_NAME.get(params.estimator)
+    # the point of asking for few sensors by name is what so few tell
+    seen = choice.segments if asked is None or asked.sensors is None else asked.sensors
+    used = tuple(s for s in choice.segments if s in seen)
     take = _Take(mounted, _without(mounted.orientations, set(WHOLE) - set(used)), contacts, params)
     notices, reduced = list(choice.notices), choice.reduced
     if mounted.calibrated.recording.protocol == "treadmill":
@@ -100,7 +97,7 @@ def estimate_poses(
     if made is None:
         # no figure; the notices of what is missing are still wanted
         made = take.anchored()
-        made = replace(made, poses=replace(made.poses, method="none"))
+        made = replace(made, poses=replace(made.poses, method=NO_FIGURE))
     if made.feet is None:
         try:
             made = take.with_feet(made, used)
@@ -139,9 +136,9 @@ class _Take:
         return self.mounted.body
 
     def run(self, estimator: Estimator, segments: tuple[Segment, ...]) -> PoseEstimate:
-        if estimator == "erkf":
+        if estimator == ERKF.name:
             return self.chain(segments)
-        if estimator == "stance_foot_anchor":
+        if estimator == ORIENTATIONS_ONLY.name:
             return self.anchored()
         poses = l7s_poses(
             self.orientations,
@@ -149,7 +146,7 @@ class _Take:
             self.steps(),
             self.body,
             self.params.l7s,
-            "3I" if estimator == "l7s_3i" else "2I",
+            "3I" if estimator == L7S_3I.name else "2I",
         )
         notices = (*poses.notices, *l7s_notices(self.calibrated.recording.protocol))
         poses = replace(poses, health=l7s_health(poses), notices=notices)

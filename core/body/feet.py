@@ -20,7 +20,7 @@ class FootTracks:
     valid : side → (n,) the sensor was there.
     linked : both feet hang on one chain of sensors, so that their places relative to each other are known;
         False: each foot has its own origin and heading.
-    source : the estimator, "erkf_smoothed" or "erkf_feet".
+    source : `core.estimators.LINKED_PATHS` or `SINGLE_PATHS`; live their live twins.
     withheld : side → reason why no distance of this foot is told (core/withheld.py).
     """
 

@@ -20,6 +20,7 @@ from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.places import FOOT as SENSOR_ON_FOOT
 from core.body.poses import Poses
 from core.errors import Notice
+from core.estimators import NO_FIGURE, ORIENTATIONS_ONLY
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from core.rotation import rotate
 from core.shoe import Shoe
@@ -96,7 +97,7 @@ def forward_kinematics(
             np.zeros(n, bool),
             {},
             body,
-            "none",
+            NO_FIGURE,
             notices=notices,
         )
     q: dict[Segment, Floats] = {"pelvis": orientations.q["pelvis"]}
@@ -121,7 +122,7 @@ def forward_kinematics(
         valid=valid,
         contact={FOOT[s]: carrying[s] for s in legs},
         body=body,
-        method="stance_foot_anchor",
+        method=ORIENTATIONS_ONLY.method,
         notices=notices,
     )
 

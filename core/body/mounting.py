@@ -18,6 +18,7 @@ from core.body.model import BodyModel
 from core.body.pose_params import PoseParams
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError, Notice
+from core.estimators import ERKF
 from core.frames import Segment
 from core.fusion.orientations import Orientations
 
@@ -63,14 +64,14 @@ def mount_sensors(
     calibrated, orientations = legs_apart(calibrated, orientations, body)
     choice = choose(calibrated, orientations, params.estimator, params.least_valid)
     mounted = MountedSensors(calibrated, orientations, body, assumed, choice)
-    if choice.order[:1] != ("erkf",):
+    if choice.order[:1] != (ERKF.name,):
         return mounted
     try:
         calibrated, orientations, turned = agreed(
             calibrated, orientations, body, choice.segments, params.erkf
         )
     except EstimationError as error:
-        if choice.order == ("erkf",):
+        if choice.order == (ERKF.name,):
             raise
         return replace(mounted, failure=error)
     return replace(mounted, calibrated=calibrated, orientations=orientations, turned_rad=turned)

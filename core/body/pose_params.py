@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import get_args
 
-from core.body.choice import Requested
 from core.body.erkf.params import ErkfParams
 from core.body.kinematics import AnchorParams
 from core.body.l7s.filter import L7sParams
 from core.errors import ParameterError
+from core.estimators import AUTO, Requested
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class PoseParams:
     ParameterError `unknown_estimator`.
     """
 
-    estimator: Requested = "auto"
+    estimator: Requested = AUTO
     erkf: ErkfParams = field(default_factory=ErkfParams.people)
     l7s: L7sParams = field(default_factory=L7sParams)
     anchor: AnchorParams = field(default_factory=AnchorParams)

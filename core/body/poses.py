@@ -22,7 +22,7 @@ class Poses:
         mid-hip, thigh hip centre, shank knee centre, foot ankle centre (docs/coordinate-systems.md).
     valid : (n,) all segments of the figure measured.
     contact : segment (feet) → (n,) True while the foot is taken to be on the floor.
-    method : "erkf_smoothed", "l7s_3i", "l7s_2i", "stance_foot_anchor", or "none" when there is no figure.
+    method : of an estimator of `core.estimators`, or its NO_FIGURE.
     reduced : a stable code when a better estimator was not possible or not asked for, e.g. "sensor_failed";
         None for the best one of the worn sensors.
     health : the estimator's own findings.

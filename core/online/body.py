@@ -14,10 +14,10 @@ from core.body.model import BodyModel
 from core.body.tree import person_tree
 from core.calibration.result import SegmentCalibration
 from core.errors import Notice
+from core.estimators import LiveMethod
 from core.frames import FOOT, GRAVITY, R_NEUTRAL, SIDES, Bools, Floats, Segment
 from core.online.bridge import Bridge
 from core.online.erkf import LiveErkf, Signals
-from core.online.frame import Method
 from core.online.still import Stillness
 from core.rotation import from_matrix, multiply
 
@@ -72,7 +72,7 @@ class Estimator(Protocol):
     linked, source : as in `FootTracks`. broken : it gave up.
     """
 
-    method: Method
+    method: LiveMethod
     segments: tuple[Segment, ...]
     attitudes: tuple[Segment, ...]
     linked: bool

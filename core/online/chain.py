@@ -16,6 +16,7 @@ from core.body.choice import WHOLE, possible
 from core.body.erkf.params import ErkfParams
 from core.body.l7s.filter import L7sParams
 from core.errors import Notice
+from core.estimators import ERKF, L7S_2I, L7S_3I
 from core.events.flags import StrideParams
 from core.events.foot_pitch import FootPitchParams
 from core.events.result import GaitEvent
@@ -158,12 +159,12 @@ class Chain:
             return Filtered(segments, column, mounted, body, rate, params)
 
         best = next(iter(possible(self.segments)), None)
-        if best == "erkf":
+        if best == ERKF.name:
             worn = tuple(s for s in WHOLE if s in column)
             return Linked(worn, filtered(worn), body.ankle_height, rate)
         alone = worn_feet(self.segments)
         feet = FootPaths(filtered(alone)) if alone else None
-        if best in ("l7s_3i", "l7s_2i") and feet is not None:
+        if best in (L7S_3I.name, L7S_2I.name) and feet is not None:
             return Sparse(column, mounted, body, rate, feet, self.params.l7s)
         message = NOT_LIVE.format(", ".join(self.segments))
         self._notices.append(Notice("no_live_figure", message, severity="info"))

@@ -13,14 +13,12 @@ from typing import Final, Literal
 import numpy as np
 
 from core.errors import Notice
+from core.estimators import NO_FIGURE, LiveMethod
 from core.events.result import GaitEvent, StrideFlag
 from core.frames import Floats, Segment, Side
 
 Stage = Literal["waiting", "stand", "walk", "running"]
 """waiting: samples of some sensor are missing; stand, walk: calibration; running: everything there is."""
-
-Method = Literal["erkf", "l7s_3i", "l7s_2i", "none"]
-"""Estimator of the figure; none: the worn sensors allow no figure while they stream."""
 
 NOT_YET: Final = "not_yet"
 """Reason of a value that a later `LiveStride` of the same stride will have."""
@@ -145,7 +143,7 @@ class LiveFrame:
     stage: Stage
     health: tuple[SensorHealth, ...] = ()
     calibration: CalibrationView | None = None
-    method: Method = "none"
+    method: LiveMethod = NO_FIGURE
     q: Mapping[Segment, Floats] = field(default_factory=dict)
     p: Mapping[Segment, Floats] = field(default_factory=dict)
     valid: bool = False

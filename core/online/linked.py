@@ -9,9 +9,9 @@ import numba
 import numpy as np
 
 from core.errors import Notice
+from core.estimators import ERKF, LIVE_LINKED_PATHS, LIVE_SINGLE_PATHS, NO_FIGURE, LiveMethod
 from core.frames import FOOT, SHANK, SIDES, THIGH, Segment
 from core.online.body import Filtered, FootPaths, Paths, Placed, Raw, worn_feet
-from core.online.frame import Method
 from core.online.watch import JointWatch
 
 LEVEL_S: Final = 0.1
@@ -36,7 +36,7 @@ def _level(p, feet, still, valid, ankle, share, floor):  # type: ignore[no-untyp
 class Linked:
     """Pelvis and legs that hang together."""
 
-    method: Method = "erkf"
+    method: LiveMethod = ERKF.name
     attitudes: tuple[Segment, ...] = ()
 
     def __init__(
@@ -51,7 +51,7 @@ class Linked:
         shown: list[Segment] = ["pelvis", *(x for s in legs for x in (THIGH[s], SHANK[s], FOOT[s]))]
         self._shown = np.array([self.segments.index(s) for s in shown], np.int64)
         self.linked = len(feet) == 2 and not (set(self._feet.tolist()) & set(tree.roots()))
-        self.source = "erkf_live" if self.linked else "erkf_feet_live"
+        self.source = LIVE_LINKED_PATHS if self.linked else LIVE_SINGLE_PATHS
         self._watch, self._notices = JointWatch(tree, rate_hz), list[Notice]()
         self._share, self._floor = min(1.0, 1.0 / (LEVEL_S * rate_hz)), np.zeros(1)
 
@@ -81,9 +81,9 @@ class Linked:
 class Unlinked:
     """Sensors that make no figure: each by itself, and the paths of the feet among them."""
 
-    method: Method = "none"
+    method: LiveMethod = NO_FIGURE
     linked = False
-    source = "erkf_feet_live"
+    source = LIVE_SINGLE_PATHS
 
     def __init__(self, segments: Sequence[Segment], feet: FootPaths | None) -> None:
         self.segments = self.attitudes = tuple(segments)

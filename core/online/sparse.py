@@ -13,9 +13,9 @@ from core.body.l7s.legs import BODIES, HIP_SIDE, LEGS, M_LEG, LegModel
 from core.body.model import BodyModel
 from core.calibration.result import SegmentCalibration
 from core.errors import EstimationError, Notice
+from core.estimators import L7S_2I, L7S_3I, LIVE_SINGLE_PATHS, LiveMethod
 from core.frames import FOOT, GRAVITY, SHANK, THIGH, Bools, Segment
 from core.online.body import FootPaths, Placed, Raw
-from core.online.frame import Method
 from core.online.sparse_kernel import in_sy_frames, legs
 
 FIGURE: Final[tuple[Segment, ...]] = (
@@ -52,7 +52,7 @@ class Sparse:
 
     segments: tuple[Segment, ...] = FIGURE
     linked = False
-    source = "erkf_feet_live"
+    source = LIVE_SINGLE_PATHS
 
     def __init__(
         self,
@@ -64,7 +64,7 @@ class Sparse:
         params: L7sParams | None = None,
     ) -> None:
         self._worn: Worn = "3I" if "pelvis" in column else "2I"
-        self.method: Method = "l7s_3i" if self._worn == "3I" else "l7s_2i"
+        self.method: LiveMethod = (L7S_3I if self._worn == "3I" else L7S_2I).name
         self.attitudes: tuple[Segment, ...] = BODIES if self._worn == "3I" else BODIES[1:]
         self._column = {s: column[s] for s in self.attitudes}
         self._mounted = {s: mounted[s] for s in self.attitudes}

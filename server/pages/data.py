@@ -19,7 +19,7 @@ from server.context import Blobs, Db, Id
 from server.pages.session_context import read_context
 from server.pages.shell import record_opening, render_page
 from server.pages.words import SEGMENT_NAMES
-from server.report.estimator import CHOICES, EstimatorView, estimator_view
+from server.report.estimator import EstimatorView, choice_label, estimator_view
 from server.services import analyses, recordings
 from server.storage.blobs import BlobStore
 
@@ -85,7 +85,7 @@ def _estimator(blobs: BlobStore, shown: analyses.Analysis) -> EstimatorView | No
 def _asked_for(config: Mapping[str, Any]) -> str | None:
     """The estimator somebody chose by name."""
     asked = (config.get("poses") or {}).get("estimator")
-    return None if asked is None else CHOICES.get(asked, asked)
+    return None if asked is None else choice_label(asked)
 
 
 def _provenance(shown: analyses.Analysis) -> list[tuple[str, str]]:

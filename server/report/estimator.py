@@ -6,52 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from core.estimators import AUTO, BY_METHOD, BY_NAME, NO_FIGURE, NO_FIGURE_LABEL, NO_FIGURE_NOTE
 from server.report.wording import number, place_words
 
 KINDS: Final[Mapping[str, str]] = {"good": "ok", "warn": "warn", "bad": "bad"}
 VERDICTS: Final[Mapping[str, str]] = {"good": "consistent", "warn": "doubtful in part", "bad": "inconsistent"}
-
-METHODS: Final[Mapping[str, str]] = {
-    "erkf_smoothed": "ErKF, smoothed",
-    "l7s_3i": "L7S-3I",
-    "l7s_2i": "L7S-2I",
-    "stance_foot_anchor": "Orientations only",
-    "none": "No figure",
-}
-"""`Poses.method` → its name."""
-
-MEANING: Final[Mapping[str, str]] = {
-    "erkf_smoothed": (
-        "An error-state Kalman filter ties all sensors together at the joints, holds each foot in place "
-        "while it rests, and goes through the take forwards and backwards (Potter). Angles are measured by "
-        "two sensors each; on a healthy walk flexion, hip and knee adduction were within 2 to 4° of optical "
-        "motion capture, strides within 2 cm."
-    ),
-    "l7s_3i": (
-        "Thighs and shanks carry no sensor: they follow from the pelvis, the feet and the leg's length, with "
-        "knees and ankles as hinges (Sy). On a healthy walk estimated flexion was 7 to 11° from optical "
-        "motion capture, so curves show the pattern, not small changes."
-    ),
-    "l7s_2i": (
-        "Only the feet carry sensors: pelvis, thighs and shanks are estimated from them and the leg's length "
-        "(Sy). On a healthy walk estimated flexion was 8 to 11° from optical motion capture; the pelvis is "
-        "taken to keep its height and to face between the feet."
-    ),
-    "stance_foot_anchor": (
-        "Each sensor's orientation on its own, without the joints; the figure hangs on the foot that stands. "
-        "Flexion angles are measured all the same; frontal and transverse angles drift with each sensor's "
-        "heading."
-    ),
-    "none": "These sensors do not allow a figure; what they measure themselves is shown.",
-}
-
-CHOICES: Final[Mapping[str, str]] = {
-    "erkf": "ErKF with smoother",
-    "l7s_3i": "L7S-3I: pelvis and feet",
-    "l7s_2i": "L7S-2I: feet only",
-    "stance_foot_anchor": "Orientations only",
-}
-"""Estimator that can be asked for → what the choice says."""
 
 REDUCED: Final[Mapping[str, str]] = {
     "sensor_failed": "reduced: a sensor failed in this take",
@@ -126,19 +85,35 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
     name, verdict, asked = str(e["name"]), str(e["verdict"]), str(e["requested"])
     reduced = e["reduced"]
     return EstimatorView(
-        name=METHODS.get(name, name),
-        meaning=MEANING.get(name, ""),
+        name=method_label(name),
+        meaning=_method_note(name),
         sensors=len(e["sensors"]),
         kind=KINDS[verdict],
         verdict=VERDICTS[verdict],
         reduced=None if reduced is None else REDUCED.get(reduced, str(reduced)),
         health=_rows(e["health"]),
         choices=(
-            ("auto", "Automatic: the best for what is worn", asked == "auto"),
-            *((x, CHOICES.get(x, x), asked == x) for x in e["possible"]),
+            (AUTO, "Automatic: the best for what is worn", asked == AUTO),
+            *((x, choice_label(x), asked == x) for x in e["possible"]),
         ),
         estimated=_estimated(estimated_angles(e)),
     )
+
+
+def method_label(method: str) -> str:
+    """Name of `Poses.method` as people read it; one that this version does not know as it is."""
+    known = BY_METHOD.get(method)
+    return known.label if known is not None else NO_FIGURE_LABEL if method == NO_FIGURE else method
+
+
+def choice_label(name: str) -> str:
+    """What a form offers as this estimator; one that this version does not know as it is."""
+    return BY_NAME[name].choice if name in BY_NAME else name
+
+
+def _method_note(method: str) -> str:
+    known = BY_METHOD.get(method)
+    return known.note if known is not None else NO_FIGURE_NOTE if method == NO_FIGURE else ""
 
 
 def estimated_angles(e: Mapping[str, Any] | None) -> frozenset[str]:

@@ -18,13 +18,13 @@ import pytest
 
 from core import calibration, events
 from core.body import contact_mask
-from core.body.choice import Estimator
 from core.body.estimate import estimate_poses
 from core.body.health import Finding, worst
 from core.body.mounting import mount_sensors
 from core.body.pose_params import PoseParams
 from core.body.tree import PRESETS
 from core.errors import SagittalError
+from core.estimators import Estimator
 from core.frames import SIDES, Segment
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations

@@ -19,6 +19,7 @@ from core.body.model import BodyModel
 from core.body.poses import Poses
 from core.body.tree import ImuTree, person_tree
 from core.calibration.result import CalibratedRecording
+from core.estimators import ERKF, LINKED_PATHS, SINGLE_PATHS
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.rotation import from_matrix, multiply
@@ -81,7 +82,7 @@ def refined(run: ErkfRun, orientations: Orientations) -> Orientations:
     """The given orientations with those of the run's segments in their place."""
     q = run.tree.segment_q(run.track.q)
     found = {s: np.ascontiguousarray(q[:, i]) for i, s in enumerate(run.segments)}
-    return replace(orientations, q={**orientations.q, **found}, engine="erkf_smoothed")
+    return replace(orientations, q={**orientations.q, **found}, engine=ERKF.method)
 
 
 def figure(
@@ -111,7 +112,7 @@ def figure(
         valid=np.logical_and.reduce([orientations.valid[s] for s in shown]),
         contact={FOOT[s]: contacts.get(s, still[s]) for s in legs},
         body=body,
-        method="erkf_smoothed",
+        method=ERKF.method,
         notices=incomplete_legs(orientations, legs),
     )
 
@@ -134,7 +135,7 @@ def foot_tracks(run: ErkfRun, orientations: Orientations, body: BodyModel) -> Fo
         still={s: run.inputs.contact[:, i] for s, i in at.items()},
         valid={s: orientations.valid[FOOT[s]] for s in at},
         linked=linked,
-        source="erkf_smoothed" if linked else "erkf_feet",
+        source=LINKED_PATHS if linked else SINGLE_PATHS,
         body=body,
     )
 

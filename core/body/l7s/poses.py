@@ -20,6 +20,7 @@ from core.body.model import BodyModel
 from core.body.poses import Poses
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError, Notice
+from core.estimators import L7S_2I, L7S_3I
 from core.frames import FOOT, GRAVITY, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.rotation import angle_between, from_matrix, rotate, to_matrix
@@ -54,7 +55,7 @@ def l7s_poses(
 
     Returns
     -------
-    Poses in ISB frames, method "l7s_3i" or "l7s_2i", `contact` = steps. After a loss of a foot they are valid
+    Poses in ISB frames, method of L7S-3I or L7S-2I, `contact` = steps. After a loss of a foot they are valid
     again from its next rest on: until then nobody knows where it went. The feet's orientation is that of the
     constrained state and differs from the measured one by some degrees (docs/science/l7s.md, "Constraints").
     Diagnostics by side: `knee_straight_share`, samples with a foot in motion at which the leg is at its full
@@ -89,7 +90,7 @@ def l7s_poses(
         valid=_known(orientations, inputs.step, measured),
         contact={FOOT[s]: np.asarray(steps[s], bool) for s in LEGS},
         body=body,
-        method=f"l7s_{worn.lower()}",
+        method=(L7S_3I if worn == "3I" else L7S_2I).method,
         notices=_never_still(steps),
         diagnostics={
             "adjoint": params.adjoint,

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from server.report.estimator import CHOICES, METHODS, QUANTITIES, estimated_angles, estimator_view
+from core.estimators import ESTIMATORS, NO_FIGURE
+from server.report.estimator import (
+    QUANTITIES,
+    choice_label,
+    estimated_angles,
+    estimator_view,
+    method_label,
+)
 from server.report.model import report_model
 from tests.server.report.conftest import MakeBundle
 
@@ -69,10 +76,10 @@ def test_the_choice_offers_what_the_sensors_allow_and_marks_what_ran() -> None:
 
 
 def test_every_estimator_and_quantity_of_the_core_has_words() -> None:
-    from core.body.choice import ESTIMATORS
-
-    assert set(CHOICES) == set(ESTIMATORS)
-    assert {f"{name}_smoothed" if name == "erkf" else name for name in ESTIMATORS} < set(METHODS)
+    assert {choice_label(e.name) for e in ESTIMATORS} == {e.choice for e in ESTIMATORS}
+    assert {method_label(e.method) for e in ESTIMATORS} == {e.label for e in ESTIMATORS}
+    assert method_label(NO_FIGURE) == "No figure"
+    assert (method_label("of_next_year"), choice_label("of_next_year")) == ("of_next_year", "of_next_year")
     assert {"joint_residual_mm", "climb_pct", "forward_axis_turned_deg", "hinge_mm"} <= set(QUANTITIES)
 
 

@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.choice import Estimator
 from core.body.estimate import PoseEstimate
 from core.body.health import Verdict
 from core.body.l7s.filter import filter_block, start
@@ -19,6 +18,7 @@ from core.body.model import BodyModel
 from core.body.pose_params import PoseParams
 from core.calibration import calibrate
 from core.errors import EstimationError, SagittalError, SignalError
+from core.estimators import Estimator
 from core.frames import FOOT, SIDES, Floats, Segment
 from core.fusion.mahony import estimate_orientations
 from core.pipeline import PipelineConfig, analyse

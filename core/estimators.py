@@ -1,0 +1,180 @@
+"""The pose estimators: the one list that pipeline, report, forms, figure and documentation read.
+
+An estimator makes a figure of seven segments from the sensors worn (docs/estimators.md). Its names are
+written here and nowhere else in the source (tests/core/test_estimators.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from core.frames import FOOT, SHANK, SIDES, THIGH, Segment
+
+Estimator = Literal["erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
+Requested = Literal["auto", "erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
+"""What can be asked for; auto: the best one that the working sensors allow."""
+
+LiveMethod = Estimator | Literal["none"]
+"""Estimator of the live figure; none: the worn sensors allow no figure while they stream."""
+
+AUTO: Final = "auto"
+NO_FIGURE: Final = "none"
+"""`Poses.method` where no estimator could run."""
+
+NO_FIGURE_LABEL: Final = "No figure"
+NO_FIGURE_NOTE: Final = "These sensors do not allow a figure; what they measure themselves is shown."
+
+LINKED_PATHS: Final = "erkf_smoothed"
+"""`FootTracks.source` of feet that hang on one chain."""
+
+SINGLE_PATHS: Final = "erkf_feet"
+"""`FootTracks.source` of feet that each have a filter of their own."""
+
+LIVE_LINKED_PATHS: Final = "erkf_live"
+LIVE_SINGLE_PATHS: Final = "erkf_feet_live"
+"""The same two while the sensors stream: filtered, not smoothed."""
+
+
+@dataclass(frozen=True)
+class PaperReference:
+    """Where a method comes from; doi without "https://doi.org/"."""
+
+    citation: str
+    doi: str
+
+
+@dataclass(frozen=True)
+class PoseEstimator:
+    """One estimator.
+
+    Parameters
+    ----------
+    name : as it is asked for in configuration, API and command line.
+    method : `Poses.method` of its figure. label : of that method. choice : what a form offers.
+    needs : in words, after "sensors on". sets : segments whose sensors it needs, any one of these sets.
+    sensors : all that it reads when it is asked for by name; None = every sensor there is.
+    leg_model : thighs and shanks carry no sensor, a model of the leg gives them.
+    in_room : its positions hold in the room; else the figure is for the eye alone.
+    note : what a reader of a report has to know.
+    paper : None = our own. science : the page with its equations.
+    """
+
+    name: Estimator
+    method: str
+    label: str
+    choice: str
+    needs: str
+    sets: tuple[frozenset[Segment], ...]
+    sensors: tuple[Segment, ...] | None
+    leg_model: bool
+    in_room: bool
+    note: str
+    paper: PaperReference | None
+    science: str
+
+    def runs_on(self, segments: Iterable[Segment]) -> bool:
+        """Whether sensors on these segments are enough."""
+        worn = set(segments)
+        return any(needed <= worn for needed in self.sets)
+
+
+ONE_LEG: Final[tuple[frozenset[Segment], ...]] = tuple(
+    frozenset[Segment](("pelvis", THIGH[s], SHANK[s], FOOT[s])) for s in SIDES
+)
+"""The pelvis and a whole leg, of either side."""
+
+SY_2021: Final = PaperReference(
+    "Sy LW, Lovell NH, Redmond SJ 2021. Estimating lower body kinematics using a Lie group constrained "
+    "extended Kalman filter and reduced IMU count. IEEE Sensors J.",
+    "10.1109/JSEN.2021.3096078",
+)
+
+ERKF: Final = PoseEstimator(
+    name="erkf",
+    method="erkf_smoothed",
+    label="ErKF, smoothed",
+    choice="ErKF with smoother",
+    needs="the pelvis and a whole leg (thigh, shank, foot)",
+    sets=ONE_LEG,
+    sensors=None,
+    leg_model=False,
+    in_room=True,
+    note=(
+        "An error-state Kalman filter ties all sensors together at the joints, holds each foot in place "
+        "while it rests, and goes through the take forwards and backwards (Potter). Angles are measured by "
+        "two sensors each; on a healthy walk flexion, hip and knee adduction were within 2 to 4° of optical "
+        "motion capture, strides within 2 cm."
+    ),
+    paper=PaperReference(
+        "Potter MV, Cain SM, Ojeda LV, Gurchiek RD, McGinnis RS, Perkins NC 2021. Error-state Kalman filter "
+        "for lower-limb kinematic estimation: evaluation on a 3-body model. PLoS ONE 16(4): e0249577.",
+        "10.1371/journal.pone.0249577",
+    ),
+    science="docs/science/erkf.md",
+)
+
+L7S_3I: Final = PoseEstimator(
+    name="l7s_3i",
+    method="l7s_3i",
+    label="L7S-3I",
+    choice="L7S-3I: pelvis and feet",
+    needs="the pelvis and both feet",
+    sets=(frozenset[Segment](("pelvis", "foot_r", "foot_l")),),
+    sensors=("pelvis", "foot_r", "foot_l"),
+    leg_model=True,
+    in_room=True,
+    note=(
+        "Thighs and shanks carry no sensor: they follow from the pelvis, the feet and the leg's length, with "
+        "knees and ankles as hinges (Sy). On a healthy walk estimated flexion was 7 to 11° from optical "
+        "motion capture, so curves show the pattern, not small changes."
+    ),
+    paper=SY_2021,
+    science="docs/science/l7s.md",
+)
+
+L7S_2I: Final = PoseEstimator(
+    name="l7s_2i",
+    method="l7s_2i",
+    label="L7S-2I",
+    choice="L7S-2I: feet only",
+    needs="both feet",
+    sets=(frozenset[Segment](("foot_r", "foot_l")),),
+    sensors=("foot_r", "foot_l"),
+    leg_model=True,
+    in_room=True,
+    note=(
+        "Only the feet carry sensors: pelvis, thighs and shanks are estimated from them and the leg's length "
+        "(Sy). On a healthy walk estimated flexion was 8 to 11° from optical motion capture; the pelvis is "
+        "taken to keep its height and to face between the feet."
+    ),
+    paper=SY_2021,
+    science="docs/science/l7s.md",
+)
+
+ORIENTATIONS_ONLY: Final = PoseEstimator(
+    name="stance_foot_anchor",
+    method="stance_foot_anchor",
+    label="Orientations only",
+    choice="Orientations only",
+    needs="the pelvis and a whole leg (thigh, shank, foot)",
+    sets=ONE_LEG,
+    sensors=None,
+    leg_model=False,
+    in_room=False,
+    note=(
+        "Each sensor's orientation on its own, without the joints; the figure hangs on the foot that stands. "
+        "Flexion angles are measured all the same; frontal and transverse angles drift with each sensor's "
+        "heading."
+    ),
+    paper=None,
+    science="docs/science/body-model.md",
+)
+
+ESTIMATORS: Final = (ERKF, L7S_3I, L7S_2I, ORIENTATIONS_ONLY)
+"""All, as docs/estimators.md lists them."""
+
+BY_NAME: Final[dict[str, PoseEstimator]] = {e.name: e for e in ESTIMATORS}
+BY_METHOD: Final[dict[str, PoseEstimator]] = {e.method: e for e in ESTIMATORS}
+"""`Poses.method` → its estimator; `NO_FIGURE` has none."""

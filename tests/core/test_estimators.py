@@ -1,0 +1,86 @@
+"""The one list of pose estimators: complete, documented, and its names nowhere else in the source."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from core.body.choice import possible
+from core.body.tree import PRESETS
+from core.estimators import (
+    AUTO,
+    BY_METHOD,
+    BY_NAME,
+    ESTIMATORS,
+    LINKED_PATHS,
+    LIVE_LINKED_PATHS,
+    LIVE_SINGLE_PATHS,
+    SINGLE_PATHS,
+    Estimator,
+    PoseEstimator,
+    Requested,
+)
+from tests.data import ROOT
+
+NAMES = {e.name for e in ESTIMATORS} | {e.method for e in ESTIMATORS}
+NAMES |= {LINKED_PATHS, SINGLE_PATHS, LIVE_LINKED_PATHS, LIVE_SINGLE_PATHS}
+
+LIST = ROOT / "core" / "estimators.py"
+
+
+def texts(tree: ast.AST) -> Iterator[str]:
+    """All strings of a module."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value
+
+
+def sources(*endings: str) -> Iterator[Path]:
+    for room in ("core", "server", "web", "sagittal"):
+        for path in sorted((ROOT / room).rglob("*")):
+            if path.suffix in endings and "vendor" not in path.parts and path != LIST:
+                yield path
+
+
+def test_the_names_are_written_in_the_list_alone() -> None:
+    found = [
+        (str(path.relative_to(ROOT)), text)
+        for path in sources(".py")
+        for text in texts(ast.parse(path.read_text("utf-8")))
+        if text in NAMES or any(name in text for name in NAMES if "_" in name)
+    ]
+    found += [
+        (str(path.relative_to(ROOT)), name)
+        for path in sources(".js", ".html", ".css", ".json")
+        for name in NAMES
+        if name in path.read_text("utf-8", errors="replace")
+    ]
+    assert found == []
+
+
+def test_the_list_is_complete() -> None:
+    assert tuple(e.name for e in ESTIMATORS) == get_args(Estimator)
+    assert get_args(Requested) == (AUTO, *get_args(Estimator))
+    assert len(BY_NAME) == len(BY_METHOD) == len(ESTIMATORS)
+
+
+def test_what_can_run_is_what_the_list_says_of_every_set_of_sensors() -> None:
+    whole = PRESETS["lower_body7"]
+    for chosen in range(2 ** len(whole)):
+        worn = {s for i, s in enumerate(whole) if chosen >> i & 1}
+        assert set(possible(worn)) == {e.name for e in ESTIMATORS if e.runs_on(worn)}
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=lambda e: e.name)
+def test_the_documents_have_its_names_its_equations_and_its_paper(estimator: PoseEstimator) -> None:
+    overview = (ROOT / "docs" / "estimators.md").read_text("utf-8")
+    assert f"`{estimator.name}`" in overview
+    assert estimator.choice in overview
+    science = (ROOT / estimator.science).read_text("utf-8")
+    if estimator.paper is not None:
+        assert estimator.paper.doi in science
+        assert estimator.paper.doi in overview
