@@ -6,11 +6,13 @@ import json
 from itertools import pairwise
 from typing import Literal
 
-from core.formats import live_reader, mapping_xml, parquet, text, xsens
+from core.formats import live_reader, mapping_xml, parquet, text
 from core.formats.manifest import is_manifest
+from core.formats.vendors import find_vendor
 
-Kind = Literal["xsens", "parquet", "live", "manifest", "mapping", "table", "known", "empty", "other"]
-"""known = a sensor format we recognise but do not read; other = neither signals nor manifest."""
+Kind = Literal["vendor", "parquet", "live", "manifest", "mapping", "table", "known", "empty", "other"]
+"""vendor = of `VENDOR_FORMATS`; known = a sensor format we recognise but do not read; other = neither signals
+nor manifest."""
 
 _MAGIC = {
     b"\x89HDF": "HDF5 (APDM, MATLAB 7.3)",
@@ -42,6 +44,9 @@ def sniff(data: bytes) -> tuple[Kind, str]:
         return "parquet", "Parquet"
     if live_reader.looks_like(data):
         return "live", "a live take"
+    vendor = find_vendor(data)
+    if vendor is not None:
+        return "vendor", vendor.label
     for magic, name in _MAGIC.items():
         if data.startswith(magic):
             return "known", name
@@ -51,8 +56,6 @@ def sniff(data: bytes) -> tuple[Kind, str]:
         return _sniff_json(data)
     if mapping_xml.looks_like(data):
         return "mapping", "OpenSense mapping"
-    if xsens.looks_like(data):
-        return "xsens", "Xsens MT Manager text"
     head = data[:4096]
     for mark, name in _TEXT.items():
         if mark in head:

@@ -6,16 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from core.errors import ArchiveError, FormatError, InputError, ManifestError, Notice
-from core.formats import _sniff, live_reader, mapping_xml, parquet, table, text, xsens
+from core.formats import _sniff, live_reader, mapping_xml, parquet, table, text
 from core.formats.aliases import segment_named
 from core.formats.archive import ArchiveLimits, expand
 from core.formats.draft import Draft, finish
 from core.formats.manifest import Manifest, parse_manifest
 from core.formats.source import SourceFile, sha256
+from core.formats.vendors import find_vendor, list_formats
 from core.frames import Segment
 from core.recording import Recording
 
-FORMATS = "Xsens MT Manager text, CSV or TSV with a manifest, Sagittal Parquet, Sagittal live log"
 _SHOWN = 5
 
 
@@ -93,8 +93,9 @@ def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> Non
         upload.sha256[member.name] = sha256(raw)
         return
     try:
-        if kind == "xsens" and not (spec and spec.columns):
-            upload.drafts.append(xsens.read(data, member.name, spec))
+        vendor = find_vendor(data) if kind == "vendor" else None
+        if vendor is not None and not (spec and spec.columns):
+            upload.drafts += vendor.read(data, member.name, spec)
         elif kind == "parquet":
             upload.stored.append(parquet.read_recording(data, member.name))
         elif kind == "live":
@@ -141,7 +142,7 @@ def _nothing_readable(upload: _Upload) -> FormatError:
     lines = [e.message for _, e in upload.problems] + [n.message for n in upload.notices]
     shown = " ".join(lines[:_SHOWN]) + (f" … and {len(lines) - _SHOWN} more." if len(lines) > _SHOWN else "")
     code = codes.pop() if len(codes) == 1 and len(upload.problems) == len(lines) else "unknown_format"
-    return FormatError(code, f"No sensor recording was found; tried {FORMATS}. {shown}")
+    return FormatError(code, f"No sensor recording was found; tried {list_formats()}. {shown}")
 
 
 def _stored(upload: _Upload) -> Recording:

@@ -79,7 +79,7 @@ def view_live(c: Connection, session: Session, patient: Patient, *, capture: str
             "patient": patient.id,
             "variables": [_variable(v) for v in shown],
             "segments": SEGMENT_NAMES,
-            "terms": _terms(),
+            "terms": list_terms(),
             "choices": UNPRESCRIBED,
             "prescription": _prescribed(c, patient.id),
         },
@@ -93,7 +93,7 @@ def view_patient_screen(c: Connection, session: Session) -> dict[str, Any]:
             "session": session.id,
             "patient": session.patient_id,
             "prescription": _prescribed(c, session.patient_id),
-            "terms": _terms(),
+            "terms": list_terms(),
         }
     }
 
@@ -115,7 +115,7 @@ def _variable(v: Variable) -> dict[str, Any]:
     }
 
 
-def _terms() -> dict[str, Any]:
+def list_terms() -> dict[str, Any]:
     """The catalogue of parameters as the live pages read it."""
     return {
         e.name: {

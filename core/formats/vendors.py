@@ -1,0 +1,45 @@
+"""Sensor formats that say everything themselves and need no manifest: one entry each, found by content."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from core.formats import xsens
+from core.formats.draft import Draft
+from core.formats.source_spec import SourceSpec
+
+
+@dataclass(frozen=True)
+class VendorFormat:
+    """A reader of one format.
+
+    Parameters
+    ----------
+    label : name for people. looks_like : tells a file by its bytes, never by its name; text comes as UTF-8.
+    read : bytes, name of the file, what a manifest says of it → its sensors in SI units; raises FormatError.
+    """
+
+    label: str
+    looks_like: Callable[[bytes], bool]
+    read: Callable[[bytes, str, SourceSpec | None], Sequence[Draft]]
+
+
+VENDOR_FORMATS: Final[list[VendorFormat]] = [
+    VendorFormat(
+        "Xsens MT Manager text", xsens.looks_like, lambda data, name, spec: (xsens.read(data, name, spec),)
+    ),
+]
+"""All of them, in the order in which they are tried (docs/contributing.md, "Add a reader")."""
+
+
+def find_vendor(data: bytes) -> VendorFormat | None:
+    """The format of a file, None where no entry knows it."""
+    return next((vendor for vendor in VENDOR_FORMATS if vendor.looks_like(data)), None)
+
+
+def list_formats() -> str:
+    """Everything that is read, as a sentence about an unreadable upload lists it."""
+    labels = (vendor.label for vendor in VENDOR_FORMATS)
+    return ", ".join((*labels, "CSV or TSV with a manifest", "Sagittal Parquet", "Sagittal live log"))

@@ -1,0 +1,174 @@
+"""docs/contributing.md: what a newcomer touches to add something is all there is to touch."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pytest
+
+from core.errors import FormatError
+from core.feedback import Prescription
+from core.formats import SourceFile, read_recording, vendors
+from core.formats.draft import Draft
+from core.formats.source_spec import SourceSpec
+from core.formats.vendors import VendorFormat
+from core.measure import Tracks, measure
+from core.parameters.catalogue import CATALOGUE, CurveFigure, ParameterEntry
+from core.parameters.catalogue.entry import ANKLE_AND_FOOT, DORSIFLEXION
+from core.simulate import simulate_scenario
+from server.pages.live import list_terms
+from server.pages.prescription import group_trainable
+from server.report.exports import analysis_files
+from tests.data import ROOT
+from tests.parameter_page import PAGE, render_page
+from tests.server import analysed, feedback
+from tests.server.clinic import open_clinic
+from tests.true_walks import true_tracks
+
+API: Final = "/api/v1"
+
+ADDED: Final = ParameterEntry(
+    "ankle_dorsiflexion_min_swing_deg",
+    label="Dorsiflexion, least in swing",
+    group=ANKLE_AND_FOOT,
+    digits=1,
+    scale=(-50, 20),
+    comparison=DORSIFLEXION,
+    definition="Least dorsiflexion of the ankle in swing, from the person's own standing.",
+    needs=("ankle",),
+    curve=CurveFigure("ankle_dorsiflexion", "min", 60, 100),
+    trainable=True,
+    everyday="toes up",
+)
+"""A parameter that the product does not have."""
+
+
+@pytest.fixture
+def anyio_backend() -> str:
+    return "asyncio"
+
+
+@pytest.fixture
+def added(monkeypatch: pytest.MonkeyPatch) -> ParameterEntry:
+    """The parameter in the catalogue, for the length of a test."""
+    monkeypatch.setitem(CATALOGUE, ADDED.name, ADDED)
+    return ADDED
+
+
+@pytest.mark.anyio
+async def test_a_parameter_of_the_catalogue_is_in_report_api_and_csv(
+    added: ParameterEntry, tmp_path: Path
+) -> None:
+    # the files of an analysis made now, not the kept ones of other tests
+    files = analysis_files(analysed.analysis())
+    stride_columns = files["strides.csv"].decode().splitlines()[0].split(",")
+    assert added.name in stride_columns
+    async with open_clinic(tmp_path) as clinic:
+        patient = feedback.person(clinic)
+        session = feedback.visit(clinic, patient, 0)
+        analysed.finish(clinic, patient, session, files)
+        async with clinic.client("clinician") as client:
+            report = (await client.get(f"{API}/sessions/{session}/report")).json()
+            behind = (await client.get(f"{API}/sessions/{session}/parameters/{added.name}")).json()
+            table = (await client.get(f"{API}/sessions/{session}/parameters")).text
+            printed = (await client.get(f"/sessions/{session}/print")).text
+            offers = await client.get(
+                f"{API}/patients/{patient}/targets", params={"parameter": added.name, "side": "left"}
+            )
+    row = next(r for r in report["parameters"] if r["name"] == added.name)
+    assert (row["title"], row["unit"], row["group"]) == (
+        f"{added.label}, from standing",
+        "°",
+        added.group,
+    )
+    assert row["left"]["value"] < 20.0
+    assert behind["definition"] == added.definition
+    assert any(s["value"] is not None for s in behind["strides"])
+    assert {r["side"] for r in csv.DictReader(io.StringIO(table)) if r["name"] == added.name} == {
+        "left",
+        "right",
+    }
+    assert added.label in printed
+    assert offers.status_code == 200
+
+
+def test_a_parameter_of_the_catalogue_can_be_trained_and_is_known_to_the_live_pages(
+    added: ParameterEntry,
+) -> None:
+    assert Prescription.from_json({"parameter": added.name, "side": "left"}).parameter == added.name
+    listed = {choice.name: group for group, choices in group_trainable() for choice in choices}
+    assert listed[added.name] == added.group
+    assert list_terms()[added.name]["everyday"] == "toes up"
+
+
+def test_a_parameter_that_is_not_in_the_document_is_found(added: ParameterEntry) -> None:
+    text = PAGE.read_text("utf-8")
+    assert added.name not in text
+    assert f"| `{added.name}` | {added.label} | ° |" in render_page(text)
+    assert "most − least" in text
+
+
+def _measured_names(tracks: Tracks) -> set[str]:
+    return {p.name for p in measure(tracks).parameters if p.mean is not None}
+
+
+def test_what_a_parameter_needs_is_what_it_is_missing_without() -> None:
+    """Without the paths of the feet, and without angles: exactly those that say so have no number."""
+    tracks = true_tracks(simulate_scenario("comfortable", 5).truth)
+    measured = _measured_names(tracks)
+    assert tracks.angles is not None
+    bare = replace(tracks.angles, angles={})
+    for taken, needs in (
+        (replace(tracks, feet=None), {"foot_path", "linked_feet"}),
+        (replace(tracks, angles=bare), {"hip", "knee", "ankle"}),
+        (replace(tracks, q={}, valid={}), {"foot_sensor"}),
+    ):
+        lost = measured - _measured_names(taken)
+        assert lost == {name for name in measured if needs & set(CATALOGUE[name].needs)}, needs
+
+
+SMALL_MARK: Final = b"small sensor 1\n"
+
+
+def _read_small(data: bytes, source: str, spec: SourceSpec | None) -> tuple[Draft, ...]:
+    """A made-up format: a first line, then acceleration in g, ten times a second."""
+    lines = data.removeprefix(SMALL_MARK).decode().split()
+    if not lines:
+        raise FormatError("empty", f"{source} has no samples; export it again.")
+    acc = 9.80665 * np.array([[float(x) for x in line.split(",")] for line in lines])
+    return (Draft("SMALL-1", source, "index", np.arange(len(acc), dtype=float), acc, None, None, None, 10.0),)
+
+
+def test_a_reader_in_the_list_reads_its_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = SourceFile.of_bytes("walk.bin", SMALL_MARK + b"0,0,1\n" * 30)
+    with pytest.raises(FormatError):
+        read_recording([file])
+    small = VendorFormat("Small sensor", lambda data: data.startswith(SMALL_MARK), _read_small)
+    monkeypatch.setattr(vendors, "VENDOR_FORMATS", [*vendors.VENDOR_FORMATS, small])
+    recording = read_recording([file])
+    assert list(recording.streams) == ["SMALL-1"]
+    np.testing.assert_allclose(recording.streams["SMALL-1"].acc[0], (0.0, 0.0, 9.80665))
+    with pytest.raises(FormatError, match="Small sensor"):
+        read_recording([SourceFile.of_bytes("letter.txt", b"Dear reader,")])
+
+
+def test_the_exercises_name_files_that_exist() -> None:
+    text = (ROOT / "docs" / "contributing.md").read_text("utf-8")
+    for heading in ("Add a parameter", "Add a reader"):
+        assert f"## {heading}\n" in text
+
+
+def test_the_glossary_names_what_there_is_in_code() -> None:
+    page = (ROOT / "docs" / "glossary.md").read_text("utf-8")
+    named = {name for cell in re.findall(r"`([^`]+)`", page) for name in re.findall(r"\b[A-Z]\w+", cell)}
+    sources = "\n".join(
+        p.read_text("utf-8") for part in ("core", "server") for p in (ROOT / part).rglob("*.py")
+    )
+    known = set(re.findall(r"^class (\w+)|^(\w+)(?:: Final[^=]*)? = ", sources, re.MULTILINE))
+    assert named - {name for pair in known for name in pair} <= {"R_segment_sensor"}
