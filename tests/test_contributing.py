@@ -76,7 +76,7 @@ async def test_a_parameter_of_the_catalogue_is_in_report_api_and_csv(
         async with clinic.client("clinician") as client:
             report = (await client.get(f"{API}/sessions/{session}/report")).json()
             behind = (await client.get(f"{API}/sessions/{session}/parameters/{added.name}")).json()
-            table = (await client.get(f"{API}/sessions/{session}/parameters")).text
+            table = (await client.get(f"{API}/sessions/{session}/parameters.csv")).text
             printed = (await client.get(f"/sessions/{session}/print")).text
             offers = await client.get(
                 f"{API}/patients/{patient}/targets", params={"parameter": added.name, "side": "left"}
@@ -119,7 +119,7 @@ def _measured_names(tracks: Tracks) -> set[str]:
 
 
 def test_what_a_parameter_needs_is_what_it_is_missing_without() -> None:
-    """Without the paths of the feet, and without angles: exactly those that say so have no number."""
+    """Without paths, angles or sensors of the feet: exactly those that say so have no number."""
     tracks = true_tracks(simulate_scenario("comfortable", 5).truth)
     measured = _measured_names(tracks)
     assert tracks.angles is not None

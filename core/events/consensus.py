@@ -219,7 +219,7 @@ def _others(side: Side, voters: Mapping[str, GaitEvents]) -> Notice:
 def _led_by_other(side: Side, leads: str, voters: Mapping[str, GaitEvents]) -> Notice:
     return Notice(
         "led_by_other",
-        f"The foot-pitch rule found no contacts of the {side} foot; these are of {leads}"
+        f"The foot-pitch rule found no contacts of the {side} foot. These are of {leads}"
         + (f" and {len(voters) - 1} more" if len(voters) > 1 else " alone")
         + " (reconstructions of published ones), up to 0.1 s from what a foot sensor would tell. Compare them"
         " with the signals, and stance, swing and support only with takes of the same sensors.",

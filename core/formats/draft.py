@@ -145,7 +145,7 @@ def _in_order(d: Draft) -> Draft:
         raise FormatError(
             "counter_restart",
             f"{d.source}: the packet counter or time runs backwards in {back} of {len(ticks)} rows, "
-            f"first at row {int(np.argmin(rising)) + 1}; if the file holds two takes, export them apart.",
+            f"first at row {int(np.argmin(rising)) + 1}. If the file holds two takes, export them apart.",
             sensor=d.device_id,
             t_s=t,
         )

@@ -179,8 +179,8 @@ def _sensor(
         notices.append(
             Notice(
                 "missing_gyro",
-                f"{source}: sensor {device} has no gyroscope signal, so nothing can be computed from it; "
-                "name its gyr columns in the manifest or record with the gyroscope on.",
+                f"{source}: sensor {device} has no gyroscope signal, so nothing can be computed from it. "
+                "Name its gyr columns in the manifest or record with the gyroscope on.",
                 device,
             )
         )

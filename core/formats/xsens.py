@@ -174,8 +174,8 @@ def _right_aligned(names: list[str], cells: int, source: str, device: str) -> li
         return [names[0], *names[1 + len(lost) :]]
     raise FormatError(
         "collapsed_columns",
-        f"{source} is separated by spaces and its rows have {cells} cells for {len(names)} columns, so it "
-        "cannot be told which are missing; export it again with tab or comma as separator.",
+        f"{source} is separated by spaces and its rows have {cells} cells for {len(names)} columns. "
+        "Which are missing cannot be told. Export it again with tab or comma as separator.",
         sensor=device,
     )
 

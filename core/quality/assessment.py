@@ -218,7 +218,7 @@ def _sensor(
                 "magnetic_disturbed",
                 f"The magnetic field at {segment} is off its value at rest in {100 * magnetic:.0f} % of "
                 "the samples "
-                f"(limit {100 * params.magnetic_share:.0f} %); the magnetometer is not used for joint "
+                f"(limit {100 * params.magnetic_share:.0f} %). The magnetometer is not used for joint "
                 "angles.",
                 segment,
                 severity="info",

@@ -257,8 +257,8 @@ def _check_steps(i: int, item: Steps) -> None:
         if not (np.isfinite((length, turn, duration)).all() and length >= 0.0 and duration > 0.0):
             raise ParameterError(
                 "script_item",
-                f"Item {i} of the script (Steps): step {j} is ({length:g} m, {turn:g} rad, {duration:g} s);"
-                " expected a length of 0 or more and a duration above 0.",
+                f"Item {i} of the script (Steps): step {j} is ({length:g} m, {turn:g} rad, {duration:g} s)."
+                " Expected a length of 0 or more and a duration above 0.",
             )
     if not item.steps:
         raise ParameterError("script_item", f"Item {i} of the script (Steps) has no steps.")

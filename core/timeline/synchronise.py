@@ -47,8 +47,8 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
     if not usable:
         raise SignalError(
             "missing_gyro",
-            f"None of the {len(worn)} sensors has a gyroscope signal, so no orientation can be computed; "
-            "export the recording again with the rate of turn (Gyr_X, Gyr_Y, Gyr_Z).",
+            f"None of the {len(worn)} sensors has a gyroscope signal, so no orientation can be computed. "
+            "Export the recording again with the rate of turn (Gyr_X, Gyr_Y, Gyr_Z).",
         )
     _check_clocks(usable)
     rate, rate_notices = _common_rate(usable, params)
@@ -165,9 +165,8 @@ def _common_range(
         notices.append(
             Notice(
                 "cropped",
-                f"The sensors did not start and stop together; {start - first:.1f} s at the start and "
-                f"{last - end:.1f} s "
-                "at the end that only some of them recorded were left out.",
+                f"The sensors did not start and stop together. Left out, as only some of them recorded "
+                f"it: {start - first:.1f} s at the start, {last - end:.1f} s at the end.",
                 severity="info",
             )
         )

@@ -172,6 +172,6 @@ class _explained:  # noqa: N801 - reads as a word: with _explained(code)
             ) from error
         raise ServiceError(
             "bad_value",
-            "Expected sex female, male or none, a year of birth from 1850, a height of 0.5 to 2.5 m and an "
-            "affected side left, right or none.",
+            "Expected sex female, male or none, a year of birth from 1850, a height of 0.5 to 2.5 m. "
+            "Expected an affected side left, right or none.",
         ) from error

@@ -208,8 +208,8 @@ def start(inputs: L7sInputs, model: LegModel, params: L7sParams | None = None) -
             other = "body" if inputs.worn == "3I" else "left foot"
             raise EstimationError(
                 "headings_apart",
-                f"The {side} foot faces {np.degrees(apart):.0f}° away from the {other} at the start, at "
-                "most 90° can be a person; check that no sensor is worn backwards and calibrate again.",
+                f"The {side} foot faces {np.degrees(apart):.0f}° away from the {other} at the start: more "
+                "than a person can. Check that no sensor is worn backwards and calibrate again.",
                 sensor=FOOT[side],
             )
     p = np.zeros((3, 3))

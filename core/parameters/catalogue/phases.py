@@ -154,7 +154,7 @@ ENTRIES: Final = (
         scale=(0, 25),
         comparison=DURATION,
         definition="From there until the shank is vertical, as a share of the stride.",
-        needs=("foot_path", "linked_feet", "ankle", "foot_off"),
+        needs=("foot_path", "linked_feet", "foot_sensor", "ankle", "foot_off"),
     ),
     ParameterEntry(
         "terminal_swing_pct",
@@ -164,6 +164,6 @@ ENTRIES: Final = (
         scale=(0, 30),
         comparison=DURATION,
         definition="From there to contact, as a share of the stride.",
-        needs=("ankle", "foot_off"),
+        needs=("foot_sensor", "ankle", "foot_off"),
     ),
 )
