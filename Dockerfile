@@ -4,6 +4,7 @@ FROM python:3.13-slim AS build
 WORKDIR /src
 COPY pyproject.toml README.md LICENSE ./
 COPY core core
+COPY sagittal sagittal
 COPY server server
 COPY web web
 COPY migrations migrations

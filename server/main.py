@@ -123,15 +123,16 @@ def _version() -> str:
 
 
 def _refuse_foreign_packages() -> None:
-    """Our packages are named core, server and web; another distribution may have overwritten one."""
+    """Another distribution may have overwritten one of our packages: their names are common words."""
     import core
+    import sagittal
     import server
     import web
 
-    homes = {Path(p.__file__ or "").parent.parent for p in (core, server, web)}
+    homes = {Path(p.__file__ or "").parent.parent for p in (core, sagittal, server, web)}
     if len(homes) != 1:
         sys.stderr.write(
-            "The packages core, server and web do not come from one installation: "
+            "The packages core, sagittal, server and web do not come from one installation: "
             f"{', '.join(sorted(map(str, homes)))}. Another distribution uses one of these names; "
             "install Sagittal into a virtual environment of its own.\n"
         )

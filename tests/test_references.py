@@ -15,7 +15,7 @@ import pytest
 
 from tests.data import ROOT
 
-FOLDERS: Final = (".ci", "core", "docs", "migrations", "server", "tests", "web")
+FOLDERS: Final = (".ci", "core", "docs", "migrations", "sagittal", "server", "tests", "web")
 SUFFIXES: Final = {".css", ".html", ".js", ".mako", ".md", ".py", ".toml"}
 NAMES: Final = {".importlinter", "Dockerfile", "run"}
 RECORDINGS: Final = {"README.md", "tests/data/__init__.py", ".ci/run"}

@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 from core.body.pose_params import PoseParams
 from core.calibration import CalibrationParams
@@ -20,6 +21,8 @@ from core.fusion.mahony import MahonyParams
 from core.quality import QualityParams
 from core.quality.stuck import StuckParams
 from core.timeline import TimelineParams
+
+Settings = TypeVar("Settings")
 
 Detector = Literal["foot_pitch", "consensus"]
 """Whose contacts count: the foot-pitch rule's own, or what most detectors agree on."""
@@ -68,3 +71,41 @@ class PipelineConfig:
         """sha256 over all parameters; equal parameters give equal digests."""
         text = json.dumps(dataclasses.asdict(self), sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
+
+
+def override_config(defaults: Settings, overrides: Mapping[str, Any], path: str = "config") -> Settings:
+    """Replace fields of nested frozen dataclasses.
+
+    Parameters
+    ----------
+    overrides : by stage, {"fusion": {"attitude": {"kp": 0.5}}}; a list for a tuple.
+
+    Raises
+    ------
+    ParameterError : `unknown_parameter`, `bad_parameter`; and those of the dataclasses.
+    """
+    names = {f.name for f in dataclasses.fields(defaults)}  # type: ignore[arg-type] # all are dataclasses
+    values: dict[str, Any] = {}
+    for name, value in overrides.items():
+        if name not in names:
+            raise ParameterError(
+                "unknown_parameter", f"There is no {path}.{name}; expected one of {', '.join(sorted(names))}."
+            )
+        default = getattr(defaults, name)
+        if dataclasses.is_dataclass(default) and isinstance(value, Mapping):
+            values[name] = override_config(default, value, f"{path}.{name}")
+        elif _fits(value, default):
+            values[name] = tuple(value) if isinstance(default, tuple) else value
+        else:
+            raise ParameterError(
+                "bad_parameter", f"{path}.{name} is {value!r}, expected the like of {default!r}."
+            )
+    return dataclasses.replace(defaults, **values)  # type: ignore[type-var]
+
+
+def _fits(value: object, default: object) -> bool:
+    if isinstance(default, bool) or isinstance(value, bool):
+        return isinstance(default, bool) and isinstance(value, bool)
+    if isinstance(default, int | float):
+        return isinstance(value, int | float)
+    return isinstance(value, list if isinstance(default, tuple) else type(default))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import datetime as dt
 import hashlib
 import json
@@ -12,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection, Select, func, insert, select, update
 
-from core.errors import ParameterError
 from server import audit
 from server.jobs.queue import Claim, JobQueue, JobView
 from server.services import recordings, sessions
@@ -67,11 +65,12 @@ def run(
     from core.formats import read_recording
     from core.formats.manifest import parse_manifest
     from core.pipeline import PipelineConfig, analyse
+    from core.pipeline.config import override_config
     from server.report.exports import analysis_files
 
     progress("reading", 0.0)
     take = read_recording(files, parse_manifest(manifest) if manifest is not None else None)
-    chosen = configured(PipelineConfig(), config) if config else None
+    chosen = override_config(PipelineConfig(), config or {})
     result = analyse(take, chosen, progress, CODE_VERSION)
     return analysis_files(result)
 
@@ -93,35 +92,6 @@ def inspect(files: Sequence[SourceFile], manifest: Mapping[str, Any] | None, pro
     take = read_recording(files, manifest_of({"sources": sources}) if sources else None)
     progress("looking", 0.7)
     return json.dumps(quality.describe(take).to_json(), ensure_ascii=False, allow_nan=False).encode()
-
-
-def configured(defaults: Any, overrides: Mapping[str, Any], path: str = "config") -> Any:
-    """Replace fields of nested frozen dataclasses; raises ParameterError unknown_parameter, bad_parameter."""
-    names = {f.name for f in dataclasses.fields(defaults)}
-    values = {}
-    for name, value in overrides.items():
-        if name not in names:
-            raise ParameterError(
-                "unknown_parameter", f"There is no {path}.{name}; expected one of {', '.join(sorted(names))}."
-            )
-        default = getattr(defaults, name)
-        if dataclasses.is_dataclass(default) and isinstance(value, Mapping):
-            values[name] = configured(default, value, f"{path}.{name}")
-        elif _fits(value, default):
-            values[name] = tuple(value) if isinstance(default, tuple) else value
-        else:
-            raise ParameterError(
-                "bad_parameter", f"{path}.{name} is {value!r}, expected the like of {default!r}."
-            )
-    return dataclasses.replace(defaults, **values)
-
-
-def _fits(value: object, default: object) -> bool:
-    if isinstance(default, bool) or isinstance(value, bool):
-        return isinstance(default, bool) and isinstance(value, bool)
-    if isinstance(default, int | float):
-        return isinstance(value, int | float)
-    return isinstance(value, list if isinstance(default, tuple) else type(default))
 
 
 def submit(

@@ -1,0 +1,102 @@
+"""The three functions of the package."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from core.errors import InputError
+from core.formats import SourceFile, manifest_of, parse_manifest, read_recording
+from core.frames import Segment
+from core.pipeline import PipelineConfig
+from core.pipeline import analyse as run_pipeline
+from core.pipeline.config import override_config
+from core.recording import Recording
+from core.simulate import simulate_scenario
+from sagittal.analysis import Analysis
+from sagittal.simulated import SimulatedWalk
+
+
+def read(*paths: str | Path, manifest: Mapping[str, Any] | str | Path | None = None) -> Recording:
+    """Read files, folders or zips of one take.
+
+    Parameters
+    ----------
+    manifest : which sensor sits where, units, body height (docs/formats.md): a mapping, or the path of a JSON
+        file; None where the files say it themselves.
+
+    Raises
+    ------
+    SagittalError
+        `file_not_found`, or the files or the manifest are not what was expected; the message says why.
+    """
+    declared = None
+    if isinstance(manifest, Mapping):
+        declared = manifest_of(json.loads(json.dumps(manifest)))
+    elif manifest is not None:
+        declared = parse_manifest(Path(manifest).read_bytes())
+    return read_recording(list(_sources([Path(p) for p in paths])), declared)
+
+
+def analyse(
+    recording: Recording | str | Path,
+    *,
+    config: Mapping[str, Any] | None = None,
+    manifest: Mapping[str, Any] | str | Path | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> Analysis:
+    """Run the whole chain on one take.
+
+    Parameters
+    ----------
+    recording : of `read` or `simulate`, or a path that is read first, with `manifest`.
+    config : parameters of the stages that differ from the defaults, as the API takes them:
+        `{"poses": {"least_valid": 0.7}}`.
+    progress : called with the stage that starts and the share of the work done before it, 0 to 1.
+
+    Returns
+    -------
+    Analysis; when a stage could not go on its `problem` says why and what was reached is there.
+
+    Raises
+    ------
+    SagittalError
+        No common time axis can be made, or a parameter is unknown.
+    """
+    if not isinstance(recording, Recording):
+        recording = read(recording, manifest=manifest)
+    chosen = override_config(PipelineConfig(), config or {})
+    return Analysis(run_pipeline(recording, chosen, progress or _say_nothing))
+
+
+def simulate(
+    script: str = "comfortable",
+    *,
+    seed: int = 0,
+    height_m: float = 1.75,
+    rate_hz: float = 100.0,
+    segments: Sequence[Segment] | None = None,
+) -> SimulatedWalk:
+    """A simulated walk with its exact truth; the same arguments give the same bits.
+
+    Parameters
+    ----------
+    script : name of a scenario (docs/simulation.md).
+    segments : that carry a sensor; None = as the scenario says, mostly all seven.
+    """
+    worn = None if segments is None else tuple(segments)
+    return SimulatedWalk(simulate_scenario(script, seed, height_m, rate_hz, worn))
+
+
+def _sources(paths: Sequence[Path]) -> Iterator[SourceFile]:
+    for path in paths:
+        if not path.exists():
+            raise InputError("file_not_found", f"{path} does not exist; give files, a folder or a zip.")
+        for file in sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]:
+            yield SourceFile.of_path(file, str(file.relative_to(path)) if path.is_dir() else file.name)
+
+
+def _say_nothing(stage: str, share: float) -> None:
+    """Progress that nobody follows."""
