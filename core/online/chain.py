@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from core.angles.kernel import AngleKernel, mean_angles, subtract_zero
 from core.body.choice import WHOLE, possible
 from core.body.erkf.params import ErkfParams
 from core.body.l7s.filter import L7sParams
@@ -29,7 +30,6 @@ from core.online.drift import HeadingHold
 from core.online.erkf import HEADING_SD, live_params
 from core.online.frame import LiveStride
 from core.online.history import MOST, History
-from core.online.joints import LiveAngles
 from core.online.linked import Linked, Unlinked
 from core.online.sparse import Sparse
 from core.online.strides import LiveStrides, Setup
@@ -113,8 +113,9 @@ class Chain:
         self._contacts = Contacts(feet, rate, self.params.events)
         self._feet = np.array([self.segments.index(f) for f in feet], np.int64)
         self._courses = tuple(s for s in COURSES if s in self.segments)
-        self._angles = LiveAngles.of(self.estimator.segments)
-        self._pelvis = LiveAngles.of(("pelvis",)) if "pelvis" in self._courses else None
+        # a pelvis that carries a sensor tilts as that says, not as a model of the legs wants it
+        self._tilting = tuple(s for s in self.estimator.attitudes if s == "pelvis")
+        self._angles = AngleKernel.between(self._tilting, self.estimator.segments)
         self._zero: Floats | None = None
         self._told_broken = False
         self.contact: dict[Side, bool] = dict.fromkeys(self._contacts.sides, True)
@@ -221,17 +222,15 @@ class Chain:
 
     def _measure(self, placed: Placed, turned: Mapping[Segment, Floats], valid: Bools) -> Floats:
         """Angles (T, names) over those of standing; the first block is the standing."""
-        angles = self._angles(placed.q, placed.known, self._zero)
-        if self._pelvis is not None and "pelvis" in turned:
-            # a pelvis that carries a sensor tilts as that says, not as a model of the legs wants it
+        q, known = placed.q, placed.known
+        if self._tilting:
             here = self.segments.index("pelvis")
-            zero = None if self._zero is None else np.ascontiguousarray(self._zero[:2])
-            angles[:, :2] = self._pelvis(turned["pelvis"][:, None], valid[:, here, None], zero)
+            q = np.concatenate((turned["pelvis"][:, None], q), axis=1)
+            known = np.concatenate((valid[:, here, None], known), axis=1)
+        angles = self._angles.measure(q, known, self._zero)
         if self._zero is None:
-            finite = np.where(np.isfinite(angles), angles, 0.0)
-            n = np.isfinite(angles)
-            self._zero = np.arctan2((np.sin(finite) * n).sum(axis=0), (np.cos(finite) * n).sum(axis=0))
-            angles = (angles - self._zero + np.pi) % (2.0 * np.pi) - np.pi
+            self._zero = mean_angles(angles)
+            angles = subtract_zero(angles, self._zero)
         return angles
 
     def _remember(

@@ -1,6 +1,6 @@
 """What the live chain says: a frame after every push, a stride at every initial contact.
 
-Everything here is plain values on the axis of core/online/axis.py: seconds from the first sample of the take,
+Everything here is plain values on the axis of core/timeline/live.py: seconds from the first sample of the take,
 SI units and radians, names as in core.angles and core.parameters. Nothing imports numba.
 """
 

@@ -12,7 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from core import angles, body, calibration, quality, timeline
+from core import body, calibration, quality, timeline
+from core.angles.measure import measure_angles
 from core.body.estimate import estimate_poses
 from core.body.l7s.poses import free_acceleration
 from core.body.mounting import mount_sensors
@@ -127,7 +128,7 @@ def compute_angles(analysis: Analysis, config: PipelineConfig) -> Analysis:
     posed, mounted = require_stage(analysis.posed, "poses"), require_stage(analysis.mounted, "mounting")
     standing = analysis.recording.subject.standing_angles_deg
     zero = mounted.calibrated.calibration.zero
-    joint = angles.joint_angles(posed.orientations, zero, posed.poses, standing)
+    joint = measure_angles(posed.orientations, zero, posed.poses, standing)
     return replace(analysis, angles=withhold(joint, posed.poses, posed.orientations))
 
 

@@ -85,7 +85,7 @@ class SquatTruth:
     Parameters
     ----------
     t_s : (n,). q : segment → (n, 4), p : segment → (n, 3) m; the ankle of the foot stands over the origin.
-    angles : name → (n,) rad as in core/angles.py, anatomical. zero_offset : name → value in standing, rad.
+    angles : name → (n,) rad as in core/angles, anatomical. zero_offset : name → value in standing, rad.
     phases : "stand", "down", "hold", "up" in turn over the whole take.
     depths_rad : drawn knee flexion added in each squat.
     """

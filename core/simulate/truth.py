@@ -1,7 +1,7 @@
 """What really happened: poses, angles, contacts and strides that belong to a simulated recording.
 
 Angles follow the sequence and signs of docs/coordinate-systems.md, taken here from the rotation matrices on
-their own, so that a sign error in core/angles.py cannot hide.
+their own, so that a sign error in core/angles cannot hide.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class Truth:
     Parameters
     ----------
     t_s : (n,). q : segment → (n, 4), p : segment → (n, 3) m; origins as in core/body/poses.py.
-    angles : name → (n,) rad as in core/angles.py, anatomical (not zeroed).
+    angles : name → (n,) rad as in core/angles, anatomical (not zeroed).
     zero : window in s of the first standing. zero_offset : name → its mean angle there, rad.
     contact : side → (n,) the foot touches the floor. flat : side → (n,) it is flat and exactly still.
     mounts, errors : segment → how its sensor sits and what constant errors it was given.
@@ -148,7 +148,7 @@ def truth_of(
 
 
 def joint_angles(q: Mapping[Segment, Floats]) -> dict[str, Floats]:
-    """Angles (n,) in rad of segment orientations (n, 4), names and signs as in core/angles.py.
+    """Angles (n,) in rad of segment orientations (n, 4), names and signs as in core/angles.
 
     Parameters
     ----------

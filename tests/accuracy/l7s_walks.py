@@ -13,7 +13,7 @@ from math import pi, radians
 
 import numpy as np
 
-from core.angles import joint_angles
+from core.angles.measure import measure_angles
 from core.body.l7s.filter import Adjoint, L7sParams, Worn
 from core.body.l7s.poses import free_acceleration, l7s_poses
 from core.body.model import BodyModel
@@ -131,7 +131,7 @@ def raw_angles(poses: Poses, calibrated: CalibratedRecording) -> dict[str, Float
     """Angles (n,) by name in degrees, not zeroed."""
     q = dict(poses.q)
     posed = Orientations(poses.t_s, poses.rate_hz, q, dict.fromkeys(q, np.ones_like(poses.valid)), "")
-    found = joint_angles(posed, calibrated.calibration.zero)
+    found = measure_angles(posed, calibrated.calibration.zero)
     return {name: np.degrees(x + found.zero_offset[name]) for name, x in found.angles.items()}
 
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from core.angles import joint_angles
+from core.angles.measure import measure_angles
 from core.body import BodyModel
 from core.body.corrected import corrected_signals
 from core.body.erkf.headings import agreed
@@ -107,7 +107,7 @@ def healthy() -> Chain:
 
 def angles_deg(orientations: Orientations, calibrated: CalibratedRecording) -> dict[str, Floats]:
     """Raw (not zeroed) angles by name in degrees."""
-    angles = joint_angles(orientations, calibrated.calibration.zero)
+    angles = measure_angles(orientations, calibrated.calibration.zero)
     return {name: np.degrees(x + angles.zero_offset[name]) for name, x in angles.angles.items()}
 
 

@@ -14,7 +14,7 @@ from math import radians
 import numpy as np
 import pytest
 
-from core.angles import joint_angles
+from core.angles.measure import measure_angles
 from core.body import nominal_body
 from core.body.erkf.headings import agreed, turned
 from core.body.erkf.params import ErkfParams
@@ -49,7 +49,7 @@ def errors(walk: tuple[str, int], wrong: str, agree: bool) -> dict[str, float]:
     if agree:
         calibrated, orientations, _ = agreed(calibrated, orientations, body, whole, params)
     run = run_erkf(calibrated, orientations, body, whole, params)
-    angles = joint_angles(refined(run, orientations), calibrated.calibration.zero).angles
+    angles = measure_angles(refined(run, orientations), calibrated.calibration.zero).angles
     walking = np.zeros(len(truth.t_s), bool)
     for window in calibrated.calibration.walking:
         walking[samples(window, recording.rate_hz)] = True

@@ -15,7 +15,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.angles import joint_angles
+from core.angles.measure import measure_angles
 from core.calibration import CalibrationParams, calibrate
 from core.calibration.anterior import Method
 from core.frames import Floats
@@ -58,7 +58,7 @@ def estimated(method: Method = "walking_direction") -> dict[str, Floats]:
     """Our raw (not zeroed) angles by name, degrees."""
     params = replace(CalibrationParams(), method=method)
     calibrated = calibrate(neura_walk(), params)
-    angles = joint_angles(estimate_orientations(calibrated), calibrated.calibration.zero)
+    angles = measure_angles(estimate_orientations(calibrated), calibrated.calibration.zero)
     return {n: np.degrees(x + angles.zero_offset[n]) for n, x in angles.angles.items()}
 
 
@@ -140,7 +140,7 @@ def test_thigh_sensors_swapped_are_seen_by_the_scoring() -> None:
         "thigh_r": recording.sensors["thigh_l"],
     }
     calibrated = calibrate(replace(recording, sensors=swap))
-    angles = joint_angles(estimate_orientations(calibrated), calibrated.calibration.zero)
+    angles = measure_angles(estimate_orientations(calibrated), calibrated.calibration.zero)
     _, found = scores({n: np.degrees(x + angles.zero_offset[n]) for n, x in angles.angles.items()})
     assert found["hip_flexion_r"].offset_removed > 15.0
     assert found["knee_flexion_l"].offset_removed > 15.0

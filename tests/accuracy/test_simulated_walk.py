@@ -7,7 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.angles import JointAngles, joint_angles
+from core.angles import JointAngles
+from core.angles.measure import measure_angles
 from core.calibration import calibrate
 from core.frames import Floats
 from core.fusion.mahony import estimate_orientations
@@ -30,7 +31,7 @@ def errors(name: str, seed: int) -> dict[str, Floats]:
     """Error (n,) in rad of every angle."""
     recording, truth = simulated(name, seed)
     calibrated = calibrate(recording)
-    angles: JointAngles = joint_angles(estimate_orientations(calibrated), calibrated.calibration.zero)
+    angles: JointAngles = measure_angles(estimate_orientations(calibrated), calibrated.calibration.zero)
     true = truth.zeroed()
     n = min(len(recording.t_s), len(truth.t_s))
     return {k: (x[:n] - true[k][:n] + np.pi) % (2 * np.pi) - np.pi for k, x in angles.angles.items()}

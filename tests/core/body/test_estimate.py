@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from core import calibration, events
-from core.angles import joint_angles
+from core.angles.measure import measure_angles
 from core.body import contact_mask
 from core.body.choice import possible
 from core.body.estimate import PoseEstimate, estimate_poses
@@ -121,7 +121,7 @@ def test_few_sensors_give_a_figure_and_all_angles_named_as_estimated(
     assert made.poses.method == method
     assert set(made.poses.q) == set(WHOLE)
     zero = calibration.calibrate(only(simulated("fast_with_turns", 3)[0], *worn)).calibration.zero
-    angles = joint_angles(made.orientations, zero, made.poses)
+    angles = measure_angles(made.orientations, zero, made.poses)
     assert len(angles.angles) == 20
     estimated_names = set(angles.diagnostics["estimated"])  # type: ignore[call-overload]
     assert {n for n in angles.angles if not n.startswith("pelvis")} <= estimated_names
@@ -137,7 +137,7 @@ def test_a_failed_thigh_leaves_the_other_leg_as_measured_and_estimates_the_rest(
     assert told.sensor == "thigh_l"
     assert "50%" in told.message
     zero = calibration.calibrate(take).calibration.zero
-    angles = joint_angles(made.orientations, zero, made.poses)
+    angles = measure_angles(made.orientations, zero, made.poses)
     names = {n.rpartition("_") for n in angles.diagnostics["estimated"]}  # type: ignore[attr-defined]
     assert {(base.split("_")[0], side) for base, _, side in names} == {("hip", "l"), ("knee", "l")}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.angles import joint_angles
+from core.angles.measure import measure_angles
 from core.body import forward_kinematics, nominal_body
 from core.calibration import CalibrationParams, calibrate
 from core.calibration.anterior import Method
@@ -42,7 +42,7 @@ def test_any_piece_with_any_sensors_ends_in_a_result_or_a_code(seed: int) -> Non
         assert len(calibrated.message) > 30
         return
     orientations = estimate_orientations(calibrated)
-    angles = joint_angles(orientations, calibrated.calibration.zero)
+    angles = measure_angles(orientations, calibrated.calibration.zero)
     poses = forward_kinematics(orientations, nominal_body(None)[0])
     assert all(np.isfinite(q).all() for q in orientations.q.values())
     assert all(np.isfinite(p).all() for p in poses.p.values())
@@ -55,7 +55,7 @@ def test_flexion_is_right_at_any_sampling_rate(rate_hz: float) -> None:
     take = simulate_scenario("slow", 3, rate_hz=rate_hz)
     recording, truth = synchronise(take.recording), take.truth
     calibrated = calibrate(recording)
-    angles = joint_angles(estimate_orientations(calibrated), calibrated.calibration.zero).angles
+    angles = measure_angles(estimate_orientations(calibrated), calibrated.calibration.zero).angles
     n = min(len(recording.t_s), len(truth.t_s))
     for name in ("hip_flexion_l", "knee_flexion_r", "ankle_dorsiflexion_l"):
         assert rms_deg(angles[name][:n] - truth.zeroed()[name][:n]) < 1.5

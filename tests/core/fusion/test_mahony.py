@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.angles import joint_angles
+from core.angles.measure import measure_angles
 from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError
@@ -120,8 +120,8 @@ def test_drift_correction_leaves_a_short_walk_alone() -> None:
 
 def test_drift_correction_does_not_change_flexion() -> None:
     take = calibrated("five_minutes")
-    held = joint_angles(estimate_orientations(take), take.calibration.zero).angles
-    free = joint_angles(estimate_orientations(take, NO_DRIFT), take.calibration.zero).angles
+    held = measure_angles(estimate_orientations(take), take.calibration.zero).angles
+    free = measure_angles(estimate_orientations(take, NO_DRIFT), take.calibration.zero).angles
     for name in ("knee_flexion_l", "knee_flexion_r"):
         assert rms_deg(held[name] - free[name]) < 1.0
 
@@ -133,7 +133,7 @@ def test_a_lost_sensor_is_masked_and_comes_back() -> None:
     found = estimate_orientations(take)
     assert not found.valid["shank_l"][1500:2000].any()
     assert found.valid["shank_l"][2000:].all()
-    angles = joint_angles(found, take.calibration.zero)
+    angles = measure_angles(found, take.calibration.zero)
     knee = angles.angles["knee_flexion_l"]
     assert np.isnan(knee[1500:2000]).all()
     n = min(len(knee), len(truth.t_s))

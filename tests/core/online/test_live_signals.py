@@ -6,17 +6,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.angles import joint_angles
 from core.body import BodyModel
 from core.body.erkf.gaps import bridged
 from core.body.l7s.legs import M_LEG, LegModel, solve_legs
 from core.body.still import AT_REST, FOOT_STILL, still_samples
 from core.body.tree import PRESETS, person_tree
 from core.frames import GRAVITY, Bools, Floats
-from core.fusion.orientations import Orientations
 from core.online.bridge import Bridge
 from core.online.drift import HeadingHold
-from core.online.joints import LiveAngles
 from core.online.sparse import FIGURE, HIP_SIGN
 from core.online.sparse_kernel import in_sy_frames, legs
 from core.online.still import Stillness
@@ -99,38 +96,6 @@ def test_live_stillness_trails_and_never_looks_ahead() -> None:
         stored = still_samples(acc[:, 0], gyr[:, 0], valid[:, 0], RATE, rule)
         assert not (stored & ~live)[130:].any() or rule is AT_REST
         assert abs(int(stored.sum()) - int(live.sum())) < 2 * rule.window_s * RATE + 1
-
-
-def test_compiled_angles_are_those_of_the_angle_module() -> None:
-    rng = np.random.default_rng(1)
-    q = rng.normal(size=(400, 7, 4))
-    q /= np.linalg.norm(q, axis=2, keepdims=True)
-    known = rng.random((400, 7)) > 0.1
-    stored = joint_angles(
-        Orientations(
-            np.arange(400) / RATE,
-            RATE,
-            {s: q[:, i] for i, s in enumerate(SEGMENTS)},
-            {s: known[:, i] for i, s in enumerate(SEGMENTS)},
-            "",
-        ),
-        (0.0, 1.0),
-    )
-    angles = LiveAngles.of(SEGMENTS)
-    assert set(angles.names) == set(stored.angles)
-    live = angles(q, known, np.array([stored.zero_offset[name] for name in angles.names]))
-    for i, name in enumerate(angles.names):
-        off = (live[:, i] - stored.angles[name] + np.pi) % (2 * np.pi) - np.pi
-        np.testing.assert_allclose(off[np.isfinite(off)], 0.0, atol=1e-12)
-        assert np.array_equal(np.isnan(live[:, i]), np.isnan(stored.angles[name]))
-
-
-@pytest.mark.parametrize("worn", [("pelvis", "foot_l", "foot_r"), ("shank_l", "foot_l"), ("foot_r",)])
-def test_angles_are_those_between_worn_neighbours(worn: tuple[str, ...]) -> None:
-    names = LiveAngles.of(worn).names  # type: ignore[arg-type]
-    assert ("pelvis_tilt" in names) == ("pelvis" in worn)
-    assert ("ankle_dorsiflexion_l" in names) == ("shank_l" in worn)
-    assert not any(name.startswith(("hip", "knee")) for name in names)
 
 
 def test_compiled_legs_are_those_of_the_leg_model() -> None:

@@ -3,18 +3,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.angles import joint_angles
+from core.angles.measure import measure_angles
 from core.frames import SIDES, SUFFIX
 from core.fusion.orientations import Orientations
 from core.simulate import Simulation, angle_table, event_table, stride_table
 
 
 def test_truth_and_analysis_mean_the_same_angles(mixed: Simulation) -> None:
-    """Two derivations of docs/science/joint-angles.md, one here and one in core/angles.py."""
+    """Two derivations of docs/science/joint-angles.md, one here and one in core/angles."""
     truth = mixed.truth
     valid = {segment: np.ones(len(truth.t_s), bool) for segment in truth.q}
     orientations = Orientations(truth.t_s, truth.rate_hz, truth.q, valid, engine="truth")
-    analysed = joint_angles(orientations, truth.zero)
+    analysed = measure_angles(orientations, truth.zero)
     assert set(analysed.angles) == set(truth.angles)
     for name, values in truth.zeroed().items():
         assert analysed.angles[name] == pytest.approx(values, abs=1e-9), name

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import viser
 
-from core.angles import cardan_zxy, joint_angles
+from core.angles import cardan_zxy
+from core.angles.measure import measure_angles
 from core.frames import SHANK, SIDES, THIGH, Side
 from core.fusion.orientations import Orientations
 from core.norms import adult_kinematics
@@ -224,7 +225,7 @@ def raw_angles(*, zeroed: bool) -> dict[str, np.ndarray]:
     """Angles of the walk as core.angles measures them, from the first sample as standing or as they are."""
     poses = pictures.POSES
     valid = dict.fromkeys(poses.q, poses.valid)
-    whole = joint_angles(Orientations(poses.t_s, poses.rate_hz, poses.q, valid, "kinematic"), (0.0, 0.03))
+    whole = measure_angles(Orientations(poses.t_s, poses.rate_hz, poses.q, valid, "kinematic"), (0.0, 0.03))
     if zeroed:
         return dict(whole.angles)
     return {name: np.full(1, zero) for name, zero in whole.zero_offset.items()}

@@ -8,7 +8,7 @@ from math import pi
 
 import numpy as np
 
-from core.angles import joint_angles
+from core.angles.measure import measure_angles
 from core.body.erkf.filter import ErkfInputs, ErkfTrack, erkf_inputs, filter_block
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.smoother import smooth
@@ -85,7 +85,7 @@ def angles_of(take: Take, track: ErkfTrack, *, zeroed: bool = True) -> dict[str,
     q = {s: take.tree.segment_q(track.q)[:, i] for i, s in enumerate(SEGMENTS)}
     n = len(track.q)
     posed = Orientations(take.truth.t_s[:n], take.rate_hz, q, {s: np.ones(n, bool) for s in q}, "erkf")
-    found = joint_angles(posed, take.truth.zero)
+    found = measure_angles(posed, take.truth.zero)
     return {n: x + (0.0 if zeroed else found.zero_offset[n]) for n, x in found.angles.items()}
 
 

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.angles import joint_angles
+from core.angles.measure import measure_angles
 from core.body.l7s.constraints import constraint_rows
 from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start
 from core.body.l7s.legs import LegModel
@@ -138,7 +138,7 @@ def test_angles_and_strides_of_a_simulated_walk_are_within_the_limits(worn: Worn
     calibrated, _, _, truth = walk()
     found = poses_of(worn)
     posed = Orientations(found.t_s, found.rate_hz, found.q, dict.fromkeys(found.q, found.valid), found.method)
-    angles = joint_angles(posed, calibrated.calibration.zero).angles
+    angles = measure_angles(posed, calibrated.calibration.zero).angles
     true, n = truth.zeroed(), len(found.t_s)
     moving = (found.t_s > truth.stands[0][1]) & (found.t_s < truth.stands[-1][0])
     for name, rmse, r in zip(FLEXION, *LIMITS[worn], strict=True):

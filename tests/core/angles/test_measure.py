@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.angles import SIGNS, cardan_zxy, headings, joint_angles, pelvis_angles
+from core.angles import SIGNS, cardan_zxy, headings, pelvis_angles
+from core.angles.measure import measure_angles
 from core.frames import R_NEUTRAL, SIDES, SUFFIX, Bools, Floats, Segment
 from core.fusion.orientations import Orientations
 from core.rotation import about, from_matrix, multiply, rotate
@@ -34,7 +35,7 @@ def pose(**q: Floats) -> Orientations:
 
 def found(orientations: Orientations) -> dict[str, float]:
     """Degrees of every angle after the change."""
-    angles = joint_angles(orientations, (0.0, 1.0)).angles
+    angles = measure_angles(orientations, (0.0, 1.0)).angles
     return {k: float(np.degrees(x[150])) for k, x in angles.items()}
 
 
@@ -102,7 +103,7 @@ def test_standing_is_zero_and_its_offset_is_kept() -> None:
     crouched = about(2, np.radians(-25.0))
     orientations = pose()
     q = {s: x if s not in ("shank_l", "foot_l") else multiply(x, crouched) for s, x in orientations.q.items()}
-    angles = joint_angles(Orientations(orientations.t_s, 100.0, q, orientations.valid, "test"), (0.0, 1.0))
+    angles = measure_angles(Orientations(orientations.t_s, 100.0, q, orientations.valid, "test"), (0.0, 1.0))
     assert np.abs(angles.angles["knee_flexion_l"]).max() < 1e-9
     assert np.degrees(angles.zero_offset["knee_flexion_l"]) == pytest.approx(25.0)
     assert angles.zero == "standing"
@@ -112,7 +113,7 @@ def test_a_lost_segment_is_no_number_in_its_joints_only() -> None:
     orientations = pose()
     valid = dict(orientations.valid)
     valid["shank_r"] = np.arange(200) < 120
-    angles = joint_angles(Orientations(orientations.t_s, 100.0, orientations.q, valid, "test"), (0.0, 1.0))
+    angles = measure_angles(Orientations(orientations.t_s, 100.0, orientations.q, valid, "test"), (0.0, 1.0))
     assert np.isnan(angles.angles["knee_flexion_r"][120:]).all()
     assert np.isnan(angles.angles["ankle_dorsiflexion_r"][120:]).all()
     assert np.isfinite(angles.angles["hip_flexion_r"]).all()
@@ -123,14 +124,14 @@ def test_a_joint_without_both_segments_is_left_out_with_a_reason() -> None:
     orientations = pose()
     worn: tuple[Segment, ...] = ("thigh_l", "shank_l")
     q = {s: orientations.q[s] for s in worn}
-    angles = joint_angles(Orientations(orientations.t_s, 100.0, q, orientations.valid, "test"), (0.0, 1.0))
+    angles = measure_angles(Orientations(orientations.t_s, 100.0, q, orientations.valid, "test"), (0.0, 1.0))
     assert set(angles.angles) == {"knee_flexion_l", "knee_adduction_l", "knee_rotation_l"}
     assert {n.code for n in angles.notices} == {"joint_missing"}
 
 
 def test_gimbal_is_flagged_beyond_eighty_degrees_only() -> None:
-    assert not joint_angles(pose(thigh_r=about(0, np.radians(79.0))), (0.0, 1.0)).notices
-    flagged = joint_angles(pose(thigh_r=about(0, np.radians(84.0))), (0.0, 1.0)).notices
+    assert not measure_angles(pose(thigh_r=about(0, np.radians(79.0))), (0.0, 1.0)).notices
+    flagged = measure_angles(pose(thigh_r=about(0, np.radians(84.0))), (0.0, 1.0)).notices
     assert {n.code for n in flagged} == {"gimbal"}
     assert flagged[0].t_s == pytest.approx(1.0)
 
@@ -139,7 +140,7 @@ def test_a_standing_without_signal_is_told() -> None:
     orientations = pose()
     valid = dict(orientations.valid)
     valid["foot_l"] = np.arange(200) >= 100
-    angles = joint_angles(Orientations(orientations.t_s, 100.0, orientations.q, valid, "test"), (0.0, 1.0))
+    angles = measure_angles(Orientations(orientations.t_s, 100.0, orientations.q, valid, "test"), (0.0, 1.0))
     assert "no_standing_zero" in {n.code for n in angles.notices}
     assert "ankle_dorsiflexion_l" not in angles.angles
 
@@ -148,7 +149,7 @@ def test_angles_of_the_true_poses_are_the_true_angles() -> None:
     """The simulator takes its angles from rotation matrices on its own."""
     _, truth = simulated("comfortable")
     valid = {s: np.ones(len(truth.t_s), bool) for s in truth.q}
-    angles = joint_angles(Orientations(truth.t_s, truth.rate_hz, truth.q, valid, "truth"), truth.zero)
+    angles = measure_angles(Orientations(truth.t_s, truth.rate_hz, truth.q, valid, "truth"), truth.zero)
     for name, x in truth.angles.items():
         raw = angles.angles[name] + angles.zero_offset[name]
         np.testing.assert_allclose(np.angle(np.exp(1j * (raw - x))), 0.0, atol=1e-9)
@@ -161,7 +162,7 @@ def test_sign_table_covers_every_joint_in_three_planes() -> None:
 
 def test_goniometer_angles_stay_beside_the_angles() -> None:
     bent = pose(shank_l=about(2, -0.3))
-    angles = joint_angles(bent, (0.0, 1.0), standing_deg={"knee_flexion_l": 8.0})
+    angles = measure_angles(bent, (0.0, 1.0), standing_deg={"knee_flexion_l": 8.0})
     assert angles.standing_deg == {"knee_flexion_l": 8.0}
     assert angles.angles["knee_flexion_l"][0] == pytest.approx(0.0)
     assert angles.zero == "standing"

@@ -1,0 +1,136 @@
+"""Joint angles, compiled: the one rule for a file and a live take.
+
+A live push holds ten samples: there numpy costs ten times the arithmetic, and some of its functions round
+differently in a vector than alone. A file is one call over the whole take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import asin, atan2, pi
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from core.angles.result import SIGNS, joints
+from core.frames import SIDES, SUFFIX, Bools, Floats, Segment
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _measure(q, known, pelvis, ends, sign, zero, out):  # type: ignore[no-untyped-def]
+    """Write angles (T, 2 + 3 J) of segments q (T, n, 4); `ends` (J, 2), `sign` (J, 3), pelvis −1 = none."""
+    half = np.sqrt(0.5)
+    first = 2 if pelvis >= 0 else 0
+    for k in range(q.shape[0]):
+        if pelvis >= 0:
+            out[k, 0] = out[k, 1] = np.nan
+            if known[k, pelvis]:
+                # in axes of neutral standing: its inverse is a quarter turn about −x
+                w, x, y, z = q[k, pelvis]
+                a, b, c, d = half * (w + x), half * (x - w), half * (y + z), half * (z - y)
+                out[k, 0] = -atan2(2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d))
+                out[k, 1] = -asin(min(1.0, max(-1.0, -2.0 * (c * d - a * b))))
+        for j in range(ends.shape[0]):
+            here, there = ends[j, 0], ends[j, 1]
+            for c in range(3):
+                out[k, first + 3 * j + c] = np.nan
+            if not (known[k, here] and known[k, there]):
+                continue
+            a0, a1, a2, a3 = q[k, here]
+            b0, b1, b2, b3 = q[k, there]
+            w = a0 * b0 + a1 * b1 + a2 * b2 + a3 * b3
+            x = a0 * b1 - a1 * b0 - a2 * b3 + a3 * b2
+            y = a0 * b2 + a1 * b3 - a2 * b0 - a3 * b1
+            z = a0 * b3 - a1 * b2 + a2 * b1 - a3 * b0
+            flexion = atan2(-2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z))
+            frontal = asin(min(1.0, max(-1.0, 2.0 * (y * z + w * x))))
+            turned = atan2(-2.0 * (x * z - w * y), 1.0 - 2.0 * (x * x + y * y))
+            out[k, first + 3 * j] = sign[j, 0] * flexion
+            out[k, first + 3 * j + 1] = sign[j, 1] * frontal
+            out[k, first + 3 * j + 2] = sign[j, 2] * turned
+        for i in range(out.shape[1]):
+            out[k, i] = (out[k, i] - zero[i] + pi) % (2.0 * pi) - pi
+
+
+@dataclass(frozen=True, eq=False)
+class AngleKernel:
+    """Which angles some segments have, and their measurement.
+
+    Parameters
+    ----------
+    names : as in `JointAngles`. ends : (J, 2) columns of the proximal and distal segment. sign : (J, 3).
+        pelvis : its column, −1 = none. estimated : of each name, whether a segment of it has no sensor.
+    """
+
+    names: tuple[str, ...]
+    ends: NDArray[np.int64]
+    sign: Floats
+    pelvis: int
+    estimated: tuple[bool, ...]
+
+    @classmethod
+    def between(cls, worn: Sequence[Segment], figure: Sequence[Segment] = ()) -> AngleKernel:
+        """All angles between these segments; the columns to measure are those of `worn`, then of `figure`.
+
+        Parameters
+        ----------
+        worn : segments with a sensor; angles between two of them are theirs. figure : segments of a figure
+            that knows more; the angles that lack a sensor are taken from it, both ends.
+        """
+        sources = [({s: i for i, s in enumerate(worn)}, False),
+                   ({s: len(worn) + i for i, s in enumerate(figure)}, True)]  # fmt: skip
+        names: list[str] = []
+        estimated: list[bool] = []
+        ends, sign, pelvis = [], [], -1
+        for column, guessed in sources:
+            if "pelvis" in column:
+                pelvis, names, estimated = (
+                    column["pelvis"],
+                    ["pelvis_tilt", "pelvis_obliquity"],
+                    [guessed] * 2,
+                )
+                break
+        for side in SIDES:
+            for joint, proximal, distal in joints(side):
+                for column, guessed in sources:
+                    if proximal in column and distal in column:
+                        ends.append((column[proximal], column[distal]))
+                        sign.append([right if side == "right" else left for _, right, left in SIGNS[joint]])
+                        names += [f"{base}_{SUFFIX[side]}" for base, _, _ in SIGNS[joint]]
+                        estimated += [guessed] * 3
+                        break
+        return cls(
+            tuple(names),
+            np.array(ends, np.int64).reshape(-1, 2),
+            np.array(sign, np.float64).reshape(-1, 3),
+            pelvis,
+            tuple(estimated),
+        )
+
+    def measure(self, q: Floats, known: Bools, zero: Floats | None = None) -> Floats:
+        """Angles (T, names) in rad, −π to π, of segments q (T, n, 4) to W; NaN where not `known` (T, n).
+
+        Parameters
+        ----------
+        zero : (names,) rad, what is taken off.
+        """
+        out = np.empty((len(q), len(self.names)))
+        _measure(
+            np.ascontiguousarray(q), np.ascontiguousarray(known), self.pelvis, self.ends, self.sign,
+            np.zeros(len(self.names)) if zero is None else zero, out,
+        )  # fmt: skip
+        return out
+
+
+def mean_angles(angles: Floats) -> Floats:
+    """Circular mean (k,) in rad of angles (T, k) over their finite samples; 0 where there is none."""
+    finite = np.where(np.isfinite(angles), angles, 0.0)
+    n = np.isfinite(angles)
+    return np.asarray(np.arctan2((np.sin(finite) * n).sum(axis=0), (np.cos(finite) * n).sum(axis=0)))
+
+
+def subtract_zero(angles: Floats, zero: Floats) -> Floats:
+    """Angles (T, k) in rad over those of a zero (k,), −π to π."""
+    return np.asarray((angles - zero + np.pi) % (2.0 * np.pi) - np.pi)

@@ -1,0 +1,111 @@
+"""Orientations of a take → its joint angles, zeroed on standing (docs/science/joint-angles.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import radians
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from core.angles.cardan import headings
+from core.angles.kernel import AngleKernel, mean_angles, subtract_zero
+from core.angles.result import SIGNS, JointAngles, joints
+from core.errors import Notice
+from core.frames import SIDES, SUFFIX, Bools, Floats
+from core.rest import Window, samples
+
+if TYPE_CHECKING:
+    from core.body.poses import Poses
+    from core.fusion.orientations import Orientations
+
+GIMBAL_LIMIT: Final = radians(80.0)
+"""|b| beyond which a and c cannot be told apart (docs/science/joint-angles.md, "Joints")."""
+
+
+def measure_angles(
+    orientations: Orientations,
+    zero: Window,
+    poses: Poses | None = None,
+    standing_deg: Mapping[str, float] | None = None,
+) -> JointAngles:
+    """Angles of every joint whose two segments are there, zeroed on the mean over the standing window.
+
+    Parameters
+    ----------
+    orientations : segment orientations in W.
+    zero : window whose mean angles are subtracted, seconds.
+    poses : of an estimator that knows more segments than have a sensor. A joint that has not both its sensors
+        takes its angles from there; `diagnostics["estimated"]` names them.
+    standing_deg : goniometer angles of that standing; kept beside the angles, not added.
+
+    Returns
+    -------
+    JointAngles; a joint with a missing segment has no entry and a notice `joint_missing`, a joint whose |b|
+    passes 80° a notice `gimbal`, one without signal while standing is left out with `no_standing_zero`.
+    """
+    kernel = AngleKernel.between(tuple(orientations.q), () if poses is None else tuple(poses.q))
+    raw = kernel.measure(*_stack(orientations, poses))
+    notices = _find_missing_joints(orientations, kernel) + _find_gimbal(raw, kernel, orientations.t_s)
+    standing = raw[samples(zero, orientations.rate_hz)]
+    known = [bool(x.any()) for x in np.isfinite(standing).T]
+    for name in sorted(name for name, x in zip(kernel.names, known, strict=True) if not x):
+        message = (
+            f"{name}: no angle, its sensors have no signal while standing ({zero[0]:.1f} to {zero[1]:.1f} "
+            "s), so "
+            "there is no zero."
+        )
+        notices.append(Notice("no_standing_zero", message, t_s=zero[0]))
+    offset = mean_angles(standing)
+    values = subtract_zero(raw, offset)
+    kept = [i for i, x in enumerate(known) if x]
+    return JointAngles(
+        orientations.t_s,
+        {kernel.names[i]: np.ascontiguousarray(values[:, i]) for i in kept},
+        {kernel.names[i]: float(offset[i]) for i in kept},
+        notices=tuple(notices),
+        diagnostics={"estimated": tuple(kernel.names[i] for i in kept if kernel.estimated[i])},
+        standing_deg=dict(standing_deg or {}),
+        headings=headings(orientations),
+    )
+
+
+def _stack(orientations: Orientations, poses: Poses | None) -> tuple[Floats, Bools]:
+    """Orientations (n, S, 4) of the sensors' segments, then the figure's, and where known (n, S)."""
+    q, known = list(orientations.q.values()), [orientations.valid[s] for s in orientations.q]
+    if poses is not None:
+        q, known = q + list(poses.q.values()), known + [poses.valid] * len(poses.q)
+    return np.stack(q, axis=1), np.stack(known, axis=1)
+
+
+def _find_missing_joints(orientations: Orientations, kernel: AngleKernel) -> list[Notice]:
+    """A notice for every joint that has no angles."""
+    notices: list[Notice] = []
+    for side in SIDES:
+        for joint, proximal, distal in joints(side):
+            if f"{SIGNS[joint][0][0]}_{SUFFIX[side]}" in kernel.names:
+                continue
+            missing = [s for s in (proximal, distal) if s not in orientations.q]
+            message = (
+                f"{side} {joint}: no angles, no sensor on {' and '.join(missing)}; wear or map one there."
+            )
+            notices.append(Notice("joint_missing", message, sensor=missing[0]))
+    return notices
+
+
+def _find_gimbal(raw: Floats, kernel: AngleKernel, t_s: Floats) -> list[Notice]:
+    """A notice for every joint whose frontal angle in raw (n, names) passes the limit."""
+    notices: list[Notice] = []
+    for side in SIDES:
+        for joint, _, _ in joints(side):
+            frontal = f"{SIGNS[joint][1][0]}_{SUFFIX[side]}"
+            if frontal not in kernel.names:
+                continue
+            beyond = np.abs(raw[:, kernel.names.index(frontal)]) > GIMBAL_LIMIT
+            if beyond.any():
+                message = (
+                    f"{side} {joint}: the frontal angle passes 80° in {beyond.mean():.1%} of the take; there "
+                    "flexion and rotation cannot be told apart; check which segment each sensor is on."
+                )
+                notices.append(Notice("gimbal", message, t_s=float(t_s[int(np.argmax(beyond))])))
+    return notices

@@ -1,0 +1,62 @@
+"""Joint angles of a take: names, signs and what is kept beside the values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from core.errors import Notice
+from core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
+
+SIGNS: Final[dict[str, tuple[tuple[str, float, float], ...]]] = {
+    "hip": (("hip_flexion", 1, 1), ("hip_adduction", 1, -1), ("hip_rotation", 1, -1)),
+    "knee": (("knee_flexion", -1, -1), ("knee_adduction", 1, -1), ("knee_rotation", 1, -1)),
+    "ankle": (("ankle_dorsiflexion", 1, 1), ("ankle_inversion", 1, -1), ("ankle_rotation", 1, -1)),
+}
+"""Joint → (name, sign right, sign left) of a, b, c.
+
+Positive: flexion, dorsiflexion; adduction, varus, inversion; internal rotation.
+"""
+
+
+def joints(side: Side) -> tuple[tuple[str, Segment, Segment], ...]:
+    """Joints of one leg as (joint, proximal segment, distal segment)."""
+    return (
+        ("hip", "pelvis", THIGH[side]),
+        ("knee", THIGH[side], SHANK[side]),
+        ("ankle", SHANK[side], FOOT[side]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class JointAngles:
+    """Joint angles in rad on the uniform axis; NaN where a segment was lost.
+
+    Parameters
+    ----------
+    angles : name → (n,), names as in the exports without the unit: "pelvis_tilt", "pelvis_obliquity",
+        "hip_flexion_l", "hip_adduction_l", "hip_rotation_l", "knee_flexion_l", "knee_adduction_l",
+        "knee_rotation_l", "ankle_dorsiflexion_l", "ankle_inversion_l", "ankle_rotation_l", right alike.
+        Pelvis tilt: anterior positive. Pelvis obliquity: right side up is positive.
+        Zero is the mean over the calibration's standing window.
+    zero_offset : name → rad that was subtracted (the raw standing angle).
+    zero : "standing" (the only zero so far).
+    standing_deg : angles of that standing by goniometer, where somebody entered them; see
+        `core.standing_angles`, and `core.parameters.anatomical_zero`, which adds them back.
+    headings : "pelvis", "foot_l", "foot_r" → (n,) rad about the vertical, left positive, unwrapped, from a
+        zero of its own; only of segments with a sensor. Its course over a stride means something.
+    withheld : angles that were taken out again → reason (`core.withheld`).
+    bounds : name → rad, the straight knee of a leg model: at it the angle is a limit and no measurement.
+    """
+
+    t_s: Floats
+    angles: Mapping[str, Floats]
+    zero_offset: Mapping[str, float]
+    zero: str = "standing"
+    notices: tuple[Notice, ...] = ()
+    diagnostics: Mapping[str, object] = field(default_factory=dict)
+    standing_deg: Mapping[str, float] = field(default_factory=dict)
+    headings: Mapping[str, Floats] = field(default_factory=dict)
+    withheld: Mapping[str, str] = field(default_factory=dict)
+    bounds: Mapping[str, float] = field(default_factory=dict)
