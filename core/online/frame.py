@@ -1,7 +1,7 @@
 """What the live chain says: a frame after every push, a stride at every initial contact.
 
-Everything here is plain values on the axis of core/timeline/live.py: seconds from the first sample of the take,
-SI units and radians, names as in core.angles and core.parameters. Nothing imports numba.
+Everything here is plain values on the axis of core/timeline/live.py: seconds from the first sample of the
+take, SI units and radians, names as in core.angles and core.parameters. Nothing imports numba.
 """
 
 from __future__ import annotations
