@@ -17,7 +17,7 @@ from server.jobs.queue import JobQueue
 from server.live import protocol
 from server.live.intake import Ended
 from server.live.journal import Journal
-from server.live.pool import Pool
+from server.live.pool import EstimatorPool
 from server.live.protocol import Close
 from server.live.rows import Rows
 from server.live.take import LiveTake
@@ -51,7 +51,7 @@ class Ending:
         blobs: BlobStore,
         queue: JobQueue,
         journal: Journal,
-        pool: Pool,
+        pool: EstimatorPool,
         over: Callable[[live.Take], None],
     ) -> None:
         self._keep = (db, blobs, settings, queue)

@@ -7,15 +7,10 @@ from __future__ import annotations
 
 import gc
 import logging
-import os
-import resource
 import select
-import signal
-import sys
 import time
 from collections.abc import Callable
 from math import ceil
-from multiprocessing.connection import Connection
 
 from core.errors import SagittalError
 from server.live import follower
@@ -33,8 +28,8 @@ from server.live.messages import (
     decode_order,
     encode,
 )
-from server.processes.lifeline import die_with, when_parent_ends
-from server.settings import load_settings
+from server.processes.channel import Channel
+from server.processes.child import enter_child
 
 log = logging.getLogger("server.live.estimator")
 
@@ -108,28 +103,21 @@ class Estimator:
 
 def main() -> None:
     """Follow takes until the web process closes the socket."""
-    line = Connection(int(sys.argv[1]))
-    die_with(int(sys.argv[2]))
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the web process ends us
-    when_parent_ends(lambda: os._exit(1))
-    logging.basicConfig(level=logging.INFO)
-    settings = load_settings()
-    if settings.child_memory_bytes:
-        resource.setrlimit(resource.RLIMIT_AS, (settings.child_memory_bytes,) * 2)
+    line, _ = enter_child()
     warm()
     gc.collect()
     gc.freeze()  # what libraries hold is never garbage: looking through it again costs every take 50 ms
-    line.send_bytes(encode(Ready()))
+    line.send(encode(Ready()))
     try:
         follow(line)
     except (EOFError, BrokenPipeError, ConnectionError):
         return
 
 
-def follow(line: Connection) -> None:
+def follow(line: Channel) -> None:
     """Read orders and logs in turn; raises EOFError when the other side has gone."""
-    estimator = Estimator(lambda report: line.send_bytes(encode(report)))
-    # Connection.poll would make a selector at every call, and this is asked hundreds of times a second
+    estimator = Estimator(lambda report: line.send(encode(report)))
+    # one poll object for all: this is asked hundreds of times a second
     orders = select.poll()
     orders.register(line.fileno(), select.POLLIN)
     while True:
@@ -139,7 +127,7 @@ def follow(line: Connection) -> None:
             wait = None if due is None else max(0.0, due - time.monotonic())
         # all orders that are there first: what has come meanwhile is read in one go
         while orders.poll(None if wait is None else ceil(1000.0 * wait)):
-            estimator.obey(decode_order(line.recv_bytes()))
+            estimator.obey(decode_order(line.receive()))
             wait = 0.0
         estimator.work()
 

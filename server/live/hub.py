@@ -23,7 +23,7 @@ from server.live.ending import Ending
 from server.live.intake import Ended
 from server.live.journal import Journal
 from server.live.messages import Begin, Broken, Item, Picture, Report, Standing, Through
-from server.live.pool import Pool
+from server.live.pool import EstimatorPool
 from server.live.protocol import Close
 from server.live.recorder import open_recorder
 from server.live.room import Room
@@ -54,7 +54,7 @@ class Hub:
         self._settings, self._db, self._blobs, self._queue = settings, db, blobs, queue
         self.journal = Journal(db)
         self.rows = Rows(db, blobs)
-        self.pool = Pool(settings, self._report, self._begin, self._restarted)
+        self.pool = EstimatorPool(settings, self._report, self._begin, self._restarted)
         self._ending = Ending(settings, db, blobs, queue, self.journal, self.pool, self._tell_over)
         self._committer = Committer()
         self._takes: dict[str, LiveTake] = {}

@@ -6,13 +6,6 @@ Used on the event loop. What goes to a process never piles up: of a log's length
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import logging
-import os
-import socket
-import struct
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from typing import Final
@@ -29,28 +22,17 @@ from server.live.messages import (
     decode_report,
     encode,
 )
-from server.processes.environment import make_environment
+from server.processes.kept_process import KeptProcess
 from server.settings import Settings
 
-log = logging.getLogger(__name__)
-
-RESTART_S: Final = (0.0, 0.5, 2.0, 5.0, 15.0)
-"""Pause before a process is replaced, by how many died one after another."""
-CALM_S: Final = 60.0
-"""A process that has lived so long is not blamed for the deaths before it."""
-HUNG_S: Final = 20.0
-"""A process that has been told of new samples and says nothing for so long is replaced."""
-GRACE_S: Final = 1.0
-"""Time a process has to end by itself."""
 BACKLOG_BYTES: Final = 1 << 16
 """While so much waits for a process to read it, it is told no further lengths."""
 LOOK_S: Final = 1.0
+MODULE: Final = "server.live.estimator"
+"""What an estimator process runs."""
 
-_LENGTH: Final = struct.Struct("!i")
-"""Framing of multiprocessing.connection: messages below 2 GiB have their length before them."""
 
-
-class Pool:
+class EstimatorPool:
     """Estimator processes and which take each of them follows.
 
     Parameters
@@ -70,26 +52,26 @@ class Pool:
         self._report = report
         self._begin = begin
         self._restarted = restarted
-        self._workers: list[_Worker] = []
+        self._workers: list[_Estimator] = []
         self._watch: asyncio.Task[None] | None = None
 
     @property
     def pids(self) -> list[int]:
         """Process ids of those that live."""
-        return [w.process.pid for w in self._workers if w.process is not None and w.process.poll() is None]
+        return [pid for w in self._workers if (pid := w.process.pid) is not None]
 
     @property
     def is_ready(self) -> bool:
         """Whether every process has said that it is warm."""
-        return bool(self._workers) and all(w.ready for w in self._workers)
+        return bool(self._workers) and all(w.process.is_warm for w in self._workers)
 
     def start(self) -> None:
         """Start the processes, once; they get warm by themselves."""
         if self._workers or not self._settings.live_workers:
             return
-        self._workers = [_Worker(self) for _ in range(self._settings.live_workers)]
+        self._workers = [_Estimator(self) for _ in range(self._settings.live_workers)]
         for worker in self._workers:
-            worker.start()
+            worker.process.start()
         self._watch = asyncio.create_task(self._look())
 
     async def stop(self) -> None:
@@ -97,7 +79,7 @@ class Pool:
         if self._watch is not None:
             self._watch.cancel()
             await asyncio.gather(self._watch, return_exceptions=True)
-        await asyncio.gather(*(w.stop() for w in self._workers))
+        await asyncio.gather(*(w.process.stop() for w in self._workers))
         self._workers = []
 
     def follow(self, take: str) -> None:
@@ -133,7 +115,7 @@ class Pool:
         """Whether a process follows this take."""
         return self._of(take) is not None
 
-    def _of(self, take: str) -> _Worker | None:
+    def _of(self, take: str) -> _Estimator | None:
         return next((w for w in self._workers if take in w.takes), None)
 
     async def _look(self) -> None:
@@ -164,37 +146,23 @@ class Pool:
         return self._settings
 
 
-class _Worker:
-    """One process, one after another."""
+class _Estimator:
+    """One process and the takes it follows; the process may be another each time."""
 
-    def __init__(self, pool: Pool) -> None:
+    def __init__(self, pool: EstimatorPool) -> None:
         self._pool = pool
         self.takes: set[str] = set()
-        self.process: subprocess.Popen[bytes] | None = None
-        self.ready = False
-        self._writer: asyncio.StreamWriter | None = None
+        self.process = KeptProcess(MODULE, pool.settings, self._greet, self._hear, self._mourn)
         self._sizes: dict[str, int] = {}
         self._at = 0.0
         self._flushing = False
-        self._heard = time.monotonic()
-        self._owes: float | None = None
-        self._deaths = 0
-        self._task: asyncio.Task[None] | None = None
-
-    def start(self) -> None:
-        self._task = asyncio.create_task(self._live())
-
-    async def stop(self) -> None:
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
 
     def send(self, order: Order) -> None:
         # what is sent before a process is there is in the Begin it will get
-        if self._writer is None:
+        if not self.process.is_connected:
             return
         self._flush()
-        self._write(order)
+        self.process.send(encode(order))
 
     def grow(self, take: str, size: int) -> None:
         self._sizes[take] = size
@@ -208,77 +176,27 @@ class _Worker:
         """End a process that hangs; flush what waited for it to read."""
         if self._sizes:
             self._flush()
-        hung = self._owes is not None and time.monotonic() - max(self._owes, self._heard) > HUNG_S
-        if self.ready and hung and self.process is not None:
-            log.warning("live estimator %d says nothing any more; it is replaced", self.process.pid)
-            self.process.kill()
+        self.process.end_if_hung()
 
     def _flush(self) -> None:
         self._flushing = False
-        if self._writer is None or not self._sizes:
+        if not self.process.is_connected or not self._sizes:
             return
-        if self._writer.transport.get_write_buffer_size() > BACKLOG_BYTES:
+        if self.process.backlog_bytes > BACKLOG_BYTES:
             return
         sizes, self._sizes = self._sizes, {}
-        self._owes = self._owes or time.monotonic()
-        self._write(Grow(sizes, self._at))
+        self.process.expect_answer()
+        self.process.send(encode(Grow(sizes, self._at)))
 
-    def _write(self, order: Order) -> None:
-        if self._writer is not None and not self._writer.is_closing():
-            data = encode(order)
-            self._writer.write(_LENGTH.pack(len(data)) + data)
-
-    async def _live(self) -> None:
-        """Keep one process alive until cancelled."""
-        while True:
-            began = time.monotonic()
-            try:
-                await self._one()
-            finally:
-                await self._end()
-            log.warning("a live estimator has ended; starting another")
-            self._pool.died(self.takes)
-            self._deaths = 1 if time.monotonic() - began > CALM_S else self._deaths + 1
-            await asyncio.sleep(RESTART_S[min(self._deaths, len(RESTART_S)) - 1])
-
-    async def _one(self) -> None:
-        """Start a process, give it its takes, listen until it is gone."""
-        ours, theirs = socket.socketpair()
-        with theirs:
-            self.process = subprocess.Popen(  # noqa: S603 - our own module; a fork takes milliseconds
-                [sys.executable, "-m", "server.live.estimator", str(theirs.fileno()), str(os.getpid())],
-                env=make_environment(self._pool.settings),
-                stdin=subprocess.PIPE,
-                pass_fds=[theirs.fileno()],
-            )
-        reader, self._writer = await asyncio.open_connection(sock=ours)
-        self._heard, self._owes = time.monotonic(), None
+    def _greet(self) -> list[bytes]:
         self._sizes.clear()
-        for order in self._pool.again(self.takes):
-            self._write(order)
-        with contextlib.suppress(asyncio.IncompleteReadError, ConnectionError):
-            while True:
-                (length,) = _LENGTH.unpack(await reader.readexactly(_LENGTH.size))
-                report = decode_report(await reader.readexactly(length))
-                self._heard, self._owes = time.monotonic(), None
-                if isinstance(report, Ready):
-                    self.ready = True
-                self._pool.said(report)
+        return [encode(order) for order in self._pool.again(self.takes)]
 
-    async def _end(self) -> None:
-        """Let go of the process, whatever state it is in."""
-        self.ready = False
-        writer, self._writer = self._writer, None
-        if writer is not None:
-            writer.close()
-        process, self.process = self.process, None
-        if process is None:
-            return
-        if process.stdin is not None:
-            process.stdin.close()
-        limit = time.monotonic() + GRACE_S
-        while process.poll() is None and time.monotonic() < limit:
-            with contextlib.suppress(asyncio.CancelledError):
-                await asyncio.sleep(0.01)
-        process.kill()
-        process.wait()
+    def _hear(self, message: bytes) -> None:
+        report = decode_report(message)
+        if isinstance(report, Ready):
+            self.process.is_warm = True
+        self._pool.said(report)
+
+    def _mourn(self) -> None:
+        self._pool.died(self.takes)

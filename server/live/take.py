@@ -18,7 +18,7 @@ from server.live import protocol
 from server.live.intake import Answer, Ended
 from server.live.journal import Journal
 from server.live.messages import STALE_S, Begin, Charge, Command, Item, Picture
-from server.live.pool import Pool
+from server.live.pool import EstimatorPool
 from server.live.protocol import ProtocolError
 from server.live.recorder import Recorder
 from server.live.room import Room
@@ -49,7 +49,7 @@ class TakeHouse(Protocol):
     """What a take needs of the registry it belongs to (server/live/hub.py)."""
 
     @property
-    def pool(self) -> Pool:
+    def pool(self) -> EstimatorPool:
         """The estimator processes."""
 
     @property

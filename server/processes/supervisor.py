@@ -8,11 +8,10 @@ from __future__ import annotations
 import contextlib
 import logging
 import subprocess
-import sys
 import threading
 import time
 
-from server.processes.environment import make_environment
+from server.processes.child import end_process, start_module
 from server.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -50,7 +49,7 @@ class Workers:
         for process in self._processes:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(max(limit - time.monotonic(), 0.1))
-            _close(process)
+            end_process(process)
 
     @property
     def pids(self) -> list[int]:
@@ -63,9 +62,7 @@ class Workers:
         return len(self.pids) == self._settings.workers
 
     def _spawn(self) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "server.worker.worker"]
-        env = make_environment(self._settings)
-        return subprocess.Popen(command, env=env, stdin=subprocess.PIPE)  # noqa: S603 - our own module
+        return start_module("server.worker.worker", self._settings)
 
     def _watch(self) -> None:
         began = time.monotonic()
@@ -76,14 +73,7 @@ class Workers:
                 log.warning(
                     "worker %d ended with status %d; starting another", process.pid, process.returncode
                 )
-                _close(process)
+                end_process(process)
                 self._stop.wait(max(0.0, began + RESTART_S - time.monotonic()))
                 began = time.monotonic()
                 self._processes[i] = self._spawn()
-
-
-def _close(process: subprocess.Popen[bytes]) -> None:
-    process.kill()
-    process.wait()
-    if process.stdin:
-        process.stdin.close()

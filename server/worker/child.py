@@ -6,16 +6,11 @@ Started by server/worker/runner.py as `python -m server.worker.child <socket> <p
 from __future__ import annotations
 
 import logging
-import os
-import resource
-import signal
-import sys
-from multiprocessing.connection import Connection
 
 from core.errors import SagittalError
 from core.formats.source import SourceFile
-from server.processes.lifeline import die_with, when_parent_ends
-from server.settings import load_settings
+from server.processes.channel import Channel
+from server.processes.child import enter_child
 from server.storage.blobs import BlobStore
 from server.worker.messages import Failure, Input, Order, Ready, Result, Stage, decode_order, encode
 from server.worker.task import TASKS, load
@@ -25,33 +20,25 @@ log = logging.getLogger("server.worker.child")
 
 def main() -> None:
     """Answer orders until the worker closes the socket."""
-    line = Connection(int(sys.argv[1]))
-    die_with(int(sys.argv[2]))
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the worker ends us
-    when_parent_ends(lambda: os._exit(1))
-    logging.basicConfig(level=logging.INFO)
-    settings = load_settings()
-    if settings.child_memory_bytes:
-        limit = settings.child_memory_bytes
-        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    line, settings = enter_child()
     load(settings.task_modules)
     for task in TASKS.values():
         task.warm()
     store = BlobStore(settings.blobs)
-    line.send_bytes(encode(Ready()))
+    line.send(encode(Ready()))
     while True:
         try:
-            order = decode_order(line.recv_bytes())
+            order = decode_order(line.receive())
         except EOFError:
             return
-        line.send_bytes(encode(compute(order, store, line)))
+        line.send(encode(compute(order, store, line)))
 
 
-def compute(order: Order, store: BlobStore, line: Connection) -> Result | Failure:
+def compute(order: Order, store: BlobStore, line: Channel) -> Result | Failure:
     """Carry out one order; whatever goes wrong is an answer, never the end of the process."""
     try:
         files = [source(store, order.space, file) for file in order.files]
-        progress = lambda stage, share: line.send_bytes(encode(Stage(stage, float(share))))  # noqa: E731
+        progress = lambda stage, share: line.send(encode(Stage(stage, float(share))))  # noqa: E731
         return Result(TASKS[order.kind].run(files, order.params, progress))
     except SagittalError as error:
         return Failure(error.code, error.message)

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import socket
-import subprocess
-import sys
-from multiprocessing.connection import Connection
-
-from server.processes.environment import make_environment
+from server.processes.channel import Channel
+from server.processes.child import end_process, start_child
 from server.settings import Settings
 from server.worker.messages import Order, Reply, decode_reply, encode
 
@@ -21,15 +16,8 @@ class Child:
     """A running child process; it is warm once it has said Ready."""
 
     def __init__(self, settings: Settings) -> None:
-        ours, theirs = socket.socketpair()
-        with theirs:
-            self._process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
-                [sys.executable, "-m", "server.worker.child", str(theirs.fileno()), str(os.getpid())],
-                env=make_environment(settings),
-                stdin=subprocess.PIPE,
-                pass_fds=[theirs.fileno()],
-            )
-        self._line = Connection(ours.detach())
+        self._process, line = start_child("server.worker.child", settings)
+        self._line = Channel(line)
 
     @property
     def pid(self) -> int:
@@ -39,23 +27,20 @@ class Child:
     def send(self, order: Order) -> None:
         """Give it work; raises ChildDiedError."""
         try:
-            self._line.send_bytes(encode(order))
+            self._line.send(encode(order))
         except OSError:
             raise self._death() from None
 
     def receive(self, timeout_s: float) -> Reply | None:
         """Return its next word, None if it says nothing in time; raises ChildDiedError."""
         try:
-            return decode_reply(self._line.recv_bytes()) if self._line.poll(timeout_s) else None
+            return decode_reply(self._line.receive()) if self._line.has_message(timeout_s) else None
         except (EOFError, OSError):
             raise self._death() from None
 
     def kill(self) -> None:
         """End it now and wait until it is gone."""
-        self._process.kill()
-        self._process.wait()
-        if self._process.stdin:
-            self._process.stdin.close()
+        end_process(self._process)
         self._line.close()
 
     def _death(self) -> ChildDiedError:

@@ -411,10 +411,11 @@ async def test_an_estimator_ends_with_a_killed_server(tmp_path: Path) -> None:
     script = f"""
 import asyncio, sys, time
 from pathlib import Path
-from server.live.pool import Pool
+from server.live.pool import EstimatorPool
 from server.settings import Settings
 async def main():
-    pool = Pool(Settings(data_dir=Path({str(tmp_path)!r})), lambda r: None, lambda t: None, lambda t: None)
+    settings = Settings(data_dir=Path({str(tmp_path)!r}))
+    pool = EstimatorPool(settings, lambda r: None, lambda t: None, lambda t: None)
     pool.start()
     while not pool.is_ready:
         await asyncio.sleep(0.05)

@@ -6,7 +6,6 @@ import asyncio
 import subprocess
 import threading
 from collections.abc import AsyncIterator
-from multiprocessing.connection import Connection
 from pathlib import Path
 from socket import socketpair
 from typing import Any
@@ -17,6 +16,7 @@ from websockets.asyncio.client import ClientConnection
 from server.live import ending, estimator
 from server.live.hub import Hub
 from server.live.messages import Begin, Broken, End, Grow, decode_report, encode
+from server.processes.channel import Channel
 from server.services.live_recordings import log_path
 from tests.data import ROOT
 from tests.live_clinic import heard, visit
@@ -134,10 +134,10 @@ async def test_a_take_that_ended_before_the_estimator_was_ready_leaves_no_error(
 
 def test_a_log_that_is_gone_is_told_in_a_sentence(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     ours, theirs = socketpair()
-    web, line = Connection(ours.detach()), Connection(theirs.detach())
+    web, line = Channel(ours), Channel(theirs)
     missing = Begin("a" * 32, str(tmp_path / "gone.log"), 100, None, "walk", None, None, [])
     for order in (missing, End(missing.take), Begin("b" * 32, *vars_of(missing)), Grow({"b" * 32: 200}, 0.0)):
-        web.send_bytes(encode(order))
+        web.send(encode(order))
     said: list[Broken] = []
     with pytest.raises((EOFError, ConnectionError)):
         follow_until_closed(line, web, said)
@@ -150,11 +150,11 @@ def vars_of(begin: Begin) -> tuple[Any, ...]:
     return tuple(getattr(begin, name) for name in begin.__struct_fields__[1:])
 
 
-def follow_until_closed(line: Connection, web: Connection, said: list[Broken]) -> None:
+def follow_until_closed(line: Channel, web: Channel, said: list[Broken]) -> None:
     """Follow until the first report, then close the web's side."""
 
     def read() -> None:
-        report = decode_report(web.recv_bytes())
+        report = decode_report(web.receive())
         assert isinstance(report, Broken)
         said.append(report)
         web.close()

@@ -1,0 +1,69 @@
+"""A process of ours with a line to it: how it is started, and how it begins.
+
+    process, line = start_child("server.worker.child", settings)       # in the parent
+    line, settings = enter_child()                                      # in the child, first of all
+
+The child ends with its parent (lifeline.py), leaves Ctrl-C to it and keeps to the memory that the settings
+allow.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import resource
+import signal
+import socket
+import subprocess
+import sys
+
+from server.processes.channel import Channel
+from server.processes.environment import make_environment
+from server.processes.lifeline import die_with, when_parent_ends
+from server.settings import Settings, load_settings
+
+
+def start_child(module: str, settings: Settings) -> tuple[subprocess.Popen[bytes], socket.socket]:
+    """Run a module that begins with `enter_child`; return the process and our end of the line to it."""
+    ours, theirs = socket.socketpair()
+    with theirs:
+        process = subprocess.Popen(  # noqa: S603 - our own interpreter and module; a fork takes milliseconds
+            [sys.executable, "-m", module, str(theirs.fileno()), str(os.getpid())],
+            env=make_environment(settings),
+            stdin=subprocess.PIPE,
+            pass_fds=[theirs.fileno()],
+        )
+    return process, ours
+
+
+def start_module(module: str, settings: Settings) -> subprocess.Popen[bytes]:
+    """Run a module of ours without a line; it can tell our end by its standard input (lifeline.py)."""
+    return subprocess.Popen(  # noqa: S603 - our own interpreter and module
+        [sys.executable, "-m", module], env=make_environment(settings), stdin=subprocess.PIPE
+    )
+
+
+def end_process(process: subprocess.Popen[bytes]) -> None:
+    """Kill a process, wait until it is gone and let go of its standard input."""
+    process.kill()
+    process.wait()
+    if process.stdin:
+        process.stdin.close()
+
+
+def enter_child() -> tuple[Channel, Settings]:
+    """Take up the line that `start_child` gave this process, bind its life to the parent's, limit its memory.
+
+    Returns
+    -------
+    The channel to the parent, and the settings, read from the environment.
+    """
+    end = socket.socket(fileno=int(sys.argv[1]))
+    die_with(int(sys.argv[2]))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent ends us
+    when_parent_ends(lambda: os._exit(1))
+    logging.basicConfig(level=logging.INFO)
+    settings = load_settings()
+    if settings.child_memory_bytes:
+        resource.setrlimit(resource.RLIMIT_AS, (settings.child_memory_bytes,) * 2)
+    return Channel(end), settings
