@@ -1,0 +1,66 @@
+"""All routes of the API, and those beside it that serve no page."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, FastAPI
+
+from server.api import (
+    analyses,
+    audit_log,
+    comparisons,
+    files,
+    health,
+    jobs,
+    live,
+    live_feed,
+    patients,
+    prescriptions,
+    programmes,
+    reports,
+    reviews,
+    sessions,
+    sign_in,
+    trends,
+    users,
+)
+from server.api.documents import openapi
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.live import tablet
+
+BESIDE: tuple[APIRouter, ...] = (sign_in.address_router, health.router, live_feed.router)
+"""Routes outside /api/v1."""
+
+
+def build_api(app: FastAPI) -> APIRouter:
+    """Return everything under /api/v1, with the document that describes it."""
+    api = APIRouter(prefix="/api/v1")
+    for part in (
+        sign_in,
+        patients,
+        prescriptions,
+        programmes,
+        sessions,
+        files,
+        analyses,
+        reports,
+        reviews,
+        trends,
+        comparisons,
+        live,
+        jobs,
+        users,
+        audit_log,
+        tablet,
+    ):
+        api.include_router(part.router)
+
+    @api.get("/openapi.json", include_in_schema=False)
+    def document(who: Annotated[Identity, require(Action.READ_API)]) -> dict[str, Any]:
+        """Describe this API as OpenAPI."""
+        return openapi(app)
+
+    return api

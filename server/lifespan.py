@@ -1,0 +1,69 @@
+"""What the web process opens when it starts and closes when it ends."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import datetime as dt
+import logging
+from collections.abc import AsyncIterator
+
+from fastapi import FastAPI
+
+from server.auth.sessions import Logins
+from server.auth.throttle import Throttle
+from server.jobs.feed import JobFeed
+from server.jobs.table import TableQueue
+from server.live.hub import Hub
+from server.services import custody, erasure
+from server.services.custody import refuse_strangers
+from server.settings import Settings
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from server.storage.high_water import MarkKeeper
+from server.storage.migrate import upgrade
+from server.storage.readiness import Readiness
+from server.trail import Trail
+
+log = logging.getLogger(__name__)
+
+
+def _look_after(db: Database, blobs: BlobStore, settings: Settings) -> None:
+    """Finish erasures that were interrupted, and say aloud when this database is not to be trusted."""
+    erasure.finish(db, blobs, settings)
+    with db.read() as c:
+        doubted = custody.doubt(c, settings)
+    if doubted is not None:
+        log.warning("%s No stored file is taken away until `sagittal accept`.", doubted)
+
+
+@contextlib.asynccontextmanager
+async def run_installation(app: FastAPI) -> AsyncIterator[None]:
+    """Open database, files, queue and live takes of `app.state.settings` while the block runs."""
+    settings: Settings = app.state.settings
+    refuse_strangers(settings)
+    upgrade(settings.database)
+    db = Database(settings.database)
+    app.state.db = db
+    app.state.blobs = BlobStore(settings.blobs)
+    await asyncio.to_thread(_look_after, db, app.state.blobs, settings)
+    app.state.trail = Trail(db)
+    app.state.readiness = Readiness(settings, db, app.state.blobs)
+    app.state.queue = TableQueue(db, settings.lease_s)
+    app.state.feed = JobFeed(db)
+    app.state.throttle = Throttle()
+    app.state.logins = Logins(
+        db, dt.timedelta(minutes=settings.idle_minutes), dt.timedelta(hours=settings.absolute_hours)
+    )
+    keeper = MarkKeeper(db, settings.mark)
+    keeper.start()
+    app.state.hub = Hub(settings, db, app.state.blobs, app.state.queue)
+    await app.state.hub.start()
+    try:
+        async with app.state.trail.running():
+            yield
+    finally:
+        await app.state.hub.stop()
+        app.state.feed.close()
+        await asyncio.to_thread(keeper.stop)
+        db.close()

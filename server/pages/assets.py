@@ -1,0 +1,33 @@
+"""What pages load beside their HTML: style sheets, scripts and icons."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from starlette.responses import Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+import web
+from server.auth.roles import Action
+
+STATIC = Path(web.__file__).parent / "static"
+
+
+class Assets(StaticFiles):
+    """Style sheets, scripts and icons; browsers keep them and ask whether they are still the same."""
+
+    action = Action.LOAD_ASSET
+
+    def file_response(
+        self,
+        full_path: str | os.PathLike[str],
+        stat_result: os.stat_result,
+        scope: Scope,
+        status_code: int = 200,
+    ) -> Response:
+        """Let caches keep the file but ask each time: names carry no version."""
+        response = super().file_response(full_path, stat_result, scope, status_code)
+        response.headers["Cache-Control"] = "no-cache"
+        return response
