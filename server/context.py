@@ -12,6 +12,7 @@ from server.auth.throttle import Throttle
 from server.jobs.feed import JobFeed
 from server.jobs.queue import JobQueue
 from server.live.hub import Hub
+from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -28,6 +29,10 @@ def _db(connection: HTTPConnection) -> Database:
 
 def _blobs(connection: HTTPConnection) -> BlobStore:
     return cast("BlobStore", connection.app.state.blobs)
+
+
+def _reviewed(connection: HTTPConnection) -> ReviewedAnalyses:
+    return cast("ReviewedAnalyses", connection.app.state.reviewed)
 
 
 def _logins(connection: HTTPConnection) -> Logins:
@@ -57,6 +62,7 @@ def _hub(connection: HTTPConnection) -> Hub:
 Config = Annotated[Settings, Depends(_settings)]
 Db = Annotated[Database, Depends(_db)]
 Blobs = Annotated[BlobStore, Depends(_blobs)]
+Reviewed = Annotated[ReviewedAnalyses, Depends(_reviewed)]
 Queue = Annotated[JobQueue, Depends(_queue)]
 Feed = Annotated[JobFeed, Depends(_feed)]
 LiveHub = Annotated[Hub, Depends(_hub)]

@@ -17,6 +17,7 @@ from server.jobs.table import TableQueue
 from server.live.hub import Hub
 from server.services import custody, erasure
 from server.services.custody import refuse_strangers
+from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -46,6 +47,7 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     db = Database(settings.database)
     app.state.db = db
     app.state.blobs = BlobStore(settings.blobs)
+    app.state.reviewed = ReviewedAnalyses(app.state.blobs)
     await asyncio.to_thread(_look_after, db, app.state.blobs, settings)
     app.state.trail = Trail(db)
     app.state.readiness = Readiness(settings, db, app.state.blobs)
@@ -57,7 +59,7 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     )
     keeper = MarkKeeper(db, settings.mark)
     keeper.start()
-    app.state.hub = Hub(settings, db, app.state.blobs, app.state.queue)
+    app.state.hub = Hub(settings, db, app.state.reviewed, app.state.queue)
     await app.state.hub.start()
     try:
         async with app.state.trail.running():

@@ -14,7 +14,7 @@ from server.api.downloads import BINARY, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Db, Id, OpenTrail
+from server.context import Db, Id, OpenTrail, Reviewed
 from server.report.columns import plain
 from server.report.comparison import comparison_csv
 from server.services import comparisons
@@ -33,7 +33,9 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("/{other_id}", response_model=None, responses=_JSON)
-def compare(session_id: Id, other_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
+def compare(
+    session_id: Id, other_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+) -> Response:
     """Every figure before and after, its change against MDC and MCID, and what may be in the way."""
     found = _opened(db, trail, who, session_id, other_id)
     content = {
@@ -41,19 +43,19 @@ def compare(session_id: Id, other_id: Id, db: Db, blobs: Blobs, trail: OpenTrail
         "after": _session(found.after),
         "comparable": found.comparable,
         "cautions": found.cautions,
-        "changes": [{**vars(r.change), "words": r.words.verdict} for r in comparisons.rows(blobs, found)],
+        "changes": [{**vars(r.change), "words": r.words.verdict} for r in comparisons.rows(reviewed, found)],
     }
     return JSONResponse(plain(content))
 
 
 @router.get("/{other_id}/changes.csv", response_class=Response, responses=_CSV)
 def compare_as_table(
-    session_id: Id, other_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
+    session_id: Id, other_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
 ) -> Response:
     """The same as a table."""
     found = _opened(db, trail, who, session_id, other_id)
     name = f"changes-{found.before.session.id[:8]}-{found.after.session.id[:8]}.csv"
-    return attachment(comparison_csv(comparisons.rows(blobs, found)), name)
+    return attachment(comparison_csv(comparisons.rows(reviewed, found)), name)
 
 
 def _opened(db: Database, trail: Trail, who: Identity, session_id: str, other_id: str) -> Pair:

@@ -11,7 +11,7 @@ from server.api.documents import refusals
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Config, Db, Id, LiveHub, OpenTrail
+from server.context import Config, Db, Id, LiveHub, OpenTrail, Reviewed
 from server.services import erasure, patients, programmes, sessions
 
 router = APIRouter(prefix="/patients", tags=["patients"])
@@ -70,7 +70,7 @@ def delete_patient(
     patient_id: Id,
     confirm: Annotated[str, Query(max_length=64, description="the patient's code, as confirmation")],
     db: Db,
-    blobs: Blobs,
+    reviewed: Reviewed,
     settings: Config,
     hub: LiveHub,
     who: Annotated[Identity, require(Action.DELETE_PATIENT)],
@@ -82,7 +82,7 @@ def delete_patient(
         else:
             visits = []
     hub.drop_from_thread(visits)
-    erasure.erase_patient(db, blobs, settings, who, patient_id, confirm=confirm)
+    erasure.erase_patient(db, reviewed, settings, who, patient_id, confirm=confirm)
 
 
 @router.get("/{patient_id}/sessions", response_model=list[schemas.Session])

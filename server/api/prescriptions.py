@@ -16,7 +16,7 @@ from server.api.schemas import Side
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Db, Id, OpenTrail
+from server.context import Db, Id, OpenTrail, Reviewed
 from server.http.problems import Problem
 from server.report.feedback_words import prescription_words
 from server.report.tables import feedback_csv
@@ -45,11 +45,11 @@ def list_prescriptions(patient_id: Id, db: Db, trail: OpenTrail, who: Reader) ->
 
 @router.post("/patients/{patient_id}/prescriptions", status_code=201, response_model=schemas.Prescription)
 def write_prescription(
-    patient_id: Id, body: schemas.PrescriptionNew, db: Db, blobs: Blobs, who: Therapist
+    patient_id: Id, body: schemas.PrescriptionNew, db: Db, reviewed: Reviewed, who: Therapist
 ) -> dict[str, Any]:
     """Prescribe feedback; the prescription in force ends."""
     with db.write() as c:
-        return _shown(prescriptions.write(c, blobs, who, patient_id, body.model_dump(exclude_unset=True)))
+        return _shown(prescriptions.write(c, reviewed, who, patient_id, body.model_dump(exclude_unset=True)))
 
 
 @router.post(
@@ -65,7 +65,7 @@ def end_prescription(prescription_id: Id, db: Db, who: Therapist) -> dict[str, A
 def read_targets(
     patient_id: Id,
     db: Db,
-    blobs: Blobs,
+    reviewed: Reviewed,
     trail: OpenTrail,
     who: Reader,
     parameter: Annotated[str, Query(max_length=64, description="one that a prescription can train")],
@@ -78,7 +78,7 @@ def read_targets(
             422, "bad_value", f"'{parameter}' cannot be trained; expected one of {', '.join(trainable)}."
         )
     with db.read() as c:
-        walk = targets.last_walk(c, blobs, patients.get(c, patient_id))
+        walk = targets.last_walk(c, reviewed, patients.get(c, patient_id))
     trail.watched(who, "targets.opened", "patient", patient_id)
     offers = [(source, targets.offer(walk, source, parameter, side)) for source in SOURCES]
     return [
@@ -94,19 +94,23 @@ def read_targets(
 
 
 @router.get("/sessions/{session_id}/feedback", response_model=schemas.Feedback)
-def read_feedback(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> dict[str, object]:
+def read_feedback(
+    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+) -> dict[str, object]:
     """Strides with and without feedback, probe blocks, level, side effects, and the retention test."""
     gathered = _opened(db, trail, who, session_id)
-    view = feedback.view(blobs, gathered)
+    view = feedback.view(reviewed, gathered)
     if view is not None:
         return view.to_json()
     return {"reason": feedback.REASONS[gathered.reason or ""]}
 
 
 @router.get("/sessions/{session_id}/feedback.csv", response_class=Response, responses=_CSV)
-def read_feedback_table(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
+def read_feedback_table(
+    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+) -> Response:
     """Every stride of the live take with its cue; without feedback only the header."""
-    view = feedback.view(blobs, _opened(db, trail, who, session_id))
+    view = feedback.view(reviewed, _opened(db, trail, who, session_id))
     return attachment(feedback_csv(view), f"feedback-{session_id[:8]}.csv")
 
 

@@ -12,20 +12,20 @@ from server.api.downloads import BINARY, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Db, Id, OpenTrail
+from server.context import Db, Id, OpenTrail, Reviewed
 from server.report.model import ReportModel
 from server.report.tables import curves_csv, parameters_csv
 from server.services import (
     analyses,
     comparisons,
     controls,
+    edit_log,
     histories,
     patients,
     reports,
-    reviews,
     sessions,
 )
-from server.storage.blobs import BlobStore
+from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
 from server.trail import Trail
 
@@ -37,15 +37,17 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("/report", response_model=schemas.Report)
-def read_report(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> dict[str, object]:
+def read_report(
+    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+) -> dict[str, object]:
     """Quality, parameters with norms, cycle curves with norm bands, strides, provenance."""
-    return _opened(db, blobs, trail, who, session_id).to_json()
+    return _opened(db, reviewed, trail, who, session_id).to_json()
 
 
 @router.get("/parameters.csv", response_class=Response, responses=_CSV)
-def read_parameters(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
+def read_parameters(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
     """The table of parameters, left and right, with the norm."""
-    report = _opened(db, blobs, trail, who, session_id)
+    report = _opened(db, reviewed, trail, who, session_id)
     return attachment(parameters_csv(report), f"parameters-{session_id[:8]}.csv")
 
 
@@ -54,7 +56,7 @@ def read_parameter(
     session_id: Id,
     name: Annotated[str, Path(pattern=r"^[a-z0-9_]{1,64}$")],
     db: Db,
-    blobs: Blobs,
+    reviewed: Reviewed,
     trail: OpenTrail,
     who: Reader,
 ) -> dict[str, object]:
@@ -63,25 +65,29 @@ def read_parameter(
         session = sessions.get(c, session_id)
         patient = patients.get(c, session.patient_id)
         found = analyses.shown(c, session_id)
-        edits = reviews.edits_of(c, found.id)
+        edits = edit_log.edits_of(c, found.id)
         known = controls.visits(c, patient, session)
     trail.opened(who, "parameter.opened", "session", session_id, {"parameter": name})
-    return reports.behind_number(blobs, found, edits, patient, session, name, known).to_json()
+    return reports.behind_number(reviewed, found, edits, patient, session, name, known).to_json()
 
 
 @router.get("/curves.csv", response_class=Response, responses=_CSV)
-def read_curves(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
+def read_curves(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
     """The cycle curves: mean and spread by side and per cent of the cycle, with the norm."""
-    return attachment(curves_csv(_opened(db, blobs, trail, who, session_id)), f"curves-{session_id[:8]}.csv")
+    return attachment(
+        curves_csv(_opened(db, reviewed, trail, who, session_id)), f"curves-{session_id[:8]}.csv"
+    )
 
 
-def _opened(db: Database, blobs: BlobStore, trail: Trail, who: Identity, session_id: str) -> ReportModel:
+def _opened(
+    db: Database, reviewed: ReviewedAnalyses, trail: Trail, who: Identity, session_id: str
+) -> ReportModel:
     with db.read() as c:
         session = sessions.get(c, session_id)
         patient = patients.get(c, session.patient_id)
         found = analyses.shown(c, session_id)
-        edits = reviews.edits_of(c, found.id)
+        edits = edit_log.edits_of(c, found.id)
         before = comparisons.before(c, session, histories.analysed(c, patient.id))
         known = controls.visits(c, patient, session)
     trail.opened(who, "report.opened", "session", session_id, {"analysis_id": found.id})
-    return reports.read(blobs, found, edits, patient, session, before, known)[1]
+    return reports.read(reviewed, found, edits, patient, session, before, known)[1]

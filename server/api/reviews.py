@@ -16,11 +16,11 @@ from server.api.downloads import BINARY, attachment
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Db, Id, OpenTrail
+from server.context import Db, Id, OpenTrail, Reviewed
 from server.report.exports import events_csv, parameter_row, strides_csv
 from server.report.wording import excluded_words
-from server.services import analyses, reviews, signals
-from server.storage.blobs import BlobStore
+from server.services import analyses, edit_log, reviews, signals
+from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
 from server.trail import Trail
 
@@ -39,42 +39,42 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("/edits", response_model=None, responses=_REVIEW)
-def read_review(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
+def read_review(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
     """Events, strides and parameters as they count now, and the edits that made them so."""
-    return _review(blobs, *_opened(db, trail, who, session_id, "review"))
+    return _review(reviewed, *_opened(db, trail, who, session_id, "review"))
 
 
 @router.post("/edits", status_code=201, response_model=None, responses=_MADE)
 def make_edit(
-    session_id: Id, body: schemas.EditNew, db: Db, blobs: Blobs, who: Reviewer, seen: Seen = None
+    session_id: Id, body: schemas.EditNew, db: Db, reviewed: Reviewed, who: Reviewer, seen: Seen = None
 ) -> Response:
     """Move, add or delete an event, leave a stride out or count it; everything is measured again."""
     edit = edit_of(body.model_dump(exclude_none=True))
-    found, edits = reviews.make(db, blobs, who, session_id, edit, seen=seen)
-    return _review(blobs, found, edits, 201)
+    found, edits = reviews.make(db, reviewed, who, session_id, edit, seen=seen)
+    return _review(reviewed, found, edits, 201)
 
 
 @router.delete("/edits", response_model=None, responses=_REVIEW | refusals(409))
-def undo_edit(session_id: Id, db: Db, blobs: Blobs, who: Reviewer, seen: Seen = None) -> Response:
+def undo_edit(session_id: Id, db: Db, reviewed: Reviewed, who: Reviewer, seen: Seen = None) -> Response:
     """Undo the last edit that is not undone yet."""
-    return _review(blobs, *reviews.undo(db, who, session_id, seen=seen))
+    return _review(reviewed, *reviews.undo(db, who, session_id, seen=seen))
 
 
 @router.get("/events.csv", response_class=Response, responses=_CSV)
-def read_events(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
+def read_events(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
     """Contacts and foot-offs as they count, edited ones with the source "manual"."""
     found, edits = _opened(db, trail, who, session_id, "events")
-    events = reviews.bundle(blobs, found, edits).events
+    events = reviewed.read_bundle(found, edits).events
     return attachment(events_csv(events), f"events-{session_id[:8]}.csv")
 
 
 @router.get("/strides.csv", response_class=Response, responses=_CSV)
-def read_strides(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
+def read_strides(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
     """Every stride with its parameters, as it counts."""
     found, edits = _opened(db, trail, who, session_id, "strides")
-    result = reviews.measured(blobs, found, edits)
+    result = reviewed.measure(found, edits)
     content = (
-        analyses.file_bytes(blobs, found, "strides.csv")
+        analyses.file_bytes(reviewed.blobs, found, "strides.csv")
         if result is None
         else strides_csv(result.strides, result.columns)
     )
@@ -83,11 +83,11 @@ def read_strides(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Re
 
 @router.get("/signals", response_model=list[schemas.Lane])
 def list_signals(
-    session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
+    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
 ) -> tuple[signals.Lane, ...]:
     """Which signals there are: derived ones of feet and joints, raw ones of every sensor."""
     found = _watched(db, trail, who, session_id)
-    return signals.lanes(blobs, found)
+    return signals.lanes(reviewed, found)
 
 
 @router.get("/signals/{name}", response_model=None, responses={200: {"model": schemas.Piece}})
@@ -95,7 +95,7 @@ def read_signal(
     session_id: Id,
     name: str,
     db: Db,
-    blobs: Blobs,
+    reviewed: Reviewed,
     trail: OpenTrail,
     who: Reader,
     start_s: Annotated[float, Query(ge=0, le=1e6, allow_inf_nan=False)] = 0.0,
@@ -104,7 +104,7 @@ def read_signal(
 ) -> Response:
     """A window of a signal in at most so many parts, the least and the greatest value of each."""
     found = _watched(db, trail, who, session_id)
-    return JSONResponse(asdict(signals.piece(blobs, found, name, start_s, end_s, points)))
+    return JSONResponse(asdict(signals.piece(reviewed, found, name, start_s, end_s, points)))
 
 
 def _watched(db: Database, trail: Trail, who: Identity, session_id: str) -> analyses.Analysis:
@@ -117,20 +117,22 @@ def _watched(db: Database, trail: Trail, who: Identity, session_id: str) -> anal
 
 def _opened(
     db: Database, trail: Trail, who: Identity, session_id: str, what: str
-) -> tuple[analyses.Analysis, reviews.Edits]:
+) -> tuple[analyses.Analysis, edit_log.Edits]:
     with db.read() as c:
         found = analyses.shown(c, session_id)
-        edits = reviews.edits_of(c, found.id)
+        edits = edit_log.edits_of(c, found.id)
     trail.opened(who, f"{what}.opened", "session", session_id, {"analysis_id": found.id})
     return found, edits
 
 
-def _review(blobs: BlobStore, found: analyses.Analysis, edits: reviews.Edits, status: int = 200) -> Response:
+def _review(
+    reviewed: ReviewedAnalyses, found: analyses.Analysis, edits: edit_log.Edits, status: int = 200
+) -> Response:
     """Written without a model: two thousand events would be checked longer than they are measured."""
-    bundle = reviews.bundle(blobs, found, edits)
+    bundle = reviewed.read_bundle(found, edits)
     content = {
         "analysis_id": found.id,
-        "editable": reviews.take(blobs, found).tracks is not None,
+        "editable": reviewed.open(found).tracks is not None,
         "version": edits.version,
         "edits": [{"seq": m.seq, "by": m.by, "at": m.at.isoformat(), **m.edit.to_json()} for m in edits.made],
         "events": [

@@ -11,7 +11,7 @@ from server.api.documents import refusals
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Config, Db, Id, LiveHub, OpenTrail, Queue
+from server.context import Config, Db, Id, LiveHub, OpenTrail, Queue, Reviewed
 from server.jobs.queue import JobView
 from server.services import erasure, recordings, sessions
 from server.services.errors import NotFound
@@ -46,14 +46,14 @@ def change_session(
 def delete_session(
     session_id: Id,
     db: Db,
-    blobs: Blobs,
+    reviewed: Reviewed,
     settings: Config,
     hub: LiveHub,
     who: Annotated[Identity, require(Action.WRITE_SESSION)],
 ) -> None:
     """Remove a session with its recordings and results, for ever; only the audit rows stay."""
     hub.drop_from_thread([session_id])
-    erasure.erase_session(db, blobs, settings, who, session_id)
+    erasure.erase_session(db, reviewed, settings, who, session_id)
 
 
 @router.get("/recording", response_model=schemas.Recording)

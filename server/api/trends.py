@@ -17,14 +17,14 @@ from server.api.schemas import HexId
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Db, Id, OpenTrail
+from server.context import Db, Id, OpenTrail, Reviewed
 from server.report.change_words import change_words
 from server.report.columns import plain
 from server.report.tables import trends_csv
 from server.report.trends import Line, Trend, names_in, trends
 from server.services import histories, patients
 from server.services.histories import History
-from server.storage.blobs import BlobStore
+from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
 from server.trail import Trail
 
@@ -57,7 +57,7 @@ _CSV: dict[int | str, dict[str, Any]] = {
 def read_trends(
     patient_id: Id,
     db: Db,
-    blobs: Blobs,
+    reviewed: Reviewed,
     trail: OpenTrail,
     who: Reader,
     show: Names,
@@ -65,7 +65,7 @@ def read_trends(
     like: Like = None,
 ) -> Response:
     """Values by visit with the norm, and the change since the first assessment against MDC and MCID."""
-    known, found = _opened(db, blobs, trail, who, patient_id, show, protocol, like)
+    known, found = _opened(db, reviewed, trail, who, patient_id, show, protocol, like)
     visits = [
         {
             "session_id": v.session_id,
@@ -92,7 +92,7 @@ def read_trends(
 def read_trends_table(
     patient_id: Id,
     db: Db,
-    blobs: Blobs,
+    reviewed: Reviewed,
     trail: OpenTrail,
     who: Reader,
     show: Names,
@@ -100,13 +100,13 @@ def read_trends_table(
     like: Like = None,
 ) -> Response:
     """The same as a table: one row per figure, side and visit."""
-    known, found = _opened(db, blobs, trail, who, patient_id, show, protocol, like)
+    known, found = _opened(db, reviewed, trail, who, patient_id, show, protocol, like)
     return attachment(trends_csv(known.visits, found), f"trends-{patient_id[:8]}.csv")
 
 
 def _opened(
     db: Database,
-    blobs: BlobStore,
+    reviewed: ReviewedAnalyses,
     trail: Trail,
     who: Identity,
     patient_id: str,
@@ -118,7 +118,7 @@ def _opened(
         patient = patients.get(c, patient_id)
         done, plans = histories.read(c, patient)
     trail.opened(who, "trends.opened", "patient", patient_id)
-    known = histories.history(blobs, patient, done, plans, protocol, like)
+    known = histories.history(reviewed, patient, done, plans, protocol, like)
     there = names_in(known.visits)
     wanted = [n for n in names if n in there] if names else there
     return known, trends(known.visits, wanted, known.norms, known.usual, known.patient.affected_side)

@@ -17,6 +17,7 @@ from core.condition import USUAL, WalkingCondition
 from core.frames import Segment, Side
 from server.jobs.table import TableQueue
 from server.services import analyses, patients, prescriptions, recordings, sessions
+from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings, load_settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -135,7 +136,7 @@ def fill(settings: Settings) -> None:
                 fields = {k: v for k, v in vars(person).items() if k != "code"}
                 known[person.code] = patients.create(c, None, code=person.code, **fields).id
             person, content = PRESCRIBED
-            prescriptions.write(c, blobs, None, known[person.code], content)
+            prescriptions.write(c, ReviewedAnalyses(blobs), None, known[person.code], content)
         for visit in VISITS:
             made = record(visit)
             files = mt_files(made.recording, visit.script, made.first_counter)

@@ -50,13 +50,14 @@ class Ending:
         db: Database,
         blobs: BlobStore,
         queue: JobQueue,
+        rows: Rows,
         journal: Journal,
         pool: EstimatorPool,
         over: Callable[[live.Take], None],
     ) -> None:
         self._keep = (db, blobs, settings, queue)
         self._settings = settings
-        self._rows = Rows(db, blobs)
+        self._rows = rows
         self._journal, self._pool, self._over = journal, pool, over
         self._asked: dict[str, audit.Actor | None] = {}
         self._draining: dict[str, LiveTake] = {}

@@ -31,8 +31,8 @@ from server.live.rows import Rows
 from server.live.take import Line, LiveTake, standing_of
 from server.services import live, live_recordings
 from server.services.errors import Conflict
+from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
-from server.storage.blobs import BlobStore
 from server.storage.db import Database
 
 log = logging.getLogger(__name__)
@@ -50,12 +50,14 @@ ABANDONED_S: Final = live.TOKEN_LIFE.total_seconds()
 class Hub:
     """The registry."""
 
-    def __init__(self, settings: Settings, db: Database, blobs: BlobStore, queue: JobQueue) -> None:
-        self._settings, self._db, self._blobs, self._queue = settings, db, blobs, queue
+    def __init__(self, settings: Settings, db: Database, reviewed: ReviewedAnalyses, queue: JobQueue) -> None:
+        self._settings, self._db, self._blobs, self._queue = settings, db, reviewed.blobs, queue
         self.journal = Journal(db)
-        self.rows = Rows(db, blobs)
+        self.rows = Rows(db, reviewed)
         self.pool = EstimatorPool(settings, self._report, self._begin, self._restarted)
-        self._ending = Ending(settings, db, blobs, queue, self.journal, self.pool, self._tell_over)
+        self._ending = Ending(
+            settings, db, reviewed.blobs, queue, self.rows, self.journal, self.pool, self._tell_over
+        )
         self._committer = Committer()
         self._takes: dict[str, LiveTake] = {}
         self._rooms: dict[str, Room] = {}

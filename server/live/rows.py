@@ -9,15 +9,15 @@ from server.live.intake import Ended
 from server.services import live
 from server.services.errors import NotFound
 from server.services.live_training import Training, training_of
-from server.storage.blobs import BlobStore
+from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
 
 
 class Rows:
     """The rows of live takes."""
 
-    def __init__(self, db: Database, blobs: BlobStore) -> None:
-        self._db, self._blobs = db, blobs
+    def __init__(self, db: Database, reviewed: ReviewedAnalyses) -> None:
+        self._db, self._reviewed = db, reviewed
 
     def admit(self, take_id: str, token: str) -> live.Take | None:
         """The take a token opens, over or not."""
@@ -41,7 +41,7 @@ class Rows:
 
     def prepare(self, row: live.Take) -> tuple[Training, list[live.LiveEvent]]:
         """What a take is coached with, and what happened in it so far."""
-        training = training_of(self._db, self._blobs, row)
+        training = training_of(self._db, self._reviewed, row)
         with self._db.read() as c:
             return training, live.events(c, row.id)
 

@@ -13,7 +13,7 @@ from starlette.responses import Response
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import HEX_ID, Blobs, Db, Id
+from server.context import HEX_ID, Db, Id, Reviewed
 from server.pages.charts import COLUMNS, PAGE_HEIGHTS, caption_chart
 from server.pages.session import SECONDARY
 from server.pages.shell import record_opening, render_page
@@ -22,7 +22,7 @@ from server.report.curves import cycle_svg
 from server.report.panels import CurvePanel, same_zero
 from server.services import comparisons, patients, reports
 from server.services.comparisons import Pair
-from server.storage.blobs import BlobStore
+from server.services.reviewed import ReviewedAnalyses
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -44,7 +44,7 @@ def choose_visits(db: Db, pid: Id, who: ResultReader, visit: Ticked) -> Response
 def show_comparison(
     request: Request,
     db: Db,
-    blobs: Blobs,
+    reviewed: Reviewed,
     sid: Id,
     other: Id,
     who: ResultReader,
@@ -54,17 +54,19 @@ def show_comparison(
         found = comparisons.pair(c, sid, other)
     record_opening(request, who, "session", found.before.session.id)
     record_opening(request, who, "session", found.after.session.id)
-    view = view_comparison(blobs, found)
+    view = view_comparison(reviewed, found)
     return render_page(
         request, db, who, "compare.html", "patients", patient=found.patient, pair=found, compare=view
     )
 
 
-def view_comparison(blobs: BlobStore, found: Pair) -> dict[str, Any]:
+def view_comparison(reviewed: ReviewedAnalyses, found: Pair) -> dict[str, Any]:
     """The comparison page: charts with the earlier means behind, the table under its headings, sources."""
-    rows = comparisons.rows(blobs, found)
-    _, old = reports.read(blobs, found.before.found, found.before.edits, found.patient, found.before.session)
-    _, new = reports.read(blobs, found.after.found, found.after.edits, found.patient, found.after.session)
+    rows = comparisons.rows(reviewed, found)
+    _, old = reports.read(
+        reviewed, found.before.found, found.before.edits, found.patient, found.before.session
+    )
+    _, new = reports.read(reviewed, found.after.found, found.after.edits, found.patient, found.after.session)
     last_row = len(new.panels) - COLUMNS
     charts, drawn = [], []
     for i, (before, after) in enumerate(zip(old.panels, new.panels, strict=True)):

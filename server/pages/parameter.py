@@ -11,10 +11,10 @@ from starlette.responses import Response
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Db, Id
+from server.context import Db, Id, Reviewed
 from server.pages.session_context import read_context
 from server.pages.shell import record_opening, render_page
-from server.services import analyses, reports, reviews
+from server.services import analyses, edit_log, reports
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -23,7 +23,7 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 def show_parameter(
     request: Request,
     db: Db,
-    blobs: Blobs,
+    reviewed: Reviewed,
     sid: Id,
     name: Annotated[str, Path(pattern=r"^[a-z0-9_]{1,64}$")],
     who: Annotated[Identity, require(Action.READ_RESULT)],
@@ -32,9 +32,9 @@ def show_parameter(
     with db.read() as c:
         context = read_context(c, sid)
         found = analyses.shown(c, sid)
-        edits = reviews.edits_of(c, found.id)
+        edits = edit_log.edits_of(c, found.id)
     number = reports.behind_number(
-        blobs, found, edits, context["patient"], context["session"], name, context["controls"]
+        reviewed, found, edits, context["patient"], context["session"], name, context["controls"]
     )
     record_opening(request, who, "session", sid)
     return render_page(request, db, who, "parameter.html", "patients", number=number, **context)

@@ -14,7 +14,7 @@ from core.parameters.catalogue import CATALOGUE
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Db, Id
+from server.context import Db, Id, Reviewed
 from server.pages.job_views import find_active_jobs, follow_few
 from server.pages.patients import view_patient
 from server.pages.prescription import make_card
@@ -23,8 +23,8 @@ from server.pages.shell import record_opening, render_page
 from server.pages.trends import draw_teaser
 from server.pages.visit_state import judge_visit
 from server.report.exports import parameter_row
-from server.services import analyses, histories, live, patients, prescriptions, reviews, sessions
-from server.storage.blobs import BlobStore
+from server.services import analyses, edit_log, histories, live, patients, prescriptions, sessions
+from server.services.reviewed import ReviewedAnalyses
 from server.storage.tables import now
 from web.words import number
 
@@ -40,18 +40,22 @@ KEY_PARAMETERS: Final = tuple(
 
 @router.get("/patients/{pid}")
 def show_patient(
-    request: Request, db: Db, blobs: Blobs, pid: Id, who: Annotated[Identity, require(Action.READ_PATIENT)]
+    request: Request,
+    db: Db,
+    reviewed: Reviewed,
+    pid: Id,
+    who: Annotated[Identity, require(Action.READ_PATIENT)],
 ) -> Response:
     """One patient: programme, the trend of one figure, results by visit."""
     with db.read() as c:
         patient = patients.get(c, pid)
-        visits = list_visits(c, blobs, pid, results=who.may(Action.READ_RESULT))
+        visits = list_visits(c, reviewed, pid, results=who.may(Action.READ_RESULT))
         done, plans = histories.read(c, patient)
         written = prescriptions.of_patient(c, pid) if who.may(Action.READ_RESULT) else []
     record_opening(request, who, "patient", pid)
     trend = None
     if who.may(Action.READ_RESULT):
-        trend = draw_teaser(histories.history(blobs, patient, done, plans))
+        trend = draw_teaser(histories.history(reviewed, patient, done, plans))
     return render_page(
         request, db, who, "patient.html", "patients",
         patient=view_patient(patient), visits=visits, keys=KEY_PARAMETERS,
@@ -61,17 +65,19 @@ def show_patient(
     )  # fmt: skip
 
 
-def list_visits(c: Connection, blobs: BlobStore, patient_id: str, *, results: bool) -> list[dict[str, Any]]:
+def list_visits(
+    c: Connection, reviewed: ReviewedAnalyses, patient_id: str, *, results: bool
+) -> list[dict[str, Any]]:
     """The visits of a patient, newest first, with the key parameters of each visit's latest analysis."""
     rows = []
     streaming = {take.session_id for take in live.streaming(c)}
     running = find_active_jobs(c, lambda j: j.session_id)
     there = sessions.of_patient(c, patient_id)
     shown = analyses.latest_of(c, [s.id for s in there]) if results else {}
-    edits = reviews.edits_of_all(c, [found.id for found in shown.values()])
+    edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
     for s in there:
         latest = shown.get(s.id)
-        numbers = reviews.numbers(blobs, latest, edits[latest.id]).parameters if latest else ()
+        numbers = reviewed.read_numbers(latest, edits[latest.id]).parameters if latest else ()
         cells, strides = list_key_cells([parameter_row(p) for p in numbers])
         rows.append(
             {
@@ -82,7 +88,7 @@ def list_visits(c: Connection, blobs: BlobStore, patient_id: str, *, results: bo
                 "cells": cells,
                 "strides": strides,
                 "job": running.get(s.id),
-                "status": judge_visit(blobs, s, latest, edits),
+                "status": judge_visit(reviewed, s, latest, edits),
             }
         )
     follow_few([row["job"] for row in rows])

@@ -13,14 +13,14 @@ from starlette.responses import Response
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Db
+from server.context import Db, Reviewed
 from server.pages.job_views import find_active_jobs, follow_few
 from server.pages.shell import record_listing, render_page
 from server.pages.visit_state import judge_visit
 from server.pages.words import describe_person
-from server.services import analyses, live, patients, reviews, sessions
+from server.services import analyses, edit_log, live, patients, sessions
 from server.services.patients import Patient
-from server.storage.blobs import BlobStore
+from server.services.reviewed import ReviewedAnalyses
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -31,14 +31,14 @@ PATIENTS_SHOWN = 200
 def show_patients(
     request: Request,
     db: Db,
-    blobs: Blobs,
+    reviewed: Reviewed,
     who: Annotated[Identity, require(Action.READ_PATIENT)],
     q: Annotated[str, Query(max_length=200)] = "",
 ) -> Response:
     """All patients, the latest visit first."""
     with db.read() as c:
         found = patients.listing(c, search=q, limit=PATIENTS_SHOWN)
-        rows = list_patients(c, blobs, found, results=who.may(Action.READ_RESULT))
+        rows = list_patients(c, reviewed, found, results=who.may(Action.READ_RESULT))
         total = patients.count(c)
     record_listing(request, who, "patient")
     return render_page(request, db, who, "patients.html", "patients", patients=rows, query=q, total=total)
@@ -50,7 +50,7 @@ def view_patient(p: Patient) -> dict[str, Any]:
 
 
 def list_patients(
-    c: Connection, blobs: BlobStore, found: Sequence[Patient], *, results: bool
+    c: Connection, reviewed: ReviewedAnalyses, found: Sequence[Patient], *, results: bool
 ) -> list[dict[str, Any]]:
     """Rows of the patients list, each with the state of its latest visit; with `results`, of its data."""
     rows = []
@@ -58,10 +58,10 @@ def list_patients(
     newest = sessions.newest_of(c, [p.id for p in found])
     running = find_active_jobs(c, lambda j: j.patient_id)
     shown = analyses.latest_of(c, [s.id for s in newest.values()]) if results else {}
-    edits = reviews.edits_of_all(c, [a.id for a in shown.values()])
+    edits = edit_log.edits_of_all(c, [a.id for a in shown.values()])
     for p in found:
         if p.id in newest:
-            last = judge_visit(blobs, newest[p.id], shown.get(newest[p.id].id), edits)
+            last = judge_visit(reviewed, newest[p.id], shown.get(newest[p.id].id), edits)
         else:
             last = {"kind": "none", "text": "No session yet"}
         row = {"visits": p.sessions, "last": p.last_visit, "job": running.get(p.id), "status": last}

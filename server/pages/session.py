@@ -12,7 +12,7 @@ from starlette.responses import Response
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Db, Id
+from server.context import Db, Id, Reviewed
 from server.pages.charts import COLUMNS, KEY_HEIGHT, PAGE_HEIGHTS, PAPER_HEIGHTS, draw_chart
 from server.pages.session_context import read_context
 from server.pages.shell import record_opening, render_page
@@ -21,10 +21,10 @@ from server.report import level
 from server.report.curves import strip_svg
 from server.report.model import ReportModel
 from server.report.table import Row
-from server.services import analyses, comparisons, feedback, histories, reports, reviews
+from server.services import analyses, comparisons, edit_log, feedback, histories, reports
 from server.services.patients import Patient
+from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
-from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from web.words import day, seconds
 
@@ -66,32 +66,44 @@ SHOWN: Final = (
 
 @router.get("/sessions/{sid}")
 def show_overview(
-    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+    request: Request,
+    db: Db,
+    reviewed: Reviewed,
+    sid: Id,
+    who: Annotated[Identity, require(Action.READ_SESSION)],
 ) -> Response:
     """Is the data good, how does this person walk."""
-    return _show_report(request, db, blobs, sid, who, "session.html")
+    return _show_report(request, db, reviewed, sid, who, "session.html")
 
 
 @router.get("/sessions/{sid}/kinematics")
 def show_kinematics(
-    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+    request: Request,
+    db: Db,
+    reviewed: Reviewed,
+    sid: Id,
+    who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """All cycle curves with the replay."""
-    return _show_report(request, db, blobs, sid, who, "kinematics.html")
+    return _show_report(request, db, reviewed, sid, who, "kinematics.html")
 
 
 @router.get("/sessions/{sid}/print")
 def show_print(
-    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+    request: Request,
+    db: Db,
+    reviewed: Reviewed,
+    sid: Id,
+    who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """Two sheets of A4 for the browser's own print."""
-    return _show_report(request, db, blobs, sid, who, "print.html", paper=True)
+    return _show_report(request, db, reviewed, sid, who, "print.html", paper=True)
 
 
 def _show_report(
     request: Request,
     db: Database,
-    blobs: BlobStore,
+    reviewed: ReviewedAnalyses,
     sid: str,
     who: Identity,
     template: str,
@@ -109,16 +121,16 @@ def _show_report(
     if this is None and paper:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
     if this is not None:
-        context["report"] = view_report(blobs, this.found, this.edits, context, paper=paper)
-        context["feedback"] = feedback.view(blobs, trained)
+        context["report"] = view_report(reviewed, this.found, this.edits, context, paper=paper)
+        context["feedback"] = feedback.view(reviewed, trained)
     record_opening(request, who, "session", sid)
     return render_page(request, db, who, template, "patients", **context)
 
 
 def view_report(
-    blobs: BlobStore,
+    reviewed: ReviewedAnalyses,
     found: analyses.Analysis,
-    edits: reviews.Edits,
+    edits: edit_log.Edits,
     context: Mapping[str, Any],
     *,
     paper: bool,
@@ -126,7 +138,7 @@ def view_report(
     """The report of an analysis with its charts drawn, for the page or for paper."""
     patient, session = context["patient"], context["session"]
     bundle, model = reports.read(
-        blobs, found, edits, patient, session, context.get("before"), context["controls"]
+        reviewed, found, edits, patient, session, context.get("before"), context["controls"]
     )
     last_row = len(model.panels) - COLUMNS
     heights = PAPER_HEIGHTS if paper else PAGE_HEIGHTS

@@ -12,14 +12,14 @@ from starlette.responses import Response
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import Blobs, Db, Id, OpenTrail
+from server.context import Db, Id, OpenTrail, Reviewed
 from server.http.templates import TEMPLATES
 from server.pages.charts import KEY_HEIGHT, draw_chart
 from server.pages.session import explain_emptiness, select_groups
 from server.pages.session_context import read_context
 from server.pages.shell import record_opening, render_page
-from server.services import analyses, reports, reviews, signals
-from server.storage.blobs import BlobStore
+from server.services import analyses, edit_log, reports, signals
+from server.services.reviewed import ReviewedAnalyses
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -29,17 +29,21 @@ FRAGMENT = "x-sagittal-fragment"
 
 @router.get("/sessions/{sid}/timeline")
 def show_timeline(
-    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+    request: Request,
+    db: Db,
+    reviewed: Reviewed,
+    sid: Id,
+    who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """Strides, events and signals over time, to look at and to correct."""
     with db.read() as c:
         context = read_context(c, sid)
         latest = analyses.latest(c, sid)
-        edits = reviews.Edits() if latest is None else reviews.edits_of(c, latest.id)
+        edits = edit_log.Edits() if latest is None else edit_log.edits_of(c, latest.id)
     if latest is not None:
-        context["numbers"] = view_numbers(blobs, latest, edits, context)
-        context["lanes"] = [vars(lane) for lane in signals.lanes(blobs, latest)]
-        context["fixed_because"] = reviews.take(blobs, latest).fixed_because
+        context["numbers"] = view_numbers(reviewed, latest, edits, context)
+        context["lanes"] = [vars(lane) for lane in signals.lanes(reviewed, latest)]
+        context["fixed_because"] = reviewed.open(latest).fixed_because
         context["editable"] = context["fixed_because"] is None and who.may(Action.REVIEW)
     record_opening(request, who, "session", sid)
     return render_page(request, db, who, "timeline.html", "patients", **context)
@@ -49,7 +53,7 @@ def show_timeline(
 def show_numbers(
     request: Request,
     db: Db,
-    blobs: Blobs,
+    reviewed: Reviewed,
     trail: OpenTrail,
     sid: Id,
     who: Annotated[Identity, require(Action.READ_RESULT)],
@@ -60,18 +64,18 @@ def show_numbers(
     with db.read() as c:
         context = read_context(c, sid)
         latest = analyses.shown(c, sid)
-        edits = reviews.edits_of(c, latest.id)
+        edits = edit_log.edits_of(c, latest.id)
     trail.watched(who, "numbers.opened", "session", sid)
-    numbers = view_numbers(blobs, latest, edits, context)
+    numbers = view_numbers(reviewed, latest, edits, context)
     return TEMPLATES.TemplateResponse(request, "_numbers.html", {"numbers": numbers})
 
 
 def view_numbers(
-    blobs: BlobStore, found: analyses.Analysis, edits: reviews.Edits, context: Mapping[str, Any]
+    reviewed: ReviewedAnalyses, found: analyses.Analysis, edits: edit_log.Edits, context: Mapping[str, Any]
 ) -> dict[str, Any]:
     """What of the report stands beside the timeline and changes with every edit."""
     _, model = reports.read(
-        blobs, found, edits, context["patient"], context["session"], None, context["controls"]
+        reviewed, found, edits, context["patient"], context["session"], None, context["controls"]
     )
     return {
         "groups": select_groups(model, paper=False),

@@ -13,7 +13,7 @@ from core.frames import Protocol
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.context import HEX_ID, Blobs, Db, Id
+from server.context import HEX_ID, Db, Id, Reviewed
 from server.pages.shell import record_opening, render_page
 from server.report.change_words import change_words, term_of
 from server.report.notes import GROUPS
@@ -38,7 +38,7 @@ TEASERS: Final = ("gait_speed_mps", "step_length_m", "knee_flexion_rom_deg", "st
 def show_trends(
     request: Request,
     db: Db,
-    blobs: Blobs,
+    reviewed: Reviewed,
     pid: Id,
     who: Annotated[Identity, require(Action.READ_RESULT)],
     show: Shown,
@@ -49,7 +49,7 @@ def show_trends(
     with db.read() as c:
         patient = patients.get(c, pid)
         done, plans = histories.read(c, patient)
-    history = histories.history(blobs, patient, done, plans, protocol, like)
+    history = histories.history(reviewed, patient, done, plans, protocol, like)
     record_opening(request, who, "patient", pid)
     view = view_trends(history, show)
     return render_page(request, db, who, "trends.html", "patients", patient=patient, trends=view)

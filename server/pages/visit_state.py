@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Final
 
 from core.errors import FormatError
-from server.services import analyses, reviews, sessions
-from server.storage.blobs import BlobStore, IntegrityError
+from server.services import analyses, edit_log, sessions
+from server.services.reviewed import ReviewedAnalyses
+from server.storage.blobs import IntegrityError
 
 STATES: Final[Mapping[str, tuple[str, str]]] = {
     "empty": ("none", "No recording yet"),
@@ -26,16 +27,16 @@ def describe_state(state: str) -> dict[str, str]:
 
 
 def judge_visit(
-    blobs: BlobStore,
+    reviewed: ReviewedAnalyses,
     s: sessions.Session,
     shown: analyses.Analysis | None,
-    edits: Mapping[str, reviews.Edits],
+    edits: Mapping[str, edit_log.Edits],
 ) -> dict[str, str]:
     """What a list says of a session: of one that is analysed how good its data are, as its own page does."""
     if s.state != "done" or shown is None or "analysis.json" not in shown.files:
         return describe_state(s.state)
     try:
-        kind, text = reviews.verdict(blobs, shown, edits[shown.id])
+        kind, text = reviewed.read_verdict(shown, edits[shown.id])
     except (IntegrityError, FormatError):  # its own page says what is wrong; the others stay in reach
         kind, text = "bad", "Cannot be read"
     return {"kind": kind, "text": text}

@@ -12,12 +12,12 @@ from core.condition import differences, is_comparable
 from core.norms import Norms, norms_for
 from server.report.comparison import ComparedRow, compared_rows
 from server.report.numbers import Numbers
-from server.services import analyses, patients, programmes, reviews, sessions
+from server.services import analyses, edit_log, patients, programmes, sessions
 from server.services.errors import Conflict
 from server.services.histories import Analysed, kind_of
 from server.services.patients import Patient
+from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
-from server.storage.blobs import BlobStore
 
 
 @dataclass(frozen=True)
@@ -105,10 +105,10 @@ def _moment(session: Session) -> tuple[dt.date, dt.datetime]:
     return session.performed_on, session.created_at
 
 
-def rows(blobs: BlobStore, found: Pair) -> tuple[ComparedRow, ...]:
+def rows(reviewed: ReviewedAnalyses, found: Pair) -> tuple[ComparedRow, ...]:
     """The table of a comparison; raises IntegrityError."""
-    old = reviews.numbers(blobs, found.before.found, found.before.edits)
-    new = reviews.numbers(blobs, found.after.found, found.after.edits)
+    old = reviewed.read_numbers(found.before.found, found.before.edits)
+    new = reviewed.read_numbers(found.after.found, found.after.edits)
     known = norms(found.patient, found.after.session, new)
     return compared_rows(old, new, known, found.patient.affected_side, comparable=found.comparable)
 
@@ -124,7 +124,7 @@ def norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
 def _analysed(c: Connection, session_id: str) -> Analysed:
     session = sessions.get(c, session_id)
     found = analyses.shown(c, session_id)
-    return Analysed(session, found, reviews.edits_of(c, found.id))
+    return Analysed(session, found, edit_log.edits_of(c, found.id))
 
 
 def _sensors(a: Analysed) -> frozenset[str]:

@@ -12,10 +12,10 @@ from sqlalchemy import Connection, select
 from core.condition import WalkingCondition
 from core.norms.controls import ControlGroup, ControlSession, control_group, mean_curves
 from core.parameters import cycle_curves
-from server.services import analyses, reviews
+from server.services import analyses, edit_log
 from server.services.patients import Patient
+from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
-from server.storage.blobs import BlobStore
 from server.storage.tables import patient
 from server.storage.tables import session as session_table
 
@@ -33,7 +33,7 @@ class ControlVisit:
     birth_year: int | None
     performed_on: dt.date
     found: analyses.Analysis
-    edits: reviews.Edits
+    edits: edit_log.Edits
 
 
 def visits(c: Connection, this: Patient, session: Session) -> tuple[ControlVisit, ...]:
@@ -51,7 +51,7 @@ def visits(c: Connection, this: Patient, session: Session) -> tuple[ControlVisit
         )
     )
     shown = analyses.latest_of(c, theirs)
-    edits = reviews.edits_of_all(c, [found.id for found in shown.values()])
+    edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
     query = (
         select(session_table, patient.c.code, patient.c.sex, patient.c.birth_year)
         .join(patient, patient.c.id == session_table.c.patient_id)
@@ -66,19 +66,21 @@ def visits(c: Connection, this: Patient, session: Session) -> tuple[ControlVisit
     )
 
 
-def group(blobs: BlobStore, known: Sequence[ControlVisit], speed_mps: float | None) -> ControlGroup | None:
+def group(
+    reviewed: ReviewedAnalyses, known: Sequence[ControlVisit], speed_mps: float | None
+) -> ControlGroup | None:
     """The controls who walk as fast as a person; None without any control or without a speed."""
     if not known or speed_mps is None:
         return None
     near = (round(speed_mps - NEAR_MPS, 2), round(speed_mps + NEAR_MPS, 2))
-    return control_group([_session(blobs, v) for v in known], speed_mps=near)
+    return control_group([_session(reviewed, v) for v in known], speed_mps=near)
 
 
-def _session(blobs: BlobStore, visit: ControlVisit) -> ControlSession:
+def _session(reviewed: ReviewedAnalyses, visit: ControlVisit) -> ControlSession:
     def read() -> ControlSession:
-        bundle = reviews.bundle(blobs, visit.found, visit.edits)
+        bundle = reviewed.read_bundle(visit.found, visit.edits)
         curves = {} if bundle.angles is None else mean_curves(cycle_curves(bundle.angles, bundle.strides))
         age = None if visit.birth_year is None else float(visit.performed_on.year - visit.birth_year)
         return ControlSession(visit.person, age, visit.sex, bundle.parameters, curves)  # type: ignore[arg-type]
 
-    return reviews.control(visit.found, visit.edits, read)
+    return reviewed.keep_control(visit.found, visit.edits, read)

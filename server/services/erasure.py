@@ -19,9 +19,10 @@ from typing import Any
 from sqlalchemy import Connection, delete, select, update
 
 from server import audit
-from server.services import patients, reviews, sessions
+from server.services import patients, sessions
 from server.services.errors import Conflict
 from server.services.references import referenced
+from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
 from server.storage import fs
 from server.storage.blobs import BlobStore
@@ -53,7 +54,7 @@ _ID = re.compile(r"[0-9a-f]{32}")
 
 def erase_patient(
     db: Database,
-    blobs: BlobStore,
+    reviewed: ReviewedAnalyses,
     settings: Settings,
     actor: audit.Actor | None,
     patient_id: str,
@@ -80,12 +81,12 @@ def erase_patient(
         c.execute(delete(patient).where(patient.c.id == patient_id))
         audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": found.sessions})
         _note(settings, spaces=[patient_id], takes=takes)
-    reviews.forget()
-    finish(db, blobs, settings)
+    reviewed.forget()
+    finish(db, reviewed.blobs, settings)
 
 
 def erase_session(
-    db: Database, blobs: BlobStore, settings: Settings, actor: audit.Actor | None, session_id: str
+    db: Database, reviewed: ReviewedAnalyses, settings: Settings, actor: audit.Actor | None, session_id: str
 ) -> None:
     """Erase one session with its recordings and results; raises NotFound."""
     with db.write() as c:
@@ -94,8 +95,8 @@ def erase_session(
         takes = _erase_session_rows(c, session_id)
         audit.record(c, actor, "session.erased", "session", session_id, {"patient_id": found.patient_id})
         _note(settings, files=sorted(own), takes=takes)
-    reviews.forget()
-    finish(db, blobs, settings)
+    reviewed.forget()
+    finish(db, reviewed.blobs, settings)
 
 
 def _erase_session_rows(c: Connection, session_id: str) -> list[str]:

@@ -19,11 +19,11 @@ from server.report import feedback as report
 from server.report.bundle import Bundle
 from server.report.feedback import FeedbackView
 from server.report.feedback_beside import Before, side_effects
-from server.services import prescriptions, reviews
+from server.services import prescriptions
 from server.services.histories import Analysed
 from server.services.patients import Patient
 from server.services.prescriptions import Training
-from server.storage.blobs import BlobStore
+from server.services.reviewed import ReviewedAnalyses
 
 REASONS: Final = {
     "no_feedback": "No live take of this session gave feedback.",
@@ -85,18 +85,18 @@ def gather(c: Connection, patient: Patient, session_id: str, done: Sequence[Anal
     return Gathered(patient, trained[0], trained[1] if len(trained) == 2 else None)
 
 
-def view(blobs: BlobStore, gathered: Gathered) -> FeedbackView | None:
+def view(reviewed: ReviewedAnalyses, gathered: Gathered) -> FeedbackView | None:
     """Put cues and strides together; None where there is nothing, `reason` says why; IntegrityError."""
     this, before = gathered.this, gathered.before
     if this is None:
         return None
     content = this.training.content
-    bundle, strides = _strides(blobs, this)
+    bundle, strides = _strides(reviewed, this)
     curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
     earlier = None
     if before is not None:
         there = before.at.session
-        earlier = Before(there.id, there.performed_on, split(_strides(blobs, before)[1], before.cues))
+        earlier = Before(there.id, there.performed_on, split(_strides(reviewed, before)[1], before.cues))
     return report.feedback_view(
         content,
         split(strides, this.cues),
@@ -106,10 +106,10 @@ def view(blobs: BlobStore, gathered: Gathered) -> FeedbackView | None:
     )
 
 
-def _strides(blobs: BlobStore, trained: Trained) -> tuple[Bundle, tuple[AnalysedStride, ...]]:
+def _strides(reviewed: ReviewedAnalyses, trained: Trained) -> tuple[Bundle, tuple[AnalysedStride, ...]]:
     """The strides of an analysis with its edits, each with the value of what was trained."""
-    bundle = reviews.bundle(blobs, trained.at.found, trained.at.edits)
-    columns = reviews.columns(blobs, trained.at.found, trained.at.edits)
+    bundle = reviewed.read_bundle(trained.at.found, trained.at.edits)
+    columns = reviewed.read_columns(trained.at.found, trained.at.edits)
     nothing: Column = (None,) * len(bundle.strides.strides)
     column = columns.get(trained.training.content.parameter, nothing)
     return bundle, report.analysed_strides(bundle.strides, column)

@@ -11,12 +11,12 @@ from sqlalchemy import Connection
 from core.condition import WalkingCondition, is_alike
 from core.norms import Norms, NormValue, norms_for, temporal_values
 from server.report.trends import Visit, VisitKind
-from server.services import analyses, programmes, reviews, sessions
+from server.services import analyses, edit_log, programmes, sessions
 from server.services.errors import NotFound
 from server.services.patients import Patient
 from server.services.programmes import Programme
+from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
-from server.storage.blobs import BlobStore
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class Analysed:
 
     session: Session
     found: analyses.Analysis
-    edits: reviews.Edits
+    edits: edit_log.Edits
 
     @property
     def condition(self) -> WalkingCondition:
@@ -84,7 +84,7 @@ def analysed(c: Connection, patient_id: str) -> list[Analysed]:
     """The sessions of a patient with a result, oldest first."""
     there = sessions.of_patient(c, patient_id)
     shown = analyses.latest_of(c, [s.id for s in there])
-    edits = reviews.edits_of_all(c, [found.id for found in shown.values()])
+    edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
     return [
         Analysed(s, found, edits[found.id]) for s in reversed(there) if (found := shown.get(s.id)) is not None
     ]
@@ -102,7 +102,7 @@ def baseline(done: Sequence[Analysed]) -> Analysed | None:
 
 
 def history(
-    blobs: BlobStore,
+    reviewed: ReviewedAnalyses,
     patient: Patient,
     done: Sequence[Analysed],
     plans: Sequence[Programme],
@@ -137,7 +137,7 @@ def history(
                 None if plan is None else plan.label,
                 kind_of(a.session, None if plan is None else plan.kind),
                 a.condition,
-                reviews.numbers(blobs, a.found, a.edits),
+                reviewed.read_numbers(a.found, a.edits),
             )
         )
     shown = {v.session_id for v in visits}

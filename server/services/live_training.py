@@ -15,7 +15,7 @@ from sqlalchemy import Connection, select, update
 from core.errors import SagittalError
 from server import audit
 from server.services import analyses, live, prescriptions, sessions
-from server.storage.blobs import BlobStore
+from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
 from server.storage.tables import live_event, live_take, session
 
@@ -41,7 +41,7 @@ class Training:
     baseline: Mapping[str, Any] | None = None
 
 
-def training_of(db: Database, blobs: BlobStore, take: live.Take) -> Training:
+def training_of(db: Database, reviewed: ReviewedAnalyses, take: live.Take) -> Training:
     """What this take began with, or begins with now."""
     query = select(live_event.c.content).where(live_event.c.take_id == take.id, live_event.c.kind == KIND)
     with db.read() as c:
@@ -49,7 +49,7 @@ def training_of(db: Database, blobs: BlobStore, take: live.Take) -> Training:
         content = c.execute(query.order_by(live_event.c.seq).limit(1)).scalar()
         begins = content is None
         if content is None:
-            content = _prescribed(c, blobs, take)
+            content = _prescribed(c, reviewed, take)
     if begins:
         with db.write() as c:
             live.add_event(c, None, take.id, KIND, None, content)
@@ -81,11 +81,11 @@ def settle_feedback(c: Connection, actor: audit.Actor | None, take: live.Take) -
         sessions.change(c, actor, take.session_id, {"feedback": told[take.id]})
 
 
-def _prescribed(c: Connection, blobs: BlobStore, take: live.Take) -> dict[str, Any]:
+def _prescribed(c: Connection, reviewed: ReviewedAnalyses, take: live.Take) -> dict[str, Any]:
     nothing = {"id": None, "prescription": None, "baseline": None}
     try:
         written = prescriptions.in_force(c, take.patient_id)
-        found = prescriptions.for_take(c, blobs, take.session_id)
+        found = prescriptions.for_take(c, reviewed, take.session_id)
     except SagittalError:
         # an earlier visit that cannot be read must not keep this one from being recorded
         log.exception("live take %s begins without feedback", take.id)

@@ -21,8 +21,8 @@ from server import audit
 from server.services import patients, sessions, targets
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.services.patients import Patient
+from server.services.reviewed import ReviewedAnalyses
 from server.services.targets import Walk
-from server.storage.blobs import BlobStore
 from server.storage.tables import live_event, live_take, new_id, now, prescription, session, user
 
 
@@ -46,7 +46,7 @@ class Written:
 
 def write(
     c: Connection,
-    blobs: BlobStore,
+    reviewed: ReviewedAnalyses,
     actor: audit.Actor | None,
     patient_id: str,
     content: Mapping[str, object],
@@ -60,7 +60,7 @@ def write(
     """
     patient = patients.get(c, patient_id)
     asked = Prescription.from_json(content)
-    made = _with_target(c, blobs, patient, asked)
+    made = _with_target(c, reviewed, patient, asked)
     before = in_force(c, patient_id)
     if before is not None:
         _end(c, actor, before)
@@ -107,7 +107,9 @@ def in_force(c: Connection, patient_id: str) -> Written | None:
     return next((w for w in of_patient(c, patient_id) if w.ended_at is None), None)
 
 
-def for_take(c: Connection, blobs: BlobStore, session_id: str) -> tuple[Prescription, Baseline] | None:
+def for_take(
+    c: Connection, reviewed: ReviewedAnalyses, session_id: str
+) -> tuple[Prescription, Baseline] | None:
     """What a live take of this session trains, its target in numbers; None where nothing is prescribed.
 
     A norm follows the person's speed: it is looked up for the last walk before this session. Where that gives
@@ -120,7 +122,7 @@ def for_take(c: Connection, blobs: BlobStore, session_id: str) -> tuple[Prescrip
     patient = patients.get(c, this.patient_id)
     content = written.content
     by_norm = content.target.source == "norm"
-    walk = targets.last_walk(c, blobs, patient, before=this, with_controls=by_norm)
+    walk = targets.last_walk(c, reviewed, patient, before=this, with_controls=by_norm)
     if by_norm:
         fresh = targets.offer(walk, "norm", content.parameter, content.side).target
         content = content if fresh is None else replace(content, target=fresh)
@@ -196,12 +198,14 @@ def same_training(a: Prescription, b: Prescription) -> bool:
     return (a.parameter, a.side) == (b.parameter, b.side)
 
 
-def _with_target(c: Connection, blobs: BlobStore, patient: Patient, asked: Prescription) -> Prescription:
+def _with_target(
+    c: Connection, reviewed: ReviewedAnalyses, patient: Patient, asked: Prescription
+) -> Prescription:
     source = asked.target.source
     if source == "manual":
         return replace(asked, target=replace(asked.target, words="entered", session_id=None))
     chosen = None if source == "norm" else asked.target.session_id
-    walk = targets.last_walk(c, blobs, patient, session_id=chosen)
+    walk = targets.last_walk(c, reviewed, patient, session_id=chosen)
     found = targets.offer(walk, source, asked.parameter, asked.side)
     if found.target is None:
         raise ServiceError("no_target", found.reason or "")

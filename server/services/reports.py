@@ -10,20 +10,20 @@ from server.report.bundle import Bundle
 from server.report.comparison import changes, with_changes
 from server.report.level import level_column
 from server.report.model import ReportModel, Since, report_model
-from server.services import analyses, controls, reviews
+from server.services import analyses, controls, edit_log
 from server.services.comparisons import norms
 from server.services.controls import ControlVisit
 from server.services.errors import NotFound
 from server.services.histories import Analysed
 from server.services.patients import Patient
+from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
-from server.storage.blobs import BlobStore
 
 
 def read(
-    blobs: BlobStore,
+    reviewed: ReviewedAnalyses,
     found: analyses.Analysis,
-    edits: reviews.Edits,
+    edits: edit_log.Edits,
     patient: Patient,
     session: Session,
     before: Analysed | None = None,
@@ -36,7 +36,7 @@ def read(
     before : the visit that the table is compared with, None = none.
     control_visits : of the clinic's own controls.
     """
-    bundle = reviews.bundle(blobs, found, edits)
+    bundle = reviewed.read_bundle(found, edits)
     age = session.performed_on.year - patient.birth_year if patient.birth_year else None
     height = session.height_m if session.height_m is not None else patient.height_m
     speed = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
@@ -46,32 +46,32 @@ def read(
         sex=patient.sex,  # type: ignore[arg-type]
         height_m=height,
         affected=patient.affected_side,
-        controls=controls.group(blobs, control_visits, speed),
+        controls=controls.group(reviewed, control_visits, speed),
     )
     model = replace(model, condition=Analysed(session, found, edits).condition.words)
     if before is None:
         return bundle, model
-    old, new = reviews.numbers(blobs, before.found, before.edits), reviews.numbers(blobs, found, edits)
+    old, new = reviewed.read_numbers(before.found, before.edits), reviewed.read_numbers(found, edits)
     changed = changes(old, new, norms(patient, session, new), patient.affected_side)
     since = Since(before.session.id, before.session.performed_on)
     return bundle, replace(model, groups=with_changes(model.groups, changed), since=since)
 
 
 def behind_number(
-    blobs: BlobStore,
+    reviewed: ReviewedAnalyses,
     found: analyses.Analysis,
-    edits: reviews.Edits,
+    edits: edit_log.Edits,
     patient: Patient,
     session: Session,
     name: str,
     control_visits: Sequence[ControlVisit] = (),
 ) -> Behind:
     """One parameter with the strides behind it; raises NotFound, IntegrityError."""
-    bundle, model = read(blobs, found, edits, patient, session, control_visits=control_visits)
+    bundle, model = read(reviewed, found, edits, patient, session, control_visits=control_visits)
     row = next((r for _, rows in model.groups for r in rows if r.name == name), None)
     if row is None:
         raise NotFound("parameter", name)
-    columns = reviews.columns(blobs, found, edits)
+    columns = reviewed.read_columns(found, edits)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
     column = columns.get(name) or level_column(name, bundle.strides, columns, standing)
     return behind(row, bundle.strides, column, model.duration_s)

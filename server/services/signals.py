@@ -21,9 +21,9 @@ from core.frames import FOOT, SEGMENTS, SIDES, SUFFIX, Floats, Segment
 from server.report import signals as file
 from server.report.columns import floats_of
 from server.report.wording import VARIABLES, place_words
-from server.services import analyses, reviews
+from server.services import analyses
 from server.services.errors import NotFound
-from server.storage.blobs import BlobStore
+from server.services.reviewed import ReviewedAnalyses, StoredAnalysis
 
 MOST_POINTS: Final = 4000
 """Parts of a window at most: as many pixels as the widest screens have across."""
@@ -67,18 +67,18 @@ class Piece:
     high: Mapping[str, list[float | None]]
 
 
-def lanes(blobs: BlobStore, found: analyses.Analysis) -> tuple[Lane, ...]:
+def lanes(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> tuple[Lane, ...]:
     """What can be drawn of an analysis, feet first, then joints from the top, then sensors."""
-    known = reviews.take(blobs, found)
-    return tuple(lane for lane, _ in _lanes(blobs, found, known))
+    known = reviewed.open(found)
+    return tuple(lane for lane, _ in _lanes(reviewed, found, known))
 
 
 def piece(
-    blobs: BlobStore, found: analyses.Analysis, name: str, start_s: float, end_s: float, points: int
+    reviewed: ReviewedAnalyses, found: analyses.Analysis, name: str, start_s: float, end_s: float, points: int
 ) -> Piece:
     """A window of a lane in at most `points` parts; raises NotFound for a lane that is not there."""
-    known = reviews.take(blobs, found)
-    drawn = next(((lane, read) for lane, read in _lanes(blobs, found, known) if lane.name == name), None)
+    known = reviewed.open(found)
+    drawn = next(((lane, read) for lane, read in _lanes(reviewed, found, known) if lane.name == name), None)
     if drawn is None:
         raise NotFound("signal", name)
     lane, read = drawn
@@ -97,14 +97,16 @@ def piece(
 Read = Callable[[], tuple[Floats, Mapping[str, Floats]]]
 
 
-def _lanes(blobs: BlobStore, found: analyses.Analysis, known: reviews.Take) -> Iterator[tuple[Lane, Read]]:
-    yield from _foot_lanes(blobs, found, known)
+def _lanes(
+    reviewed: ReviewedAnalyses, found: analyses.Analysis, known: StoredAnalysis
+) -> Iterator[tuple[Lane, Read]]:
+    yield from _foot_lanes(reviewed, found, known)
     yield from _angle_lanes(known)
-    yield from _raw_lanes(blobs, found)
+    yield from _raw_lanes(reviewed, found)
 
 
 def _foot_lanes(
-    blobs: BlobStore, found: analyses.Analysis, known: reviews.Take
+    reviewed: ReviewedAnalyses, found: analyses.Analysis, known: StoredAnalysis
 ) -> Iterator[tuple[Lane, Read]]:
     tracks = known.tracks
     if tracks is None:
@@ -128,7 +130,7 @@ def _foot_lanes(
             t_s = tracks.t_s
             for side in worn:
                 mounted = turned[FOOT[side]]
-                t_s, axes = _raw(blobs, found, FOOT[side], "gyr")
+                t_s, axes = _raw(reviewed, found, FOOT[side], "gyr")
                 bias = np.array([b or 0.0 for b in mounted["gyro_bias_dps"]])
                 # the segment's z axis points to the right: turning about it lifts the toes
                 across = np.array(mounted["R_segment_sensor"])[2]
@@ -139,7 +141,7 @@ def _foot_lanes(
             lines: dict[str, Floats] = {}
             t_s = tracks.t_s
             for side in worn:
-                t_s, axes = _raw(blobs, found, FOOT[side], "acc")
+                t_s, axes = _raw(reviewed, found, FOOT[side], "acc")
                 lines[side] = np.sqrt(sum(axes[c] ** 2 for c in AXES))
             return t_s, lines
 
@@ -155,7 +157,7 @@ def _foot_lanes(
         yield Lane("foot_height", "Ankle height", "m", "higher", placed), height
 
 
-def _angle_lanes(known: reviews.Take) -> Iterator[tuple[Lane, Read]]:
+def _angle_lanes(known: StoredAnalysis) -> Iterator[tuple[Lane, Read]]:
     angles = known.bundle.angles
     if angles is None:
         return
@@ -172,17 +174,17 @@ def _angle_lanes(known: reviews.Take) -> Iterator[tuple[Lane, Read]]:
             yield Lane(variable.name, variable.label, "°", variable.up.lower(), tuple(lines)), read
 
 
-def _raw_lanes(blobs: BlobStore, found: analyses.Analysis) -> Iterator[tuple[Lane, Read]]:
+def _raw_lanes(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> Iterator[tuple[Lane, Read]]:
     if file.NAME not in found.files:
         return
-    names = set(_columns(blobs, found))
+    names = set(_columns(reviewed, found))
     for segment in SEGMENTS:
         for kind, label, unit in (("gyr", "angular rate", "°/s"), ("acc", "acceleration", "m/s²")):
             if f"{segment}_{kind}_x{_ENDING[kind]}" not in names:
                 continue
 
             def read(segment: Segment = segment, kind: str = kind) -> tuple[Floats, Mapping[str, Floats]]:
-                return _raw(blobs, found, segment, kind)
+                return _raw(reviewed, found, segment, kind)
 
             words = place_words(segment).capitalize()
             yield Lane(f"{segment}_{kind}", f"{words}, {label}", unit, "more", AXES, raw=True), read
@@ -191,26 +193,26 @@ def _raw_lanes(blobs: BlobStore, found: analyses.Analysis) -> Iterator[tuple[Lan
 _ENDING: Final = {"gyr": "_dps", "acc": ""}
 
 
-def _columns(blobs: BlobStore, found: analyses.Analysis) -> tuple[str, ...]:
+def _columns(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> tuple[str, ...]:
     def read() -> tuple[str, ...]:
-        content = analyses.file_bytes(blobs, found, file.NAME)
+        content = analyses.file_bytes(reviewed.blobs, found, file.NAME)
         return tuple(pq.read_schema(BufferReader(content)).names)
 
-    return reviews.kept((found.id, "columns"), read)
+    return reviewed.keep_part((found.id, "columns"), read)
 
 
 def _raw(
-    blobs: BlobStore, found: analyses.Analysis, segment: Segment, kind: str
+    reviewed: ReviewedAnalyses, found: analyses.Analysis, segment: Segment, kind: str
 ) -> tuple[Floats, Mapping[str, Floats]]:
     """The three axes of a sensor; kept, for whoever looks at a signal looks again."""
 
     def read() -> tuple[Floats, Mapping[str, Floats]]:
         names = {c: f"{segment}_{kind}_{c}{_ENDING[kind]}" for c in AXES}
-        content = analyses.file_bytes(blobs, found, file.NAME)
+        content = analyses.file_bytes(reviewed.blobs, found, file.NAME)
         table = pq.read_table(BufferReader(content), columns=["t_s", *names.values()])
         return floats_of(table, "t_s"), {c: floats_of(table, name) for c, name in names.items()}
 
-    return reviews.kept((found.id, segment, kind), read)
+    return reviewed.keep_part((found.id, segment, kind), read)
 
 
 def _extremes(values: Floats, size: int) -> tuple[list[float | None], list[float | None]]:

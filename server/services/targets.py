@@ -19,11 +19,11 @@ from core.parameters.result import Parameter
 from server.report.notes import GROUPS
 from server.report.numbers import Numbers
 from server.report.wording import NO_NORM
-from server.services import comparisons, controls, histories, reviews
+from server.services import comparisons, controls, histories
 from server.services.histories import Analysed
 from server.services.patients import Patient
+from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
-from server.storage.blobs import BlobStore
 from web.words import day
 
 FEWEST: Final = 5
@@ -55,7 +55,7 @@ class Offer:
 
 def last_walk(
     c: Connection,
-    blobs: BlobStore,
+    reviewed: ReviewedAnalyses,
     patient: Patient,
     before: Session | None = None,
     session_id: str | None = None,
@@ -81,12 +81,12 @@ def last_walk(
     last = histories.baseline(found)
     if last is None:
         return None
-    numbers = reviews.numbers(blobs, last.found, last.edits)
+    numbers = reviewed.read_numbers(last.found, last.edits)
     speed = _mean(numbers, "gait_speed_mps", None)
     visits = controls.visits(c, patient, last.session) if with_controls else ()
 
     def own_controls() -> Norms | None:
-        group = controls.group(blobs, visits, None if speed is None else speed.mean)
+        group = controls.group(reviewed, visits, None if speed is None else speed.mean)
         return None if group is None or speed is None else group.norms(speed.mean)
 
     return Walk(last.session, numbers, comparisons.norms(patient, last.session, numbers), own_controls)

@@ -38,7 +38,7 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.http.problems import Problem, as_problem
 from server.report.bundle import read_poses
-from server.services import analyses, comparisons, reviews, sessions
+from server.services import analyses, comparisons, edit_log, sessions
 from server.services.histories import Analysed
 from server.storage.blobs import BlobStore
 from server.viewer.figure import Figure
@@ -172,7 +172,7 @@ async def replay(
 async def _open(
     ws: WebSocket, sid: str, who: Identity, tab: str, dark: bool, other: str | None
 ) -> View[Figure]:
-    db, blobs = ws.app.state.db, ws.app.state.blobs
+    db, reviewed = ws.app.state.db, ws.app.state.reviewed
 
     def latest() -> tuple[Analysed | None, Analysed | None]:
         with db.read() as c:
@@ -192,11 +192,11 @@ async def _open(
         raise Problem(404, "no_poses", "There is nothing to replay: no analysis has reached the poses yet.")
 
     def load() -> Motion:
-        motion = _motion(blobs, this)
+        motion = _motion(reviewed.blobs, this)
         if before is None:
             return motion
-        mine, theirs = (reviews.bundle(blobs, a.found, a.edits).strides for a in (this, before))
-        return replace(motion, ghost=ghost_of(motion, mine, _motion(blobs, before), theirs))
+        mine, theirs = (reviewed.read_bundle(a.found, a.edits).strides for a in (this, before))
+        return replace(motion, ghost=ghost_of(motion, mine, _motion(reviewed.blobs, before), theirs))
 
     shown = this.found.id if before is None else f"{_state(this)} over {_state(before)}"
     return await _views(ws).open(who.login_id, tab, shown, load, dark)
@@ -206,7 +206,7 @@ def _replayable(c: Connection, sid: str) -> Analysed | None:
     found = analyses.latest(c, sid)
     if found is None or "poses.parquet" not in found.files:
         return None
-    return Analysed(sessions.get(c, sid), found, reviews.edits_of(c, found.id))
+    return Analysed(sessions.get(c, sid), found, edit_log.edits_of(c, found.id))
 
 
 def _state(a: Analysed) -> str:

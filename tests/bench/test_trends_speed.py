@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from server.report.trends import names_in, trends
-from server.services import histories, patients, reviews, sessions
+from server.services import histories, patients, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic, open_clinic
 
@@ -38,12 +38,12 @@ async def test_trends_of_24_visits_are_read_within_300_ms(tmp_path: Path) -> Non
             analysed.finish(clinic, patient.id, session, results)
         cold, warm, page = [], [], []
         for _ in range(5):
-            reviews.forget()
+            clinic.app.state.reviewed.forget()
             cold.append(_read(clinic, patient))
             warm.append(_read(clinic, patient))
         async with clinic.client("viewer") as client:
             for _ in range(5):
-                reviews.forget()
+                clinic.app.state.reviewed.forget()
                 began = time.perf_counter()
                 answer = await client.get(f"/patients/{patient.id}/trends")
                 page.append(time.perf_counter() - began)
@@ -57,7 +57,7 @@ def _read(clinic: Clinic, patient: patients.Patient) -> float:
     began = time.perf_counter()
     with clinic.db.read() as c:
         done, plans = histories.read(c, patient)
-    known = histories.history(clinic.app.state.blobs, patient, done, plans)
+    known = histories.history(clinic.app.state.reviewed, patient, done, plans)
     found = trends(known.visits, names_in(known.visits), known.norms, known.usual)
     took = time.perf_counter() - began
     assert len(known.visits) == VISITS

@@ -8,7 +8,8 @@ import pytest
 from playwright.sync_api import expect
 
 from core.feedback import FeedbackEngine
-from server.services import analyses, prescriptions, reviews
+from server.services import analyses, edit_log, prescriptions
+from server.services.reviewed import ReviewedAnalyses
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from tests.browser import filling
@@ -36,15 +37,16 @@ def trained(running: RunningServer) -> str:
         assert filling.analyse(client, session, sensors)["state"] == "done"
         filling.add(client, f"/patients/{patient}/prescriptions", **GIVEN)
     blobs = BlobStore(running.folder / "blobs")
+    reviewed = ReviewedAnalyses(blobs)
     with closing(Database(running.folder / "sagittal.db")) as db:
         with db.read() as c:
             found = analyses.shown(c, session)
-            edits = reviews.edits_of(c, found.id)
-            given = prescriptions.for_take(c, blobs, session)
+            edits = edit_log.edits_of(c, found.id)
+            given = prescriptions.for_take(c, reviewed, session)
         assert given is not None
         engine = FeedbackEngine(*given)
-        lengths = reviews.columns(blobs, found, edits)["step_length_m"]
-        strides = reviews.bundle(blobs, found, edits).strides.strides
+        lengths = reviewed.read_columns(found, edits)["step_length_m"]
+        strides = reviewed.read_bundle(found, edits).strides.strides
         told = [
             engine.push(
                 Walked(

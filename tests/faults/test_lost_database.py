@@ -18,6 +18,7 @@ import pytest
 from server import audit
 from server.main import main
 from server.services import checks, custody, erasure, recordings, sessions
+from server.services.reviewed import ReviewedAnalyses
 from server.services.sweep import sweep
 from server.settings import Settings
 from server.storage import fs
@@ -368,10 +369,12 @@ def take_out(clinic: Clinic, name: str) -> None:
 def erase(clinic: Clinic, what: str) -> None:
     if what == "patient":
         erasure.erase_patient(
-            clinic.db, clinic.blobs, clinic.settings, None, clinic.patient.id, confirm="P-1"
+            clinic.db, ReviewedAnalyses(clinic.blobs), clinic.settings, None, clinic.patient.id, confirm="P-1"
         )
     else:
-        erasure.erase_session(clinic.db, clinic.blobs, clinic.settings, None, clinic.session.id)
+        erasure.erase_session(
+            clinic.db, ReviewedAnalyses(clinic.blobs), clinic.settings, None, clinic.session.id
+        )
 
 
 @pytest.mark.parametrize("what", ["patient", "session"])

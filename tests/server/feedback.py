@@ -8,6 +8,7 @@ from typing import Any
 
 from core.feedback import Cue
 from server.services import live, live_training, patients, sessions
+from server.services.reviewed import ReviewedAnalyses
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.tables import live_take, new_id
@@ -58,7 +59,7 @@ def ended_take(
     with db.write() as c:
         made, code = live.open_take(c, None, session)
         live.pair(c, code)
-    begun = live_training.training_of(db, blobs, made)
+    begun = live_training.training_of(db, ReviewedAnalyses(blobs), made)
     with db.write() as c:
         live.started(c, made.id, "replay")
         for cue in cues:

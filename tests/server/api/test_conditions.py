@@ -204,7 +204,7 @@ async def test_a_take_is_coached_from_the_walk_in_its_own_condition(clinic: Clin
         answer = await client.post(f"{API}/patients/{patient}/prescriptions", json=body)
     assert answer.status_code == 201
     with clinic.db.read() as c:
-        found = prescriptions.for_take(c, clinic.app.state.blobs, today)
+        found = prescriptions.for_take(c, clinic.app.state.reviewed, today)
     assert found is not None
     assert found[1].session_id == aided
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from core.feedback import Baseline, Cue, FeedbackEngine, Prescription
-from server.services import analyses, prescriptions, reviews
+from server.services import analyses, edit_log, prescriptions
 from tests.feedback import Walked
 from tests.server import feedback
 from tests.server.clinic import Clinic
@@ -36,12 +36,12 @@ async def _prescribe(clinic: Clinic, patient: str) -> str:
 
 def _live(clinic: Clinic, session: str, given: Prescription, baseline: Baseline) -> tuple[list[Cue], str]:
     """The cues that the strides of a session's analysis would have got, and its recording."""
-    blobs = clinic.app.state.blobs
+    reviewed = clinic.app.state.reviewed
     with clinic.db.read() as c:
         found = analyses.shown(c, session)
-        edits = reviews.edits_of(c, found.id)
-    strides = reviews.bundle(blobs, found, edits).strides.strides
-    column = reviews.columns(blobs, found, edits)[given.parameter]
+        edits = edit_log.edits_of(c, found.id)
+    strides = reviewed.read_bundle(found, edits).strides.strides
+    column = reviewed.read_columns(found, edits)[given.parameter]
     engine = FeedbackEngine(given, baseline)
     cues = []
     for n, (s, value) in enumerate(zip(strides, column, strict=True)):
@@ -59,7 +59,7 @@ async def _train(
 ) -> tuple[str, list[Cue]]:
     session = feedback.walked(clinic, patient, days, 48.0, **values)
     with clinic.db.read() as c:
-        given = prescriptions.for_take(c, clinic.app.state.blobs, session)
+        given = prescriptions.for_take(c, clinic.app.state.reviewed, session)
     assert given is not None
     cues, recording = _live(clinic, session, *given)
     feedback.take(clinic, session, prescription, cues, recording)

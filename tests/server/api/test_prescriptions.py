@@ -8,7 +8,7 @@ import pytest
 
 from core.feedback import Baseline, FeedbackEngine, Prescription
 from core.parameters.result import Parameter
-from server.services import prescriptions, reviews
+from server.services import prescriptions
 from server.services.histories import analysed
 from server.storage.tables import audit
 from tests.feedback import prescription, train
@@ -28,13 +28,13 @@ MANUAL: dict[str, Any] = {
 def _numbers(clinic: Clinic, patient: str, name: str, side: str) -> Parameter:
     with clinic.db.read() as c:
         last = analysed(c, patient)[-1]
-    numbers = reviews.numbers(clinic.app.state.blobs, last.found, last.edits)
+    numbers = clinic.app.state.reviewed.read_numbers(last.found, last.edits)
     return next(p for p in numbers.parameters if (p.name, p.side) == (name, side))
 
 
 def _for_take(clinic: Clinic, session: str) -> tuple[Prescription, Baseline]:
     with clinic.db.read() as c:
-        found = prescriptions.for_take(c, clinic.app.state.blobs, session)
+        found = prescriptions.for_take(c, clinic.app.state.reviewed, session)
     assert found is not None
     return found
 
@@ -76,7 +76,7 @@ async def test_a_prescription_is_ended_once(clinic: Clinic) -> None:
         assert prescriptions.in_force(c, patient) is None
         session = feedback.visit(clinic, patient, 0)
     with clinic.db.read() as c:
-        assert prescriptions.for_take(c, clinic.app.state.blobs, session) is None
+        assert prescriptions.for_take(c, clinic.app.state.reviewed, session) is None
 
 
 @pytest.mark.parametrize(

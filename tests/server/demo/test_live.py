@@ -11,7 +11,6 @@ from core.feedback import Cue
 from server.demo.clinic import PRESCRIBED
 from server.demo.live import open_take, training, walk
 from server.services import live, patients, prescriptions, sessions
-from server.storage.blobs import BlobStore
 from server.storage.tables import session
 from tests.server.clinic import open_clinic
 from tests.server.serving import serve
@@ -30,7 +29,7 @@ async def test_the_demo_s_live_patient_walks_is_told_how_and_becomes_a_recording
         with clinic.db.write() as c:
             fields = {k: v for k, v in vars(person).items() if k != "code"}
             someone = patients.create(c, None, code=person.code, **fields)
-            prescriptions.write(c, BlobStore(clinic.settings.blobs), None, someone.id, content)
+            prescriptions.write(c, clinic.app.state.reviewed, None, someone.id, content)
         code = open_take(clinic.settings)
         made = training(laps=1)
         # a client with a loop of its own, as in the demo

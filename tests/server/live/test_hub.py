@@ -71,7 +71,7 @@ def prescribed(clinic: Clinic) -> str:
     session = new_session(clinic)
     with clinic.db.write() as c:
         patient = sessions.get(c, session).patient_id
-        prescriptions.write(c, clinic.app.state.blobs, None, patient, STANCE)
+        prescriptions.write(c, clinic.app.state.reviewed, None, patient, STANCE)
     return session
 
 

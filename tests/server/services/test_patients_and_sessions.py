@@ -14,6 +14,7 @@ from server import audit
 from server.jobs.table import TableQueue
 from server.services import analyses, checks, erasure, jobs, patients, recordings, sessions
 from server.services.errors import Conflict, NotFound, ServiceError
+from server.services.reviewed import ReviewedAnalyses
 from server.services.sweep import sweep
 from server.settings import Settings
 from server.storage import tables
@@ -306,9 +307,13 @@ def test_erasing_a_patient_needs_the_code_and_leaves_only_the_trail(clinic: Clin
     claim = clinic.queue.claim("w", (recordings.INSPECT,))
     assert claim is not None
     with pytest.raises(Conflict) as caught:
-        erasure.erase_patient(clinic.db, clinic.blobs, clinic.settings, clinic.who, patient_id, confirm="P-2")
+        erasure.erase_patient(
+            clinic.db, ReviewedAnalyses(clinic.blobs), clinic.settings, clinic.who, patient_id, confirm="P-2"
+        )
     assert caught.value.code == "not_confirmed"
-    erasure.erase_patient(clinic.db, clinic.blobs, clinic.settings, clinic.who, patient_id, confirm="P-1")
+    erasure.erase_patient(
+        clinic.db, ReviewedAnalyses(clinic.blobs), clinic.settings, clinic.who, patient_id, confirm="P-1"
+    )
     assert {f.space for f in clinic.blobs.files()} == {other_id}
     assert not clinic.queue.finish(claim, lambda c: None)  # its worker finds the fence closed
     with clinic.db.read() as c:
@@ -337,7 +342,12 @@ def test_no_byte_of_an_erased_patient_is_left_in_the_data_folder(clinic: Clinic)
 
     assert found()
     erasure.erase_patient(
-        clinic.db, clinic.blobs, clinic.settings, clinic.who, patient_id, confirm="CANARY-CODE"
+        clinic.db,
+        ReviewedAnalyses(clinic.blobs),
+        clinic.settings,
+        clinic.who,
+        patient_id,
+        confirm="CANARY-CODE",
     )
     assert found() == set()
 
@@ -358,7 +368,9 @@ def test_no_byte_of_an_erased_session_is_left_and_who_reads_an_older_state_only_
 
     with clinic.db.read() as c:
         sessions.get(c, session_id)
-        erasure.erase_session(clinic.db, clinic.blobs, clinic.settings, clinic.who, session_id)
+        erasure.erase_session(
+            clinic.db, ReviewedAnalyses(clinic.blobs), clinic.settings, clinic.who, session_id
+        )
         assert found()
     erasure.finish(clinic.db, clinic.blobs, clinic.settings)
     assert not found()
@@ -371,7 +383,7 @@ def test_erasing_a_session_keeps_the_files_another_one_shares(clinic: Clinic) ->
     clinic.upload(one, "a", b"shared")
     clinic.upload(one, "b", b"own")
     clinic.upload(two, "a", b"shared")
-    erasure.erase_session(clinic.db, clinic.blobs, clinic.settings, clinic.who, one)
+    erasure.erase_session(clinic.db, ReviewedAnalyses(clinic.blobs), clinic.settings, clinic.who, one)
     assert [f.path.read_bytes() for f in clinic.blobs.files()] == [b"shared"]
     assert checks.check(clinic.db, clinic.blobs, clinic.settings) == []
 

@@ -12,6 +12,7 @@ from sqlalchemy import select
 from server.services import erasure, patients, programmes, sessions
 from server.services.course import SIX_WEEKS
 from server.services.errors import Conflict, NotFound, ServiceError
+from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
@@ -143,10 +144,10 @@ def test_erasing_a_session_opens_its_visit_again_and_erasing_the_patient_leaves_
     with db.write() as c:
         made = programmes.start(c, None, patient, starts_on=MONDAY)
         programmes.change_visit(c, None, made.visits[1].id, {"session_id": session})
-    erasure.erase_session(db, blobs, settings, None, session)
+    erasure.erase_session(db, ReviewedAnalyses(blobs), settings, None, session)
     with db.read() as c:
         assert programmes.get(c, made.id).count("done") == 0
-    erasure.erase_patient(db, blobs, settings, None, patient, confirm="P-1")
+    erasure.erase_patient(db, ReviewedAnalyses(blobs), settings, None, patient, confirm="P-1")
     with db.read() as c:
         assert c.execute(select(planned_visit)).first() is None
 

@@ -10,8 +10,9 @@ from sqlalchemy import delete, func, select, update
 from sqlalchemy.exc import IntegrityError as DatabaseIntegrityError
 
 from core.edits import Edit
-from server.services import analyses, erasure, patients, reviews, sessions
+from server.services import analyses, edit_log, erasure, patients, reviews, sessions
 from server.services.errors import Conflict
+from server.services.reviewed import ReviewedAnalyses
 from server.storage import tables
 from tests.server import analysed, walk
 from tests.server.clinic import Clinic, open_clinic
@@ -42,8 +43,8 @@ def session_of(clinic: Clinic) -> str:
     return session
 
 
-def make(clinic: Clinic, session: str, edit: Edit, seen: int | None = None) -> reviews.Edits:
-    return reviews.make(clinic.db, clinic.app.state.blobs, None, session, edit, seen=seen)[1]
+def make(clinic: Clinic, session: str, edit: Edit, seen: int | None = None) -> edit_log.Edits:
+    return reviews.make(clinic.db, clinic.app.state.reviewed, None, session, edit, seen=seen)[1]
 
 
 def rows(clinic: Clinic) -> list[str]:
@@ -74,16 +75,16 @@ async def test_who_measured_on_a_state_that_changed_meanwhile_is_refused(
     clinic: Clinic, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session = session_of(clinic)
-    measure = reviews._measure
+    measure = clinic.app.state.reviewed.measure_anew
     calls = []
 
     def interrupted(*args: object) -> object:
         calls.append(args)
         if len(calls) == 1:
             make(clinic, session, LEAVE_OUT)  # a colleague, while the numbers are being computed
-        return measure(*args)  # type: ignore[arg-type]
+        return measure(*args)
 
-    monkeypatch.setattr(reviews, "_measure", interrupted)
+    monkeypatch.setattr(clinic.app.state.reviewed, "measure_anew", interrupted)
     with pytest.raises(Conflict) as refused:
         make(clinic, session, MOVE)
     assert refused.value.code == "edited_meanwhile"
@@ -99,23 +100,24 @@ async def test_an_edit_that_is_refused_leaves_no_row(clinic: Clinic) -> None:
 
 async def test_what_is_measured_is_kept_for_the_state_and_undo_finds_it_again(clinic: Clinic) -> None:
     session = session_of(clinic)
-    blobs = clinic.app.state.blobs
+    reviewed: ReviewedAnalyses = clinic.app.state.reviewed
     one = make(clinic, session, MOVE)
     with clinic.db.read() as c:
         found = analyses.shown(c, session)
-    kept = reviews.measured(blobs, found, one)
+    kept = reviewed.measure(found, one)
     make(clinic, session, LEAVE_OUT)
     _, back = reviews.undo(clinic.db, None, session)
     assert back.version != one.version
-    assert reviews.measured(blobs, found, back) is kept
+    assert reviewed.measure(found, back) is kept
 
 
 async def test_an_erased_session_is_erased_from_memory_too(clinic: Clinic) -> None:
     session = session_of(clinic)
     make(clinic, session, MOVE)
-    assert reviews._takes._values
-    erasure.erase_session(clinic.db, clinic.app.state.blobs, clinic.settings, None, session)
-    assert not reviews._takes._values
-    assert not reviews._results._values
+    reviewed: ReviewedAnalyses = clinic.app.state.reviewed
+    assert len(reviewed._analyses) > 0
+    erasure.erase_session(clinic.db, clinic.app.state.reviewed, clinic.settings, None, session)
+    assert len(reviewed._analyses) == 0
+    assert len(reviewed._results) == 0
     with clinic.db.read() as c:
         assert c.execute(select(func.count()).select_from(tables.edit)).scalar_one() == 0

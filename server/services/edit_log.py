@@ -1,0 +1,74 @@
+"""The edits of an analysis: rows that are only added to; undoing one adds a row too."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Final
+
+from sqlalchemy import Connection, select
+
+from core.edits import Edit, edit_of
+from server.storage.tables import edit as rows
+from server.storage.tables import user
+
+UNDO: Final = "undo"
+"""Kind of the row that takes the last live edit back."""
+
+
+@dataclass(frozen=True)
+class MadeEdit:
+    """A live edit: who made it, and when."""
+
+    seq: int
+    edit: Edit
+    by: str | None
+    at: dt.datetime
+
+
+@dataclass(frozen=True)
+class Edits:
+    """The edits of an analysis that count, oldest first.
+
+    Parameters
+    ----------
+    version : number of the last row, undone ones included; 0 = nothing was ever changed.
+    """
+
+    version: int = 0
+    made: tuple[MadeEdit, ...] = ()
+
+    @property
+    def edits(self) -> tuple[Edit, ...]:
+        """What was changed."""
+        return tuple(m.edit for m in self.made)
+
+    @property
+    def key(self) -> tuple[int, ...]:
+        """Equal keys are equal edits: undoing one leads back to the key before."""
+        return tuple(m.seq for m in self.made)
+
+
+def edits_of(c: Connection, analysis_id: str) -> Edits:
+    """The live edits of an analysis."""
+    return edits_of_all(c, [analysis_id])[analysis_id]
+
+
+def edits_of_all(c: Connection, analysis_ids: Collection[str]) -> dict[str, Edits]:
+    """The live edits of many analyses by analysis, in one statement."""
+    query = (
+        select(rows, user.c.display_name)
+        .join(user, user.c.id == rows.c.user_id, isouter=True)
+        .where(rows.c.analysis_id.in_(analysis_ids))
+        .order_by(rows.c.seq)
+    )
+    made: dict[str, list[MadeEdit]] = {found: [] for found in analysis_ids}
+    version = dict.fromkeys(made, 0)
+    for row in c.execute(query) if made else ():
+        version[row.analysis_id] = row.seq
+        if row.kind == UNDO:
+            made[row.analysis_id].pop()
+        else:
+            made[row.analysis_id].append(MadeEdit(row.seq, edit_of(row.content), row.display_name, row.at))
+    return {found: Edits(version[found], tuple(live)) for found, live in made.items()}

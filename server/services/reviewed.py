@@ -1,0 +1,199 @@
+"""Finished analyses as they count: what is stored, with what its live edits give.
+
+A stored analysis never changes. The events, strides and parameters that count are measured from its tracks
+and the live edits, by the function that the pipeline ends with.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Generic, TypeVar, cast
+
+from core.edits import Edit
+from core.measure import Measured, Tracks, measure
+from core.norms.controls import ControlSession
+from core.parameters.rows import Column
+from server.report import signals, tracks
+from server.report.bundle import Bundle, load_bundle, read_columns, reviewed
+from server.report.numbers import Numbers, numbers_of, read_numbers
+from server.services import analyses
+from server.services.edit_log import Edits
+from server.services.errors import Conflict
+from server.storage.blobs import BlobStore
+
+_Value = TypeVar("_Value")
+
+NOT_READ: Final = ("poses.parquet", signals.NAME)
+"""Files that only the replay and the drawing of signals need."""
+
+ANALYSES_KEPT, RESULTS_KEPT, PARTS_KEPT = 3, 12, 24
+NUMBERS_KEPT, CONTROLS_KEPT, VERDICTS_KEPT = 240, 500, 5000
+"""Finished analyses, results of edits, signals of one sensor and numbers kept in memory: those at work. Ten
+minutes are some 20 MB, 1 MB, 2 MB and 50 kB; a verdict is two words."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredAnalysis:
+    """A finished analysis in memory; one without `tracks`, of an earlier version, cannot be edited."""
+
+    bundle: Bundle
+    tracks: Tracks | None
+
+    @property
+    def fixed_because(self) -> str | None:
+        """Why nothing of it can be edited, None where it can."""
+        if self.tracks is not None:
+            return None
+        stopped = next((n.message for n in self.bundle.warnings if n.severity == "error"), None)
+        if stopped is not None:
+            return f"The analysis stopped before events were looked for. {stopped}"
+        return (
+            "This analysis was made by an earlier version, which did not keep what an edit is measured on. "
+            "Run the analysis again."
+        )
+
+
+class ReviewedAnalyses:
+    """The analyses of an installation as they count; those at work are kept in memory. Any thread may use it.
+
+    Parameters
+    ----------
+    blobs : the store of the result files.
+    """
+
+    def __init__(self, blobs: BlobStore) -> None:
+        self.blobs = blobs
+        self._analyses: RecentValues[StoredAnalysis] = RecentValues(ANALYSES_KEPT)
+        self._results: RecentValues[Measured] = RecentValues(RESULTS_KEPT)
+        self._numbers: RecentValues[Numbers] = RecentValues(NUMBERS_KEPT)
+        self._controls: RecentValues[ControlSession] = RecentValues(CONTROLS_KEPT)
+        self._verdicts: RecentValues[tuple[str, str]] = RecentValues(VERDICTS_KEPT)
+        self._parts: RecentValues[Any] = RecentValues(PARTS_KEPT)
+
+    def open(self, found: analyses.Analysis) -> StoredAnalysis:
+        """Return an analysis as it is stored, read once while it is at work; raises IntegrityError."""
+
+        def read() -> StoredAnalysis:
+            names = [name for name in found.files if name not in NOT_READ]
+            files = {name: analyses.file_bytes(self.blobs, found, name) for name in names}
+            stored = load_bundle(files)
+            if tracks.NAME not in files:
+                return StoredAnalysis(stored, None)
+            return StoredAnalysis(
+                stored, tracks.read_tracks(files[tracks.NAME], stored.events, stored.angles)
+            )
+
+        return self._analyses.get(found.id, read)
+
+    def measure(self, found: analyses.Analysis, edits: Edits) -> Measured | None:
+        """Return what the live edits give; None without an edit: then the stored analysis counts."""
+        if not edits.made:
+            return None
+        return self._results.get((found.id, edits.key), lambda: self.measure_anew(found, edits.edits))
+
+    def measure_anew(self, found: analyses.Analysis, edits: tuple[Edit, ...]) -> Measured:
+        """Measure with these edits, without looking into the memory or keeping the result.
+
+        Raises
+        ------
+        Conflict no_tracks, IntegrityError, ParameterError of core.edits.
+        """
+        known = self.open(found)
+        if known.tracks is None:
+            raise Conflict("no_tracks", known.fixed_because or "")
+        return measure(known.tracks, edits)
+
+    def keep_result(self, found: analyses.Analysis, edits: Edits, result: Measured) -> None:
+        """Keep what `measure_anew` gave for these edits."""
+        self._results.put((found.id, edits.key), result)
+
+    def read_columns(self, found: analyses.Analysis, edits: Edits) -> Mapping[str, Column]:
+        """Return figures of every stride of the list as they count, by parameter; raises IntegrityError."""
+        result = self.measure(found, edits)
+        if result is not None:
+            return result.columns
+        if "strides.csv" not in found.files:
+            return {}
+        return read_columns(analyses.file_bytes(self.blobs, found, "strides.csv"))
+
+    def read_bundle(self, found: analyses.Analysis, edits: Edits) -> Bundle:
+        """Return the analysis with what its live edits give; raises IntegrityError."""
+        stored, result = self.open(found).bundle, self.measure(found, edits)
+        return stored if result is None else reviewed(stored, result, edits.edits)
+
+    def read_numbers(self, found: analyses.Analysis, edits: Edits) -> Numbers:
+        """Return parameters and scores as they count; without an edit no signal is read.
+
+        Raises
+        ------
+        IntegrityError
+            a result file is not what it was.
+        """
+
+        def read() -> Numbers:
+            if not edits.made:
+                stored = read_numbers(analyses.file_bytes(self.blobs, found, "analysis.json"))
+                if stored is not None:
+                    return stored
+            return numbers_of(self.read_bundle(found, edits))
+
+        return self._numbers.get((found.id, edits.key), read)
+
+    def read_verdict(self, found: analyses.Analysis, edits: Edits) -> tuple[str, str]:
+        """Return shape and word for the data of an analysis, as lists show it; raises IntegrityError."""
+        return self._verdicts.get((found.id, edits.key), lambda: self.read_numbers(found, edits).verdict)
+
+    def keep_part(self, key: tuple[str, ...], make_value: Callable[[], _Value]) -> _Value:
+        """Return a part that is looked at again and again, by a key that begins with the analysis's id."""
+        return cast("_Value", self._parts.get(key, make_value))
+
+    def keep_control(
+        self, found: analyses.Analysis, edits: Edits, make_value: Callable[[], ControlSession]
+    ) -> ControlSession:
+        """Return what serves as reference of a finished analysis of a control."""
+        return self._controls.get((found.id, edits.key), make_value)
+
+    def forget(self) -> None:
+        """Keep nothing in memory: what is erased on disk must not stay here."""
+        for memory in (
+            self._analyses, self._results, self._numbers, self._controls, self._parts, self._verdicts
+        ):  # fmt: skip
+            memory.clear()
+
+
+class RecentValues(Generic[_Value]):
+    """The values used last, at most `size` of them; any thread may use it."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self._values: OrderedDict[Hashable, _Value] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def clear(self) -> None:
+        """Forget all."""
+        with self._lock:
+            self._values.clear()
+
+    def get(self, key: Hashable, make_value: Callable[[], _Value]) -> _Value:
+        """Return the value of a key, made and kept when it is not there."""
+        with self._lock:
+            if key in self._values:
+                self._values.move_to_end(key)
+                return self._values[key]
+        value = make_value()
+        self.put(key, value)
+        return value
+
+    def put(self, key: Hashable, value: _Value) -> None:
+        """Keep a value; the one that was used longest ago may have to go."""
+        with self._lock:
+            self._values[key] = value
+            self._values.move_to_end(key)
+            while len(self._values) > self._size:
+                self._values.popitem(last=False)
