@@ -14,7 +14,12 @@ from server.processes.channel import Channel, frame, read_message
 def test_messages_of_any_length_arrive_whole_and_in_order() -> None:
     left, right = (Channel(end) for end in socketpair())
     sent = [b"", b"x", bytes(range(256)) * 40_000]
-    sender = threading.Thread(target=lambda: [left.send(message) for message in sent])
+
+    def send() -> None:
+        for message in sent:
+            left.send(message)
+
+    sender = threading.Thread(target=send)
     sender.start()
     assert [right.receive() for _ in sent] == sent
     sender.join()
