@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 import pytest
 
-from core.errors import FormatError
+from core.errors import FormatError, Notice
 from core.feedback import Prescription
 from core.formats import SourceFile, read_recording, vendors
 from core.formats.draft import Draft
@@ -21,6 +21,9 @@ from core.formats.vendors import VendorFormat
 from core.measure import Tracks, measure
 from core.parameters.catalogue import CATALOGUE, CurveFigure, ParameterEntry
 from core.parameters.catalogue.entry import ANKLE_AND_FOOT, DORSIFLEXION
+from core.pipeline import WALK, Analysis, PipelineConfig, PipelineStage, analyse, recipes
+from core.pipeline.recipes import SIGNALS, run_stages, say_nothing
+from core.pipeline.stages import ORIENTATION, orient_segments
 from core.simulate import simulate_scenario
 from server.pages.live import list_terms
 from server.pages.prescription import group_trainable
@@ -158,9 +161,47 @@ def test_a_reader_in_the_list_reads_its_files(monkeypatch: pytest.MonkeyPatch) -
         read_recording([SourceFile.of_bytes("letter.txt", b"Dear reader,")])
 
 
-def test_the_exercises_name_files_that_exist() -> None:
+def _hold_first(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """A made-up filter: orientations as usual, but every segment stays as it was at the start."""
+    fused = orient_segments(analysis, config).fused
+    assert fused is not None
+    held = {segment: np.repeat(q[:1], len(q), axis=0) for segment, q in fused.q.items()}
+    return replace(analysis, fused=replace(fused, q=held))
+
+
+def test_a_filter_in_a_recipe_is_what_later_stages_take() -> None:
+    source = simulate_scenario("comfortable", 1, worn=("foot_l", "foot_r")).recording
+    held = PipelineStage("orientation", 0.1, _hold_first, ("fused",), ("fusion",))
+    recipe = tuple(held if stage is ORIENTATION else stage for stage in WALK)
+    usual = run_stages(Analysis(source, PipelineConfig(), ""), WALK[:5], say_nothing)
+    still = run_stages(Analysis(source, PipelineConfig(), ""), recipe[:5], say_nothing)
+    assert usual.contacts is not None
+    assert still.contacts is not None
+    assert len(usual.contacts.events.events) > 20
+    assert still.contacts.events.events == ()
+
+
+def _count_rests(analysis: Analysis, config: PipelineConfig) -> Analysis:
+    """A made-up protocol's own step: it says how often the person stood still."""
+    assert analysis.quality is not None
+    said = Notice("stood", f"Stood still {len(analysis.quality.rest)} times.", severity="error")
+    return replace(analysis, problem=said)
+
+
+def test_a_protocol_is_a_tuple_of_stages_that_the_loop_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    standing = (*SIGNALS, PipelineStage("rests", 0.5, _count_rests, ("problem",)))
+    monkeypatch.setattr(recipes, "choose_recipe", lambda analysis: standing)
+    told: list[str] = []
+    source = simulate_scenario("comfortable", 1, worn=("foot_l", "foot_r")).recording
+    found = analyse(source, progress=lambda stage, share: told.append(stage))
+    assert told[:3] == ["timeline", "quality", "rests"]
+    assert found.problem is not None
+    assert found.problem.code == "stood"
+
+
+def test_there_is_an_exercise_for_each() -> None:
     text = (ROOT / "docs" / "contributing.md").read_text("utf-8")
-    for heading in ("Add a parameter", "Add a reader"):
+    for heading in ("Add a parameter", "Add a reader", "Add a filter", "Add a protocol"):
         assert f"## {heading}\n" in text
 
 
