@@ -31,7 +31,7 @@ MARKED: Final = ("accuracy", "bench", "browser", "faults")
 """Folders of long tests; each is a mark of the same name."""
 FIRST: Final = "pytest.mark.first"
 """Written in the files of long folders that have a test for every run; the others are not imported then."""
-ORDER: Final = ("core", "server", "test_", "accuracy", "acceptance", "faults", "browser", "bench")
+ORDER: Final = ("core", "server", "web", "test_", "accuracy", "acceptance", "faults", "browser", "bench")
 """Which tests come first: what a change breaks is seen in the first seconds."""
 
 

@@ -29,8 +29,11 @@ HEARD = """() => {
 
 PIXELS = """([tag, token]) => {
   const canvas = document.querySelector(`${tag} canvas`), g = canvas.getContext('2d');
-  const probe = document.createElement('canvas').getContext('2d');
-  probe.fillStyle = getComputedStyle(document.documentElement).getPropertyValue(`--${token}`);
+  const probe = document.createElement('canvas').getContext('2d'), named = document.createElement('span');
+  document.body.append(named);
+  named.style.color = `var(--${token})`;
+  probe.fillStyle = getComputedStyle(named).color;
+  named.remove();
   probe.fillRect(0, 0, 1, 1);
   const [r, gr, b] = probe.getImageData(0, 0, 1, 1).data;
   const d = g.getImageData(0, 0, canvas.width, canvas.height).data;

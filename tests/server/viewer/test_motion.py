@@ -61,12 +61,11 @@ def test_left_and_right_have_the_colours_of_the_charts(motion: Motion) -> None:
     assert motion.batches["bones"].tint[:4] == ("left", "left", "right", "right")
     assert motion.batches["shoes"].tint == ("left", "right")
     tokens = (ROOT / "web/static/css/tokens.css").read_text()
-    light, dark = tokens.split(':root[data-theme="dark"] {')[:2]
-    for theme, text in ((False, light), (True, dark)):
-        for side in SIDES:
-            named = re.search(rf"--{side}: (#\w+);", text)
-            assert named
-            assert named[1] == "#{:02X}{:02X}{:02X}".format(*TINTS[theme][side])
+    for side in SIDES:
+        named = re.search(rf"--{side}: light-dark\((#\w+), (#\w+)\);", tokens)
+        assert named
+        for dark in (False, True):
+            assert named[1 + dark] == "#{:02X}{:02X}{:02X}".format(*TINTS[dark][side])
 
 
 def test_soles_stand_on_the_floor(motion: Motion) -> None:

@@ -1,5 +1,7 @@
 // A canvas chart: sharp on every screen, coloured by the design tokens, drawn at most once per animation frame.
 // Heights and widths come from the stylesheet; a change of the theme draws again.
+import { resolveColours } from "../common/colours.js";
+
 const NAMES = [
   "surface", "ink", "ink-2", "ink-3", "axis", "grid", "zero", "left", "left-ink", "right",
   "right-ink", "target", "target-line", "ok", "warn", "bad", "control", "accent", "line-2",
@@ -11,15 +13,16 @@ export const DASH = [6, 3.5]; // the right side, as --dash-right
 
 export class Plot extends HTMLElement {
   #asked = false;
+  #colours = null;
 
   connectedCallback() {
     this.canvas = this.querySelector("canvas");
     this.sized = new ResizeObserver(() => this.ask());
     this.sized.observe(this.canvas);
-    this.themed = new MutationObserver(() => this.ask());
+    this.themed = new MutationObserver(() => this.#recolour());
     this.themed.observe(document.documentElement, { attributeFilter: ["data-theme"] });
     this.scheme = matchMedia("(prefers-color-scheme: dark)");
-    this.onScheme = () => this.ask();
+    this.onScheme = () => this.#recolour();
     this.scheme.addEventListener("change", this.onScheme);
     this.ask();
   }
@@ -28,6 +31,11 @@ export class Plot extends HTMLElement {
     this.sized.disconnect();
     this.themed.disconnect();
     this.scheme.removeEventListener("change", this.onScheme);
+  }
+
+  #recolour() {
+    this.#colours = null;
+    this.ask();
   }
 
   ask() {
@@ -47,12 +55,11 @@ export class Plot extends HTMLElement {
       this.canvas.width = Math.round(width * ratio);
       this.canvas.height = Math.round(height * ratio);
     }
-    const style = getComputedStyle(this);
-    const colour = Object.fromEntries(NAMES.map((n) => [n, style.getPropertyValue(`--${n}`).trim()]));
+    const colour = (this.#colours ??= resolveColours(this, NAMES));
     const g = this.canvas.getContext("2d");
     g.setTransform(ratio, 0, 0, ratio, 0, 0);
     g.clearRect(0, 0, width, height);
-    g.font = `${FONT_PX}px ${style.fontFamily}`;
+    g.font = `${FONT_PX}px ${getComputedStyle(this).fontFamily}`;
     g.lineJoin = "round";
     this.draw(g, { width, height, colour });
   }
