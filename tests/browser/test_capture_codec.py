@@ -68,7 +68,7 @@ def test_a_batch_has_the_bytes_that_the_server_would_write(blank: Page, offsets:
     batch = Batch(3, 2**40 + 7, 1_795_000_000_123_456, 1_795_000_000_200_001, samples, late)
     made = run(
         blank,
-        "live/wire.js",
+        "common/wire.js",
         """return text(m.encodeBatch({ stream: 3, seq: 2 ** 40 + 7, t0Us: 1795000000123456, nImu: 7,
           sentUs: 1795000000200001, samples: new Float32Array(bytes(a.samples).buffer),
           offsetsUs: a.offsets && Uint32Array.from(a.offsets) }));""",
@@ -82,7 +82,7 @@ def test_a_batch_of_the_server_is_read_back(blank: Page) -> None:
     frame = encode_batch(Batch(1, 5, 10, 20, samples, np.array([0, 11], np.uint32)))
     read = run(
         blank,
-        "live/wire.js",
+        "common/wire.js",
         "const b = m.decodeBatch(bytes(a));"
         " return { ...b, samples: [...b.samples], offsetsUs: [...b.offsetsUs] };",
         b64(frame),
@@ -95,7 +95,7 @@ def test_a_batch_of_the_server_is_read_back(blank: Page) -> None:
     broken[40] ^= 1
     said = run(
         blank,
-        "live/wire.js",
+        "common/wire.js",
         "try { m.decodeBatch(bytes(a)); return 'read'; } catch (e) { return e.message; }",
         b64(bytes(broken)),
     )
@@ -108,8 +108,8 @@ def test_a_saved_rest_is_a_recording_that_the_server_reads(blank: Page) -> None:
     frames = [encode_batch(Batch(0, n + 60, n * 50_000, n * 50_000, samples[n])) for n in range(40)]
     made = run(
         blank,
-        "live/wire.js",
-        "const { Sha256 } = await import('/static/js/live/sha256.js');"
+        "common/wire.js",
+        "const { Sha256 } = await import('/static/js/common/sha256.js');"
         "const hash = new Sha256(), frames = a.frames.map(bytes);"
         "for (const frame of frames) hash.update(m.payload(frame));"
         "const parts = m.logParts({ ...a.hello, token: 'secret' }, frames, hash.hex());"
@@ -129,7 +129,7 @@ def test_a_saved_rest_is_a_recording_that_the_server_reads(blank: Page) -> None:
 def test_the_browsers_scan_of_a_log_stops_where_the_servers_does(blank: Page) -> None:
     whole = b"SAGLIVE1\n" + record("H", json.dumps(HELLO).encode()) + record("B", b"x" * 50)
     for cut in (9, 30, len(whole) - 1, len(whole)):
-        kinds = run(blank, "live/wire.js", "return m.scanLog(bytes(a)).map((r) => r.kind);", b64(whole[:cut]))
+        kinds = run(blank, "common/wire.js", "return m.scanLog(bytes(a)).map((r) => r.kind);", b64(whole[:cut]))
         assert kinds == [r.kind for r in scan(whole[:cut])[0]]
 
 
@@ -138,7 +138,7 @@ def test_sha256_goes_on_from_a_saved_state(blank: Page) -> None:
     for length in (0, 1, 55, 56, 63, 64, 65, 119, 128, 10_000):
         found = run(
             blank,
-            "live/sha256.js",
+            "common/sha256.js",
             """const all = bytes(a); let hash = new m.Sha256(), step = 1;
             for (let at = 0; at < all.length; step = (step * 5) % 211 + 1) {
               hash.update(all.subarray(at, at += step));

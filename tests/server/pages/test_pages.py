@@ -137,7 +137,7 @@ async def test_every_page_assumes_the_same_height(clinic: Clinic) -> None:
 
 def test_tablet_and_therapist_are_told_to_stand_as_long_as_the_server_waits() -> None:
     static = ROOT / "web" / "static" / "js"
-    (told,) = re.findall(r"STAND_S = (\d+)", (static / "standing.js").read_text())
+    (told,) = re.findall(r"STAND_S = (\d+)", (static / "common/standing.js").read_text())
     assert float(told) == CalibratingParams().stand_s
     by_hand = [
         path.name

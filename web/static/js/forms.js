@@ -1,5 +1,5 @@
 // Forms that speak to the API, dialogs, whole-row links and back buttons: behaviour by data attributes, for every page.
-import { request, showProblem } from "./api.js";
+import { request, showProblem } from "./common/api.js";
 
 const TYPES = { int: (v) => parseInt(v, 10), float: (v) => parseFloat(v.replace(",", ".")), bool: (v) => v === "true" };
 
@@ -17,7 +17,9 @@ function values(form) {
 }
 
 // "config.poses.estimator" goes three levels deep.
-function put(body, [first, ...rest], value) {
+/** @param {string[]} path */
+function put(body, path, value) {
+  const [first, ...rest] = path;
   if (rest.length) put((body[first] ??= {}), rest, value);
   else body[first] = value;
 }

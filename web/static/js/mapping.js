@@ -1,19 +1,12 @@
 // <sensor-map>: which sensor is on which segment. The selects are the truth; the body is a second way to set them.
-import { request, showProblem } from "./api.js";
+import { request, showProblem } from "./common/api.js";
+import { s } from "./common/elements.js";
+import { SIDE_KEY, SIDE_LETTER, sideOf } from "./common/words.js";
 
-const SVG = "http://www.w3.org/2000/svg";
 const PLACES = {
   pelvis: [150, 236], thigh_r: [121, 312], thigh_l: [179, 312], shank_r: [123, 412], shank_l: [177, 412],
   foot_r: [116, 484], foot_l: [184, 484], chest: [150, 130],
 };
-const sideOf = (segment) => (segment.endsWith("_l") ? "l" : segment.endsWith("_r") ? "r" : "");
-
-function node(name, attributes, parent) {
-  const el = document.createElementNS(SVG, name);
-  for (const [k, v] of Object.entries(attributes)) el.setAttribute(k, v);
-  parent.append(el);
-  return el;
-}
 
 class SensorMap extends HTMLElement {
   connectedCallback() {
@@ -52,7 +45,7 @@ class SensorMap extends HTMLElement {
     for (const row of this.rows) {
       const select = row.querySelector("select");
       const side = sideOf(select.value);
-      if (side) select.value = select.value.slice(0, -1) + (side === "l" ? "r" : "l");
+      if (side) select.value = select.value.slice(0, -1) + (side === "left" ? "r" : "l");
     }
     this.draw();
   }
@@ -74,14 +67,14 @@ class SensorMap extends HTMLElement {
   }
 
   draw() {
-    const focused = this.layer.contains(document.activeElement) ? document.activeElement.dataset.segment : null;
+    const focused = this.layer.contains(document.activeElement) ? document.activeElement.getAttribute("data-segment") : null;
     const worn = new Map();
     const clashes = new Set();
     for (const row of this.rows) {
       const segment = this.segment(row);
       const side = row.querySelector("[data-side]");
-      side.className = `lr ${sideOf(segment) || "none"}`;
-      side.textContent = sideOf(segment).toUpperCase() || "–";
+      side.className = `lr ${SIDE_KEY[sideOf(segment)] ?? "none"}`;
+      side.textContent = SIDE_LETTER[sideOf(segment)] ?? "–";
       row.classList.toggle("unused", !segment);
       if (!segment) continue;
       if (worn.has(segment)) clashes.add(segment);
@@ -94,31 +87,38 @@ class SensorMap extends HTMLElement {
   }
 
   mark(segment, x, y, row, clash) {
-    const g = node("g", { class: "slotg", tabindex: 0, role: "button", "data-segment": segment }, this.layer);
-    node("circle", { class: "hit", cx: x, cy: y, r: 26 }, g);
-    if (row) {
-      const on = row === this.selected ? " on" : "";
-      g.setAttribute("class", `sens ${sideOf(segment) || "c"}${clash ? " warn" : ""}${on}`);
-      g.setAttribute("aria-label", `${this.name(segment)}: sensor ${row.dataset.number}`);
-      node("rect", { x: x - 14, y: y - 14, width: 28, height: 28, rx: 7 }, g);
-      node("text", { x, y: y + 4.5, "text-anchor": "middle" }, g).textContent = row.dataset.number;
-    } else {
-      g.setAttribute("aria-label", `${this.name(segment)}: no sensor`);
-      node("rect", { class: "slot", x: x - 13, y: y - 13, width: 26, height: 26, rx: 6 }, g);
-    }
-    g.addEventListener("click", () => this.place(segment));
-    g.addEventListener("keydown", (e) => {
+    const on = row && row === this.selected ? " on" : "";
+    const kind = row ? `sens ${SIDE_KEY[sideOf(segment)] ?? "c"}${clash ? " warn" : ""}${on}` : "slotg";
+    const what = row ? `sensor ${row.dataset.number}` : "no sensor";
+    const marks = row
+      ? [
+          s("rect", { x: x - 14, y: y - 14, width: 28, height: 28, rx: 7 }),
+          s("text", { x, y: y + 4.5, "text-anchor": "middle" }, row.dataset.number),
+        ]
+      : [s("rect", { class: "slot", x: x - 13, y: y - 13, width: 26, height: 26, rx: 6 })];
+    const act = (e) => {
       if (e.key !== "Enter" && e.key !== " ") return;
       e.preventDefault();
       this.place(segment);
-    });
+    };
+    this.layer.append(
+      s(
+        "g",
+        {
+          class: kind, tabindex: 0, role: "button", "data-segment": segment, "aria-label": `${this.name(segment)}: ${what}`,
+          onclick: () => this.place(segment), onkeydown: act,
+        },
+        s("circle", { class: "hit", cx: x, cy: y, r: 26 }),
+        ...marks,
+      ),
+    );
   }
 
   report(worn, clashes) {
     const clash = this.querySelector("[data-clash]");
     clash.hidden = clashes.size === 0;
     if (clashes.size) {
-      clash.querySelector("[data-title]").textContent = `Two sensors on one segment: ${[...clashes].map((s) => this.name(s)).join(", ")}`;
+      clash.querySelector("[data-title]").textContent = `Two sensors on one segment: ${[...clashes].map((segment) => this.name(segment)).join(", ")}`;
       clash.querySelector("[data-detail]").textContent = "A segment carries one sensor. Set the other one to Not used.";
     }
     if (this.ask) {
@@ -158,7 +158,9 @@ class SensorMap extends HTMLElement {
   }
 }
 // "subject.shoe.back_m" goes three levels deep; a field left empty takes its place away.
-function put(into, [first, ...rest], value) {
+/** @param {string[]} path */
+function put(into, path, value) {
+  const [first, ...rest] = path;
   if (rest.length) {
     const inner = into[first] ?? {};
     put(inner, rest, value);

@@ -1,5 +1,5 @@
 // The form of a feedback prescription: targets of this person as one chooses, and one JSON record at the end.
-import { request, showProblem } from "./api.js";
+import { request, showProblem } from "./common/api.js";
 
 const form = document.getElementById("prescription");
 const base = `/api/v1/patients/${form.dataset.patient}`;
@@ -82,7 +82,7 @@ function quantity(mean, sd) {
 }
 
 form.addEventListener("change", (e) => {
-  if (e.target.name === "parameter" || e.target.name === "side") offer();
+  if (e.target.matches("[name=parameter], [name=side]")) offer();
   arrange();
 });
 

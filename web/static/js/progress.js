@@ -1,5 +1,5 @@
 // <job-progress job="…" done="/where"> follows one job by server-sent events: stage names, bar, cancel.
-import { request, showProblem } from "./api.js";
+import { request, showProblem } from "./common/api.js";
 
 const ENDS = new Set(["done", "failed", "cancelled"]);
 

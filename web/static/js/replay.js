@@ -24,7 +24,7 @@ class GaitView extends HTMLElement {
     this.tries = 0;
     this.onTick = () => this.request();
     clock.addEventListener("tick", this.onTick);
-    const recolour = () => this.tell({ dark: isDark() });
+    const recolour = () => this.tell({ dark: String(isDark()) });
     new MutationObserver(recolour).observe(document.documentElement, { attributeFilter: ["data-theme"] });
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
     this.options = this.parentElement.querySelector("[data-options]");
@@ -46,7 +46,7 @@ class GaitView extends HTMLElement {
 
   connect() {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
-    const query = new URLSearchParams({ tab: tabId(), dark: isDark() });
+    const query = new URLSearchParams({ tab: tabId(), dark: String(isDark()) });
     if (this.dataset.ghost) query.set("ghost", this.dataset.ghost);
     this.socket = new WebSocket(`${scheme}://${location.host}${this.getAttribute("replay")}?${query}`);
     this.socket.onmessage = (e) => this.receive(JSON.parse(e.data));

@@ -1,10 +1,11 @@
 // <take-timeline>: strides, events and signals over one stretch of time; every change goes to the server, and
 // what depends on it is drawn again from the answer.
-import { showProblem } from "./api.js";
+import { showProblem } from "./common/api.js";
 import { clock } from "./clock.js";
 import { ticks } from "./timeline/axis.js";
 import { askEvent, askReason } from "./timeline/dialogs.js";
-import { WORD, h, seconds } from "./timeline/dom.js";
+import { h } from "./common/elements.js";
+import { WORD, seconds } from "./timeline/words.js";
 import { drag, follow, wheel } from "./timeline/gestures.js";
 import { EventHandles } from "./timeline/handles.js";
 import { SignalLane } from "./timeline/lane.js";
@@ -29,7 +30,7 @@ class TakeTimeline extends HTMLElement {
     this.win.addEventListener("move", () => this.moved());
     clock.addEventListener("tick", () => this.ticked());
     this.review.addEventListener("change", () => this.changed());
-    this.review.addEventListener("busy", () => this.setAttribute("aria-busy", this.review.busy));
+    this.review.addEventListener("busy", () => this.setAttribute("aria-busy", String(this.review.busy)));
     await this.attempt(() => this.review.load());
     this.start();
   }
@@ -266,7 +267,7 @@ class TakeTimeline extends HTMLElement {
     const began = performance.now();
     if (!(await this.attempt(act))) return this.panel(); // fields show again what holds
     await this.attempt(() => this.numbers());
-    this.dataset.took = Math.round(performance.now() - began);
+    this.dataset.took = String(Math.round(performance.now() - began));
     const used = this.review.strides.filter((s) => s.used).length;
     this.find("said").textContent = `${said} ${used} of ${this.review.strides.length} strides count.`;
   }

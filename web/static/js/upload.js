@@ -1,5 +1,5 @@
 // <upload-area>: files, folders and zips to the session, two at a time, each with its own progress; then the inspection.
-import { request, showProblem, Problem } from "./api.js";
+import { request, showProblem, Problem } from "./common/api.js";
 
 const PARALLEL = 2;
 const mb = (n) => `${(n / 1e6).toFixed(n < 1e7 ? 1 : 0)} MB`;
@@ -59,7 +59,7 @@ class UploadArea extends HTMLElement {
 
   add(files) {
     const hidden = /(^|\/)(\.|Thumbs\.db$|desktop\.ini$|__MACOSX\/)/; // system litter of folders, never a recording
-    for (const f of files.filter((f) => !hidden.test(f.name))) {
+    for (const f of files.filter((file) => !hidden.test(file.name))) {
       const row = document.createElement("li");
       row.innerHTML = `<svg class="ico" aria-hidden="true"><use href="#i-file"/></svg><span class="grow"><b class="wrapany"></b>
         <progress max="1" value="0"></progress><span class="xs dim" data-say>Waiting</span></span>

@@ -1,6 +1,6 @@
 // The tablet's socket (docs/live-protocol.md): says hello, sends what the outbox holds from where the server stands,
 // lets go of what is acknowledged, and connects again with growing pauses until the take is finished.
-import { PROTOCOL } from "../live/wire.js";
+import { PROTOCOL } from "../common/wire.js";
 
 const PAUSES_S = [0.25, 0.5, 1, 2, 4, 8];
 const SILENCE_MS = 4000; // a network that is gone is noticed by missing acknowledgements, long before the browser says so
@@ -10,6 +10,10 @@ const LATE_S = 1; // signal made while the end was on its way is no loss
 const FINAL = { 1009: "refused", 4400: "refused", 4401: "token", 4410: "ended", 4412: "replaced" };
 
 export class Link {
+  /**
+   * @param {import("./outbox.js").Outbox} outbox
+   * @param {{ onchange?: (state: string) => void, onmessage?: (message: object) => void }} [listeners]
+   */
   constructor(outbox, { onchange = () => {}, onmessage = () => {} } = {}) {
     this.outbox = outbox;
     this.onchange = onchange;

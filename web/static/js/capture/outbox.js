@@ -1,7 +1,7 @@
 // What the tablet holds of one take, in IndexedDB: every batch is stored before it is sent and kept until the server
 // has acknowledged it; the running hash is stored with it, so that a reload can go on and finish.
-import { encodeBatch, payload } from "../live/wire.js";
-import { Sha256 } from "../live/sha256.js";
+import { encodeBatch, payload } from "../common/wire.js";
+import { Sha256 } from "../common/sha256.js";
 
 const NAME = "sagittal-capture";
 const IN_MEMORY = 512; // batches kept besides, so that sending need not read back what was just written
@@ -61,7 +61,7 @@ export class Outbox {
     this.writing = null;
     this.problem = null; // the storage refused: {name}
     this.onstored = () => {};
-    this.onproblem = () => {};
+    this.onproblem = (_problem) => {};
   }
 
   get acked() { return this.record.acked; }

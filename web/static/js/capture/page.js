@@ -1,6 +1,6 @@
 // <capture-page>: pair, place the sensors, record, hand over. States: loading, pairing, prepare, running, sending, done.
-import { Sha256 } from "../live/sha256.js";
-import { PROTOCOL, logParts, payload } from "../live/wire.js";
+import { Sha256 } from "../common/sha256.js";
+import { PROTOCOL, logParts, payload } from "../common/wire.js";
 import { alone, roomHours, stayAwake, tone } from "./device.js";
 import { Link } from "./link.js";
 import { remember } from "./mapping.js";

@@ -1,5 +1,5 @@
 // The code's form: a field, large keys that write into it, and the request when it is complete.
-import { request } from "../api.js";
+import { request } from "../common/api.js";
 
 const SPLIT = 3;
 export const grouped = (code) => [code.slice(0, SPLIT), code.slice(SPLIT)];

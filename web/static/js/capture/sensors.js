@@ -1,7 +1,8 @@
 // The list of sensors: where each is worn, how fast it sends, its battery and its state; a tap says where it is worn.
+import { SIDE_KEY, SIDE_LETTER, capitalise, sideOf, withoutSide } from "../common/words.js";
+
 const NEAR = 0.03;
 
-const sideOf = (segment) => (segment?.endsWith("_l") ? "l" : segment?.endsWith("_r") ? "r" : "");
 
 export class SensorList {
   constructor(root, { onplaced }) {
@@ -17,8 +18,7 @@ export class SensorList {
   // Part and side apart, as "Thigh" and L; the names of the server begin with the side.
   words(segment) {
     if (!segment) return "Not placed";
-    const name = this.names[segment].replace(/^(Left|Right) /, "");
-    return name[0].toUpperCase() + name.slice(1);
+    return capitalise(withoutSide(this.names[segment]));
   }
 
   shape(kind) {
@@ -39,8 +39,8 @@ export class SensorList {
     set(part("place"), String(number));
     set(part("segment"), this.words(sensor.segment));
     part("side").hidden = !side;
-    part("side").className = `lr ${side}`;
-    set(part("side"), side.toUpperCase());
+    part("side").className = `lr ${SIDE_KEY[side] ?? ""}`;
+    set(part("side"), SIDE_LETTER[side] ?? "");
     const name = sensor.label && sensor.label !== sensor.id ? `${sensor.label}, ${sensor.id}` : sensor.id;
     set(part("id"), [name, health.note].filter(Boolean).join(", "));
     // counted over two seconds a rate is good to a batch: nearer than that it is the one the sensor says

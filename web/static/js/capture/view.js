@@ -2,7 +2,8 @@
 import { grouped } from "./pairing.js";
 import { POSES } from "./sources/axes.js";
 import { SensorList } from "./sensors.js";
-import { STAND_S } from "../standing.js";
+import { STAND_S } from "../common/standing.js";
+import { formatClock } from "../common/words.js";
 import * as words from "./words.js";
 
 const ADD = { dot: "Add sensor", replay: "Other files" };
@@ -104,7 +105,7 @@ export class View {
     set(this.part("say"), say.title);
     set(this.part("say-more"), say.more);
     this.part("say-icon").setAttribute("href", `#i-${say.icon}`);
-    set(this.part("elapsed"), state === "running" && !paused ? words.clock(elapsedS) : "");
+    set(this.part("elapsed"), state === "running" && !paused ? formatClock(elapsedS, 1) : "");
   }
 
   // The first thing that is wrong, where nothing else was said.

@@ -1,5 +1,5 @@
 // What the page says: what to do now, and one sentence for what is wrong.
-import { STAND_S } from "../standing.js";
+import { STAND_S } from "../common/standing.js";
 
 // By the stage the server is at (its "state" messages); before the first one, by the time since the start.
 export function instruction(stage, elapsedS) {
@@ -103,8 +103,6 @@ export function sensorProblem(number, place, sensor, health, running) {
     detail: `Expected ${Math.round(Math.max(sensor.rateHz, 40))} samples a second, ${got}. ${running ? closer : wake}`,
   };
 }
-
-export const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 
 export function hours(value) {
   if (value === null) return "this tablet keeps the data until then";

@@ -76,7 +76,7 @@ export class Worn {
   restore(hello) {
     const all = hello.streams.flatMap((s) => s.sensors.map((x) => ({ ...x, rateHz: s.rate_hz })));
     const place = (sensor) => all.findIndex((x) => x.id === sensor.id);
-    if (this.kind !== "replay") this.sensors.sort((a, b) => (place(a) < 0) - (place(b) < 0) || place(a) - place(b));
+    if (this.kind !== "replay") this.sensors.sort((a, b) => Number(place(a) < 0) - Number(place(b) < 0) || place(a) - place(b));
     for (const sensor of this.sensors) {
       const known = all[place(sensor)];
       sensor.segment = known?.segment ?? null;

@@ -1,5 +1,5 @@
 // What came of the take: saved, being analysed, or nothing arrived. Leads to the session when the analysis is done.
-import { request } from "../api.js";
+import { request } from "../common/api.js";
 import { say } from "./words.js";
 
 export class After {

@@ -1,7 +1,8 @@
 // <live-calibration>: stand, then walk; what is waited for, how still each sensor is, what its axes came out as.
 import { cell, segmentCell, setState, shape, stateOf } from "./shapes.js";
-import { STAND_S } from "../standing.js";
-import { capital, number, say } from "./words.js";
+import { STAND_S } from "../common/standing.js";
+import { capitalise } from "../common/words.js";
+import { number, say } from "./words.js";
 
 const STEPS = 8; // straight steps, or
 const WALK_S = 12; // seconds of walking
@@ -83,7 +84,7 @@ class LiveCalibration extends HTMLElement {
       const title = document.createElement("b");
       title.textContent = n.title ?? n.of ?? "";
       const text = document.createElement("p");
-      text.textContent = capital(n.message ?? n.text ?? "");
+      text.textContent = capitalise(n.message ?? n.text ?? "");
       note.append(shape(n.severity === "bad" ? "bad" : "warn"), title, text);
       return note;
     }));

@@ -1,5 +1,5 @@
 // What is pressed on the live page, sent one after the other so that the server sees them in their order.
-import { request } from "../api.js";
+import { request } from "../common/api.js";
 
 export class Commands {
   constructor(api, failed) {
@@ -8,7 +8,7 @@ export class Commands {
     this.last = Promise.resolve();
   }
 
-  // t: the moment a mark means, in the time of the frames.
+  // t: the moment a mark means, in the time of the frames. Answers null when the server refused.
   send(command, value = null, t = null) {
     return this.#post(`${this.api}/commands`, { command, value, t_s: t });
   }
@@ -18,8 +18,12 @@ export class Commands {
     return this.#post(`${this.api}/close`, {});
   }
 
+  /** @returns {Promise<object | null>} */
   #post(path, body) {
-    this.last = this.last.then(() => request("POST", path, body)).catch((problem) => this.failed(problem));
+    this.last = this.last.then(() => request("POST", path, body)).catch((problem) => {
+      this.failed(problem);
+      return null;
+    });
     return this.last;
   }
 }

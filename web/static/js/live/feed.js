@@ -3,9 +3,12 @@
 const RETRY_MS = [250, 500, 1000, 2000, 5000];
 export const STALE_MS = 500; // live feedback pauses when data are older (docs/feedback.md)
 const CHECK_MS = 100;
-export const KEPT = 60; // strides and cues kept of each; the strip shows 20
+const KEPT = 60; // strides and cues kept of each; the strip shows 20
 
 export class Feed extends EventTarget {
+  clock = null;
+  timer = null;
+
   constructor(path) {
     super();
     this.path = path;

@@ -1,5 +1,5 @@
 // What is prescribed may change while a page waits; with its first sample a take keeps what is in force then.
-import { request } from "../api.js";
+import { request } from "../common/api.js";
 
 // Calls `changed` with the prescription in force when it is another than the page was made with.
 export async function whenOther(data, changed) {

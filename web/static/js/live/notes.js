@@ -1,4 +1,5 @@
 // The line of notes under the head: the tablet is lost, the server is lost, something was refused, the take was told of.
+import { h } from "../common/elements.js";
 import { shape } from "./shapes.js";
 
 const NOTICE_MS = 12000;
@@ -14,24 +15,15 @@ export class Notes {
     const same = this.shown.get(key);
     if (same?.dataset.said === title + text) return same;
     this.take(key);
-    const note = document.createElement("div");
-    note.className = `note ${kind}`;
-    note.dataset.said = title + text;
-    note.dataset.note = key;
-    const b = document.createElement("b"), p = document.createElement("p");
-    b.textContent = title;
-    p.textContent = text;
-    note.append(shape(kind === "" ? "none" : kind), b, p);
-    if (action) {
-      const acts = document.createElement("span"), button = document.createElement("button");
-      acts.className = "acts";
-      button.className = "btn sm";
-      button.type = "button";
-      button.dataset.do = action.do;
-      button.textContent = action.word;
-      acts.append(button);
-      note.append(acts);
-    }
+    const button = action && h("button", { class: "btn sm", type: "button", "data-do": action.do }, action.word);
+    const note = h(
+      "div",
+      { class: `note ${kind}`, "data-said": title + text, "data-note": key },
+      shape(kind === "" ? "none" : kind),
+      h("b", {}, title),
+      h("p", {}, text),
+      action ? h("span", { class: "acts" }, button) : null,
+    );
     this.shown.set(key, note);
     this.box.append(note);
     return note;

@@ -14,7 +14,8 @@ import { Top } from "./top.js";
 import { After } from "./after.js";
 import { Notes } from "./notes.js";
 import { inOrder } from "./sensors.js";
-import { clock, number, say } from "./words.js";
+import { formatClock } from "../common/words.js";
+import { number, say } from "./words.js";
 
 const data = JSON.parse(document.getElementById("live-data").textContent);
 const OVER = new Set(["finished", "closed"]);
@@ -31,7 +32,7 @@ class LivePage extends HTMLElement {
     this.pairing = new Pairing(part("pair"), api);
     this.top = new Top(this);
     this.strip = new StripCard(this.querySelector(".l-strip"), data, this.feed);
-    this.after = new After(part("over"), data.session);
+    this.ended = new After(part("over"), data.session);
     this.screen = new Screen(this, data.session);
     this.chart = this.querySelector("stride-chart");
     this.sensors = this.querySelector("live-sensors");
@@ -82,11 +83,11 @@ class LivePage extends HTMLElement {
     this.notes.estimate(state);
     if (OVER.has(state.state)) {
       this.view("over");
-      this.after.show(state, this.watched === state.take);
+      this.ended.show(state, this.watched === state.take);
       return;
     }
-    if (this.watched === undefined || (state.state === "streaming" && this.before !== "streaming")) whenOther(data, () => this.given());
-    this.before = state.state;
+    if (this.watched === undefined || (state.state === "streaming" && this.lastState !== "streaming")) whenOther(data, () => this.given());
+    this.lastState = state.state;
     this.watched = state.take;
     if (state.state === "streaming") {
       this.view(this.feed.frame?.stage === "running" ? "run" : "calibrate");
@@ -113,7 +114,7 @@ class LivePage extends HTMLElement {
     if (frame.stage === "running") this.chart.frame(frame);
     else this.calibration.show(frame.stage, frame.calibration, health, data.segments);
     this.top.delay(this.feed.delay);
-    this.screen.frame(frame);
+    this.screen.frame();
   }
 
   // Calibrated anew: what was drawn belongs to the old axes.
@@ -200,7 +201,7 @@ class LivePage extends HTMLElement {
   mark() {
     const dialog = this.querySelector("#mark-dialog"), input = dialog.querySelector("input");
     const t = this.feed.frame?.t ?? null;
-    say(dialog.querySelector("[data-mark-time]"), clock(t));
+    say(dialog.querySelector("[data-mark-time]"), formatClock(t));
     input.value = "";
     dialog.returnValue = "";
     dialog.onclose = () => { if (dialog.returnValue === "mark") this.commands.send("mark", input.value.trim() || null, t); };

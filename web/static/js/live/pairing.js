@@ -1,6 +1,7 @@
 // The take before anything streams: open it, show its code, count down, ask for a new one.
-import { request, showProblem } from "../api.js";
-import { code as grouped, clock, say } from "./words.js";
+import { request, showProblem } from "../common/api.js";
+import { formatClock } from "../common/words.js";
+import { code as grouped, say } from "./words.js";
 
 const TAKEN = new Set(["pairing", "open"]);
 
@@ -55,6 +56,6 @@ export class Pairing {
     if (this.ends === undefined || !out) return;
     if (this.ends === null) return say(out, "The code was shown when the take was opened. Ask for a new one.");
     const left = (this.ends - Date.now()) / 1000;
-    say(out, left > 0 ? `Valid for ${clock(left)}.` : "The code has expired. Ask for a new one.");
+    say(out, left > 0 ? `Valid for ${formatClock(left)}.` : "The code has expired. Ask for a new one.");
   }
 }

@@ -1,9 +1,9 @@
 // What the patient reads: short, positive, no numbers, no jargon.
-const capital = (text) => text[0].toUpperCase() + text.slice(1);
+import { capitalise } from "../common/words.js";
 
 export function what(prescription, term) {
   const name = term?.everyday || term?.label.toLowerCase() || "walk";
-  return capital(prescription.side ? `${prescription.side} ${name}` : name);
+  return capitalise(prescription.side ? `${prescription.side} ${name}` : name);
 }
 
 // The way to the zone, never what was wrong: "A little longer", "Longer".
@@ -11,10 +11,10 @@ export function wayTo(zone, term) {
   if (zone === "in") return "Good step";
   const [more, less] = term?.comparison ?? ["more", "less"];
   const to = zone.endsWith("low") ? more : less;
-  return zone.startsWith("near") ? `A little ${to}` : capital(to);
+  return zone.startsWith("near") ? `A little ${to}` : capitalise(to);
 }
 
-export const ends = (term) => (term?.comparison ?? ["more", "less"]).map(capital);
+export const ends = (term) => (term?.comparison ?? ["more", "less"]).map(capitalise);
 
 export const HELD = {
   waiting: ["One moment", "The sensors are getting ready."],

@@ -27,8 +27,8 @@ class PatientScreen extends HTMLElement {
     on("frame", (frame) => this.frame(frame));
     on("cue", (cue) => this.cue(cue));
     on("state", (state) => {
-      if (state.state === "streaming" && this.before !== "streaming") whenOther(data, () => this.anew());
-      this.before = state.state;
+      if (state.state === "streaming" && this.lastState !== "streaming") whenOther(data, () => this.anew());
+      this.lastState = state.state;
     });
     for (const type of ["state", "feedback", "fresh", "line"]) on(type, () => this.hold());
     this.feed.open();

@@ -6,10 +6,15 @@ const NAMES = [
   "surface", "ink", "ink-2", "ink-3", "axis", "grid", "zero", "left", "left-ink", "right",
   "right-ink", "target", "target-line", "ok", "warn", "bad", "control", "accent", "line-2",
 ];
-export const FONT_PX = 11;
+const FONT_PX = 11;
 export const MEAN_PX = 2.25;
 export const THIN_PX = 1;
 export const DASH = [6, 3.5]; // the right side, as --dash-right
+
+/**
+ * What is drawn into: the size in CSS pixels and the colours by the names of their tokens.
+ * @typedef {{ width: number, height: number, colour: Record<string, string> }} Ground
+ */
 
 export class Plot extends HTMLElement {
   #asked = false;
@@ -26,6 +31,13 @@ export class Plot extends HTMLElement {
     this.scheme.addEventListener("change", this.onScheme);
     this.ask();
   }
+
+  /**
+   * Draws everything; each chart has its own.
+   * @param {CanvasRenderingContext2D} _g
+   * @param {Ground} _ground
+   */
+  draw(_g, _ground) {}
 
   disconnectedCallback() {
     this.sized.disconnect();
@@ -65,7 +77,11 @@ export class Plot extends HTMLElement {
   }
 }
 
-// A polyline that breaks where a value is missing.
+/**
+ * A polyline that breaks where a value is missing.
+ * @param {CanvasRenderingContext2D} g
+ * @param {Iterable<[number, number | null]>} points
+ */
 export function trace(g, points) {
   g.beginPath();
   let pen = false;
@@ -80,7 +96,14 @@ export function trace(g, points) {
   g.stroke();
 }
 
-// Words over lines: a halo in the colour of the ground keeps them readable.
+/**
+ * Words over lines: a halo in the colour of the ground keeps them readable.
+ * @param {CanvasRenderingContext2D} g
+ * @param {string} text
+ * @param {number} x
+ * @param {number} y
+ * @param {{ colour: string, halo?: string, align?: CanvasTextAlign, bold?: boolean }} style
+ */
 export function label(g, text, x, y, { colour, halo, align = "left", bold = false }) {
   const font = g.font;
   if (bold) g.font = `600 ${font}`;

@@ -5,6 +5,9 @@ const RAMP_S = 0.012; // soft edges, so that nothing clicks that is not a tick
 const TICK_HZ = { left: 880, right: 660 }; // the two feet sound a fourth apart, so that they can be told
 
 export class Sound {
+  /** @type {AudioContext | undefined} */
+  context;
+
   constructor() {
     this.on = false;
     this.volume = 0.5;

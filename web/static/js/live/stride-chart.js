@@ -1,6 +1,7 @@
 // <stride-chart>: the stride being walked with the last ones, left solid, right dashed, the last thin.
 import { DASH, MEAN_PX, Plot, THIN_PX, label, trace } from "./plot.js";
-import { SHORT, number, say } from "./words.js";
+import { SIDE_KEY } from "../common/words.js";
+import { number, say } from "./words.js";
 
 const SIDES = ["left", "right"];
 const THIN = 3; // last strides drawn thin, of each side
@@ -36,7 +37,7 @@ class StrideChart extends Plot {
     if (!this.variable) return;
     const times = message.trace?.t ?? [];
     for (const side of SIDES) {
-      const s = SHORT[side];
+      const s = SIDE_KEY[side];
       const values = message.trace?.[`${this.variable.name}_${s}`];
       const list = this.samples[side];
       times.forEach((t, i) => list.push([t, values?.[i] ?? null]));
@@ -61,7 +62,7 @@ class StrideChart extends Plot {
 
   curve(stride) {
     const c = stride.curves_deg ?? {};
-    return c[this.variable.name] ?? c[`${this.variable.name}_${SHORT[stride.side]}`] ?? null;
+    return c[this.variable.name] ?? c[`${this.variable.name}_${SIDE_KEY[stride.side]}`] ?? null;
   }
 
   draw(g, { width, height, colour }) {

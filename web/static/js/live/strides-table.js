@@ -1,11 +1,12 @@
 // The last strides as rows: for the strip, and as a table twin for who does not see it.
+import { chip, h } from "../common/elements.js";
 import { cell } from "./shapes.js";
 import { SHOWN } from "./strip.js";
 import { withUnit } from "./words.js";
 
 const ZONE = { in: "in", near_low: "near", near_high: "near", low: "away", high: "away" };
-export const ZONE_WORDS = { in: "in the zone", near_low: "just below", near_high: "just above", low: "below", high: "above" };
-export const WHY = {
+const ZONE_WORDS = { in: "in the zone", near_low: "just below", near_high: "just above", low: "below", high: "above" };
+const WHY = {
   baseline: "first strides", retention: "retention test", off: "off", paused: "paused", stale: "no data", stopped: "ended",
   probe: "probe", faded: "faded out", positive_only: "not in the zone", bandwidth: "in the zone",
 };
@@ -29,15 +30,15 @@ export function rowsOf(feed, parameter, prescription) {
 
 export function fill(body, rows, term) {
   body.replaceChildren(...[...rows].reverse().map((r, i) => {
-    const tr = document.createElement("tr");
-    const side = cell("");
-    const chip = document.createElement("span");
-    chip.className = `lr ${r.side[0]}`;
-    chip.textContent = r.side[0].toUpperCase();
-    chip.title = r.side;
-    side.append(chip);
     const told = !r.cue ? "–" : r.cue.shown ? "yes" : `no, ${WHY[r.cue.why_not] ?? "not shown"}`;
-    tr.append(cell(i === 0 ? "now" : `${i} ago`, "n"), side, cell(withUnit(r.value, term), "n"), cell(r.cue ? ZONE_WORDS[r.cue.zone] : "–"), cell(told));
-    return tr;
+    return h(
+      "tr",
+      {},
+      cell(i === 0 ? "now" : `${i} ago`, "n"),
+      h("td", {}, chip(r.side)),
+      cell(withUnit(r.value, term), "n"),
+      cell(r.cue ? ZONE_WORDS[r.cue.zone] : "–"),
+      cell(told),
+    );
   }));
 }

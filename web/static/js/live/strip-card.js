@@ -6,7 +6,9 @@ import { asymmetry, say } from "./words.js";
 
 export class StripCard {
   constructor(root, data, feed) {
-    Object.assign(this, { root, data, feed });
+    this.root = root;
+    this.data = data;
+    this.feed = feed;
     this.strip = root.querySelector("target-strip");
     this.choice = root.querySelector("[data-strip-of]");
     for (const name of data.choices) this.choice.add(new Option(data.terms[name].label, name));

@@ -8,10 +8,20 @@ const EDGE = { left: 44, right: 64, top: 10, bottom: 42 };
 const MARK = 6.5;
 
 class TargetStrip extends Plot {
-  // rows: [{value, kind: in|near|away|left|right|none, cued, cue}] oldest first; zone: [low, high] of the next stride
-  // or null. A stride was judged by the zone of its cue, so the band steps where the level changed.
+  /** @typedef {{ value: number | null, kind: string, cued: boolean, cue: any }} Row */
+  /** @type {Row[] | undefined} */
+  rows;
+
+  /**
+   * A stride was judged by the zone of its cue, so the band steps where the level changed.
+   * @param {Row[]} rows oldest first; kind: in, near, away, left, right or none
+   * @param {[number, number] | null} zone of the next stride, low and high
+   * @param {number} digits
+   */
   show(rows, zone, digits) {
-    Object.assign(this, { rows, zone, digits });
+    this.rows = rows;
+    this.zone = zone;
+    this.digits = digits;
     this.ask();
   }
 
@@ -25,9 +35,13 @@ class TargetStrip extends Plot {
     return [low - room, high + room];
   }
 
-  // The zone of each of the places, oldest first; none without a target.
+  /**
+   * The zone of each of the places, oldest first; none without a target.
+   * @returns {[number, number][]}
+   */
   zones() {
     if (!this.zone) return [];
+    /** @type {([number, number] | null)[]} */
     const known = this.rows.map((r) => (r.cue ? [r.cue.zone_low, r.cue.zone_high] : null));
     let last = this.zone;
     for (let i = known.length - 1; i >= 0; i--) last = known[i] ??= last;
@@ -60,8 +74,9 @@ class TargetStrip extends Plot {
       }
     });
     const under = EDGE.top + h + 30;
-    for (const [i, text] of [[0, `${SHOWN} ago`], [5, "15"], [10, "10"], [15, "5"], [SHOWN - 1, "now"]])
-      label(g, text, X(i), under, { colour: colour.axis, align: "center" });
+    const places = { 0: `${SHOWN} ago`, 5: "15", 10: "10", 15: "5", [SHOWN - 1]: "now" };
+    for (const [i, text] of Object.entries(places))
+      label(g, text, X(Number(i)), under, { colour: colour.axis, align: "center" });
     if (this.rows.some((r) => r.cued)) label(g, "feedback", EDGE.left + w + 8, tick + 4, { colour: colour.axis });
   }
 

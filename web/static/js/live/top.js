@@ -1,7 +1,8 @@
 // The bar on top and the one below: recording time, delay, Start, STOP, pause, the last mark.
 import { STALE_MS } from "./feed.js";
 import { setState } from "./shapes.js";
-import { clock, number, say } from "./words.js";
+import { formatClock } from "../common/words.js";
+import { number, say } from "./words.js";
 
 // Sample to screen. Within a tenth of a second it feels at once (Card, Robertson & Mackinlay 1991, CHI: 0.1 s); from
 // STALE_MS on it is stale.
@@ -31,7 +32,7 @@ export class Top {
     this.button("stop").hidden = !running;
     const marks = state.marks ?? [], last = marks.at(-1);
     this.button("undo").disabled = !last;
-    say(this.at("last-mark"), last ? `Last mark: ${last.value ? `“${last.value}”, ` : ""}${clock(last.t_s)}` : "");
+    say(this.at("last-mark"), last ? `Last mark: ${last.value ? `“${last.value}”, ` : ""}${formatClock(last.t_s)}` : "");
     this.tick();
   }
 
@@ -49,6 +50,6 @@ export class Top {
   }
 
   tick() {
-    if (this.now) say(this.at("elapsed"), clock(this.now.elapsed + (performance.now() - this.now.at) / 1000));
+    if (this.now) say(this.at("elapsed"), formatClock(this.now.elapsed + (performance.now() - this.now.at) / 1000));
   }
 }

@@ -1,8 +1,4 @@
-// Numbers, sides and times as the live pages write them: a real minus, no negative zero, a dash where nothing is.
-export const SIDE = { left: "left", right: "right" };
-export const LETTER = { left: "L", right: "R" };
-export const SHORT = { left: "l", right: "r" };
-
+// Numbers as the live pages write them: a real minus, no negative zero, a dash where nothing is.
 export function number(value, digits = 0) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const text = value.toFixed(digits);
@@ -14,13 +10,6 @@ export function withUnit(value, term) {
   if (text === "–" || !term?.unit) return text;
   return term.unit === "°" ? `${text}°` : `${text}\u2009${term.unit}`;
 }
-
-export function clock(seconds) {
-  const s = Math.max(0, Math.floor(seconds ?? 0));
-  return `${String(Math.floor(s / 60)).padStart(2, "0")}:${String(s % 60).padStart(2, "0")}`;
-}
-
-export const capital = (text) => (text ? text[0].toUpperCase() + text.slice(1) : "");
 
 // "47K29M" as two groups of three.
 export const code = (text) => `${text.slice(0, 3)} ${text.slice(3)}`;

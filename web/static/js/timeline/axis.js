@@ -1,5 +1,6 @@
 // Ticks of the time axis, as many as there is room for.
-import { h, seconds } from "./dom.js";
+import { h } from "../common/elements.js";
+import { seconds } from "./words.js";
 
 const STEPS_S = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200];
 const ROOM_PX = 70;

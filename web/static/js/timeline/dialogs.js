@@ -1,5 +1,5 @@
 // The two questions of the timeline: why a stride is left out, and which event is added where.
-import { seconds } from "./dom.js";
+import { seconds } from "./words.js";
 
 export function askReason(stride, answer) {
   const dialog = document.getElementById("leave-out");

@@ -1,6 +1,8 @@
 // Event handles of one foot: drag, arrow keys, Delete. A handle is a slider whose value is a time.
 import { clock } from "../clock.js";
-import { LETTER, WORD, h, s, seconds } from "./dom.js";
+import { SIDE_KEY } from "../common/words.js";
+import { h, s } from "../common/elements.js";
+import { WORD, seconds } from "./words.js";
 
 const CLOSE_PX_PER_S = 42; // below it handles would lie on each other; the blocks alone are shown
 const APART_S = 0.051; // the server refuses less than 50 ms between two events of a foot
@@ -14,7 +16,14 @@ function origin(event) {
 
 export class EventHandles {
   constructor(host, side, { win, review, editable, onMove, onDelete, onPick }) {
-    Object.assign(this, { host, side, win, review, editable, onMove, onDelete, onPick });
+    this.host = host;
+    this.side = side;
+    this.win = win;
+    this.review = review;
+    this.editable = editable;
+    this.onMove = onMove;
+    this.onDelete = onDelete;
+    this.onPick = onPick;
     this.made = new Map();
     win.addEventListener("move", () => this.show());
   }
@@ -44,7 +53,7 @@ export class EventHandles {
 
   make(event) {
     const handle = h("div", {
-      class: `ev ${event.kind} ${LETTER[this.side]}${event.source === "manual" ? " manual" : ""}`,
+      class: `ev ${event.kind} ${SIDE_KEY[this.side]}${event.source === "manual" ? " manual" : ""}`,
       role: "slider",
       tabindex: "0",
       "aria-label": `${this.side} ${WORD[event.kind]}`,

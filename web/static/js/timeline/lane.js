@@ -1,6 +1,8 @@
 // One signal over time. The whole take is loaded once, thinned; a closer look loads its own window with margins.
-import { request } from "../api.js";
-import { LETTER, h, s, seconds } from "./dom.js";
+import { request } from "../common/api.js";
+import { SIDE_KEY, SIDE_LETTER } from "../common/words.js";
+import { h, s } from "../common/elements.js";
+import { seconds } from "./words.js";
 
 const MS = 1000;
 const COARSE_POINTS = 2000;
@@ -8,11 +10,14 @@ const WAIT_MS = 90;
 const DENSE_S = 0.08;
 const MARGIN = 1; // so many windows on each side are loaded along
 const CLASS = { left: "tl-l", right: "tl-r", both: "tl-x", x: "tl-x", y: "tl-y", z: "tl-z" };
-const SHORT = { left: "L", right: "R", both: "" };
+const SHORT = { ...SIDE_LETTER, both: "" };
 
 export class SignalLane {
   constructor(host, values, session, win) {
-    Object.assign(this, { host, values, win });
+    this.host = host;
+    this.values = values;
+    this.win = win;
+    this.top = this.bottom = 0;
     this.path = `/api/v1/sessions/${session}/signals`;
     this.group = s("g");
     this.svg = s("svg", { class: "chart tl-lines", preserveAspectRatio: "none", "aria-hidden": "true" }, this.group);
@@ -137,7 +142,7 @@ export class SignalLane {
     const parts = Object.entries(piece.low).map(([line, low]) => {
       const v = low[i];
       const text = v === null || v === undefined ? "–" : seconds(v, this.digits + (this.digits ? 0 : 1));
-      return h("span", { class: LETTER[line] ? `leg ${LETTER[line]}` : "" }, `${SHORT[line] ?? line} ${text}`);
+      return h("span", { class: SIDE_KEY[line] ? `leg ${SIDE_KEY[line]}` : "" }, `${SHORT[line] ?? line} ${text}`);
     });
     this.values.replaceChildren(...parts);
   }

@@ -1,5 +1,6 @@
 // What stands beside and below the drawing: the picked stride, the changes, and the table of strides in view.
-import { WORD, chip, h, icon, seconds } from "./dom.js";
+import { chip, h, icon } from "../common/elements.js";
+import { WORD, seconds } from "./words.js";
 
 const LISTED = 40;
 
@@ -27,7 +28,7 @@ function eventRow(stride, kind, label, time, { editable, review, onMove, onDelet
   const id = `t-${label.replaceAll(" ", "-").toLowerCase()}`;
   const event = time === null ? null : review.at(stride.side, kind, time);
   if (!event) return [h("span", { class: "small" }, label), h("span", { class: "small dim" }, "not found"), h("span")];
-  const field = h("input", { class: "input num", id, type: "number", step: "0.01", min: 0, value: event.time_s.toFixed(3), readonly: !editable });
+  const field = /** @type {HTMLInputElement} */ (h("input", { class: "input num", id, type: "number", step: "0.01", min: 0, value: event.time_s.toFixed(3), readonly: !editable }));
   field.addEventListener("change", () => {
     const to = Number(field.value);
     if (field.value === "" || Math.abs(to - event.time_s) < 0.0005) field.value = event.time_s.toFixed(3);

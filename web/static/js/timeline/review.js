@@ -1,5 +1,5 @@
 // Events, strides and edits as the server has them; every change is the server's answer, never a guess.
-import { request } from "../api.js";
+import { request } from "../common/api.js";
 
 export class Review extends EventTarget {
   constructor(session) {

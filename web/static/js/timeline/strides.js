@@ -1,5 +1,6 @@
 // Strides as blocks over time: stance full, swing pale, left out crossed. Drawn once, moved by the viewBox.
-import { LETTER, s } from "./dom.js";
+import { SIDE_KEY } from "../common/words.js";
+import { s } from "../common/elements.js";
 
 const MS = 1000; // the x axis of the drawing is in milliseconds, so that rounding is never seen
 
@@ -35,7 +36,7 @@ export class StrideBlocks {
 }
 
 function block(stride, index, top, height) {
-  const k = LETTER[stride.side];
+  const k = SIDE_KEY[stride.side];
   const faded = stride.used ? "" : " x";
   const [y, tall] = [top + height * 0.08, height * 0.84];
   const [start, end] = [stride.start_s * MS, stride.end_s * MS];

@@ -32,7 +32,8 @@ export class DeviceMotion {
 
   // Ask (iOS wants a tap for it) and listen; the axes are checked once per browser version.
   async add() {
-    if (DeviceMotionEvent.requestPermission && (await DeviceMotionEvent.requestPermission()) !== "granted") {
+    const motion = /** @type {any} */ (DeviceMotionEvent); // only iOS has to be asked
+    if (motion.requestPermission && (await motion.requestPermission()) !== "granted") {
       throw new Error("Motion was not allowed. Reload this page and allow it, or allow it in the browser's settings.");
     }
     let id = remembered(ID_KEY);

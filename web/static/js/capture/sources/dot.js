@@ -8,7 +8,7 @@ const LOW_BATTERY = 25;
 const SILENT_S = 2;
 const PAUSES_MS = [500, 1000, 2000, 4000];
 const SAME_CLOCK_US = 1e6; // after a reconnection the sensor's clock has gone on when it is this close to ours
-export const ACC_RANGE = 16 * 9.80665, GYR_RANGE = 2000 * (Math.PI / 180); // ±16 g and ±2000 °/s (Movella DOT data sheet)
+const ACC_RANGE = 16 * 9.80665, GYR_RANGE = 2000 * (Math.PI / 180); // ±16 g and ±2000 °/s (Movella DOT data sheet)
 
 // Why there is no Bluetooth here, in a sentence for people; null where there is.
 export function whyNot() {
@@ -23,6 +23,7 @@ const nowUs = () => (performance.timeOrigin + performance.now()) * 1000;
 export class Dot {
   kind = "dot";
 
+  /** @param {{ bluetooth?: any, onchange?: () => void, onbattery?: (levels: object) => void }} [options] */
   constructor({ bluetooth = navigator.bluetooth, onchange = () => {}, onbattery = () => {} } = {}) {
     this.bluetooth = bluetooth;
     this.onchange = onchange;

@@ -1,9 +1,9 @@
 // Movella DOT over Bluetooth: addresses and payloads (XD0506P, BLE Services Specifications rev F), little endian.
 // Every payload starts with the sensor's clock, uint32 µs, which starts again at 0 after 71.6 min.
-export const uuid = (short) => `1517${short.toString(16).padStart(4, "0")}-4947-11e9-8646-d663bd873d93`;
+const uuid = (short) => `1517${short.toString(16).padStart(4, "0")}-4947-11e9-8646-d663bd873d93`;
 export const SERVICES = { configuration: uuid(0x1000), measurement: uuid(0x2000), battery: uuid(0x3000) };
 export const INFO = uuid(0x1001), DEVICE = uuid(0x1002), CONTROL = uuid(0x2001), BATTERY = uuid(0x3001);
-export const LONG = uuid(0x2002), MEDIUM = uuid(0x2003), SHORT = uuid(0x2004);
+const LONG = uuid(0x2002), MEDIUM = uuid(0x2003), SHORT = uuid(0x2004);
 
 const WRAP_US = 2 ** 32;
 const RADIANS = Math.PI / 180;

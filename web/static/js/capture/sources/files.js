@@ -1,5 +1,5 @@
 // Files a tablet can play: which kind each is, decided by its content, and its sensors as tracks on one clock.
-import { decodeBatch, isLog, scanLog } from "../../live/wire.js";
+import { decodeBatch, isLog, scanLog } from "../../common/wire.js";
 import { parseMtText, looksLikeMtText } from "./mt_text.js";
 import { parseTable, looksLikeTable } from "./table.js";
 

@@ -12,14 +12,29 @@ const TABLE = Uint32Array.from({ length: 256 }, (_, n) => {
   return c;
 });
 
-// CRC-32 as zlib computes it.
+/**
+ * CRC-32 as zlib computes it.
+ * @param {Uint8Array} bytes
+ */
 export function crc32(bytes) {
   let c = 0xffffffff;
   for (let i = 0; i < bytes.length; i++) c = TABLE[(c ^ bytes[i]) & 255] ^ (c >>> 8);
   return (c ^ 0xffffffff) >>> 0;
 }
 
-// samples: Float32Array [n_samples][n_imu][9]; offsetsUs: Uint32Array from t0Us, or null where the rate tells.
+/**
+ * One batch of samples of a stream.
+ * @typedef {object} Batch
+ * @property {number} stream
+ * @property {number} seq
+ * @property {number} t0Us time of the first sample
+ * @property {number} sentUs
+ * @property {number} nImu
+ * @property {Float32Array} samples [sample][sensor][channel]
+ * @property {Uint32Array | null} [offsetsUs] from t0Us; null where the rate tells
+ */
+
+/** @param {Batch} batch */
 export function encodeBatch({ stream, seq, t0Us, sentUs, nImu, samples, offsetsUs = null }) {
   const nSamples = samples.length / (nImu * CHANNELS);
   if (!Number.isInteger(nSamples) || nSamples < 1 || nSamples > 1000) {
@@ -43,7 +58,10 @@ export function encodeBatch({ stream, seq, t0Us, sentUs, nImu, samples, offsetsU
   return bytes;
 }
 
-// What a batch says; throws where the bytes are not one.
+/**
+ * What a batch says; throws where the bytes are not one.
+ * @param {Uint8Array} bytes
+ */
 export function decodeBatch(bytes) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   if (bytes.length < HEADER + 4 || view.getUint32(0, true) !== MAGIC) throw new Error("not a batch");
@@ -62,7 +80,10 @@ export function decodeBatch(bytes) {
   };
 }
 
-// The float32 block alone: what the take's sha256 runs over.
+/**
+ * The float32 block alone: what the take's sha256 runs over.
+ * @param {Uint8Array} bytes
+ */
 export function payload(bytes) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   return bytes.subarray(HEADER, HEADER + view.getUint16(6, true) * view.getUint16(8, true) * CHANNELS * 4);
@@ -70,7 +91,10 @@ export function payload(bytes) {
 
 export const isLog = (bytes) => bytes.length >= LOG_MAGIC.length && text(bytes.subarray(0, LOG_MAGIC.length)) === LOG_MAGIC;
 
-// Records of a log up to the first damaged one: [{kind: "H"|"B"|"F", body}].
+/**
+ * Records of a log up to the first damaged one; kind: H, B or F.
+ * @param {Uint8Array} bytes
+ */
 export function scanLog(bytes) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const records = [];
@@ -85,7 +109,12 @@ export function scanLog(bytes) {
   return records;
 }
 
-// A whole log of a hello and some batches, numbered from 0, as the parts of a Blob; `sha256` over their payloads.
+/**
+ * A whole log of a hello and some batches, numbered from 0, as the parts of a Blob.
+ * @param {any} hello
+ * @param {Uint8Array[]} batches
+ * @param {string} sha256 over their payloads
+ */
 export function logParts(hello, batches, sha256) {
   const record = (kind, body) => {
     const part = new Uint8Array(9 + body.length), view = new DataView(part.buffer);
@@ -96,7 +125,7 @@ export function logParts(hello, batches, sha256) {
     return part;
   };
   const json = (value) => new TextEncoder().encode(JSON.stringify(value));
-  const { token, ...rest } = hello;
+  const { token: _token, ...rest } = hello; // a log holds no secret
   const numbered = batches.map((bytes, seq) => record("B", renumbered(bytes, seq)));
   return [LOG_MAGIC, record("H", json(rest)), ...numbered, record("F", json({ type: "finish", count: batches.length, sha256 }))];
 }

@@ -9,7 +9,14 @@ export class Problem extends Error {
   }
 }
 
+/**
+ * @param {string} method
+ * @param {string} path
+ * @param {object} [body] sent as JSON
+ * @returns {Promise<any>} what the server answers; an error is thrown as a Problem
+ */
 export async function request(method, path, body) {
+  /** @type {RequestInit} */
   const init = { method, headers: { Accept: "application/json" }, credentials: "same-origin" };
   if (body !== undefined) {
     init.headers["Content-Type"] = "application/json";
@@ -31,7 +38,11 @@ export async function request(method, path, body) {
   return data;
 }
 
-// Any element with the parts of a .form-error note shows a problem as title and sentence.
+/**
+ * Shows a problem as title and sentence in a note with the parts of .form-error.
+ * @param {HTMLElement} note
+ * @param {{ title?: string, detail?: string }} problem
+ */
 export function showProblem(note, problem) {
   note.hidden = false;
   note.querySelector("[data-title]").textContent = problem.title || "That did not work";
