@@ -132,7 +132,7 @@ async def test_every_page_assumes_the_same_height(clinic: Clinic) -> None:
     templates = ROOT / "web" / "templates"
     said = {p.name: re.findall(r"\d\.\d\d m\b", p.read_text()) for p in templates.glob("*.html")}
     assert not {name: heights for name, heights in said.items() if heights}, "written by hand"
-    assert "ASSUMED_HEIGHT ~ ' is assumed" in (templates / "upload.html").read_text()
+    assert "ASSUMED_HEIGHT ~ ' is assumed" in (templates / "_sensor_map.html").read_text()
 
 
 def test_tablet_and_therapist_are_told_to_stand_as_long_as_the_server_waits() -> None:
