@@ -129,7 +129,9 @@ def test_a_saved_rest_is_a_recording_that_the_server_reads(blank: Page) -> None:
 def test_the_browsers_scan_of_a_log_stops_where_the_servers_does(blank: Page) -> None:
     whole = b"SAGLIVE1\n" + record("H", json.dumps(HELLO).encode()) + record("B", b"x" * 50)
     for cut in (9, 30, len(whole) - 1, len(whole)):
-        kinds = run(blank, "common/wire.js", "return m.scanLog(bytes(a)).map((r) => r.kind);", b64(whole[:cut]))
+        kinds = run(
+            blank, "common/wire.js", "return m.scanLog(bytes(a)).map((r) => r.kind);", b64(whole[:cut])
+        )
         assert kinds == [r.kind for r in scan(whole[:cut])[0]]
 
 
