@@ -9,8 +9,8 @@ import viser
 from numpy.typing import NDArray
 from viser._messages import SceneNodeUpdateMessage
 
-from server.viewer.colours import GHOST, TINTS, linear
-from server.viewer.layout import Batch
+from server.viewer.colours import GHOST, TINTS, to_linear_rgb
+from server.viewer.layout import MeshBatch
 from server.viewer.steps import Single
 
 PALE: Final = 0.5
@@ -21,7 +21,7 @@ FAINT: Final = 0.35
 
 
 def add_batch(
-    scene: viser.SceneApi, name: str, batch: Batch, *, ghost: bool = False
+    scene: viser.SceneApi, name: str, batch: MeshBatch, *, ghost: bool = False
 ) -> viser.BatchedMeshHandle:
     """Draw the first frame of a batch; with `ghost` the legs of the second too, pale, in the same node."""
     frames = 2 if ghost else 1
@@ -38,22 +38,27 @@ def add_batch(
         batch.wxyz[:frames].reshape(-1, 4),
         batch.position[:frames].reshape(-1, 3),
         batched_scales=scale,
-        batched_colors=colours(batch, dark=False, ghost=ghost),
+        batched_colors=colour_copies(batch, dark=False, ghost=ghost),
         batched_opacities=None if (opacity == 1.0).all() else opacity,
         lod="off",
         receive_shadow=False,
     )
 
 
-def colours(batch: Batch, dark: bool, *, ghost: bool = False, grey: bool = False) -> NDArray[np.uint8]:
-    """Colours (k, 3), with a ghost (2k, 3), as viser takes them; `grey`: the sides have lost theirs."""
+def colour_copies(
+    batch: MeshBatch, dark: bool, *, ghost: bool = False, grey: bool = False
+) -> NDArray[np.uint8]:
+    """Return the colours of all copies, (k, 3) and with a ghost (2k, 3), as viser takes them.
+
+    `grey` draws the sides in the colour of the body.
+    """
     tints = ["body" if grey and tint in ("left", "right") else tint for tint in batch.tint]
-    own = [linear(TINTS[dark][tint]) for tint in tints]
-    return np.array(own + [linear(GHOST[dark])] * (len(own) * ghost), np.uint8)
+    own = [to_linear_rgb(TINTS[dark][tint]) for tint in tints]
+    return np.array(own + [to_linear_rgb(GHOST[dark])] * (len(own) * ghost), np.uint8)
 
 
-def put(handle: viser.BatchedMeshHandle, wxyz: Single, position: Single) -> None:
-    """Turn and place all copies (k, 4), (k, 3) by one message; the public setters take one each.
+def move_copies(handle: viser.BatchedMeshHandle, wxyz: Single, position: Single) -> None:
+    """Turn (k, 4) and place (k, 3) all copies by one message; the public setters take one each.
 
     A message is what a frame costs, not its bytes; the test of viser's contract holds what this relies on.
     """

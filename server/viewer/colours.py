@@ -44,7 +44,7 @@ FLOOR: Final[Mapping[bool, tuple[Rgb, Rgb]]] = {
 """Dark → lines of the floor's cells and sections."""
 
 
-def linear(colour: Rgb) -> Rgb:
+def to_linear_rgb(colour: Rgb) -> Rgb:
     """Turn sRGB into the linear RGB that viser expects per instance of a batch (0 to 255).
 
     A colour per mesh is taken as sRGB, a colour per instance is not: unconverted it looks washed out.

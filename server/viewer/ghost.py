@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats
-from server.viewer.motion import Ghost, Motion
+from server.viewer.motion import GhostMotion, ReplayMotion
 
 SPAN_S: Final = 1.0
 """The way of the person over this time says where the walk goes: about a stride, so that sway does not."""
@@ -24,7 +24,9 @@ STANDS_M: Final = 0.15
 """A shorter way in that time has no direction; on a treadmill the facing of the beginning stands for it."""
 
 
-def ghost_of(figure: Motion, strides: Strides, other: Motion, other_strides: Strides) -> Ghost | None:
+def match_ghost(
+    figure: ReplayMotion, strides: Strides, other: ReplayMotion, other_strides: Strides
+) -> GhostMotion | None:
     """Match another visit to a figure; None when no side has strides that count in both.
 
     Strides of the left lead; those of the right fill in where the left has none, as at the ends of a walk.
@@ -39,15 +41,15 @@ def ghost_of(figure: Motion, strides: Strides, other: Motion, other_strides: Str
     frames[~other.valid[there]] = -1
     if not (frames >= 0).any():
         return None
-    turn = heading(figure) - heading(other)[there]
+    turn = find_heading(figure) - find_heading(other)[there]
     root = other.root[there].astype(np.float64)
     c, s = np.cos(turn), np.sin(turn)
     moved = np.stack((c * root[:, 0] - s * root[:, 1], s * root[:, 0] + c * root[:, 1]), axis=1)
-    return Ghost(other, frames, turn, figure.root - moved)
+    return GhostMotion(other, frames, turn, figure.root - moved)
 
 
-def heading(motion: Motion) -> Floats:
-    """Direction of the walk in rad at each frame, from the way of the root."""
+def find_heading(motion: ReplayMotion) -> Floats:
+    """Return the direction of the walk in rad at each frame (m,), from the way of the root."""
     step = float(motion.t_s[1] - motion.t_s[0]) if len(motion.t_s) > 1 else SPAN_S
     half = max(1, round(SPAN_S / 2 / step))
     i = np.arange(len(motion.t_s))

@@ -53,7 +53,7 @@ Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class FigurePart:
     """One copy of a mesh, or a point.
 
     Parameters
@@ -72,7 +72,7 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
+class MeshBatch:
     """Copies of one mesh, k of them in each of m frames.
 
     Parameters
@@ -92,7 +92,7 @@ class Batch:
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class PlacedFigure:
     """A figure in m frames.
 
     Parameters
@@ -100,11 +100,11 @@ class Placed:
     batches : name → copies of one mesh. soles : side → (m, 3) m, world.
     """
 
-    batches: Mapping[str, Batch]
+    batches: Mapping[str, MeshBatch]
     soles: Mapping[Side, Single]
 
 
-class Layout:
+class FigureLayout:
     """The parts of a figure.
 
     Parameters
@@ -132,9 +132,9 @@ class Layout:
         self._moved = np.flatnonzero(self._at.any(axis=(1, 2)))
         self._arm = np.array([_swinging(x) for x in self._at[self._moved, 0]]).reshape(-1, 16, 3)
         self._meshes = {
-            "bones": shapes.bone(),
+            "bones": shapes.make_bone(),
             "shoes": _shoe(body),
-            "balls": shapes.ball(),
+            "balls": shapes.make_ball(),
             "letters_left": _letter("left"),
             "letters_right": _letter("right"),
         }
@@ -159,7 +159,7 @@ class Layout:
             if (x.name, x.tint) == ("soles", side)
         }
 
-    def place(self, q: Mapping[Segment, Floats], p: Mapping[Segment, Floats]) -> Placed:
+    def place(self, q: Mapping[Segment, Floats], p: Mapping[Segment, Floats]) -> PlacedFigure:
         """Place all parts; q (m, 4) and p (m, 3) of every segment of this layout."""
         turn, at = [q[s] for s in self.segments], [p[s] for s in self.segments]
         if "pelvis" in self.segments:
@@ -177,18 +177,18 @@ class Layout:
             moved += self._at
             moved[self._moved] += pairs @ self._arm
             wxyz[block], position[block] = (held @ self._turn).swapaxes(0, 1), moved.swapaxes(0, 1)
-        return Placed(
+        return PlacedFigure(
             {
-                name: Batch(self._meshes[name], wxyz[:, rows], position[:, rows], *self._look[name])
+                name: MeshBatch(self._meshes[name], wxyz[:, rows], position[:, rows], *self._look[name])
                 for name, rows in self._rows.items()
             },
             {side: position[:, k] for side, k in self._soles.items()},
         )
 
 
-def _parts(segments: Sequence[Segment], body: BodyModel) -> list[Part]:
+def _parts(segments: Sequence[Segment], body: BodyModel) -> list[FigurePart]:
     stature = body.thigh / _THIGH_FRACTION
-    parts: list[Part] = []
+    parts: list[FigurePart] = []
 
     def add(
         name: Name,
@@ -200,7 +200,7 @@ def _parts(segments: Sequence[Segment], body: BodyModel) -> list[Part]:
         trunk: bool = False,
     ) -> None:
         if segment in segments:
-            parts.append(Part(name, segment, scale, tint, turn, at, trunk))
+            parts.append(FigurePart(name, segment, scale, tint, turn, at, trunk))
 
     for side in SIDES:
         add("bones", THIGH[side], (0.058, 0.058, body.thigh), side, _DOWN)
@@ -259,9 +259,9 @@ def _swinging(at: Floats) -> Floats:
 @lru_cache(maxsize=2)
 def _letter(side: Side) -> shapes.Mesh:
     radius, length = _BAND
-    return shapes.letter(side, radius + 0.002, length, 0.8 * length, _SEEN_FROM)
+    return shapes.make_letter(side, radius + 0.002, length, 0.8 * length, _SEEN_FROM)
 
 
 @lru_cache(maxsize=32)
 def _shoe(body: BodyModel) -> shapes.Mesh:
-    return shapes.shoe(body.foot, body.ankle_height)
+    return shapes.make_shoe(body.foot, body.ankle_height)

@@ -14,8 +14,8 @@ import viser
 from core import rotation
 from core.frames import SIDES, Floats, Side
 from server.viewer import shapes
-from server.viewer.batches import put
-from server.viewer.colours import TINTS, linear
+from server.viewer.batches import move_copies
+from server.viewer.colours import TINTS, to_linear_rgb
 from server.viewer.room import ROOM
 from server.viewer.steps import CLEAR_M, PIECE_M, REST_MPS, SAME_M, Single
 
@@ -55,7 +55,7 @@ class LiveFloor:
         self._sent_s = 0.0
 
     def clear(self) -> None:
-        """Another walk."""
+        """Forget prints and trails, for another walk begins."""
         for side in SIDES:
             self._trails[side] = _Trail()
             self._steps[side].clear()
@@ -69,13 +69,13 @@ class LiveFloor:
             self._steps[side].push(t_s, sole, q, contact)
 
     def lose(self) -> None:
-        """Samples are missing: a trail has a gap, a contact is over."""
+        """Break the trail and end the contact of a foot whose samples are missing."""
         for side in SIDES:
             self._trails[side].lose()
             self._steps[side].lose()
 
     def send(self, t_s: float) -> None:
-        """Show the trails, if it is time."""
+        """Send the trails when the last time is `EVERY_S` ago."""
         if t_s - self._sent_s >= EVERY_S:
             self._sent_s = t_s
             self._line.points = self._points(t_s)
@@ -83,7 +83,7 @@ class LiveFloor:
     def set_dark(self, dark: bool) -> None:
         """Change the colours to the theme of the page around."""
         for side in SIDES:
-            self._steps[side].node.batched_colors = np.array(linear(TINTS[dark][side]), np.uint8)
+            self._steps[side].node.batched_colors = np.array(to_linear_rgb(TINTS[dark][side]), np.uint8)
         rows = [np.full((PIECES, 2, 3), TINTS[dark][side], np.uint8) for side in SIDES]
         self._line.colors = np.concatenate(rows)
 
@@ -127,11 +127,11 @@ class _Steps:
         self._scale = np.zeros(PRINTS, np.float32)
         self.node = scene.add_batched_meshes_simple(
             f"{ROOM}/prints_{side}",
-            *shapes.footprint(foot, side),
+            *shapes.make_footprint(foot, side),
             self._wxyz,
             self._position,
             batched_scales=self._scale,
-            batched_colors=linear(TINTS[False][side]),
+            batched_colors=to_linear_rgb(TINTS[False][side]),
             opacity=_OPACITY,
             lod="off",
             cast_shadow=False,
@@ -192,7 +192,7 @@ class _Steps:
         place, turn = self._rest[0], float(rotation.yaw(self._rest[1]))
         self._position[k] = (place[0], place[1], CLEAR_M)
         self._wxyz[k] = rotation.about(2, turn)
-        put(self.node, self._wxyz, self._position)
+        move_copies(self.node, self._wxyz, self._position)
         if self._scale[k] == 0.0:
             self._scale[k] = 1.0
             self.node.batched_scales = self._scale

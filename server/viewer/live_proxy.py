@@ -28,10 +28,10 @@ from server.context import Db, Id, OpenTrail
 from server.live.hub import Hub
 from server.services import patients, sessions
 from server.storage.db import Database
-from server.viewer.live import LiveFigure
+from server.viewer.live_figure import LiveFigure
 from server.viewer.live_reference import LiveReference
 from server.viewer.live_watch import LiveWatch
-from server.viewer.views import View, Views
+from server.viewer.views import FigureView, FigureViews
 
 router = APIRouter(include_in_schema=False)
 
@@ -49,12 +49,12 @@ async def figure(
     body, norm = await asyncio.to_thread(_person, db, sid)
     await asyncio.to_thread(trail.watched, who, "live.watched", "session", sid)
     hub: Hub = request.app.state.hub
-    views: Views = request.app.state.views
+    views: FigureViews = request.app.state.views
 
     def draw(server: viser.ViserServer) -> LiveFigure:
         return LiveFigure(server, body, dark)
 
-    def attend(view: View[LiveFigure]) -> None:
+    def attend(view: FigureView[LiveFigure]) -> None:
         _attend(view, hub, sid, LiveReference(body, norm, lambda: _trained(hub, sid)))
 
     view = await views.open_live(("live", sid, "dark" if dark else "light"), draw, attend)
@@ -72,7 +72,7 @@ def _person(db: Database, sid: str) -> tuple[BodyModel, dict[str, Floats]]:
     return nominal_body(height)[0], {name: np.radians(b.mean_deg) for name, b in norm.bands.items()}
 
 
-def _attend(view: View[LiveFigure], hub: Hub, sid: str, reference: LiveReference) -> None:
+def _attend(view: FigureView[LiveFigure], hub: Hub, sid: str, reference: LiveReference) -> None:
     """Connect a new view with the session's pictures until it ends."""
     room = hub.room(sid)
 

@@ -13,8 +13,8 @@ from core.body.model import BodyModel
 from core.frames import SIDES, SUFFIX, Floats, Side
 from core.norms.speed import SLOW_MPS
 from core.rotation import conjugate, multiply
-from server.viewer.moment import Moment
-from server.viewer.reference import SAGITTAL, ReferenceWalk, better_side, mirrored
+from server.viewer.moment import FigureMoment
+from server.viewer.reference import SAGITTAL, ReferenceWalk, add_standing_angles, find_better_side
 
 MEAN_OF: Final = 5
 """Strides of a side whose mean is shown: enough to be the person's walk, few enough to be the present one."""
@@ -22,7 +22,7 @@ SPEED_OF, SPEED_FROM = 10, 3
 """Strides over which walking is judged too slow for a norm, and how many it takes: as on the page."""
 
 
-class Told(msgspec.Struct, frozen=True):
+class FeedStride(msgspec.Struct, frozen=True):
     """What of a stride for the browsers (server/live/wire.py) is used here."""
 
     n: int
@@ -32,7 +32,7 @@ class Told(msgspec.Struct, frozen=True):
     curves_deg: dict[str, list[float | None]]
 
 
-_told = msgspec.json.Decoder(Told).decode
+_told = msgspec.json.Decoder(FeedStride).decode
 
 
 class LiveReference:
@@ -50,7 +50,7 @@ class LiveReference:
         self._body, self._trained = body, trained
         self._norm = norm if all(name in norm for name in SAGITTAL) else {}
         self._walks: dict[str, ReferenceWalk | None] = {}
-        self._strides: dict[int, Told] = {}
+        self._strides: dict[int, FeedStride] = {}
         self._last: bytes = b""
 
     def find(
@@ -78,12 +78,12 @@ class LiveReference:
             return ReferenceWalk(self._norm, self._body) if self._norm and not self._slow() else None
         if choice not in ("better", "own"):
             return None
-        means = {side: mean_curves(s for s in self._strides.values() if s.side == side) for side in SIDES}
+        means = {side: average_curves(s for s in self._strides.values() if s.side == side) for side in SIDES}
         trained = self._trained()
-        side = _other(trained) if trained is not None else better_side(means, self._norm)
+        side = _other(trained) if trained is not None else find_better_side(means, self._norm)
         if side is None or not all(name in means[side] for name in SAGITTAL):
             return None
-        return ReferenceWalk(mirrored(means[side], zero(), side), self._body, lead=side)
+        return ReferenceWalk(add_standing_angles(means[side], zero(), side), self._body, lead=side)
 
     def _slow(self) -> bool:
         """No adult norm is of people so slow."""
@@ -92,8 +92,8 @@ class LiveReference:
         return len(speeds) >= SPEED_FROM and float(np.mean(speeds)) < SLOW_MPS
 
 
-def mean_curves(strides: Iterable[Told]) -> dict[str, Floats]:
-    """Mean curves in rad over the last counted strides; a variable that one of them lacks is left out."""
+def average_curves(strides: Iterable[FeedStride]) -> dict[str, Floats]:
+    """Return variable → mean curve (n,) in rad of the last counted strides, of what all of them have."""
     last = [s.curves_deg for s in strides if s.counted][-MEAN_OF:]
     if not last:
         return {}
@@ -102,8 +102,8 @@ def mean_curves(strides: Iterable[Told]) -> dict[str, Floats]:
     return {name: np.radians(mean) for name, mean in found.items() if np.isfinite(mean).all()}
 
 
-def standing_angles(moment: Moment, angles_deg: Mapping[str, float | None]) -> dict[str, float]:
-    """Raw angles at standing in rad: what core.angles reads from the poses without the live angles there."""
+def find_standing_angles(moment: FigureMoment, angles_deg: Mapping[str, float | None]) -> dict[str, float]:
+    """Return angle → rad while standing: what the poses of a moment give, less its angles from standing."""
     raw: dict[str, float] = {}
     if "pelvis" in moment.q:
         tilt, obliquity = pelvis_angles(moment.q["pelvis"])

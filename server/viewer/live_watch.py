@@ -16,9 +16,9 @@ import numpy as np
 
 from core.frames import SIDES, SUFFIX, Segment, Side
 from server.live.messages import STALE_S, Picture, Pose
-from server.viewer.live import LiveFigure
-from server.viewer.live_reference import LiveReference, standing_angles
-from server.viewer.moment import Moment
+from server.viewer.live_figure import LiveFigure
+from server.viewer.live_reference import LiveReference, find_standing_angles
+from server.viewer.moment import FigureMoment
 
 log = logging.getLogger(__name__)
 
@@ -26,7 +26,7 @@ TICK_S: Final = 0.1
 """How often silence is looked for."""
 
 
-class Shown(msgspec.Struct, frozen=True):
+class FeedFrame(msgspec.Struct, frozen=True):
     """What of a frame for the browsers (server/live/wire.py) is used here."""
 
     method: str
@@ -34,7 +34,7 @@ class Shown(msgspec.Struct, frozen=True):
     angles_deg: dict[str, float | None]
 
 
-_shown = msgspec.json.Decoder(Shown).decode
+_shown = msgspec.json.Decoder(FeedFrame).decode
 
 
 class LiveWatch:
@@ -108,23 +108,23 @@ class LiveWatch:
             return
         # the body lacks its closing brace (messages.Picture)
         shown = _shown(picture.body + b"}")
-        moment = moment_of(picture, picture.pose, shown)
+        moment = read_moment(picture, picture.pose, shown)
         self._figure.set_reference(
             self._reference.find(
-                self._ghost(), self._strides(), lambda: standing_angles(moment, shown.angles_deg)
+                self._ghost(), self._strides(), lambda: find_standing_angles(moment, shown.angles_deg)
             )
         )
         late = picture.delay_s is None or picture.delay_s > STALE_S
         self._figure.show(moment, late=late)
 
 
-def moment_of(picture: Picture, pose: Pose, shown: Shown) -> Moment:
-    """Poses and phases of a picture."""
+def read_moment(picture: Picture, pose: Pose, shown: FeedFrame) -> FigureMoment:
+    """Return poses and phases of a picture; the phases of `shown` come in % and leave as 0 to 1."""
     segments = [cast("Segment", s) for s in pose.segments]
     q = np.frombuffer(pose.q, np.float32).reshape(-1, 4).astype(np.float64)
     p = np.frombuffer(pose.p, np.float32).reshape(-1, 3).astype(np.float64)
     phase = {side: shown.phase.get(SUFFIX[side]) for side in SIDES}
-    return Moment(
+    return FigureMoment(
         t_s=picture.t_s,
         q=dict(zip(segments, q, strict=True)),
         p=dict(zip(segments, p, strict=True)),

@@ -9,7 +9,7 @@ from core.frames import Floats, Segment, Side
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class FigureMoment:
     """Poses at one time of a take.
 
     Parameters

@@ -18,8 +18,8 @@ from core.body.poses import Poses
 from core.errors import ParameterError
 from core.estimators import ESTIMATORS
 from core.frames import FOOT, Bools, Floats, Segment, Side
-from server.viewer.layout import Batch, Layout
-from server.viewer.steps import Prints, Single, Trail, prints, trail
+from server.viewer.layout import FigureLayout, MeshBatch
+from server.viewer.steps import FootPrints, FootTrail, Single, find_prints, lay_trail
 
 FRAME_RATE = 50.0
 """Frames kept per second; the page asks for about 30."""
@@ -32,7 +32,7 @@ FOR_THE_EYE = frozenset(e.method for e in ESTIMATORS if not e.in_room)
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class ReplayMotion:
     """A prepared walk.
 
     Parameters
@@ -46,14 +46,14 @@ class Motion:
 
     t_s: Floats
     valid: Bools
-    batches: Mapping[str, Batch]
+    batches: Mapping[str, MeshBatch]
     root: Single
-    prints: dict[Side, Prints]
-    trails: dict[Side, Trail]
+    prints: dict[Side, FootPrints]
+    trails: dict[Side, FootTrail]
     placed: bool
     facing: float
     body: BodyModel
-    ghost: Ghost | None = None
+    ghost: GhostMotion | None = None
 
     @property
     def duration_s(self) -> float:
@@ -81,7 +81,7 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class Ghost:
+class GhostMotion:
     """Another motion, matched frame by frame.
 
     Parameters
@@ -90,13 +90,13 @@ class Ghost:
     turn : (m,) rad about the vertical, and place : (m, 2) m, that bring it to where the figure is.
     """
 
-    motion: Motion
+    motion: ReplayMotion
     frames: NDArray[np.int64]
     turn: Floats
     place: Floats
 
 
-def prepare(poses: Poses) -> Motion:
+def prepare_motion(poses: Poses) -> ReplayMotion:
     """Lay out everything that is drawn, for all frames at once (about 0.1 s for 10 min; call in a thread).
 
     Raises
@@ -122,19 +122,19 @@ def prepare(poses: Poses) -> Motion:
     lead: Segment = "pelvis" if "pelvis" in q else next(iter(q))
     root = p["pelvis"] if "pelvis" in p else np.mean(list(p.values()), axis=0)
     rate = poses.rate_hz / (keep.step or 1)
-    placed = Layout(tuple(q), poses.body, poses.method).place(q, p)
+    placed = FigureLayout(tuple(q), poses.body, poses.method).place(q, p)
     in_room = poses.method not in FOR_THE_EYE
-    return Motion(
+    return ReplayMotion(
         t_s=t_s,
         valid=valid,
         batches=placed.batches,
         root=_smooth(root[:, :2], max(1, round(ROOT_WINDOW_S * rate))).astype(np.float32),
         prints={
-            side: prints(t_s, valid, poses.contact[FOOT[side]][keep], path, q[FOOT[side]])
+            side: find_prints(t_s, valid, poses.contact[FOOT[side]][keep], path, q[FOOT[side]])
             for side, path in placed.soles.items()
             if FOOT[side] in poses.contact
         },
-        trails={side: trail(t_s, valid, path) for side, path in placed.soles.items() if in_room},
+        trails={side: lay_trail(t_s, valid, path) for side, path in placed.soles.items() if in_room},
         placed=in_room,
         facing=float(rotation.yaw(q[lead][first])),
         body=poses.body,

@@ -21,13 +21,13 @@ ALLOWED: Final = frozenset({"ViewerCameraMessage"})
 """Types of messages a browser may send to viser; everything else, such as a request to share, is dropped."""
 
 
-def subprotocols_of(ws: WebSocket) -> list[str]:
-    """Subprotocols the browser offers that are viser's."""
+def find_subprotocols(ws: WebSocket) -> list[str]:
+    """Return the subprotocols the browser offers that are viser's."""
     return [p for p in ws.scope.get("subprotocols", []) if p.startswith("viser-v")]
 
 
-def upstream(socket: Path, subprotocols: list[str]) -> connect:
-    """Connection to the viser server on a socket; no proxy, compression or size limit between us."""
+def connect_to_viser(socket: Path, subprotocols: list[str]) -> connect:
+    """Return a connection to the viser server on a socket, without proxy, compression or size limit."""
     return unix_connect(
         str(socket),
         subprotocols=subprotocols,
@@ -37,14 +37,14 @@ def upstream(socket: Path, subprotocols: list[str]) -> connect:
     )
 
 
-async def carry(ws: WebSocket, up: ClientConnection, is_open: Callable[[], bool]) -> None:
+async def carry_messages(ws: WebSocket, up: ClientConnection, is_open: Callable[[], bool]) -> None:
     """Carry messages both ways until one side ends or the sign-in does; the close code is passed on.
 
     Parameters
     ----------
     is_open : asked in a thread every `CHECK_EVERY_S`.
     """
-    tasks = [asyncio.create_task(c) for c in (_down(ws, up), _upward(ws, up), until_over(is_open))]
+    tasks = [asyncio.create_task(c) for c in (_down(ws, up), _upward(ws, up), wait_for_sign_out(is_open))]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
@@ -58,7 +58,7 @@ async def carry(ws: WebSocket, up: ClientConnection, is_open: Callable[[], bool]
             await ws.close(code, reason)
 
 
-async def until_over(is_open: Callable[[], bool]) -> None:
+async def wait_for_sign_out(is_open: Callable[[], bool]) -> None:
     """Return when the sign-in has ended."""
     while True:
         await asyncio.sleep(CHECK_EVERY_S)
@@ -66,7 +66,7 @@ async def until_over(is_open: Callable[[], bool]) -> None:
             return
 
 
-class Activity:
+class ViewActivity:
     """Counts use of a view as activity of the sign-in, at most every `CHECK_EVERY_S`."""
 
     def __init__(self, touch: Callable[[], object]) -> None:

@@ -41,11 +41,17 @@ from server.report.bundle import read_poses
 from server.services import analyses, comparisons, edit_log, sessions
 from server.services.histories import Analysed
 from server.storage.blobs import BlobStore
-from server.viewer.figure import Figure
-from server.viewer.ghost import ghost_of
-from server.viewer.motion import Motion, prepare
-from server.viewer.pipe import Activity, carry, subprotocols_of, until_over, upstream
-from server.viewer.views import View, Views
+from server.viewer.ghost import match_ghost
+from server.viewer.motion import ReplayMotion, prepare_motion
+from server.viewer.pipe import (
+    ViewActivity,
+    carry_messages,
+    connect_to_viser,
+    find_subprotocols,
+    wait_for_sign_out,
+)
+from server.viewer.replay_figure import ReplayFigure
+from server.viewer.views import FigureView, FigureViews
 
 CONTENT_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; "
@@ -62,11 +68,11 @@ _HIDE_PANEL = "<style>.mantine-Paper-root,.mantine-Notifications-root{display:no
 _GONE = 4404
 """Close code: the view is not there (any more); the page around should connect again."""
 
-_SWITCHES: Mapping[str, Callable[[Figure, bool], None]] = {
-    "dark": Figure.set_dark,
-    "follow": Figure.set_follow,
-    "ground": Figure.set_ground,
-    "ghost": Figure.set_ghost,
+_SWITCHES: Mapping[str, Callable[[ReplayFigure, bool], None]] = {
+    "dark": ReplayFigure.set_dark,
+    "follow": ReplayFigure.set_follow,
+    "ground": ReplayFigure.set_ground,
+    "ghost": ReplayFigure.set_ghost,
 }
 
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -74,7 +80,7 @@ Reader = Annotated[Identity, require(Action.READ_RESULT)]
 
 @contextlib.asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
-    async with Views().running() as views:
+    async with FigureViews().running() as views:
         app.state.views = views
         yield
 
@@ -111,18 +117,18 @@ async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
         return
     with view.watched():
         try:
-            up = await upstream(view.socket, subprotocols_of(ws))
+            up = await connect_to_viser(view.socket, find_subprotocols(ws))
         except (OSError, WebSocketException):
             await _say_gone(ws)
             return
         async with up:
             await ws.accept(subprotocol=up.subprotocol)
-            await carry(ws, up, functools.partial(ws.app.state.logins.is_open, who.login_id))
+            await carry_messages(ws, up, functools.partial(ws.app.state.logins.is_open, who.login_id))
 
 
 async def _say_gone(ws: WebSocket) -> None:
     """Close with a code of our own, which needs an accepted connection."""
-    await ws.accept(subprotocol=next(iter(subprotocols_of(ws)), None))
+    await ws.accept(subprotocol=next(iter(find_subprotocols(ws)), None))
     await ws.close(_GONE, "view_not_found")
 
 
@@ -157,8 +163,8 @@ async def replay(
                 "measured": motion.measured,
             }
         )
-        cursor = asyncio.create_task(_follow(ws, view, Activity(lambda: logins.touch(who.login_id))))
-        over = asyncio.create_task(until_over(lambda: logins.is_open(who.login_id)))
+        cursor = asyncio.create_task(_follow(ws, view, ViewActivity(lambda: logins.touch(who.login_id))))
+        over = asyncio.create_task(wait_for_sign_out(lambda: logins.is_open(who.login_id)))
         await asyncio.wait((cursor, over), return_when=asyncio.FIRST_COMPLETED)
         ended = over.done()
         for task in (cursor, over):
@@ -171,7 +177,7 @@ async def replay(
 
 async def _open(
     ws: WebSocket, sid: str, who: Identity, tab: str, dark: bool, other: str | None
-) -> View[Figure]:
+) -> FigureView[ReplayFigure]:
     db, reviewed = ws.app.state.db, ws.app.state.reviewed
 
     def latest() -> tuple[Analysed | None, Analysed | None]:
@@ -191,12 +197,12 @@ async def _open(
     if this is None:
         raise Problem(404, "no_poses", "There is nothing to replay: no analysis has reached the poses yet.")
 
-    def load() -> Motion:
+    def load() -> ReplayMotion:
         motion = _motion(reviewed.blobs, this)
         if before is None:
             return motion
         mine, theirs = (reviewed.read_bundle(a.found, a.edits).strides for a in (this, before))
-        return replace(motion, ghost=ghost_of(motion, mine, _motion(reviewed.blobs, before), theirs))
+        return replace(motion, ghost=match_ghost(motion, mine, _motion(reviewed.blobs, before), theirs))
 
     shown = this.found.id if before is None else f"{_state(this)} over {_state(before)}"
     return await _views(ws).open(who.login_id, tab, shown, load, dark)
@@ -214,11 +220,11 @@ def _state(a: Analysed) -> str:
     return f"{a.found.id} {a.edits.key}"
 
 
-def _motion(blobs: BlobStore, a: Analysed) -> Motion:
-    return prepare(read_poses(analyses.file_bytes(blobs, a.found, "poses.parquet")))
+def _motion(blobs: BlobStore, a: Analysed) -> ReplayMotion:
+    return prepare_motion(read_poses(analyses.file_bytes(blobs, a.found, "poses.parquet")))
 
 
-async def _follow(ws: WebSocket, view: View[Figure], activity: Activity) -> None:
+async def _follow(ws: WebSocket, view: FigureView[ReplayFigure], activity: ViewActivity) -> None:
     """Pose the figure at every {"t"} and answer with what is shown."""
     while True:
         try:
@@ -229,7 +235,7 @@ async def _follow(ws: WebSocket, view: View[Figure], activity: Activity) -> None
         await activity.seen()
 
 
-def _act(view: View[Figure], text: str) -> dict[str, Any]:
+def _act(view: FigureView[ReplayFigure], text: str) -> dict[str, Any]:
     try:
         message = json.loads(text)
     except ValueError:
@@ -247,6 +253,6 @@ def _act(view: View[Figure], text: str) -> dict[str, Any]:
     return {"error": {"code": "bad_message", "detail": detail}}
 
 
-def _views(connection: Request | WebSocket) -> Views:
-    views: Views = connection.app.state.views
+def _views(connection: Request | WebSocket) -> FigureViews:
+    views: FigureViews = connection.app.state.views
     return views

@@ -56,7 +56,7 @@ class ReferenceWalk:
         self._pelvis, self._turn, self._points = pelvis, turn, points
 
     def at(self, phases: Phases, place: tuple[float, float], heading: float) -> tuple[Floats, Floats] | None:
-        """Orientations (7, 4) and positions (7, 3) in m of `SEGMENTS`, the lower sole on the floor.
+        """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS`, the lower sole on the floor.
 
         Parameters
         ----------
@@ -92,8 +92,8 @@ def _before(w: float, x: float, y: float, z: float) -> Floats:
     return np.array([[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]])
 
 
-def standing(body: BodyModel) -> tuple[Floats, Floats]:
-    """Orientations and positions of `SEGMENTS` of somebody who stands at the origin and looks along x."""
+def stand_upright(body: BodyModel) -> tuple[Floats, Floats]:
+    """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS` standing at the origin, facing x."""
     return ReferenceWalk({name: np.zeros(1) for name in SAGITTAL}, body).pose(0, 0, (0.0, 0.0), 0.0)
 
 
@@ -107,8 +107,10 @@ def _row(phases: Phases, side: Side, last: int) -> int | None:
     return round(last * min(max(own, 0.0), 1.0))
 
 
-def mirrored(curves: Mapping[str, Floats], zero: Mapping[str, float], side: Side) -> dict[str, Floats]:
-    """Mean curves of a side with its standing angles put back, so that both legs can follow them.
+def add_standing_angles(
+    curves: Mapping[str, Floats], zero: Mapping[str, float], side: Side
+) -> dict[str, Floats]:
+    """Put the standing angles back into the mean curves of a side, so that both legs can follow them.
 
     Parameters
     ----------
@@ -126,8 +128,8 @@ def mirrored(curves: Mapping[str, Floats], zero: Mapping[str, float], side: Side
     return found
 
 
-def better_side(curves: Mapping[Side, Mapping[str, Floats]], norm: Mapping[str, Floats]) -> Side | None:
-    """The side whose sagittal curves are more like the norm's in shape, their means removed; rad.
+def find_better_side(curves: Mapping[Side, Mapping[str, Floats]], norm: Mapping[str, Floats]) -> Side | None:
+    """Return the side whose sagittal curves are more like the norm's in shape, their means removed; rad.
 
     The mean of root mean squares as in `gps_sagittal`, levels left out since ours are from standing. None
     without both sides and the norm; then there is nothing to choose by.

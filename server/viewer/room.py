@@ -25,7 +25,7 @@ Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Shot:
+class CameraShot:
     """A place to look from, in m: at, eye in the scene; fade, section are end and lines of the floor."""
 
     at: Vector
@@ -34,7 +34,7 @@ class Shot:
     section: float
 
 
-class Room:
+class SceneRoom:
     """An empty room in a viser server of its own.
 
     Parameters
@@ -60,8 +60,8 @@ class Room:
         """Bring a place of the floor, m, to where the camera looks."""
         self._node.position = (-x, -y, 0.0)
 
-    def look(self, shot: Shot) -> None:
-        """Look from there, now and whoever comes later."""
+    def look(self, shot: CameraShot) -> None:
+        """Move the cameras of all who look, and of who comes later, to a shot."""
         self._grid.fade_distance = shot.fade
         self._grid.section_size, self._grid.cell_size = shot.section, shot.section / 5
         initial = self._server.initial_camera
@@ -76,18 +76,18 @@ class Room:
         self._server.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
 
 
-def near(size: float, facing: float) -> Shot:
-    """From the right and slightly from ahead, the whole person in the picture.
+def frame_person(size: float, facing: float) -> CameraShot:
+    """Return the shot that has the whole person in the picture, from the right and slightly from ahead.
 
     Parameters
     ----------
     size : leg length relative to 0.9 m. facing : heading, rad.
     """
-    x, y, z = size * (turned(facing) @ np.array([1.9, -3.4, 1.75]))
-    return Shot((0.0, 0.0, 0.86 * size), (float(x), float(y), float(z)), fade=12.0, section=1.0)
+    x, y, z = size * (turn_about_vertical(facing) @ np.array([1.9, -3.4, 1.75]))
+    return CameraShot((0.0, 0.0, 0.86 * size), (float(x), float(y), float(z)), fade=12.0, section=1.0)
 
 
-def turned(heading: float) -> Floats:
-    """Rotation matrix about the vertical."""
+def turn_about_vertical(heading: float) -> Floats:
+    """Return the rotation matrix (3, 3) by a heading in rad about the vertical."""
     c, s = np.cos(heading), np.sin(heading)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -31,18 +31,18 @@ _STROKES: dict[Side, list[list[tuple[float, float]]]] = {
 """The letters L and R as lines, 1 high with the stroke, their feet at 0."""
 
 
-def bone(sides: int = 28, tip: float = TIP, cap: float = 0.09) -> Mesh:
-    """Rounded cone along +z from 0 to 1: radius 1 at the base, `tip` at the end, caps `cap` long."""
+def make_bone(sides: int = 28, tip: float = TIP, cap: float = 0.09) -> Mesh:
+    """Return a rounded cone along +z from 0 to 1: radius 1 at the base, `tip` at the end, caps `cap` long."""
     u = np.linspace(0.0, np.pi / 2, 7)
     base = [(np.sin(a), -cap * np.cos(a)) for a in u]
     end = [(tip * np.cos(a), 1.0 + cap * tip * np.sin(a)) for a in u]
     return _turned(base + end, sides)
 
 
-def letter(
+def make_letter(
     side: Side, radius: float, length: float, height: float, turn: float = 0.0, copies: int = 4
 ) -> Mesh:
-    """L or R, several times around a bone of this `radius` and `length` m, as it lies on it; feet at its end.
+    """Return the letter L or R, several times around a bone of `radius` and `length` m, its feet at the end.
 
     One of the copies faces whoever looks at the bone, the first one where it is looked at from `turn` rad
     about its axis, 0 along x.
@@ -72,14 +72,14 @@ def _stroke(line: Sequence[tuple[float, float]], step: float = 0.1) -> NDArray[n
     return np.array(quads)
 
 
-def ball(rings: int = 14, sides: int = 28) -> Mesh:
-    """Sphere of radius 1; scaled per axis it is the pelvis."""
+def make_ball(rings: int = 14, sides: int = 28) -> Mesh:
+    """Return a sphere of radius 1; scaled per axis it is the pelvis."""
     u = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)
     return _turned([(np.cos(a), np.sin(a)) for a in u], sides)
 
 
-def footprint(length: float, side: Side, points: int = 48) -> Mesh:
-    """Outline of a sole lying flat, facing +z: x to the toes, z = 0, origin in the middle of its length.
+def make_footprint(length: float, side: Side, points: int = 48) -> Mesh:
+    """Return the outline of a flat sole facing +z: x to the toes, z = 0, origin in the middle of its length.
 
     Narrow at the arch on the inner side, the toes drawn inwards; proportions are for the eye only.
     """
@@ -98,8 +98,8 @@ def footprint(length: float, side: Side, points: int = 48) -> Mesh:
     return vertices.astype(np.float32), faces.astype(np.uint32)
 
 
-def shoe(length: float, ankle_height: float, sides: int = 24) -> Mesh:
-    """A shoe in foot axes (x forward, y up, z right), origin at the ankle, sole at −`ankle_height`.
+def make_shoe(length: float, ankle_height: float, sides: int = 24) -> Mesh:
+    """Return a shoe in foot axes (x forward, y up, z right), origin at the ankle, sole at −`ankle_height`.
 
     The heel lies a quarter of the length behind the ankle; the ratio is for the eye only.
     """

@@ -29,7 +29,7 @@ Single = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
-class Trail:
+class FootTrail:
     """The way of one foot over the whole take.
 
     Parameters
@@ -42,7 +42,7 @@ class Trail:
 
 
 @dataclass(frozen=True, eq=False)
-class Prints:
+class FootPrints:
     """The footprints of one foot.
 
     Parameters
@@ -56,7 +56,7 @@ class Prints:
     wxyz: Single
 
 
-def trail(t_s: Floats, valid: Bools, path: Floats | Single) -> Trail:
+def lay_trail(t_s: Floats, valid: Bools, path: Floats | Single) -> FootTrail:
     """Lay a path (n, 3) out in pieces; where samples are not valid there is a gap."""
     stride = np.linalg.norm(np.diff(path, axis=0), axis=1)
     gone = np.concatenate(([0.0], np.cumsum(np.where(valid[1:] & valid[:-1], stride, 0.0))))
@@ -67,11 +67,11 @@ def trail(t_s: Floats, valid: Bools, path: Floats | Single) -> Trail:
     whole = lost[kept[1:]] == lost[kept[:-1]]
     points = path[kept].astype(np.float32)
     points[:, 2] = np.maximum(points[:, 2], CLEAR_M)
-    return Trail(t_s[kept[1:]][whole], np.stack((points[:-1], points[1:]), axis=1)[whole])
+    return FootTrail(t_s[kept[1:]][whole], np.stack((points[:-1], points[1:]), axis=1)[whole])
 
 
-def prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats | Single, q: Floats) -> Prints:
-    """One print for every time the foot rested on the floor, at its slowest moment.
+def find_prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats | Single, q: Floats) -> FootPrints:
+    """Find one print for every time the foot rested on the floor, at its slowest moment.
 
     A contact is searched for several rests, since a step in it may have been missed, and has one at least.
 
@@ -93,7 +93,7 @@ def prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats | Single, q: 
             rest.append(at)
     position = path[rest].astype(np.float32)
     position[:, 2] = CLEAR_M
-    return Prints(t_s[rest], position, rotation.about(2, rotation.yaw(q[rest])).astype(np.float32))
+    return FootPrints(t_s[rest], position, rotation.about(2, rotation.yaw(q[rest])).astype(np.float32))
 
 
 def _slowest(where: Bools, speed: Floats) -> list[int]:

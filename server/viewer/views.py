@@ -21,9 +21,9 @@ import viser
 
 from core.errors import EstimationError
 from server.auth.roles import Action, Role, may
-from server.viewer.figure import Figure
-from server.viewer.live import LiveFigure
-from server.viewer.motion import Motion
+from server.viewer.live_figure import LiveFigure
+from server.viewer.motion import ReplayMotion
+from server.viewer.replay_figure import ReplayFigure
 from server.viewer.scene_server import socket_of, start_scene_server, stop_scene_server
 
 IDLE_S = 30.0
@@ -34,11 +34,11 @@ MAX_VIEWS = 48
 """Open views at most, about 15 MB each for a 10 min walk if all show different ones."""
 
 Key = tuple[str, ...]
-Drawn = TypeVar("Drawn", Figure, LiveFigure)
+Drawn = TypeVar("Drawn", ReplayFigure, LiveFigure)
 
 
 @dataclass(eq=False)
-class View(Generic[Drawn]):
+class FigureView(Generic[Drawn]):
     """One figure in one viser server.
 
     Parameters
@@ -74,19 +74,19 @@ class View(Generic[Drawn]):
             self.left_at = time.monotonic()
 
 
-class Views:
+class FigureViews:
     """Registry of the open views of this process; used from its event loop only."""
 
     def __init__(self, idle_s: float = IDLE_S, limit: int = MAX_VIEWS) -> None:
         self._idle_s, self._limit = idle_s, limit
-        self._views: dict[str, View[Any]] = {}
-        self._motions: weakref.WeakValueDictionary[str, Motion] = weakref.WeakValueDictionary()
+        self._views: dict[str, FigureView[Any]] = {}
+        self._motions: weakref.WeakValueDictionary[str, ReplayMotion] = weakref.WeakValueDictionary()
         self._opening = asyncio.Lock()
 
     def __len__(self) -> int:
         return len(self._views)
 
-    def find(self, view_id: str, login_id: str, role: Role) -> View[Any] | None:
+    def find(self, view_id: str, login_id: str, role: Role) -> FigureView[Any] | None:
         """Return a view to those who may look at it, None to everybody else."""
         view = self._views.get(view_id)
         if view is None or view.login_id not in (None, login_id) or not may(role, view.action):
@@ -94,8 +94,8 @@ class Views:
         return view
 
     async def open(
-        self, login_id: str, tab: str, source: str, load: Callable[[], Motion], dark: bool = False
-    ) -> View[Figure]:
+        self, login_id: str, tab: str, source: str, load: Callable[[], ReplayMotion], dark: bool = False
+    ) -> FigureView[ReplayFigure]:
         """Return the view of one browser tab on one source, made at need.
 
         Parameters
@@ -116,15 +116,17 @@ class Views:
             if motion is None:
                 motion = await asyncio.to_thread(load)
                 self._motions[source] = motion
-            server, figure = await asyncio.to_thread(_start, lambda server: Figure(server, motion, dark))
+            server, figure = await asyncio.to_thread(
+                _start, lambda server: ReplayFigure(server, motion, dark)
+            )
             return self._add((login_id, tab, source), login_id, Action.READ_RESULT, server, figure)
 
     async def open_live(
         self,
         key: Key,
         draw: Callable[[viser.ViserServer], LiveFigure],
-        attend: Callable[[View[LiveFigure]], None],
-    ) -> View[LiveFigure]:
+        attend: Callable[[FigureView[LiveFigure]], None],
+    ) -> FigureView[LiveFigure]:
         """Return the shared view of a live session, made at need.
 
         Parameters
@@ -158,7 +160,7 @@ class Views:
             await self._stop(view)
 
     @contextlib.asynccontextmanager
-    async def running(self) -> AsyncIterator[Views]:
+    async def running(self) -> AsyncIterator[FigureViews]:
         """Sweep in the background; stop everything at the end."""
         sweeper = asyncio.create_task(self._sweep_for_ever())
         try:
@@ -173,7 +175,7 @@ class Views:
             await asyncio.sleep(SWEEP_S)
             await self.sweep()
 
-    def _known(self, key: Key) -> View[Any] | None:
+    def _known(self, key: Key) -> FigureView[Any] | None:
         for view in self._views.values():
             if view.key == key:
                 view.left_at = time.monotonic()
@@ -187,8 +189,8 @@ class Views:
         action: Action,
         server: viser.ViserServer,
         figure: Drawn,
-    ) -> View[Drawn]:
-        view = View(secrets.token_hex(16), key, login_id, action, server, figure)
+    ) -> FigureView[Drawn]:
+        view = FigureView(secrets.token_hex(16), key, login_id, action, server, figure)
         self._views[view.id] = view
         return view
 
@@ -203,7 +205,7 @@ class Views:
             )
         await self._stop(min(unwatched, key=lambda v: v.left_at))
 
-    async def _stop(self, view: View[Any]) -> None:
+    async def _stop(self, view: FigureView[Any]) -> None:
         self._views.pop(view.id, None)
         if view.let_go is not None:
             view.let_go()

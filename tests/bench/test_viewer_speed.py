@@ -15,12 +15,12 @@ import pytest
 import viser
 
 from core.norms import adult_kinematics
-from server.viewer.figure import Figure
-from server.viewer.ghost import ghost_of
-from server.viewer.live import LiveFigure
+from server.viewer.ghost import match_ghost
+from server.viewer.live_figure import LiveFigure
 from server.viewer.live_reference import LiveReference
 from server.viewer.live_watch import LiveWatch
-from server.viewer.motion import prepare
+from server.viewer.motion import prepare_motion
+from server.viewer.replay_figure import ReplayFigure
 from tests.server import walk
 from tests.server.viewer.pictures import POSES, RATE_HZ, picture
 
@@ -105,9 +105,9 @@ def live(server: viser.ViserServer) -> Callable[[int], object]:
 
 def replay(server: viser.ViserServer) -> Callable[[int], object]:
     """The same walk replayed with another one over it."""
-    motion = prepare(replace(walk.poses(12.0, 60.0), method="erkf_smoothed"))
-    ghost = ghost_of(motion, walk.strides(), motion, walk.strides())
-    figure = Figure(server, replace(motion, ghost=ghost))
+    motion = prepare_motion(replace(walk.poses(12.0, 60.0), method="erkf_smoothed"))
+    ghost = match_ghost(motion, walk.strides(), motion, walk.strides())
+    figure = ReplayFigure(server, replace(motion, ghost=ghost))
     return lambda i: figure.pose(i / RATE_HZ)
 
 
@@ -148,7 +148,7 @@ def test_a_view_of_ten_minutes_is_ready_soon() -> None:
         poses = replace(walk.poses(lasts_s), method="erkf_smoothed")
         with view() as server:
             began = time.thread_time()
-            Figure(server, prepare(poses))
+            ReplayFigure(server, prepare_motion(poses))
             took[lasts_s] = time.thread_time() - began
     sys.stdout.write(f"a view of one minute {took[60.0]:.3f} s, of ten {took[600.0]:.3f} s\n")
     assert took[600.0] <= 15 * took[60.0]

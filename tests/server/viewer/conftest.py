@@ -11,7 +11,7 @@ import pytest
 
 from server.report.exports import poses_parquet
 from server.services import analyses, patients, recordings, sessions
-from server.viewer.motion import Motion, prepare
+from server.viewer.motion import ReplayMotion, prepare_motion
 from tests.server import walk
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
@@ -23,8 +23,8 @@ def anyio_backend() -> str:
 
 
 @pytest.fixture(scope="session")
-def motion() -> Motion:
-    return prepare(walk.poses())
+def motion() -> ReplayMotion:
+    return prepare_motion(walk.poses())
 
 
 @dataclass

@@ -15,7 +15,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 from websockets.typing import Subprotocol
 
-from server.viewer.views import Views
+from server.viewer.views import FigureViews
 from tests.server.viewer.conftest import Ward
 
 pytestmark = pytest.mark.anyio
@@ -77,8 +77,8 @@ async def views_open(ward: Ward, headers: dict[str, str]) -> AsyncIterator[list[
     await views_of(ward).close()
 
 
-def views_of(ward: Ward) -> Views:
-    views: Views = ward.clinic.app.state.views
+def views_of(ward: Ward) -> FigureViews:
+    views: FigureViews = ward.clinic.app.state.views
     return views
 
 

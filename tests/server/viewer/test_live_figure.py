@@ -16,13 +16,13 @@ from core.body.poses import Poses
 from core.frames import FOOT, SHANK, SIDES, Segment
 from core.norms import adult_kinematics
 from server.viewer.batches import PALE
-from server.viewer.colours import GHOST, TINTS, linear
-from server.viewer.layout import Layout
-from server.viewer.live import LiveFigure
+from server.viewer.colours import GHOST, TINTS, to_linear_rgb
+from server.viewer.layout import FigureLayout
+from server.viewer.live_figure import LiveFigure
 from server.viewer.live_floor import PRINTS, TRAIL_S
 from server.viewer.live_path import LivePath
-from server.viewer.moment import Moment
-from server.viewer.motion import prepare
+from server.viewer.moment import FigureMoment
+from server.viewer.motion import prepare_motion
 from server.viewer.reference import SEGMENTS, ReferenceWalk
 from server.viewer.steps import PIECE_M
 from tests.server import walk
@@ -64,9 +64,9 @@ class Scene:
         return int(times[-1])
 
 
-def moment(poses: Poses, i: int, *, valid: bool = True) -> Moment:
+def moment(poses: Poses, i: int, *, valid: bool = True) -> FigureMoment:
     t_s = float(poses.t_s[i])
-    return Moment(
+    return FigureMoment(
         t_s,
         {s: q[i] for s, q in poses.q.items()},
         {s: p[i] for s, p in poses.p.items()},
@@ -94,7 +94,7 @@ def test_a_moment_is_drawn_as_the_replay_draws_it(
     server: viser.ViserServer, poses: Poses, worn: tuple[Segment, ...]
 ) -> None:
     part = some(poses, *worn)
-    replay, scene = prepare(part), Scene(server)
+    replay, scene = prepare_motion(part), Scene(server)
     for i in (0, 37, 200):
         scene.figure.show(moment(part, i))
         for name, batch in replay.batches.items():
@@ -112,14 +112,16 @@ def test_before_the_first_pose_somebody_stands_in_grey_and_then_the_sides_have_t
     bones = np.asarray(scene["/bones"].batched_colors)
     assert len(bones) == 8
     # but for the bands of the letters
-    assert {tuple(c) for c in np.delete(bones, [4, 5], axis=0).tolist()} == {linear(TINTS[False]["body"])}
+    assert {tuple(c) for c in np.delete(bones, [4, 5], axis=0).tolist()} == {
+        to_linear_rgb(TINTS[False]["body"])
+    }
     shoes = np.asarray(scene["/shoes"].batched_positions)
     np.testing.assert_allclose(shoes[:, 2], walk.BODY.ankle_height, atol=1e-6)
     scene.play(poses, 0.2)
     assert not scene.figure.is_grey
     colours = np.asarray(scene["/bones"].batched_colors)
-    assert tuple(colours[0]) == linear(TINTS[False]["left"])
-    assert tuple(colours[2]) == linear(TINTS[False]["right"])
+    assert tuple(colours[0]) == to_linear_rgb(TINTS[False]["left"])
+    assert tuple(colours[2]) == to_linear_rgb(TINTS[False]["right"])
 
 
 def test_what_is_stale_or_lost_stays_where_it_was_in_grey(server: viser.ViserServer, poses: Poses) -> None:
@@ -143,7 +145,7 @@ def test_the_trails_are_the_last_seconds_of_the_soles_way(server: viser.ViserSer
     scene = Scene(server)
     i = scene.play(poses, 11.0)
     pieces = np.asarray(scene["/trails"].points)
-    soles = Layout(tuple(poses.q), walk.BODY, "").place(poses.q, poses.p).soles
+    soles = FigureLayout(tuple(poses.q), walk.BODY, "").place(poses.q, poses.p).soles
     for side, drawn in zip(SIDES, np.split(pieces, 2), strict=True):
         seen = drawn[drawn[:, 0, 2] > -1.0]
         path = soles[side][: i + 1]
@@ -164,7 +166,7 @@ def test_a_trail_has_a_gap_where_poses_were_lost(server: viser.ViserServer, pose
 
 
 def test_prints_lie_where_the_replay_has_them(server: viser.ViserServer, poses: Poses) -> None:
-    scene, replay = Scene(server), prepare(replace(poses, method="erkf_smoothed"))
+    scene, replay = Scene(server), prepare_motion(replace(poses, method="erkf_smoothed"))
     scene.play(poses, 11.0)
     for side in SIDES:
         node = scene[f"/prints_{side}"]
@@ -262,7 +264,7 @@ def test_the_ghost_is_pale_and_goes_when_it_is_switched_off_or_no_phase_is_known
     scene.figure.show(moment(poses, 60))
     colours = np.asarray(scene["/bones"].batched_colors)
     assert len(colours) == 16
-    assert {tuple(c) for c in colours[8:].tolist()} == {linear(GHOST[False])}
+    assert {tuple(c) for c in colours[8:].tolist()} == {to_linear_rgb(GHOST[False])}
     np.testing.assert_allclose(np.asarray(scene["/bones"].batched_opacities)[8:], PALE)
     own, ghost = np.split(np.asarray(scene["/bones"].batched_scales), 2)
     np.testing.assert_array_equal(ghost[:4], own[:4])
@@ -293,7 +295,7 @@ def test_the_ghost_walks_where_the_person_walks(server: viser.ViserServer, poses
 
 @pytest.mark.bench
 def test_a_moment_costs_little(server: viser.ViserServer, poses: Poses) -> None:
-    layout = Layout(tuple(poses.q), walk.BODY, "erkf")
+    layout = FigureLayout(tuple(poses.q), walk.BODY, "erkf")
     q, p = ({s: a[:1] for s, a in of.items()} for of in (poses.q, poses.p))
     took = []
     for _ in range(200):

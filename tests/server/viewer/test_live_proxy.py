@@ -17,7 +17,7 @@ from websockets.typing import Subprotocol
 
 from server.live.hub import Hub
 from server.services import patients, sessions
-from server.viewer.views import View, Views
+from server.viewer.views import FigureView, FigureViews
 from tests.server.viewer.conftest import Ward
 from tests.server.viewer.pictures import picture
 
@@ -25,8 +25,8 @@ pytestmark = pytest.mark.anyio
 VISER = Subprotocol(f"viser-v{viser.__version__}")
 
 
-def views_of(ward: Ward) -> Views:
-    views: Views = ward.clinic.app.state.views
+def views_of(ward: Ward) -> FigureViews:
+    views: FigureViews = ward.clinic.app.state.views
     return views
 
 
@@ -69,7 +69,7 @@ async def looking(ward: Ward, headers: dict[str, str], src: str) -> AsyncIterato
         yield ws
 
 
-def the_view(ward: Ward, src: str) -> View[Any]:
+def the_view(ward: Ward, src: str) -> FigureView[Any]:
     return views_of(ward)._views[src.split("/")[2]]
 
 

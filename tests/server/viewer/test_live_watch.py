@@ -18,11 +18,11 @@ from core.norms import adult_kinematics
 from core.rotation import conjugate, multiply
 from server.live.messages import STALE_S, Picture
 from server.live.room import Room
-from server.viewer.live import LiveFigure
-from server.viewer.live_reference import LiveReference, standing_angles
-from server.viewer.live_watch import LiveWatch, Shown, moment_of
-from server.viewer.moment import Moment
-from server.viewer.reference import SEGMENTS, ReferenceWalk, better_side, mirrored
+from server.viewer.live_figure import LiveFigure
+from server.viewer.live_reference import LiveReference, find_standing_angles
+from server.viewer.live_watch import FeedFrame, LiveWatch, read_moment
+from server.viewer.moment import FigureMoment
+from server.viewer.reference import SEGMENTS, ReferenceWalk, add_standing_angles, find_better_side
 from tests.server import walk
 from tests.server.viewer import pictures
 from tests.server.viewer.pictures import Leg, picture, stride
@@ -167,7 +167,7 @@ def test_the_better_side_is_the_one_that_moves_more_like_the_norm() -> None:
     assert found is not None
     assert found.lead == "right"
     assert knee(found, 0.73) == pytest.approx(float(walk.KNEE(0.74)), abs=np.radians(1.5))
-    assert better_side({"left": Leg("left").curves()}, NORM) is None
+    assert find_better_side({"left": Leg("left").curves()}, NORM) is None
 
 
 def test_the_side_that_is_trained_is_not_the_better_one() -> None:
@@ -204,21 +204,21 @@ def test_whoever_walks_too_slowly_for_a_norm_sees_none() -> None:
 
 def test_standing_angles_are_put_back_so_that_the_mirror_has_the_persons_own_posture() -> None:
     i = 70
-    shown = Shown("erkf", {}, {n: float(np.degrees(x[i])) for n, x in raw_angles(zeroed=True).items()})
-    found = standing_angles(moment_at(i), shown.angles_deg)
+    shown = FeedFrame("erkf", {}, {n: float(np.degrees(x[i])) for n, x in raw_angles(zeroed=True).items()})
+    found = find_standing_angles(moment_at(i), shown.angles_deg)
     raw = {name: x[0] for name, x in raw_angles(zeroed=False).items()}
     for name, value in raw.items():
         assert found[name] == pytest.approx(value, abs=1e-6), name
     curves = {"knee_flexion": np.full(101, 0.3), "pelvis_obliquity": np.full(101, 0.1)}
-    left = mirrored(curves, {"knee_flexion_l": 0.05, "pelvis_obliquity": 0.02}, "left")
+    left = add_standing_angles(curves, {"knee_flexion_l": 0.05, "pelvis_obliquity": 0.02}, "left")
     assert left["knee_flexion"][0] == pytest.approx(0.35)
     assert left["pelvis_obliquity"][0] == pytest.approx(0.08)  # right up is positive, the left's own is not
 
 
-def moment_at(i: int) -> Moment:
+def moment_at(i: int) -> FigureMoment:
     made: Picture = picture(i)
     assert made.pose is not None
-    return moment_of(made, made.pose, Shown("erkf", {}, {}))
+    return read_moment(made, made.pose, FeedFrame("erkf", {}, {}))
 
 
 def raw_angles(*, zeroed: bool) -> dict[str, np.ndarray]:

@@ -17,15 +17,15 @@ from websockets.typing import Subprotocol
 from server.auth.identity import Identity
 from server.auth.roles import Role
 from server.viewer import pipe
-from server.viewer.views import View, Views
+from server.viewer.views import FigureView, FigureViews
 from tests.server.viewer.conftest import Ward
 
 pytestmark = pytest.mark.anyio
 VISER = Subprotocol(f"viser-v{viser.__version__}")
 
 
-def views_of(ward: Ward) -> Views:
-    views: Views = ward.clinic.app.state.views
+def views_of(ward: Ward) -> FigureViews:
+    views: FigureViews = ward.clinic.app.state.views
     return views
 
 
@@ -196,7 +196,7 @@ async def test_a_forged_request_to_share_never_reaches_viser(ward: Ward) -> None
     headers = ward.cookie()
     async with replaying(ward, headers) as (_, opened):
         view = views_of(ward).find(str(opened["view"]), *_login_of(ward, headers))
-        assert isinstance(view, View)
+        assert isinstance(view, FigureView)
         seen: list[str] = []
         handle = view.server._websock_server._handle_incoming_message
 

@@ -10,8 +10,8 @@ import pytest
 from core import rotation
 from core.body.poses import Poses
 from core.frames import FOOT, SIDES, Floats
-from server.viewer.motion import Motion, prepare
-from server.viewer.steps import PIECE_M, prints, trail
+from server.viewer.motion import ReplayMotion, prepare_motion
+from server.viewer.steps import PIECE_M, find_prints, lay_trail
 from tests.server import walk
 from tests.walks import simulated
 
@@ -38,12 +38,12 @@ def without_contact(poses: Poses) -> Poses:
 
 def test_one_print_lies_under_each_contact_and_appears_during_it() -> None:
     path, contact = stepping()
-    found = prints(T_S, np.ones(500, bool), contact, path, FLAT)
+    found = find_prints(T_S, np.ones(500, bool), contact, path, FLAT)
     np.testing.assert_allclose(found.position[:, 0], 1.2 * np.arange(5), atol=1e-5)
     assert np.all((found.t_s % 2.0) < 1.0)
 
 
-def test_prints_are_a_stride_apart_on_a_walk(motion: Motion) -> None:
+def test_prints_are_a_stride_apart_on_a_walk(motion: ReplayMotion) -> None:
     for side in SIDES:
         steps = np.diff(motion.prints[side].position[1:-1, 0])
         assert len(steps) >= 8
@@ -57,7 +57,7 @@ def test_prints_are_those_of_the_simulated_walker(name: str, known: bool) -> Non
     always = np.ones(len(truth.t_s), bool)
     contact = {FOOT[s]: c if known else always for s, c in truth.contact.items()}
     poses = Poses(truth.t_s, truth.rate_hz, truth.q, truth.p, always, contact, truth.body, "erkf_smoothed")
-    found = prepare(poses).prints
+    found = prepare_motion(poses).prints
     for side in SIDES:
         true = truth.footprints[side]
         heading = np.array([f.foot_rad for f in true])
@@ -72,7 +72,7 @@ def test_prints_are_those_of_the_simulated_walker(name: str, known: bool) -> Non
 def test_a_print_lies_flat_and_points_where_the_toes_point() -> None:
     path, contact = stepping()
     turned = rotation.multiply(rotation.about(2, np.radians(30)), rotation.about(1, np.radians(-12)))
-    found = prints(T_S, np.ones(500, bool), contact, path, np.tile(turned, (500, 1)))
+    found = find_prints(T_S, np.ones(500, bool), contact, path, np.tile(turned, (500, 1)))
     np.testing.assert_allclose(np.degrees(rotation.yaw(found.wxyz.astype(float))), 30, atol=1e-4)
     up = rotation.rotate(found.wxyz.astype(float), np.array([0.0, 0.0, 1.0]))
     np.testing.assert_allclose(up, [[0, 0, 1]] * 5, atol=1e-6)
@@ -81,37 +81,37 @@ def test_a_print_lies_flat_and_points_where_the_toes_point() -> None:
 
 def test_a_restless_standing_foot_leaves_one_print() -> None:
     wobble = np.stack((0.004 * np.sin(9 * T_S), 0 * T_S, 0 * T_S), axis=1)
-    found = prints(T_S, np.ones(500, bool), np.sin(20 * T_S) > 0, wobble, FLAT)
+    found = find_prints(T_S, np.ones(500, bool), np.sin(20 * T_S) > 0, wobble, FLAT)
     assert len(found.t_s) == 1
 
 
 def test_a_step_that_the_contacts_miss_leaves_its_print() -> None:
     path, contact = stepping()
     missed = contact | ((T_S > 2.9) & (T_S < 4.1))
-    found = prints(T_S, np.ones(500, bool), missed, path, FLAT)
+    found = find_prints(T_S, np.ones(500, bool), missed, path, FLAT)
     np.testing.assert_allclose(found.position[:, 0], 1.2 * np.arange(5), atol=1e-5)
 
 
 def test_a_foot_that_slides_through_its_contact_leaves_a_print_all_the_same() -> None:
-    found = prints(T_S, np.ones(500, bool), (T_S > 3) & (T_S < 4), straight(0.5), FLAT)
+    found = find_prints(T_S, np.ones(500, bool), (T_S > 3) & (T_S < 4), straight(0.5), FLAT)
     assert len(found.t_s) == 1
     assert 3 < found.t_s[0] < 4
 
 
 def test_a_foot_that_never_rests_leaves_no_print() -> None:
-    found = prints(T_S, np.ones(500, bool), np.zeros(500, bool), straight(), FLAT)
+    found = find_prints(T_S, np.ones(500, bool), np.zeros(500, bool), straight(), FLAT)
     assert found.position.shape == (0, 3)
     assert found.wxyz.shape == (0, 4)
 
 
 def test_no_print_comes_from_samples_that_were_lost() -> None:
     path, contact = stepping()
-    found = prints(T_S, (T_S < 3.9) | (T_S > 5.2), contact, path, FLAT)
+    found = find_prints(T_S, (T_S < 3.9) | (T_S > 5.2), contact, path, FLAT)
     np.testing.assert_allclose(found.position[:, 0], 1.2 * np.array([0, 1, 3, 4]), atol=1e-5)
 
 
 def test_a_trail_is_one_line_in_short_pieces() -> None:
-    found = trail(T_S, np.ones(500, bool), straight())
+    found = lay_trail(T_S, np.ones(500, bool), straight())
     length = np.linalg.norm(found.pieces[:, 1] - found.pieces[:, 0], axis=1)
     assert length.max() < PIECE_M + 0.021  # a sample's way more at most
     np.testing.assert_allclose(length.sum(), straight()[-1, 0], rtol=1e-5)
@@ -119,7 +119,7 @@ def test_a_trail_is_one_line_in_short_pieces() -> None:
     assert np.all(np.diff(found.t_s) > 0)
 
 
-def test_a_trail_ends_where_the_foot_is(motion: Motion) -> None:
+def test_a_trail_ends_where_the_foot_is(motion: ReplayMotion) -> None:
     for side in SIDES:
         found = motion.trails[side]
         for t_s in (2.0, 5.5, 9.0):
@@ -129,14 +129,14 @@ def test_a_trail_ends_where_the_foot_is(motion: Motion) -> None:
 
 
 def test_a_standing_foot_adds_nothing_to_its_trail() -> None:
-    assert len(trail(T_S, np.ones(500, bool), straight(0.0)).t_s) <= 1
+    assert len(lay_trail(T_S, np.ones(500, bool), straight(0.0)).t_s) <= 1
 
 
 def test_a_trail_has_a_gap_where_samples_were_lost() -> None:
     valid = (T_S < 4.0) | (T_S >= 6.0)
     path = straight()
     path[~valid] = path[199]
-    found = trail(T_S, valid, path)
+    found = lay_trail(T_S, valid, path)
     assert found.pieces[..., 0].max() > 9.9
     inside = (found.pieces[..., 0] > 3.99) & (found.pieces[..., 0] < 5.99)
     assert not inside.any()
@@ -144,11 +144,11 @@ def test_a_trail_has_a_gap_where_samples_were_lost() -> None:
 
 
 def test_a_trail_of_nothing_valid_is_empty() -> None:
-    assert trail(T_S, np.zeros(500, bool), straight()).pieces.shape == (0, 2, 3)
+    assert lay_trail(T_S, np.zeros(500, bool), straight()).pieces.shape == (0, 2, 3)
 
 
 def test_a_take_without_contacts_has_trails_and_no_prints() -> None:
-    found = prepare(without_contact(walk.poses(3.0)))
+    found = prepare_motion(without_contact(walk.poses(3.0)))
     assert found.prints == {}
     assert set(found.trails) == {"left", "right"}
 
@@ -161,6 +161,6 @@ def test_one_foot_leaves_its_own_prints_and_trail_only() -> None:
         p={"foot_r": poses.p["foot_r"]},
         contact={"foot_r": poses.contact[FOOT["right"]]},
     )
-    found = prepare(one)
+    found = prepare_motion(one)
     assert set(found.prints) == set(found.trails) == {"right"}
     assert len(found.prints["right"].t_s) >= 4

@@ -12,8 +12,8 @@ import pytest
 
 from core.errors import EstimationError, InputError
 from server.auth.roles import Role
-from server.viewer.motion import Motion
-from server.viewer.views import Views
+from server.viewer.motion import ReplayMotion
+from server.viewer.views import FigureViews
 
 pytestmark = pytest.mark.anyio
 
@@ -22,14 +22,14 @@ def open_files() -> int:
     return len(list(Path("/proc/self/fd").iterdir()))
 
 
-async def test_same_tab_shares_and_other_sign_in_does_not(motion: Motion) -> None:
+async def test_same_tab_shares_and_other_sign_in_does_not(motion: ReplayMotion) -> None:
     loads: list[int] = []
 
-    def load() -> Motion:
+    def load() -> ReplayMotion:
         loads.append(1)
         return motion
 
-    async with Views().running() as views:
+    async with FigureViews().running() as views:
         mine = await views.open("login-1", "tab", "analysis", load)
         assert await views.open("login-1", "tab", "analysis", load) is mine
         theirs = await views.open("login-2", "tab", "analysis", load)
@@ -40,8 +40,8 @@ async def test_same_tab_shares_and_other_sign_in_does_not(motion: Motion) -> Non
         assert loads == [1]
 
 
-async def test_a_views_socket_is_for_this_user_alone_and_goes_with_it(motion: Motion) -> None:
-    async with Views(idle_s=0.0).running() as views:
+async def test_a_views_socket_is_for_this_user_alone_and_goes_with_it(motion: ReplayMotion) -> None:
+    async with FigureViews(idle_s=0.0).running() as views:
         view = await views.open("login", "tab", "analysis", lambda: motion)
         assert view.socket.is_socket()
         folder = view.socket.parent.stat()
@@ -58,13 +58,13 @@ def short_path() -> Iterator[Path]:
 
 
 async def test_a_figure_that_cannot_be_drawn_leaves_nothing_behind(
-    motion: Motion, short_path: Path, monkeypatch: pytest.MonkeyPatch
+    motion: ReplayMotion, short_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def draw(_server: object) -> NoReturn:
         raise InputError("body_bad", "There is no body.")
 
     monkeypatch.setattr(tempfile, "tempdir", str(short_path))
-    async with Views().running() as views:
+    async with FigureViews().running() as views:
         threads = threading.active_count()
         with pytest.raises(InputError):
             await views.open_live(("live",), draw, lambda _view: None)
@@ -74,19 +74,19 @@ async def test_a_figure_that_cannot_be_drawn_leaves_nothing_behind(
 
 @pytest.mark.parametrize(("folder", "why"), [("a" * 100, "too long"), ("missing/folder", "No such file")])
 async def test_a_folder_that_takes_no_sockets_is_told_and_not_waited_for(
-    motion: Motion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str, why: str
+    motion: ReplayMotion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str, why: str
 ) -> None:
     (tmp_path / ("a" * 100)).mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / folder))
-    async with Views().running() as views:
+    async with FigureViews().running() as views:
         with pytest.raises(EstimationError, match=f"{why}.*set TMPDIR") as told:
             await views.open("login", "tab", "analysis", lambda: motion)
     assert told.value.code == "no_place_for_views"
     assert list(tmp_path.rglob("sagittal-view-*")) == []
 
 
-async def test_unwatched_views_stop_and_watched_ones_stay(motion: Motion) -> None:
-    async with Views(idle_s=0.0).running() as views:
+async def test_unwatched_views_stop_and_watched_ones_stay(motion: ReplayMotion) -> None:
+    async with FigureViews(idle_s=0.0).running() as views:
         view = await views.open("login", "tab", "analysis", lambda: motion)
         with view.watched():
             await views.sweep()
@@ -95,8 +95,8 @@ async def test_unwatched_views_stop_and_watched_ones_stay(motion: Motion) -> Non
         assert len(views) == 0
 
 
-async def test_at_the_limit_the_longest_unwatched_view_gives_way(motion: Motion) -> None:
-    async with Views(limit=2).running() as views:
+async def test_at_the_limit_the_longest_unwatched_view_gives_way(motion: ReplayMotion) -> None:
+    async with FigureViews(limit=2).running() as views:
         first = await views.open("login", "1", "analysis", lambda: motion)
         second = await views.open("login", "2", "analysis", lambda: motion)
         third = await views.open("login", "3", "analysis", lambda: motion)
@@ -107,12 +107,12 @@ async def test_at_the_limit_the_longest_unwatched_view_gives_way(motion: Motion)
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts open files in /proc")
-async def test_views_leave_no_threads_and_no_files_behind(motion: Motion) -> None:
-    async def one(views: Views) -> None:
+async def test_views_leave_no_threads_and_no_files_behind(motion: ReplayMotion) -> None:
+    async def one(views: FigureViews) -> None:
         await views.open("login", "tab", "analysis", lambda: motion)
         await views.close()
 
-    async with Views().running() as views:
+    async with FigureViews().running() as views:
         await one(views)
         await asyncio.sleep(0.1)
         threads, files = threading.active_count(), open_files()
@@ -124,8 +124,8 @@ async def test_views_leave_no_threads_and_no_files_behind(motion: Motion) -> Non
         assert open_files() <= files + 2
 
 
-async def test_no_banner_is_printed(motion: Motion, capfd: pytest.CaptureFixture[str]) -> None:
-    async with Views().running() as views:
+async def test_no_banner_is_printed(motion: ReplayMotion, capfd: pytest.CaptureFixture[str]) -> None:
+    async with FigureViews().running() as views:
         await views.open("login", "tab", "analysis", lambda: motion)
     out, err = capfd.readouterr()
     assert (out, err) == ("", "")

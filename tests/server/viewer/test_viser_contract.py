@@ -14,10 +14,10 @@ from viser import _messages
 from viser.infra import _infra
 
 from server.viewer import pipe
-from server.viewer.batches import add_batch, put
-from server.viewer.motion import Motion, prepare
+from server.viewer.batches import add_batch, move_copies
+from server.viewer.motion import ReplayMotion, prepare_motion
 from server.viewer.proxy import client_page
-from server.viewer.views import Views
+from server.viewer.views import FigureViews
 from tests.server import walk
 
 
@@ -40,8 +40,8 @@ def test_message_types_keep_their_names() -> None:
 
 
 @pytest.mark.anyio
-async def test_a_view_has_no_handler_for_requests_to_share(motion: Motion) -> None:
-    async with Views().running() as views:
+async def test_a_view_has_no_handler_for_requests_to_share(motion: ReplayMotion) -> None:
+    async with FigureViews().running() as views:
         view = await views.open("login", "tab", "analysis", lambda: motion)
         assert _messages.ShareUrlRequest not in view.server._websock_server._incoming_handlers
 
@@ -58,17 +58,17 @@ def test_viser_asks_websockets_for_nothing_but_what_we_hand_it() -> None:
 def test_one_message_turns_and_places_a_batch_as_the_public_setters_would() -> None:
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
-        drawn = prepare(walk.poses(1.0)).batches["bones"]
+        drawn = prepare_motion(walk.poses(1.0)).batches["bones"]
         handle = add_batch(server.scene, "/bones", drawn)
         kept = server._websock_server._broadcast_buffer.message_from_id
         before = set(kept)
-        put(handle, drawn.wxyz[5], drawn.position[5])
+        move_copies(handle, drawn.wxyz[5], drawn.position[5])
         (sent,) = [kept[k] for k in set(kept) - before]
         assert isinstance(sent, _messages.SceneNodeUpdateMessage)
         assert (sent.name, set(sent.updates)) == ("/bones", {"batched_wxyzs", "batched_positions"})
         np.testing.assert_array_equal(handle.batched_positions, drawn.position[5])
         # who comes later gets the newest message of a kind only, and these two always come together
-        put(handle, drawn.wxyz[6], drawn.position[6])
+        move_copies(handle, drawn.wxyz[6], drawn.position[6])
         later = [
             m for m in kept.values() if isinstance(m, _messages.SceneNodeUpdateMessage) and m.name == "/bones"
         ]
@@ -76,7 +76,7 @@ def test_one_message_turns_and_places_a_batch_as_the_public_setters_would() -> N
         np.testing.assert_array_equal(later[0].updates["batched_wxyzs"], drawn.wxyz[6])
         handle.batched_positions = drawn.position[7]
         np.testing.assert_array_equal(
-            drawn.position[6], prepare(walk.poses(1.0)).batches["bones"].position[6]
+            drawn.position[6], prepare_motion(walk.poses(1.0)).batches["bones"].position[6]
         )
     finally:
         server.stop()

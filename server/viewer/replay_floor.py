@@ -12,9 +12,9 @@ import viser
 
 from core.frames import Side
 from server.viewer import shapes
-from server.viewer.colours import TINTS, Rgb, linear
-from server.viewer.motion import Motion
-from server.viewer.steps import Prints, Single, Trail
+from server.viewer.colours import TINTS, Rgb, to_linear_rgb
+from server.viewer.motion import ReplayMotion
+from server.viewer.steps import FootPrints, FootTrail, Single
 
 CHUNK = 256
 """Pieces of a trail per scene node, about eight strides."""
@@ -26,7 +26,7 @@ _PIXELS = 1.6
 _OPACITY = 0.6
 
 
-class Ground:
+class ReplayFloor:
     """Prints and trails of a motion in one scene.
 
     Parameters
@@ -34,7 +34,7 @@ class Ground:
     parent : name of the scene node that carries the room.
     """
 
-    def __init__(self, scene: viser.SceneApi, parent: str, motion: Motion) -> None:
+    def __init__(self, scene: viser.SceneApi, parent: str, motion: ReplayMotion) -> None:
         self._all = scene.add_frame(f"{parent}/ground", show_axes=False)
         under, length = self._all.name, motion.body.foot
         parts: list[_Prints | _Trail] = [
@@ -62,15 +62,17 @@ class Ground:
 
 
 class _Prints:
-    def __init__(self, scene: viser.SceneApi, parent: str, side: Side, prints: Prints, length: float) -> None:
+    def __init__(
+        self, scene: viser.SceneApi, parent: str, side: Side, prints: FootPrints, length: float
+    ) -> None:
         self.side, self.t_s = side, prints.t_s
         self._node = scene.add_batched_meshes_simple(
             f"{parent}/prints_{side}",
-            *shapes.footprint(length, side),
+            *shapes.make_footprint(length, side),
             prints.wxyz,
             prints.position,
             batched_scales=np.zeros(len(prints.t_s), np.float32),
-            batched_colors=linear(TINTS[False][side]),
+            batched_colors=to_linear_rgb(TINTS[False][side]),
             opacity=_OPACITY,
             lod="off",
             cast_shadow=False,
@@ -78,7 +80,7 @@ class _Prints:
         )
 
     def paint(self, colour: Rgb) -> None:
-        self._node.batched_colors = np.array(linear(colour), np.uint8)
+        self._node.batched_colors = np.array(to_linear_rgb(colour), np.uint8)
 
     def show(self, count: int, recent: bool) -> None:
         scales = np.zeros(len(self.t_s), np.float32)
@@ -87,7 +89,7 @@ class _Prints:
 
 
 class _Trail:
-    def __init__(self, scene: viser.SceneApi, parent: str, side: Side, trail: Trail) -> None:
+    def __init__(self, scene: viser.SceneApi, parent: str, side: Side, trail: FootTrail) -> None:
         self.side, self.t_s, self._pieces = side, trail.t_s, trail.pieces
         self._seen: set[int] = set()
 

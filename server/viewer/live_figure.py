@@ -11,13 +11,13 @@ import viser
 
 from core.body.model import BodyModel
 from core.frames import FOOT, SIDES, Floats, Segment
-from server.viewer.batches import add_batch, colours, put
-from server.viewer.layout import Batch, Layout, Placed
+from server.viewer.batches import add_batch, colour_copies, move_copies
+from server.viewer.layout import FigureLayout, MeshBatch, PlacedFigure
 from server.viewer.live_floor import LiveFloor
 from server.viewer.live_path import GAP_S, LivePath
-from server.viewer.moment import Moment
-from server.viewer.reference import SEGMENTS, ReferenceWalk, standing
-from server.viewer.room import ROOM, Room, near
+from server.viewer.moment import FigureMoment
+from server.viewer.reference import SEGMENTS, ReferenceWalk, stand_upright
+from server.viewer.room import ROOM, SceneRoom, frame_person
 
 _BURIED: Final = np.array([0.0, 0.0, -100.0])
 """Where a ghost is that has no phase."""
@@ -33,40 +33,40 @@ class LiveFigure:
 
     def __init__(self, server: viser.ViserServer, body: BodyModel, dark: bool = False) -> None:
         self._server, self._body, self._dark = server, body, dark
-        self._room = Room(server)
+        self._room = SceneRoom(server)
         self._floor = LiveFloor(server.scene, body.foot)
         self._path = LivePath()
         self._reference: ReferenceWalk | None = None
-        self._layout: Layout | None = None
+        self._layout: FigureLayout | None = None
         self._key: tuple[object, ...] = ()
-        self._drawn: list[tuple[str, Batch, viser.BatchedMeshHandle]] = []
+        self._drawn: list[tuple[str, MeshBatch, viser.BatchedMeshHandle]] = []
         self._times = 0
         self._grey = True
         self._t_s: float | None = None
         self._room.set_dark(dark)
         self._floor.set_dark(dark)
         size = (body.thigh + body.shank + body.ankle_height) / 0.9
-        self._room.look(near(size, 0.0))
+        self._room.look(frame_person(size, 0.0))
         self.wait()
 
     @property
     def is_grey(self) -> bool:
-        """What is shown is not now."""
+        """Whether the figure is grey because what it shows is no longer current."""
         return self._grey
 
     def wait(self) -> None:
-        """Stand and wait for poses."""
+        """Show the figure standing until poses come."""
         if self._key == ("standing",):
             return
-        q, p = ({s: x[k : k + 1] for k, s in enumerate(SEGMENTS)} for x in standing(self._body))
+        q, p = ({s: x[k : k + 1] for k, s in enumerate(SEGMENTS)} for x in stand_upright(self._body))
         self._floor.clear()
         self._path, self._t_s = LivePath(), None
-        self._draw(Layout(SEGMENTS, self._body, ""), q, p, ("standing",))
+        self._draw(FigureLayout(SEGMENTS, self._body, ""), q, p, ("standing",))
         self._room.bring(0.0, 0.0)
         self._set_grey(True)
         self._server.flush()
 
-    def show(self, moment: Moment, *, late: bool = False) -> None:
+    def show(self, moment: FigureMoment, *, late: bool = False) -> None:
         """Show a moment and send it at once; one that is not valid leaves the figure as it was, grey.
 
         Parameters
@@ -87,7 +87,7 @@ class LiveFigure:
         self._server.flush()
 
     def set_stale(self) -> None:
-        """Nothing has come for a while: the figure stays, grey, until the next moment."""
+        """Turn the figure grey until the next moment, since nothing has come for a while."""
         if not self._grey:
             self._set_grey(True)
             self._server.flush()
@@ -96,7 +96,7 @@ class LiveFigure:
         """Show a walk pale in the same place at the same share of the cycle, None = none."""
         self._reference = walk
 
-    def _show(self, moment: Moment) -> None:
+    def _show(self, moment: FigureMoment) -> None:
         lead: Segment = "pelvis" if "pelvis" in moment.q else next(iter(moment.q))
         x, y, _ = moment.p[lead].tolist()
         root_x, root_y, heading = self._path.push(moment.t_s, x, y, _yaw(*moment.q[lead].tolist()))
@@ -114,13 +114,13 @@ class LiveFigure:
                 q[s], p[s] = np.array([moment.q[s]] * 2), np.array([moment.p[s], p["pelvis"][1]])
         key = (tuple(moment.q), moment.method, ghost)
         if key != self._key or self._layout is None:
-            layout = Layout(tuple(moment.q), self._body, moment.method)
+            layout = FigureLayout(tuple(moment.q), self._body, moment.method)
             placed = self._draw(layout, q, p, key)
         else:
             placed = self._layout.place(q, p)
             for name, _, handle in self._drawn:
                 batch = placed.batches[name]
-                put(handle, batch.wxyz.reshape(-1, 4), batch.position.reshape(-1, 3))
+                move_copies(handle, batch.wxyz.reshape(-1, 4), batch.position.reshape(-1, 3))
         for side in SIDES:
             if side in placed.soles:
                 sole, foot = placed.soles[side][0], moment.q[FOOT[side]]
@@ -130,11 +130,11 @@ class LiveFigure:
 
     def _draw(
         self,
-        layout: Layout,
+        layout: FigureLayout,
         q: Mapping[Segment, Floats],
         p: Mapping[Segment, Floats],
         key: tuple[object, ...],
-    ) -> Placed:
+    ) -> PlacedFigure:
         """Draw other parts than before."""
         for _, _, handle in self._drawn:
             handle.remove()
@@ -149,7 +149,7 @@ class LiveFigure:
         self._paint()
         return placed
 
-    def _add(self, name: str, batch: Batch) -> viser.BatchedMeshHandle:
+    def _add(self, name: str, batch: MeshBatch) -> viser.BatchedMeshHandle:
         path = f"{ROOM}/{name}_{self._times}"
         return add_batch(self._server.scene, path, batch, ghost=len(batch.wxyz) > 1)
 
@@ -160,7 +160,9 @@ class LiveFigure:
 
     def _paint(self) -> None:
         for _, batch, handle in self._drawn:
-            handle.batched_colors = colours(batch, self._dark, ghost=len(batch.wxyz) > 1, grey=self._grey)
+            handle.batched_colors = colour_copies(
+                batch, self._dark, ghost=len(batch.wxyz) > 1, grey=self._grey
+            )
 
 
 def _yaw(w: float, x: float, y: float, z: float) -> float:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import viser
 
-from server.viewer.figure import Figure
-from server.viewer.ground import CHUNK, RECENT_PRINTS
-from server.viewer.motion import Motion, prepare
+from server.viewer.motion import ReplayMotion, prepare_motion
+from server.viewer.replay_figure import ReplayFigure
+from server.viewer.replay_floor import CHUNK, RECENT_PRINTS
 from tests.server import walk
 
 LONG_S = 120.0
@@ -20,8 +20,8 @@ LONG_S = 120.0
 class Scene:
     """A figure in a viser server, and the scene nodes it has made."""
 
-    def __init__(self, server: viser.ViserServer, motion: Motion) -> None:
-        self.figure = Figure(server, motion)
+    def __init__(self, server: viser.ViserServer, motion: ReplayMotion) -> None:
+        self.figure = ReplayFigure(server, motion)
         self.nodes = dict(server.scene._handle_from_node_name)
 
     def __getitem__(self, name: str) -> viser.SceneNodeHandle:
@@ -39,8 +39,8 @@ class Scene:
 
 
 @pytest.fixture(scope="module")
-def long_walk() -> Motion:
-    return prepare(replace(walk.poses(LONG_S), method="erkf_smoothed"))
+def long_walk() -> ReplayMotion:
+    return prepare_motion(replace(walk.poses(LONG_S), method="erkf_smoothed"))
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ WAYS = [(5.0,), (110.0, 5.0), (1.0, 60.0, 119.0, 30.0), (119.9, 0.0)]
 
 @pytest.mark.parametrize("way", WAYS)
 def test_standing_back_shows_all_that_was_left_whatever_was_shown_before(
-    server: viser.ViserServer, long_walk: Motion, way: tuple[float, ...]
+    server: viser.ViserServer, long_walk: ReplayMotion, way: tuple[float, ...]
 ) -> None:
     scene = Scene(server, long_walk)
     for t_s in way:
@@ -70,7 +70,7 @@ def test_standing_back_shows_all_that_was_left_whatever_was_shown_before(
 
 @pytest.mark.parametrize("way", WAYS)
 def test_following_shows_the_last_strides_whatever_was_shown_before(
-    server: viser.ViserServer, long_walk: Motion, way: tuple[float, ...]
+    server: viser.ViserServer, long_walk: ReplayMotion, way: tuple[float, ...]
 ) -> None:
     scene = Scene(server, long_walk)
     scene.figure.set_follow(False)
@@ -86,7 +86,9 @@ def test_following_shows_the_last_strides_whatever_was_shown_before(
         np.testing.assert_array_equal(scene.prints(side), left[-RECENT_PRINTS:])
 
 
-def test_a_frame_sends_at_most_one_chunk_of_a_trail(server: viser.ViserServer, long_walk: Motion) -> None:
+def test_a_frame_sends_at_most_one_chunk_of_a_trail(
+    server: viser.ViserServer, long_walk: ReplayMotion
+) -> None:
     scene = Scene(server, long_walk)
     lengths = []
     for t_s in np.linspace(0, LONG_S, 60):
@@ -98,13 +100,13 @@ def test_a_frame_sends_at_most_one_chunk_of_a_trail(server: viser.ViserServer, l
 def test_where_positions_are_for_the_eye_only_there_are_prints_and_no_trail(
     server: viser.ViserServer,
 ) -> None:
-    scene = Scene(server, prepare(replace(walk.poses(12.0), method="stance_foot_anchor")))
+    scene = Scene(server, prepare_motion(replace(walk.poses(12.0), method="stance_foot_anchor")))
     scene.figure.pose(11.0)
     assert len(scene.prints("left")) >= 9
     assert len(scene.drawn("left")) == 0
 
 
-def test_prints_and_trails_can_be_hidden_together(server: viser.ViserServer, long_walk: Motion) -> None:
+def test_prints_and_trails_can_be_hidden_together(server: viser.ViserServer, long_walk: ReplayMotion) -> None:
     scene = Scene(server, long_walk)
     scene.figure.set_ground(False)
     assert not scene["/room/ground"].visible
@@ -113,7 +115,7 @@ def test_prints_and_trails_can_be_hidden_together(server: viser.ViserServer, lon
 
 
 def test_following_keeps_the_person_in_the_middle_and_letting_go_keeps_the_room_still(
-    server: viser.ViserServer, long_walk: Motion
+    server: viser.ViserServer, long_walk: ReplayMotion
 ) -> None:
     scene = Scene(server, long_walk)
 
@@ -137,9 +139,9 @@ def test_following_keeps_the_person_in_the_middle_and_letting_go_keeps_the_room_
 
 @pytest.mark.parametrize("heading", [0.0, 2.0])
 def test_the_whole_walk_is_in_a_square_picture(
-    server: viser.ViserServer, long_walk: Motion, heading: float
+    server: viser.ViserServer, long_walk: ReplayMotion, heading: float
 ) -> None:
-    figure = Figure(server, replace(long_walk, facing=heading))
+    figure = ReplayFigure(server, replace(long_walk, facing=heading))
     figure.set_follow(False)
     camera = server.initial_camera
     eye = np.asarray(camera.position)
