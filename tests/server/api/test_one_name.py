@@ -43,11 +43,11 @@ def _texts(html: str, pattern: str) -> list[str]:
 def _rows(html: str) -> list[str]:
     """First cells of the parameter tables, without the unit and what stands behind it."""
     tables = re.findall(r'<table class="[^"]*params[^"]*">.*?</table>', html, re.DOTALL)
-    return [t for table in tables for t in _texts(table, r"<tr><td>(.*?)(?:<span|</td>)")]
+    return [t for table in tables for t in _texts(table, r"<tr>\s*<td>(.*?)(?:<span|</td>)")]
 
 
 def _charts(html: str) -> list[str]:
-    return _texts(html, r"<figcaption><h3>(.*?)</h3>") or _texts(html, r"<figure><h3>(.*?)</h3>")
+    return _texts(html, r"<figcaption>\s*<h3>(.*?)</h3>") or _texts(html, r"<figure>\s*<h3>(.*?)</h3>")
 
 
 async def test_no_name_occurs_twice_with_different_values(clinic: Clinic) -> None:
