@@ -73,7 +73,8 @@ def lay_points(  # type: ignore[no-untyped-def]
             a = start + (first + k) / rate
             while b + 1 < n and t[s, b + 1] <= a + slack:
                 b += 1
-            on_sample = abs(a - t[s, b]) <= slack
+            # written as the advance is: one rounding decides whether a sample is passed and whether it is met
+            on_sample = a - slack <= t[s, b] <= a + slack
             past = b == n - 1 and not on_sample
             share, between = 0.0, False
             if not on_sample and not past:

@@ -8,7 +8,7 @@ from time import perf_counter
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -174,6 +174,7 @@ def test_jittering_samples_are_interpolated_as_in_the_file() -> None:
 
 @given(st.integers(0, 1 << 32), st.sampled_from([41.7, 60.0, 99.0, 100.0]), st.integers(1, 40))
 @settings(max_examples=40, deadline=None)
+@example((1 << 32) - 1, 60.0, 1)  # a sample as far beside a point as still counts as on it, but for rounding
 def test_whatever_is_lost_and_however_times_jitter_the_points_are_those_of_the_file(
     seed: int, rate: float, n: int
 ) -> None:
