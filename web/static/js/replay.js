@@ -24,7 +24,7 @@ class GaitView extends HTMLElement {
     this.tries = 0;
     this.onTick = () => this.request();
     clock.addEventListener("tick", this.onTick);
-    const recolour = () => this.tell({ dark: String(isDark()) });
+    const recolour = () => this.tell({ dark: isDark() });
     new MutationObserver(recolour).observe(document.documentElement, { attributeFilter: ["data-theme"] });
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
     this.options = this.parentElement.querySelector("[data-options]");
