@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from core.errors import InputError
-from core.formats import SourceFile, manifest_of, parse_manifest, read_recording
+from core.formats import list_source_files, manifest_of, parse_manifest, read_named_file, read_recording
 from core.frames import Segment
 from core.pipeline import PipelineConfig
 from core.pipeline import analyse as run_pipeline
 from core.pipeline.config import override_config
+from core.pipeline.recipes import say_nothing
 from core.recording import Recording
 from core.simulate import simulate_scenario
 from sagittal.analysis import Analysis
@@ -36,8 +36,8 @@ def read(*paths: str | Path, manifest: Mapping[str, Any] | str | Path | None = N
     if isinstance(manifest, Mapping):
         declared = manifest_of(json.loads(json.dumps(manifest)))
     elif manifest is not None:
-        declared = parse_manifest(Path(manifest).read_bytes())
-    return read_recording(list(_sources([Path(p) for p in paths])), declared)
+        declared = parse_manifest(read_named_file(Path(manifest)))
+    return read_recording(list(list_source_files(map(Path, paths))), declared)
 
 
 def analyse(
@@ -68,7 +68,7 @@ def analyse(
     if not isinstance(recording, Recording):
         recording = read(recording, manifest=manifest)
     chosen = override_config(PipelineConfig(), config or {})
-    return Analysis(run_pipeline(recording, chosen, progress or _say_nothing))
+    return Analysis(run_pipeline(recording, chosen, progress or say_nothing))
 
 
 def simulate(
@@ -88,15 +88,3 @@ def simulate(
     """
     worn = None if segments is None else tuple(segments)
     return SimulatedWalk(simulate_scenario(script, seed, height_m, rate_hz, worn))
-
-
-def _sources(paths: Sequence[Path]) -> Iterator[SourceFile]:
-    for path in paths:
-        if not path.exists():
-            raise InputError("file_not_found", f"{path} does not exist; give files, a folder or a zip.")
-        for file in sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]:
-            yield SourceFile.of_path(file, str(file.relative_to(path)) if path.is_dir() else file.name)
-
-
-def _say_nothing(stage: str, share: float) -> None:
-    """Progress that nobody follows."""

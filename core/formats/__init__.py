@@ -6,15 +6,17 @@ from core.formats.archive import ArchiveLimits, expand
 from core.formats.manifest import Manifest, manifest_of, parse_manifest
 from core.formats.parquet import write_recording
 from core.formats.reader import read_recording
-from core.formats.source import SourceFile
+from core.formats.source import SourceFile, list_source_files, read_named_file
 
 __all__ = [
     "ArchiveLimits",
     "Manifest",
     "SourceFile",
     "expand",
+    "list_source_files",
     "manifest_of",
     "parse_manifest",
+    "read_named_file",
     "read_recording",
     "write_recording",
 ]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from core.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +34,28 @@ class SourceFile:
     def of_path(cls, path: Path, name: str | None = None) -> SourceFile:
         """Wrap a file on disk; `name` defaults to its last part."""
         return cls(name or path.name, path.stat().st_size, path.read_bytes)
+
+
+def list_source_files(paths: Iterable[Path]) -> Iterator[SourceFile]:
+    """Files that a person named, folders walked, as lazily read sources.
+
+    Raises
+    ------
+    InputError `file_not_found`.
+    """
+    for path in paths:
+        if not path.exists():
+            raise InputError("file_not_found", f"{path} does not exist; give files, a folder or a zip.")
+        for file in sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]:
+            yield SourceFile.of_path(file, str(file.relative_to(path)) if path.is_dir() else file.name)
+
+
+def read_named_file(path: Path) -> bytes:
+    """Bytes of a file that a person named; raises InputError `file_not_found`."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError("file_not_found", f"{path} cannot be read: {error.strerror or error}.") from error
 
 
 def sha256(data: bytes) -> str:

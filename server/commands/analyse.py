@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from core.errors import InputError, SagittalError
 from server.report.estimator import estimator_view
 from server.storage import fs
-
-if TYPE_CHECKING:
-    from core.formats.source import SourceFile
 
 
 def analyse(
@@ -34,11 +31,12 @@ def analyse(
     -------
     0 when at least one parameter was found, 1 when nothing could be analysed.
     """
+    from core.formats import list_source_files, read_named_file
     from server.services import analyses
 
     try:
-        sources = list(source_files(paths))
-        declared = manifest.read_bytes() if manifest else None
+        sources = list(list_source_files(paths))
+        declared = read_named_file(manifest) if manifest else None
         with _ProgressBar() as bar:
             files = analyses.run(sources, declared, _overrides(config, estimator), bar.stage)
     except SagittalError as error:
@@ -68,18 +66,6 @@ def _overrides(path: Path | None, estimator: str) -> dict[str, Any]:
     if estimator != "auto":
         chosen["poses"] = {**chosen.get("poses", {}), "estimator": estimator}
     return chosen
-
-
-def source_files(paths: Sequence[Path]) -> Iterator[SourceFile]:
-    """Files named on the command line, folders walked, as lazily read sources."""
-    from core.formats.source import SourceFile
-
-    for path in paths:
-        if not path.exists():
-            raise InputError("file_not_found", f"{path} does not exist; give files, a folder or a zip.")
-        for file in sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]:
-            name = str(file.relative_to(path)) if path.is_dir() else file.name
-            yield SourceFile.of_path(file, name)
 
 
 def print_summary(result: dict[str, Any], out: Path) -> None:

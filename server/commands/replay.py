@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from core.errors import InputError, SagittalError
-from server.commands.analyse import source_files
 
 if TYPE_CHECKING:
     from core.recording import Recording
@@ -82,15 +81,10 @@ def _check(speed: float, drop: float, jitter: float) -> None:
 
 
 def _read(paths: Sequence[Path], manifest: Path | None) -> Recording:
-    from core.formats import parse_manifest, read_recording
+    from core.formats import list_source_files, parse_manifest, read_named_file, read_recording
 
-    declared = None
-    if manifest is not None:
-        try:
-            declared = parse_manifest(manifest.read_bytes())
-        except OSError as error:
-            raise InputError("file_not_found", f"{manifest} cannot be read: {error}.") from error
-    return read_recording(list(source_files(paths)), declared)
+    declared = parse_manifest(read_named_file(manifest)) if manifest else None
+    return read_recording(list(list_source_files(paths)), declared)
 
 
 def _heard(message: Mapping[str, Any]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import hashlib
 import json
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,9 +21,7 @@ from server.storage.tables import analysis, analysis_file, job, new_id, now, pat
 
 if TYPE_CHECKING:
     from core.formats.source import SourceFile
-
-Progress = Callable[[str, float], None]
-"""Called with the stage that starts and the share of the work done before it, 0 to 1."""
+    from core.pipeline import Progress
 
 
 @dataclass(frozen=True)

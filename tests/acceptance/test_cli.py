@@ -219,3 +219,7 @@ def test_missing_path_and_broken_manifest_are_named(tmp_path: Path) -> None:
     wrong = sagittal("analyse", tmp_path, "--manifest", tmp_path / "m.json", "--out", tmp_path / "out")
     assert wrong.returncode == 1
     assert "nose" in wrong.stderr
+    missing = sagittal("analyse", tmp_path, "--manifest", tmp_path / "none.json", "--out", tmp_path / "out")
+    assert missing.returncode == 1
+    assert "none.json cannot be read" in missing.stderr
+    assert "Traceback" not in missing.stderr
