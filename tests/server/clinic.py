@@ -25,7 +25,7 @@ ORIGIN = "http://127.0.0.1"
 
 @functools.cache
 def password_hash() -> str:
-    """One hash for all test accounts: argon2 takes a third of a second."""
+    """One hash for all test accounts, made by the first test: with its settings, cheap or real."""
     return hash_password(PASSWORD)
 
 
