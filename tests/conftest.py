@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Generator
@@ -20,6 +21,15 @@ from tests.passed import Passed
 
 # before anything imports numba: every process that a test starts inherits it
 share_compile_cache(Path(tempfile.gettempdir()) / "sagittal-tests")
+
+MEMORY_DISK: Final = Path("/dev/shm")  # noqa: S108
+ROOM: Final = 8 << 30
+"""Bytes that must be free there."""
+
+# a test waits for no disk: thousands of databases and logs are synced. What a disk does when the power is
+# lost, when it is full or broken is modelled in tests/faults
+if MEMORY_DISK.is_dir() and shutil.disk_usage(MEMORY_DISK).free > ROOM:
+    os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY_DISK))
 
 # a busy machine must not fail a property: the clock says nothing about it
 hypothesis.settings.register_profile(

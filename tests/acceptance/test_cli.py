@@ -53,6 +53,7 @@ def rows(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(path.read_text("utf-8"))))
 
 
+@pytest.mark.slow
 def test_another_estimator_and_a_config_file(tmp_path: Path) -> None:
     take = tmp_path / "take"
     assert sagittal("simulate", "--out", take, "--script", "comfortable").returncode == 0
@@ -129,6 +130,7 @@ def test_result_files_have_the_documented_columns(analysed: tuple[Path, str]) ->
     assert set(content["provenance"]) >= {"input_sha256", "parameters_sha256", "version"}
 
 
+@pytest.mark.slow
 def test_same_input_gives_the_same_bytes(simulated: Path, analysed: tuple[Path, str], tmp_path: Path) -> None:
     again = sagittal("analyse", simulated / "recording.parquet", "--out", tmp_path)
     assert again.returncode == 0
@@ -210,6 +212,7 @@ def test_nothing_analysable_is_exit_1_with_a_sentence(case: str, tmp_path: Path)
     assert len(said.strip()) > 40
 
 
+@pytest.mark.slow
 def test_missing_path_and_broken_manifest_are_named(tmp_path: Path) -> None:
     gone = sagittal("analyse", tmp_path / "nowhere", "--out", tmp_path / "out")
     assert gone.returncode == 1

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import pytest
 
 from core.online import warm
 from server.demo.clinic import PRESCRIBED
@@ -18,6 +19,7 @@ SPEED = 6.0
 """The walk is streamed so much faster than it was walked."""
 
 
+@pytest.mark.slow
 def test_a_training_with_feedback_ends_in_a_report_of_what_was_told(tmp_path: Path) -> None:
     # compiled before the server starts, or its estimator would still compile when the walk is over
     warm()

@@ -65,6 +65,7 @@ def test_neura_walk_through_rest_equals_the_command_line(service: Service, tmp_p
         assert client.get(f"{address}/{name}").content == (tmp_path / "out" / name).read_bytes(), name
 
 
+@pytest.mark.slow
 def test_an_unreadable_recording_fails_with_a_sentence_and_the_next_one_works(service: Service) -> None:
     client = service.client
     session = new_session(client, "P-2")

@@ -7,11 +7,14 @@ import re
 import signal
 import subprocess
 import sys
+import time
 
+import sagittal
+from server.demo.clinic import VISITS, record
 from tests.data import ROOT
 
-LIMIT_S = 25.0
-"""All visits are analysed within so long after the address was printed, on two cores that do nothing else."""
+LIMIT = 1.3
+"""Time until all visits are analysed, over the time in which one process simulates and analyses them."""
 
 
 def run_demo() -> float:
@@ -35,6 +38,15 @@ def run_demo() -> float:
         process.stdout.close()
 
 
+def analyse_all_visits() -> float:
+    """Simulate and analyse the demo's visits one after the other in this process; seconds that took."""
+    began = time.perf_counter()
+    for visit in VISITS:
+        sagittal.analyse(record(visit).recording)
+    return time.perf_counter() - began
+
+
 def test_the_second_start_of_the_demo_shows_all_visits_soon() -> None:
     run_demo()
-    assert run_demo() <= LIMIT_S
+    analyse_all_visits()
+    assert run_demo() / analyse_all_visits() < LIMIT

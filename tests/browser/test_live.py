@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import re
 from collections import defaultdict
 from urllib.parse import urlsplit
@@ -16,9 +15,9 @@ from tests.browser import filling
 from tests.browser.capturing import choose, network, place, start, tablet, walk_files
 from tests.browser.conftest import Opener, RunningServer
 from tests.browser.network import Network
+from tests.browser.picture import wait_for_picture
 from tests.browser.streaming import until_strides, walking
 from tests.browser.test_live_screens import prescribe
-from tests.browser.test_replay import COUNT
 from tests.browser.test_upload import SEGMENTS
 
 __all__ = ["network"]
@@ -156,17 +155,9 @@ def test_the_figure_walks_and_stop_ends_the_take(
     with walking(running) as session:
         page = opened(f"/sessions/{session}/live", browser=solid)
         until_strides(page, 2)
-        page.frame_locator("live-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
         page.get_by_role("button", name="Norm").dispatch_event("click")
-        pictures: list[bytes] = []
-        found = {"orange": 0, "blue": 0}
-        for _ in range(40):  # the figure is drawn anew with its ghost, by software here
-            page.wait_for_timeout(500)
-            pictures.append(page.locator("live-view iframe").screenshot())
-            found = page.evaluate(COUNT, base64.b64encode(pictures[-1]).decode())
-            if len(set(pictures)) > 2 and min(found["orange"], found["blue"]) > 150:
-                break
-        assert len(set(pictures)) > 2, "the figure stands still"
-        assert min(found["orange"], found["blue"]) > 150
+        before = wait_for_picture(page, lambda now: min(now["orange"], now["blue"]) > 150)
+        after = wait_for_picture(page, lambda now: now != before and min(now["orange"], now["blue"]) > 150)
+        assert after != before, "the figure stands still"
         page.get_by_role("button", name="STOP").click()
         page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), timeout=90_000)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -12,8 +11,8 @@ from playwright.sync_api import Browser, Page
 
 from tests.browser.conftest import Filled, Opener, RunningServer
 from tests.browser.design import all_faults, layout_faults, text_faults
+from tests.browser.picture import wait_for_picture, wait_until_still
 from tests.browser.streaming import until_strides, walking
-from tests.browser.test_replay import COUNT
 from tests.data import ROOT
 
 DESK, TABLET, PHONE = (1280, 800), (810, 1080), (360, 740)
@@ -173,16 +172,9 @@ def _screens(otherwise: Path) -> Path:
 
 
 def _wait_for_live_figure(page: Page) -> None:
-    """Software WebGL needs seconds for the first picture of a figure that moves."""
-    for _ in range(20):
-        picture = base64.b64encode(page.locator("live-view iframe").screenshot()).decode()
-        if page.evaluate(COUNT, picture)["orange"] > 150:
-            return
-        page.wait_for_timeout(1000)
-    pytest.fail("no figure")
+    wait_for_picture(page, lambda now: now["orange"] > 150)
 
 
 def _wait_for_figure(page: Page) -> None:
     page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
-    page.frame_locator("gait-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
-    page.wait_for_timeout(2500)
+    wait_until_still(page)

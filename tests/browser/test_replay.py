@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
 from uuid import uuid4
 
@@ -10,47 +9,25 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.browser import filling
 from tests.browser.conftest import Filled, Opener, RunningServer
+from tests.browser.picture import wait_for_picture, wait_until_still
 from tests.data import data_folder
 from tests.walks import NEURA
-
-COUNT = """async (png) => {
-  const image = new Image();
-  image.src = `data:image/png;base64,${png}`;
-  await image.decode();
-  const canvas = document.createElement('canvas');
-  [canvas.width, canvas.height] = [image.width, image.height];
-  const context = canvas.getContext('2d');
-  context.drawImage(image, 0, 0);
-  const d = context.getImageData(0, 0, canvas.width, canvas.height).data;
-  const found = { orange: 0, blue: 0, sum: 0, x: 0 };
-  for (let i = 0; i < d.length; i += 4) {
-    const [r, g, b] = [d[i], d[i + 1], d[i + 2]];
-    const left = r > 120 && r > 1.5 * g && g > b, right = b > 120 && b > 1.5 * r && b > g;
-    found.orange += left ? 1 : 0;
-    found.blue += right ? 1 : 0;
-    found.x += left || right ? ((i / 4) % canvas.width) / canvas.width : 0;
-    found.sum += r + g + b;
-  }
-  return { ...found, x: found.x / (found.orange + found.blue), mean: found.sum / (d.length / 4) / 3 };
-}"""
-"""Pixels of the left and of the right leg's colour, where they are across (0 to 1), the mean brightness."""
 
 
 def test_the_figure_has_two_legs_and_follows_the_clock(
     opened: Opener, solid: Browser, filled: Filled
 ) -> None:
     page = _open(opened, solid, filled.done)
-    before = _pixels(page)
+    before = wait_until_still(page)
     assert before["orange"] > 200
     assert before["blue"] > 200
-    picture = _picture(page)
     page.keyboard.press("j")
     page.wait_for_function(
         "() => Math.abs(document.querySelector('gait-view').dataset.shown"
         " - document.querySelector('time-bar input').value) < 0.05"
     )
-    page.wait_for_timeout(500)
-    assert _picture(page) != picture
+    after = wait_for_picture(page, lambda now: now != before)
+    assert after["orange"] > 100, "the figure is gone"
 
 
 def test_a_lost_line_comes_back_by_itself(opened: Opener, solid: Browser, filled: Filled) -> None:
@@ -59,18 +36,17 @@ def test_a_lost_line_comes_back_by_itself(opened: Opener, solid: Browser, filled
     view = page.locator("gait-view")
     expect(view).to_have_attribute("data-state", "lost")
     expect(view).to_have_attribute("data-state", "open", timeout=10_000)
-    page.frame_locator("gait-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
-    page.wait_for_timeout(1500)
-    assert _pixels(page)["orange"] > 200
+    found = wait_for_picture(page, lambda now: now["orange"] > 200)
+    assert found["blue"] > 200
 
 
 def test_the_figure_goes_dark_with_the_page(opened: Opener, solid: Browser, filled: Filled) -> None:
     page = _open(opened, solid, filled.done)
-    light = _pixels(page)["mean"]
+    light = wait_until_still(page)
     page.locator(".rail [data-theme-toggle]").click()
-    page.wait_for_timeout(1500)
-    assert light > 200
-    assert _pixels(page)["mean"] < 80
+    dark = wait_for_picture(page, lambda now: now["mean"] < 80 and now["blue"] > 0)
+    assert light["mean"] > 200
+    assert dark["orange"] > 0
 
 
 def test_the_view_follows_the_walker(opened: Opener, solid: Browser, filled: Filled) -> None:
@@ -78,7 +54,7 @@ def test_the_view_follows_the_walker(opened: Opener, solid: Browser, filled: Fil
     _switch(page, "ground")
     for t_s in (12, 45):
         _seek(page, t_s)
-        assert 0.35 < _pixels(page)["x"] < 0.65
+        assert 0.35 < wait_until_still(page)["x"] < 0.65
 
 
 def test_from_where_the_view_stands_still_the_walk_goes_on(
@@ -89,7 +65,7 @@ def test_from_where_the_view_stands_still_the_walk_goes_on(
     across = []
     for t_s in (15, 30, 45):
         _seek(page, t_s)
-        across.append(_pixels(page)["x"])
+        across.append(wait_until_still(page)["x"])
     assert across[0] + 0.05 < across[1] < across[2] - 0.03
 
 
@@ -98,11 +74,11 @@ def test_steps_and_trails_are_left_behind_and_can_be_hidden(
 ) -> None:
     page = _open(opened, solid, filled.done)
     _seek(page, 30)
-    shown = _pixels(page)
+    shown = wait_until_still(page)
     _switch(page, "ground")
-    hidden = _pixels(page)
-    for colour in ("orange", "blue"):
-        assert shown[colour] > hidden[colour] + 150
+    hidden = wait_for_picture(page, lambda now: shown["orange"] > now["orange"] + 150)
+    assert shown["blue"] > hidden["blue"] + 150
+    assert min(hidden["orange"], hidden["blue"]) > 200, "the figure is hidden too"
 
 
 def test_a_lost_line_keeps_what_was_switched(opened: Opener, solid: Browser, filled: Filled) -> None:
@@ -125,7 +101,7 @@ def test_a_take_of_two_feet_says_which_parts_are_estimated(
         expect(page.locator("[data-estimated]")).to_be_visible(visible=estimated)
         _switch(page, "ground")
         _seek(page, 20)
-        seen.append(_pixels(page))
+        seen.append(wait_until_still(page))
         page.close()
     full, faint = seen
     for colour in ("orange", "blue"):
@@ -146,9 +122,10 @@ def test_a_real_walk_leaves_its_steps(opened: Opener, solid: Browser, running: R
     files = {p.name: p.read_bytes() for p in sorted(folder.glob("*.txt"))}
     page = _open(opened, solid, _analysed(running, files, NEURA))
     _seek(page, 19)
-    shown = _pixels(page)
+    shown = wait_until_still(page)
     _switch(page, "ground")
-    assert _pixels(page)["orange"] < shown["orange"] - 100
+    hidden = wait_for_picture(page, lambda now: now["orange"] < shown["orange"] - 100)
+    assert hidden["orange"] > 0
 
 
 def _analysed(
@@ -170,32 +147,19 @@ def _analysed(
 def _open(opened: Opener, solid: Browser, session_id: str) -> Page:
     page = opened(f"/sessions/{session_id}", browser=solid)
     page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
-    page.frame_locator("gait-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
-    page.wait_for_timeout(2000)
+    wait_for_picture(page, lambda now: min(now["orange"], now["blue"]) > 0)
     return page
 
 
 def _seek(page: Page, t_s: float) -> None:
-    """Move the time bar and wait until the figure is there and drawn."""
+    """Move the time bar and wait until the figure is there."""
     page.locator("time-bar input").evaluate(
         "(e, t) => { e.value = t; e.dispatchEvent(new Event('input')); }", t_s
     )
     page.wait_for_function(
         "t => Math.abs(document.querySelector('gait-view').dataset.shown - t) < 0.05", arg=t_s
     )
-    page.wait_for_timeout(700)
 
 
 def _switch(page: Page, name: str) -> None:
     page.locator(f"[data-switch={name}]").click()
-    page.wait_for_timeout(700)
-
-
-def _picture(page: Page) -> bytes:
-    return page.locator("gait-view iframe").screenshot()
-
-
-def _pixels(page: Page) -> dict[str, float]:
-    png = base64.b64encode(_picture(page)).decode()
-    found: dict[str, float] = page.evaluate(COUNT, png)
-    return found

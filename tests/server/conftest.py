@@ -14,7 +14,7 @@ NOBODY = CHEAP.hash("no account has this password")
 
 @pytest.fixture(autouse=True)
 def cheap_passwords(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sign in without the tenths of a second that a real hash takes; tests of `auth` have the real one."""
-    if request.path.parent.name != "auth":
+    """Sign in without the tenths of a second that a real hash takes; their own tests have the real one."""
+    if request.path.name != "test_passwords.py":
         monkeypatch.setattr(passwords, "_HASHER", CHEAP)
         monkeypatch.setattr(passwords, "_nobody", lambda: NOBODY)

@@ -61,6 +61,7 @@ def test_resumed_at_any_stage_is_the_whole(stage: str) -> None:
     assert same(resume(whole(*worn), stage), whole(*worn))
 
 
+@pytest.mark.slow
 def test_seven_sensors_resumed_where_their_mountings_are_found_are_the_whole() -> None:
     assert same(resume(whole(), "mounting"), whole())
 

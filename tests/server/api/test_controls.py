@@ -12,7 +12,7 @@ from core.simulate import Stand, Straight, mt_files, simulate
 from server.processes.supervisor import Workers
 from tests.server.clinic import Clinic, open_clinic
 
-pytestmark = pytest.mark.anyio
+pytestmark = [pytest.mark.anyio, pytest.mark.slow]
 
 API = "/api/v1"
 SCRIPT = (Stand(5.0), Straight(12.8, 0.64, 0.54), Stand(4.0))

@@ -40,6 +40,7 @@ async def until(holds: Any) -> None:
             await asyncio.sleep(0.02)
 
 
+@pytest.mark.slow
 async def test_an_estimator_is_warmed_at_the_start_of_the_server_in_a_process_of_its_own(
     tmp_path: Path,
 ) -> None:

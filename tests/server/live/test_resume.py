@@ -250,7 +250,7 @@ class Stream(RuleBasedStateMachine):
         self.tablet.lost()
 
 
-Stream.TestCase.settings = settings(max_examples=300, stateful_step_count=40, deadline=None)
+Stream.TestCase.settings = settings(max_examples=100, stateful_step_count=40, deadline=None)
 TestStream = Stream.TestCase
 
 

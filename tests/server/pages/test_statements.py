@@ -108,6 +108,7 @@ async def asked(clinic: Clinic, path: str, answer: int = 200) -> list[str]:
     return sent
 
 
+@pytest.mark.slow
 async def test_the_patient_list_takes_as_few_statements_for_500_patients_as_for_two(tmp_path: Path) -> None:
     async with open_clinic(tmp_path / "small") as clinic:
         crowd.fill(clinic, 2, 1)
@@ -128,6 +129,7 @@ async def test_no_page_takes_more_statements_than_20(
     assert len(sent) <= MOST, "\n\n".join(sent)
 
 
+@pytest.mark.slow
 async def test_a_session_page_takes_as_few_statements_for_200_control_visits_as_for_six(
     tmp_path: Path,
 ) -> None:

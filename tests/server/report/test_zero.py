@@ -38,7 +38,7 @@ def panel(model: ReportModel, variable: str) -> CurvePanel:
     return next(p for p in model.panels if p.variable.name == variable)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=12)
 @given(st.dictionaries(st.sampled_from(NAMES), st.floats(-40.0, 40.0)))
 def test_a_curve_has_a_norm_band_of_its_own_zero_or_none(
     make_bundle: MakeBundle, standing: dict[str, float]
