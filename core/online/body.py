@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-import numba
 import numpy as np
 
 from core.body.erkf.params import ErkfParams
@@ -95,28 +94,6 @@ def worn_feet(segments: Iterable[Segment]) -> tuple[Segment, ...]:
     return tuple(FOOT[s] for s in SIDES if FOOT[s] in worn)
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _segments(states, mount, place, q, p):  # type: ignore[no-untyped-def]
-    """Orientation (T, n, 4) and origin (T, n, 3) of segments from sensor states (T, n, 16)."""
-    for k in range(states.shape[0]):
-        for i in range(states.shape[1]):
-            a, b, c, d = states[k, i, 6], states[k, i, 7], states[k, i, 8], states[k, i, 9]
-            m = mount[i]
-            # q ⊗ mount*
-            w = a * m[0] + b * m[1] + c * m[2] + d * m[3]
-            x = -a * m[1] + b * m[0] - c * m[3] + d * m[2]
-            y = -a * m[2] + b * m[3] + c * m[0] - d * m[1]
-            z = -a * m[3] - b * m[2] + c * m[1] + d * m[0]
-            q[k, i, 0], q[k, i, 1], q[k, i, 2], q[k, i, 3] = w, x, y, z
-            u, v, s = place[i]
-            p[k, i, 0] = states[k, i, 0] - (1 - 2 * (y * y + z * z)) * u
-            p[k, i, 0] -= 2 * (x * y - w * z) * v + 2 * (x * z + w * y) * s
-            p[k, i, 1] = states[k, i, 1] - 2 * (x * y + w * z) * u
-            p[k, i, 1] -= (1 - 2 * (x * x + z * z)) * v + 2 * (y * z - w * x) * s
-            p[k, i, 2] = states[k, i, 2] - 2 * (x * z - w * y) * u
-            p[k, i, 2] -= 2 * (y * z + w * x) * v + (1 - 2 * (x * x + y * y)) * s
-
-
 @dataclass(frozen=True, eq=False)
 class Tracked:
     """Signals as filtered; q (T, n, 4), p (T, n, 3) origins of segments; (T, joints) their ends apart, m."""
@@ -170,8 +147,7 @@ class Filtered:
         if self._filter is None:
             self._filter = LiveErkf(self.tree, self._params, self._rate_hz, signals, self._start)
         states, residual = self._filter.push(signals)
-        q, p = np.empty((*valid.shape, 4)), np.empty((*valid.shape, 3))
-        _segments(states, self.tree.q_mount, self.tree.place, q, p)
+        q, p = self.tree.segments(states[..., :3], states[..., 6:10])
         return Tracked(signals, q, p, residual)
 
 

@@ -8,16 +8,13 @@ import pytest
 
 from core.body import BodyModel
 from core.body.erkf.gaps import bridged
-from core.body.l7s.legs import M_LEG, LegModel, solve_legs
 from core.body.still import AT_REST, FOOT_STILL, still_samples
 from core.body.tree import PRESETS, person_tree
 from core.frames import GRAVITY, Bools, Floats
 from core.online.bridge import Bridge
 from core.online.drift import HeadingHold
-from core.online.sparse import FIGURE, HIP_SIGN
-from core.online.sparse_kernel import in_sy_frames, legs
 from core.online.still import Stillness
-from core.rotation import about, from_matrix, to_matrix, yaw
+from core.rotation import about, yaw
 
 SEGMENTS = PRESETS["lower_body7"]
 RATE = 100.0
@@ -96,25 +93,6 @@ def test_live_stillness_trails_and_never_looks_ahead() -> None:
         stored = still_samples(acc[:, 0], gyr[:, 0], valid[:, 0], RATE, rule)
         assert not (stored & ~live)[130:].any() or rule is AT_REST
         assert abs(int(stored.sum()) - int(live.sum())) < 2 * rule.window_s * RATE + 1
-
-
-def test_compiled_legs_are_those_of_the_leg_model() -> None:
-    model = LegModel.of(BodyModel.from_height(1.7))
-    rng = np.random.default_rng(4)
-    small = rng.normal(scale=0.3, size=(300, 3, 4)) + np.array([1.0, 0.0, 0.0, 0.0])
-    R = to_matrix(small / np.linalg.norm(small, axis=2, keepdims=True))
-    p = np.array([[0.0, 0.0, 0.9], [0.0, 0.1, 0.1], [0.0, -0.1, 0.1]]) + rng.normal(0.0, 0.05, (300, 3, 3))
-    stored = solve_legs(R, p, model)
-    q, at = np.empty((300, 7, 4)), np.empty((300, 7, 3))
-    to_foot = np.array(model.to_isb("foot_l"))
-    legs(R, p, model.hip_width, model.thigh, model.shank, model.foot, HIP_SIGN, M_LEG.copy(), to_foot, q, at)
-    np.testing.assert_allclose(q[:, 0], from_matrix(R[:, 0] @ M_LEG), atol=1e-12)
-    for i, segment in enumerate(FIGURE[1:], 1):
-        np.testing.assert_allclose(q[:, i], stored.q[segment], atol=1e-12)
-        np.testing.assert_allclose(at[:, i], stored.p[segment], atol=1e-12)
-    again = np.empty((300, 3, 3))
-    in_sy_frames(q[:, 3].copy(), to_foot.T.copy(), again)
-    np.testing.assert_allclose(again, R[:, 1], atol=1e-12)
 
 
 def drifting(n: int, seed: int) -> tuple[Floats, Floats]:
