@@ -6,18 +6,19 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from core.body.erkf.live_sensors import FootPaths
 from core.body.l7s.filter import L7sInputs, L7sParams, L7sState, L7sTrack, Worn, filter_block, start
 from core.body.l7s.inputs import KnownSamples, arrange_inputs, bodies_of, remove_gravity
 from core.body.l7s.legs import FIGURE, LegModel, solve_legs
+from core.body.live_estimator import Placed, Raw
 from core.body.model import BodyModel
 from core.calibration.result import SegmentCalibration
 from core.errors import EstimationError, Notice
 from core.estimators import L7S_2I, L7S_3I, LIVE_SINGLE_PATHS, LiveMethod
 from core.frames import Bools, Segment
-from core.online.body import FootPaths, Placed, Raw
 
 
-class Sparse:
+class LiveL7s:
     """Seven poses from three sensors or two."""
 
     segments: tuple[Segment, ...] = FIGURE
