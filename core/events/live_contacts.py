@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from core.errors import SignalError
 from core.events.detection import KINDS, SOURCE
-from core.events.foot_pitch import FootPitchParams, FootPitchState, push
+from core.events.foot_pitch import FootPitchParams, FootPitchState, pitch_signal, push
 from core.events.result import GaitEvent
 from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
 
@@ -52,9 +52,8 @@ class Contacts:
         """
         found = []
         for i, (side, rule) in enumerate(zip(self.sides, self._rules, strict=True)):
-            # the sine of the pitch, as `pitch_signal`
-            s = 2.0 * (q[:, i, 1] * q[:, i, 3] - q[:, i, 0] * q[:, i, 2])
-            for kind, index, known, offset in zip(*push(rule, s, valid[:, i]), strict=True):
+            told = push(rule, pitch_signal(q[:, i]), valid[:, i])
+            for kind, index, known, offset in zip(*told, strict=True):
                 event = GaitEvent(
                     time_s=(first + int(index) + float(offset)) / self._rate_hz,
                     side=side,
