@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 from core.angles import JointAngles
 from core.body.feet import FootTracks
-from core.edits import Edit, edited_events, edited_strides
 from core.errors import Notice
 from core.events.bouts import Bout, BoutParams, bouts_of
+from core.events.edits import Edit, edited_events, edited_strides
 from core.events.flags import StrideParams, with_flag
 from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
@@ -107,7 +107,8 @@ def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
     Raises
     ------
     ParameterError
-        An edit does not fit the events: `no_such_event`, `event_outside`, `event_order` (core/edits.py).
+        An edit does not fit the events: `no_such_event`, `event_outside`, `event_order` of
+        core/events/edits.py.
     """
     events = edited_events(tracks.events, edits, tracks.duration_s)
     strides = edited_strides(_walked(tracks, events), edits)

@@ -13,7 +13,7 @@ from core.formats.live_log import Batch, Hello, SensorInfo, StreamInfo
 from core.frames import Floats, Side
 from core.online import LiveFrame, LiveStride, Online
 from core.online.chain import Chain
-from core.online.history import History
+from core.parameters.live_history import History
 from core.recording import UniformRecording
 
 

@@ -25,7 +25,8 @@ from core.body.erkf.start import start_state
 from core.body.feet import FootTracks
 from core.body.kinematics import forward_kinematics
 from core.body.l7s.health import l7s_health, l7s_notices
-from core.body.l7s.poses import free_acceleration, l7s_poses
+from core.body.l7s.inputs import free_acceleration
+from core.body.l7s.poses import l7s_poses
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.mounting import MountedSensors
 from core.body.pose_params import PoseParams

@@ -18,7 +18,7 @@ from core.body.model import BodyModel
 from core.body.places import joint_places, sensor_place, standing_origin
 from core.errors import EstimationError, ParameterError
 from core.frames import Floats, Segment
-from core.rotation import conjugate, from_matrix, multiply, rotate, to_matrix
+from core.rotation import conjugate, from_matrix, rotate, to_matrix
 
 Preset = Literal["lower_body7", "feet_pelvis3", "feet2", "single_foot_r", "single_foot_l"]
 
@@ -126,13 +126,34 @@ class ImuTree:
         """The segments' anterior axes (n, 3) in sensor axes."""
         return rotate(conjugate(self.q_mount), np.array([1.0, 0.0, 0.0]))
 
+    def segments(self, p: Floats, q: Floats) -> tuple[Floats, Floats]:
+        """Segment orientations (..., n, 4) and origins (..., n, 3) in W.
+
+        Parameters
+        ----------
+        p, q : (..., n, 3), (..., n, 4) of the sensors in W.
+        """
+        from core.body.segment_kernel import write_segments
+
+        n = len(self.imus)
+        turned, origin = np.empty((q.size // (4 * n), n, 4)), np.empty((p.size // (3 * n), n, 3))
+        write_segments(
+            np.ascontiguousarray(p, np.float64).reshape(origin.shape),
+            np.ascontiguousarray(q, np.float64).reshape(turned.shape),
+            self.q_mount,
+            self.place,
+            turned,
+            origin,
+        )
+        return turned.reshape(q.shape), origin.reshape(p.shape)
+
     def segment_q(self, q: Floats) -> Floats:
         """Segment orientations (..., n, 4) from sensor orientations (..., n, 4)."""
-        return multiply(q, conjugate(self.q_mount))
+        return self.segments(np.zeros((*q.shape[:-1], 3)), q)[0]
 
     def segment_origin(self, p: Floats, q: Floats) -> Floats:
         """Segment origins (..., n, 3) in W from sensor positions (..., n, 3) and orientations (..., n, 4)."""
-        return np.asarray(p - rotate(self.segment_q(q), self.place))
+        return self.segments(p, q)[1]
 
 
 def person_tree(

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.frames import Bools, Floats
-from core.rotation import rotate
 
 
 @dataclass(frozen=True)
@@ -119,7 +118,8 @@ def push(
 
 def pitch_signal(q_foot: Floats) -> Floats:
     """s (n,) of foot orientations (n, 4): sine of the foot's pitch, toes up positive (thesis Eq 52)."""
-    return np.ascontiguousarray(rotate(q_foot, np.array([1.0, 0.0, 0.0]))[:, 2])
+    w, x, y, z = q_foot[:, 0], q_foot[:, 1], q_foot[:, 2], q_foot[:, 3]
+    return np.asarray(2.0 * (x * z - w * y))
 
 
 def warm() -> None:

@@ -4,14 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from core.online.frame import (
-    CalibrationView,
-    LiveFrame,
-    LiveStride,
-    SegmentCheck,
-    SensorHealth,
-    Trail,
-)
+from core.online.frame import CalibrationView, LiveFrame, SegmentCheck, SensorHealth, Trail
+from core.parameters.live_stride import LiveStride
 
 if TYPE_CHECKING:
     from core.online.session import Online, OnlineParams, warm

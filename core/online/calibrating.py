@@ -16,14 +16,14 @@ import numpy as np
 
 from core.calibration import calibrate
 from core.calibration.calibrate import FEW_STEPS
+from core.calibration.live_attempt import Attempt, Wearer
+from core.calibration.live_standing import StandingNow, last_part, standing_now, upwards
 from core.calibration.result import Calibration
 from core.calibration.walking import moving_mask
 from core.errors import Notice, SagittalError
 from core.frames import Bools, Floats, Segment
-from core.online.attempt import Attempt, Wearer
 from core.online.calibrated import LiveCalibration, MountingParams, finished
 from core.online.frame import CalibrationView, SegmentCheck, Stage
-from core.online.standing import StandingNow, last_part, standing_now, upwards
 from core.recording import UniformRecording
 from core.timeline.live import UniformBlock
 

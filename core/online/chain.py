@@ -14,25 +14,28 @@ import numpy as np
 
 from core.angles.kernel import AngleKernel, mean_angles, subtract_zero
 from core.body.choice import WHOLE, possible
+from core.body.erkf.live_erkf import HEADING_SD, live_params
+from core.body.erkf.live_figure import Linked, Unlinked
+from core.body.erkf.live_sensors import Filtered, FootPaths
 from core.body.erkf.params import ErkfParams
 from core.body.l7s.filter import L7sParams
+from core.body.l7s.live_figure import LiveL7s
+from core.body.live_estimator import Estimator, Placed, Raw, worn_feet
+from core.body.still import FOOT_STILL
 from core.errors import Notice
 from core.estimators import ERKF, L7S_2I, L7S_3I
 from core.events.flags import StrideParams
 from core.events.foot_pitch import FootPitchParams
+from core.events.live_contacts import Contacts
 from core.events.result import GaitEvent
 from core.frames import Bools, Floats, Segment, Side
 from core.fusion.attitude import AttitudeParams
-from core.online.body import Estimator, Filtered, FootPaths, Placed, Raw, worn_feet
+from core.fusion.live_attitude import Attitudes
+from core.fusion.live_drift import HeadingHold
 from core.online.calibrated import LiveCalibration
-from core.online.contacts import Attitudes, Contacts
-from core.online.drift import HeadingHold
-from core.online.erkf import HEADING_SD, live_params
-from core.online.frame import LiveStride
-from core.online.history import MOST, History
-from core.online.linked import Linked, Unlinked
-from core.online.sparse import Sparse
-from core.online.strides import LiveStrides, Setup
+from core.parameters.live_history import MOST, History
+from core.parameters.live_stride import LiveStride
+from core.parameters.live_strides import LiveStrides, Setup
 from core.parameters.spatial import Surface
 from core.rest import samples
 
@@ -108,7 +111,7 @@ class Chain:
         index = [self.segments.index(s) for s in turned]
         self._turned = turned
         self._index = np.array(index, np.int64)
-        self._hold = HeadingHold(turned, rate)
+        self._hold = HeadingHold(turned, rate, FOOT_STILL.gyr_limit)
         self._attitudes = Attitudes(index, [mounted[s] for s in turned], rate, self.params.attitude)
         self._contacts = Contacts(feet, rate, self.params.events)
         self._feet = np.array([self.segments.index(f) for f in feet], np.int64)
@@ -166,7 +169,7 @@ class Chain:
         alone = worn_feet(self.segments)
         feet = FootPaths(filtered(alone)) if alone else None
         if best in (L7S_3I.name, L7S_2I.name) and feet is not None:
-            return Sparse(column, mounted, body, rate, feet, self.params.l7s)
+            return LiveL7s(column, mounted, body, rate, feet, self.params.l7s)
         message = NOT_LIVE.format(", ".join(self.segments))
         self._notices.append(Notice("no_live_figure", message, severity="info"))
         return Unlinked(self.segments, feet)

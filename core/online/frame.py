@@ -14,14 +14,12 @@ import numpy as np
 
 from core.errors import Notice
 from core.estimators import NO_FIGURE, LiveMethod
-from core.events.result import GaitEvent, StrideFlag
+from core.events.result import GaitEvent
 from core.frames import Floats, Segment, Side
+from core.parameters.live_stride import LiveStride
 
 Stage = Literal["waiting", "stand", "walk", "running"]
 """waiting: samples of some sensor are missing; stand, walk: calibration; running: everything there is."""
-
-NOT_YET: Final = "not_yet"
-"""Reason of a value that a later `LiveStride` of the same stride will have."""
 
 
 @dataclass(frozen=True)
@@ -88,40 +86,6 @@ class Trail:
 
 
 EMPTY_TRAIL: Final = Trail(np.zeros(0), (), np.zeros((0, 0)))
-
-
-@dataclass(frozen=True, eq=False)
-class LiveStride:
-    """One cycle of a foot, told as soon as its second contact is known.
-
-    Distances need the rest of the foot after that contact: where a reason is `not_yet`, the same stride (same
-    `n`) is told once more when they are known, at the latest with the foot's next contact, and is then
-    `complete`. Values that were there do not change.
-
-    Parameters
-    ----------
-    n : running number over both feet, from 0. detected_s : last sample that was needed.
-    values : parameters of a stride as in the stride table (core.parameters: temporal, spatial, stance,
-        phases, kinematic), None where undefined. reasons : why, for every None.
-    curves : variable → (101,) rad over the cycle, as `cycle_curves`; only those known throughout.
-    turn_rad : heading change of the foot, left positive. flags : those that are known by then; "first" of a
-        bout and "near_turn" after a turn from the start, "last" and "in_place" when it is `complete`.
-        counted : no flag.
-    """
-
-    n: int
-    side: Side
-    start_s: float
-    foot_off_s: float | None
-    end_s: float
-    detected_s: float
-    values: Mapping[str, float | None]
-    reasons: Mapping[str, str]
-    curves: Mapping[str, Floats]
-    turn_rad: float | None
-    flags: tuple[StrideFlag, ...]
-    counted: bool
-    complete: bool
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,23 +7,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from core.body.live_still import Stillness
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.tree import PRESETS
+from core.calibration.live_attempt import Wearer
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
 from core.errors import Notice, SagittalError
 from core.formats.live_log import Batch, Hello
 from core.frames import GRAVITY, R_NEUTRAL, Protocol, Segment
 from core.fusion.orientations import Orientations
-from core.online.attempt import Wearer
 from core.online.calibrated import LiveCalibration
 from core.online.calibrated import warm as warm_calibration
 from core.online.calibrating import CalibratingParams, LiveCalibrator
 from core.online.chain import Chain, ChainParams, Outcome
 from core.online.frame import EMPTY_TRAIL, LiveFrame, Trail
 from core.online.health import Health
-from core.online.still import Stillness
-from core.online.stuck import StuckSensors
 from core.parameters.spatial import Surface
+from core.quality.live_stuck import StuckSensors
 from core.quality.stuck import warm as warm_stuck
 from core.recording import SensorSignals, Subject, UniformRecording, check_belt
 from core.rotation import from_matrix

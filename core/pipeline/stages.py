@@ -15,7 +15,7 @@ import numpy as np
 from core import body, calibration, quality, timeline
 from core.angles.measure import measure_angles
 from core.body.estimate import estimate_poses
-from core.body.l7s.poses import free_acceleration
+from core.body.l7s.inputs import free_acceleration
 from core.body.mounting import mount_sensors
 from core.body.walking_frame import in_walking_frame
 from core.events.consensus import all_detectors, consensus, with_confidence

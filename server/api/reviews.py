@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
-from core.edits import edit_of
+from core.events.edits import edit_of
 from server.api import review_schemas as schemas
 from server.api.documents import refusals
 from server.api.downloads import BINARY, attachment

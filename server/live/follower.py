@@ -19,7 +19,8 @@ from core.feedback.engine import COMMANDS, FeedbackEngine
 from core.formats.live_log import Batch, Hello, Record, decode_batch, parse_hello, scan, scan_records
 from core.frames import SIDES, Protocol, Side
 from core.online import Online
-from core.online.frame import LiveFrame, LiveStride, Trail
+from core.online.frame import LiveFrame, Trail
+from core.parameters.live_stride import LiveStride
 from core.recording import Subject
 from server.live import wire
 from server.live.messages import STALE_S, Begin, Command, Item, Kind, Picture, Report, Standing, Through

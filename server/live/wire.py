@@ -15,7 +15,8 @@ import numpy as np
 from core.errors import Notice
 from core.feedback import Cue, FeedbackState
 from core.frames import SIDES, SUFFIX, Floats, Side
-from core.online.frame import CalibrationView, LiveFrame, LiveStride, SensorHealth, Trail
+from core.online.frame import CalibrationView, LiveFrame, SensorHealth, Trail
+from core.parameters.live_stride import LiveStride
 from server.live.messages import BATTERY_WARN_PCT, STALE_S, Pose
 
 LOST_WARN, LOST_BAD = 0.01, 0.20

@@ -16,8 +16,8 @@ import numpy as np
 from core.angles import JointAngles
 from core.body.model import BodyModel
 from core.body.poses import Poses
-from core.edits import Edit, EditKind
 from core.errors import FormatError, Notice
+from core.events.edits import Edit, EditKind
 from core.events.result import EventKind, GaitEvent, GaitEvents, Stride, StrideFlag, Strides
 from core.events.strides import NOTICES
 from core.frames import SEGMENTS, Segment, Side

@@ -9,7 +9,7 @@ from typing import Final
 
 from sqlalchemy import Connection, select
 
-from core.edits import Edit, edit_of
+from core.events.edits import Edit, edit_of
 from server.storage.tables import edit as rows
 from server.storage.tables import user
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar, cast
 
-from core.edits import Edit
+from core.events.edits import Edit
 from core.measure import Measured, Tracks, measure
 from core.norms.controls import ControlSession
 from core.parameters.rows import Column
@@ -99,7 +99,7 @@ class ReviewedAnalyses:
 
         Raises
         ------
-        Conflict no_tracks, IntegrityError, ParameterError of core.edits.
+        Conflict no_tracks, IntegrityError, ParameterError of core.events.edits.
         """
         known = self.open(found)
         if known.tracks is None:

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, insert
 
-from core.edits import Edit
+from core.events.edits import Edit
 from server import audit
 from server.services import analyses
 from server.services.edit_log import UNDO, Edits, edits_of
@@ -48,7 +48,7 @@ def make(
 
     Raises
     ------
-    NotFound: no analysis. Conflict: edited_meanwhile, no_tracks. ParameterError of core.edits.
+    NotFound: no analysis. Conflict: edited_meanwhile, no_tracks. ParameterError of core.events.edits.
     """
     found, before = _state(db, session_id, seen)
     # measured before the lock is taken: what cannot be is refused, and nobody waits for it

@@ -293,7 +293,7 @@ edit = Table(
     Column("seq", Integer, primary_key=True, autoincrement=True),
     _ref("analysis_id", "analysis"),
     Column("kind", String(16), nullable=False),
-    Column("content", Json, nullable=False),  # core.edits.Edit; of an undo {}
+    Column("content", Json, nullable=False),  # core.events.edits.Edit; of an undo {}
     _ref("user_id", "user", nullable=True, index=False),
     Column("at", Utc, nullable=False),
     _one_of("kind", EDIT_KINDS),

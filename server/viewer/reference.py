@@ -13,10 +13,10 @@ import numpy as np
 
 from core import rotation
 from core.angles import SIGNS
+from core.angles.inverse import leg_orientations, pelvis_orientation
 from core.body.kinematics import leg_points, sole_points
 from core.body.model import BodyModel
 from core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Floats, Segment, Side
-from core.inverse_angles import leg_orientations, pelvis_orientation
 
 SAGITTAL: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 """Without these there is no walk to show."""

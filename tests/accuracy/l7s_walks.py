@@ -15,7 +15,8 @@ import numpy as np
 
 from core.angles.measure import measure_angles
 from core.body.l7s.filter import Adjoint, L7sParams, Worn
-from core.body.l7s.poses import free_acceleration, l7s_poses
+from core.body.l7s.inputs import free_acceleration
+from core.body.l7s.poses import l7s_poses
 from core.body.model import BodyModel
 from core.body.poses import Poses
 from core.body.still import FOOT_STILL, still_samples

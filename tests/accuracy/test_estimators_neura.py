@@ -13,7 +13,8 @@ import numpy as np
 from core.body import BodyModel
 from core.body.erkf.poses import run_erkf
 from core.body.l7s.filter import Worn
-from core.body.l7s.poses import free_acceleration, l7s_poses
+from core.body.l7s.inputs import free_acceleration
+from core.body.l7s.poses import l7s_poses
 from core.body.still import FOOT_STILL, still_samples
 from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations

@@ -13,11 +13,10 @@ from typing import Final, get_args
 import numpy as np
 
 from core.body.l7s.filter import Adjoint, L7sParams, filter_block, start
+from core.body.l7s.inputs import inputs_of
 from core.body.l7s.legs import LegModel, solve_legs
-from core.body.l7s.poses import inputs_of
 from core.body.poses import Poses
 from core.frames import FOOT, SIDES, Floats
-from core.rotation import from_matrix
 from tests.accuracy.l7s_walks import Trial, trial, trial_scores
 from tests.accuracy.report import record
 from tests.l7s_textbook import Textbook, textbook
@@ -64,8 +63,8 @@ def poses_of(of: Trial, R: Floats, p: Floats, model: LegModel) -> Poses:
     return Poses(
         t_s=of.orientations.t_s,
         rate_hz=RATE,
-        q={"pelvis": from_matrix(R[:, 0] @ model.to_isb("pelvis")), **legs.q},
-        p={"pelvis": p[:, 0], **legs.p},
+        q=legs.q_by_segment(),
+        p=legs.p_by_segment(),
         valid=np.ones(n, bool),
         contact={FOOT[s]: of.steps[s] for s in SIDES},
         body=of.truth.body,

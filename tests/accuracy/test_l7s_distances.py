@@ -19,7 +19,8 @@ import pytest
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.poses import foot_tracks, refined, run_erkf
 from core.body.l7s.filter import Worn
-from core.body.l7s.poses import free_acceleration, l7s_poses
+from core.body.l7s.inputs import free_acceleration
+from core.body.l7s.poses import l7s_poses
 from core.body.model import BodyModel
 from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording

@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 
 from core.body.l7s.filter import Adjoint, L7sParams, Worn
+from core.body.l7s.inputs import free_acceleration
 from core.body.l7s.legs import BODIES
-from core.body.l7s.poses import free_acceleration, l7s_poses
+from core.body.l7s.poses import l7s_poses
 from core.body.poses import Poses
 from core.calibration import calibrate
 from core.frames import FOOT, SHANK, SIDES, Floats, Segment, Side

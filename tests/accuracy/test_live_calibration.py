@@ -18,10 +18,10 @@ from core.body.erkf.headings import agreed
 from core.body.erkf.params import ErkfParams
 from core.body.tree import PRESETS
 from core.calibration import calibrate
+from core.calibration.live_attempt import Wearer
 from core.calibration.result import CalibratedRecording, Calibration
 from core.frames import Segment
 from core.fusion.mahony import estimate_orientations
-from core.online.attempt import Wearer
 from core.online.calibrated import LiveCalibration, warm
 from core.online.calibrating import LiveCalibrator
 from core.recording import UniformRecording

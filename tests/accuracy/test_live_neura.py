@@ -15,13 +15,13 @@ import pytest
 
 from core.body.corrected import corrected_signals
 from core.body.erkf.filter import erkf_inputs, filter_block
+from core.body.erkf.live_erkf import live_params
 from core.body.erkf.start import start_state
+from core.body.live_still import Stillness
 from core.body.tree import person_tree
 from core.events import detect
 from core.events.result import GaitEvent
 from core.frames import FOOT, SIDES, Floats, Side
-from core.online.erkf import live_params
-from core.online.still import Stillness
 from tests.accuracy.gaitmap import RATE
 from tests.accuracy.neura import stride_errors_m, take
 from tests.accuracy.report import record, record_in_short

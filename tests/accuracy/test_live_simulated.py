@@ -15,8 +15,8 @@ import pytest
 
 from core.body.tree import PRESETS
 from core.frames import SIDES, Floats, Side
+from core.fusion.live_drift import HeadingHold
 from core.online.chain import COURSES
-from core.online.drift import HeadingHold
 from core.rotation import yaw
 from core.simulate import Truth
 from tests.accuracy.report import record

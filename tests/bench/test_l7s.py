@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start, warm
+from core.body.l7s.inputs import free_acceleration, inputs_of
 from core.body.l7s.legs import LegModel
-from core.body.l7s.poses import free_acceleration, inputs_of
 from core.body.still import FOOT_STILL, still_samples
 from core.calibration import calibrate
 from core.frames import FOOT, SIDES

@@ -17,12 +17,12 @@ from typing import Final
 import numpy as np
 import pytest
 
+from core.body.erkf.live_erkf import LiveErkf
 from core.body.tree import PRESETS
 from core.formats.live_log import Batch
 from core.frames import Segment
 from core.online import LiveStride, Online, warm
-from core.online.erkf import LiveErkf
-from core.online.strides import LiveStrides
+from core.parameters.live_strides import LiveStrides
 from core.recording import UniformRecording
 from tests.live_walks import batches, hello_of
 from tests.walks import only, simulated

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from core.edits import Edit
+from core.events.edits import Edit
 from core.measure import Tracks, measure
 from server.pages.timeline import FRAGMENT
 from server.services import patients, sessions

@@ -14,7 +14,8 @@ from playwright.sync_api import Page, WebSocketRoute
 from core.feedback.cue import Cue, FeedbackState, GuardState, SideEffect, Summary, Tone, WhyNot, Zone
 from core.frames import SUFFIX, Side
 from core.norms import norms_for
-from core.online.frame import CalibrationView, LiveFrame, LiveStride, SegmentCheck, SensorHealth, Stage, Trail
+from core.online.frame import CalibrationView, LiveFrame, SegmentCheck, SensorHealth, Stage, Trail
+from core.parameters.live_stride import LiveStride
 from server.live import wire
 
 SEGMENTS = ("pelvis", "thigh_l", "shank_l", "foot_l", "thigh_r", "shank_r", "foot_r")

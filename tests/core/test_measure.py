@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from core.body.walking_frame import in_walking_frame
-from core.edits import Edit
+from core.events.edits import Edit
 from core.frames import R_NEUTRAL
 from core.measure import Measured, measure
 from core.parameters.result import Parameter

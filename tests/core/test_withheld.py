@@ -16,9 +16,9 @@ from core.body.health import Finding, worst
 from core.events.result import Stride, Strides
 from core.frames import Segment
 from core.measure import measure
-from core.online.figures import Span, early_figures
 from core.parameters.catalogue import list_curve_figures
 from core.parameters.kinematic import cycle_curves, kinematic
+from core.parameters.live_figures import Span, early_figures
 from core.parameters.spatial import GROUND, NAMES
 from core.parameters.temporal import per_stride, temporal
 from core.pipeline import Analysis, analyse

@@ -7,7 +7,6 @@ forward axis, so that nothing of it is left in our foot frame; with it 0 the con
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import atan2, hypot
 from typing import Final
@@ -18,7 +17,7 @@ from core.body.kinematics import sole_points
 from core.body.model import BodyModel
 from core.errors import EstimationError
 from core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
-from core.rotation import about, from_matrix, to_matrix
+from core.rotation import about, to_matrix
 
 BODIES: Final[tuple[Segment, ...]] = ("pelvis", "foot_l", "foot_r")
 """Order of the three bodies of the state (paper: p, lf, rf)."""
@@ -28,6 +27,12 @@ LEGS: Final[tuple[Side, ...]] = ("left", "right")
 
 HIP_SIDE: Final[dict[Side, float]] = {"left": 1.0, "right": -1.0}
 """Sign of the hip centre on the pelvis's y axis, which points left (paper eq 32)."""
+
+FIGURE: Final[tuple[Segment, ...]] = (
+    "pelvis",
+    *(segment for side in LEGS for segment in (THIGH[side], SHANK[side], FOOT[side])),
+)
+"""Order of the segments of the figure."""
 
 M_LEG: Final[Floats] = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 M_FOOT: Final[Floats] = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
@@ -92,19 +97,27 @@ class LegModel:
 
 @dataclass(frozen=True, eq=False)
 class Legs:
-    """Both legs, poses in our ISB frames.
+    """Pelvis and both legs, poses in our ISB frames.
 
     Parameters
     ----------
-    q : segment → (n, 4). p : segment → (n, 3) hip for thighs, knee for shanks, ankle for feet, m.
-    reach : side → (n,) distance of ankle and hip, m. hinge : side → (n,) distance of the hip from the plane
-    of the foot, m, zero when the hinge constraint holds.
+    q : (n, 7, 4), p : (n, 7, 3) of `FIGURE`, mid-hip for the pelvis, hip for thighs, knee for shanks, ankle
+    for feet, m. reach : (n, 2) distance of ankle and hip of `LEGS`, m. hinge : (n, 2) distance of the hip
+    from the plane of the foot, m, zero when the hinge constraint holds.
     """
 
-    q: Mapping[Segment, Floats]
-    p: Mapping[Segment, Floats]
-    reach: Mapping[Side, Floats]
-    hinge: Mapping[Side, Floats]
+    q: Floats
+    p: Floats
+    reach: Floats
+    hinge: Floats
+
+    def q_by_segment(self) -> dict[Segment, Floats]:
+        """Segment → (n, 4)."""
+        return {s: self.q[:, i].copy() for i, s in enumerate(FIGURE)}
+
+    def p_by_segment(self) -> dict[Segment, Floats]:
+        """Segment → (n, 3)."""
+        return {s: self.p[:, i].copy() for i, s in enumerate(FIGURE)}
 
 
 def solve_legs(R: Floats, p: Floats, model: LegModel) -> Legs:
@@ -118,35 +131,13 @@ def solve_legs(R: Floats, p: Floats, model: LegModel) -> Legs:
     ----------
     Sy 2021 eq 40–44. Where the leg is longer than thigh and shank (the cosine passes 1) the knee is straight.
     """
-    q: dict[Segment, Floats] = {}
-    places: dict[Segment, Floats] = {}
-    reach: dict[Side, Floats] = {}
-    hinge: dict[Side, Floats] = {}
-    for leg, side in enumerate(LEGS):
-        R_foot, p_foot = R[:, 1 + leg], p[:, 1 + leg]
-        hip = p[:, 0] + 0.5 * HIP_SIDE[side] * model.hip_width * R[:, 0, :, 1]
-        ankle = p_foot - 0.5 * model.foot * R_foot[:, :, 2]
-        y = R_foot[:, :, 1]
-        tau = hip - ankle
-        distance = np.linalg.norm(tau, axis=1)
-        cosine = (model.shank**2 + distance**2 - model.thigh**2) / (2.0 * model.shank * distance)
-        angle = np.arccos(np.clip(cosine, -1.0, 1.0))[:, None]
-        along = tau / distance[:, None]
-        # Exp(θ y) of a vector across y; the small part along y, left by the last projection, stays
-        z_shank = np.cos(angle) * along + np.sin(angle) * np.cross(y, along)
-        knee = ankle + model.shank * z_shank
-        z_thigh = _unit(hip - knee)
-        for segment, z, origin in ((SHANK[side], z_shank, knee), (THIGH[side], z_thigh, hip)):
-            x = _unit(np.cross(y, z))
-            R_leg = np.stack((x, np.cross(z, x), z), axis=-1)
-            q[segment] = from_matrix(R_leg @ model.to_isb(segment))
-            places[segment] = origin
-        q[FOOT[side]] = from_matrix(R_foot @ model.to_isb(FOOT[side]))
-        places[FOOT[side]] = ankle
-        reach[side] = distance
-        hinge[side] = np.sum(y * tau, axis=1)
-    return Legs(q, places, reach, hinge)
+    from core.body.l7s.leg_kernel import write_legs
 
-
-def _unit(v: Floats) -> Floats:
-    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
+    n = len(R)
+    legs = Legs(np.empty((n, 7, 4)), np.empty((n, 7, 3)), np.empty((n, 2)), np.empty((n, 2)))
+    write_legs(
+        np.ascontiguousarray(R), np.ascontiguousarray(p), model.hip_width, model.thigh, model.shank,
+        model.foot, np.array([HIP_SIDE[side] for side in LEGS]), M_LEG.copy(),
+        np.array(model.to_isb("foot_l")), legs.q, legs.p, legs.reach, legs.hinge,
+    )  # fmt: skip
+    return legs

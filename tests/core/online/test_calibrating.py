@@ -15,9 +15,9 @@ from core.body.choice import WHOLE
 from core.body.erkf.headings import agreed
 from core.body.erkf.params import ErkfParams
 from core.calibration import calibrate
+from core.calibration.live_attempt import Wearer
 from core.frames import Segment
 from core.fusion.mahony import estimate_orientations
-from core.online.attempt import Wearer
 from core.online.calibrated import LiveCalibration
 from core.online.calibrating import LiveCalibrator
 from core.online.frame import CalibrationView, Stage

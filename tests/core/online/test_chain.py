@@ -19,7 +19,7 @@ from core.fusion.orientations import Orientations
 from core.measure import Measured, Tracks, measure
 from core.online import LiveFrame, LiveStride, Online
 from core.online.chain import COURSES
-from core.online.frame import NOT_YET
+from core.parameters.live_stride import NOT_YET
 from core.recording import UniformRecording
 from tests.live_walks import Run, batches, hello_of, live, recorded
 from tests.walks import cut, lost, neura_walk, only, simulated

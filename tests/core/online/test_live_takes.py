@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.body.erkf.live_figure import Linked
 from core.errors import ParameterError
 from core.frames import SIDES, Segment
 from core.online import LiveFrame, LiveStride, Online
-from core.online.linked import Linked
 from core.parameters.spatial import NAMES as SPATIAL
 from core.recording import SensorSignals, UniformRecording
 from tests.live_walks import batches, hello_of, live, recorded

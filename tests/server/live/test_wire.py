@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from core.errors import Notice
-from core.online.frame import CalibrationView, LiveFrame, LiveStride, SegmentCheck, SensorHealth, Trail
+from core.online.frame import CalibrationView, LiveFrame, SegmentCheck, SensorHealth, Trail
+from core.parameters.live_stride import LiveStride
 from server.live import wire
 from server.live.room import QUEUE, SHOWN, Room
 

@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import delete, func, select, update
 from sqlalchemy.exc import IntegrityError as DatabaseIntegrityError
 
-from core.edits import Edit
+from core.events.edits import Edit
 from server.services import analyses, edit_log, erasure, patients, reviews, sessions
 from server.services.errors import Conflict
 from server.services.reviewed import ReviewedAnalyses

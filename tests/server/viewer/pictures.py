@@ -9,7 +9,8 @@ import numpy as np
 
 from core.body.poses import Poses
 from core.frames import FOOT, SIDES, SUFFIX, Side
-from core.online.frame import LiveFrame, LiveStride
+from core.online.frame import LiveFrame
+from core.parameters.live_stride import LiveStride
 from server.live import wire
 from server.live.messages import Picture
 from tests.server import walk

@@ -12,8 +12,9 @@ import pytest
 from core.body.estimate import PoseEstimate
 from core.body.health import Verdict
 from core.body.l7s.filter import filter_block, start
+from core.body.l7s.inputs import free_acceleration, inputs_of
 from core.body.l7s.legs import LegModel
-from core.body.l7s.poses import free_acceleration, inputs_of, l7s_poses
+from core.body.l7s.poses import l7s_poses
 from core.body.model import BodyModel
 from core.body.pose_params import PoseParams
 from core.calibration import calibrate

@@ -11,8 +11,9 @@ import pytest
 from core.angles.measure import measure_angles
 from core.body.l7s.constraints import constraint_rows
 from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start
+from core.body.l7s.inputs import free_acceleration, inputs_of
 from core.body.l7s.legs import LegModel
-from core.body.l7s.poses import free_acceleration, inputs_of, l7s_poses
+from core.body.l7s.poses import l7s_poses
 from core.body.l7s.updates import inject, reset
 from core.body.model import BodyModel
 from core.body.poses import Poses

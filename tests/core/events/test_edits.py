@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.edits import APART_S, Edit, edit_of, edited_events, edited_strides
 from core.errors import ParameterError
+from core.events.edits import APART_S, Edit, edit_of, edited_events, edited_strides
 from core.events.result import GaitEvent, GaitEvents, Stride, Strides
 from core.frames import SIDES
 

@@ -21,9 +21,9 @@ from core.body.erkf.gaps import HOLD_S
 from core.body.erkf.kernel import CONTACT, INVALID, STILL, forward
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.start import start_state
+from core.body.live_still import ROLLING_MPS
 from core.body.tree import ImuTree
 from core.frames import Bools, Floats
-from core.online.still import ROLLING_MPS
 from core.rotation import exp, multiply, rotate
 
 HEADING_SD: Final = radians(2.0)

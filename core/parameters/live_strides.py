@@ -20,15 +20,15 @@ from core.angles import JointAngles, headings
 from core.body.feet import FootTracks
 from core.body.model import BodyModel
 from core.events.flags import StrideParams, flagged, with_flag
+from core.events.live_contacts import Known
 from core.events.result import GaitEvent, GaitEvents, Stride, StrideFlag
 from core.events.strides import side_strides
 from core.frames import Floats, Segment, Side
 from core.fusion.orientations import Orientations
-from core.online.contacts import Known
-from core.online.figures import Span, distances, early_figures
-from core.online.frame import LiveStride
-from core.online.history import KEPT_S, History
 from core.parameters.flats import OTHER
+from core.parameters.live_figures import Span, distances, early_figures
+from core.parameters.live_history import KEPT_S, History
+from core.parameters.live_stride import LiveStride
 from core.parameters.rows import Value
 from core.parameters.spatial import NAMES as SPATIAL
 from core.parameters.spatial import Surface

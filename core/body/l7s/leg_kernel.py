@@ -1,7 +1,4 @@
-"""Legs of L7S on a few samples at a time, compiled: `solve_legs` and `inputs_of` of core/body by samples.
-
-A push holds ten samples, where numpy costs ten times the arithmetic. Tests hold both to the same legs.
-"""
+"""The compiled legs of L7S, sample by sample; core/body/l7s/legs.py explains them."""
 
 from __future__ import annotations
 
@@ -11,7 +8,7 @@ import numba
 import numpy as np
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]
 def _quaternion(R, q):  # type: ignore[no-untyped-def]
     """Write the unit quaternion (4,), w ≥ 0, of a matrix (3, 3), by the largest component (Shepperd)."""
     a, b, c = R[0, 0], R[1, 1], R[2, 2]
@@ -37,44 +34,35 @@ def _quaternion(R, q):  # type: ignore[no-untyped-def]
         q[i] /= length
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]
 def _times(a, b, out):  # type: ignore[no-untyped-def]
     for i in range(3):
         for j in range(3):
             out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]
 def _cross(a, b, out):  # type: ignore[no-untyped-def]
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]
 def _unit(a):  # type: ignore[no-untyped-def]
     length = sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
     for c in range(3):
         a[c] /= length
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def in_sy_frames(q, back, out):  # type: ignore[no-untyped-def]
-    """Write matrices (T, 3, 3) in Sy's frames of segments q (T, 4) in ours; `back` (3, 3) is Mᵀ."""
-    R = np.empty((3, 3))
-    for k in range(q.shape[0]):
-        w, x, y, z = q[k]
-        R[0, 0], R[0, 1], R[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
-        R[1, 0], R[1, 1], R[1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
-        R[2, 0], R[2, 1], R[2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
-        _times(R, back, out[k])
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def legs(R, p, hip_width, thigh, shank, foot, side, to_leg, to_foot, q, at):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]
+def write_legs(  # type: ignore[no-untyped-def]
+    R, p, hip_width, thigh, shank, foot, side, to_leg, to_foot, q, at, reach, hinge
+):
     """Write q (T, 7, 4), at (T, 7, 3): pelvis, and thigh, shank, foot of each leg, from the filter's R, p.
 
-    side : (2,) sign of the hip on the pelvis' y axis. to_leg, to_foot : (3, 3) M of R_ISB = R_Sy M.
+    side : (2,) sign of the hip on the pelvis' y axis. to_leg, to_foot : (3, 3) M of R_ISB = R_Sy M. reach,
+    hinge : (T, 2) written, distance of ankle and hip, distance of the hip from the plane of the foot.
     """
     M, turned = np.empty((3, 3)), np.empty((3, 3))
     along, bent, x, y, z, across = np.empty((6, 3))
@@ -85,7 +73,7 @@ def legs(R, p, hip_width, thigh, shank, foot, side, to_leg, to_foot, q, at):  # 
             at[k, 0, c] = p[k, 0, c]
         for leg in range(2):
             first = 1 + 3 * leg
-            distance = 0.0
+            distance = off = 0.0
             for c in range(3):
                 hip = p[k, 0, c] + 0.5 * side[leg] * hip_width * R[k, 0, c, 1]
                 ankle = p[k, 1 + leg, c] - 0.5 * foot * R[k, 1 + leg, c, 2]
@@ -93,7 +81,9 @@ def legs(R, p, hip_width, thigh, shank, foot, side, to_leg, to_foot, q, at):  # 
                 y[c] = R[k, 1 + leg, c, 1]
                 along[c] = hip - ankle
                 distance += along[c] ** 2
+                off += y[c] * along[c]
             distance = sqrt(distance)
+            reach[k, leg], hinge[k, leg] = distance, off
             cosine = (shank**2 + distance**2 - thigh**2) / (2.0 * shank * distance)
             angle = acos(min(1.0, max(-1.0, cosine)))
             for c in range(3):

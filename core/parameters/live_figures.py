@@ -13,7 +13,6 @@ from core.angles import JointAngles
 from core.body.feet import FootTracks
 from core.events.result import Stride, Strides
 from core.frames import Bools, Floats, Segment
-from core.online.frame import NOT_YET
 from core.parameters.catalogue import list_curve_figures
 from core.parameters.kinematic import (
     FOOT_PITCH,
@@ -22,6 +21,7 @@ from core.parameters.kinematic import (
     stride_figures,
     turning_angle,
 )
+from core.parameters.live_stride import NOT_YET
 from core.parameters.phases import phase_rows
 from core.parameters.plausible import IMPOSSIBLE, impossible
 from core.parameters.rows import Value

@@ -1,5 +1,4 @@
-"""The parts before the chain: bridging, stillness, angles, contacts in a stream are those of the whole
-take."""
+"""Bridging and stillness in a stream are those of the whole take."""
 
 from __future__ import annotations
 
@@ -8,16 +7,11 @@ import pytest
 
 from core.body import BodyModel
 from core.body.erkf.gaps import bridged
-from core.body.l7s.legs import M_LEG, LegModel, solve_legs
+from core.body.erkf.live_bridge import Bridge
+from core.body.live_still import Stillness
 from core.body.still import AT_REST, FOOT_STILL, still_samples
 from core.body.tree import PRESETS, person_tree
 from core.frames import GRAVITY, Bools, Floats
-from core.online.bridge import Bridge
-from core.online.drift import HeadingHold
-from core.online.sparse import FIGURE, HIP_SIGN
-from core.online.sparse_kernel import in_sy_frames, legs
-from core.online.still import Stillness
-from core.rotation import about, from_matrix, to_matrix, yaw
 
 SEGMENTS = PRESETS["lower_body7"]
 RATE = 100.0
@@ -96,65 +90,3 @@ def test_live_stillness_trails_and_never_looks_ahead() -> None:
         stored = still_samples(acc[:, 0], gyr[:, 0], valid[:, 0], RATE, rule)
         assert not (stored & ~live)[130:].any() or rule is AT_REST
         assert abs(int(stored.sum()) - int(live.sum())) < 2 * rule.window_s * RATE + 1
-
-
-def test_compiled_legs_are_those_of_the_leg_model() -> None:
-    model = LegModel.of(BodyModel.from_height(1.7))
-    rng = np.random.default_rng(4)
-    small = rng.normal(scale=0.3, size=(300, 3, 4)) + np.array([1.0, 0.0, 0.0, 0.0])
-    R = to_matrix(small / np.linalg.norm(small, axis=2, keepdims=True))
-    p = np.array([[0.0, 0.0, 0.9], [0.0, 0.1, 0.1], [0.0, -0.1, 0.1]]) + rng.normal(0.0, 0.05, (300, 3, 3))
-    stored = solve_legs(R, p, model)
-    q, at = np.empty((300, 7, 4)), np.empty((300, 7, 3))
-    to_foot = np.array(model.to_isb("foot_l"))
-    legs(R, p, model.hip_width, model.thigh, model.shank, model.foot, HIP_SIGN, M_LEG.copy(), to_foot, q, at)
-    np.testing.assert_allclose(q[:, 0], from_matrix(R[:, 0] @ M_LEG), atol=1e-12)
-    for i, segment in enumerate(FIGURE[1:], 1):
-        np.testing.assert_allclose(q[:, i], stored.q[segment], atol=1e-12)
-        np.testing.assert_allclose(at[:, i], stored.p[segment], atol=1e-12)
-    again = np.empty((300, 3, 3))
-    in_sy_frames(q[:, 3].copy(), to_foot.T.copy(), again)
-    np.testing.assert_allclose(again, R[:, 1], atol=1e-12)
-
-
-def drifting(n: int, seed: int) -> tuple[Floats, Floats]:
-    """Pelvis and two feet that swing, turn about every 20 s and drift apart by 6° and −4° a minute."""
-    t = np.arange(n) / RATE
-    way = np.pi * np.floor((t + 2.0) / 20.0) * np.clip(((t + 2.0) % 20.0) / 2.0, 0.0, 1.0)
-    rng = np.random.default_rng(seed)
-    course = np.stack((
-        way + np.radians(5.0) * np.sin(2 * np.pi * t),
-        way + np.radians(8.0) + np.radians(4.0) * np.sin(2 * np.pi * t + 1.0) + np.radians(6.0) * t / 60.0,
-        way - np.radians(8.0) + np.radians(4.0) * np.sin(2 * np.pi * t + 4.0) - np.radians(4.0) * t / 60.0,
-    ), axis=1)  # fmt: skip
-    return about(2, course + 0.01 * rng.standard_normal(course.shape)), np.full((n, 3, 3), 1.0)
-
-
-def test_headings_are_held_over_five_minutes_and_turns_are_not_taken_for_drift() -> None:
-    n = 30_000
-    q, gyr = drifting(n, 0)
-    valid = np.ones((n, 3), bool)
-    valid[15_000:15_200, 1] = False
-    held = q.copy()
-    HeadingHold(("pelvis", "foot_l", "foot_r"), RATE).push(held, gyr, valid)
-    np.testing.assert_array_equal(held[:, 0], q[:, 0])
-
-    def apart(x: Floats, i: int, at: slice) -> float:
-        return float(np.degrees(np.angle(np.mean(np.exp(1j * (yaw(x[at, i]) - yaw(x[at, 0])))))))
-
-    first, last = slice(200, 1600), slice(n - 1600, n - 200)
-    for i, rate in ((1, 6.0), (2, -4.0)):
-        assert abs(apart(q, i, last) - apart(q, i, first)) > 3.5 * abs(rate)
-        assert abs(apart(held, i, last) - apart(held, i, first)) < 3.0
-    again = q.copy()
-    hold = HeadingHold(("pelvis", "foot_l", "foot_r"), RATE)
-    for k in in_blocks(n, 5):
-        hold.push(again[k], gyr[k], valid[k])
-    np.testing.assert_array_equal(again, held)
-
-
-def test_a_segment_alone_has_nothing_to_be_held_to() -> None:
-    q, gyr = drifting(1000, 1)
-    one = np.ascontiguousarray(q[:, 1:2])
-    HeadingHold(("foot_l",), RATE).push(one, gyr[:, :1], np.ones((1000, 1), bool))
-    np.testing.assert_array_equal(one[:, 0], q[:, 1])

@@ -16,7 +16,6 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.still import FOOT_STILL
 from core.frames import Bools, Floats, Segment
 from core.fusion.drift import DriftParams
 
@@ -112,12 +111,13 @@ class HeadingHold:
     Parameters
     ----------
     segments : one of them alone is left as it is; the pelvis leads where it is among them.
+    moving_rps : angular rate of a sensor, rad/s, from which on somebody moves.
     """
 
-    def __init__(self, segments: Sequence[Segment], rate_hz: float) -> None:
+    def __init__(self, segments: Sequence[Segment], rate_hz: float, moving_rps: float) -> None:
         n = len(segments)
         self._lead = segments.index("pelvis") if "pelvis" in segments else -1
-        self._dt = 1.0 / rate_hz
+        self._dt, self._moving = 1.0 / rate_hz, moving_rps
         self._scalars = np.array(
             [REFERENCE_S * rate_hz, LEAST_S * rate_hz, MEAN_S, QUICK_S, TURNING], np.float64
         )
@@ -129,6 +129,6 @@ class HeadingHold:
         """Turn segments q (T, n, 4) to W in place; gyr (T, n, 3), valid (T, n) of their sensors."""
         if q.shape[1] > 1:
             _hold(
-                q, gyr, valid, self._lead, self._dt, FOOT_STILL.gyr_limit, self._scalars, self._first,
+                q, gyr, valid, self._lead, self._dt, self._moving, self._scalars, self._first,
                 self._mean, self._seen, self.turn, self._ahead, self._quiet,
             )  # fmt: skip

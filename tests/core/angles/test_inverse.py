@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from core.angles import SIGNS, cardan_zxy, joints, pelvis_angles
+from core.angles.inverse import leg_orientations, pelvis_orientation
 from core.frames import SIDES, Floats, Side
-from core.inverse_angles import leg_orientations, pelvis_orientation
 from core.norms import adult_kinematics
 from core.rotation import conjugate, multiply, rotate
 

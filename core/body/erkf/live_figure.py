@@ -8,11 +8,12 @@ from typing import Final
 import numba
 import numpy as np
 
+from core.body.erkf.live_sensors import Filtered, FootPaths
+from core.body.erkf.live_watch import JointWatch
+from core.body.live_estimator import Paths, Placed, Raw, worn_feet
 from core.errors import Notice
 from core.estimators import ERKF, LIVE_LINKED_PATHS, LIVE_SINGLE_PATHS, NO_FIGURE, LiveMethod
 from core.frames import FOOT, SHANK, SIDES, THIGH, Segment
-from core.online.body import Filtered, FootPaths, Paths, Placed, Raw, worn_feet
-from core.online.watch import JointWatch
 
 LEVEL_S: Final = 0.1
 """The figure is let down or lifted to the floor of the foot that rests within about so long: for the eye."""

@@ -1,0 +1,190 @@
+"""What L7S takes of the sensors: accelerations free of gravity, orientations in Sy's frames, what is known.
+
+Every kernel goes on from one block of samples to the next, so that a file is one block and a stream is many.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numba
+import numpy as np
+
+from core.body.l7s.filter import L7sInputs, Worn
+from core.body.l7s.legs import BODIES, LEGS, LegModel
+from core.calibration.result import CalibratedRecording, SegmentCalibration
+from core.errors import EstimationError
+from core.frames import FOOT, GRAVITY, Bools, Floats, Segment, Side
+from core.fusion.orientations import Orientations
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _write_free_acceleration(acc, valid, q, R, excess, out):  # type: ignore[no-untyped-def]
+    """Write accelerations (T, 3) in W without gravity of one sensor, 0 where it is lost.
+
+    Parameters
+    ----------
+    acc : (T, 3) as measured. valid : (T,). q : (T, 4) segment to W. R : (3, 3) sensor to segment. excess :
+    of the norm at rest over G, m/s².
+    """
+    force = np.empty(3)
+    for k in range(acc.shape[0]):
+        for c in range(3):
+            out[k, c] = 0.0
+            force[c] = R[c, 0] * acc[k, 0] + R[c, 1] * acc[k, 1] + R[c, 2] * acc[k, 2]
+        if not valid[k]:
+            continue
+        force[1] -= excess
+        w, x, y, z = q[k]
+        out[k, 0] = (1 - 2 * (y * y + z * z)) * force[0] + 2 * (x * y - w * z) * force[1]
+        out[k, 0] += 2 * (x * z + w * y) * force[2]
+        out[k, 1] = 2 * (x * y + w * z) * force[0] + (1 - 2 * (x * x + z * z)) * force[1]
+        out[k, 1] += 2 * (y * z - w * x) * force[2]
+        out[k, 2] = 2 * (x * z - w * y) * force[0] + 2 * (y * z + w * x) * force[1]
+        out[k, 2] += (1 - 2 * (x * x + y * y)) * force[2] - GRAVITY
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _write_sy_frames(q, back, out):  # type: ignore[no-untyped-def]
+    """Write matrices (T, 3, 3) in Sy's frames of segments q (T, 4) in ours; `back` (3, 3) is Mᵀ."""
+    R = np.empty((3, 3))
+    for k in range(q.shape[0]):
+        w, x, y, z = q[k]
+        R[0, 0], R[0, 1], R[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+        R[1, 0], R[1, 1], R[1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+        R[2, 0], R[2, 1], R[2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+        for i in range(3):
+            for j in range(3):
+                out[k, i, j] = R[i, 0] * back[0, j] + R[i, 1] * back[1, j] + R[i, 2] * back[2, j]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _mark_known(valid, step, lost, known):  # type: ignore[no-untyped-def]
+    """Write which samples (T,) are known; valid (T, n), the feet last; `lost` (2,) is advanced in place."""
+    n = valid.shape[1]
+    for k in range(valid.shape[0]):
+        known[k] = True
+        for i in range(n):
+            if not valid[k, i]:
+                known[k] = False
+        for leg in range(2):
+            if not valid[k, n - 2 + leg]:
+                lost[leg] = True
+            elif step[k, leg]:
+                lost[leg] = False
+            if lost[leg]:
+                known[k] = False
+
+
+class KnownSamples:
+    """Samples at which every worn sensor is there and no foot is on its way after a loss.
+
+    Any division into blocks gives the same.
+    """
+
+    def __init__(self) -> None:
+        self._lost = np.zeros(len(LEGS), np.bool_)
+
+    def push(self, valid: Sequence[Bools], step: Bools) -> Bools:
+        """The next samples (T,).
+
+        Parameters
+        ----------
+        valid : (T,) of each worn body in the order of `BODIES`. step : (T, 2) left and right foot still.
+        """
+        known = np.empty(len(step), np.bool_)
+        _mark_known(np.stack(valid, axis=1), np.ascontiguousarray(step, np.bool_), self._lost, known)
+        return known
+
+
+def remove_gravity(acc: Floats, valid: Bools, q: Floats, mounted: SegmentCalibration) -> Floats:
+    """Accelerations (T, 3) of one sensor in W without gravity, m/s²; zero while lost.
+
+    What the accelerometer's norm at rest differs from G is taken off as a bias along the segment's axis that
+    is vertical at rest, not as a scale (docs/science/calibration.md, "Standing").
+
+    Parameters
+    ----------
+    acc : (T, 3) specific force as measured, sensor axes, m/s². valid : (T,). q : (T, 4) segment to W.
+    """
+    out = np.empty((len(acc), 3))
+    _write_free_acceleration(
+        np.ascontiguousarray(acc),
+        np.ascontiguousarray(valid),
+        np.ascontiguousarray(q),
+        np.array(mounted.R_segment_sensor),
+        mounted.rest_norm - GRAVITY,
+        out,
+    )
+    return out
+
+
+def free_acceleration(calibrated: CalibratedRecording, orientations: Orientations) -> dict[Segment, Floats]:
+    """Accelerations (n, 3) of all sensors with an orientation, as `remove_gravity`."""
+    mounted, sensors = calibrated.calibration.segments, calibrated.recording.sensors
+    return {
+        s: remove_gravity(sensors[s].acc, sensors[s].valid, q, mounted[s]) for s, q in orientations.q.items()
+    }
+
+
+def arrange_inputs(
+    q: Mapping[Segment, Floats],
+    acceleration: Mapping[Segment, Floats],
+    step: Bools,
+    model: LegModel,
+    worn: Worn,
+) -> L7sInputs:
+    """Bring orientations (T, 4), accelerations (T, 3) of the worn bodies into the filter's order and frames.
+
+    Parameters
+    ----------
+    step : (T, 2) left and right foot still.
+    """
+    R, acc = np.empty((len(step), 3, 3, 3)), np.zeros((len(step), 3, 3))
+    R[:, 0] = np.eye(3)
+    for b, segment in enumerate(BODIES):
+        if segment in bodies_of(worn):
+            in_frame = np.empty((len(step), 3, 3))
+            back = np.ascontiguousarray(model.to_isb(segment).T)
+            _write_sy_frames(np.ascontiguousarray(q[segment]), back, in_frame)
+            R[:, b], acc[:, b] = in_frame, acceleration[segment]
+    if worn == "2I":
+        acc[:, 0] = 0.5 * (acc[:, 1] + acc[:, 2])
+    return L7sInputs(R, acc, step, worn)
+
+
+def bodies_of(worn: Worn) -> tuple[Segment, ...]:
+    """Bodies of the state that carry a sensor."""
+    return BODIES if worn == "3I" else BODIES[1:]
+
+
+def inputs_of(
+    orientations: Orientations,
+    acceleration: Mapping[Segment, Floats],
+    steps: Mapping[Side, Bools],
+    model: LegModel,
+    worn: Worn,
+) -> L7sInputs:
+    """The filter's inputs of a whole take.
+
+    Raises
+    ------
+    EstimationError `sensor_missing` when a worn body has no orientation, acceleration or steps.
+    """
+    needed = bodies_of(worn)
+    for segment in needed:
+        if segment not in orientations.q or segment not in acceleration:
+            raise EstimationError(
+                "sensor_missing",
+                f"L7S-{worn} needs {', '.join(needed)}; nothing of {segment}. Wear or map a sensor there.",
+                sensor=segment,
+            )
+    for side in LEGS:
+        if side not in steps:
+            raise EstimationError(
+                "sensor_missing",
+                f"L7S needs to know when the {side} foot is still; give its step flags.",
+                sensor=FOOT[side],
+            )
+    step = np.stack([steps[side] for side in LEGS], axis=1)
+    return arrange_inputs(orientations.q, acceleration, step, model, worn)

@@ -1,0 +1,84 @@
+"""What every live estimator takes and gives: a block of samples in, a block of the body out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from core.errors import Notice
+from core.estimators import LiveMethod
+from core.frames import FOOT, SIDES, Bools, Floats, Segment
+
+
+@dataclass(frozen=True, eq=False)
+class Raw:
+    """A block as measured: acc, gyr (T, n, 3), valid (T, n) of the chain's sensors.
+
+    Parameters
+    ----------
+    turned : segment → (T, 4) to W by its sensor alone (`Attitudes`), of `Estimator.attitudes` and the feet.
+    """
+
+    acc: Floats
+    gyr: Floats
+    valid: Bools
+    turned: Mapping[Segment, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """A block of the feet: p (T, F, 3), q (T, F, 4), still, valid (T, F), as `FootTracks`."""
+
+    p: Floats
+    q: Floats
+    still: Bools
+    valid: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A block of the body.
+
+    Parameters
+    ----------
+    q, p : (T, S, 4), (T, S, 3) of the estimator's segments, p NaN where it gives no place. known : (T, S) the
+        orientation means something. whole : (T,) the figure does.
+    paths : of the feet that carry a sensor.
+    """
+
+    q: Floats
+    p: Floats
+    known: Bools
+    whole: Bools
+    paths: Paths
+
+
+class Estimator(Protocol):
+    """What turns signals into a body.
+
+    segments : of `Placed`. attitudes : segments whose orientation by their sensor alone it wants.
+    linked, source : as in `FootTracks`. broken : it gave up.
+    """
+
+    method: LiveMethod
+    segments: tuple[Segment, ...]
+    attitudes: tuple[Segment, ...]
+    linked: bool
+    source: str
+
+    @property
+    def broken(self) -> bool:
+        """A filter gave up."""
+
+    def push(self, raw: Raw) -> Placed:
+        """The next samples; the first block is the whole standing window."""
+
+    def told(self) -> list[Notice]:
+        """What is new to be said of itself."""
+
+
+def worn_feet(segments: Iterable[Segment]) -> tuple[Segment, ...]:
+    """Feet among these segments, left first."""
+    worn = set(segments)
+    return tuple(FOOT[s] for s in SIDES if FOOT[s] in worn)

@@ -1,0 +1,47 @@
+"""A stride as it is told while samples come. Plain values: nothing here imports numba."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from core.events.result import StrideFlag
+from core.frames import Floats, Side
+
+NOT_YET: Final = "not_yet"
+"""Reason of a value that a later `LiveStride` of the same stride will have."""
+
+
+@dataclass(frozen=True, eq=False)
+class LiveStride:
+    """One cycle of a foot, told as soon as its second contact is known.
+
+    Distances need the rest of the foot after that contact: where a reason is `not_yet`, the same stride (same
+    `n`) is told once more when they are known, at the latest with the foot's next contact, and is then
+    `complete`. Values that were there do not change.
+
+    Parameters
+    ----------
+    n : running number over both feet, from 0. detected_s : last sample that was needed.
+    values : parameters of a stride as in the stride table (core.parameters: temporal, spatial, stance,
+        phases, kinematic), None where undefined. reasons : why, for every None.
+    curves : variable → (101,) rad over the cycle, as `cycle_curves`; only those known throughout.
+    turn_rad : heading change of the foot, left positive. flags : those that are known by then; "first" of a
+        bout and "near_turn" after a turn from the start, "last" and "in_place" when it is `complete`.
+        counted : no flag.
+    """
+
+    n: int
+    side: Side
+    start_s: float
+    foot_off_s: float | None
+    end_s: float
+    detected_s: float
+    values: Mapping[str, float | None]
+    reasons: Mapping[str, str]
+    curves: Mapping[str, Floats]
+    turn_rad: float | None
+    flags: tuple[StrideFlag, ...]
+    counted: bool
+    complete: bool
