@@ -29,7 +29,7 @@ CSS: Final[dict[Side, tuple[str, float]]] = {"left": ("dl", 5.2), "right": ("dr"
 
 @dataclass(frozen=True)
 class StrideValue:
-    """The figure of one stride; None where it has none. `index` is its place in the stride list."""
+    """The figure of one stride, null where it has none; `index` is its place in the stride list."""
 
     index: int
     side: Side
