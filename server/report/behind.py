@@ -13,7 +13,7 @@ from core.parameters.catalogue import CATALOGUE
 from core.parameters.rows import Column
 from server.report.columns import plain
 from server.report.level import from_standing
-from server.report.svg import KEY, write_seconds, write_text
+from server.report.svg import KEY, make_label, make_time_labels
 from server.report.table import Row
 from server.report.wording import excluded_words, number
 
@@ -120,8 +120,8 @@ def _chart(row: Row, values: Sequence[StrideValue], duration_s: float) -> str:
     for k in range(TICKS):
         at = low + pad + (high - low - 2 * pad) * k / (TICKS - 1)
         parts.append(f'<line class="g" x1="0" x2="100%" y1="{y(at):.1f}" y2="{y(at):.1f}"/>')
-        parts.append(write_text("0", y(at), number(at, digits), "", "end", dx=-7, dy=4))
-    parts.append(write_seconds(duration_s, HEIGHT, -6))
+        parts.append(make_label("0", y(at), number(at, digits), "", "end", dx=-7, dy=4))
+    parts.append(make_time_labels(duration_s, HEIGHT, -6))
     for side, cell in zip(SIDES, (row.left, row.right), strict=True):
         if cell is not None:
             line = f'x1="0" x2="100%" y1="{y(cell.value):.1f}" y2="{y(cell.value):.1f}"'

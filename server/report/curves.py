@@ -11,7 +11,15 @@ import numpy as np
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Side
 from server.report.panels import CurvePanel, SideCurve
-from server.report.svg import KEY, PlotArea, draw_bar, stretch, write_coordinate, write_seconds, write_text
+from server.report.svg import (
+    KEY,
+    PlotArea,
+    draw_bar,
+    format_coordinate,
+    make_label,
+    make_time_labels,
+    stretch,
+)
 from server.report.wording import excluded_words, number
 
 X_TICKS: Final = (0, 20, 40, 60, 80, 100)
@@ -94,14 +102,14 @@ def strip_svg(strides: Strides, duration_s: float, height: int = 92) -> str:
     plot_height = height - 24
     marks = "".join(_stride_mark(i, s, duration_s) for i, s in enumerate(strides.strides))
     letters = "".join(
-        write_text("0", plot_height * (0.25 + 0.5 * i), side[0].upper(), f"t{KEY[side]}", "end", dx=-9, dy=4)
+        make_label("0", plot_height * (0.25 + 0.5 * i), side[0].upper(), f"t{KEY[side]}", "end", dx=-9, dy=4)
         for i, side in enumerate(SIDES)
     )
     return (
         f'<div class="chart strip"><svg width="100%" height="{plot_height}" overflow="visible" role="img">'
         "<title>Strides of this take over time; a cross marks a stride left out</title>"
         f'{stretch(marks)}<line class="cursor now" x1="0" x2="0" y1="0" y2="100%"/>'
-        f"{letters}{write_seconds(duration_s, plot_height, 15)}</svg></div>"
+        f"{letters}{make_time_labels(duration_s, plot_height, 15)}</svg></div>"
     )
 
 
@@ -159,7 +167,7 @@ class _CyclePlot(PlotArea):
             anchor, out = ("end", -1) if side == earlier and len(found) == 2 else ("start", 1)
             label = f"{side[0].upper()}\u2009{x:.0f}"
             self.add_text(
-                f"{write_coordinate(x)}%", -5, label, f"t{KEY[side]}", anchor, dx=out * (3 if close else -4)
+                f"{format_coordinate(x)}%", -5, label, f"t{KEY[side]}", anchor, dx=out * (3 if close else -4)
             )
 
     def cursor(self) -> None:

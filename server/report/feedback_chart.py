@@ -11,7 +11,7 @@ from typing import Final
 
 from core.feedback import FeedbackSplit, Prescription
 from core.feedback.summary import MatchedStride
-from server.report.svg import KEY, PlotArea, find_round_ticks, write_coordinate
+from server.report.svg import KEY, PlotArea, find_round_ticks, format_coordinate
 from server.report.wording import Term, number
 
 HEIGHT: Final = 190
@@ -46,7 +46,7 @@ def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str
             left, width = x(i - 0.5), x(j + 0.5) - x(i - 0.5)
             plot.add_column("fb-block", left, width)
             if width >= NARROW:
-                at = f"{write_coordinate((left + width / 2) / 10)}%"
+                at = f"{format_coordinate((left + width / 2) / 10)}%"
                 plot.add_text(at, plot.height + 14, word, "words", "middle")
     for i, j, m in _runs(strides, lambda m: (m.cue.zone_low, m.cue.zone_high)):
         plot.add_band("band", m.cue.zone_low, m.cue.zone_high, x(i - 0.5), x(j + 0.5) - x(i - 0.5))
@@ -61,7 +61,7 @@ def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str
         plot.add_dot(x(i), min(max(m.value, low), high), css, 2.6)
     for i, j, m in _runs(strides, lambda m: (_opens(m), m.cue.level)):
         if not _opens(m) and x(j + 0.5) - x(i - 0.5) >= NARROW:
-            at = f"{write_coordinate(x(i - 0.5) / 10)}%"
+            at = f"{format_coordinate(x(i - 0.5) / 10)}%"
             plot.add_text(at, plot.height + 28, f"level {m.cue.level}", "words", "start")
     title = f"{term.label} of every stride over the zone of its level; the table has the numbers"
     return plot.draw("chart fb-plot", title)

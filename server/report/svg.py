@@ -25,16 +25,16 @@ BAR_MARKS: Final = (("right", "dr", 4.6), ("left", "dl", 5.2), ("both", "ptf", 5
 """Marks of a bar from back to front: a ring, a disc, a disc in ink; CSS class and radius in px."""
 
 
-def write_coordinate(value: float) -> str:
-    """Write a coordinate in tenths, without ".0"."""
+def format_coordinate(value: float) -> str:
+    """Format a coordinate in tenths, without ".0"."""
     return f"{value:.1f}".removesuffix(".0")
 
 
-def write_text(x: str, y: float, text: str, css: str, anchor: str, dx: int = 0, dy: int = 0) -> str:
-    """Write a label; `x` with its unit, "12%" or "0", the rest in px."""
+def make_label(x: str, y: float, text: str, css: str, anchor: str, dx: int = 0, dy: int = 0) -> str:
+    """Make a label; `x` with its unit, "12%" or "0", the rest in px."""
     named = f' class="{css}"' if css else ""
     return (
-        f'<text{named} x="{x}" y="{write_coordinate(y)}" dx="{dx}" dy="{dy}" text-anchor="{anchor}">'
+        f'<text{named} x="{x}" y="{format_coordinate(y)}" dx="{dx}" dy="{dy}" text-anchor="{anchor}">'
         f"{escape(text)}</text>"
     )
 
@@ -48,11 +48,11 @@ def find_round_ticks(low: float, high: float) -> tuple[list[float], int]:
     return ticks, max(0, -math.floor(math.log10(step) + 1e-9))
 
 
-def write_seconds(duration_s: float, y: float, dy: int) -> str:
-    """Write the labels of a time axis from 0, at most a dozen up to two minutes."""
+def make_time_labels(duration_s: float, y: float, dy: int) -> str:
+    """Make the labels of a time axis from 0, at most a dozen up to two minutes."""
     step = next((s for s in (1, 2, 5, 10, 30, 60) if duration_s / s <= 12), 120)
     return "".join(
-        write_text(f"{write_coordinate(100 * t / duration_s)}%", y, f"{t}\u2009s", "", "middle", dy=dy)
+        make_label(f"{format_coordinate(100 * t / duration_s)}%", y, f"{t}\u2009s", "", "middle", dy=dy)
         for t in range(0, int(duration_s) + 1, step)
     )
 
@@ -84,7 +84,7 @@ def draw_bar(
         inside = (value - scale[0]) / (scale[1] - scale[0])
         return round(min(max(6 + (width - 12) * inside, 6), width - 6), 1)
 
-    f = write_coordinate
+    f = format_coordinate
     parts = [f'<line class="ax" x1="2" x2="{width - 2}" y1="13" y2="13"/>']
     for low, high in boxes:
         left = x(low)
@@ -131,25 +131,25 @@ class PlotArea:
 
     def add_level(self, css: str, value: float) -> None:
         """Add a line across at a value."""
-        y = write_coordinate(self.y(value))
+        y = format_coordinate(self.y(value))
         self.add(f'<line class="{css}" x1="0" x2="1000" y1="{y}" y2="{y}"/>')
 
     def add_upright(self, css: str, x: float) -> None:
         """Add a line from bottom to top at 0 to 1000 of the width."""
-        at = write_coordinate(x)
+        at = format_coordinate(x)
         self.add(f'<line class="{css}" x1="{at}" x2="{at}" y1="0" y2="1000"/>')
 
     def add_band(self, css: str, low: float, high: float, x: float = 0.0, width: float = 1000.0) -> None:
         """Add a band between two values, across or over a part of the width."""
         top, bottom = self.y(high), self.y(low)
-        f = write_coordinate
+        f = format_coordinate
         self.add(
             f'<rect class="{css}" x="{f(x)}" width="{f(width)}" y="{f(top)}" height="{f(bottom - top)}"/>'
         )
 
     def add_column(self, css: str, x: float, width: float) -> None:
         """Add a column over the whole height."""
-        f = write_coordinate
+        f = format_coordinate
         self.add(f'<rect class="{css}" x="{f(x)}" width="{f(width)}" y="0" height="1000"/>')
 
     def add_tick(self, css: str, value: float, label: str) -> None:
@@ -158,13 +158,13 @@ class PlotArea:
         self.add_text("0", self.px(value), label, "", "end", dx=-7, dy=4)
 
     def add_text(self, x: str, y: float, text: str, css: str, anchor: str, dx: int = 0, dy: int = 0) -> None:
-        """Add a label; as `write_text`."""
-        self._fixed.append(write_text(x, y, text, css, anchor, dx, dy))
+        """Add a label; as `make_label`."""
+        self._fixed.append(make_label(x, y, text, css, anchor, dx, dy))
 
     def add_dot(self, x: float, value: float, css: str, radius: float) -> None:
         """Add a dot that stays round, at 0 to 1000 of the width."""
         self._fixed.append(
-            f'<svg x="{write_coordinate(x / 10)}%" y="{write_coordinate(self.px(value))}" overflow="visible" '
+            f'<svg x="{format_coordinate(x / 10)}%" y="{format_coordinate(self.px(value))}" overflow="visible" '
             f'width="1" height="1"><circle class="{css}" r="{radius}"/></svg>'
         )
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from server.report.svg import KEY, PlotArea, find_round_ticks, write_coordinate
+from server.report.svg import KEY, PlotArea, find_round_ticks, format_coordinate
 from server.report.trends import Line, Trend, Visit
 from server.report.wording import number
 from web.words import MONTHS
@@ -123,7 +123,7 @@ class _TrendPlot(PlotArea):
         assessed = [p for p in line.points if self._visits[p.visit].kind == "assessment"]
         for a, b in pairwise(assessed):
             ends = (self._at(a.visit), a.value), (self._at(b.visit), b.value)
-            d = "L".join(f"{write_coordinate(x)} {write_coordinate(self.y(value))}" for x, value in ends)
+            d = "L".join(f"{format_coordinate(x)} {format_coordinate(self.y(value))}" for x, value in ends)
             self.add(f'<path class="tr-{key}" d="M{d}"/>')
         for p in line.points:
             large = self._visits[p.visit].kind == "assessment"
@@ -161,4 +161,4 @@ def _day(day: dt.date) -> str:
 
 
 def _pct(x: float) -> str:
-    return f"{write_coordinate(x / 10)}%"
+    return f"{format_coordinate(x / 10)}%"
