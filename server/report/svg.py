@@ -164,8 +164,8 @@ class PlotArea:
     def add_dot(self, x: float, value: float, css: str, radius: float) -> None:
         """Add a dot that stays round, at 0 to 1000 of the width."""
         self._fixed.append(
-            f'<svg x="{format_coordinate(x / 10)}%" y="{format_coordinate(self.px(value))}" overflow="visible" '
-            f'width="1" height="1"><circle class="{css}" r="{radius}"/></svg>'
+            f'<svg x="{format_coordinate(x / 10)}%" y="{format_coordinate(self.px(value))}" '
+            f'overflow="visible" width="1" height="1"><circle class="{css}" r="{radius}"/></svg>'
         )
 
     def draw(self, css: str, title: str, attributes: str = "") -> str:
