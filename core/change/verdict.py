@@ -39,7 +39,7 @@ UNLIKE: Final = "conditions_differ"
 
 @dataclass(frozen=True)
 class Change:
-    """One figure in two sessions.
+    """One figure in two sessions; beyond `limit` (MDC) the change is real, beyond `mcid` relevant too.
 
     Parameters
     ----------
@@ -60,14 +60,14 @@ class Change:
     after: float | None
     difference: float | None
     verdict: Verdict | None
-    limit: float | None = None
-    limit_source: str | None = None
-    people: str | None = None
-    mcid: float | None = None
-    mcid_source: str | None = None
-    towards_norm: bool | None = None
-    reason: str | None = None
-    note: str | None = None
+    limit: float | None
+    limit_source: str | None
+    people: str | None
+    mcid: float | None
+    mcid_source: str | None
+    towards_norm: bool | None
+    reason: str | None
+    note: str | None
 
 
 def parameter_changes(
@@ -175,9 +175,24 @@ def _strides(old: Parameter, new: Parameter) -> float:
 
 
 def _plain(name: str, side: Side | None, unit: str, before: float | None, after: float | None) -> Change:
-    if before is None or after is None:
-        return Change(name, side, unit, before, after, None, None, reason="no_value")
-    return Change(name, side, unit, before, after, after - before, None)
+    difference = None if before is None or after is None else after - before
+    return Change(
+        name=name,
+        side=side,
+        unit=unit,
+        before=before,
+        after=after,
+        difference=difference,
+        verdict=None,
+        limit=None,
+        limit_source=None,
+        people=None,
+        mcid=None,
+        mcid_source=None,
+        towards_norm=None,
+        reason="no_value" if difference is None else None,
+        note=None,
+    )
 
 
 def _judged(change: Change, mdc: ChangeLimit | None, mcid: ChangeLimit | None) -> Change:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from itertools import pairwise
 from typing import Literal
 
 from core.formats import live_reader, mapping_xml, parquet, text
+from core.formats.json_tree import read_json
 from core.formats.manifest import is_manifest
 from core.formats.vendors import find_vendor
 
@@ -65,8 +65,8 @@ def sniff(data: bytes) -> tuple[Kind, str]:
 
 def _sniff_json(data: bytes) -> tuple[Kind, str]:
     try:
-        value = json.loads(data)
-    except (ValueError, RecursionError):
+        value = read_json(data)
+    except ValueError:
         return "other", "a damaged JSON file"
     return ("manifest", "a manifest") if is_manifest(value) else ("other", "a JSON file")
 

@@ -1,11 +1,86 @@
-"""A JSON tree whose nodes know their own path, so that a mistake can name its place."""
+"""JSON from outside: read by one strict rule, and a tree whose nodes know their own path.
+
+`read_json` reads every JSON text that comes from a person, a device or a file that others may have written:
+bodies of requests, live messages, manifests, notes on the disk.
+"""
 
 from __future__ import annotations
 
 import difflib
 import json
+from math import isfinite
+from typing import Final
 
 from core.errors import ManifestError
+
+MOST_DEPTH: Final = 64
+"""Objects and lists inside each other; a manifest has five levels."""
+
+
+def read_json(data: bytes | str, most_bytes: int | None = None) -> object:
+    """Read a JSON text (RFC 8259) by the strict rule.
+
+    UTF-8, with or without a byte order mark; no key twice in an object; every number finite; every text valid
+    Unicode, no lone surrogates; at most MOST_DEPTH levels.
+
+    Parameters
+    ----------
+    most_bytes : bytes of `data` (characters of a str) at most; None where the caller has bounded it.
+
+    Raises
+    ------
+    ValueError
+        what is wrong, in words that complete "The … is not valid JSON: ".
+    """
+    if most_bytes is not None and len(data) > most_bytes:
+        raise ValueError(f"it has {len(data)} bytes, at most {most_bytes} are read")
+    try:
+        text = data if isinstance(data, str) else data.decode("utf-8-sig")
+        root: object = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_make_object)
+    except RecursionError:
+        raise _too_deep() from None
+    _check_values(root)
+    return root
+
+
+def _refuse_constant(name: str) -> object:
+    raise ValueError(f"{name} is not a number in JSON; use null")
+
+
+def _make_object(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    made: dict[str, object] = {}
+    for key, value in pairs:
+        if key in made:
+            raise ValueError(f"the key '{key}' is given twice")
+        made[key] = value
+    return made
+
+
+def _check_values(root: object) -> None:
+    """Refuse what Python reads but is not JSON: numbers beyond a float, lone surrogates; and great depth."""
+    level: list[object] = [[root]]
+    for _ in range(MOST_DEPTH + 1):
+        inner: list[object] = []
+        for container in level:
+            if isinstance(container, dict):
+                "".join(container).encode()
+                container = container.values()
+            for value in container:  # type: ignore[attr-defined]  # a list, or values of an object
+                kind = type(value)
+                if kind is dict or kind is list:
+                    inner.append(value)
+                elif kind is float and not isfinite(value):
+                    raise ValueError("a number is too large")
+                elif kind is str:
+                    value.encode()
+        if not inner:
+            return
+        level = inner
+    raise _too_deep()
+
+
+def _too_deep() -> ValueError:
+    return ValueError(f"it has more than {MOST_DEPTH} levels")
 
 
 class Node:
@@ -114,18 +189,3 @@ class Node:
 def _kind(value: object) -> str:
     text = json.dumps(value, ensure_ascii=False, default=str)
     return text if len(text) <= 40 else text[:37] + "..."
-
-
-def no_constant(name: str) -> object:
-    """Refuse NaN and Infinity, which JSON does not have."""
-    raise ValueError(f"{name} is not a number in JSON; use null")
-
-
-def unique(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    """Refuse a key that is given twice."""
-    out: dict[str, object] = {}
-    for key, value in pairs:
-        if key in out:
-            raise ValueError(f"the key '{key}' is given twice")
-        out[key] = value
-    return out

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, Literal, cast, get_args
 
 from core.errors import InputError
-from core.formats.json_tree import no_constant, unique
+from core.formats.json_tree import read_json
 from core.frames import SEGMENTS, Segment
 
 PROTOCOL: Final = "sagittal.live.v1"
@@ -93,12 +93,9 @@ def parse_hello(data: bytes | str) -> Hello:
     InputError `hello_bad_json`, `hello_bad_value`, `hello_protocol`, `unknown_segment`, `duplicate_segment`,
     `duplicate_device`; the message names the path.
     """
-    if len(data) > MOST_HELLO_BYTES:
-        raise InputError("hello_bad_json", f"The hello is longer than {MOST_HELLO_BYTES} bytes.")
     try:
-        text = data if isinstance(data, str) else data.decode("utf-8")
-        root = json.loads(text, parse_constant=no_constant, object_pairs_hook=unique)
-    except (ValueError, RecursionError) as e:
+        root = read_json(data, MOST_HELLO_BYTES)
+    except ValueError as e:
         raise InputError("hello_bad_json", f"The hello is not valid JSON: {e}.") from e
     return hello_of(root)
 

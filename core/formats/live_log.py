@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import InputError
-from core.formats.json_tree import no_constant, unique
+from core.formats.json_tree import read_json
 from core.formats.live_hello import (
     PROTOCOL,
     Clock,
@@ -278,9 +278,14 @@ def parse_finish(data: bytes | str) -> Finish:
     InputError `finish_bad`.
     """
     try:
-        root = json.loads(data, parse_constant=no_constant, object_pairs_hook=unique)
-    except (ValueError, RecursionError) as e:
+        root = read_json(data)
+    except ValueError as e:
         raise InputError("finish_bad", f"The finish is not valid JSON: {e}.") from e
+    return finish_of(root)
+
+
+def finish_of(root: object) -> Finish:
+    """Build a finish from decoded JSON; errors as in `parse_finish`."""
     count = root.get("count") if isinstance(root, dict) else None
     digest = root.get("sha256") if isinstance(root, dict) else None
     if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count < LATEST_US:

@@ -6,7 +6,6 @@ exact place ("sources[0].columns.foot_l.acc") and what would be right there.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -14,7 +13,7 @@ from typing import Final
 
 from core.errors import ManifestError, ParameterError
 from core.formats.aliases import segment_named
-from core.formats.json_tree import Node, no_constant, unique
+from core.formats.json_tree import Node, read_json
 from core.formats.source_spec import SourceSpec, read_source
 from core.frames import PROTOCOLS, SEGMENTS, Protocol, Segment
 from core.recording import Subject, check_belt
@@ -81,13 +80,9 @@ def parse_manifest(data: bytes) -> Manifest:
         standing_angle_implausible, shoe_implausible, unknown_unit, belt_speed_implausible,
         belt_speed_without_treadmill; the message names the path inside the manifest.
     """
-    if len(data) > MAX_BYTES:
-        raise ManifestError(
-            "manifest_bad_json", f"The manifest has {len(data)} bytes, at most {MAX_BYTES} make sense."
-        )
     try:
-        root = json.loads(data.decode("utf-8-sig"), parse_constant=no_constant, object_pairs_hook=unique)
-    except (ValueError, RecursionError) as e:
+        root = read_json(data, MAX_BYTES)
+    except ValueError as e:
         raise ManifestError("manifest_bad_json", f"The manifest is not valid JSON: {e}.") from e
     return manifest_of(root)
 

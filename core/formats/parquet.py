@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from core.errors import FormatError, Notice
 from core.formats.draft import signal_digest
+from core.formats.json_tree import read_json
 from core.frames import Floats, Protocol, Segment
 from core.recording import ImuStream, Recording, Subject
 from core.shoe import Shoe
@@ -139,7 +140,7 @@ def read_recording(data: bytes, source: str) -> Recording:
                 f"{source} is a Parquet file that Sagittal did not write; export the recording as CSV and "
                 "describe it in a manifest (docs/formats.md).",
             )
-        info = json.loads(stored)
+        info: Any = read_json(stored)
         if info["schema"] > SCHEMA:
             raise FormatError(
                 "newer_schema",

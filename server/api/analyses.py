@@ -14,15 +14,16 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Blobs, Db, Id, OpenTrail, Queue
+from server.http.json_body import StrictJsonRoute
 from server.jobs.queue import JobView
 from server.services import analyses, recordings, sessions
 
-router = APIRouter(tags=["analyses"])
+router = APIRouter(route_class=StrictJsonRoute, tags=["analyses"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
 
 
 @router.post(
-    "/sessions/{session_id}/analyses", status_code=202, response_model=schemas.Job, responses=refusals(409)
+    "/sessions/{session_id}/analyses", status_code=202, response_model=JobView, responses=refusals(409)
 )
 def analyse(
     session_id: Id,
@@ -38,8 +39,8 @@ def analyse(
         return analyses.submit(c, queue, who, session_id, config=body.config)
 
 
-@router.get("/sessions/{session_id}/analyses", response_model=list[schemas.Analysis])
-def list_analyses(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[schemas.Analysis]:
+@router.get("/sessions/{session_id}/analyses", response_model=list[schemas.AnalysisAnswer])
+def list_analyses(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[schemas.AnalysisAnswer]:
     """The finished analyses of a session, the one its pages show first."""
     with db.read() as c:
         sessions.get(c, session_id)
@@ -48,8 +49,8 @@ def list_analyses(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list
     return [_shown(found) for found in made]
 
 
-@router.get("/analyses/{analysis_id}", response_model=schemas.Analysis)
-def read_analysis(analysis_id: Id, db: Db, trail: OpenTrail, who: Reader) -> schemas.Analysis:
+@router.get("/analyses/{analysis_id}", response_model=schemas.AnalysisAnswer)
+def read_analysis(analysis_id: Id, db: Db, trail: OpenTrail, who: Reader) -> schemas.AnalysisAnswer:
     """Open an analysis: what went in, by what version, and which files came out."""
     with db.read() as c:
         found = analyses.get(c, analysis_id)
@@ -77,9 +78,6 @@ def read_file(analysis_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail
     return attachment(content, f"{stem}-{analysis_id[:8]}{dot}{ending}")
 
 
-def _shown(found: analyses.Analysis) -> schemas.Analysis:
-    files = [
-        schemas.StoredFile(name=name, size=blob.size, sha256=blob.sha256)
-        for name, blob in found.files.items()
-    ]
-    return schemas.Analysis.model_validate({**vars(found), "files": files})
+def _shown(found: analyses.Analysis) -> schemas.AnalysisAnswer:
+    files = [recordings.RecordedFile(name, blob.size, blob.sha256) for name, blob in found.files.items()]
+    return schemas.make_answer(schemas.AnalysisAnswer, found, files=files)

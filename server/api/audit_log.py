@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query
-from sqlalchemy import Row
 
 from server import audit
 from server.api import schemas
@@ -23,7 +22,9 @@ def list_audit(
     who: Annotated[Identity, require(Action.READ_AUDIT)],
     before: Annotated[int | None, Query(ge=1, le=2**53, description="rows older than this number")] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
-) -> list[Row[Any]]:
+) -> list[schemas.AuditRow]:
     """The newest rows first."""
     with db.read() as c:
-        return audit.entries(c, before=before, limit=limit)
+        return [
+            schemas.make_answer(schemas.AuditRow, row) for row in audit.entries(c, before=before, limit=limit)
+        ]

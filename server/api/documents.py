@@ -6,6 +6,7 @@ from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
+from pydantic import TypeAdapter
 
 from server.api.schemas import ProblemDetails
 from server.http.problems import MEDIA_TYPE
@@ -45,7 +46,7 @@ def refusals(*statuses: int) -> dict[int | str, dict[str, Any]]:
 def _complete(document: dict[str, Any]) -> dict[str, Any]:
     components = document.setdefault("components", {})
     schemas = components.setdefault("schemas", {})
-    whole = ProblemDetails.model_json_schema(ref_template="#/components/schemas/{model}")
+    whole = TypeAdapter(ProblemDetails).json_schema(ref_template="#/components/schemas/{model}")
     schemas.update(whole.pop("$defs", {}))
     schemas["ProblemDetails"] = whole
     for unused in ("HTTPValidationError", "ValidationError"):

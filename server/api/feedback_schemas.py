@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import datetime as dt
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints
 
-from server.api.schemas import HexId, Request, Response, Side
+from server.api.schemas import HexId, Request, Side
 
 # limits of the numbers are those of core.feedback.Prescription, whose sentences say what was expected
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -83,7 +84,8 @@ class PrescriptionNew(Request):
     guard: GuardNew = GuardNew()
 
 
-class Prescription(Response):
+@dataclass(frozen=True)
+class PrescriptionAnswer:
     """A prescription; it never changes: another one ends it."""
 
     id: str
@@ -95,7 +97,8 @@ class Prescription(Response):
     ended_at: dt.datetime | None
 
 
-class TargetOffer(Response):
+@dataclass(frozen=True)
+class TargetOffer:
     """What a source gives as target for this person; null with a reason where it gives nothing."""
 
     source: Source
@@ -105,19 +108,20 @@ class TargetOffer(Response):
     reason: str | None
 
 
-class Feedback(Response):
+@dataclass(frozen=True)
+class Feedback:
     """Strides with and without feedback of a session's live take; empty with a reason where there is none."""
 
     reason: str | None = None
     prescription: dict[str, Any] | None = None
-    words: list[str] = Field(default=[])
+    words: list[str] = field(default_factory=list)
     parameter: str | None = None
     unit: str | None = None
     side: str | None = None
-    rows: list[dict[str, Any]] = Field(default=[])
-    probes: list[dict[str, Any]] = Field(default=[])
-    levels: list[dict[str, Any]] = Field(default=[])
-    effects: list[dict[str, Any]] = Field(default=[])
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    probes: list[dict[str, Any]] = field(default_factory=list)
+    levels: list[dict[str, Any]] = field(default_factory=list)
+    effects: list[dict[str, Any]] = field(default_factory=list)
     retention: dict[str, Any] | None = None
-    notes: list[str] = Field(default=[])
-    strides: list[dict[str, Any]] = Field(default=[])
+    notes: list[str] = field(default_factory=list)
+    strides: list[dict[str, Any]] = field(default_factory=list)

@@ -45,7 +45,7 @@ _FORM = {
 @router.put(
     "/{name:path}",
     status_code=201,
-    response_model=schemas.StoredFile,
+    response_model=recordings.RecordedFile,
     responses=refusals(413),
     openapi_extra={"requestBody": {"required": True, **_RAW}},
 )
@@ -73,7 +73,7 @@ async def put_file(
 @router.post(
     "",
     status_code=201,
-    response_model=list[schemas.StoredFile],
+    response_model=list[recordings.RecordedFile],
     responses=refusals(411, 413),
     openapi_extra={"requestBody": {"required": True, **_FORM}},
 )
@@ -144,13 +144,13 @@ def read_file(
     return attachment(content, name.rpartition("/")[2], "application/octet-stream")
 
 
-@router.delete("/{name:path}", response_model=schemas.Recording)
+@router.delete("/{name:path}", response_model=schemas.RecordingAnswer)
 def delete_file(
     session_id: Id, name: FileName, db: Db, who: Annotated[Identity, require(Action.UPLOAD)]
-) -> recordings.Recording:
+) -> schemas.RecordingAnswer:
     """Take a file out of the current recording; analyses already made keep theirs."""
     with db.write() as c:
-        return recordings.remove_file(c, who, session_id, name)
+        return schemas.make_answer(schemas.RecordingAnswer, recordings.remove_file(c, who, session_id, name))
 
 
 def _declared(request: Request, limit: int) -> int:

@@ -14,23 +14,25 @@ router = APIRouter(prefix="/health", tags=["health"], dependencies=[])
 _DOOR = [require(Action.CHECK_HEALTH)]
 
 
-@router.get("/live", dependencies=_DOOR, response_model=schemas.Health, openapi_extra=PUBLIC)
-def live() -> schemas.Health:
+@router.get("/live", dependencies=_DOOR, response_model=schemas.HealthAnswer, openapi_extra=PUBLIC)
+def live() -> schemas.HealthAnswer:
     """Answer, which is all that is asked."""
-    return schemas.Health(status="ok")
+    return schemas.HealthAnswer(status="ok")
 
 
 @router.get(
     "/ready",
     dependencies=_DOOR,
-    response_model=schemas.Health,
-    responses={503: {"model": schemas.Health, "description": "A part does not work; `checks` says which"}},
+    response_model=schemas.HealthAnswer,
+    responses={
+        503: {"model": schemas.HealthAnswer, "description": "A part does not work; `checks` says which"}
+    },
     openapi_extra=PUBLIC,
 )
-def ready(request: Request, response: Response) -> schemas.Health:
+def ready(request: Request, response: Response) -> schemas.HealthAnswer:
     """Check that database and data folder can be written, the schema is ours, and the disk has room."""
     readiness: Readiness = request.app.state.readiness
     checks = dict(readiness.checks())
     healthy = all(state == "ok" for state in checks.values())
     response.status_code = 200 if healthy else 503
-    return schemas.Health(status="ok" if healthy else "failing", checks=checks)
+    return schemas.HealthAnswer(status="ok" if healthy else "failing", checks=checks)

@@ -8,11 +8,11 @@ from collections.abc import AsyncGenerator, AsyncIterator, Callable
 from typing import Annotated, cast
 
 from fastapi import APIRouter, Query
+from pydantic import TypeAdapter
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
 from server import context
-from server.api import schemas
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -28,30 +28,31 @@ RETRY_MS = 2000
 """How long a browser waits before it connects again."""
 
 Reader = Annotated[Identity, require(Action.READ_JOB)]
+_JOB = TypeAdapter(JobView)
 
 
-@router.get("", response_model=list[schemas.ListedJob])
+@router.get("", response_model=list[jobs.ListedJob])
 def list_jobs(
     db: Db,
     trail: OpenTrail,
     who: Reader,
     active: Annotated[bool, Query(description="only queued and running ones")] = False,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
-) -> list[schemas.ListedJob]:
+) -> list[jobs.ListedJob]:
     """Jobs, the newest first."""
     with db.read() as c:
         rows = jobs.listing(c, active_only=active, limit=limit)
     trail.watched(who, "job.listed", "job", None)
-    return [_shown(found) for found in rows]
+    return rows
 
 
-@router.get("/{job_id}", response_model=schemas.ListedJob)
-def read_job(job_id: Id, db: Db, trail: OpenTrail, who: Reader) -> schemas.ListedJob:
+@router.get("/{job_id}", response_model=jobs.ListedJob)
+def read_job(job_id: Id, db: Db, trail: OpenTrail, who: Reader) -> jobs.ListedJob:
     """One job: its progress, or why it failed."""
     with db.read() as c:
         found = jobs.get(c, job_id)
     trail.watched(who, "job.opened", "job", job_id)
-    return _shown(found)
+    return found
 
 
 @router.get(
@@ -75,7 +76,7 @@ async def watch_job(
     return StreamingResponse(events, media_type="text/event-stream", headers={"X-Accel-Buffering": "no"})
 
 
-@router.post("/{job_id}/cancel", status_code=202, response_model=schemas.Job)
+@router.post("/{job_id}/cancel", status_code=202, response_model=JobView)
 def cancel_job(
     job_id: Id,
     db: Db,
@@ -85,10 +86,6 @@ def cancel_job(
     """Ask a job to stop, which it does within two seconds; a finished one stays as it is."""
     with db.write() as c:
         return jobs.cancel(c, queue, who, job_id)
-
-
-def _shown(found: jobs.ListedJob) -> schemas.ListedJob:
-    return schemas.ListedJob.model_validate({**vars(found.job), **vars(found)})
 
 
 async def _events(feed: JobFeed, job_id: str, is_open: Callable[[], bool]) -> AsyncIterator[str]:
@@ -108,7 +105,7 @@ async def _events(feed: JobFeed, job_id: str, is_open: Callable[[], bool]) -> As
                 view = pending.result()
                 if view is None:
                     return
-                yield f"data: {schemas.Job.model_validate(view).model_dump_json()}\n\n"
+                yield f"data: {_JOB.dump_json(view).decode()}\n\n"
                 pending = asyncio.ensure_future(anext(views, None))
         finally:
             pending.cancel()

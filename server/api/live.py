@@ -9,13 +9,15 @@ from starlette.concurrency import run_in_threadpool
 
 from server.api import live_schemas as schemas
 from server.api.documents import PUBLIC, refusals
+from server.api.schemas import make_answer
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Failures, Id, LiveHub, OpenTrail, address_of
+from server.http.json_body import StrictJsonRoute
 from server.services import live, sessions
 
-router = APIRouter(tags=["live"])
+router = APIRouter(route_class=StrictJsonRoute, tags=["live"])
 Therapist = Annotated[Identity, require(Action.RUN_LIVE)]
 SOCKET = "/api/v1/live"
 
@@ -23,7 +25,7 @@ SOCKET = "/api/v1/live"
 @router.post(
     "/sessions/{session_id}/live", status_code=201, response_model=schemas.OpenedTake, responses=refusals(409)
 )
-async def open_take(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> dict[str, Any]:
+async def open_take(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> schemas.OpenedTake:
     """Open a take; a tablet joins it with the code within ten minutes."""
 
     def write() -> tuple[live.Take, str]:
@@ -50,7 +52,7 @@ def read_take(session_id: Id, db: Db, hub: LiveHub, trail: OpenTrail, who: Thera
     response_model=schemas.OpenedTake,
     responses=refusals(409),
 )
-async def give_code(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> dict[str, Any]:
+async def give_code(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> schemas.OpenedTake:
     """Give another code; the one before ends, and when it is used the tablet before is sent away."""
 
     def write() -> tuple[live.Take, str]:
@@ -72,13 +74,13 @@ async def give_command(
     return await hub.command(who, session_id, body.command, body.value, body.t_s)
 
 
-@router.post("/sessions/{session_id}/live/close", response_model=schemas.LiveTake, responses=refusals(409))
-async def close_take(session_id: Id, hub: LiveHub, who: Therapist) -> live.Take:
+@router.post("/sessions/{session_id}/live/close", response_model=schemas.TakeAnswer, responses=refusals(409))
+async def close_take(session_id: Id, hub: LiveHub, who: Therapist) -> schemas.TakeAnswer:
     """End the take without the tablet; what has come becomes the session's recording and is analysed."""
-    return await hub.close(who, session_id)
+    return make_answer(schemas.TakeAnswer, await hub.close(who, session_id))
 
 
-@router.get("/sessions/{session_id}/live/events", response_model=list[schemas.LiveEvent])
+@router.get("/sessions/{session_id}/live/events", response_model=list[live.LiveEvent])
 def list_events(session_id: Id, db: Db, trail: OpenTrail, who: Therapist) -> list[live.LiveEvent]:
     """What happened in the session's takes, in order."""
     with db.read() as c:
@@ -92,13 +94,13 @@ def list_events(session_id: Id, db: Db, trail: OpenTrail, who: Therapist) -> lis
     "/live/pairings",
     status_code=201,
     dependencies=[require(Action.PAIR)],
-    response_model=schemas.Paired,
+    response_model=schemas.PairedTablet,
     responses=refusals(404, 429),
     openapi_extra=PUBLIC,
 )
 async def pair(
-    request: Request, body: schemas.Pairing, db: Db, hub: LiveHub, trail: OpenTrail, failures: Failures
-) -> dict[str, Any]:
+    request: Request, body: schemas.PairingCode, db: Db, hub: LiveHub, trail: OpenTrail, failures: Failures
+) -> schemas.PairedTablet:
     """Join a tablet to a take by its code; a code works once."""
     # counted per address: a stranger cannot keep other tablets out by guessing
     address = address_of(request)
@@ -118,20 +120,8 @@ async def pair(
         raise
     failures.succeed(who, address)
     hub.tell_row(take)
-    return {
-        "token": paired.token,
-        "take": paired.take,
-        "session_title": paired.session_title,
-        "patient_code": paired.patient_code,
-        "socket": SOCKET,
-    }
+    return make_answer(schemas.PairedTablet, paired, socket=SOCKET)
 
 
-def _opened(take: live.Take, code: str) -> dict[str, Any]:
-    return {
-        "id": take.id,
-        "session_id": take.session_id,
-        "state": take.state,
-        "code": code,
-        "expires_at": take.code_expires_at,
-    }
+def _opened(take: live.Take, code: str) -> schemas.OpenedTake:
+    return make_answer(schemas.OpenedTake, take, code=code, expires_at=take.code_expires_at)

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import datetime as dt
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
-from server.api.schemas import HexId, Request, Response
+from server.api.schemas import HexId, Request
+from server.live.take import Mark
 
 
-class OpenedTake(Response):
+@dataclass(frozen=True)
+class OpenedTake:
     """A take that waits for a tablet, and its code; the code is told this once."""
 
     id: str
     session_id: str
     state: str
-    code: str = Field(description="six characters, to be shown in two groups of three")
+    code: Annotated[str, Field(description="six characters, to be shown in two groups of three")]
     expires_at: dt.datetime
 
 
-class LiveTake(Response):
+@dataclass(frozen=True)
+class TakeAnswer:
     """A live take.
 
     `state` is pairing, open (a tablet has joined), streaming, finished (by the tablet) or closed (here);
@@ -31,61 +35,59 @@ class LiveTake(Response):
     session_id: str
     state: str
     source: str | None
-    count: int | None = Field(description="batches, at the end")
-    recording_id: str | None = Field(description="what the take became, null until then")
+    count: Annotated[int | None, Field(description="batches, at the end")]
+    recording_id: Annotated[str | None, Field(description="what the take became, null until then")]
     problem: str | None
     code_expires_at: dt.datetime | None
     created_at: dt.datetime
     finished_at: dt.datetime | None
 
 
-class Mark(Response):
-    """A moment the therapist marked."""
-
-    t_s: float | None
-    value: str | None
-
-
-class LiveSensor(Response):
+@dataclass(frozen=True)
+class LiveSensor:
     """A sensor as the recorder knows it; frames have it with what the estimator counts."""
 
     id: str
     segment: str | None
     rate_hz: float
-    lost_pct: float | None = Field(description="null: only an estimator counts")
+    lost_pct: Annotated[float | None, Field(description="null: only an estimator counts")]
     still: bool | None
     battery_pct: float | None
-    state: str = Field(description="ok, warn, bad, none")
+    state: Annotated[str, Field(description="ok, warn, bad, none")]
     words: str
 
 
-class LiveState(Response):
+@dataclass(frozen=True)
+class LiveState:
     """Where a session's newest take stands: the feed's `state` message."""
 
     type: Literal["state"]
-    take: str | None = Field(description="null: there was none yet")
-    state: str = Field(description="none, pairing, open, streaming, finished or closed")
-    tablet: str = Field(description="connected, lost, or none (has not joined, or the take is over)")
+    take: Annotated[str | None, Field(description="null: there was none yet")]
+    state: Annotated[str, Field(description="none, pairing, open, streaming, finished or closed")]
+    tablet: Annotated[str, Field(description="connected, lost, or none (not joined, or the take is over)")]
     source: str | None
-    count: int | None = Field(description="batches so far")
-    elapsed_s: float | None = Field(description="length of what has come, estimated or not")
-    sensors: list[LiveSensor] = Field(description="empty until a tablet has joined and once the take is over")
+    count: Annotated[int | None, Field(description="batches so far")]
+    elapsed_s: Annotated[float | None, Field(description="length of what has come, estimated or not")]
+    sensors: Annotated[
+        list[LiveSensor], Field(description="empty until a tablet has joined and once the take is over")
+    ]
     marks: list[Mark]
     ghost: str | None
     stale: bool
     stopping: bool
-    estimate: str = Field(description="preparing, ok, failed, or none (nobody estimates)")
+    estimate: Annotated[str, Field(description="preparing, ok, failed, or none (nobody estimates)")]
     recording: str | None
     problem: str | None
 
 
-class Pairing(Request):
+class PairingCode(Request):
     """The code on the therapist's screen, in any case, spaces and hyphens do not count."""
 
     code: Annotated[str, StringConstraints(min_length=1, max_length=40)]
 
 
-class Paired(Response):
+@dataclass(frozen=True)
+class PairedTablet:
     """What the tablet needs to stream; the token opens this take only, for twelve hours."""
 
     token: str
@@ -105,15 +107,3 @@ class LiveCommand(Request):
     t_s: float | None = Field(
         None, ge=0, description="of a mark: the moment meant, in the time of the frames; null: the newest"
     )
-
-
-class LiveEvent(Response):
-    """Something that happened in a take: a command, a cue, a calibration, a notice."""
-
-    seq: int
-    take_id: str
-    kind: str
-    t_s: float | None
-    content: dict[str, Any]
-    by: str | None
-    at: dt.datetime

@@ -12,12 +12,13 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Config, Db, Id, LiveHub, OpenTrail, Reviewed
+from server.http.json_body import StrictJsonRoute
 from server.services import erasure, patients, programmes, sessions
 
-router = APIRouter(prefix="/patients", tags=["patients"])
+router = APIRouter(route_class=StrictJsonRoute, prefix="/patients", tags=["patients"])
 
 
-@router.get("", response_model=list[schemas.Patient])
+@router.get("", response_model=list[patients.Patient])
 def list_patients(
     db: Db,
     trail: OpenTrail,
@@ -33,7 +34,7 @@ def list_patients(
     return found
 
 
-@router.post("", status_code=201, response_model=schemas.Patient, responses=refusals(409))
+@router.post("", status_code=201, response_model=patients.Patient, responses=refusals(409))
 def add_patient(
     body: schemas.PatientNew, db: Db, who: Annotated[Identity, require(Action.WRITE_PATIENT)]
 ) -> patients.Patient:
@@ -42,7 +43,7 @@ def add_patient(
         return patients.create(c, who, **body.values())
 
 
-@router.get("/{patient_id}", response_model=schemas.Patient)
+@router.get("/{patient_id}", response_model=patients.Patient)
 def read_patient(
     patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_PATIENT)]
 ) -> patients.Patient:
@@ -53,7 +54,7 @@ def read_patient(
     return found
 
 
-@router.patch("/{patient_id}", response_model=schemas.Patient, responses=refusals(409))
+@router.patch("/{patient_id}", response_model=patients.Patient, responses=refusals(409))
 def change_patient(
     patient_id: Id,
     body: schemas.PatientChange,
@@ -85,7 +86,7 @@ def delete_patient(
     erasure.erase_patient(db, reviewed, settings, who, patient_id, confirm=confirm)
 
 
-@router.get("/{patient_id}/sessions", response_model=list[schemas.Session])
+@router.get("/{patient_id}/sessions", response_model=list[sessions.Session])
 def list_sessions(
     patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> list[sessions.Session]:
@@ -98,7 +99,7 @@ def list_sessions(
 
 
 @router.post(
-    "/{patient_id}/sessions", status_code=201, response_model=schemas.Session, responses=refusals(409)
+    "/{patient_id}/sessions", status_code=201, response_model=sessions.Session, responses=refusals(409)
 )
 def add_session(
     patient_id: Id,

@@ -17,6 +17,7 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail, Reviewed
+from server.http.json_body import StrictJsonRoute
 from server.http.problems import Problem
 from server.report.feedback_words import prescription_words
 from server.report.tables import feedback_csv
@@ -25,7 +26,7 @@ from server.services.prescriptions import Written
 from server.storage.db import Database
 from server.trail import Trail
 
-router = APIRouter(tags=["feedback"])
+router = APIRouter(route_class=StrictJsonRoute, tags=["feedback"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
 Therapist = Annotated[Identity, require(Action.RUN_LIVE)]
 _CSV: dict[int | str, dict[str, Any]] = {
@@ -33,7 +34,7 @@ _CSV: dict[int | str, dict[str, Any]] = {
 }
 
 
-@router.get("/patients/{patient_id}/prescriptions", response_model=list[schemas.Prescription])
+@router.get("/patients/{patient_id}/prescriptions", response_model=list[schemas.PrescriptionAnswer])
 def list_prescriptions(patient_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[dict[str, Any]]:
     """The patient's prescriptions, the newest first; one that has not ended is in force."""
     with db.read() as c:
@@ -43,7 +44,9 @@ def list_prescriptions(patient_id: Id, db: Db, trail: OpenTrail, who: Reader) ->
     return [_shown(w) for w in written]
 
 
-@router.post("/patients/{patient_id}/prescriptions", status_code=201, response_model=schemas.Prescription)
+@router.post(
+    "/patients/{patient_id}/prescriptions", status_code=201, response_model=schemas.PrescriptionAnswer
+)
 def write_prescription(
     patient_id: Id, body: schemas.PrescriptionNew, db: Db, reviewed: Reviewed, who: Therapist
 ) -> dict[str, Any]:
@@ -53,7 +56,7 @@ def write_prescription(
 
 
 @router.post(
-    "/prescriptions/{prescription_id}/end", response_model=schemas.Prescription, responses=refusals(409)
+    "/prescriptions/{prescription_id}/end", response_model=schemas.PrescriptionAnswer, responses=refusals(409)
 )
 def end_prescription(prescription_id: Id, db: Db, who: Therapist) -> dict[str, Any]:
     """End a prescription; the record stays."""

@@ -12,13 +12,14 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail
+from server.http.json_body import StrictJsonRoute
 from server.services import patients, programmes
 
-router = APIRouter(tags=["programmes"])
+router = APIRouter(route_class=StrictJsonRoute, tags=["programmes"])
 Planner = Annotated[Identity, require(Action.WRITE_SESSION)]
 
 
-@router.get("/patients/{patient_id}/programmes", response_model=list[schemas.Programme])
+@router.get("/patients/{patient_id}/programmes", response_model=list[programmes.Programme])
 def list_programmes(
     patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> list[programmes.Programme]:
@@ -33,7 +34,7 @@ def list_programmes(
 @router.post(
     "/patients/{patient_id}/programmes",
     status_code=201,
-    response_model=schemas.Programme,
+    response_model=programmes.Programme,
     responses=refusals(409),
 )
 def start_programme(patient_id: Id, body: schemas.ProgrammeNew, db: Db, who: Planner) -> programmes.Programme:
@@ -49,7 +50,7 @@ def end_programme(programme_id: Id, db: Db, who: Planner) -> None:
         programmes.end(c, who, programme_id)
 
 
-@router.patch("/planned-visits/{visit_id}", response_model=schemas.Programme, responses=refusals(409))
+@router.patch("/planned-visits/{visit_id}", response_model=programmes.Programme, responses=refusals(409))
 def change_planned_visit(
     visit_id: Id, body: schemas.PlannedVisitChange, db: Db, who: Planner
 ) -> programmes.Programme:

@@ -36,7 +36,7 @@ _CSV: dict[int | str, dict[str, Any]] = {
 }
 
 
-@router.get("/report", response_model=schemas.Report)
+@router.get("/report", response_model=schemas.ReportAnswer)
 def read_report(
     session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
 ) -> dict[str, object]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import datetime as dt
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from server.api.schemas import Line, Request, Response
+from server.api.schemas import Line, Request
 
 Seconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False, description="s from the start")]
 
@@ -23,7 +24,8 @@ class EditNew(Request):
     reason: Line | None = Field(default=None, description="why a stride is left out")
 
 
-class MadeEdit(Response):
+@dataclass(frozen=True)
+class EditAnswer:
     """An edit that counts, by whom and when."""
 
     seq: int
@@ -37,7 +39,8 @@ class MadeEdit(Response):
     reason: str | None = None
 
 
-class Event(Response):
+@dataclass(frozen=True)
+class Event:
     """A contact (ic) or foot-off (tc); its source is a detector, "consensus", or "manual".
 
     `confidence` is the share of the detectors that found it, null when there was one.
@@ -50,7 +53,8 @@ class Event(Response):
     confidence: float | None
 
 
-class ReviewedStride(Response):
+@dataclass(frozen=True)
+class ReviewedStride:
     """A stride: what the rules found about it, and whether and why it is left out."""
 
     side: str
@@ -62,34 +66,14 @@ class ReviewedStride(Response):
     excluded: str | None
 
 
-class Review(Response):
+@dataclass(frozen=True)
+class Review:
     """Events, strides and parameters of an analysis as they count now; `version` grows with every change."""
 
     analysis_id: str
     editable: bool
     version: int
-    edits: list[MadeEdit]
+    edits: list[EditAnswer]
     events: list[Event]
     strides: list[ReviewedStride]
     parameters: list[dict[str, Any]]
-
-
-class Lane(Response):
-    """A signal over time: what its lines are, its unit, which way is up; raw = as one sensor measured it."""
-
-    name: str
-    label: str
-    unit: str
-    up: str
-    lines: list[str]
-    raw: bool
-
-
-class Piece(Response):
-    """A window of a signal: of every part of `step_s` the least and the greatest value, null while lost."""
-
-    lane: Lane
-    start_s: float
-    step_s: float
-    low: dict[str, list[float | None]]
-    high: dict[str, list[float | None]]

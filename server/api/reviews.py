@@ -17,6 +17,7 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail, Reviewed
+from server.http.json_body import StrictJsonRoute
 from server.report.exports import events_csv, parameter_row, strides_csv
 from server.report.wording import excluded_words
 from server.services import analyses, edit_log, reviews, signals
@@ -24,7 +25,7 @@ from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
 from server.trail import Trail
 
-router = APIRouter(prefix="/sessions/{session_id}", tags=["review"])
+router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}", tags=["review"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
 Reviewer = Annotated[Identity, require(Action.REVIEW)]
 Seen = Annotated[
@@ -81,16 +82,16 @@ def read_strides(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, w
     return attachment(content, f"strides-{session_id[:8]}.csv")
 
 
-@router.get("/signals", response_model=list[schemas.Lane])
+@router.get("/signals", response_model=list[signals.SignalLane])
 def list_signals(
     session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
-) -> tuple[signals.Lane, ...]:
+) -> tuple[signals.SignalLane, ...]:
     """Which signals there are: derived ones of feet and joints, raw ones of every sensor."""
     found = _watched(db, trail, who, session_id)
     return signals.lanes(reviewed, found)
 
 
-@router.get("/signals/{name}", response_model=None, responses={200: {"model": schemas.Piece}})
+@router.get("/signals/{name}", response_model=None, responses={200: {"model": signals.Piece}})
 def read_signal(
     session_id: Id,
     name: str,

@@ -1,17 +1,20 @@
-"""What goes over the wire: every request and response of /api/v1."""
+"""What goes over the wire: requests of /api/v1, checked, and answers that are no record of a service."""
 
 from __future__ import annotations
 
 import datetime as dt
-import json
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
 from core.frames import Protocol
 from server.auth.passwords import MAX_LENGTH, MIN_LENGTH
 from server.auth.roles import Role
+from server.jobs.queue import JobView
+from server.report.behind import StrideValue
+from server.services.recordings import RecordedFile, RecordingState
 
 # one line of text: starts and ends with something visible, no control characters
 _LINE = r"^[^\s\x00-\x1f\x7f]([^\x00-\x1f\x7f]*[^\s\x00-\x1f\x7f])?$"
@@ -27,18 +30,8 @@ BirthYear = Annotated[int, Field(ge=1850, le=2200)]
 Sex = Literal["female", "male"]
 Side = Literal["left", "right"]
 HexId = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{32}$")]
-
-
-def _storable(value: dict[str, Any]) -> dict[str, Any]:
-    # Python reads NaN and lone surrogates from JSON, but they are neither JSON nor UTF-8
-    try:
-        json.dumps(value, allow_nan=False, ensure_ascii=False).encode()
-    except (ValueError, RecursionError):
-        raise ValueError("expected JSON with finite numbers and valid Unicode") from None
-    return value
-
-
-Json = Annotated[dict[str, Any], AfterValidator(_storable)]
+Answer = TypeVar("Answer")
+Json = dict[str, Any]
 
 
 class Request(BaseModel):
@@ -52,20 +45,28 @@ class Request(BaseModel):
         return sent | ({"note": ""} if "note" in sent and sent["note"] is None else {})
 
 
-class Response(BaseModel):
-    """A body we send, read from a row or a result."""
+def make_answer(kind: type[Answer], source: object, **others: object) -> Answer:
+    """Build an answer from a row or a result.
 
-    model_config = ConfigDict(from_attributes=True)
+    Parameters
+    ----------
+    kind : a dataclass. source : what has members of the same names; what `kind` does not name stays inside.
+    others : members that `source` has not, or in another form.
+    """
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]  # any dataclass
+    return kind(**{name: others[name] if name in others else getattr(source, name) for name in names})
 
 
-class FieldProblem(Response):
+@dataclass(frozen=True)
+class FieldProblem:
     """One field that is not as expected."""
 
     field: str
     message: str
 
 
-class ProblemDetails(Response):
+@dataclass(frozen=True)
+class ProblemDetails:
     """RFC 9457; `code` is stable, `detail` is a sentence that says what to do."""
 
     type: str
@@ -99,7 +100,8 @@ class PasswordChange(Request):
     password: Password
 
 
-class User(Response):
+@dataclass(frozen=True)
+class User:
     """An account."""
 
     id: str
@@ -110,7 +112,8 @@ class User(Response):
     created_at: dt.datetime
 
 
-class Account(Response):
+@dataclass(frozen=True)
+class Account:
     """Who is signed in, and what this person may do."""
 
     id: str
@@ -156,23 +159,6 @@ class PatientChange(PatientNew):
     code: Code = ""
 
 
-class Patient(Response):
-    """A patient, with what a list shows of the visits."""
-
-    id: str
-    code: str
-    sex: Sex | None
-    birth_year: int | None
-    height_m: float | None
-    affected_side: Side | None
-    is_control: bool
-    note: str
-    created_at: dt.datetime
-    sessions: int
-    last_visit: dt.date | None
-    running: bool
-
-
 class SessionNew(Request):
     """A new visit, today unless said otherwise; of how it was walked null = not stated."""
 
@@ -212,97 +198,17 @@ class PlannedVisitChange(Request):
     session_id: HexId | None = None
 
 
-class PlannedVisit(Response):
-    """A visit of a programme; week 1 is that of the first training."""
-
-    id: str
-    label: str
-    kind: Literal["assessment", "training"]
-    week: int
-    planned_on: dt.date
-    session_id: str | None
-    performed_on: dt.date | None
-    state: Literal["done", "missing", "next", "planned"]
-
-
-class Programme(Response):
-    """The visits that are planned for a patient, in the order of their days."""
-
-    id: str
-    patient_id: str
-    template: str
-    words: str
-    starts_on: dt.date
-    created_at: dt.datetime
-    visits: list[PlannedVisit]
-
-
-class Session(Response):
-    """A visit; its state: empty, uploaded, running, done or failed."""
-
-    id: str
-    patient_id: str
-    patient_code: str
-    title: str
-    performed_on: dt.date
-    protocol: str
-    height_m: float | None
-    pace: WalkingPace | None
-    aid: WalkingAid | None
-    orthosis: Orthosis | None
-    shoes: Footwear | None
-    feedback: bool
-    note: str
-    created_at: dt.datetime
-    state: str
-
-
-class StoredFile(Response):
-    """A file exactly as it was uploaded, or as an analysis wrote it."""
-
-    name: str
-    size: int
-    sha256: str
-
-
-class Job(Response):
-    """A piece of work for a worker; `stage`, `fraction` and `message` are its progress."""
-
-    id: str
-    kind: str
-    recording_id: str | None
-    state: Literal["queued", "running", "done", "failed", "cancelled"]
-    attempt: int
-    stage: str | None
-    fraction: float | None
-    message: str | None
-    cancel_requested: bool
-    error_code: str | None
-    error_message: str | None
-    created_at: dt.datetime
-    started_at: dt.datetime | None
-    finished_at: dt.datetime | None
-
-
-class ListedJob(Job):
-    """A job and whose it is."""
-
-    session_id: str | None
-    session_title: str | None
-    patient_id: str | None
-    patient_code: str | None
-
-
-class Recording(Response):
+@dataclass(frozen=True)
+class RecordingAnswer:
     """The upload set of a session; `inspection` is what was found in it, before any mapping."""
 
     id: str
     session_id: str
-    state: Literal["draft", "ready", "failed"]
-    files: list[StoredFile]
+    state: RecordingState
+    files: tuple[RecordedFile, ...]
     manifest: dict[str, Any] | None
     inspection: dict[str, Any] | None
-    job: Job | None
+    job: JobView | None
 
 
 class AnalysisNew(Request):
@@ -312,7 +218,8 @@ class AnalysisNew(Request):
     config: Json | None = None
 
 
-class Analysis(Response):
+@dataclass(frozen=True)
+class AnalysisAnswer:
     """A finished analysis; its input, settings and code version give the same numbers again."""
 
     id: str
@@ -325,13 +232,12 @@ class Analysis(Response):
     manifest: dict[str, Any] | None
     config: dict[str, Any]
     created_at: dt.datetime
-    files: list[StoredFile]
+    files: list[RecordedFile]
 
 
-class Report(Response):
+@dataclass(frozen=True)
+class ReportAnswer:
     """Everything the pages of a session show, in degrees and words; undefined is null with a reason."""
-
-    model_config = ConfigDict(extra="allow")
 
     problem: str | None
     quality: dict[str, Any]
@@ -348,30 +254,22 @@ class Report(Response):
     since: dict[str, Any] | None
     condition: str
     provenance: dict[str, Any]
+    estimator: dict[str, Any] | None
+    profile: dict[str, Any] | None
+    limits: dict[str, Any] | None
 
 
-class StrideFigure(Response):
-    """The figure of one stride; null where it has none."""
-
-    index: int
-    side: str
-    start_s: float
-    end_s: float
-    value: float | None
-    text: str
-    counted: bool
-    excluded: str | None
-
-
-class ParameterBehind(Response):
+@dataclass(frozen=True)
+class ParameterBehind:
     """A parameter as in the table, its definition, and every stride of the list with its own figure."""
 
     parameter: dict[str, Any]
     definition: str
-    strides: list[StrideFigure]
+    strides: list[StrideValue]
 
 
-class AuditRow(Response):
+@dataclass(frozen=True)
+class AuditRow:
     """Who opened or changed what, when; each row's hash covers the row before it."""
 
     seq: int
@@ -385,8 +283,9 @@ class AuditRow(Response):
     hash: str
 
 
-class Health(Response):
+@dataclass(frozen=True)
+class HealthAnswer:
     """State of the process, or of one of its parts."""
 
     status: Literal["ok", "failing"]
-    checks: dict[str, str] = {}
+    checks: dict[str, str] = field(default_factory=dict)

@@ -8,18 +8,20 @@ from fastapi import APIRouter
 
 from server.api import schemas
 from server.api.documents import refusals
+from server.api.schemas import make_answer
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Config, Db, Id, LiveHub, OpenTrail, Queue, Reviewed
+from server.http.json_body import StrictJsonRoute
 from server.jobs.queue import JobView
 from server.services import erasure, recordings, sessions
 from server.services.errors import NotFound
 
-router = APIRouter(prefix="/sessions/{session_id}", tags=["sessions"])
+router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}", tags=["sessions"])
 
 
-@router.get("", response_model=schemas.Session)
+@router.get("", response_model=sessions.Session)
 def read_session(
     session_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> sessions.Session:
@@ -30,7 +32,7 @@ def read_session(
     return found
 
 
-@router.patch("", response_model=schemas.Session)
+@router.patch("", response_model=sessions.Session)
 def change_session(
     session_id: Id,
     body: schemas.SessionChange,
@@ -56,29 +58,29 @@ def delete_session(
     erasure.erase_session(db, reviewed, settings, who, session_id)
 
 
-@router.get("/recording", response_model=schemas.Recording)
+@router.get("/recording", response_model=schemas.RecordingAnswer)
 def read_recording(
     session_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
-) -> recordings.Recording:
+) -> schemas.RecordingAnswer:
     """The current upload set: its files, what was found in them, the mapping."""
     with db.read() as c:
         found = recordings.current(c, session_id)
     trail.watched(who, "recording.opened", "session", session_id)
     if found is None:
         raise NotFound("recording of session", session_id)
-    return found
+    return make_answer(schemas.RecordingAnswer, found)
 
 
-@router.put("/manifest", response_model=schemas.Recording, responses=refusals(409))
+@router.put("/manifest", response_model=schemas.RecordingAnswer, responses=refusals(409))
 def set_manifest(
     session_id: Id, body: schemas.Json, db: Db, who: Annotated[Identity, require(Action.UPLOAD)]
-) -> recordings.Recording:
+) -> schemas.RecordingAnswer:
     """Set the mapping (docs/formats.md); the next analysis uses it."""
     with db.write() as c:
-        return recordings.set_manifest(c, who, session_id, body)
+        return make_answer(schemas.RecordingAnswer, recordings.set_manifest(c, who, session_id, body))
 
 
-@router.post("/inspections", status_code=202, response_model=schemas.Job, responses=refusals(409))
+@router.post("/inspections", status_code=202, response_model=JobView, responses=refusals(409))
 def inspect(
     session_id: Id, db: Db, queue: Queue, who: Annotated[Identity, require(Action.UPLOAD)]
 ) -> JobView:

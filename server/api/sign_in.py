@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import json
 from collections.abc import Iterator
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Request, Response
 from fastapi.exceptions import RequestValidationError
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 from sqlalchemy import Connection, Row
 from sqlalchemy.exc import OperationalError
 from starlette.requests import ClientDisconnect
@@ -17,6 +18,7 @@ from starlette.responses import JSONResponse, RedirectResponse
 from server import audit
 from server.api import schemas
 from server.api.documents import PUBLIC, refusals
+from server.api.users import user_answer
 from server.auth import accounts, one_time
 from server.auth.access import require
 from server.auth.cookie import clear_token, read_token, set_token
@@ -26,13 +28,15 @@ from server.auth.roles import POLICY, Action, Role
 from server.auth.sessions import Logins
 from server.auth.tokens import token_hash
 from server.context import Db, Failures, OpenLogins, OpenTrail, address_of
+from server.http.json_body import StrictJsonRoute
 from server.http.problems import SENTENCES, Problem
 from server.storage.refusal import refusal_of
 from server.trail import Trail
 
-router = APIRouter(tags=["account"])
+router = APIRouter(route_class=StrictJsonRoute, tags=["account"])
 address_router = APIRouter(include_in_schema=False)
 
+_USER = TypeAdapter(schemas.User)
 _FORM = "application/x-www-form-urlencoded"
 _BODY = {"schema": schemas.SignIn.model_json_schema()}
 
@@ -41,13 +45,16 @@ async def _credentials(request: Request) -> schemas.SignIn:
     """Read JSON, or the form of a page without scripts."""
     is_form = request.headers.get("content-type", "").startswith(_FORM)
     try:
-        body = await request.body()
+        await request.body()
     except ClientDisconnect:
         raise Problem(400, "bad_request", SENTENCES["bad_request"]) from None
     try:
         if is_form:
             return schemas.SignIn.model_validate(dict(await request.form()))
-        return schemas.SignIn.model_validate_json(body)
+        return schemas.SignIn.model_validate(await request.json())
+    except json.JSONDecodeError as error:
+        told = {"type": "json_invalid", "loc": ("body", error.pos), "msg": error.msg}
+        raise RequestValidationError([told]) from None
     except ValidationError as error:
         items = [{**item, "loc": ("body", *item["loc"])} for item in error.errors()]
         raise RequestValidationError(items) from error
@@ -84,7 +91,7 @@ def sign_in(
     if request.headers.get("content-type", "").startswith(_FORM):
         response = RedirectResponse(local_path(body.next), status_code=303)
     else:
-        response = JSONResponse(schemas.User.model_validate(row).model_dump(mode="json"))
+        response = JSONResponse(_USER.dump_python(user_answer(row), mode="json"))
     set_token(response, request, token)
     return response
 
@@ -125,7 +132,7 @@ def set_up(
         row = accounts.create(c, body.name, body.display_name, Role.ADMIN, hashed)
         audit.record(c, None, "user.set_up", "user", row.id)
         session = _open(c, logins, row, request, "sign_in")
-    response = JSONResponse(schemas.User.model_validate(row).model_dump(mode="json"), 201)
+    response = JSONResponse(_USER.dump_python(user_answer(row), mode="json"), 201)
     set_token(response, request, session)
     return response
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import datetime as dt
+from dataclasses import dataclass
 from typing import Any, Literal
 
+from core.change import Change
 from core.condition import Footwear, Orthosis, WalkingAid, WalkingPace
-from server.api.schemas import Response
 
 
-class Condition(Response):
+@dataclass(frozen=True)
+class Condition:
     """How a take was walked, and the same in words; null = not stated, of a belt not entered."""
 
     protocol: str
@@ -22,7 +24,8 @@ class Condition(Response):
     words: str
 
 
-class TrendVisit(Response):
+@dataclass(frozen=True)
+class TrendVisit:
     """An analysed visit; `label` of the programme's plan, null outside one. With feedback: a training."""
 
     session_id: str
@@ -33,7 +36,8 @@ class TrendVisit(Response):
     condition: Condition
 
 
-class OtherWalks(Response):
+@dataclass(frozen=True)
+class OtherWalksAnswer:
     """Visits walked otherwise: how many, and the newest of them, to be asked for with `like`."""
 
     condition: Condition
@@ -41,27 +45,8 @@ class OtherWalks(Response):
     session_id: str
 
 
-class Change(Response):
-    """One figure in two sessions; beyond `limit` (MDC) the change is real, beyond `mcid` relevant too."""
-
-    name: str
-    side: str | None
-    unit: str
-    before: float | None
-    after: float | None
-    difference: float | None
-    verdict: Literal["within_measurement_error", "real_change", "clinically_relevant"] | None
-    limit: float | None
-    limit_source: str | None
-    people: str | None
-    mcid: float | None
-    mcid_source: str | None
-    towards_norm: bool | None
-    reason: str | None
-    note: str | None
-
-
-class TrendPoint(Response):
+@dataclass(frozen=True)
+class TrendPoint:
     """A value at a visit (index into `visits`); `change` from the first assessment, null with feedback."""
 
     visit: int
@@ -73,7 +58,8 @@ class TrendPoint(Response):
     change: Change | None
 
 
-class TrendLine(Response):
+@dataclass(frozen=True)
+class TrendLine:
     """One side; `base` and `latest` are indices of the first and the last assessment, null without one."""
 
     side: str | None
@@ -85,7 +71,8 @@ class TrendLine(Response):
     words: str | None
 
 
-class Trend(Response):
+@dataclass(frozen=True)
+class TrendAnswer:
     """A figure over the visits, with the norm of people like this one."""
 
     name: str
@@ -95,17 +82,19 @@ class Trend(Response):
     lines: list[TrendLine]
 
 
-class Trends(Response):
+@dataclass(frozen=True)
+class Trends:
     """Figures over the visits walked under one condition."""
 
     protocol: str | None
     condition: Condition | None
     visits: list[TrendVisit]
-    others: list[OtherWalks]
-    trends: list[Trend]
+    others: list[OtherWalksAnswer]
+    trends: list[TrendAnswer]
 
 
-class ComparedSession(Response):
+@dataclass(frozen=True)
+class ComparedSession:
     """One of two sessions."""
 
     session_id: str
@@ -116,13 +105,15 @@ class ComparedSession(Response):
     analysis_id: str
 
 
+@dataclass(frozen=True)
 class ChangeInWords(Change):
     """A change and its verdict as the pages say it."""
 
     words: str
 
 
-class Comparison(Response):
+@dataclass(frozen=True)
+class Comparison:
     """Two sessions, the earlier one first; `cautions` say how walks and measurements themselves differ.
 
     `comparable` false: they were not walked alike, or with feedback, and no change has a verdict.

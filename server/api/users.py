@@ -14,32 +14,35 @@ from server.auth import accounts
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.passwords import hash_password
-from server.auth.roles import Action
+from server.auth.roles import Action, Role
 from server.context import Db, Id, OpenLogins
+from server.http.json_body import StrictJsonRoute
 
-router = APIRouter(prefix="/users", tags=["users"])
+router = APIRouter(route_class=StrictJsonRoute, prefix="/users", tags=["users"])
 Admin = Annotated[Identity, require(Action.MANAGE_USERS)]
 
 
 @router.get("", response_model=list[schemas.User])
-def list_users(db: Db, who: Admin) -> list[Row[Any]]:
+def list_users(db: Db, who: Admin) -> list[schemas.User]:
     """All accounts in order of their names."""
     with db.read() as c:
-        return accounts.everyone(c)
+        return [user_answer(row) for row in accounts.everyone(c)]
 
 
 @router.post("", status_code=201, response_model=schemas.User, responses=refusals(409))
-def add_user(body: schemas.UserNew, db: Db, who: Admin) -> Row[Any]:
+def add_user(body: schemas.UserNew, db: Db, who: Admin) -> schemas.User:
     """Add an account with its first password."""
     hashed = hash_password(body.password)
     with db.write() as c:
         row = accounts.create(c, body.name, body.display_name, body.role, hashed)
         audit.record(c, who, "user.created", "user", row.id, {"role": row.role})
-    return row
+    return user_answer(row)
 
 
 @router.patch("/{user_id}", response_model=schemas.User, responses=refusals(409))
-def change_user(user_id: Id, body: schemas.UserChange, db: Db, logins: OpenLogins, who: Admin) -> Row[Any]:
+def change_user(
+    user_id: Id, body: schemas.UserChange, db: Db, logins: OpenLogins, who: Admin
+) -> schemas.User:
     """Change role, shown name, password, or close the account; sign-ins end with a new role."""
     values = body.model_dump(exclude_unset=True, mode="json")
     fields = sorted(values)
@@ -51,4 +54,9 @@ def change_user(user_id: Id, body: schemas.UserChange, db: Db, logins: OpenLogin
         if "password_hash" in values or (row.role, row.active) != (before.role, before.active):
             logins.end_all(c, user_id, but=who.login_id)
         audit.record(c, who, "user.changed", "user", user_id, {"fields": fields, "role": row.role})
-    return row
+    return user_answer(row)
+
+
+def user_answer(row: Row[Any]) -> schemas.User:
+    """Return an account as it is answered: of its row everything but the password."""
+    return schemas.make_answer(schemas.User, row, role=Role(row.role))

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from core.errors import InputError, SagittalError
+from core.formats.json_tree import read_json
 from server.report.estimator import estimator_view
 from server.storage import fs
 
@@ -58,7 +59,7 @@ def _overrides(path: Path | None, estimator: str) -> dict[str, Any]:
     InputError `config_unreadable`.
     """
     try:
-        chosen = json.loads(path.read_bytes()) if path else {}
+        chosen = read_json(path.read_bytes()) if path else {}
     except (OSError, ValueError) as error:
         raise InputError("config_unreadable", f"{path} cannot be read as JSON: {error}.") from error
     if not isinstance(chosen, dict) or not isinstance(chosen.get("poses", {}), dict):

@@ -182,7 +182,8 @@ def _wants_page(connection: HTTPConnection) -> bool:
 def _without_input(item: Mapping[str, Any]) -> str:
     # pydantic's text of a failed validator may quote the value, and the value may be a patient's name
     message = str(item["msg"])
-    return message if item["type"] != "value_error" or item.get("ctx") is None else str(item["ctx"]["error"])
+    has_own = item["type"] in {"value_error", "json_invalid"} and item.get("ctx") is not None
+    return str(item["ctx"]["error"]) if has_own else message
 
 
 CODE_OF_STATUS = {

@@ -12,7 +12,7 @@ import datetime as dt
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from sqlalchemy import Connection, Row
 
@@ -22,9 +22,12 @@ Publish = Callable[[Connection], None]
 """Writes a result's rows; called inside the transaction that marks the job done."""
 
 
+JobState = Literal["queued", "running", "done", "failed", "cancelled"]
+
+
 @dataclass(frozen=True)
 class JobView:
-    """A job as people may see it.
+    """A piece of work for a worker, as people may see it.
 
     Parameters
     ----------
@@ -37,8 +40,7 @@ class JobView:
     id: str
     kind: str
     recording_id: str | None
-    requested_by: str | None
-    state: str
+    state: JobState
     attempt: int
     stage: str | None
     fraction: float | None

@@ -6,8 +6,10 @@ import json
 import urllib.error
 import urllib.request
 from dataclasses import dataclass
+from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
+from core.formats.json_tree import read_json
 from server.live.sender import LiveError
 
 
@@ -43,7 +45,7 @@ def pair(address: str, code: str) -> Pairing:
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
         with opener.open(request, timeout=20) as answer:
-            said = json.loads(answer.read())
+            said: Any = read_json(answer.read())
     except urllib.error.HTTPError as refused:
         raise _refusal(refused) from None
     except (OSError, ValueError) as error:
@@ -60,7 +62,7 @@ def pair(address: str, code: str) -> Pairing:
 
 def _refusal(refused: urllib.error.HTTPError) -> LiveError:
     try:
-        problem = json.loads(refused.read())
+        problem: Any = read_json(refused.read())
         return LiveError(str(problem["code"]), str(problem["detail"]))
     except (ValueError, KeyError, TypeError):
         return LiveError("unreachable", f"The server answered HTTP {refused.code}; is it Sagittal?")

@@ -12,15 +12,15 @@ from enum import IntEnum
 from typing import Any, Final, Literal
 
 from core.errors import InputError
-from core.formats.json_tree import no_constant, unique
+from core.formats.json_tree import read_json
 from core.formats.live_log import (
     MOST_FRAME_BYTES,
     Batch,
     Finish,
     Hello,
     batch_of_json,
+    finish_of,
     hello_of,
-    parse_finish,
 )
 
 MAX_UNACKED: Final = 64
@@ -85,8 +85,8 @@ def parse(text: str) -> Said:
     """
     check_size(text)
     try:
-        root = json.loads(text, parse_constant=no_constant, object_pairs_hook=unique)
-    except (ValueError, RecursionError) as error:
+        root: Any = read_json(text)
+    except ValueError as error:
         raise ProtocolError("message_bad_json", f"The message is not valid JSON: {error}.") from None
     kind = root.get("type") if isinstance(root, dict) else None
     try:
@@ -96,7 +96,7 @@ def parse(text: str) -> Said:
             case "batch":
                 return batch_of_json(root)
             case "finish":
-                return parse_finish(text)
+                return finish_of(root)
             case "battery":
                 return _battery(root)
     except InputError as error:

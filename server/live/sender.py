@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import functools
 import hashlib
-import json
 import random
 import time
 from collections import deque
@@ -18,6 +17,7 @@ from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import ConnectionClosed
 
 from core.errors import SagittalError
+from core.formats.json_tree import read_json
 from core.formats.live_log import Finish, finish_json, payload, peek
 
 
@@ -132,14 +132,14 @@ class Sender:
         self._welcome = False
         await ws.send(self._hello)
         while not self._welcome and not self.finished:
-            self._heed(json.loads(await ws.recv()))
+            self._heed(await ws.recv())
         self.report.reconnects += self._connections > 0
         self._connections += 1
         sending = asyncio.create_task(self._send(ws))
         sending.add_done_callback(functools.partial(_over, ws))
         try:
             while not self.finished:
-                self._heed(json.loads(await ws.recv()))
+                self._heed(await ws.recv())
         finally:
             sending.cancel()
             with contextlib.suppress(asyncio.CancelledError, ConnectionClosed):
@@ -177,7 +177,8 @@ class Sender:
         self._at += 1
         await ws.send(frame)
 
-    def _heed(self, message: Mapping[str, Any]) -> None:
+    def _heed(self, text: bytes | str) -> None:
+        message: Any = read_json(text)
         match message.get("type"):
             case "welcome":
                 self._welcomed(int(message["next_seq"]), int(message["max_unacked"]))

@@ -71,7 +71,7 @@ class Mark:
     """A moment the therapist marked."""
 
     t_s: float | None
-    value: Any = None
+    value: str | None
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""

@@ -37,5 +37,5 @@ def find_active_jobs(
     """The running job, else the newest that waits, by what `whose` takes of it (patient or session)."""
     found: dict[str | None, dict[str, Any]] = {}
     for listed in jobs.active(c):
-        found.setdefault(whose(listed), view_job(listed.job))
+        found.setdefault(whose(listed), view_job(listed))
     return found

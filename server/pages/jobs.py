@@ -46,11 +46,10 @@ def show_jobs(request: Request, db: Db, who: Annotated[Identity, require(Action.
 def list_jobs(c: Connection) -> list[dict[str, Any]]:
     """The newest jobs, each with its visit."""
     rows = []
-    for listed in jobs.listing(c, limit=JOBS_SHOWN):
-        view = listed.job
+    for view in jobs.listing(c, limit=JOBS_SHOWN):
         shape, word = JOB_WORDS[view.state]
         ended = view.started_at and view.finished_at
-        visit = {"id": listed.session_id, "code": listed.patient_code, "title": listed.session_title}
+        visit = {"id": view.session_id, "code": view.patient_code, "title": view.session_title}
         rows.append(
             view_job(view)
             | {
@@ -58,7 +57,7 @@ def list_jobs(c: Connection) -> list[dict[str, Any]]:
                 "word": word,
                 "what": KIND_WORDS.get(view.kind, view.kind),
                 "took": seconds((view.finished_at - view.started_at).total_seconds()) if ended else None,  # type: ignore[operator]
-                "session": visit if listed.session_id else None,
+                "session": visit if view.session_id else None,
             }
         )
     follow_few(rows)

@@ -146,6 +146,7 @@ def view_report(
     used, total = sum(model.used.values()), len(model.strides)
     return {
         **{name: getattr(model, name) for name in SHOWN},
+        "estimator": model.estimator,
         "groups": select_groups(model, paper=paper),
         "since": None if paper else model.since,
         "not_compared": _not_compared(session, model),

@@ -13,6 +13,7 @@ from core.parameters.catalogue import CATALOGUE
 from core.parameters.rows import Column
 from server.report.columns import plain
 from server.report.level import from_standing
+from server.report.svg import KEY, make_label, make_time_labels
 from server.report.table import Row
 from server.report.wording import excluded_words, number
 
@@ -29,7 +30,7 @@ CSS: Final[dict[Side, tuple[str, float]]] = {"left": ("dl", 5.2), "right": ("dr"
 
 @dataclass(frozen=True)
 class StrideValue:
-    """The figure of one stride; None where it has none. `index` is its place in the stride list."""
+    """The figure of one stride, null where it has none; `index` is its place in the stride list."""
 
     index: int
     side: Side
@@ -119,17 +120,12 @@ def _chart(row: Row, values: Sequence[StrideValue], duration_s: float) -> str:
     for k in range(TICKS):
         at = low + pad + (high - low - 2 * pad) * k / (TICKS - 1)
         parts.append(f'<line class="g" x1="0" x2="100%" y1="{y(at):.1f}" y2="{y(at):.1f}"/>')
-        parts.append(
-            f'<text x="0" y="{y(at):.1f}" dx="-7" dy="4" text-anchor="end">{number(at, digits)}</text>'
-        )
-    step = next((s for s in (1, 2, 5, 10, 30, 60) if duration_s / s <= 12), 120)
-    for t in range(0, int(duration_s) + 1, step):
-        x = 100 * t / duration_s
-        parts.append(f'<text x="{x:.1f}%" y="{HEIGHT}" dy="-6" text-anchor="middle">{t}\u2009s</text>')
+        parts.append(make_label("0", y(at), number(at, digits), "", "end", dx=-7, dy=4))
+    parts.append(make_time_labels(duration_s, HEIGHT, -6))
     for side, cell in zip(SIDES, (row.left, row.right), strict=True):
         if cell is not None:
             line = f'x1="0" x2="100%" y1="{y(cell.value):.1f}" y2="{y(cell.value):.1f}"'
-            parts.append(f'<line class="m{side[0]}" {line}/>')
+            parts.append(f'<line class="m{KEY[side]}" {line}/>')
     parts += [_mark(s, y(s.value), duration_s) for s in shown if s.value is not None]
     return (
         f'<div class="chart behind"><svg width="100%" height="{HEIGHT}" overflow="visible" role="group">'

@@ -6,7 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from core.estimators import AUTO, BY_METHOD, BY_NAME, NO_FIGURE, NO_FIGURE_LABEL, NO_FIGURE_NOTE
+from core.estimators import (
+    AUTO,
+    BY_METHOD,
+    BY_NAME,
+    NO_FIGURE,
+    NO_FIGURE_LABEL,
+    NO_FIGURE_NOTE,
+    PaperReference,
+)
 from server.report.wording import number, place_words
 
 KINDS: Final[Mapping[str, str]] = {"good": "ok", "warn": "warn", "bad": "bad"}
@@ -65,6 +73,7 @@ class EstimatorView:
     kind, verdict : ok, warn or bad and its word. reduced : words, None when the take allowed what is worn.
     choices : (value, words, asked for now) of what can be asked for on these sensors.
     estimated : sentence about angles that no two sensors measure, empty when there are none.
+    paper : where the method comes from; None = our own, or one that this version does not know.
     """
 
     name: str
@@ -76,6 +85,7 @@ class EstimatorView:
     health: tuple[HealthRow, ...]
     choices: tuple[tuple[str, str, bool], ...]
     estimated: str
+    paper: PaperReference | None
 
 
 def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
@@ -97,6 +107,7 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
             *((x, choice_label(x), asked == x) for x in e["possible"]),
         ),
         estimated=_estimated(estimated_angles(e)),
+        paper=BY_METHOD[name].paper if name in BY_METHOD else None,
     )
 
 

@@ -8,6 +8,7 @@ from typing import Final
 from core.frames import SIDES, Side
 from core.norms.profile import Mode
 from core.scores import Score, Scores
+from server.report.svg import draw_bar
 from server.report.wording import VARIABLES, number, reason_words
 
 SCALE_DEG: Final = 24.0
@@ -91,24 +92,9 @@ def _text(score: Score) -> str:
 
 def _bar(marks: dict[Side, float], healthy: tuple[float, float, float] | None) -> str:
     """Healthy to the 75th (dark) and 95th percentile (light), median as a line; left disc, right ring."""
-
-    def x(value: float) -> str:
-        return f"{6 + (WIDTH - 12) * min(value / SCALE_DEG, 1.0):.1f}"
-
-    parts = [f'<line class="ax" x1="2" x2="{WIDTH - 2}" y1="13" y2="13"/>']
-    if healthy is not None:
-        median, p75, p95 = healthy
-        for end in (p95, p75):
-            width = float(x(end)) - 6
-            parts.append(f'<rect class="band" x="6" y="5" width="{width:.1f}" height="16" rx="2"/>')
-        parts.append(f'<line class="nm" x1="{x(median)}" x2="{x(median)}" y1="5" y2="21"/>')
-    for side, css, radius in (("right", "dr", 4.6), ("left", "dl", 5.2)):
-        if side in marks:
-            parts.append(f'<circle class="{css}" cx="{x(marks[side])}" cy="13" r="{radius}"/>')
-    return (
-        f'<svg class="chart range" width="{WIDTH}" height="26" viewBox="0 0 {WIDTH} 26" aria-hidden="true">'
-        f"{''.join(parts)}</svg>"
-    )
+    median, p75, p95 = healthy or (None, None, None)
+    boxes = [(0.0, end) for end in (p95, p75) if end is not None]
+    return draw_bar(marks, boxes, median, (0.0, SCALE_DEG), WIDTH)
 
 
 def _index(scores: Scores) -> str:

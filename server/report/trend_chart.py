@@ -1,20 +1,18 @@
 """Draws one line of a trend: assessments large, trainings small, the measurement error as a band.
 
-The rules are those of the cycle curves (server/report/curves.py): the plot stretches, text and strokes do
+The rules are those of the cycle curves (server/report/svg.py): the plot stretches, text and strokes do
 not, colours come from CSS classes.
 """
 
 from __future__ import annotations
 
 import datetime as dt
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from itertools import pairwise
 from typing import Final
 
-from server.report.curves import KEY
+from server.report.svg import KEY, PlotArea, find_round_ticks, format_coordinate
 from server.report.trends import Line, Trend, Visit
 from server.report.wording import number
 from web.words import MONTHS
@@ -25,7 +23,6 @@ TOP, BOTTOM, LEFT, RIGHT = 22, 22, 44, 12
 ROOM: Final = 0.06
 """Part of the time axis left free at both ends."""
 
-TICKS: Final = 5
 LABEL_PX: Final = 46
 """Width that a label under the axis takes."""
 
@@ -64,43 +61,32 @@ def trend_svg(
     ----------
     ahead : planned assessments to come, hairlines with their label. height : px with margins.
     """
-    plot = _Plot(value_range(trend), visits, ahead, height - TOP - BOTTOM)
+    plot = _TrendPlot(value_range(trend), visits, ahead, height - TOP - BOTTOM)
     base = line.start
     if trend.norm is not None:
-        plot.band("band", trend.norm.mean - trend.norm.sd, trend.norm.mean + trend.norm.sd)
+        plot.add_band("band", trend.norm.mean - trend.norm.sd, trend.norm.mean + trend.norm.sd)
     if line.mdc is not None:
-        plot.band("mdc", base - line.mdc, base + line.mdc)
-    plot.grid(_ticks(*value_range(trend)))
+        plot.add_band("mdc", base - line.mdc, base + line.mdc)
+    ticks, digits = find_round_ticks(plot.low, plot.high)
+    for tick in ticks:
+        plot.add_tick("g", tick, number(tick, digits))
     if trend.norm is not None:
-        plot.level("nm", trend.norm.mean)
+        plot.add_level("nm", trend.norm.mean)
     if line.mdc is not None:
-        plot.level("mdcl", base - line.mdc)
-        plot.level("mdcl", base + line.mdc)
+        plot.add_level("mdcl", base - line.mdc)
+        plot.add_level("mdcl", base + line.mdc)
     if line.mcid is not None:
-        plot.level("mcid", base - line.mcid)
-        plot.level("mcid", base + line.mcid)
+        plot.add_level("mcid", base - line.mcid)
+        plot.add_level("mcid", base + line.mcid)
     plot.days()
     plot.labels(line)
     plot.points(line, trend.term.digits)
     title = f"{trend.term.label}{'' if line.side is None else f', {line.side}'}"
-    return (
-        '<div class="chart trend-plot">'
-        f'<svg width="100%" height="{plot.height}" overflow="visible" role="img">'
-        f"<title>{escape(title)} over the visits; the table has the numbers</title>{plot.svg()}</svg></div>"
-    )
+    return plot.draw("chart trend-plot", f"{title} over the visits; the table has the numbers")
 
 
-def _ticks(low: float, high: float) -> list[float]:
-    """Round values inside the axis, at most five."""
-    raw = (high - low) / TICKS
-    power = 10.0 ** math.floor(math.log10(raw))
-    step = next(f * power for f in (1, 2, 5, 10) if f * power >= raw)
-    first = math.ceil(low / step)
-    return [step * i for i in range(first, math.floor(high / step) + 1)]
-
-
-class _Plot:
-    """Collects what stretches (0 to 1000 both ways) and what does not (percent and px)."""
+class _TrendPlot(PlotArea):
+    """A plot over the days of visits."""
 
     def __init__(
         self,
@@ -109,33 +95,13 @@ class _Plot:
         ahead: Sequence[Ahead],
         height: int,
     ) -> None:
-        self.height = height
-        self._low, self._high = y_range
+        super().__init__(y_range, height)
         self._visits, self._ahead = visits, ahead
         days = [v.performed_on for v in visits] + [a.day for a in ahead]
         self._first = min(days)
         span = (max(days) - self._first).days
         self._span = float(span) if span else 1.0
         self._alone = span == 0
-        self._stretched: list[str] = []
-        self._fixed: list[str] = []
-
-    def band(self, css: str, low: float, high: float) -> None:
-        top, bottom = self._y(high), self._y(low)
-        self._stretched.append(
-            f'<rect class="{css}" x="0" width="1000" y="{_f(top)}" height="{_f(bottom - top)}"/>'
-        )
-
-    def level(self, css: str, value: float) -> None:
-        y = _f(self._y(value))
-        self._stretched.append(f'<line class="{css}" x1="0" x2="1000" y1="{y}" y2="{y}"/>')
-
-    def grid(self, ticks: Sequence[float]) -> None:
-        step = abs(ticks[1] - ticks[0]) if len(ticks) > 1 else 1.0
-        digits = max(0, -math.floor(math.log10(step) + 1e-9))
-        for tick in ticks:
-            self.level("g", tick)
-            self._text("0", self._px(tick), number(tick, digits), "", "end", dx=-7, dy=4)
 
     def days(self) -> None:
         """Hairlines of what is planned, and what stands under the axis: assessments first, then trainings."""
@@ -148,26 +114,25 @@ class _Plot:
             x = self._x(day)
             if all(abs(x - other) * WIDTH_PX / 1000 >= LABEL_PX for other in taken):
                 taken.append(x)
-                self._text(_pct(x), self.height, label, css, "middle", dy=15)
+                self.add_text(_pct(x), self.height, label, css, "middle", dy=15)
         for planned in self._ahead:
-            at = _f(self._x(planned.day))
-            self._stretched.append(f'<line class="ax" x1="{at}" x2="{at}" y1="0" y2="1000"/>')
+            self.add_upright("ax", self._x(planned.day))
 
     def points(self, line: Line, digits: int) -> None:
         key = "b" if line.side is None else KEY[line.side]
         assessed = [p for p in line.points if self._visits[p.visit].kind == "assessment"]
         for a, b in pairwise(assessed):
             ends = (self._at(a.visit), a.value), (self._at(b.visit), b.value)
-            d = "L".join(f"{_f(x)} {_f(self._y(value))}" for x, value in ends)
-            self._stretched.append(f'<path class="tr-{key}" d="M{d}"/>')
+            d = "L".join(f"{format_coordinate(x)} {format_coordinate(self.y(value))}" for x, value in ends)
+            self.add(f'<path class="tr-{key}" d="M{d}"/>')
         for p in line.points:
             large = self._visits[p.visit].kind == "assessment"
             css, radius = (f"pl-{key}", 5.0) if large else (f"ps-{key}", 2.8)
-            self._dot(self._at(p.visit), p.value, css, radius)
+            self.add_dot(self._at(p.visit), p.value, css, radius)
         for i in sorted({i for i in (line.base, line.latest) if i is not None}):
             p = line.points[i]
-            x, y = _pct(self._at(p.visit)), self._px(p.value)
-            self._text(x, y, number(p.value, digits), "strong halo", "middle", dy=-11)
+            x, y = _pct(self._at(p.visit)), self.px(p.value)
+            self.add_text(x, y, number(p.value, digits), "strong halo", "middle", dy=-11)
 
     def labels(self, line: Line) -> None:
         """Name band and limit where nothing is measured yet, else in the middle, away from the two values."""
@@ -176,23 +141,11 @@ class _Plot:
         free = self._alone or any(a.day > last for a in self._ahead)
         x, anchor, dx = ("100%", "end", -4) if free else ("50%", "middle", 0)
         if line.mdc is not None:
-            y = self._px(base - line.mdc)
-            self._text(x, y, "within measurement error (MDC)", "words halo", anchor, dx=dx, dy=-5)
+            y = self.px(base - line.mdc)
+            self.add_text(x, y, "within measurement error (MDC)", "words halo", anchor, dx=dx, dy=-5)
         if line.mcid is not None and line.mcid != line.mdc:
-            y = self._px(base + line.mcid)
-            self._text(x, y, "MCID", "words halo", anchor, dx=dx, dy=-4)
-
-    def svg(self) -> str:
-        return (
-            '<svg viewBox="0 0 1000 1000" preserveAspectRatio="none" width="100%" height="100%" '
-            f'overflow="hidden">{"".join(self._stretched)}</svg>{"".join(self._fixed)}'
-        )
-
-    def _dot(self, x: float, value: float, css: str, radius: float) -> None:
-        self._fixed.append(
-            f'<svg x="{_pct(x)}" y="{_f(self._px(value))}" overflow="visible" width="1" height="1">'
-            f'<circle class="{css}" r="{radius}"/></svg>'
-        )
+            y = self.px(base + line.mcid)
+            self.add_text(x, y, "MCID", "words halo", anchor, dx=dx, dy=-4)
 
     def _at(self, visit: int) -> float:
         return self._x(self._visits[visit].performed_on)
@@ -202,26 +155,10 @@ class _Plot:
             return 500.0
         return 1000 * (ROOM + (1 - 2 * ROOM) * (day - self._first).days / self._span)
 
-    def _y(self, value: float) -> float:
-        return 1000 - 1000 * (value - self._low) / (self._high - self._low)
-
-    def _px(self, value: float) -> float:
-        return self._y(value) / 1000 * self.height
-
-    def _text(self, x: str, y: float, text: str, css: str, anchor: str, dx: int = 0, dy: int = 0) -> None:
-        self._fixed.append(
-            f'<text class="{css}" x="{x}" y="{_f(y)}" dx="{dx}" dy="{dy}" text-anchor="{anchor}">'
-            f"{escape(text)}</text>"
-        )
-
 
 def _day(day: dt.date) -> str:
     return f"{day.day} {MONTHS[day.month - 1]}"
 
 
 def _pct(x: float) -> str:
-    return f"{_f(x / 10)}%"
-
-
-def _f(value: float) -> str:
-    return f"{value:.1f}".removesuffix(".0")
+    return f"{format_coordinate(x / 10)}%"

@@ -18,6 +18,7 @@ from typing import Any
 
 from sqlalchemy import Connection, delete, select, update
 
+from core.formats.json_tree import read_json
 from server import audit
 from server.services import patients, sessions
 from server.services.errors import Conflict
@@ -186,7 +187,7 @@ def _note(
 
 def _read(path: Path) -> dict[str, Any] | None:
     try:
-        note = json.loads(path.read_bytes())
+        note: Any = read_json(path.read_bytes())
         spaces, takes = [str(x) for x in note["spaces"]], [str(x) for x in note["takes"]]
         files = [(str(space), str(name)) for space, name in note["files"]]
         if not all(map(_ID.fullmatch, [*spaces, *takes, *(space for space, _ in files)])):

@@ -43,12 +43,12 @@ class History:
             return None
         numbers = next((v for v in reversed(self.visits) if not v.feedback), self.visits[-1]).numbers
         speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
-        return norms_for(self._age, self.patient.sex, speed, self.patient.height_m)  # type: ignore[arg-type]
+        return norms_for(self._age, self.patient.sex, speed, self.patient.height_m)
 
     @property
     def usual(self) -> dict[str, NormValue]:
         """Of people of this age and sex at their comfortable speed."""
-        return dict(temporal_values(self._age, self.patient.sex).values)  # type: ignore[arg-type]
+        return dict(temporal_values(self._age, self.patient.sex).values)
 
     @property
     def _age(self) -> int | None:

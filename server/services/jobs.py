@@ -8,16 +8,15 @@ from typing import Any
 from sqlalchemy import Connection, func, select
 
 from server import audit
-from server.jobs.queue import VIEW_COLUMNS, JobQueue, JobView, job_view
+from server.jobs.queue import VIEW_COLUMNS, JobQueue, JobView
 from server.services.errors import NotFound
 from server.storage.tables import ACTIVE_STATES, job, patient, recording, session
 
 
 @dataclass(frozen=True)
-class ListedJob:
+class ListedJob(JobView):
     """A job and whose it is (None for jobs that belong to no recording)."""
 
-    job: JobView
     session_id: str | None
     session_title: str | None
     patient_id: str | None
@@ -50,7 +49,7 @@ def of_session(c: Connection, session_id: str, *, kind: str | None = None) -> li
     query = _QUERY.where(session.c.id == session_id).order_by(job.c.seq.desc())
     if kind is not None:
         query = query.where(job.c.kind == kind)
-    return [_listed(row).job for row in c.execute(query)]
+    return [_listed(row) for row in c.execute(query)]
 
 
 def get(c: Connection, job_id: str) -> ListedJob:
@@ -86,4 +85,4 @@ _QUERY = (
 
 
 def _listed(row: Any) -> ListedJob:
-    return ListedJob(job_view(row), row.session_id, row.session_title, row.patient_id, row.patient_code)
+    return ListedJob(**{name: getattr(row, name) for name in ListedJob.__dataclass_fields__})

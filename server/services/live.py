@@ -95,14 +95,13 @@ class Paired:
 
 @dataclass(frozen=True)
 class LiveEvent:
-    """Something that happened in a take: a command, a cue, a change of state."""
+    """Something that happened in a take: a command, a cue, a calibration, a notice, a change of state."""
 
     seq: int
     take_id: str
     kind: str
     t_s: float | None
     content: Mapping[str, Any]
-    user_id: str | None
     by: str | None
     at: dt.datetime
 
@@ -297,7 +296,7 @@ def add_event(
 def events(c: Connection, take_id: str) -> list[LiveEvent]:
     """Everything that happened in a take, in order."""
     query = (
-        select(live_event, user.c.display_name.label("by"))
+        select(*_EVENT_COLUMNS, user.c.display_name.label("by"))
         .join(user, user.c.id == live_event.c.user_id, isouter=True)
         .where(live_event.c.take_id == take_id)
         .order_by(live_event.c.seq)
@@ -335,6 +334,7 @@ def takes_of(c: Connection, session_id: str) -> list[Take]:
     return [Take(**row._asdict()) for row in c.execute(query.order_by(live_take.c.created_at))]
 
 
+_EVENT_COLUMNS = tuple(live_event.c[name] for name in LiveEvent.__dataclass_fields__ if name in live_event.c)
 _COLUMNS = tuple(live_take.c[name] for name in Take.__dataclass_fields__ if name in live_take.c)
 _QUERY = select(*_COLUMNS, session.c.patient_id).join(session, session.c.id == live_take.c.session_id)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from sqlalchemy import Connection, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
@@ -33,7 +33,7 @@ class Patient:
 
     id: str
     code: str
-    sex: str | None
+    sex: Literal["female", "male"] | None
     birth_year: int | None
     height_m: float | None
     affected_side: Side | None

@@ -39,12 +39,12 @@ class PlannedVisit:
     planned_on: dt.date
     session_id: str | None
     performed_on: dt.date | None
-    state: VisitState = "planned"
+    state: VisitState
 
 
 @dataclass(frozen=True)
 class Programme:
-    """A programme with its visits in order; `words` says what it is."""
+    """The visits that are planned for a patient, in the order of their days; `words` says what it is."""
 
     id: str
     patient_id: str
@@ -196,7 +196,7 @@ _VISITS = select(planned_visit, session.c.performed_on).join(
 
 def _planned(row: Any) -> PlannedVisit:
     names = ("id", "label", "kind", "week", "planned_on", "session_id", "performed_on")
-    visit = PlannedVisit(**{name: getattr(row, name) for name in names})
+    visit = PlannedVisit(**{name: getattr(row, name) for name in names}, state="planned")
     return visit if visit.session_id is None else replace(visit, state="done")
 
 

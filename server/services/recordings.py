@@ -10,15 +10,14 @@ after that it never changes, and the next added or removed file starts a new one
 
 from __future__ import annotations
 
-import datetime as dt
 import hashlib
 import shutil
 import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Literal, Self
 
-from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy import Connection, delete, func, insert, literal, select, update
 
 from core.errors import InputError
 from server import audit
@@ -38,12 +37,14 @@ ANALYSE = "analyse"
 
 @dataclass(frozen=True)
 class RecordedFile:
-    """One original file: name as sent, bytes, sha256."""
+    """A file exactly as it was uploaded, or as an analysis wrote it: its name, bytes, and sha256."""
 
     name: str
     size: int
     sha256: str
-    added_at: dt.datetime
+
+
+RecordingState = Literal["draft", "ready", "failed"]
 
 
 @dataclass(frozen=True)
@@ -61,12 +62,11 @@ class Recording:
     id: str
     session_id: str
     patient_id: str
-    state: str
+    state: RecordingState
     files: tuple[RecordedFile, ...]
     manifest: Mapping[str, Any] | None
     inspection: Mapping[str, Any] | None
     job: JobView | None
-    created_at: dt.datetime
 
     @property
     def input_sha256(self) -> str:
@@ -247,7 +247,7 @@ class receive:  # noqa: N801 - a verb: with receive(...) as upload
         c.execute(insert(recording_file).values(**key, **row))
         detail = {"session_id": self._session_id, "sha256": blob.sha256, "size": blob.size}
         audit.record(c, self._actor, "recording.file_added", "recording", target, detail)
-        return RecordedFile(self._name, blob.size, blob.sha256, row["added_at"])  # type: ignore[arg-type]
+        return RecordedFile(self._name, blob.size, blob.sha256)
 
     def _check_set(self, this: Recording | None, size: int) -> None:
         others = [f for f in this.files if f.name != self._name] if this else []
@@ -320,11 +320,10 @@ def _recording(c: Connection, row: Any) -> Recording:
         session_id=row.session_id,
         patient_id=row.patient_id,
         state="ready" if row.inspection is not None else "failed" if failed else "draft",
-        files=tuple(RecordedFile(f.name, f.size, f.sha256, f.added_at) for f in files),
+        files=tuple(RecordedFile(f.name, f.size, f.sha256) for f in files),
         manifest=row.manifest,
         inspection=row.inspection,
         job=look,
-        created_at=row.created_at,
     )
 
 
@@ -360,9 +359,10 @@ def _editable(c: Connection, session_id: str) -> str:
     fresh = new_id()
     manifest = this.manifest if this else None
     c.execute(insert(recording).values(id=fresh, session_id=session_id, manifest=manifest, created_at=now()))
-    for f in this.files if this else ():
-        row = {"name": f.name, "size": f.size, "sha256": f.sha256, "added_at": f.added_at}
-        c.execute(insert(recording_file).values(recording_id=fresh, **row))
+    if this is not None:
+        kept = [recording_file.c[name] for name in ("name", "size", "sha256", "added_at")]
+        files = select(literal(fresh), *kept).where(recording_file.c.recording_id == this.id)
+        c.execute(insert(recording_file).from_select(["recording_id", *kept], files))
     return fresh
 
 

@@ -43,7 +43,7 @@ def read(
     model = report_model(
         bundle,
         age=age,
-        sex=patient.sex,  # type: ignore[arg-type]
+        sex=patient.sex,
         height_m=height,
         affected=patient.affected_side,
         controls=controls.group(reviewed, control_visits, speed),

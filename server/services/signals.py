@@ -33,8 +33,8 @@ DIGITS: Final = 3
 
 
 @dataclass(frozen=True)
-class Lane:
-    """One diagram over time.
+class SignalLane:
+    """A signal over time, drawn in one diagram.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Lane:
     unit: str
     up: str
     lines: tuple[str, ...]
-    raw: bool = False
+    raw: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,14 +60,14 @@ class Piece:
     low, high : line → least and greatest value of every part, None where the sensor was lost.
     """
 
-    lane: Lane
+    lane: SignalLane
     start_s: float
     step_s: float
     low: Mapping[str, list[float | None]]
     high: Mapping[str, list[float | None]]
 
 
-def lanes(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> tuple[Lane, ...]:
+def lanes(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> tuple[SignalLane, ...]:
     """What can be drawn of an analysis, feet first, then joints from the top, then sensors."""
     known = reviewed.open(found)
     return tuple(lane for lane, _ in _lanes(reviewed, found, known))
@@ -99,7 +99,7 @@ Read = Callable[[], tuple[Floats, Mapping[str, Floats]]]
 
 def _lanes(
     reviewed: ReviewedAnalyses, found: analyses.Analysis, known: StoredAnalysis
-) -> Iterator[tuple[Lane, Read]]:
+) -> Iterator[tuple[SignalLane, Read]]:
     yield from _foot_lanes(reviewed, found, known)
     yield from _angle_lanes(known)
     yield from _raw_lanes(reviewed, found)
@@ -107,7 +107,7 @@ def _lanes(
 
 def _foot_lanes(
     reviewed: ReviewedAnalyses, found: analyses.Analysis, known: StoredAnalysis
-) -> Iterator[tuple[Lane, Read]]:
+) -> Iterator[tuple[SignalLane, Read]]:
     tracks = known.tracks
     if tracks is None:
         return
@@ -121,7 +121,7 @@ def _foot_lanes(
                 lines[side] = np.where(tracks.valid[FOOT[side]], angle, np.nan)
             return tracks.t_s, lines
 
-        yield Lane("foot_pitch", "Foot pitch", "°", "toes up", worn), pitch
+        yield SignalLane("foot_pitch", "Foot pitch", "°", "toes up", worn, raw=False), pitch
     turned = (known.bundle.calibration or {}).get("segments") or {}
     if worn and file.NAME in found.files and all(FOOT[side] in turned for side in worn):
 
@@ -145,8 +145,8 @@ def _foot_lanes(
                 lines[side] = np.sqrt(sum(axes[c] ** 2 for c in AXES))
             return t_s, lines
 
-        yield Lane("foot_rate", "Foot turning rate", "°/s", "toes rise", worn), rate
-        yield Lane("foot_acceleration", "Foot acceleration", "m/s²", "more", worn), strength
+        yield SignalLane("foot_rate", "Foot turning rate", "°/s", "toes rise", worn, raw=False), rate
+        yield SignalLane("foot_acceleration", "Foot acceleration", "m/s²", "more", worn, raw=False), strength
     feet = tracks.feet
     if feet is not None and feet.p:
         placed = tuple(side for side in SIDES if side in feet.p)
@@ -154,10 +154,10 @@ def _foot_lanes(
         def height() -> tuple[Floats, Mapping[str, Floats]]:
             return feet.t_s, {str(s): np.where(feet.valid[s], feet.p[s][:, 2], np.nan) for s in placed}
 
-        yield Lane("foot_height", "Ankle height", "m", "higher", placed), height
+        yield SignalLane("foot_height", "Ankle height", "m", "higher", placed, raw=False), height
 
 
-def _angle_lanes(known: StoredAnalysis) -> Iterator[tuple[Lane, Read]]:
+def _angle_lanes(known: StoredAnalysis) -> Iterator[tuple[SignalLane, Read]]:
     angles = known.bundle.angles
     if angles is None:
         return
@@ -171,10 +171,13 @@ def _angle_lanes(known: StoredAnalysis) -> Iterator[tuple[Lane, Read]]:
             def read(lines: Mapping[str, Floats] = lines) -> tuple[Floats, Mapping[str, Floats]]:
                 return angles.t_s, {line: np.degrees(values) for line, values in lines.items()}
 
-            yield Lane(variable.name, variable.label, "°", variable.up.lower(), tuple(lines)), read
+            yield (
+                SignalLane(variable.name, variable.label, "°", variable.up.lower(), tuple(lines), raw=False),
+                read,
+            )
 
 
-def _raw_lanes(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> Iterator[tuple[Lane, Read]]:
+def _raw_lanes(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> Iterator[tuple[SignalLane, Read]]:
     if file.NAME not in found.files:
         return
     names = set(_columns(reviewed, found))
@@ -187,7 +190,7 @@ def _raw_lanes(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> Iterator
                 return _raw(reviewed, found, segment, kind)
 
             words = place_words(segment).capitalize()
-            yield Lane(f"{segment}_{kind}", f"{words}, {label}", unit, "more", AXES, raw=True), read
+            yield SignalLane(f"{segment}_{kind}", f"{words}, {label}", unit, "more", AXES, raw=True), read
 
 
 _ENDING: Final = {"gyr": "_dps", "acc": ""}

@@ -19,11 +19,12 @@ import sqlite3
 import threading
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from sqlalchemy import Connection, select
 from sqlalchemy.exc import SQLAlchemyError
 
+from core.formats.json_tree import read_json
 from server.storage import fs
 from server.storage.db import Database
 from server.storage.tables import audit
@@ -50,11 +51,11 @@ class DamagedMarkError(Exception):
 def read_mark(path: Path) -> HighWater | None:
     """The mark, None before the first; raises DamagedMarkError, OSError."""
     try:
-        found = json.loads(path.read_bytes())
+        found: Any = read_json(path.read_bytes())
         mark = HighWater(found["seq"], found["hash"])
     except FileNotFoundError:
         return None
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError) as error:
         raise DamagedMarkError(path.name) from error
     if type(mark.seq) is not int or mark.seq < 1 or not _HASH.fullmatch(str(mark.hash)):
         raise DamagedMarkError(path.name)

@@ -17,7 +17,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
-import json
 import math
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import replace
@@ -33,6 +32,7 @@ from starlette.websockets import WebSocketDisconnect
 from websockets.exceptions import WebSocketException
 
 from core.errors import SagittalError
+from core.formats.json_tree import read_json
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -237,7 +237,7 @@ async def _follow(ws: WebSocket, view: FigureView[ReplayFigure], activity: ViewA
 
 def _act(view: FigureView[ReplayFigure], text: str) -> dict[str, Any]:
     try:
-        message = json.loads(text)
+        message = read_json(text)
     except ValueError:
         message = None
     if isinstance(message, dict) and len(message) == 1:

@@ -14,9 +14,7 @@ from server.storage.blobs import Blob
 
 if TYPE_CHECKING:
     from core.formats.source import SourceFile
-
-Progress = Callable[[str, float], None]
-"""Called by the computation with its stage and the share of the work done, 0 to 1."""
+    from core.pipeline import Progress
 
 
 def _nothing() -> None:

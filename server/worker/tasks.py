@@ -11,10 +11,11 @@ from sqlalchemy import Connection
 from server.jobs.queue import Claim
 from server.services import analyses, recordings
 from server.storage.blobs import Blob
-from server.worker.task import Progress, Task, register
+from server.worker.task import Task, register
 
 if TYPE_CHECKING:
     from core.formats.source import SourceFile
+    from core.pipeline import Progress
 
 FOUND = "inspection.json"
 

@@ -56,6 +56,15 @@ def test_two_visits_are_ticked_and_compared(opened: Opener, filled: Filled) -> N
     expect(page.locator(".compared").first).to_contain_text("within measurement error")
 
 
+@pytest.mark.parametrize("width", [1024, 1200, 1280, 1400])
+def test_the_results_by_visit_fit_a_window_of_a_laptop(opened: Opener, filled: Filled, width: int) -> None:
+    page = opened(f"/patients/{filled.patient}")
+    page.set_viewport_size({"width": width, "height": 900})
+    expect(page.locator(".results").get_by_text("Data", exact=True)).to_be_visible()
+    room, needed = page.locator(".scroll:has(> .results)").evaluate("e => [e.clientWidth, e.scrollWidth]")
+    assert needed <= room
+
+
 def test_the_overview_leads_to_the_comparison_with_the_visit_before(opened: Opener, filled: Filled) -> None:
     page = opened(f"/sessions/{filled.done}")
     page.get_by_role("link", name="Since 21 Oct 2026").first.click()

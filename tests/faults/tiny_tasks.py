@@ -11,7 +11,7 @@ import signal
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection
 
@@ -20,7 +20,10 @@ from core.formats.source import SourceFile
 from server.jobs.queue import Claim
 from server.services import analyses
 from server.storage.blobs import Blob
-from server.worker.task import Progress, Task, register
+from server.worker.task import Task, register
+
+if TYPE_CHECKING:
+    from core.pipeline import Progress
 
 STAGES = ("first", "second", "third")
 

@@ -1,8 +1,11 @@
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from server import audit
+from server.api.documents import openapi
 from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
@@ -80,6 +83,31 @@ async def test_what_is_no_json_is_refused(clinic: Clinic, body: bytes) -> None:
         )
     assert answer.status_code in {400, 422}
     assert answer.headers["content-type"] == "application/problem+json"
+
+
+async def test_a_member_given_twice_is_refused_and_named(clinic: Clinic) -> None:
+    async with clinic.client("clinician") as client:
+        answer = await client.post(
+            f"{API}/patients",
+            content=b'{"code": "twice-1", "code": "twice-2"}',
+            headers={"Content-Type": "application/json"},
+        )
+    assert answer.status_code == 422
+    assert "the key 'code' is given twice" in answer.json()["detail"]
+
+
+async def test_every_operation_that_takes_json_reads_it_strictly(clinic: Clinic) -> None:
+    refused = {}
+    async with clinic.client("admin") as client:
+        for path, item in openapi(clinic.app)["paths"].items():
+            for method, operation in item.items():
+                if "application/json" in operation.get("requestBody", {}).get("content", {}):
+                    address = re.sub(r"{\w+}", "0" * 32, path)
+                    kind = {"Content-Type": "application/json"}
+                    answer = await client.request(method, address, content=b'{"a":1,"a":1}', headers=kind)
+                    refused[f"{method} {path}"] = "the key 'a' is given twice" in answer.text
+    assert all(refused.values()), [name for name, well in refused.items() if not well]
+    assert len(refused) > 15
 
 
 async def test_every_opened_and_changed_resource_is_one_audit_row_with_its_person(clinic: Clinic) -> None:

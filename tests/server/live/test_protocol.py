@@ -199,7 +199,7 @@ def test_battery_is_handed_on_and_not_kept() -> None:
         ('{"type":["hello"]}', "message_unknown"),
         ('{"type":"hello"}', "hello_protocol"),
         ('{"type":"hello","protocol":"sagittal.live.v1","take":"t"}', "hello_bad_value"),
-        (json.dumps(json.loads(hello_json(HELLO)) | {"take": "\ud800"}), "hello_bad_value"),
+        (json.dumps(json.loads(hello_json(HELLO)) | {"take": "\ud800"}), "message_bad_json"),
         ('{"type":"batch"}', "batch_shape"),
         ('{"type":"batch","stream":0,"seq":0,"t0_us":0,"sent_us":0,"samples":[[1,2]]}', "batch_shape"),
         ('{"type":"finish"}', "finish_bad"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -11,8 +10,6 @@ import pytest
 
 from server.pages.upload import fits_movement, view_inspection
 from server.services.recordings import Recording
-
-NOW = dt.datetime(2026, 11, 18, tzinfo=dt.UTC)
 
 
 def device(name: str, part: str | None = None, leg: int | None = None, **more: Any) -> dict[str, Any]:
@@ -44,7 +41,7 @@ RIGHT_WAY = {"P": "pelvis", "A": "foot_r", "B": "foot_l", "C": "shank_r"}
 
 def recording(devices: list[dict[str, Any]], manifest: Mapping[str, Any] | None = None) -> Recording:
     found = {"devices": devices, "duration_s": 25.0, "protocol": "walk", "notices": []}
-    return Recording("r", "s", "p", "ready", (), manifest, found, None, NOW)
+    return Recording("r", "s", "p", "ready", (), manifest, found, None)
 
 
 def chosen(view: Mapping[str, Any]) -> dict[str, str | None]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from core.estimators import ESTIMATORS, NO_FIGURE
+import pytest
+
+from core.estimators import ESTIMATORS, NO_FIGURE, PoseEstimator
 from server.report.estimator import (
     QUANTITIES,
     choice_label,
@@ -73,6 +75,19 @@ def test_the_choice_offers_what_the_sensors_allow_and_marks_what_ran() -> None:
     asked = estimator_view(section(name="l7s_2i", requested="l7s_2i"))
     assert asked is not None
     assert [v for v, _, on in asked.choices if on] == ["l7s_2i"]
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=lambda e: e.name)
+def test_it_has_the_paper_of_the_method_that_ran(estimator: PoseEstimator) -> None:
+    view = estimator_view(section(name=estimator.method))
+    assert view is not None
+    assert view.paper == estimator.paper
+
+
+def test_a_method_of_another_version_has_no_paper() -> None:
+    view = estimator_view(section(name="of_tomorrow"))
+    assert view is not None
+    assert view.paper is None
 
 
 def test_every_estimator_and_quantity_of_the_core_has_words() -> None:

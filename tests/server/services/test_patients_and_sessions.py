@@ -445,7 +445,7 @@ def test_jobs_are_listed_with_whose_they_are_and_cancelled_with_a_trail(clinic: 
         view = recordings.inspect(c, clinic.queue, None, session_id)
     with clinic.db.write() as c:
         listed = jobs.listing(c, active_only=True)
-        assert [(x.job.id, x.session_id, x.patient_code) for x in listed] == [(view.id, session_id, "P-1")]
+        assert [(x.id, x.session_id, x.patient_code) for x in listed] == [(view.id, session_id, "P-1")]
         assert jobs.cancel(c, clinic.queue, clinic.who, view.id).state == "cancelled"
         assert jobs.listing(c, active_only=True) == []
         assert [v.id for v in jobs.of_session(c, session_id)] == [view.id]

@@ -1,0 +1,52 @@
+"""The pose estimators one can ask for, with the sensors they need and the papers they come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import APIRouter
+from pydantic import Field
+
+from core.estimators import ESTIMATORS, PaperReference, PoseEstimator
+from core.frames import SEGMENTS, Segment
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+
+router = APIRouter(prefix="/estimators", tags=["analyses"])
+
+
+@dataclass(frozen=True)
+class EstimatorAnswer:
+    """A pose estimator; `name` is what the settings of an analysis take as `poses.estimator`."""
+
+    name: str
+    title: str
+    needs: Annotated[str, Field(description="sensors on these, in words")]
+    sensor_sets: Annotated[
+        list[list[Segment]], Field(description="segments that must carry a sensor: any one of these sets")
+    ]
+    measures_every_joint: Annotated[
+        bool, Field(description="false: thighs and shanks carry no sensor, a model of the leg gives them")
+    ]
+    note: Annotated[str, Field(description="what a reader of its results has to know")]
+    paper: Annotated[PaperReference | None, Field(description="where the method comes from; null: our own")]
+
+
+@router.get("", response_model=list[EstimatorAnswer])
+def list_estimators(who: Annotated[Identity, require(Action.READ_API)]) -> list[EstimatorAnswer]:
+    """The estimators of this version, the best for all seven sensors first."""
+    return [_shown(estimator) for estimator in ESTIMATORS]
+
+
+def _shown(estimator: PoseEstimator) -> EstimatorAnswer:
+    return EstimatorAnswer(
+        name=estimator.name,
+        title=estimator.choice,
+        needs=estimator.needs,
+        sensor_sets=[[s for s in SEGMENTS if s in needed] for needed in estimator.sets],
+        measures_every_joint=not estimator.leg_model,
+        note=estimator.note,
+        paper=estimator.paper,
+    )

@@ -1,0 +1,37 @@
+"""Bodies of requests read by the one rule for JSON from outside (core/formats/json_tree.py)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+
+from core.formats.json_tree import read_json
+
+
+class StrictJsonRequest(Request):
+    """A request whose JSON has no key twice, no NaN, no lone surrogate and no great depth."""
+
+    async def json(self) -> Any:
+        """Return the body as Python values; raises JSONDecodeError, which FastAPI answers with 422."""
+        body = await self.body()
+        try:
+            return read_json(body)
+        except ValueError as error:
+            raise json.JSONDecodeError(str(error), "", 0) from None
+
+
+class StrictJsonRoute(APIRoute):
+    """A route that reads its body so; `APIRouter(route_class=StrictJsonRoute)`."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return what serves a request."""
+        handler = super().get_route_handler()
+
+        async def handle(request: Request) -> Response:
+            return await handler(StrictJsonRequest(request.scope, request.receive))
+
+        return handle

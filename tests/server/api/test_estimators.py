@@ -1,0 +1,29 @@
+from __future__ import annotations
+
+import pytest
+
+from core.estimators import BY_NAME, ESTIMATORS
+from tests.server.clinic import Clinic
+
+pytestmark = pytest.mark.anyio
+
+PATH = "/api/v1/estimators"
+
+
+async def test_every_estimator_is_listed_with_its_sensors_and_its_paper(clinic: Clinic) -> None:
+    async with clinic.client("assistant") as client:
+        answer = await client.get(PATH)
+    assert answer.status_code == 200
+    told = {e["name"]: e for e in answer.json()}
+    assert list(told) == [e.name for e in ESTIMATORS]
+    for name, shown in told.items():
+        known = BY_NAME[name]
+        assert {frozenset(needed) for needed in shown["sensor_sets"]} == set(known.sets)
+        assert shown["title"] == known.choice
+        assert shown["paper"] == (known.paper and {"citation": known.paper.citation, "doi": known.paper.doi})
+    assert any(e["paper"] for e in told.values())
+
+
+async def test_a_stranger_is_not_told(clinic: Clinic) -> None:
+    async with clinic.client() as client:
+        assert (await client.get(PATH)).status_code == 401
