@@ -24,8 +24,8 @@ from core.body.erkf.updates import (
     known_rows,
     tilt_rows,
 )
-from core.body.so3 import FAST, matrix, turn
 from core.frames import Bools, Floats
+from core.rotation.compiled import FAST, to_matrix, turn
 
 INVALID, CONTACT, STILL = 1, 2, 4
 """Bits of a sample's flags."""
@@ -196,7 +196,7 @@ def forward(  # type: ignore[no-untyped-def]
                     x[i, 10 + c] += dx[b + 9 + c]
                     x[i, 13 + c] += dx[b + 12 + c]
             turn(x[i, 6:10], dx[b + 6], dx[b + 7], dx[b + 8])
-            matrix(x[i, 6:10], R[i])
+            to_matrix(x[i, 6:10], R[i])
             var = 0.0
             for c in range(3):
                 for e in range(3):

@@ -8,11 +8,11 @@ stacked update. Rows: Potter 2021 eq 28–35; V = L⁻¹ H P, P ← P − VᵀV:
 
 from __future__ import annotations
 
-from math import atan2, pi, sqrt
+from math import atan2, sqrt
 
 import numba
 
-from core.body.so3 import FAST, times_cross
+from core.rotation.compiled import FAST, skew, times_cross, wrap_angle
 
 FIRST, SECOND, UNIT, TURNS = range(4)
 """A block's place: first error of its IMUs (SECOND is −1 for one IMU), offset of the ±1 (−1: none), whether
@@ -72,11 +72,7 @@ def tilt_rows(R, f, m, i, place, H, y):  # type: ignore[no-untyped-def]
     """Tilt: Rᵀẑ is the direction of the specific force at rest; δθ: [Rᵀẑ]×."""
     place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, -1, 1
     norm = 1.0 / sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
-    a, b, c = R[2, 0], R[2, 1], R[2, 2]
-    G = H[0]
-    G[0, 0], G[0, 1], G[0, 2] = 0.0, -c, b
-    G[1, 0], G[1, 1], G[1, 2] = c, 0.0, -a
-    G[2, 0], G[2, 1], G[2, 2] = -b, a, 0.0
+    skew(R[2], H[0])
     for k in range(3):
         y[k] = f[k] * norm - R[2, k]
 
@@ -95,8 +91,7 @@ def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-un
         H[0, 0, k] = (tx * H[1, 1, k] - ty * H[1, 0, k]) / level
         H[0, 1, k] = 0.0
         H[0, 2, k] = 0.0
-    y[0], y[1], y[2] = measured - atan2(ty, tx), 0.0, 0.0
-    y[0] -= 2.0 * pi * round(y[0] / (2.0 * pi))
+    y[0], y[1], y[2] = wrap_angle(measured - atan2(ty, tx)), 0.0, 0.0
     return True
 
 
