@@ -9,6 +9,7 @@ from typing import Protocol
 import numba
 import numpy as np
 
+from core.body.erkf.gaps import Bridge
 from core.body.erkf.params import ErkfParams
 from core.body.model import BodyModel
 from core.body.tree import person_tree
@@ -16,7 +17,6 @@ from core.calibration.result import SegmentCalibration
 from core.errors import Notice
 from core.estimators import LiveMethod
 from core.frames import FOOT, GRAVITY, R_NEUTRAL, SIDES, Bools, Floats, Segment
-from core.online.bridge import Bridge
 from core.online.erkf import LiveErkf, Signals
 from core.online.still import Stillness
 from core.rotation import from_matrix, multiply

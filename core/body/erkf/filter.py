@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.body.erkf.gaps import bridged
+from core.body.erkf.gaps import bridge_gaps
 from core.body.erkf.kernel import CONTACT, INVALID, STILL, Links, Noise, Record, forward
 from core.body.erkf.params import ErkfParams
 from core.body.still import AT_REST, FOOT_STILL, still_samples
@@ -128,7 +128,7 @@ def erkf_inputs(
     for i, name in enumerate(tree.imus):
         if not valid[:, i].any():
             raise SignalError("bad_signal", f"{name}: no valid sample; leave this sensor out.", sensor=name)
-    acc, gyr = bridged(tree, acc, gyr, valid, rate_hz)
+    acc, gyr = bridge_gaps(tree, acc, gyr, valid, rate_hz)
     for i in range(len(tree.imus)):
         still[:, i] = still_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz, AT_REST)
         if i in tree.feet:
