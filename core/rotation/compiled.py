@@ -12,9 +12,6 @@ import numpy as np
 
 from core.frames import Floats
 
-FAST = {"contract", "reassoc", "nsz"}
-"""Floating-point licence of the compiled loops: NaN and infinity keep their meaning, so checks still work."""
-
 SMALL = 1e-8
 """Below this angle in rad the series of one term replaces the sine."""
 
@@ -39,7 +36,7 @@ def multiply(pw, px, py, pz, qw, qx, qy, qz):  # type: ignore[no-untyped-def]
     )
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def to_matrix(q, R):  # type: ignore[no-untyped-def]
     """Write the matrix R (3, 3) of a unit quaternion q (4,)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -54,7 +51,7 @@ def to_matrix(q, R):  # type: ignore[no-untyped-def]
     R[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def turn(q, a, b, c):  # type: ignore[no-untyped-def]
     """Turn q (4,) in place by the rotation vector (a, b, c), rad: q ← q ⊗ Exp((a, b, c)), normalised."""
     angle = sqrt(a * a + b * b + c * c)
@@ -72,7 +69,7 @@ def skew(a: Floats, out: Floats) -> None:
     out[2, 0], out[2, 1], out[2, 2] = -a[1], a[0], 0.0
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def times_cross(M, r, k, out):  # type: ignore[no-untyped-def]
     """Write k M [r]× (3, 3) of a matrix M (3, 3), a vector r (3,) and a factor k."""
     for i in range(3):
@@ -82,7 +79,7 @@ def times_cross(M, r, k, out):  # type: ignore[no-untyped-def]
         out[i, 2] = x * r[1] - y * r[0]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def skew_polynomial(phi, k, c1, c2, out):  # type: ignore[no-untyped-def]
     """Write k 1 + c1 [φ]× + c2 [φ]×² (3, 3); the exponential and its Jacobians are of this form."""
     x, y, z = phi[0], phi[1], phi[2]

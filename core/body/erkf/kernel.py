@@ -25,7 +25,7 @@ from core.body.erkf.updates import (
     tilt_rows,
 )
 from core.frames import Bools, Floats
-from core.rotation.compiled import FAST, to_matrix, turn
+from core.rotation.compiled import to_matrix, turn
 
 INVALID, CONTACT, STILL = 1, 2, 4
 """Bits of a sample's flags."""
@@ -81,7 +81,7 @@ class Links(NamedTuple):
     sd: Floats
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def passes(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     """vᵀ S⁻¹ v ≤ gate for the zero velocity of the IMU whose errors begin at b."""
     S = P[b + 3 : b + 6, b + 3 : b + 6]
@@ -95,7 +95,7 @@ def passes(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     return s <= gate * det
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def forward(  # type: ignore[no-untyped-def]
     x, P, before, dx, refused, step, acc, gyr, flags, heading, links, noise, record, out, sd, residual, hit
 ):
@@ -219,7 +219,7 @@ def forward(  # type: ignore[no-untyped-def]
     return -1
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def backward(lam, step, record, m, out):  # type: ignore[no-untyped-def]
     """Sweep λ (N,) back over a recorded segment and turn its filtered states `out` into smoothed ones."""
     T, n = out.shape[0], out.shape[1]

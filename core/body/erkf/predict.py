@@ -12,7 +12,6 @@ import numpy as np
 
 from core.frames import GRAVITY
 from core.rotation.compiled import (
-    FAST,
     multiply3,
     sine_quotients,
     skew_polynomial,
@@ -25,7 +24,7 @@ A, S, D, GAMMA, C = range(5)
 """Blocks of F per IMU, δv'=δv+A δθ+D δb_g+C δb_a, δp'=δp+Δt δv+½Δt(δv'−δv), δθ'=S δθ+Γ δb_g."""
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-untyped-def]
     """Advance one IMU's nominal state x (16,) and write its blocks F (5, 3, 3) and new matrix R (3, 3).
 
@@ -64,7 +63,7 @@ def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-unty
             F[C, i, j] = -dt * (first * start[i, j] + last * R[i, j])
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def reset_before(F, d):  # type: ignore[no-untyped-def]
     """Fold the reset Jacobian G = 1 − ½[δθ̂]× of the last correction (eq 27) into A and S: F ← F G."""
     a, b, c = 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]
@@ -76,7 +75,7 @@ def reset_before(F, d):  # type: ignore[no-untyped-def]
             F[k, i, 2] = z - (x * b - y * a)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
     """P ← F P Fᵀ for the blocks F (n, 5, 3, 3) of n IMUs with m errors each."""
     N = P.shape[0]
@@ -136,7 +135,7 @@ def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
             P[c, r] = P[r, c]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def back(lam, F, m, dt):  # type: ignore[no-untyped-def]
     """λ ← Fᵀ λ, the same step for the smoother."""
     for j in range(len(lam) // m):
