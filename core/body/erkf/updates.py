@@ -96,7 +96,7 @@ def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-un
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def correct(P, dx, place, H, y, sd, V, E, U):  # type: ignore[no-untyped-def]
+def take_block(P, dx, place, H, y, sd, V, E, U):  # type: ignore[no-untyped-def]
     """Take one block; V (3, N) and E (9,) = (e, L) are kept for the smoother. False if S is not positive."""
     N = P.shape[0]
     b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
