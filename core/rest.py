@@ -106,7 +106,7 @@ def windows_of(quiet: Bools, rate_hz: float, params: RestParams | None = None) -
 def runs(mask: Bools) -> list[tuple[int, int]]:
     """Half-open index ranges of the True runs of a mask (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [(a, b) for a, b in edges.reshape(-1, 2).tolist()]
 
 
 def samples(window: Window, rate_hz: float) -> slice:

@@ -21,6 +21,7 @@ from core.errors import Notice
 from core.estimators import BY_METHOD
 from core.frames import FOOT, SIDES, SUFFIX, Oriented, Side
 from core.rest import runs
+from core.rotation import wrap_angle
 
 BAD: Final = "estimator_bad"
 """Reason of an angle whose estimator contradicts itself at that joint."""
@@ -73,7 +74,7 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
     estimator = BY_METHOD.get(poses.method)
     modelled = estimator is not None and estimator.leg_model
     bounds = {
-        name: float((-angles.zero_offset[name] + np.pi) % (2.0 * np.pi) - np.pi)
+        name: wrap_angle(float(-angles.zero_offset[name]))
         for name in kept
         if modelled and name in estimated and name.startswith("knee_flexion")
     }

@@ -81,6 +81,11 @@ def test_every_dependency_is_imported_by_what_is_shipped() -> None:
     assert declared - used == NEEDED_BY_OTHERS
 
 
+def test_no_compiled_loop_of_core_may_reorder_sums() -> None:
+    """With numba's fastmath the last bits depend on whether the code was compiled just now or loaded."""
+    assert not [p for p in (ROOT / "core").rglob("*.py") if "fastmath" in p.read_text(encoding="utf-8")]
+
+
 @pytest.mark.parametrize("folder", ["core", "sagittal", "server", "web"])
 def test_no_module_is_longer_than_500_lines(folder: str) -> None:
     long = {

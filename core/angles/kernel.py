@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import asin, atan2, pi
+from math import asin, atan2
 
 import numba
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from core.angles.result import SIGNS, joints
 from core.frames import SIDES, SUFFIX, Bools, Floats, Segment
+from core.rotation import compiled, wrap_angle
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
@@ -40,10 +41,7 @@ def _measure(q, known, pelvis, ends, sign, zero, out):  # type: ignore[no-untype
                 continue
             a0, a1, a2, a3 = q[k, here]
             b0, b1, b2, b3 = q[k, there]
-            w = a0 * b0 + a1 * b1 + a2 * b2 + a3 * b3
-            x = a0 * b1 - a1 * b0 - a2 * b3 + a3 * b2
-            y = a0 * b2 + a1 * b3 - a2 * b0 - a3 * b1
-            z = a0 * b3 - a1 * b2 + a2 * b1 - a3 * b0
+            w, x, y, z = compiled.multiply(a0, -a1, -a2, -a3, b0, b1, b2, b3)
             flexion = atan2(-2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z))
             frontal = asin(min(1.0, max(-1.0, 2.0 * (y * z + w * x))))
             turned = atan2(-2.0 * (x * z - w * y), 1.0 - 2.0 * (x * x + y * y))
@@ -51,7 +49,7 @@ def _measure(q, known, pelvis, ends, sign, zero, out):  # type: ignore[no-untype
             out[k, first + 3 * j + 1] = sign[j, 1] * frontal
             out[k, first + 3 * j + 2] = sign[j, 2] * turned
         for i in range(out.shape[1]):
-            out[k, i] = (out[k, i] - zero[i] + pi) % (2.0 * pi) - pi
+            out[k, i] = compiled.wrap_angle(out[k, i] - zero[i])
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,4 +131,4 @@ def mean_angles(angles: Floats) -> Floats:
 
 def subtract_zero(angles: Floats, zero: Floats) -> Floats:
     """Angles (T, k) in rad over those of a zero (k,), −π to π."""
-    return np.asarray((angles - zero + np.pi) % (2.0 * np.pi) - np.pi)
+    return wrap_angle(np.asarray(angles - zero))

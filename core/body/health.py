@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-import numpy as np
-
 from core.frames import Bools
+from core.rest import runs
 
 Verdict = Literal["good", "warn", "bad"]
 
@@ -51,5 +50,4 @@ more from the last rest on."""
 
 def longest_run_s(flags: Bools, rate_hz: float) -> float:
     """Duration of the longest stretch of True in s, 0 without any."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False]))))
-    return float(np.max(edges[1::2] - edges[::2], initial=0)) / rate_hz
+    return max((stop - start for start, stop in runs(flags)), default=0) / rate_hz

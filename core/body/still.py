@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.frames import GRAVITY, Bools, Floats
+from core.rest import runs
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,7 @@ def still_samples(acc: Floats, gyr: Floats, valid: Bools, rate_hz: float, rule: 
     index = np.arange(len(quiet))
     low, high = np.maximum(index - reach, 0), np.minimum(index + reach + 1, len(quiet))
     still = loud[high] == loud[low]
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], still, [False]))))
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in runs(still):
         if stop - start < rule.shortest_s * rate_hz:
             still[start:stop] = False
     return np.asarray(still)

@@ -18,9 +18,10 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from core.filtering import low_pass
 from core.frames import Floats
 from core.rest import Window
-from core.rotation import rotate
+from core.rotation import rotate, wrap_angle
 
 Complexes = NDArray[np.complex128]
 Part = tuple[int, int]
@@ -160,16 +161,13 @@ def acceleration_axis(
     steps_s : step time in each part for a trunk sensor: a(t) + a(t + step) is what both steps share, which is
         forward; what changes side with every step, the sway, cancels. None for the legs.
     """
-    from scipy.signal import butter, sosfiltfilt
-
-    sos = butter(2, min(0.9, params.cutoff_hz / (0.5 * rate_hz)), output="sos")
     power, moment = 0.0, 0j
     for (start, end), turn, step_s in zip(parts, bearing, steps_s or [0.0] * len(parts), strict=True):
         shift = round(step_s * rate_hz)
         if steps_s and any(steps_s) and not shift:
             continue
         piece = np.stack((a[start:end].real, a[start:end].imag))
-        smooth = sosfiltfilt(sos, piece, axis=1, padlen=min(piece.shape[1] - 1, 30))
+        smooth = low_pass(piece, params.cutoff_hz, rate_hz, pad=30)
         x = (smooth[0] + 1j * smooth[1]) * np.exp(-1j * turn)
         if 0 < shift < len(x) // 2:
             x = x[:-shift] + x[shift:]
@@ -199,15 +197,11 @@ def step_time(up: Floats, rate_hz: float) -> float:
 
 
 def nearest_sign(axis: float, towards: float) -> float:
-    """The one of axis and axis + π that is nearer to a direction, rad in (−π, π]."""
-    turned = axis if abs(_wrap(axis - towards)) <= pi / 2 else axis + pi
-    return _wrap(turned)
+    """The one of axis and axis + π that is nearer to a direction, rad in [−π, π)."""
+    turned = axis if abs(wrap_angle(axis - towards)) <= pi / 2 else axis + pi
+    return wrap_angle(turned)
 
 
 def difference(a: float, b: float) -> float:
-    """Angle a − b in rad, (−π, π]."""
-    return _wrap(a - b)
-
-
-def _wrap(x: float) -> float:
-    return (x + pi) % (2 * pi) - pi
+    """Angle a − b in rad, [−π, π)."""
+    return wrap_angle(a - b)

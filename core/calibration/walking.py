@@ -8,10 +8,11 @@ from math import radians
 
 import numpy as np
 
+from core.filtering import low_pass
 from core.frames import Bools, Floats, Segment
 from core.recording import UniformRecording
 from core.rest import runs
-from core.rotation import conjugate, multiply, rotate
+from core.rotation import conjugate, multiply, rotate, wrap_angle
 
 TRUNK: tuple[Segment, ...] = ("pelvis", "chest")
 DOWN: tuple[tuple[Segment, ...], ...] = (
@@ -70,18 +71,12 @@ def turning_mask(
     ----------
     q : segment → (n, 4) sensor to its own z-up world.
     """
-    from scipy.signal import butter, sosfiltfilt
-
     worn = turn_sensors(recording)
     rate = np.zeros(len(recording.t_s))
     for s in worn:
         rate += rotate(q[s], recording.sensors[s].gyr - biases[s])[:, 2] / len(worn)
     cutoff = params.turn_cutoff_hz if worn[0] in TRUNK else 0.5 * params.turn_cutoff_hz
-    sos = butter(2, cutoff / (0.5 * recording.rate_hz), output="sos")
-    turning = (
-        np.abs(sosfiltfilt(sos, rate, padlen=min(len(rate) - 1, round(2 * recording.rate_hz))))
-        > params.turn_rate
-    )
+    turning = np.abs(low_pass(rate, cutoff, recording.rate_hz)) > params.turn_rate
     reach = round(params.turn_margin_s * recording.rate_hz)
     for a, b in runs(turning):
         turning[max(0, a - reach) : b + reach] = True
@@ -119,11 +114,7 @@ def turned(q: Floats, q_rest: Floats) -> Floats:
     The twist of the rotation about z: it exists for any mounting of the sensor.
     """
     d = multiply(q, conjugate(q_rest))
-    return np.asarray(_wrap(2.0 * np.arctan2(d[..., 3], d[..., 0])))
-
-
-def _wrap(x: Floats) -> Floats:
-    return np.asarray((x + np.pi) % (2 * np.pi) - np.pi)
+    return wrap_angle(np.asarray(2.0 * np.arctan2(d[..., 3], d[..., 0])))
 
 
 def _box(x: Floats, width: int) -> Floats:

@@ -21,6 +21,7 @@ import numpy as np
 
 from core.errors import Notice, SignalError
 from core.events.result import GaitEvent, GaitEvents
+from core.filtering import low_pass
 from core.frames import FOOT, SHANK, SIDES, Bools, Floats, Oriented, Segment, Side
 from core.rotation import conjugate, log, multiply
 
@@ -133,7 +134,7 @@ def gyro_peak_events(take: Oriented, rate_hz: float, params: GyroPeakParams | No
             continue
         rate = sagittal_rate(take.q[segment], rate_hz)
         if params.low_pass_hz is not None:
-            rate = _low_pass(rate, params.low_pass_hz, rate_hz)
+            rate = low_pass(rate, params.low_pass_hz, rate_hz)
         unclear = _unclear(rate[take.valid[segment]], rate_hz, params)
         if unclear:
             notices.append(_say_unclear(side, segment, unclear, params))
@@ -252,10 +253,3 @@ def _vertex(x: Floats, i: int) -> float:
     """Where between the samples the extremum at i is, within ±0.5: a parabola through three of them."""
     bend = x[i - 1] - 2.0 * x[i] + x[i + 1]
     return 0.0 if bend == 0.0 else float(np.clip(0.5 * (x[i - 1] - x[i + 1]) / bend, -0.5, 0.5))
-
-
-def _low_pass(x: Floats, cutoff_hz: float, rate_hz: float) -> Floats:
-    from scipy.signal import butter, sosfiltfilt
-
-    sos = butter(2, min(0.99, cutoff_hz / (0.5 * rate_hz)), output="sos")
-    return np.asarray(sosfiltfilt(sos, x, padlen=min(len(x) - 1, round(2.0 * rate_hz))))

@@ -9,7 +9,6 @@ from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
-from math import remainder, tau
 from typing import Final
 
 import numpy as np
@@ -19,7 +18,7 @@ from core.errors import Notice
 from core.events.flags import StrideParams, decided, flagged
 from core.events.result import COMPARED, GaitEvents, Stride, StrideFlag, Strides
 from core.frames import FOOT, SIDES, Bools, Oriented, Side
-from core.rotation import yaw
+from core.rotation import wrap_angle, yaw
 
 NOTICES: Final = ("short_walk", "no_strides")
 """Codes of what the stride list says about itself."""
@@ -88,7 +87,7 @@ def side_strides(
         gap = lost[past] > lost[first]
         turn = None
         if heading is not None and not gap:
-            turn = remainder(heading[i + 1] - heading[i], tau)
+            turn = wrap_angle(heading[i + 1] - heading[i])
         flags: list[StrideFlag] = []
         if gap:
             flags.append("gap")

@@ -14,6 +14,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from core.filtering import low_pass
 from core.frames import Bools, Floats, Oriented, Segment
 from core.rest import runs
 from core.rotation import conjugate, log, multiply
@@ -81,8 +82,8 @@ def turns(
     params = params or TurnParams()
     if len(yaw_rate) < rate_hz * params.seconds[0]:
         return ()
-    smooth = _low_pass(yaw_rate, params.cutoff_hz, rate_hz)
-    quick = _low_pass(yaw_rate, params.peak_cutoff_hz, rate_hz)
+    smooth = low_pass(yaw_rate, params.cutoff_hz, rate_hz)
+    quick = low_pass(yaw_rate, params.peak_cutoff_hz, rate_hz)
     found: list[tuple[int, int]] = []
     for sign in (1.0, -1.0):
         for first, end in _joined(runs(sign * smooth > params.edge_rad_s), params.join_s * rate_hz):
@@ -125,14 +126,6 @@ def _vertical_rate(q: Floats) -> Floats:
     """World z component (n,) of the rotation from each sample to the next, rad."""
     step = log(multiply(q[1:], conjugate(q[:-1])))[:, 2]
     return np.append(step, step[-1:] if len(step) else 0.0)
-
-
-def _low_pass(x: Floats, cutoff_hz: float, rate_hz: float) -> Floats:
-    """Zero-phase Butterworth, twice second order."""
-    from scipy.signal import butter, sosfiltfilt
-
-    sos = butter(2, min(0.99, cutoff_hz / (0.5 * rate_hz)), output="sos")
-    return np.asarray(sosfiltfilt(sos, x, padlen=min(len(x) - 1, round(2.0 * rate_hz))))
 
 
 def _joined(found: list[tuple[int, int]], pause: float) -> list[tuple[int, int]]:

@@ -22,7 +22,7 @@ import numpy as np
 
 from core.errors import EstimationError, ParameterError
 from core.frames import Bools, Floats
-from core.rotation import normalise, slerp
+from core.rotation import compiled, normalise, slerp
 
 
 @dataclass(frozen=True)
@@ -101,13 +101,7 @@ def attitude_kernel(
         else:
             p = np.sqrt(square)
             s, c = np.sin(p) / p, np.cos(p)
-        px, py, pz = s * px, s * py, s * pz
-        w, i, j, k = (
-            w * c - i * px - j * py - k * pz,
-            w * px + i * c + j * pz - k * py,
-            w * py - i * pz + j * c + k * px,
-            w * pz + i * py - j * px + k * c,
-        )
+        w, i, j, k = compiled.multiply(w, i, j, k, c, s * px, s * py, s * pz)
         gain = kp
         if age < np.inf:
             age += dt
@@ -122,12 +116,7 @@ def attitude_kernel(
         vy = 2.0 * (j * k + w * i)
         vz = w * w - i * i - j * j + k * k
         ex, ey, ez = g * (ay * vz - az * vy), g * (az * vx - ax * vz), g * (ax * vy - ay * vx)
-        w, i, j, k = (
-            w - i * ex - j * ey - k * ez,
-            i + w * ex + j * ez - k * ey,
-            j + w * ey - i * ez + k * ex,
-            k + w * ez + i * ey - j * ex,
-        )
+        w, i, j, k = compiled.multiply(w, i, j, k, 1.0, ex, ey, ez)
         r = 1.0 / np.sqrt(w * w + i * i + j * j + k * k)
         w, i, j, k = w * r, i * r, j * r, k * r
         out[n, 0], out[n, 1], out[n, 2], out[n, 3] = w, i, j, k

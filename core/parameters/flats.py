@@ -14,6 +14,7 @@ import numpy as np
 from core.body.feet import FootTracks
 from core.events.result import Stride
 from core.frames import Side
+from core.rest import runs
 
 STANCE_SHARE: Final = 0.7
 """Part of the stride in which its flat is looked for when no foot-off was found."""
@@ -47,8 +48,8 @@ def places(strides: Sequence[Stride], feet: FootTracks) -> Places:
 def rest_runs(feet: FootTracks, side: Side) -> tuple[list[int], list[int]]:
     """First and past-the-last samples of every rest of a foot, in order."""
     resting = feet.still[side] & feet.valid[side]
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], resting, [False]))))
-    return edges[::2].tolist(), edges[1::2].tolist()
+    found = runs(resting)
+    return [start for start, _ in found], [stop for _, stop in found]
 
 
 def _longest(starts: Sequence[int], stops: Sequence[int], first: int, past: int) -> int | None:

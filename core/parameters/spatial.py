@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import atan2, ceil, degrees, hypot, remainder, tau
+from math import atan2, ceil, degrees, hypot
 from typing import Final, Literal
 
 import numpy as np
@@ -27,7 +27,8 @@ from core.parameters.result import Parameter
 from core.parameters.rows import Column, Row, Value, row_columns, row_parameter
 from core.parameters.variability import summary
 from core.recording import UniformRecording
-from core.rotation import yaw
+from core.rest import runs
+from core.rotation import wrap_angle, yaw
 
 NAMES: Final[tuple[str, ...]] = (*list_names(DISTANCES, of="stride"), "toe_out_deg")
 """Per-side parameters in the order of the tables."""
@@ -146,8 +147,7 @@ def _total(feet: FootTracks | None, surface: Surface) -> Parameter:
     if not told and feet.withheld:
         return summary(name, None, [], "m", next(iter(feet.withheld.values())))
     for side, still in told.items():
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], still & feet.valid[side], [False]))))
-        middles = (edges[::2] + edges[1::2]) // 2
+        middles = [(start + stop) // 2 for start, stop in runs(still & feet.valid[side])]
         lengths = np.linalg.norm(np.diff(feet.p[side][middles, :2], axis=0), axis=1)
         if len(middles):
             ways.append(float(lengths[lengths > STEP_M].sum()))
@@ -209,7 +209,7 @@ def _row(s: Stride, feet: FootTracks | None, paths: _Paths | None) -> Row:
     along = np.array([x / length, y / length])
     mirror = 1.0 if s.side == "left" else -1.0
     outward = np.array([-along[1], along[0]]) * mirror
-    out = mirror * remainder(paths.heading[s.side, first] - atan2(y, x), tau)
+    out = mirror * wrap_angle(paths.heading[s.side, first] - atan2(y, x))
     row: dict[str, Value] = {
         "gait_speed_mps": length / float(feet.t_s[last] - feet.t_s[first]),
         "stride_length_m": length,

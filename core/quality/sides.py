@@ -76,7 +76,7 @@ def left_leg(acc: Floats, gyr: Floats, first: Floats, second: Floats, rate_hz: f
 
 def _vote(off: float) -> int | None:
     """1 when a phase is as expected of a left leg, 2 when opposite, None in between."""
-    off = abs(float(np.angle(np.exp(1j * off))))
+    off = abs(rotation.wrap_angle(off))
     return 1 if off < AGREE else 2 if off > np.pi - AGREE else None
 
 

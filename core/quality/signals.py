@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.frames import GRAVITY, Floats
+from core.rest import runs
 
 STILL: Final = 0.03
 """A second is still when acc varies less than this share of its mean (0.25 m/s²:
@@ -116,8 +117,7 @@ def saturation(x: Floats, floor: float) -> tuple[float, float | None]:
             if any(abs(top / full - 1) < 0.01 for full in RANGES) and np.count_nonzero(crowd) >= CROWD:
                 clipped |= crowd
                 value = max(top, value or 0.0)
-            edges = np.flatnonzero(np.diff(np.concatenate(([False], at_top, [False])).astype(np.int8)))
-            for start, end in zip(edges[::2], edges[1::2], strict=True):
+            for start, end in runs(at_top):
                 if end - start >= PLATEAU:
                     clipped[start:end] = True
                     value = max(top, value or 0.0)

@@ -26,6 +26,7 @@ from core.formats.live_log import (
 )
 from core.frames import Floats
 from core.recording import ImuStream, Recording
+from core.rest import runs
 
 ON_GRID: Final = 0.01
 """Largest distance from the grid in samples, as core/timeline takes it."""
@@ -148,8 +149,7 @@ def _pieces(number: int, grid: _Grid, per_batch: int, begin_s: float) -> Iterato
 
 def _runs(there: np.ndarray[tuple[int], np.dtype[np.bool_]], most: int) -> Iterator[tuple[int, int]]:
     """Stretches of at most so many samples without a tick at which no sensor measured."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], there, [False])).astype(np.int8)))
-    for start, stop in edges.reshape(-1, 2).tolist():
+    for start, stop in runs(there):
         for i in range(start, stop, most):
             yield i, min(i + most, stop)
 

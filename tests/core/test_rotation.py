@@ -9,6 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 from core import rotation
 from core.frames import Floats
+from core.rotation import compiled
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -98,3 +99,47 @@ def test_about_turns_about_one_axis(angle: float, axis: int) -> None:
 def test_yaw_reads_the_heading_of_x(heading: float, pitch: float) -> None:
     q = rotation.multiply(rotation.about(2, heading), rotation.about(1, pitch))
     assert abs(float(rotation.yaw(q)) - heading) < 1e-9
+
+
+@given(st.floats(-50.0, 50.0))
+def test_a_wrapped_angle_is_the_same_direction(angle: float) -> None:
+    wrapped = rotation.wrap_angle(angle)
+    assert -np.pi <= wrapped < np.pi
+    assert abs(np.exp(1j * wrapped) - np.exp(1j * angle)) < 1e-13
+    assert compiled.wrap_angle(angle) == wrapped
+    assert rotation.wrap_angle(np.array([angle]))[0] == wrapped
+
+
+@given(quaternions, quaternions, vectors)
+def test_compiled_loops_turn_as_arrays_do(p: Floats, q: Floats, phi: Floats) -> None:
+    matrix, product, back = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    compiled.to_matrix(p, matrix)
+    np.testing.assert_allclose(matrix, rotation.to_matrix(p), atol=1e-14)
+    np.testing.assert_allclose(compiled.multiply(*p, *q), rotation.multiply(p, q), atol=1e-15)
+    turned = p.copy()
+    compiled.turn(turned, *phi)
+    np.testing.assert_allclose(turned, rotation.multiply(p, rotation.exp(phi)), atol=1e-12)
+    compiled.multiply3(matrix, rotation.to_matrix(q), product)
+    np.testing.assert_allclose(product, matrix @ rotation.to_matrix(q), atol=1e-14)
+    compiled.exp_so3(phi, matrix, product)
+    np.testing.assert_allclose(matrix, rotation.to_matrix(rotation.exp(phi)), atol=1e-12)
+    compiled.log_so3(matrix, back)
+    np.testing.assert_allclose(rotation.to_matrix(rotation.exp(back)), matrix, atol=1e-7)
+
+
+@given(vectors, vectors)
+def test_compiled_cross_products_are_those_of_numpy(a: Floats, b: Floats) -> None:
+    cross, both = np.empty((3, 3)), np.empty((3, 3))
+    compiled.skew(a, cross)
+    np.testing.assert_allclose(cross @ b, np.cross(a, b), atol=1e-12)
+    compiled.times_cross(np.eye(3), a, -2.0, both)
+    np.testing.assert_allclose(both, -2.0 * cross)
+    compiled.skew_polynomial(a, 3.0, 2.0, 0.5, both)
+    np.testing.assert_allclose(both, 3.0 * np.eye(3) + 2.0 * cross + 0.5 * cross @ cross, atol=1e-11)
+
+
+@given(arrays(np.float64, 3, elements=st.floats(-0.5, 0.5, width=64)))
+def test_a_rotation_with_rounding_becomes_a_rotation_again(phi: Floats) -> None:
+    R, work = rotation.to_matrix(rotation.exp(phi)) + 1e-7 * np.arange(9.0).reshape(3, 3), np.empty((2, 3, 3))
+    compiled.orthonormalise(R, work)
+    np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-11)

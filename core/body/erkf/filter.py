@@ -16,9 +16,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from core.body.erkf.gaps import bridged
-from core.body.erkf.kernel import CONTACT, INVALID, STILL, Links, Noise, Record, forward
+from core.body.erkf.gaps import bridge_gaps
+from core.body.erkf.kernel import (
+    CONTACT,
+    INVALID,
+    STILL,
+    ErkfMemory,
+    ErkfOutput,
+    ErkfSamples,
+    Links,
+    Noise,
+    Record,
+    forward,
+)
 from core.body.erkf.params import ErkfParams
 from core.body.still import AT_REST, FOOT_STILL, still_samples
 from core.body.tree import ImuTree
@@ -73,7 +85,7 @@ class ErkfState:
     P: Floats
     before: Floats
     injected: Floats
-    refused: Floats
+    refused: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +140,7 @@ def erkf_inputs(
     for i, name in enumerate(tree.imus):
         if not valid[:, i].any():
             raise SignalError("bad_signal", f"{name}: no valid sample; leave this sensor out.", sensor=name)
-    acc, gyr = bridged(tree, acc, gyr, valid, rate_hz)
+    acc, gyr = bridge_gaps(tree, acc, gyr, valid, rate_hz)
     for i in range(len(tree.imus)):
         still[:, i] = still_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz, AT_REST)
         if i in tree.feet:
@@ -157,26 +169,45 @@ def run_block(
     T, n = inputs.valid.shape
     _check(state, inputs, tree, params)
     rate = 1.0 / np.median(inputs.step_s[inputs.step_s > 0.0]) if np.any(inputs.step_s > 0.0) else 1.0
-    x, P, before = state.nominal.copy(), state.P.copy(), state.before.copy()
-    dx, refused = state.injected.copy(), state.refused.copy()
+    memory = memory_of(state)
     flags = (INVALID * ~inputs.valid + CONTACT * inputs.contact + STILL * inputs.still).astype(np.int64)
     heading = np.empty((0, n)) if inputs.heading is None else np.ascontiguousarray(inputs.heading)
-    out, sd = np.empty((T, n, 16)), np.empty((T, n))
-    residual, hit = np.empty((T, len(tree.joints))), np.empty((T, n), bool)
-    broke = forward(
-        x, P, before, dx, refused,
-        np.ascontiguousarray(inputs.step_s), np.ascontiguousarray(inputs.acc),
-        np.ascontiguousarray(inputs.gyr), flags, heading, links_of(tree, params), noise_of(params, rate),
-        record, out, sd, residual, hit,
-    )  # fmt: skip
-    if broke >= 0 or not _positive(P):
+    samples = ErkfSamples(
+        np.ascontiguousarray(inputs.step_s),
+        np.ascontiguousarray(inputs.acc),
+        np.ascontiguousarray(inputs.gyr),
+        flags,
+        heading,
+    )
+    output = new_output(tree, T)
+    links, noise = links_of(tree, params), noise_of(params, rate)
+    broke = forward(*map(tuple, (memory, samples, links, noise, record, output)))
+    if broke >= 0 or not _positive(memory.P):
         at = broke if broke >= 0 else T - 1
         raise EstimationError(
             "filter_diverged",
             f"The covariance is no longer positive definite {inputs.step_s[: at + 1].sum():.2f} s into "
             "this block; check units, sensor positions and which sensor is on which segment.",
         )
-    return ErkfTrack(out, sd, residual, hit), ErkfState(x, P, before, dx, refused)
+    return ErkfTrack(*output), ErkfState(*memory)
+
+
+def memory_of(state: ErkfState) -> ErkfMemory:
+    """A copy of the state for the kernels to advance."""
+    return ErkfMemory(
+        state.nominal.copy(), state.P.copy(), state.before.copy(), state.injected.copy(), state.refused.copy()
+    )
+
+
+def new_output(tree: ImuTree, samples: int) -> ErkfOutput:
+    """Room for what a block of so many samples gives."""
+    n = len(tree.imus)
+    return ErkfOutput(
+        nominal=np.empty((samples, n, 16)),
+        heading_sd=np.empty((samples, n)),
+        residual=np.empty((samples, len(tree.joints))),
+        refused=np.empty((samples, n), np.bool_),
+    )
 
 
 def new_record(tree: ImuTree, params: ErkfParams, samples: int) -> Record:
@@ -184,8 +215,8 @@ def new_record(tree: ImuTree, params: ErkfParams, samples: int) -> Record:
     n, J = len(tree.imus), len(tree.joints)
     N = n * params.states
     # per sample at most: centre and axis of each joint; zero velocity, tilt, ZARU and heading of each IMU
-    B = 2 * J + 4 * n + 1
-    used = J * (params.joint_centre_sd is not None) + n * (params.tilt_sd is not None) + len(tree.feet) + 1
+    B = 2 * J + 4 * n
+    used = J * (params.joint_centre_sd is not None) + n * (params.tilt_sd is not None) + len(tree.feet)
     used += sum(j.e_distal is not None for j in tree.joints) * (params.joint_axis_sd is not None)
     used += n * (params.zaru_sd is not None) + n
     K, B = samples, min(B, used)

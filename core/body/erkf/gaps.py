@@ -1,4 +1,4 @@
-"""What a lost sensor is taken to measure until it comes back.
+"""What a lost sensor is taken to measure until it comes back: one rule for a file and a stream.
 
 Holding its last values on would turn it round and round, and the joints its neighbours with it. It goes on as
 it last did for a moment. Then the end of a limb is taken as fixed to what it hangs on, and a link between two
@@ -13,11 +13,12 @@ from __future__ import annotations
 
 from typing import Final
 
+import numba
 import numpy as np
 
 from core.body.tree import ImuTree
 from core.frames import GRAVITY, Bools, Floats
-from core.rotation import conjugate, multiply, rotate
+from core.rotation import conjugate, multiply, to_matrix
 
 HOLD_S: Final = 0.3
 """So long a sensor goes on as it last did: a gap of 0.3 s in mid-swing costs 1.4° at the ankle."""
@@ -25,53 +26,155 @@ HOLD_S: Final = 0.3
 POSTURE_S: Final = 1.0
 """About a stride: the mean specific force over it is gravity in the mean posture."""
 
+NEVER_LOST: Final = -(2**62)
+"""Count of lost samples of a sensor that has not measured yet: no gap of it begins before it has."""
 
-def bridged(tree: ImuTree, acc: Floats, gyr: Floats, valid: Bools, rate_hz: float) -> tuple[Floats, Floats]:
-    """Signals (T, n, 3) with every lost sample filled; causal but for a sensor's first samples.
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _mean_up(ring, seen, out):  # type: ignore[no-untyped-def]
+    """Write the direction of the mean of the last `seen` specific forces in a ring (W, 3)."""
+    W = ring.shape[0]
+    first = seen - min(seen, W)
+    for c in range(3):
+        total = 0.0
+        for k in range(first, seen):
+            total += ring[k % W, c]
+        out[c] = total
+    length = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
+    for c in range(3):
+        out[c] /= length
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _bridge(  # type: ignore[no-untyped-def]
+    acc, gyr, valid, excess, bias, hold, guide, carry, along, held, lost, seen, ring, up, out_acc, out_gyr
+):
+    """Correct and bridge a block; `held`, `lost`, `seen`, `ring` and `up` are advanced in place.
+
+    Parameters
+    ----------
+    acc, gyr : (T, n, 3) as measured. excess, bias : (n, 3) what is taken off. guide : (n, n) indices, −1 =
+    none left. carry : (n,) index or −1. along : (n, 3, 3) axes of the carrier in those of the sensor.
+    held : (n, 6) last measured. lost : (n,) samples of the gap that is going on. ring : (n, W, 3).
+    """
+    n = acc.shape[1]
+    level = np.empty(3)
+    for k in range(acc.shape[0]):
+        for i in range(n):
+            if valid[k, i]:
+                lost[i] = 0
+                for c in range(3):
+                    held[i, c] = acc[k, i, c] - excess[i, c]
+                    held[i, 3 + c] = gyr[k, i, c] - bias[i, c]
+            else:
+                lost[i] += 1
+                if lost[i] == 1:
+                    _mean_up(ring[i], seen[0], up[i])
+        for i in range(n):
+            for c in range(3):
+                out_acc[k, i, c], out_gyr[k, i, c] = held[i, c], held[i, 3 + c]
+            if lost[i] <= hold:
+                continue
+            for c in range(3):
+                out_acc[k, i, c], out_gyr[k, i, c] = GRAVITY * up[i, c], 0.0
+            for g in range(n):
+                j = guide[i, g]
+                if j < 0:
+                    break
+                if not valid[k, j]:
+                    continue
+                _mean_up(ring[j], seen[0], level)
+                turn = held[j, 3] * level[0] + held[j, 4] * level[1] + held[j, 5] * level[2]
+                for c in range(3):
+                    out_gyr[k, i, c] = turn * up[i, c]
+            j = carry[i]
+            if j >= 0 and valid[k, j]:
+                for c in range(3):
+                    f = w = 0.0
+                    for e in range(3):
+                        f += along[i, c, e] * held[j, e]
+                        w += along[i, c, e] * held[j, 3 + e]
+                    out_acc[k, i, c], out_gyr[k, i, c] = f, w
+        slot = seen[0] % ring.shape[1]
+        for i in range(n):
+            for c in range(3):
+                ring[i, slot, c] = held[i, c]
+        seen[0] += 1
+
+
+class Bridge:
+    """Corrected signals without holes; any division into blocks gives the same bits.
+
+    Before its first sample a sensor is taken to stand upright.
+
+    Parameters
+    ----------
+    excess : (n, 3) of specific force at rest, bias : (n, 3) of angular rate at rest, both taken off.
+    """
+
+    def __init__(self, tree: ImuTree, excess: Floats, bias: Floats, rate_hz: float) -> None:
+        n = len(tree.imus)
+        self._excess, self._bias = np.ascontiguousarray(excess), np.ascontiguousarray(bias)
+        self._hold = round(HOLD_S * rate_hz)
+        self._guide = np.full((n, n), -1, np.int64)
+        self._carry = np.full(n, -1, np.int64)
+        # in neutral standing the axes of all segments are parallel
+        self._along = np.tile(np.eye(3), (n, 1, 1))
+        mount = to_matrix(tree.q_mount)
+        for i in range(n):
+            found = guides(tree, i)
+            self._guide[i, : len(found)] = found
+            j = carrier(tree, i)
+            if j is not None:
+                self._carry[i] = j
+                self._along[i] = to_matrix(multiply(conjugate(tree.q_mount[i]), tree.q_mount[j]))
+        self._held = np.zeros((n, 6))
+        self._held[:, :3] = GRAVITY * mount[:, 1]
+        self._lost = np.zeros(n, np.int64)
+        self._ring = np.tile(self._held[:, None, :3], (1, round(POSTURE_S * rate_hz), 1))
+        self._seen = np.array([self._ring.shape[1]], np.int64)
+        self._up = mount[:, 1].copy()
+
+    @classmethod
+    def from_first_samples(
+        cls, tree: ImuTree, acc: Floats, gyr: Floats, valid: Bools, rate_hz: float
+    ) -> Bridge:
+        """A bridge for a whole take, from which nothing is taken off.
+
+        Before its first sample a sensor holds that; its mean posture is of what the take has so far.
+
+        Parameters
+        ----------
+        acc, gyr, valid : the take as in `bridge_gaps`.
+        """
+        nothing = np.zeros((len(tree.imus), 3))
+        bridge = cls(tree, nothing, nothing, rate_hz)
+        first, sensor = np.argmax(valid, axis=0), np.arange(len(tree.imus))
+        bridge._held[:] = np.concatenate((acc[first, sensor], gyr[first, sensor]), axis=1)
+        bridge._lost[:], bridge._seen[:] = NEVER_LOST, 0
+        return bridge
+
+    def push(self, acc: Floats, gyr: Floats, valid: Bools) -> tuple[Floats, Floats]:
+        """Specific force and angular rate (T, n, 3) with every lost sample filled."""
+        out_acc, out_gyr = np.empty(acc.shape), np.empty(acc.shape)
+        _bridge(
+            acc, gyr, valid, self._excess, self._bias, self._hold, self._guide, self._carry, self._along,
+            self._held, self._lost, self._seen, self._ring, self._up, out_acc, out_gyr,
+        )  # fmt: skip
+        return out_acc, out_gyr
+
+
+def bridge_gaps(
+    tree: ImuTree, acc: Floats, gyr: Floats, valid: Bools, rate_hz: float
+) -> tuple[Floats, Floats]:
+    """Signals (T, n, 3) of a take with every lost sample filled; causal but for a sensor's first samples.
 
     Parameters
     ----------
     acc, gyr : (T, n, 3), of any value where not valid. valid : (T, n), some of every sensor's.
     """
-    acc, gyr = acc.copy(), gyr.copy()
-    for i in range(len(tree.imus)):
-        last = np.maximum.accumulate(np.where(valid[:, i], np.arange(len(valid)), -1))
-        last[last < 0] = int(np.argmax(valid[:, i]))
-        acc[:, i], gyr[:, i] = acc[last, i], gyr[last, i]
-    held_acc, held_gyr = acc.copy(), gyr.copy()
-    for i in range(len(tree.imus)):
-        for start, stop in _gaps(valid[:, i]):
-            begin = start + round(HOLD_S * rate_hz)
-            if start == 0 or begin >= stop:
-                continue
-            up = _up(held_acc[:, i], start, start + 1, rate_hz)[0]
-            acc[begin:stop, i], gyr[begin:stop, i] = GRAVITY * up, 0.0
-            for j in guides(tree, i):
-                turn = np.sum(held_gyr[begin:stop, j] * _up(held_acc[:, j], begin, stop, rate_hz), axis=1)
-                there = valid[begin:stop, j]
-                gyr[begin:stop, i][there] = turn[there, None] * up
-            above = carrier(tree, i)
-            if above is not None:
-                k = begin + np.flatnonzero(valid[begin:stop, above])
-                # in neutral standing the axes of all segments are parallel
-                along = multiply(conjugate(tree.q_mount[i]), tree.q_mount[above])
-                acc[k, i] = rotate(along, held_acc[k, above])
-                gyr[k, i] = rotate(along, held_gyr[k, above])
-    return acc, gyr
-
-
-def _up(acc: Floats, start: int, stop: int, rate_hz: float) -> Floats:
-    """Upward axis (m, 3) of one sensor in its mean posture over the time before samples start … stop − 1."""
-    total = np.concatenate((np.zeros((1, 3)), np.cumsum(acc[:stop], axis=0)))
-    k = np.arange(start, stop)
-    mean = total[k] - total[np.maximum(0, k - round(POSTURE_S * rate_hz))]
-    return np.asarray(mean / np.linalg.norm(mean, axis=1, keepdims=True))
-
-
-def _gaps(valid: Bools) -> list[tuple[int, int]]:
-    """Runs start … stop − 1 of lost samples."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], ~valid, [False]))))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    bridge = Bridge.from_first_samples(tree, acc, gyr, valid, rate_hz)
+    return bridge.push(np.ascontiguousarray(acc), np.ascontiguousarray(gyr), np.ascontiguousarray(valid))
 
 
 def guides(tree: ImuTree, i: int) -> list[int]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import degrees, pi, radians
+from math import degrees, radians
 from typing import Final
 
 import numpy as np
@@ -29,7 +29,7 @@ from core.errors import Notice, Severity
 from core.frames import Segment
 from core.fusion.orientations import Orientations
 from core.rest import samples
-from core.rotation import about, from_matrix, multiply, to_matrix, yaw
+from core.rotation import about, from_matrix, multiply, to_matrix, wrap_angle, yaw
 
 LOOKED_AT_S: Final = 120.0
 """Part of the take that is filtered for this, from the standing zero on: some fifty strides."""
@@ -69,7 +69,7 @@ def agreed(
     for _ in range(ROUNDS):
         errors = heading_errors(calibrated, orientations, body, segments, params)
         calibrated, orientations = turned(calibrated, orientations, errors)
-        total = {s: _wrap(total.get(s, 0.0) + error) for s, error in errors.items()}
+        total = {s: wrap_angle(total.get(s, 0.0) + error) for s, error in errors.items()}
         if all(abs(error) <= SETTLED for error in errors.values()):
             break
     return calibrated, orientations, total
@@ -138,7 +138,7 @@ def heading_errors(
         if not seen.any():
             return {}
         change.append(np.angle(np.mean(np.exp(1j * (yaw(now) - yaw(was)))[seen])))
-    apart = np.array([_wrap(float(x - change[0])) for x in change])
+    apart = np.array([wrap_angle(float(x - change[0])) for x in change])
     return dict(zip(segments, (apart - np.median(apart)).tolist(), strict=True))
 
 
@@ -154,7 +154,3 @@ def turned(
         q[segment] = multiply(multiply(about(2, error), q[segment]), about(1, -error))
     calibration = replace(calibrated.calibration, segments=mounted)
     return replace(calibrated, calibration=calibration), replace(orientations, q=q)
-
-
-def _wrap(x: float) -> float:
-    return (x + pi) % (2 * pi) - pi

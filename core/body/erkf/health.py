@@ -12,7 +12,7 @@ from core.body.erkf.start import parts
 from core.body.health import LONGEST_MOVING_S, Finding, longest_run_s
 from core.errors import Notice, Severity
 from core.frames import Floats
-from core.rotation import conjugate, multiply, yaw
+from core.rotation import conjugate, multiply, wrap_angle, yaw
 
 RESIDUAL_MM: Final = (25.0, 80.0)
 """RMS distance of the two ends of a joint while moving. A right set-up has 3 to 19 (simulation, neura_walk),
@@ -145,8 +145,8 @@ def _start_heading(run: ErkfRun) -> Finding:
     part = parts(run.tree)
     off = np.zeros(len(turn))
     for root in set(part.tolist()):
-        apart = np.angle(np.exp(1j * (turn[part == root] - turn[root])))
-        off[part == root] = np.angle(np.exp(1j * (apart - np.median(apart))))
+        apart = wrap_angle(turn[part == root] - turn[root])
+        off[part == root] = wrap_angle(apart - np.median(apart))
     most = int(np.argmax(np.abs(off)))
     value = float(np.degrees(abs(off[most])))
     return Finding("start_heading_off_deg", run.tree.imus[most], value, *START_HEADING_DEG)

@@ -1,7 +1,8 @@
 """The compiled loops of the ErKF: forward over a block of samples, and back over it for the smoother.
 
-One forward function serves live blocks, whole recordings and the smoother's second pass, so all give the same
-bits. What the smoother needs is written to a `Record`; without one the same slot is overwritten every sample.
+A sample is one `advance`: predict, add noise, judge contacts, correct, inject. It serves live blocks, whole
+recordings and the smoother's second pass, so all give the same bits. What the smoother needs is written to a
+`Record`; without one the same slot is overwritten every sample.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from core.body.erkf.updates import (
     VELOCITY,
     back_correct,
     bent,
-    correct,
     heading_rows,
     joint_rows,
     known_rows,
+    take_block,
     tilt_rows,
 )
-from core.body.so3 import FAST, matrix, turn
 from core.frames import Bools, Floats
+from core.rotation.compiled import to_matrix, turn
 
 INVALID, CONTACT, STILL = 1, 2, 4
 """Bits of a sample's flags."""
@@ -46,6 +47,58 @@ class Record(NamedTuple):
     blocks: Floats
     P: Floats
     dx: Floats
+
+
+class ErkfMemory(NamedTuple):
+    """What passes from one sample to the next, advanced in place: `ErkfState` as the kernels take it.
+
+    x (n, 16) · P (N, N) · before (n, 6) · dx (N,) injected last · refused (n,).
+    """
+
+    x: Floats
+    P: Floats
+    before: Floats
+    dx: Floats
+    refused: NDArray[np.int64]
+
+
+class ErkfSamples(NamedTuple):
+    """A block: step (T,) s · acc, gyr (T, n, 3) · flags (T, n) · heading (T, n), or (0, n) for none."""
+
+    step: Floats
+    acc: Floats
+    gyr: Floats
+    flags: NDArray[np.int64]
+    heading: Floats
+
+
+class ErkfOutput(NamedTuple):
+    """What a block gives: nominal (T, n, 16) · heading_sd (T, n) · residual (T, J) · refused (T, n)."""
+
+    nominal: Floats
+    heading_sd: Floats
+    residual: Floats
+    refused: Bools
+
+    def part(self, first: int, past: int) -> ErkfOutput:
+        """Where samples first … past − 1 are written."""
+        k = slice(first, past)
+        return ErkfOutput(self.nominal[k], self.heading_sd[k], self.residual[k], self.refused[k])
+
+
+class ErkfScratch(NamedTuple):
+    """R (n, 3, 3) of the IMUs · U (4, 3), y (3,), place (4,), H (2, 3, 3) of a block · vectors (10, 3) ·
+    zero (3,) · taken (n,) zero velocities · slack (J,) m of the joint centres."""
+
+    R: Floats
+    U: Floats
+    y: Floats
+    vectors: Floats
+    zero: Floats
+    taken: Bools
+    slack: Floats
+    place: NDArray[np.int64]
+    H: Floats
 
 
 class Noise(NamedTuple):
@@ -81,7 +134,7 @@ class Links(NamedTuple):
     sd: Floats
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def passes(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     """vᵀ S⁻¹ v ≤ gate for the zero velocity of the IMU whose errors begin at b."""
     S = P[b + 3 : b + 6, b + 3 : b + 6]
@@ -95,131 +148,193 @@ def passes(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     return s <= gate * det
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
-def forward(  # type: ignore[no-untyped-def]
-    x, P, before, dx, refused, step, acc, gyr, flags, heading, links, noise, record, out, sd, residual, hit
-):
-    """Filter a block in place; sample at which the covariance broke, or −1."""
-    T, n = flags.shape
-    m, N = noise.m, P.shape[0]
-    J = links.ends.shape[0]
-    stride = 1 if record.V.shape[0] > 1 else 0
-    R, U, y = np.empty((n, 3, 3)), np.empty((4, 3)), np.empty(3)
-    scratch, zero = np.empty((10, 3)), np.zeros(3)
-    take, slack = np.zeros(n, np.bool_), np.empty(J)
-    for k in range(T):
-        slot, dt = stride * k, step[k]
-        F, V, E, H = record.F[slot], record.V[slot], record.E[slot], record.H[slot]
-        place = record.place[slot]
-        for i in range(n):
-            move(x[i], before[i], acc[k, i], gyr[k, i], dt, noise.first, R[i], F[i], scratch)
-            reset_before(F[i], dx[i * m + 6 : i * m + 9])
-        propagate(P, F, m, dt)
-        for i in range(n):
-            b = i * m
-            jump = 0.0
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-def]
+    """Move every IMU and the covariance over the time before sample k; F (n, 5, 3, 3) is kept."""
+    x, before, dx, acc, gyr = memory.x, memory.before, memory.dx, samples.acc, samples.gyr
+    R, vectors, m, dt = scratch.R, scratch.vectors, noise.m, samples.step[k]
+    for i in range(F.shape[0]):
+        move(x[i], before[i], acc[k, i], gyr[k, i], dt, noise.first, R[i], F[i], vectors)
+        reset_before(F[i], dx[i * m + 6 : i * m + 9])
+    propagate(memory.P, F, m, dt)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+def add_noise(memory, samples, k, links, noise):  # type: ignore[no-untyped-def]
+    """Add the process noise of sample k, and make that the last sample."""
+    P, before, dt = memory.P, memory.before, samples.step[k]
+    acc, gyr, flags, sd = samples.acc, samples.gyr, samples.flags, links.sd
+    for i in range(before.shape[0]):
+        b = i * noise.m
+        jump = 0.0
+        for c in range(3):
+            jump += (acc[k, i, c] - before[i, c]) ** 2
+        va = sd[i, 0] ** 2 + noise.impact**2 * jump
+        vw = sd[i, 1] ** 2
+        if flags[k, i] & INVALID:
+            va, vw = noise.gap_acc**2, noise.gap_gyr**2
+        for c in range(3):
+            P[b + 3 + c, b + 3 + c] += va * dt * dt
+            P[b + 6 + c, b + 6 + c] += vw * dt * dt
+            if noise.m == 15:
+                P[b + 9 + c, b + 9 + c] += noise.gyr_walk**2 * dt
+                P[b + 12 + c, b + 12 + c] += noise.acc_walk**2 * dt
+            before[i, c] = acc[k, i, c]
+            before[i, 3 + c] = gyr[k, i, c]
+
+
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+def judge_contacts(memory, flags, noise, taken, refused):  # type: ignore[no-untyped-def]
+    """Write for a sample's flags (n,) which zero velocities are taken (n,) and which the gate refuses (n,).
+
+    All are judged from the predicted state, before any block, so that the order does not matter.
+    """
+    P, x, count = memory.P, memory.x, memory.refused
+    for i in range(flags.shape[0]):
+        taken[i] = False
+        refused[i] = False
+        if not flags[i] & CONTACT or noise.zero_velocity < 0.0:
+            count[i] = 0
+            continue
+        b, v = i * noise.m, x[i, 3:6]
+        taken[i] = noise.gate < 0.0 or passes(P, b, v, noise.zero_velocity, noise.gate)
+        refused[i] = not taken[i]
+        count[i] = 0 if taken[i] else count[i] + 1
+        if count[i] >= noise.reaccept:
+            taken[i] = True
+            speed2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
             for c in range(3):
-                jump += (acc[k, i, c] - before[i, c]) ** 2
-            va = links.sd[i, 0] ** 2 + noise.impact**2 * jump
-            vw = links.sd[i, 1] ** 2
-            if flags[k, i] & INVALID:
-                va, vw = noise.gap_acc**2, noise.gap_gyr**2
-            for c in range(3):
-                P[b + 3 + c, b + 3 + c] += va * dt * dt
-                P[b + 6 + c, b + 6 + c] += vw * dt * dt
-                if m == 15:
-                    P[b + 9 + c, b + 9 + c] += noise.gyr_walk**2 * dt
-                    P[b + 12 + c, b + 12 + c] += noise.acc_walk**2 * dt
-                before[i, c] = acc[k, i, c]
-                before[i, 3 + c] = gyr[k, i, c]
-        # contacts are judged from the predicted state, before any block, so that the order does not matter
-        for i in range(n):
-            take[i] = False
-            hit[k, i] = False
-            if not flags[k, i] & CONTACT or noise.zero_velocity < 0.0:
-                refused[i] = 0
+                P[b + c, b + c] += noise.reaccept_m**2
+                P[b + 3 + c, b + 3 + c] += speed2
+
+
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: ignore[no-untyped-def]
+    """Take all blocks of sample k into the covariance and the correction; False if one is not positive."""
+    x, P, dx, R, y, U = memory.x, memory.P, memory.dx, scratch.R, scratch.y, scratch.U
+    place, H, V, E = record.place[slot], record.H[slot], record.V[slot], record.E[slot]
+    m = noise.m
+    # from the predicted covariance, as the contacts
+    for j in range(links.ends.shape[0]):
+        a, c = links.ends[j, 0], links.ends[j, 1]
+        scratch.slack[j] = np.sqrt(
+            max(noise.centre, 0.0) ** 2 + bent(P, R, m, a, c, links.lever[j, 0], links.lever[j, 1])
+        )
+    dx[:] = 0.0
+    B = 0
+    good = True
+    for j in range(links.ends.shape[0]):
+        a, c = links.ends[j, 0], links.ends[j, 1]
+        for axis in range(2):
+            if (noise.axis if axis else noise.centre) < 0.0 or (axis and not links.hinged[j]):
                 continue
-            b, v = i * m, x[i, 3:6]
-            take[i] = noise.gate < 0.0 or passes(P, b, v, noise.zero_velocity, noise.gate)
-            hit[k, i] = not take[i]
-            refused[i] = 0 if take[i] else refused[i] + 1
-            if refused[i] >= noise.reaccept:
-                take[i] = True
-                speed2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-                for c in range(3):
-                    P[b + c, b + c] += noise.reaccept_m**2
-                    P[b + 3 + c, b + 3 + c] += speed2
-        # all from the predicted covariance too
-        for j in range(J):
-            a, c = links.ends[j, 0], links.ends[j, 1]
-            slack[j] = np.sqrt(
-                max(noise.centre, 0.0) ** 2 + bent(P, R, m, a, c, links.lever[j, 0], links.lever[j, 1])
-            )
-        dx[:] = 0.0
-        B = 0
-        good = True
-        for j in range(J):
-            a, c = links.ends[j, 0], links.ends[j, 1]
-            for axis in range(2):
-                if (noise.axis if axis else noise.centre) < 0.0 or (axis and not links.hinged[j]):
-                    continue
-                s = noise.axis if axis else slack[j]
-                on = links.axis[j] if axis else links.lever[j]
-                joint_rows(x, R, m, a, c, on[0], on[1], axis == 0, place[B], H[B], y)
-                good &= correct(P, dx, place[B], H[B], y, s, V[B], E[B], U)
+            sd = noise.axis if axis else scratch.slack[j]
+            on = links.axis[j] if axis else links.lever[j]
+            joint_rows(x, R, m, a, c, on[0], on[1], axis == 0, place[B], H[B], y)
+            good &= take_block(P, dx, place[B], H[B], y, sd, V[B], E[B], U)
+            B += 1
+    for i in range(x.shape[0]):
+        rests = samples.flags[k, i] & STILL
+        if scratch.taken[i]:
+            known_rows(place[B], m, i, VELOCITY, x[i, 3:6], scratch.zero, y)
+            good &= take_block(P, dx, place[B], H[B], y, noise.zero_velocity, V[B], E[B], U)
+            B += 1
+        if noise.tilt > 0.0 and (scratch.taken[i] or rests):
+            tilt_rows(R[i], samples.acc[k, i], m, i, place[B], H[B], y)
+            good &= take_block(P, dx, place[B], H[B], y, noise.tilt, V[B], E[B], U)
+            B += 1
+        if noise.zaru > 0.0 and m == 15 and rests:
+            known_rows(place[B], m, i, GYRO_BIAS, x[i, 10:13], samples.gyr[k, i], y)
+            good &= take_block(P, dx, place[B], H[B], y, noise.zaru, V[B], E[B], U)
+            B += 1
+        # nested: heading_rows writes the block and may only run where a heading was measured
+        if samples.heading.shape[0] > 0 and np.isfinite(samples.heading[k, i]):  # noqa: SIM102
+            if heading_rows(R[i], links.forward[i], samples.heading[k, i], m, i, place[B], H[B], y):
+                good &= take_block(P, dx, place[B], H[B], y, noise.heading, V[B], E[B], U)
                 B += 1
-        for i in range(n):
-            if take[i]:
-                known_rows(place[B], m, i, VELOCITY, x[i, 3:6], zero, y)
-                good &= correct(P, dx, place[B], H[B], y, noise.zero_velocity, V[B], E[B], U)
-                B += 1
-            if noise.tilt > 0.0 and (take[i] or flags[k, i] & STILL):
-                tilt_rows(R[i], acc[k, i], m, i, place[B], H[B], y)
-                good &= correct(P, dx, place[B], H[B], y, noise.tilt, V[B], E[B], U)
-                B += 1
-            if noise.zaru > 0.0 and m == 15 and flags[k, i] & STILL:
-                known_rows(place[B], m, i, GYRO_BIAS, x[i, 10:13], gyr[k, i], y)
-                good &= correct(P, dx, place[B], H[B], y, noise.zaru, V[B], E[B], U)
-                B += 1
-            # nested: heading_rows writes the block and may only run where a heading was measured
-            if heading.shape[0] > 0 and np.isfinite(heading[k, i]):  # noqa: SIM102
-                if heading_rows(R[i], links.forward[i], heading[k, i], m, i, place[B], H[B], y):
-                    good &= correct(P, dx, place[B], H[B], y, noise.heading, V[B], E[B], U)
-                    B += 1
-        record.blocks[slot] = B
-        for i in range(n):
-            b = i * m
-            for c in range(3):
-                x[i, c] += dx[b + c]
-                x[i, 3 + c] += dx[b + 3 + c]
-                if m == 15:
-                    x[i, 10 + c] += dx[b + 9 + c]
-                    x[i, 13 + c] += dx[b + 12 + c]
-            turn(x[i, 6:10], dx[b + 6], dx[b + 7], dx[b + 8])
-            matrix(x[i, 6:10], R[i])
-            var = 0.0
-            for c in range(3):
-                for e in range(3):
-                    var += R[i, 2, c] * P[b + 6 + c, b + 6 + e] * R[i, 2, e]
-            sd[k, i] = np.sqrt(max(var, 0.0))
-            out[k, i] = x[i]
-        for r in range(N):
-            good &= P[r, r] > 0.0 and abs(dx[r]) < 1e9
-        if not good:
+    record.blocks[slot] = B
+    return good
+
+
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-untyped-def]
+    """Move the correction into the state, and write that (n, 16) and its headings' deviations (n,)."""
+    x, P, dx, R = memory.x, memory.P, memory.dx, scratch.R
+    for i in range(x.shape[0]):
+        b = i * noise.m
+        for c in range(3):
+            x[i, c] += dx[b + c]
+            x[i, 3 + c] += dx[b + 3 + c]
+            if noise.m == 15:
+                x[i, 10 + c] += dx[b + 9 + c]
+                x[i, 13 + c] += dx[b + 12 + c]
+        turn(x[i, 6:10], dx[b + 6], dx[b + 7], dx[b + 8])
+        to_matrix(x[i, 6:10], R[i])
+        var = 0.0
+        for c in range(3):
+            for e in range(3):
+                var += R[i, 2, c] * P[b + 6 + c, b + 6 + e] * R[i, 2, e]
+        heading_sd[i] = np.sqrt(max(var, 0.0))
+        nominal[i] = x[i]
+
+
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+def measure_joints(memory, links, noise, scratch, residual):  # type: ignore[no-untyped-def]
+    """Write how far the two ends of each joint are apart (J,), m."""
+    y = scratch.y
+    for j in range(residual.shape[0]):
+        a, c = links.ends[j, 0], links.ends[j, 1]
+        joint_rows(
+            memory.x, scratch.R, noise.m, a, c, links.lever[j, 0], links.lever[j, 1], True, scratch.place,
+            scratch.H, y,
+        )  # fmt: skip
+        residual[j] = np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+def advance(memory, samples, k, links, noise, scratch, record, slot, output):  # type: ignore[no-untyped-def]
+    """Filter sample k of a block: the one rule of a file and a stream; False if the covariance broke."""
+    predict(memory, samples, k, noise, scratch, record.F[slot])
+    add_noise(memory, samples, k, links, noise)
+    judge_contacts(memory, samples.flags[k], noise, scratch.taken, output.refused[k])
+    good = correct(memory, samples, k, links, noise, scratch, record, slot)
+    inject(memory, noise, scratch, output.nominal[k], output.heading_sd[k])
+    for r in range(memory.dx.shape[0]):
+        good &= memory.P[r, r] > 0.0 and abs(memory.dx[r]) < 1e9
+    if good:
+        measure_joints(memory, links, noise, scratch, output.residual[k])
+    return good
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def forward(memory, samples, links, noise, record, output):  # type: ignore[no-untyped-def]
+    """Filter a block, `memory` in place; sample at which the covariance broke, or −1.
+
+    All are given as plain tuples: numba looks at the fields of a named one anew in every call, 0.3 µs each.
+    """
+    memory = ErkfMemory(*memory)
+    samples = ErkfSamples(*samples)
+    links = Links(*links)
+    noise = Noise(*noise)
+    record = Record(*record)
+    output = ErkfOutput(*output)
+    n, J = memory.x.shape[0], links.ends.shape[0]
+    scratch = ErkfScratch(
+        np.empty((n, 3, 3)), np.empty((4, 3)), np.empty(3), np.empty((10, 3)), np.zeros(3),
+        np.zeros(n, np.bool_), np.empty(J), np.empty(4, np.int64), np.empty((2, 3, 3)),
+    )  # fmt: skip
+    keeps = record.V.shape[0] > 1
+    for k in range(samples.step.shape[0]):
+        slot = k if keeps else 0
+        if not advance(memory, samples, k, links, noise, scratch, record, slot, output):
             return k
-        for j in range(J):
-            joint_rows(
-                x, R, m, links.ends[j, 0], links.ends[j, 1], links.lever[j, 0], links.lever[j, 1], True,
-                place[B], H[B], y,
-            )  # fmt: skip
-            residual[k, j] = np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2)
-        if stride:
-            record.P[slot] = P
-            record.dx[slot] = dx
+        if keeps:
+            record.P[slot] = memory.P
+            record.dx[slot] = memory.dx
     return -1
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def backward(lam, step, record, m, out):  # type: ignore[no-untyped-def]
     """Sweep λ (N,) back over a recorded segment and turn its filtered states `out` into smoothed ones."""
     T, n = out.shape[0], out.shape[1]

@@ -16,9 +16,9 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.erkf.filter import ErkfInputs, links_of, new_record, noise_of
+from core.body.erkf.filter import ErkfInputs, links_of, memory_of, new_output, new_record, noise_of
 from core.body.erkf.gaps import HOLD_S
-from core.body.erkf.kernel import CONTACT, INVALID, STILL, forward
+from core.body.erkf.kernel import CONTACT, INVALID, STILL, ErkfSamples, forward
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.start import start_state
 from core.body.live_still import ROLLING_MPS
@@ -103,8 +103,7 @@ class LiveErkf:
         state = start_state(
             tree, ErkfInputs(step, standing.acc, standing.gyr, standing.valid, none, none), params, (0, T), q
         )
-        self._x, self._P, self._before = state.nominal, state.P, state.before
-        self._dx, self._refused = state.injected, state.refused
+        self._memory = memory_of(state)
         self._heading = np.empty((0, n))
         self._gone, self._adrift = np.zeros(n, np.int64), np.zeros(n, np.bool_)
         linked = {i for j in tree.joints for i in (j.proximal, j.distal)}
@@ -118,11 +117,11 @@ class LiveErkf:
         NaN too is a foot that was lost for long, until it rests again.
         """
         T, n = signals.valid.shape
-        out, sd = np.empty((T, n, 16)), np.empty((T, n))
-        residual, hit = np.empty((T, len(self.tree.joints))), np.empty((T, n), np.bool_)
+        output = new_output(self.tree, T)
+        states, residual = output.nominal, output.residual
         if self.broken:
-            out[:], residual[:] = np.nan, np.nan
-            return out, residual
+            states[:], residual[:] = np.nan, np.nan
+            return states, residual
         step = np.full(T, self._dt)
         if self._first and T:
             step[0], self._first = 0.0, False
@@ -134,16 +133,16 @@ class LiveErkf:
             for _, i in (x for x in begins if x[0] == first):
                 self._settle(i, signals.acc[first, i], signals.gyr[first, i])
             k = slice(first, past)
+            samples = ErkfSamples(step[k], signals.acc[k], signals.gyr[k], flags[k], self._heading)
+            part = output.part(first, past)
             broke = forward(
-                self._x, self._P, self._before, self._dx, self._refused, step[k], signals.acc[k],
-                signals.gyr[k], flags[k], self._heading, self._links, self._noise, self._record, out[k],
-                sd[k], residual[k], hit[k],
-            )  # fmt: skip
+                *map(tuple, (self._memory, samples, self._links, self._noise, self._record, part))
+            )
             if broke >= 0:
-                out[first + broke :], residual[first + broke :], self.broken = np.nan, np.nan, True
+                states[first + broke :], residual[first + broke :], self.broken = np.nan, np.nan, True
                 break
-        out[adrift] = np.nan
-        return out, residual
+        states[adrift] = np.nan
+        return states, residual
 
     def _settles(self, signals: Signals, adrift: Bools) -> Iterator[tuple[int, int]]:
         """Sample and foot where one that hangs on nothing rests again after a loss; marks all until they do.
@@ -167,7 +166,8 @@ class LiveErkf:
 
     def _settle(self, i: int, acc: Floats, gyr: Floats) -> None:
         """Begin sensor i anew where it is, at rest: level by gravity, as it faces."""
-        x, m, c = self._x[i], self._noise.m, self._params
+        memory, m, c = self._memory, self._noise.m, self._params
+        x = memory.x[i]
         x[3:6] = 0.0
         force = rotate(x[6:10], acc)
         force /= np.linalg.norm(force)
@@ -176,8 +176,8 @@ class LiveErkf:
         turn = axis * (np.arctan2(sine, force[2]) / sine) if sine > 0.0 else np.zeros(3)
         x[6:10] = multiply(exp(turn), x[6:10])
         part = slice(i * m, (i + 1) * m)
-        self._P[part], self._P[:, part], self._dx[part] = 0.0, 0.0, 0.0
+        memory.P[part], memory.P[:, part], memory.dx[part] = 0.0, 0.0, 0.0
         sd = np.repeat((c.start_position_sd, ROLLING_MPS, SETTLED_TILT, c.start_gyr_bias_sd,
                         c.start_acc_bias_sd), 3)[:m]  # fmt: skip
-        self._P[part, part] = np.diag(sd**2)
-        self._before[i], self._refused[i] = np.concatenate((acc, gyr)), 0
+        memory.P[part, part] = np.diag(sd**2)
+        memory.before[i], memory.refused[i] = np.concatenate((acc, gyr)), 0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.body.erkf.live_bridge import Bridge
+from core.body.erkf.gaps import Bridge
 from core.body.erkf.live_erkf import LiveErkf, Signals
 from core.body.erkf.params import ErkfParams
 from core.body.live_estimator import Paths, Raw

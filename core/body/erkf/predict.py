@@ -7,19 +7,24 @@ asymmetry grows without bound: docs/science/erkf.md, "Prediction".)
 
 from __future__ import annotations
 
-from math import sin, sqrt
-
 import numba
 import numpy as np
 
-from core.body.so3 import FAST, exponential, matrix, product, times_cross, turn
 from core.frames import GRAVITY
+from core.rotation.compiled import (
+    multiply3,
+    sine_quotients,
+    skew_polynomial,
+    times_cross,
+    to_matrix,
+    turn,
+)
 
 A, S, D, GAMMA, C = range(5)
 """Blocks of F per IMU, δv'=δv+A δθ+D δb_g+C δb_a, δp'=δp+Δt δv+½Δt(δv'−δv), δθ'=S δθ+Γ δb_g."""
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-untyped-def]
     """Advance one IMU's nominal state x (16,) and write its blocks F (5, 3, 3) and new matrix R (3, 3).
 
@@ -34,9 +39,9 @@ def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-unty
         phi[i] = (first * before[3 + i] + last * gyr[i] - x[10 + i]) * dt
         f0[i] = first * (before[i] - x[13 + i])
         f1[i] = last * (acc[i] - x[13 + i])
-    matrix(x[6:10], start)
+    to_matrix(x[6:10], start)
     turn(x[6:10], phi[0], phi[1], phi[2])
-    matrix(x[6:10], R)
+    to_matrix(x[6:10], R)
     for i in range(3):
         accelerated[i] = start[i, 0] * f0[0] + start[i, 1] * f0[1] + start[i, 2] * f0[2]
         accelerated[i] += R[i, 0] * f1[0] + R[i, 1] * f1[1] + R[i, 2] * f1[2]
@@ -45,19 +50,12 @@ def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-unty
         x[i] += dt * x[3 + i] + 0.5 * dt * dt * accelerated[i]
         x[3 + i] += dt * accelerated[i]
 
-    angle2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2]
-    angle = sqrt(angle2)
-    if angle < 1e-4:
-        s1, s2, s3 = 1.0 - angle2 / 6.0, 0.5 - angle2 / 24.0, 1.0 / 6.0 - angle2 / 120.0
-    else:
-        s1 = sin(angle) / angle
-        s2 = 2.0 * sin(0.5 * angle) ** 2 / angle2
-        s3 = (1.0 - s1) / angle2
-    exponential(phi, 1.0, -s1, s2, F[S])
-    exponential(phi, -dt, dt * s2, -dt * s3, F[GAMMA])
+    s1, s2, s3 = sine_quotients(phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
+    skew_polynomial(phi, 1.0, -s1, s2, F[S])
+    skew_polynomial(phi, -dt, dt * s2, -dt * s3, F[GAMMA])
     times_cross(R, f1, -dt, turned)
-    product(turned, F[S], 1.0, F[A])
-    product(turned, F[GAMMA], 1.0, F[D])
+    multiply3(turned, F[S], F[A])
+    multiply3(turned, F[GAMMA], F[D])
     times_cross(start, f0, -dt, F[C])
     for i in range(3):
         for j in range(3):
@@ -65,7 +63,7 @@ def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-unty
             F[C, i, j] = -dt * (first * start[i, j] + last * R[i, j])
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def reset_before(F, d):  # type: ignore[no-untyped-def]
     """Fold the reset Jacobian G = 1 − ½[δθ̂]× of the last correction (eq 27) into A and S: F ← F G."""
     a, b, c = 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]
@@ -77,7 +75,7 @@ def reset_before(F, d):  # type: ignore[no-untyped-def]
             F[k, i, 2] = z - (x * b - y * a)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
     """P ← F P Fᵀ for the blocks F (n, 5, 3, 3) of n IMUs with m errors each."""
     N = P.shape[0]
@@ -137,7 +135,7 @@ def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
             P[c, r] = P[r, c]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def back(lam, F, m, dt):  # type: ignore[no-untyped-def]
     """λ ← Fᵀ λ, the same step for the smoother."""
     for j in range(len(lam) // m):

@@ -8,11 +8,11 @@ stacked update. Rows: Potter 2021 eq 28–35; V = L⁻¹ H P, P ← P − VᵀV:
 
 from __future__ import annotations
 
-from math import atan2, pi, sqrt
+from math import atan2, sqrt
 
 import numba
 
-from core.body.so3 import FAST, times_cross
+from core.rotation.compiled import skew, times_cross, wrap_angle
 
 FIRST, SECOND, UNIT, TURNS = range(4)
 """A block's place: first error of its IMUs (SECOND is −1 for one IMU), offset of the ±1 (−1: none), whether
@@ -22,7 +22,7 @@ POSITION, VELOCITY, ANGLE, GYRO_BIAS = 0, 3, 6, 9
 """Offsets in an IMU's errors."""
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-untyped-def]
     """Joint centre p_i + R_i r_i = p_j + R_j r_j, or with centre False joint axis R_i e_i = R_j e_j."""
     place[FIRST], place[SECOND] = i * m, j * m
@@ -36,7 +36,7 @@ def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-u
             y[k] += x[j, k] - x[i, k]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def bent(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
     """Variance of the joint centre's second-order term, ½ σ⁴ |r_xy|² of both levers, in m².
 
@@ -59,7 +59,7 @@ def bent(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
     return min(0.5 * var * var, 1.5) * reach
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def known_rows(place, m, i, offset, value, measured, y):  # type: ignore[no-untyped-def]
     """Zero velocity (measured 0) or the gyroscope at rest showing its bias: an error itself is observed."""
     place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, offset, 0
@@ -67,21 +67,17 @@ def known_rows(place, m, i, offset, value, measured, y):  # type: ignore[no-unty
         y[k] = measured[k] - value[k]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def tilt_rows(R, f, m, i, place, H, y):  # type: ignore[no-untyped-def]
     """Tilt: Rᵀẑ is the direction of the specific force at rest; δθ: [Rᵀẑ]×."""
     place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, -1, 1
     norm = 1.0 / sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
-    a, b, c = R[2, 0], R[2, 1], R[2, 2]
-    G = H[0]
-    G[0, 0], G[0, 1], G[0, 2] = 0.0, -c, b
-    G[1, 0], G[1, 1], G[1, 2] = c, 0.0, -a
-    G[2, 0], G[2, 1], G[2, 2] = -b, a, 0.0
+    skew(R[2], H[0])
     for k in range(3):
         y[k] = f[k] * norm - R[2, k]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-untyped-def]
     """Heading of the axis t = R f; two empty rows make it a block of three. False when t is near vertical."""
     tx = R[0, 0] * forward[0] + R[0, 1] * forward[1] + R[0, 2] * forward[2]
@@ -95,13 +91,12 @@ def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-un
         H[0, 0, k] = (tx * H[1, 1, k] - ty * H[1, 0, k]) / level
         H[0, 1, k] = 0.0
         H[0, 2, k] = 0.0
-    y[0], y[1], y[2] = measured - atan2(ty, tx), 0.0, 0.0
-    y[0] -= 2.0 * pi * round(y[0] / (2.0 * pi))
+    y[0], y[1], y[2] = wrap_angle(measured - atan2(ty, tx)), 0.0, 0.0
     return True
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
-def correct(P, dx, place, H, y, sd, V, E, U):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def take_block(P, dx, place, H, y, sd, V, E, U):  # type: ignore[no-untyped-def]
     """Take one block; V (3, N) and E (9,) = (e, L) are kept for the smoother. False if S is not positive."""
     N = P.shape[0]
     b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
@@ -181,7 +176,7 @@ def correct(P, dx, place, H, y, sd, V, E, U):  # type: ignore[no-untyped-def]
     return True
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def back_correct(lam, place, H, V, E):  # type: ignore[no-untyped-def]
     """λ ← λ − Hᵀ L⁻ᵀ (V λ + e): one block of the modified Bryson–Frazier smoother
     (docs/science/erkf.md, "Smoother")."""

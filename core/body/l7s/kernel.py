@@ -7,8 +7,8 @@ import numpy as np
 
 from core.body.l7s.constraints import project
 from core.body.l7s.updates import VELOCITY, N, apply_row, inject, reset
-from core.body.se3 import log_so3
 from core.frames import Floats
+from core.rotation.compiled import log_so3
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from core.body.se3 import exp_so3, multiply3, orthonormalise, right_jacobian
+from core.body.se3 import right_jacobian
+from core.rotation.compiled import exp_so3, multiply3, orthonormalise
 
 N = 27
 """Length of the error vector."""

@@ -115,7 +115,7 @@ def test_a_filter_that_breaks_says_so_once_and_contacts_go_on() -> None:
             # nothing from outside breaks it
             core = online.chain.estimator._filtered._filter
             assert core is not None
-            core._P[:] = -1.0
+            core._memory.P[:] = -1.0
     assert codes(frames).count("live_figure_lost") == 1
     after = [f for f in frames if f.t_s > 14.2]
     assert not any(f.valid or f.q or f.p for f in after)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from core.body.erkf.filter import erkf_inputs
-from core.body.erkf.gaps import HOLD_S, bridged
+from core.body.erkf.gaps import HOLD_S, bridge_gaps
 from core.body.erkf.params import ErkfParams
 from core.body.tree import ImuTree
 from core.frames import GRAVITY, Bools, Floats, Segment
@@ -35,7 +35,7 @@ def filled(valid: Bools) -> tuple[Floats, Floats]:
     take = mixed_walk()
     acc, gyr = take.inputs.acc.copy(), take.inputs.gyr.copy()
     acc[~valid] = gyr[~valid] = np.nan
-    return bridged(take.tree, acc, gyr, valid, take.rate_hz)
+    return bridge_gaps(take.tree, acc, gyr, valid, take.rate_hz)
 
 
 @cache
@@ -90,11 +90,11 @@ def test_without_a_neighbour_a_sensor_travels_on_upright() -> None:
         ("foot_l",), (), (0,), take.tree.q_mount[[foot]], take.tree.place[[foot]], take.tree.origin[[foot]]
     )
     valid = gap("foot_l", 2.0)
-    alone = bridged(
+    alone = bridge_gaps(
         tree, take.inputs.acc[:, [foot]], take.inputs.gyr[:, [foot]], valid[:, [foot]], take.rate_hz
     )
     all_lost = np.repeat(valid[:, [foot]], len(SEGMENTS), axis=1)
-    together = bridged(take.tree, take.inputs.acc, take.inputs.gyr, all_lost, take.rate_hz)
+    together = bridge_gaps(take.tree, take.inputs.acc, take.inputs.gyr, all_lost, take.rate_hz)
     late = slice(round((FROM_S + HOLD_S) * take.rate_hz), round((FROM_S + 2.0) * take.rate_hz))
     for acc, gyr in (
         (alone[0][late, 0], alone[1][late, 0]),
@@ -110,9 +110,19 @@ def test_filling_looks_only_back() -> None:
     n = round((FROM_S + 2.0) * take.rate_hz)
     whole = filled(valid)
     acc, gyr = take.inputs.acc[:n].copy(), take.inputs.gyr[:n].copy()
-    part = bridged(take.tree, acc, gyr, valid[:n], take.rate_hz)
+    part = bridge_gaps(take.tree, acc, gyr, valid[:n], take.rate_hz)
     for a, b in zip(whole, part, strict=True):
-        np.testing.assert_allclose(a[:n], b, atol=1e-12)
+        assert np.array_equal(a[:n], b)
+
+
+def test_before_its_first_sample_a_sensor_holds_that_and_no_gap_of_it_begins() -> None:
+    take = mixed_walk()
+    foot, first = SEGMENTS.index("foot_l"), round(2.0 * take.rate_hz)
+    valid = np.ones(take.inputs.valid.shape, bool)
+    valid[:first, foot] = False
+    acc, gyr = filled(valid)
+    assert (acc[:first, foot] == take.inputs.acc[first, foot]).all()
+    assert (gyr[:first, foot] == take.inputs.gyr[first, foot]).all()
 
 
 @pytest.mark.slow

@@ -1,16 +1,19 @@
-"""Quaternions and rotation matrices on (..., 4) and (..., 3, 3) arrays.
+"""Quaternions and rotation matrices on (..., 4) and (..., 3, 3) arrays, in numpy.
 
-Hamilton, scalar first (w, x, y, z); q maps body to world: v_W = q ⊗ v_B ⊗ q*.
-Source: docs/coordinate-systems.md, "Frames"; references in docs/science/orientation.md.
+Conventions and sources: `core/rotation/__init__.py`.
 """
 
 from __future__ import annotations
+
+from typing import TypeVar
 
 import numpy as np
 
 from core.frames import Floats
 
 _SMALL = 1e-8
+
+Angle = TypeVar("Angle", float, Floats)
 
 
 def normalise(q: Floats) -> Floats:
@@ -134,6 +137,11 @@ def yaw(q: Floats) -> Floats:
     """Heading (...) in rad of the body's x axis in the world's floor plane, from x towards y."""
     x = rotate(q, np.array([1.0, 0.0, 0.0]))
     return np.asarray(np.arctan2(x[..., 1], x[..., 0]))
+
+
+def wrap_angle(angle: Angle) -> Angle:
+    """The same angle (...) in rad in [−π, π)."""
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def _components(x: Floats) -> tuple[Floats, ...]:

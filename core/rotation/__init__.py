@@ -1,0 +1,30 @@
+"""Quaternions, rotation matrices and rotation vectors: on arrays (`arrays`) and one at a time (`compiled`).
+
+Hamilton, scalar first (w, x, y, z); q maps body to world: v_W = q ⊗ v_B ⊗ q*.
+Source: docs/coordinate-systems.md, "Frames"; references in docs/science/orientation.md.
+
+What this package gives itself is numpy and takes arrays with any leading axes. Compiled loops import
+`core.rotation.compiled`, which brings numba; readers of results do without.
+"""
+
+from core.rotation.arrays import (
+    about,
+    angle_between,
+    conjugate,
+    exp,
+    from_matrix,
+    log,
+    mean,
+    multiply,
+    normalise,
+    rotate,
+    slerp,
+    to_matrix,
+    wrap_angle,
+    yaw,
+)
+
+__all__ = [
+    "about", "angle_between", "conjugate", "exp", "from_matrix", "log", "mean", "multiply", "normalise",
+    "rotate", "slerp", "to_matrix", "wrap_angle", "yaw",
+]  # fmt: skip

@@ -1,0 +1,27 @@
+"""The low-pass of whole signals: what it lets through, and that it moves nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core.filtering import low_pass
+
+RATE = 100.0
+
+
+@pytest.mark.parametrize(("hz", "share"), [(0.2, 1.0), (3.0, 0.5), (20.0, 0.0)])
+def test_slow_passes_in_place_and_fast_does_not(hz: float, share: float) -> None:
+    """Twice second order: half the amplitude at the cutoff, no delay."""
+    t = np.arange(0.0, 20.0, 1.0 / RATE)
+    wave = np.sin(2.0 * np.pi * hz * t)
+    middle = slice(500, 1500)
+    np.testing.assert_allclose(low_pass(wave, 3.0, RATE)[middle], share * wave[middle], atol=0.01)
+
+
+def test_every_row_is_filtered_alone_and_a_short_signal_too() -> None:
+    rows = np.random.default_rng(0).normal(size=(2, 60))
+    both = low_pass(rows, 4.0, RATE, pad=30)
+    assert np.array_equal(both[1], low_pass(rows[1], 4.0, RATE, pad=30))
+    assert np.isfinite(low_pass(rows[0, :5], 4.0, RATE)).all()
+    np.testing.assert_allclose(low_pass(np.full(40, 2.0), 500.0, RATE), 2.0)
