@@ -133,7 +133,7 @@ USUAL: Final = WalkingCondition("comfortable", "none", "none", "shoes")
 
 def is_alike(a: WalkingCondition, b: WalkingCondition) -> bool:
     """Whether two takes were walked under the same condition, feedback aside."""
-    return not differences(replace(a, feedback=False), replace(b, feedback=False))
+    return not compare_conditions(replace(a, feedback=False), replace(b, feedback=False))
 
 
 def is_comparable(a: WalkingCondition, b: WalkingCondition) -> bool:
@@ -141,7 +141,7 @@ def is_comparable(a: WalkingCondition, b: WalkingCondition) -> bool:
     return not a.feedback and not b.feedback and is_alike(a, b)
 
 
-def differences(a: WalkingCondition, b: WalkingCondition) -> tuple[str, ...]:
+def compare_conditions(a: WalkingCondition, b: WalkingCondition) -> tuple[str, ...]:
     """How the condition of one take differs from that of a later one, in words: "own pace, then fast"."""
     found = []
     if a.protocol != b.protocol:

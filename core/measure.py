@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 from core.angles import JointAngles
 from core.body.feet import FootTracks
 from core.errors import Notice
-from core.events.bouts import Bout, BoutParams, bouts_of
-from core.events.edits import Edit, edited_events, edited_strides
-from core.events.flags import StrideParams, with_flag
+from core.events.bouts import Bout, BoutParams, find_bouts
+from core.events.edits import Edit, apply_event_edits, apply_stride_edits
+from core.events.flags import StrideParams, add_flag
 from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
-from core.events.strides import counted, stride_list
+from core.events.strides import count_strides, stride_list
 from core.events.turns import Turn
 from core.frames import Bools, Floats, Segment
 from core.parameters import Surface, take_figures
@@ -70,7 +70,7 @@ class Tracks:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredGait:
     """What the events and edits give.
 
     Parameters
@@ -101,7 +101,7 @@ def _regular(tracks: Tracks, steps: Steps) -> tuple[Parameter, ...]:
     )
 
 
-def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
+def measure_gait(tracks: Tracks, edits: Sequence[Edit] = ()) -> MeasuredGait:
     """Apply the edits and measure again.
 
     Raises
@@ -110,15 +110,15 @@ def measure(tracks: Tracks, edits: Sequence[Edit] = ()) -> Measured:
         An edit does not fit the events: `no_such_event`, `event_outside`, `event_order` of
         core/events/edits.py.
     """
-    events = edited_events(tracks.events, edits, tracks.duration_s)
-    strides = edited_strides(_walked(tracks, events), edits)
+    events = apply_event_edits(tracks.events, edits, tracks.duration_s)
+    strides = apply_stride_edits(_walked(tracks, events), edits)
     figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk)
     # contacts, found or set by a person, say more than the trunk
     steps = None if events.events else tracks.steps
-    bouts = bouts_of(events, tracks.rests, tracks.bout_params) if steps is None else steps.bouts
+    bouts = find_bouts(events, tracks.rests, tracks.bout_params) if steps is None else steps.bouts
     first = figures.parameters if steps is None else _of_steps(tracks, steps, figures.parameters)
     parameters = first + bout_parameters(bouts) + turn_parameters(tracks.turns)
-    return Measured(events, strides, parameters, figures.columns, bouts, tracks.turns, steps)
+    return MeasuredGait(events, strides, parameters, figures.columns, bouts, tracks.turns, steps)
 
 
 def _walked(tracks: Tracks, events: GaitEvents) -> Strides:
@@ -127,8 +127,8 @@ def _walked(tracks: Tracks, events: GaitEvents) -> Strides:
     marching = in_place(found, tracks.feet, tracks.surface)
     if not marching:
         return found
-    return counted(
-        [with_flag(s, "in_place") if i in marching else s for i, s in enumerate(found.strides)], tracks.params
+    return count_strides(
+        [add_flag(s, "in_place") if i in marching else s for i, s in enumerate(found.strides)], tracks.params
     )
 
 

@@ -89,7 +89,7 @@ class Subject:
         check_standing(self.standing_angles_deg)
         object.__setattr__(self, "standing_angles_deg", MappingProxyType(dict(self.standing_angles_deg)))
 
-    def completed(self, other: Subject) -> Subject:
+    def complete_from(self, other: Subject) -> Subject:
         """What is known here, and from `other` what is not."""
         height, width = self.height_m, self.standing_width_m
         return Subject(

@@ -49,7 +49,7 @@ class Quietness:
     quiet: Bools
 
 
-def quietness(signals: SensorSignals, rate_hz: float, params: RestParams | None = None) -> Quietness:
+def measure_quietness(signals: SensorSignals, rate_hz: float, params: RestParams | None = None) -> Quietness:
     """Measure how quiet a sensor is in the window around every sample; borders hold the nearest window."""
     params = params or RestParams()
     width = max(2, round(params.window_s * rate_hz))
@@ -71,7 +71,7 @@ def quietness(signals: SensorSignals, rate_hz: float, params: RestParams | None 
     return Quietness(_centred(gyro, n, width), _centred(acc, n, width), _centred(quiet, n, width))
 
 
-def rest_windows(
+def find_rest_windows(
     recording: UniformRecording,
     params: RestParams | None = None,
     segments: Iterable[Segment] | None = None,
@@ -86,30 +86,30 @@ def rest_windows(
         return ()
     quiet = np.ones(len(recording.t_s), bool)
     for segment in chosen:
-        quiet &= quietness(recording.sensors[segment], recording.rate_hz, params).quiet
-    return windows_of(quiet, recording.rate_hz, params)
+        quiet &= measure_quietness(recording.sensors[segment], recording.rate_hz, params).quiet
+    return find_windows(quiet, recording.rate_hz, params)
 
 
-def windows_of(quiet: Bools, rate_hz: float, params: RestParams | None = None) -> tuple[Window, ...]:
+def find_windows(quiet: Bools, rate_hz: float, params: RestParams | None = None) -> tuple[Window, ...]:
     """Turn a mask of quiet window centres into rest windows of at least `shortest_s`."""
     params = params or RestParams()
     n = len(quiet)
     reach = round(0.25 * params.window_s * rate_hz)
     found = []
-    for start, end in runs(quiet):
+    for start, end in find_runs(quiet):
         first, last = max(0, start - reach), min(n, end + reach)
         if last - first >= params.shortest_s * rate_hz - 1:
             found.append((first / rate_hz, last / rate_hz))
     return tuple(found)
 
 
-def runs(mask: Bools) -> list[tuple[int, int]]:
+def find_runs(mask: Bools) -> list[tuple[int, int]]:
     """Half-open index ranges of the True runs of a mask (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     return [(a, b) for a, b in edges.reshape(-1, 2).tolist()]
 
 
-def samples(window: Window, rate_hz: float) -> slice:
+def index_window(window: Window, rate_hz: float) -> slice:
     """Index range of a time window on the uniform axis."""
     return slice(max(0, round(window[0] * rate_hz)), max(0, round(window[1] * rate_hz)))
 

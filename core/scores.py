@@ -108,7 +108,7 @@ class Scores:
         return tuple(s for s in self.scores if s.mode == mode and s.unit == "deg")
 
 
-def scores(
+def score_curves(
     curves: CycleCurves,
     standing_deg: Mapping[str, float] | None = None,
     reference: CurveReference | None = None,

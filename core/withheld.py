@@ -13,14 +13,14 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import SIGNS, JointAngles, joints
+from core.angles import SIGNS, JointAngles, list_leg_joints
 from core.body.estimate import PoseEstimate
-from core.body.health import Finding
+from core.body.health import HealthFinding
 from core.body.poses import Poses
 from core.errors import Notice
 from core.estimators import BY_METHOD
 from core.frames import FOOT, SIDES, SUFFIX, Oriented, Side
-from core.rest import runs
+from core.rest import find_runs
 from core.rotation import wrap_angle
 
 BAD: Final = "estimator_bad"
@@ -121,13 +121,13 @@ def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
     )
 
 
-def _concerned(f: Finding, estimated: frozenset[str]) -> Iterator[str]:
+def _concerned(f: HealthFinding, estimated: frozenset[str]) -> Iterator[str]:
     """Names of the angles that a bad finding spoils."""
     of = f.of or ""
     if f.name in OF_JOINT or f.name in OF_SEGMENT:
         ends = set(of.split("-"))
         for side in SIDES:
-            for joint, proximal, distal in joints(side):
+            for joint, proximal, distal in list_leg_joints(side):
                 # of a joint both ends are named, of a segment one
                 if ends <= {proximal, distal}:
                     yield from (f"{base}_{SUFFIX[side]}" for base, _, _ in SIGNS[joint])
@@ -147,7 +147,7 @@ def _after_gaps(orientations: Oriented, side: Side, least_s: float) -> np.ndarra
     """Samples (n,) in a loss of a foot longer than `least_s` or within `AFTER_GAP_S` of its end."""
     t_s, valid = orientations.t_s, orientations.valid[FOOT[side]]
     long = np.zeros(len(valid), np.bool_)
-    for start, stop in runs(~valid):
+    for start, stop in find_runs(~valid):
         end_s = float(t_s[stop - 1])
         if end_s - float(t_s[start]) > least_s:
             long |= (t_s >= t_s[start]) & (t_s <= end_s + AFTER_GAP_S)

@@ -26,7 +26,7 @@ class Analysis:
     of a column. Undefined is null.
     """
 
-    _found: pipeline.Analysis
+    _found: pipeline.TakeAnalysis
 
     @property
     def problem(self) -> Notice | None:

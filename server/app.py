@@ -23,7 +23,7 @@ def create_app(settings: Settings) -> FastAPI:
     from starlette.middleware import Middleware
 
     from server.api.routes import BESIDE, build_api
-    from server.auth.routes import declared_actions
+    from server.auth.routes import list_declared_actions
     from server.http import problems
     from server.http.body_limit import BodyLimit
     from server.http.compression import Compression
@@ -58,5 +58,5 @@ def create_app(settings: Settings) -> FastAPI:
     for router in (build_api(app), *BESIDE, *ROUTERS, proxy.router, live_proxy.router):
         app.include_router(router)
     app.mount("/static", Assets(directory=STATIC), name="static")
-    declared_actions(app.routes)
+    list_declared_actions(app.routes)
     return app

@@ -64,13 +64,13 @@ def record(
     c.execute(insert(audit).values(**row, hash=_seal(row)))
 
 
-def entries(c: Connection, *, before: int | None = None, limit: int = 100) -> list[Row[Any]]:
+def list_entries(c: Connection, *, before: int | None = None, limit: int = 100) -> list[Row[Any]]:
     """The newest rows, or the newest before a sequence number (for paging)."""
     query = select(audit).order_by(audit.c.seq.desc()).limit(limit)
     return list(c.execute(query if before is None else query.where(audit.c.seq < before)))
 
 
-def problems(c: Connection) -> list[str]:
+def find_problems(c: Connection) -> list[str]:
     """Where the chain is broken: changed rows, removed rows, a cut-off beginning or end.
 
     A whole database that is older than the one before is not seen here but in storage/high_water.py.

@@ -16,7 +16,7 @@ from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
-from server.trail import Trail
+from server.trail import AuditTrail
 
 
 def _settings(connection: HTTPConnection) -> Settings:
@@ -39,8 +39,8 @@ def _logins(connection: HTTPConnection) -> Logins:
     return cast("Logins", connection.app.state.logins)
 
 
-def _trail(connection: HTTPConnection) -> Trail:
-    return cast("Trail", connection.app.state.trail)
+def _trail(connection: HTTPConnection) -> AuditTrail:
+    return cast("AuditTrail", connection.app.state.trail)
 
 
 def _throttle(connection: HTTPConnection) -> Throttle:
@@ -66,7 +66,7 @@ Reviewed = Annotated[ReviewedAnalyses, Depends(_reviewed)]
 Queue = Annotated[JobQueue, Depends(_queue)]
 Feed = Annotated[JobFeed, Depends(_feed)]
 LiveHub = Annotated[Hub, Depends(_hub)]
-OpenTrail = Annotated[Trail, Depends(_trail)]
+OpenTrail = Annotated[AuditTrail, Depends(_trail)]
 OpenLogins = Annotated[Logins, Depends(_logins)]
 Failures = Annotated[Throttle, Depends(_throttle)]
 

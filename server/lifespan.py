@@ -24,7 +24,7 @@ from server.storage.db import Database
 from server.storage.high_water import MarkKeeper
 from server.storage.migrate import upgrade
 from server.storage.readiness import Readiness
-from server.trail import Trail
+from server.trail import AuditTrail
 
 log = logging.getLogger(__name__)
 
@@ -33,7 +33,7 @@ def _look_after(db: Database, blobs: BlobStore, settings: Settings) -> None:
     """Finish erasures that were interrupted, and say aloud when this database is not to be trusted."""
     erasure.finish(db, blobs, settings)
     with db.read() as c:
-        doubted = custody.doubt(c, settings)
+        doubted = custody.find_doubt(c, settings)
     if doubted is not None:
         log.warning("%s No stored file is taken away until `sagittal accept`.", doubted)
 
@@ -49,7 +49,7 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     app.state.blobs = BlobStore(settings.blobs)
     app.state.reviewed = ReviewedAnalyses(app.state.blobs)
     await asyncio.to_thread(_look_after, db, app.state.blobs, settings)
-    app.state.trail = Trail(db)
+    app.state.trail = AuditTrail(db)
     app.state.readiness = Readiness(settings, db, app.state.blobs)
     app.state.queue = TableQueue(db, settings.lease_s)
     app.state.feed = JobFeed(db)
@@ -62,7 +62,7 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     app.state.hub = Hub(settings, db, app.state.reviewed, app.state.queue)
     await app.state.hub.start()
     try:
-        async with app.state.trail.running():
+        async with app.state.trail.run():
             yield
     finally:
         await app.state.hub.stop()

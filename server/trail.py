@@ -61,7 +61,7 @@ class _Row:
     at: dt.datetime = field(default_factory=now)
 
 
-class Trail:
+class AuditTrail:
     """The way of those rows into the table `audit`; any thread may use it.
 
     Parameters
@@ -79,7 +79,7 @@ class Trail:
         self._refused: deque[float] = deque()
         self._uncounted = 0
 
-    def opened(
+    def record_opened(
         self,
         who: SignedIn,
         action: str,
@@ -96,7 +96,7 @@ class Trail:
         """
         self._add(_Row(who, action, resource, resource_id, dict(detail or {})))
 
-    def watched(
+    def record_watched(
         self,
         who: SignedIn,
         action: str,
@@ -104,7 +104,7 @@ class Trail:
         resource_id: str | None,
         detail: Mapping[str, Any] | None = None,
     ) -> None:
-        """Do the same once in QUIET_S for each sign-in, action and resource; raises as `opened`."""
+        """Do the same once in QUIET_S for each sign-in, action and resource; raises as `record_opened`."""
         key = (who.login_id, action, resource_id)
         at = self._clock()
         with self._guard:
@@ -112,11 +112,11 @@ class Trail:
                 return
             if len(self._watched) >= _MOST_WATCHED:
                 self._watched = {k: t for k, t in self._watched.items() if at - t < QUIET_S}
-        self.opened(who, action, resource, resource_id, detail)
+        self.record_opened(who, action, resource, resource_id, detail)
         with self._guard:
             self._watched[key] = at
 
-    def refused(self, action: str, resource: str, resource_id: str | None, address: str) -> None:
+    def record_refused(self, action: str, resource: str, resource_id: str | None, address: str) -> None:
         """Write down that somebody at an address could not get in; never raises for the disk.
 
         What was typed is not kept: people type passwords into the field of the name. At most MOST_REFUSED
@@ -145,7 +145,7 @@ class Trail:
         return not self._waiting
 
     @contextlib.asynccontextmanager
-    async def running(self) -> AsyncIterator[None]:
+    async def run(self) -> AsyncIterator[None]:
         """Try again now and then while the block runs, and once more at its end."""
         again = asyncio.create_task(self._again())
         try:

@@ -9,7 +9,7 @@ import numpy as np
 
 from core.frames import FOOT, SUFFIX, Floats, Side
 from core.rotation import rotate
-from core.simulate.truth import TrueStride, Truth
+from core.simulate.truth import TrueStride, WalkTruth
 from core.simulate.walker import SIGN
 
 
@@ -39,7 +39,7 @@ class Features:
     cadence: float
 
 
-def features(truth: Truth, side: Side) -> Features:
+def features(truth: WalkTruth, side: Side) -> Features:
     """Features of one side of a simulated walk."""
     t, end, mirror = truth.t_s, SUFFIX[side], SIGN[side]
     strides = [s for s in truth.strides if s.side == side][1:-2]

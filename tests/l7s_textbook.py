@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from core.body.l7s.filter import L7sInputs, L7sParams, L7sState, Worn, start
+from core.body.l7s.filter import L7sInputs, L7sParams, L7sState, Worn, start_l7s_state
 from core.body.l7s.legs import LegModel
 from core.frames import Floats
 
@@ -201,7 +201,7 @@ def textbook(
     form_of: type[Textbook] = Textbook,
 ) -> tuple[Floats, Floats]:
     """Positions (n, 3, 3) and orientations (n, 3, 3, 3) by the form with matrices."""
-    form = form_of(start(inputs, model, params), model, params, inputs.worn, rate_hz)
+    form = form_of(start_l7s_state(inputs, model, params), model, params, inputs.worn, rate_hz)
     p, R = np.empty((len(inputs.step), 3, 3)), np.empty((len(inputs.step), 3, 3, 3))
     for n in range(len(inputs.step)):
         form.step(inputs.R[n], inputs.acc[n], inputs.step[n])

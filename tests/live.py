@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from core.formats.live_log import (
     FILE_MARK,
-    Batch,
     Clock,
     Finish,
     Hello,
+    SampleBatch,
     SensorInfo,
     StreamInfo,
     encode_batch,
@@ -32,7 +32,7 @@ class LiveTake:
     """What a tablet sent."""
 
     hello: Hello
-    batches: tuple[Batch, ...]
+    batches: tuple[SampleBatch, ...]
 
     def finish(self) -> Finish:
         digest = hashlib.sha256()
@@ -50,7 +50,7 @@ class LiveTake:
 
     def cut(self, n: int) -> LiveTake:
         """The same samples in batches of n."""
-        parts: list[Batch] = []
+        parts: list[SampleBatch] = []
         for b in self.batches:
             rate = self.hello.stream(b.stream).rate_hz
             for i in range(0, len(b.samples), n):
@@ -106,7 +106,7 @@ def shared(
 
 def send(devices: Sequence[Device], n: int = 10, take: str = "take") -> LiveTake:
     """Batches of up to n samples in order of sending; a hole that no offsets tell begins a new batch."""
-    sent: list[tuple[int, int, Batch]] = []
+    sent: list[tuple[int, int, SampleBatch]] = []
     for d in devices:
         step = 1e6 / d.info.rate_hz
         true_us = np.rint((d.t_us - d.ahead_us) / d.drift).astype(np.int64)
@@ -116,7 +116,7 @@ def send(devices: Sequence[Device], n: int = 10, take: str = "take") -> LiveTake
                 b = min(a + n, past)
                 at = int(true_us[b - 1]) + d.delay_us
                 offsets = (d.t_us[a:b] - d.t_us[a]).astype(np.uint32) if d.jitter else None
-                batch = Batch(d.info.stream, 0, int(d.t_us[a]), at, d.samples[a:b], offsets)
+                batch = SampleBatch(d.info.stream, 0, int(d.t_us[a]), at, d.samples[a:b], offsets)
                 sent.append((at, d.info.stream, batch))
     sent.sort(key=lambda x: x[:2])
     hello = Hello(take, "replay", tuple(d.info for d in devices))
@@ -127,13 +127,13 @@ SENSORS = (SensorInfo("A1", "foot_l", 160.0, 35.0), SensorInfo("ö 2", None))
 SMALL_HELLO = Hello("take-1", "dot", (StreamInfo(3, 100.0, "shared", SENSORS),))
 
 
-def small_batch(seq: int = 0, n: int = 5, offsets: bool = False) -> Batch:
+def small_batch(seq: int = 0, n: int = 5, offsets: bool = False) -> SampleBatch:
     """Noise of two sensors without magnetometer."""
     samples = np.random.default_rng(1 + seq).normal(size=(n, 2, 9)).astype(np.float32)
     samples[:, :, 6:] = np.nan
     at = 1_000_000 + seq * n * 10_000
     steps = np.arange(n, dtype=np.uint32) * np.uint32(10_000) if offsets else None
-    return Batch(3, seq, at, at + 70_000, samples, steps)
+    return SampleBatch(3, seq, at, at + 70_000, samples, steps)
 
 
 def small(n: int = 3) -> LiveTake:

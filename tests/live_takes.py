@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 
 from core.formats.live_log import (
-    Batch,
     Finish,
     Hello,
+    SampleBatch,
     SensorInfo,
     StreamInfo,
     encode_batch,
+    encode_samples,
     finish_json,
-    payload,
-    peek,
+    read_batch_header,
     scan,
 )
-from server.live.intake import Ended
+from server.live.intake import TakeEnd
 from server.live.protocol import ProtocolError
 from server.storage import segments
 
@@ -41,14 +41,14 @@ def frame(seq: int, n: int = 3, stream: int | None = None, sent_us: int | None =
     samples[0, 0, 6:] = np.nan
     offsets = np.arange(n, dtype=np.uint32) * 20_001 if number == 3 else None
     t0 = seq * 30_000
-    return encode_batch(Batch(number, seq, t0, t0 if sent_us is None else sent_us, samples, offsets))
+    return encode_batch(SampleBatch(number, seq, t0, t0 if sent_us is None else sent_us, samples, offsets))
 
 
 def digest(frames: list[bytes]) -> str:
     """Hash over the payloads, as the tablet takes it."""
     whole = hashlib.sha256()
     for one in frames:
-        whole.update(payload(one, peek(one)))
+        whole.update(encode_samples(one, read_batch_header(one)))
     return whole.hexdigest()
 
 
@@ -58,7 +58,7 @@ def finish_text(frames: list[bytes]) -> str:
 
 def stored(path: Path) -> list[bytes]:
     """The batches of a log, as they came."""
-    return [one.body for _, one in segments.records(path) if one.kind == "B"]
+    return [one.body for _, one in segments.read_records(path) if one.kind == "B"]
 
 
 def kept_in(log: bytes) -> list[bytes]:
@@ -74,17 +74,17 @@ class Heard:
     def __init__(self) -> None:
         self.sizes: list[int] = []
         self.acks: list[int] = []
-        self.ends: list[Ended] = []
+        self.ends: list[TakeEnd] = []
         self.failures: list[ProtocolError] = []
 
-    def grown(self, size: int) -> None:
+    def note_growth(self, size: int) -> None:
         self.sizes.append(size)
 
-    def acknowledged(self, below: int) -> None:
+    def note_acknowledged(self, below: int) -> None:
         self.acks.append(below)
 
-    def ended(self, end: Ended) -> None:
+    def note_end(self, end: TakeEnd) -> None:
         self.ends.append(end)
 
-    def failed(self, error: ProtocolError) -> None:
+    def note_failure(self, error: ProtocolError) -> None:
         self.failures.append(error)

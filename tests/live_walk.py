@@ -10,15 +10,15 @@ from pathlib import Path
 from core.formats.live_log import Hello
 from core.simulate import simulate_scenario
 from server.live.follower import Follower
-from server.live.messages import Begin, Command, Item, Report
-from server.live.playback import Due, cut, hello_of
+from server.live.messages import Command, FeedItem, FollowTake, Report
+from server.live.playback import DueBatch, cut, hello_of
 from server.storage.tables import new_id
 
 PER_BATCH = 5
 
 
 @cache
-def walk(per_batch: int = PER_BATCH) -> tuple[Due, ...]:
+def walk(per_batch: int = PER_BATCH) -> tuple[DueBatch, ...]:
     """52 s: standing, walking there and back."""
     return tuple(cut(simulate_scenario("comfortable", 3).recording, per_batch))
 
@@ -42,7 +42,7 @@ def replayed(
     """Everything an estimator says of a whole log."""
     training = training or {}
     said: list[Report] = []
-    begin = Begin(
+    begin = FollowTake(
         new_id(), str(log), log.stat().st_size, height_m, "walk",
         training.get("prescription"), training.get("baseline"), list(commands),  # type: ignore[arg-type]
     )  # fmt: skip
@@ -54,5 +54,5 @@ def replayed(
     return said
 
 
-def items(said: Sequence[Report], kind: str) -> list[Item]:
-    return [one for one in said if isinstance(one, Item) and one.kind == kind]
+def items(said: Sequence[Report], kind: str) -> list[FeedItem]:
+    return [one for one in said if isinstance(one, FeedItem) and one.kind == kind]

@@ -9,11 +9,11 @@ from unittest.mock import patch
 import numpy as np
 
 from core.events.result import GaitEvent
-from core.formats.live_log import Batch, Hello, SensorInfo, StreamInfo
+from core.formats.live_log import Hello, SampleBatch, SensorInfo, StreamInfo
 from core.frames import Floats, Side
-from core.online import LiveFrame, LiveStride, Online
-from core.online.chain import Chain
-from core.parameters.live_history import History
+from core.online import LiveFrame, LiveStride, OnlineSession
+from core.online.chain import LiveChain
+from core.parameters.live_history import SampleHistory
 from core.recording import UniformRecording
 
 
@@ -33,7 +33,7 @@ def samples_of(recording: UniformRecording) -> Floats:
     return np.stack(parts, axis=1)
 
 
-def batches(recording: UniformRecording, sizes: int | Sequence[int] = 10) -> Iterator[Batch]:
+def batches(recording: UniformRecording, sizes: int | Sequence[int] = 10) -> Iterator[SampleBatch]:
     """The recording in batches of one size, or of these in turn, each sent when its last sample is there."""
     x = samples_of(recording).astype(np.float32)
     turn = [sizes] if isinstance(sizes, int) else list(sizes)
@@ -42,13 +42,15 @@ def batches(recording: UniformRecording, sizes: int | Sequence[int] = 10) -> Ite
         past = min(len(x), first + turn[seq % len(turn)])
         t0, sent = (round(1e6 * k / recording.rate_hz) for k in (first, past - 1))
         offsets = np.round(1e6 * np.arange(first, past) / recording.rate_hz).astype(np.int64) - t0
-        yield Batch(0, seq, t0, sent, x[first:past], offsets.astype(np.uint32))
+        yield SampleBatch(0, seq, t0, sent, x[first:past], offsets.astype(np.uint32))
         first, seq = past, seq + 1
 
 
-def live(recording: UniformRecording, sizes: int | Sequence[int] = 10) -> tuple[Online, list[LiveFrame]]:
+def live(
+    recording: UniformRecording, sizes: int | Sequence[int] = 10
+) -> tuple[OnlineSession, list[LiveFrame]]:
     """A take from its first batch to its last."""
-    online = Online(hello_of(recording), recording.subject, recording.protocol)
+    online = OnlineSession(hello_of(recording), recording.subject, recording.protocol)
     frames = [f for b in batches(recording, sizes) if (f := online.push(b)) is not None]
     return online, frames
 
@@ -65,12 +67,12 @@ def trails(frames: Sequence[LiveFrame]) -> tuple[Floats, dict[str, Floats]]:
 class Run:
     """A live take, and all samples of its chain as they were remembered: name → (n, …) from `first` on."""
 
-    online: Online
+    online: OnlineSession
     frames: list[LiveFrame]
     rows: dict[str, Floats]
 
     @property
-    def chain(self) -> Chain:
+    def chain(self) -> LiveChain:
         chain = self.online.chain
         assert chain is not None
         return chain
@@ -102,12 +104,12 @@ class Run:
 def recorded(recording: UniformRecording, sizes: int | Sequence[int] = 10) -> Run:
     """`live` with all that the chain measures on."""
     rows: list[dict[str, Floats]] = []
-    append = History.append
+    append = SampleHistory.append
 
-    def kept(history: History, columns: Mapping[str, Floats]) -> None:
+    def kept(history: SampleHistory, columns: Mapping[str, Floats]) -> None:
         rows.append({name: x.copy() for name, x in columns.items()})
         append(history, columns)
 
-    with patch.object(History, "append", kept):
+    with patch.object(SampleHistory, "append", kept):
         online, frames = live(recording, sizes)
     return Run(online, frames, {name: np.concatenate([r[name] for r in rows]) for name in rows[0]})

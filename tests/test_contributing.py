@@ -18,10 +18,10 @@ from core.formats import SourceFile, read_recording, vendors
 from core.formats.draft import Draft
 from core.formats.source_spec import SourceSpec
 from core.formats.vendors import VendorFormat
-from core.measure import Tracks, measure
+from core.measure import Tracks, measure_gait
 from core.parameters.catalogue import CATALOGUE, CurveFigure, ParameterEntry
 from core.parameters.catalogue.entry import ANKLE_AND_FOOT, DORSIFLEXION
-from core.pipeline import WALK, Analysis, PipelineConfig, PipelineStage, analyse, recipes
+from core.pipeline import WALK, PipelineConfig, PipelineStage, TakeAnalysis, analyse, recipes
 from core.pipeline.recipes import SIGNALS, run_stages, say_nothing
 from core.pipeline.stages import ORIENTATION, orient_segments
 from core.simulate import simulate_scenario
@@ -118,7 +118,7 @@ def test_a_parameter_that_is_not_in_the_document_is_found(added: ParameterEntry)
 
 
 def _measured_names(tracks: Tracks) -> set[str]:
-    return {p.name for p in measure(tracks).parameters if p.mean is not None}
+    return {p.name for p in measure_gait(tracks).parameters if p.mean is not None}
 
 
 def test_what_a_parameter_needs_is_what_it_is_missing_without() -> None:
@@ -161,7 +161,7 @@ def test_a_reader_in_the_list_reads_its_files(monkeypatch: pytest.MonkeyPatch) -
         read_recording([SourceFile.of_bytes("letter.txt", b"Dear reader,")])
 
 
-def _hold_first(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def _hold_first(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """A made-up filter: orientations as usual, but every segment stays as it was at the start."""
     fused = orient_segments(analysis, config).fused
     assert fused is not None
@@ -173,15 +173,15 @@ def test_a_filter_in_a_recipe_is_what_later_stages_take() -> None:
     source = simulate_scenario("comfortable", 1, worn=("foot_l", "foot_r")).recording
     held = PipelineStage("orientation", 0.1, _hold_first, ("fused",), ("fusion",))
     recipe = tuple(held if stage is ORIENTATION else stage for stage in WALK)
-    usual = run_stages(Analysis(source, PipelineConfig(), ""), WALK[:5], say_nothing)
-    still = run_stages(Analysis(source, PipelineConfig(), ""), recipe[:5], say_nothing)
+    usual = run_stages(TakeAnalysis(source, PipelineConfig(), ""), WALK[:5], say_nothing)
+    still = run_stages(TakeAnalysis(source, PipelineConfig(), ""), recipe[:5], say_nothing)
     assert usual.contacts is not None
     assert still.contacts is not None
     assert len(usual.contacts.events.events) > 20
     assert still.contacts.events.events == ()
 
 
-def _count_rests(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def _count_rests(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """A made-up protocol's own step: it says how often the person stood still."""
     assert analysis.quality is not None
     said = Notice("stood", f"Stood still {len(analysis.quality.rest)} times.", severity="error")

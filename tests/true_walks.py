@@ -11,10 +11,10 @@ from core.angles import JointAngles
 from core.body.feet import FootTracks
 from core.events.result import GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES
-from core.measure import Measured, Tracks, measure
+from core.measure import MeasuredGait, Tracks, measure_gait
 from core.pipeline import PipelineConfig, analyse
 from core.shoe import Shoe
-from core.simulate import Truth, simulate_scenario
+from core.simulate import WalkTruth, simulate_scenario
 from core.simulate.sensors import PLACES
 from core.simulate.walker import Anatomy
 
@@ -26,7 +26,7 @@ TIP_UP_M = _ANATOMY.rocker_radius - np.sqrt(_ANATOMY.rocker_radius**2 - (TIP_M -
 """How far the rolling forefoot holds the tip off the floor."""
 
 
-def true_tracks(truth: Truth) -> Tracks:
+def true_tracks(truth: WalkTruth) -> Tracks:
     """Tracks without any error; a foot is off the floor when its sole is 5 mm up, where it ever is."""
     n = len(truth.t_s)
     events = []
@@ -54,11 +54,11 @@ def true_tracks(truth: Truth) -> Tracks:
         q={FOOT[s]: truth.q[FOOT[s]] for s in SIDES},
         valid={FOOT[s]: np.ones(n, np.bool_) for s in SIDES},
         feet=feet,
-        angles=JointAngles(truth.t_s, truth.zeroed(), truth.zero_offset),
+        angles=JointAngles(truth.t_s, truth.subtract_standing(), truth.zero_offset),
     )
 
 
-def standing_width(truth: Truth) -> float:
+def standing_width(truth: WalkTruth) -> float:
     """Between the ankles in the first standing, to the centimetre of a tape."""
     standing = (truth.t_s >= truth.zero[0]) & (truth.t_s < truth.zero[1])
     apart = (truth.p["foot_l"] - truth.p["foot_r"])[standing, :2].mean(axis=0)
@@ -66,7 +66,7 @@ def standing_width(truth: Truth) -> float:
 
 
 @cache
-def measured_walk(name: str, seed: int = 5) -> tuple[Truth, Measured, Measured]:
+def measured_walk(name: str, seed: int = 5) -> tuple[WalkTruth, MeasuredGait, MeasuredGait]:
     """A named script: its truth, what is measured on the truth, and what the analysis measures."""
     take = simulate_scenario(name, seed)
     ahead = PLACES["foot_l"][0]
@@ -74,4 +74,4 @@ def measured_walk(name: str, seed: int = 5) -> tuple[Truth, Measured, Measured]:
     subject = replace(take.recording.subject, shoe=shoe, standing_width_m=standing_width(take.truth))
     analysis = analyse(replace(take.recording, subject=subject), PipelineConfig())
     assert analysis.measured is not None
-    return take.truth, measure(true_tracks(take.truth)), analysis.measured
+    return take.truth, measure_gait(true_tracks(take.truth)), analysis.measured

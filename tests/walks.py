@@ -12,7 +12,7 @@ from core.formats import SourceFile, parse_manifest, read_recording
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment
 from core.recording import Recording, SensorSignals, UniformRecording
 from core.rotation import rotate
-from core.simulate import SCRIPTS, Truth, simulate, simulate_scenario
+from core.simulate import SCRIPTS, WalkTruth, simulate, simulate_scenario
 from core.simulate.script import Script
 from core.simulate.walker import SIGN, Walker
 from core.timeline import synchronise
@@ -26,14 +26,14 @@ NEURA = {
 
 
 @cache
-def simulated(name: str = "comfortable", seed: int = 0) -> tuple[UniformRecording, Truth]:
+def simulated(name: str = "comfortable", seed: int = 0) -> tuple[UniformRecording, WalkTruth]:
     """A named script on the uniform axis, and its truth."""
     take = simulate_scenario(name, seed)
     return synchronise(take.recording), take.truth
 
 
 @cache
-def scripted(script: Script, seed: int = 0) -> tuple[UniformRecording, Truth]:
+def scripted(script: Script, seed: int = 0) -> tuple[UniformRecording, WalkTruth]:
     """A script of one's own for the reference person, with the sensors of the comfortable walk."""
     take = simulate(script, Walker(), seed, SCRIPTS["comfortable"].setup)
     return synchronise(take.recording), take.truth
@@ -99,7 +99,7 @@ def lost(recording: UniformRecording, segment: Segment, start_s: float, end_s: f
     )
 
 
-def joint_gap(truth: Truth) -> float:
+def joint_gap(truth: WalkTruth) -> float:
     """Largest distance in m between the two ends that meet in any joint of seven true segments."""
     body = truth.body
     gaps = []

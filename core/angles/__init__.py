@@ -8,7 +8,7 @@ obliquity do not depend on the direction of walking.
 `core.angles.measure` measures a take; it brings numba, which readers of results do without.
 """
 
-from core.angles.cardan import cardan_zxy, headings, pelvis_angles
-from core.angles.result import SIGNS, JointAngles, joints
+from core.angles.cardan import cardan_zxy, compute_headings, pelvis_angles
+from core.angles.result import SIGNS, JointAngles, list_leg_joints
 
-__all__ = ["SIGNS", "JointAngles", "cardan_zxy", "headings", "joints", "pelvis_angles"]
+__all__ = ["SIGNS", "JointAngles", "cardan_zxy", "compute_headings", "list_leg_joints", "pelvis_angles"]

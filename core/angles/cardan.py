@@ -35,7 +35,7 @@ def pelvis_angles(q: Floats) -> tuple[Floats, Floats]:
     return np.asarray(tilt), np.asarray(obliquity)
 
 
-def headings(orientations: Oriented) -> dict[str, Floats]:
+def compute_headings(orientations: Oriented) -> dict[str, Floats]:
     """Course of pelvis and feet about the vertical, as `JointAngles.headings`; NaN where lost.
 
     The pelvis turns with its medio-lateral axis, as in the decomposition above; a foot points with its own.

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import SIGNS, joints
+from core.angles import SIGNS, list_leg_joints
 from core.frames import R_NEUTRAL, Floats, Segment, Side
 from core.rotation import about, from_matrix, multiply
 
@@ -43,7 +43,7 @@ def leg_orientations(angles: Mapping[str, Floats], side: Side) -> dict[Segment, 
     """
     found: dict[Segment, Floats] = {}
     q = np.array([1.0, 0.0, 0.0, 0.0])
-    for joint, _, distal in joints(side):
+    for joint, _, distal in list_leg_joints(side):
         a, b, c = np.broadcast_arrays(
             *(
                 (right if side == "right" else left) * np.asarray(angles.get(name, 0.0))

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.angles.result import SIGNS, joints
+from core.angles.result import SIGNS, list_leg_joints
 from core.frames import SIDES, SUFFIX, Bools, Floats, Segment
 from core.rotation import compiled, wrap_angle
 
@@ -91,7 +91,7 @@ class AngleKernel:
                 )
                 break
         for side in SIDES:
-            for joint, proximal, distal in joints(side):
+            for joint, proximal, distal in list_leg_joints(side):
                 for column, guessed in sources:
                     if proximal in column and distal in column:
                         ends.append((column[proximal], column[distal]))

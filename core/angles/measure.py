@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from core.angles.cardan import headings
+from core.angles.cardan import compute_headings
 from core.angles.kernel import AngleKernel, mean_angles, subtract_zero
-from core.angles.result import SIGNS, JointAngles, joints
+from core.angles.result import SIGNS, JointAngles, list_leg_joints
 from core.errors import Notice
 from core.frames import SIDES, SUFFIX, Bools, Floats
-from core.rest import Window, samples
+from core.rest import Window, index_window
 
 if TYPE_CHECKING:
     from core.body.poses import Poses
@@ -47,7 +47,7 @@ def measure_angles(
     kernel = AngleKernel.between(tuple(orientations.q), () if poses is None else tuple(poses.q))
     raw = kernel.measure(*_stack(orientations, poses))
     notices = _find_missing_joints(orientations, kernel) + _find_gimbal(raw, kernel, orientations.t_s)
-    standing = raw[samples(zero, orientations.rate_hz)]
+    standing = raw[index_window(zero, orientations.rate_hz)]
     known = [bool(x.any()) for x in np.isfinite(standing).T]
     for name in sorted(name for name, x in zip(kernel.names, known, strict=True) if not x):
         message = (
@@ -66,7 +66,7 @@ def measure_angles(
         notices=tuple(notices),
         diagnostics={"estimated": tuple(kernel.names[i] for i in kept if kernel.estimated[i])},
         standing_deg=dict(standing_deg or {}),
-        headings=headings(orientations),
+        headings=compute_headings(orientations),
     )
 
 
@@ -82,7 +82,7 @@ def _find_missing_joints(orientations: Orientations, kernel: AngleKernel) -> lis
     """A notice for every joint that has no angles."""
     notices: list[Notice] = []
     for side in SIDES:
-        for joint, proximal, distal in joints(side):
+        for joint, proximal, distal in list_leg_joints(side):
             if f"{SIGNS[joint][0][0]}_{SUFFIX[side]}" in kernel.names:
                 continue
             missing = [s for s in (proximal, distal) if s not in orientations.q]
@@ -97,7 +97,7 @@ def _find_gimbal(raw: Floats, kernel: AngleKernel, t_s: Floats) -> list[Notice]:
     """A notice for every joint whose frontal angle in raw (n, names) passes the limit."""
     notices: list[Notice] = []
     for side in SIDES:
-        for joint, _, _ in joints(side):
+        for joint, _, _ in list_leg_joints(side):
             frontal = f"{SIGNS[joint][1][0]}_{SUFFIX[side]}"
             if frontal not in kernel.names:
                 continue

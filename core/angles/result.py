@@ -20,7 +20,7 @@ Positive: flexion, dorsiflexion; adduction, varus, inversion; internal rotation.
 """
 
 
-def joints(side: Side) -> tuple[tuple[str, Segment, Segment], ...]:
+def list_leg_joints(side: Side) -> tuple[tuple[str, Segment, Segment], ...]:
     """Joints of one leg as (joint, proximal segment, distal segment)."""
     return (
         ("hip", "pelvis", THIGH[side]),

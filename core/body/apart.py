@@ -23,7 +23,7 @@ LONGEST: Final = 0.5
 """Sine of the widest lean that is believed."""
 
 
-def legs_apart(
+def lean_legs_apart(
     calibrated: CalibratedRecording, orientations: Orientations, body: BodyModel
 ) -> tuple[CalibratedRecording, Orientations]:
     """Thighs and shanks leaning as the standing width says; unchanged when nobody measured it.

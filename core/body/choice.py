@@ -37,7 +37,7 @@ class Choice:
     notices: tuple[Notice, ...]
 
 
-def possible(segments: Iterable[Segment]) -> tuple[Estimator, ...]:
+def list_possible_estimators(segments: Iterable[Segment]) -> tuple[Estimator, ...]:
     """Estimators that can run on these segments, the one taken by default first."""
     worn = set(segments)
     found = [e.name for e in (L7S_3I, L7S_2I) if e.runs_on(worn)]
@@ -66,10 +66,10 @@ def choose(
     share = {s: float(np.mean(x.valid)) if s in orientations.q else 0.0 for s, x in worn.items()}
     working = tuple(s for s in WHOLE if share.get(s, 0.0) >= max(least_valid, 1e-9))
     failed = tuple(s for s in worn if s not in working)
-    found = possible(working)
+    found = list_possible_estimators(working)
     if requested != AUTO and requested not in found:
         raise EstimationError("estimator_impossible", _impossible(requested, working))
-    hoped = possible(worn)[:1]
+    hoped = list_possible_estimators(worn)[:1]
     reduced = "sensor_failed" if requested == AUTO and hoped != found[:1] else None
     notices = []
     for s in failed:

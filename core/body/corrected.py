@@ -10,7 +10,7 @@ from core.calibration.result import CalibratedRecording
 from core.frames import GRAVITY, Bools, Floats, Segment
 
 
-def corrected_signals(
+def correct_signals(
     calibrated: CalibratedRecording, segments: Sequence[Segment]
 ) -> tuple[Floats, Floats, Bools]:
     """Specific force and angular rate (T, n, 3), valid (T, n) of the sensors of these segments, in order.

@@ -14,12 +14,12 @@ from typing import Final
 import numpy as np
 
 from core.body.choice import WHOLE
-from core.body.corrected import corrected_signals
+from core.body.corrected import correct_signals
 from core.body.erkf.filter import erkf_inputs
-from core.body.erkf.headings import findings, told
+from core.body.erkf.headings import judge_turned_axes, report_turned_axes
 from core.body.erkf.health import erkf_health, erkf_notices
 from core.body.erkf.params import ErkfParams
-from core.body.erkf.poses import figure, foot_tracks, refined, run_erkf
+from core.body.erkf.poses import foot_tracks, place_figure, replace_orientations, run_erkf
 from core.body.erkf.smoother import smooth
 from core.body.erkf.start import start_state
 from core.body.feet import FootTracks
@@ -158,13 +158,13 @@ class _Take:
         if self.mounted.failure is not None:
             raise self.mounted.failure
         run = run_erkf(self.calibrated, self.orientations, self.body, segments, self.params.erkf)
-        orientations = refined(run, self.orientations)
-        poses = figure(run, orientations, self.contacts, self.body)
+        orientations = replace_orientations(run, self.orientations)
+        poses = place_figure(run, orientations, self.contacts, self.body)
         health, turned = erkf_health(run), self.mounted.turned_rad
         poses = replace(
             poses,
-            health=(*health, *findings(turned)),
-            notices=(*poses.notices, *erkf_notices(run, health), *told(turned)),
+            health=(*health, *judge_turned_axes(turned)),
+            notices=(*poses.notices, *erkf_notices(run, health), *report_turned_axes(turned)),
             diagnostics={"heading_error_rad": turned},
         )
         return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body))
@@ -178,7 +178,7 @@ class _Take:
         """When each foot is still."""
         found: dict[Side, Bools] = {}
         for side in SIDES:
-            acc, gyr, valid = corrected_signals(self.calibrated, (FOOT[side],))
+            acc, gyr, valid = correct_signals(self.calibrated, (FOOT[side],))
             rate = self.calibrated.recording.rate_hz
             found[side] = still_samples(acc[:, 0], gyr[:, 0], valid[:, 0], rate, FOOT_STILL)
         return found
@@ -201,7 +201,9 @@ class _Take:
             health=(*made.poses.health, *(f for f in health if (f.name, f.of) not in known)),
             notices=(*made.poses.notices, *erkf_notices(run, health)),
         )
-        return replace(made, poses=poses, feet=foot_tracks(run, refined(run, self.orientations), self.body))
+        return replace(
+            made, poses=poses, feet=foot_tracks(run, replace_orientations(run, self.orientations), self.body)
+        )
 
 
 def _without(orientations: Orientations, failed: Collection[Segment]) -> Orientations:
@@ -213,7 +215,7 @@ def _without(orientations: Orientations, failed: Collection[Segment]) -> Orienta
     )
 
 
-def warm() -> None:
+def compile_pose_kernels() -> None:
     """Compile the filter's kernels or load them, so that the first take does not wait for it."""
     tree = person_tree(BodyModel.from_height(NOMINAL_HEIGHT_M), {"foot_r": np.eye(3)}, ("foot_r",))
     acc, gyr = np.tile([0.0, GRAVITY, 0.0], (2, 1, 1)), np.zeros((2, 1, 3))

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from core.frames import Bools
-from core.rest import runs
+from core.rest import find_runs
 
 Verdict = Literal["good", "warn", "bad"]
 
 
 @dataclass(frozen=True)
-class Finding:
+class HealthFinding:
     """One measured quantity of a run.
 
     Parameters
@@ -37,7 +37,7 @@ class Finding:
         return "warn" if self.warn is not None and not self.value <= self.warn else "good"
 
 
-def worst(findings: Sequence[Finding]) -> Verdict:
+def find_worst_verdict(findings: Sequence[HealthFinding]) -> Verdict:
     """The least favourable verdict of all."""
     verdicts = {f.verdict for f in findings}
     return "bad" if "bad" in verdicts else "warn" if "warn" in verdicts else "good"
@@ -50,4 +50,4 @@ more from the last rest on."""
 
 def longest_run_s(flags: Bools, rate_hz: float) -> float:
     """Duration of the longest stretch of True in s, 0 without any."""
-    return max((stop - start for start, stop in runs(flags)), default=0) / rate_hz
+    return max((stop - start for start, stop in find_runs(flags)), default=0) / rate_hz

@@ -12,12 +12,13 @@ from core.frames import FOOT, SIDES, Bools, Floats, Segment
 
 
 @dataclass(frozen=True, eq=False)
-class Raw:
+class MeasuredBlock:
     """A block as measured: acc, gyr (T, n, 3), valid (T, n) of the chain's sensors.
 
     Parameters
     ----------
-    turned : segment → (T, 4) to W by its sensor alone (`Attitudes`), of `Estimator.attitudes` and the feet.
+    turned : segment → (T, 4) to W by its sensor alone (`AttitudeTracker`), of
+        `LivePoseEstimator.attitudes` and the feet.
     """
 
     acc: Floats
@@ -27,7 +28,7 @@ class Raw:
 
 
 @dataclass(frozen=True, eq=False)
-class Paths:
+class FootBlock:
     """A block of the feet: p (T, F, 3), q (T, F, 4), still, valid (T, F), as `FootTracks`."""
 
     p: Floats
@@ -37,7 +38,7 @@ class Paths:
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class BodyBlock:
     """A block of the body.
 
     Parameters
@@ -51,13 +52,13 @@ class Placed:
     p: Floats
     known: Bools
     whole: Bools
-    paths: Paths
+    paths: FootBlock
 
 
-class Estimator(Protocol):
+class LivePoseEstimator(Protocol):
     """What turns signals into a body.
 
-    segments : of `Placed`. attitudes : segments whose orientation by their sensor alone it wants.
+    segments : of `BodyBlock`. attitudes : segments whose orientation by their sensor alone it wants.
     linked, source : as in `FootTracks`. broken : it gave up.
     """
 
@@ -71,14 +72,14 @@ class Estimator(Protocol):
     def broken(self) -> bool:
         """A filter gave up."""
 
-    def push(self, raw: Raw) -> Placed:
+    def push(self, raw: MeasuredBlock) -> BodyBlock:
         """The next samples; the first block is the whole standing window."""
 
-    def told(self) -> list[Notice]:
+    def drain_notices(self) -> list[Notice]:
         """What is new to be said of itself."""
 
 
-def worn_feet(segments: Iterable[Segment]) -> tuple[Segment, ...]:
+def list_worn_feet(segments: Iterable[Segment]) -> tuple[Segment, ...]:
     """Feet among these segments, left first."""
     worn = set(segments)
     return tuple(FOOT[s] for s in SIDES if FOOT[s] in worn)

@@ -31,13 +31,13 @@ LIMITS: Final[Floats] = np.array([[r.gyr_limit, r.acc_limit] for r in (FOOT_STIL
 LIMITS.setflags(write=False)
 
 
-def needed(rate_hz: float) -> tuple[int, int]:
+def count_needed_samples(rate_hz: float) -> tuple[int, int]:
     """Quiet samples in a row, this one included, after which a foot stands and a sensor rests."""
     return max(1, round(FOOT_S * rate_hz)), max(1, round(AT_REST.window_s * rate_hz))
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def trailing(acc, gyr, valid, limits, need, quiet, still):  # type: ignore[no-untyped-def]
+def count_trailing_samples(acc, gyr, valid, limits, need, quiet, still):  # type: ignore[no-untyped-def]
     """Count quiet samples in a row and say which are still.
 
     Parameters
@@ -58,15 +58,15 @@ def trailing(acc, gyr, valid, limits, need, quiet, still):  # type: ignore[no-un
                 still[k, i, r] = quiet[i, r] >= need[r]
 
 
-class Stillness:
+class StillnessDetector:
     """The rule on n sensors, block by block; any division into blocks gives the same bits."""
 
     def __init__(self, n: int, rate_hz: float) -> None:
-        self._need = np.array(needed(rate_hz), np.int64)
+        self._need = np.array(count_needed_samples(rate_hz), np.int64)
         self._quiet = np.zeros((n, 2), np.int64)
 
     def push(self, acc: Floats, gyr: Floats, valid: Bools) -> Bools:
         """(T, n, 2): stands as a foot does, rests; acc, gyr (T, n, 3) corrected, valid (T, n)."""
         still = np.empty((*valid.shape, 2), np.bool_)
-        trailing(acc, gyr, valid, LIMITS, self._need, self._quiet, still)
+        count_trailing_samples(acc, gyr, valid, LIMITS, self._need, self._quiet, still)
         return still

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from core.body.apart import legs_apart
+from core.body.apart import lean_legs_apart
 from core.body.choice import Choice, choose
-from core.body.erkf.headings import agreed
+from core.body.erkf.headings import align_forward_axes
 from core.body.kinematics import nominal_body
 from core.body.model import BodyModel
 from core.body.pose_params import PoseParams
@@ -61,13 +61,13 @@ def mount_sensors(
     """
     subject = calibrated.recording.subject
     body, assumed = nominal_body(subject.height_m, subject.standing_width_m, subject.shoe)
-    calibrated, orientations = legs_apart(calibrated, orientations, body)
+    calibrated, orientations = lean_legs_apart(calibrated, orientations, body)
     choice = choose(calibrated, orientations, params.estimator, params.least_valid)
     mounted = MountedSensors(calibrated, orientations, body, assumed, choice)
     if choice.order[:1] != (ERKF.name,):
         return mounted
     try:
-        calibrated, orientations, turned = agreed(
+        calibrated, orientations, turned = align_forward_axes(
             calibrated, orientations, body, choice.segments, params.erkf
         )
     except EstimationError as error:

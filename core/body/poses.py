@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from core.body.health import Finding
+from core.body.health import HealthFinding
 from core.body.model import BodyModel
 from core.errors import Notice
 from core.frames import Bools, Floats, Segment
@@ -37,6 +37,6 @@ class Poses:
     body: BodyModel
     method: str
     reduced: str | None = None
-    health: tuple[Finding, ...] = ()
+    health: tuple[HealthFinding, ...] = ()
     notices: tuple[Notice, ...] = ()
     diagnostics: Mapping[str, object] = field(default_factory=dict)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.frames import GRAVITY, Bools, Floats
-from core.rest import runs
+from core.rest import find_runs
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def still_samples(acc: Floats, gyr: Floats, valid: Bools, rate_hz: float, rule: 
     index = np.arange(len(quiet))
     low, high = np.maximum(index - reach, 0), np.minimum(index + reach + 1, len(quiet))
     still = loud[high] == loud[low]
-    for start, stop in runs(still):
+    for start, stop in find_runs(still):
         if stop - start < rule.shortest_s * rate_hz:
             still[start:stop] = False
     return np.asarray(still)

@@ -18,19 +18,19 @@ from core.calibration.gyro_pca import (
     sagittal_angle,
 )
 from core.calibration.heading import (
-    Direction,
     HeadingParams,
     Part,
+    WalkingDirection,
     acceleration_axis,
-    difference,
     horizontal_acceleration,
     nearest_sign,
     rest_to_rest_velocity,
     start_direction,
+    subtract_angles,
     velocity_direction,
 )
-from core.calibration.mounting import declared_angle
-from core.calibration.standing import Standing, vertical_frame
+from core.calibration.mounting import read_declared_angle
+from core.calibration.standing import SensorAtRest, vertical_frame
 from core.calibration.walking import TRUNK
 from core.errors import CalibrationError, Notice
 from core.frames import Bools, Floats, Segment
@@ -61,7 +61,7 @@ Method = Literal["walking_direction", "gyro_pca"]
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
+class CalibrationWalk:
     """The straight walking that shows the direction, as seen from the rest that calibration uses.
 
     Parameters
@@ -83,7 +83,7 @@ class Walk:
 
 
 @dataclass(frozen=True, eq=False)
-class Anterior:
+class AnteriorAxis:
     """Angle in rad of the anterior axis in the sensor's rest world, how it was found and what to tell."""
 
     angle: float
@@ -93,16 +93,16 @@ class Anterior:
     facts: Mapping[str, object] = field(default_factory=dict)
 
 
-def anterior(
+def find_anterior_axis(
     segment: Segment,
     signals: SensorSignals,
-    standing: Standing,
+    standing: SensorAtRest,
     q: Floats,
-    walk: Walk,
+    walk: CalibrationWalk,
     declared: str,
     method: Method,
     params: HeadingParams,
-) -> Anterior:
+) -> AnteriorAxis:
     """Find the anterior axis of one segment.
 
     Parameters
@@ -114,7 +114,7 @@ def anterior(
     CalibrationError `no_walking`, `pelvis_heading_unknown`, `not_single_axis`, `calibration_sign_conflict`.
     """
     R_vertical = vertical_frame(standing.up)
-    written = declared_angle(declared, R_vertical, segment)
+    written = read_declared_angle(declared, R_vertical, segment)
     if not walk.parts:
         if written is None:
             raise CalibrationError(
@@ -123,16 +123,17 @@ def anterior(
                 "Record at least 8 steps straight ahead, or declare the mounting: “lateral, face right”.",
                 sensor=segment,
             )
-        return Anterior(written, "declared", 0.5)
+        return AnteriorAxis(written, "declared", 0.5)
     if method == "gyro_pca" and segment not in TRUNK:
         found = _by_gyro(segment, signals, standing, R_vertical, q, walk, written)
     else:
         found = _by_walking(segment, signals, R_vertical, q, walk, written, params)
-    if written is not None and abs(difference(found.angle, written)) > CONFLICT:
+    if written is not None and abs(subtract_angles(found.angle, written)) > CONFLICT:
         raise CalibrationError(
             "calibration_sign_conflict",
             f"{segment}: the walk and the declared mounting “{declared}” differ by "
-            f"{abs(degrees(difference(found.angle, written))):.0f}°, allowed are {degrees(CONFLICT):.0f}°. "
+            f"{abs(degrees(subtract_angles(found.angle, written))):.0f}°, "
+            f"allowed are {degrees(CONFLICT):.0f}°. "
             "Correct the mounting in the manifest, or the segment this sensor is mapped to.",
             sensor=segment,
         )
@@ -144,10 +145,10 @@ def _by_walking(
     signals: SensorSignals,
     R_vertical: Floats,
     q: Floats,
-    walk: Walk,
+    walk: CalibrationWalk,
     written: float | None,
     params: HeadingParams,
-) -> Anterior:
+) -> AnteriorAxis:
     """Direction of the rest-to-rest velocity, or the axis of the acceleration with a sign from elsewhere."""
     a = horizontal_acceleration(q, signals.acc)
     steps_s = walk.steps_s if segment in TRUNK else None
@@ -163,12 +164,12 @@ def _by_walking(
     facts: dict[str, object] = {"axis_share": axis.score}
     allowed = DISAGREEMENT
     if velocity is not None:
-        off = difference(nearest_sign(axis.angle, velocity.angle), velocity.angle)
+        off = subtract_angles(nearest_sign(axis.angle, velocity.angle), velocity.angle)
         facts |= {"source": "velocity", "disagreement_rad": off}
         if abs(off) > DISAGREEMENT and axis.score > STRONG_AXIS:
             # one lost impact bends an integrated velocity, many strides hold the axis
             facts["source"] = "acceleration"
-            chosen = Direction(nearest_sign(axis.angle, velocity.angle), axis.score)
+            chosen = WalkingDirection(nearest_sign(axis.angle, velocity.angle), axis.score)
         else:
             chosen = velocity
     else:
@@ -179,14 +180,14 @@ def _by_walking(
         if start is None:
             angle, notices = _signed(segment, axis.angle, written, R_vertical, q, walk)
             facts |= {"source": "acceleration", "sign": "declared" if written is not None else "gait"}
-            return Anterior(angle, "walking_direction", axis.score, notices, facts)
-        off = difference(nearest_sign(axis.angle, start.angle), start.angle)
+            return AnteriorAxis(angle, "walking_direction", axis.score, notices, facts)
+        off = subtract_angles(nearest_sign(axis.angle, start.angle), start.angle)
         facts |= {"source": "acceleration", "sign": "velocity", "disagreement_rad": off}
-        chosen = Direction(nearest_sign(axis.angle, start.angle), axis.score)
+        chosen = WalkingDirection(nearest_sign(axis.angle, start.angle), axis.score)
         allowed = COARSE
         if abs(off) > allowed and axis.score <= STRONG_AXIS:
             facts["source"] = "velocity"
-            chosen = Direction(start.angle, 0.5)
+            chosen = WalkingDirection(start.angle, 0.5)
     notices = _sign_notices(segment, chosen.angle, R_vertical, q, walk)
     if abs(off) > allowed:
         message = (
@@ -195,18 +196,18 @@ def _by_walking(
             "transverse angles of this segment are doubtful; look at the mounting."
         )
         notices += (Notice("heading_disagreement", message, sensor=segment),)
-    return Anterior(chosen.angle, "walking_direction", chosen.score, notices, facts)
+    return AnteriorAxis(chosen.angle, "walking_direction", chosen.score, notices, facts)
 
 
 def _by_gyro(
     segment: Segment,
     signals: SensorSignals,
-    standing: Standing,
+    standing: SensorAtRest,
     R_vertical: Floats,
     q: Floats,
-    walk: Walk,
+    walk: CalibrationWalk,
     written: float | None,
-) -> Anterior:
+) -> AnteriorAxis:
     """Flexion axis by gyro PCA, sign by declared mounting or the gait rules."""
     axis = flexion_axis(signals.gyr[walk.mask] - standing.gyro_bias, R_vertical, segment)
     angle, notices = _signed(segment, -axis.gamma, written, R_vertical, q, walk)
@@ -219,11 +220,11 @@ def _by_gyro(
                 sensor=segment,
             ),
         )
-    return Anterior(angle, "gyro_pca", axis.rho, notices, {"rho": axis.rho})
+    return AnteriorAxis(angle, "gyro_pca", axis.rho, notices, {"rho": axis.rho})
 
 
 def _signed(
-    segment: Segment, axis: float, written: float | None, R_vertical: Floats, q: Floats, walk: Walk
+    segment: Segment, axis: float, written: float | None, R_vertical: Floats, q: Floats, walk: CalibrationWalk
 ) -> tuple[float, tuple[Notice, ...]]:
     """Choose the sign of an axis: by declared mounting first, then by the gait rules
     (docs/science/calibration.md, "Signs")."""
@@ -250,13 +251,13 @@ def _signed(
     return (axis if margin > 0 else nearest_sign(axis, axis + np.pi)), ()
 
 
-def _margin(segment: Segment, angle: float, R_vertical: Floats, q: Floats, walk: Walk) -> float:
+def _margin(segment: Segment, angle: float, R_vertical: Floats, q: Floats, walk: CalibrationWalk) -> float:
     up = rotate(conjugate(q), np.array([0.0, 0.0, 1.0]))
     return gait_margin(sagittal_angle(up, about_vertical(-angle) @ R_vertical), walk.mask, segment)
 
 
 def _sign_notices(
-    segment: Segment, angle: float, R_vertical: Floats, q: Floats, walk: Walk
+    segment: Segment, angle: float, R_vertical: Floats, q: Floats, walk: CalibrationWalk
 ) -> tuple[Notice, ...]:
     """Tell when the gait rule contradicts a sign found otherwise; velocity and declaration go first."""
     if segment in TRUNK:

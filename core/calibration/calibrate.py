@@ -8,11 +8,11 @@ from math import degrees, radians
 
 import numpy as np
 
-from core.calibration.anterior import Anterior, Method, Walk, anterior
+from core.calibration.anterior import AnteriorAxis, CalibrationWalk, Method, find_anterior_axis
 from core.calibration.gyro_pca import about_vertical, sagittal_angle
 from core.calibration.heading import HeadingParams, Part, step_time
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
-from core.calibration.standing import Standing, choose_rest, find_rests, stand_all, vertical_frame
+from core.calibration.standing import SensorAtRest, choose_rest, find_rests, stand_all, vertical_frame
 from core.calibration.walking import (
     TRUNK,
     WalkingParams,
@@ -24,7 +24,7 @@ from core.calibration.walking import (
 )
 from core.errors import CalibrationError, Notice
 from core.frames import R_NEUTRAL, Bools, Floats, Segment
-from core.fusion.attitude import AttitudeParams, orientation
+from core.fusion.attitude import AttitudeParams, estimate_orientation
 from core.recording import UniformRecording
 from core.rest import RestParams, Window
 from core.rotation import conjugate, from_matrix, rotate
@@ -88,12 +88,14 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
     turning = turning_mask(recording, biases, q, params.walking) & moving
     parts = straight_parts(moving, turning, rate, params.walking)
     walk, facing = _walk(recording, rests, zero, parts, q, params.heading)
-    found: dict[Segment, Anterior] = {}
+    found: dict[Segment, AnteriorAxis] = {}
     notices: list[Notice] = []
     for s, signals in recording.sensors.items():
         declared = recording.mounting.get(s, "")
         try:
-            found[s] = anterior(s, signals, standing[s], q[s], walk, declared, params.method, params.heading)
+            found[s] = find_anterior_axis(
+                s, signals, standing[s], q[s], walk, declared, params.method, params.heading
+            )
         except CalibrationError as error:
             if error.code != "pelvis_heading_unknown" or len(recording.sensors) == 1:
                 raise
@@ -131,14 +133,18 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
 
 
 def _rest_world(
-    recording: UniformRecording, segment: Segment, standing: Standing, zero: Window, params: AttitudeParams
+    recording: UniformRecording,
+    segment: Segment,
+    standing: SensorAtRest,
+    zero: Window,
+    params: AttitudeParams,
 ) -> Floats:
     """Orientations (n, 4) of a sensor in its rest world: z up, x along its vertical frame's x at rest."""
     signals = recording.sensors[segment]
     at = round(0.5 * (zero[0] + zero[1]) * recording.rate_hz)
     q_rest = from_matrix(R_NEUTRAL @ vertical_frame(standing.up))
     gyr = signals.gyr - standing.gyro_bias
-    return orientation(
+    return estimate_orientation(
         q_rest, at, gyr, signals.acc, signals.valid, recording.rate_hz, standing.rest_norm, params
     )
 
@@ -150,7 +156,7 @@ def _walk(
     parts: list[Part],
     q: Mapping[Segment, Floats],
     params: HeadingParams,
-) -> tuple[Walk, float]:
+) -> tuple[CalibrationWalk, float]:
     """The straight parts to take the direction from, and their turn from where the person stood facing."""
     rate = recording.rate_hz
     rest = next(r for r in rests if r[0] <= zero[0] and zero[1] <= r[1])
@@ -180,10 +186,10 @@ def _walk(
     if trunk is not None:
         up = rotate(q[trunk], recording.sensors[trunk].acc)[:, 2]
         steps_s = [step_time(up[a:b], rate) for a, b in near]
-    return Walk(rest, leads, near, bearing, span, mask, steps_s, rate), facing
+    return CalibrationWalk(rest, leads, near, bearing, span, mask, steps_s, rate), facing
 
 
-def _mounted(standing: Standing, found: Anterior) -> SegmentCalibration:
+def _mounted(standing: SensorAtRest, found: AnteriorAxis) -> SegmentCalibration:
     return SegmentCalibration(
         R_segment_sensor=about_vertical(-found.angle) @ vertical_frame(standing.up),
         gyro_bias=standing.gyro_bias,
@@ -194,10 +200,10 @@ def _mounted(standing: Standing, found: Anterior) -> SegmentCalibration:
 
 
 def _straight_steps(
-    found: Mapping[Segment, Anterior],
-    standing: Mapping[Segment, Standing],
+    found: Mapping[Segment, AnteriorAxis],
+    standing: Mapping[Segment, SensorAtRest],
     q: Mapping[Segment, Floats],
-    walk: Walk,
+    walk: CalibrationWalk,
 ) -> int | None:
     """Steps that the direction rests on: twice the swings of one leg sensor."""
     leg = next((s for s in found if s not in TRUNK), None)

@@ -56,7 +56,7 @@ class HeadingParams:
 
 
 @dataclass(frozen=True)
-class Direction:
+class WalkingDirection:
     """A direction of walking in a sensor's world.
 
     Parameters
@@ -84,7 +84,7 @@ def rest_to_rest_velocity(a: Complexes, rests_at_end: bool, rate_hz: float) -> C
 
 def velocity_direction(
     v: Complexes, offset: int, parts: list[Part], bearing: list[float], params: HeadingParams
-) -> Direction | None:
+) -> WalkingDirection | None:
     """Direction of the mean velocity over the parts, each turned back by its bearing; None if implausible.
 
     For a walk out and back this is mean(out) − mean(back): a constant velocity error cancels.
@@ -106,7 +106,7 @@ def velocity_direction(
     coherence = float(np.abs(total) / path)
     if not params.speed[0] <= np.abs(total) <= params.speed[1] or coherence < params.coherence:
         return None
-    return Direction(float(np.angle(total)), coherence)
+    return WalkingDirection(float(np.angle(total)), coherence)
 
 
 def start_direction(
@@ -118,7 +118,7 @@ def start_direction(
     rate_hz: float,
     longest_gap_s: float,
     params: HeadingParams,
-) -> Direction | None:
+) -> WalkingDirection | None:
     """Direction from the velocity gained since a rest (lost until it), good enough for a sign.
 
     Parameters
@@ -153,7 +153,7 @@ def acceleration_axis(
     rate_hz: float,
     params: HeadingParams,
     steps_s: list[float] | None = None,
-) -> Direction:
+) -> WalkingDirection:
     """Principal axis of the low-passed horizontal acceleration, angle mod π.
 
     Parameters
@@ -175,7 +175,7 @@ def acceleration_axis(
         # Σ x² is the second moment about the axis: its phase is twice the axis angle
         moment += (x**2).sum()
         power += float((np.abs(x) ** 2).sum())
-    return Direction(0.5 * float(np.angle(moment)), float(np.abs(moment) / max(power, 1e-12)))
+    return WalkingDirection(0.5 * float(np.angle(moment)), float(np.abs(moment) / max(power, 1e-12)))
 
 
 def step_time(up: Floats, rate_hz: float) -> float:
@@ -202,6 +202,6 @@ def nearest_sign(axis: float, towards: float) -> float:
     return wrap_angle(turned)
 
 
-def difference(a: float, b: float) -> float:
+def subtract_angles(a: float, b: float) -> float:
     """Angle a − b in rad, [−π, π)."""
     return wrap_angle(a - b)

@@ -13,7 +13,7 @@ from core.timeline.live import UniformBlock
 
 
 @dataclass(frozen=True)
-class Wearer:
+class WornSensors:
     """Who wears which sensors: what of a recording is known before its first sample.
 
     Parameters
@@ -28,10 +28,10 @@ class Wearer:
     mounting: Mapping[str, str]
 
 
-class Attempt:
+class CalibrationSamples:
     """Samples of the axis from `first` on, the oldest of which can be dropped."""
 
-    def __init__(self, wearer: Wearer, first: int) -> None:
+    def __init__(self, wearer: WornSensors, first: int) -> None:
         n = len(wearer.segments)
         self.wearer, self.first, self.past = wearer, first, first
         self._acc, self._gyr = [np.zeros((0, n, 3))], [np.zeros((0, n, 3))]

@@ -8,7 +8,7 @@ import numpy as np
 
 from core.frames import Floats, Segment
 from core.recording import UniformRecording
-from core.rest import RestParams, quietness, windows_of
+from core.rest import RestParams, find_windows, measure_quietness
 
 
 @dataclass(frozen=True)
@@ -20,13 +20,13 @@ class StandingNow:
     longest_s: float
 
 
-def standing_now(recording: UniformRecording, rest: RestParams) -> StandingNow:
+def judge_standing(recording: UniformRecording, rest: RestParams) -> StandingNow:
     """By the rules of core/rest.py; the last second decides on now."""
     rate, n = recording.rate_hz, len(recording.t_s)
-    quiet = {s: quietness(x, rate, rest).quiet for s, x in recording.sensors.items()}
+    quiet = {s: measure_quietness(x, rate, rest).quiet for s, x in recording.sensors.items()}
     if not quiet or not n:
         return StandingNow(frozenset(), 0.0, 0.0)
-    windows = windows_of(np.logical_and.reduce(list(quiet.values())), rate, rest)
+    windows = find_windows(np.logical_and.reduce(list(quiet.values())), rate, rest)
     lasting = [b - a for a, b in windows if round(b * rate) >= n]
     return StandingNow(
         frozenset(s for s, x in quiet.items() if x[-1]),
@@ -35,7 +35,7 @@ def standing_now(recording: UniformRecording, rest: RestParams) -> StandingNow:
     )
 
 
-def last_part(recording: UniformRecording, seconds: float) -> UniformRecording:
+def cut_last_part(recording: UniformRecording, seconds: float) -> UniformRecording:
     """The last seconds of a recording."""
     part = slice(-round(seconds * recording.rate_hz), None)
     sensors = {
@@ -47,7 +47,7 @@ def last_part(recording: UniformRecording, seconds: float) -> UniformRecording:
     return replace(recording, t_s=recording.t_s[part], sensors=sensors)
 
 
-def upwards(recording: UniformRecording) -> dict[Segment, Floats]:
+def find_upward_axes(recording: UniformRecording) -> dict[Segment, Floats]:
     """Direction of the vertical in each sensor in the last second."""
     mean = {s: x.acc[-round(recording.rate_hz) :].mean(axis=0) for s, x in recording.sensors.items()}
     return {s: x / max(float(np.linalg.norm(x)), 1e-9) for s, x in mean.items()}

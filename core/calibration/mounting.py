@@ -26,7 +26,7 @@ _PHRASE = re.compile(
 )
 
 
-def declared_direction(text: str) -> tuple[Floats, float] | None:
+def read_declared_direction(text: str) -> tuple[Floats, float] | None:
     """Sensor axis (3,) and the angle from anterior in rad it points to, or None if the text does not say.
 
     >>> declared_direction("sacrum, face backwards")[1]
@@ -39,7 +39,7 @@ def declared_direction(text: str) -> tuple[Floats, float] | None:
     return axis, float(np.radians(WAYS[found["way"].lower()]))
 
 
-def declared_angle(text: str, R_vertical: Floats, segment: Segment) -> float | None:
+def read_declared_angle(text: str, R_vertical: Floats, segment: Segment) -> float | None:
     """Angle in rad of the anterior axis in the sensor's rest world, from a declared mounting.
 
     Parameters
@@ -50,7 +50,7 @@ def declared_angle(text: str, R_vertical: Floats, segment: Segment) -> float | N
     -------
     None when the text says nothing, or names an axis that stands within 30° of vertical.
     """
-    declared = declared_direction(text)
+    declared = read_declared_direction(text)
     if declared is None:
         return None
     axis, way = declared

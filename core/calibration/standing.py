@@ -10,7 +10,7 @@ import numpy as np
 from core.errors import SignalError
 from core.frames import Bools, Floats, Segment
 from core.recording import SensorSignals, UniformRecording
-from core.rest import RestParams, Window, quietness, rest_windows, runs, samples
+from core.rest import RestParams, Window, find_rest_windows, find_runs, index_window, measure_quietness
 
 LONGEST_S = 8.0
 """Rest that is used, s; 1, 2, 3, 5 and 8 s gave the same angles within 0.1°
@@ -34,7 +34,7 @@ WOBBLE_FACTOR = 2.5
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class SensorAtRest:
     """One sensor at rest.
 
     Parameters
@@ -47,14 +47,16 @@ class Standing:
     rest_norm: float
 
 
-def stand(signals: SensorSignals, rate_hz: float, window: Window, segment: Segment) -> Standing:
+def measure_standing(
+    signals: SensorSignals, rate_hz: float, window: Window, segment: Segment
+) -> SensorAtRest:
     """Mean specific force and mean rate of a sensor over a rest window.
 
     Raises
     ------
     SignalError `unit_suspect` when what is measured at rest cannot be gravity in m/s².
     """
-    part = samples(window, rate_hz)
+    part = index_window(window, rate_hz)
     ok = signals.valid[part]
     force, bias = signals.acc[part][ok].mean(axis=0), signals.gyr[part][ok].mean(axis=0)
     norm = float(np.linalg.norm(force))
@@ -66,7 +68,7 @@ def stand(signals: SensorSignals, rate_hz: float, window: Window, segment: Segme
             sensor=segment,
             t_s=window[0],
         )
-    return Standing(force / norm, bias, norm)
+    return SensorAtRest(force / norm, bias, norm)
 
 
 def vertical_frame(up: Floats) -> Floats:
@@ -93,18 +95,18 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
     ------
     SignalError `rest_too_short`, `not_still` or `no_rest`, with the quietest moment that was found.
     """
-    found = rest_windows(recording, params)
+    found = find_rest_windows(recording, params)
     if found:
         return found
     quietest: list[tuple[float, Segment, float]] = []
     for segment, signals in recording.sensors.items():
-        q = quietness(signals, recording.rate_hz, params)
+        q = measure_quietness(signals, recording.rate_hz, params)
         at = int(np.argmin(q.gyro))
         quietest.append((float(q.gyro[at]), segment, float(recording.t_s[at])))
     rate, segment, at_s = max(quietest)
     short = RestParams(params.window_s / 2, params.gyro_limit, params.acc_std_limit, params.shortest_s / 2)
     limit = np.degrees(params.gyro_limit)
-    if rest_windows(recording, short):
+    if find_rest_windows(recording, short):
         code, what = "rest_too_short", f"the sensors are still together for less than {params.shortest_s:g} s"
     elif rate < params.gyro_limit:
         code, what = "no_rest", "every sensor is still at some time, but never all of them together"
@@ -135,7 +137,7 @@ def choose_rest(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> Win
     -------
     At most 8 s of the chosen rest, at the side of the walk.
     """
-    walks = [(a / rate_hz, b / rate_hz) for a, b in runs(moving)]
+    walks = [(a / rate_hz, b / rate_hz) for a, b in find_runs(moving)]
     long = min(LONG_WALK_S, 0.5 * max((b - a for a, b in walks), default=0.0))
     start, end = next(((a, b) for a, b in walks if b - a >= long), (np.inf, np.inf))
     before = [r for r in rests if r[1] <= start + 0.5 * GOOD_S]
@@ -150,6 +152,6 @@ def choose_rest(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> Win
     return first, min(last, first + LONGEST_S)
 
 
-def stand_all(recording: UniformRecording, window: Window) -> Mapping[Segment, Standing]:
+def stand_all(recording: UniformRecording, window: Window) -> Mapping[Segment, SensorAtRest]:
     """Standing of every sensor over one window."""
-    return {s: stand(x, recording.rate_hz, window, s) for s, x in recording.sensors.items()}
+    return {s: measure_standing(x, recording.rate_hz, window, s) for s, x in recording.sensors.items()}

@@ -11,7 +11,7 @@ import numpy as np
 from core.filtering import low_pass
 from core.frames import Bools, Floats, Segment
 from core.recording import UniformRecording
-from core.rest import runs
+from core.rest import find_runs
 from core.rotation import conjugate, multiply, rotate, wrap_angle
 
 TRUNK: tuple[Segment, ...] = ("pelvis", "chest")
@@ -78,7 +78,7 @@ def turning_mask(
     cutoff = params.turn_cutoff_hz if worn[0] in TRUNK else 0.5 * params.turn_cutoff_hz
     turning = np.abs(low_pass(rate, cutoff, recording.rate_hz)) > params.turn_rate
     reach = round(params.turn_margin_s * recording.rate_hz)
-    for a, b in runs(turning):
+    for a, b in find_runs(turning):
         turning[max(0, a - reach) : b + reach] = True
     return np.asarray(turning)
 
@@ -93,22 +93,22 @@ def turn_sensors(recording: UniformRecording) -> list[Segment]:
 def _gaps(recording: UniformRecording, segment: Segment) -> bool:
     """Was the sensor lost for longer than the 0.1 s that are interpolated
     (docs/science/timeline.md, "Rule")?"""
-    return any(b - a > 0.1 * recording.rate_hz for a, b in runs(~recording.sensors[segment].valid))
+    return any(b - a > 0.1 * recording.rate_hz for a, b in find_runs(~recording.sensors[segment].valid))
 
 
 def straight_parts(
     moving: Bools, turning: Bools, rate_hz: float, params: WalkingParams
 ) -> list[tuple[int, int]]:
     """Index ranges of straight walking of at least `shortest_s`."""
-    return [r for r in runs(moving & ~turning) if r[1] - r[0] >= params.shortest_s * rate_hz]
+    return [r for r in find_runs(moving & ~turning) if r[1] - r[0] >= params.shortest_s * rate_hz]
 
 
 def mean_turn(q: Floats, q_rest: Floats, part: tuple[int, int]) -> float:
     """Mean angle in rad turned about the vertical over an index range, circular."""
-    return float(np.angle(np.exp(1j * turned(q[part[0] : part[1]], q_rest)).mean()))
+    return float(np.angle(np.exp(1j * measure_turned_angle(q[part[0] : part[1]], q_rest)).mean()))
 
 
-def turned(q: Floats, q_rest: Floats) -> Floats:
+def measure_turned_angle(q: Floats, q_rest: Floats) -> Floats:
     """Angle (n,) in rad by which q (n, 4) is turned about the vertical against q_rest (4,).
 
     The twist of the rotation about z: it exists for any mounting of the sensor.

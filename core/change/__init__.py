@@ -3,10 +3,10 @@
 from core.change.limits import (
     ChangeLimit,
     Repeatability,
-    detectable,
     detectable_ratio,
-    relevant,
-    repeatability,
+    estimate_repeatability,
+    find_detectable_change,
+    find_relevant_change,
 )
 from core.change.verdict import (
     UNLIKE,
@@ -15,7 +15,7 @@ from core.change.verdict import (
     ratio_changes,
     score_changes,
     score_name,
-    unjudged,
+    withdraw_verdicts,
 )
 
 __all__ = [
@@ -23,13 +23,13 @@ __all__ = [
     "Change",
     "ChangeLimit",
     "Repeatability",
-    "detectable",
     "detectable_ratio",
+    "estimate_repeatability",
+    "find_detectable_change",
+    "find_relevant_change",
     "parameter_changes",
     "ratio_changes",
-    "relevant",
-    "repeatability",
     "score_changes",
     "score_name",
-    "unjudged",
+    "withdraw_verdicts",
 ]

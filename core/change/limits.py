@@ -60,7 +60,7 @@ class Repeatability:
         )
 
 
-def repeatability(values: Sequence[Sequence[float]]) -> Repeatability | None:
+def estimate_repeatability(values: Sequence[Sequence[float]]) -> Repeatability | None:
     """Measurement error from one list of values per person; None with fewer than five people measured twice.
 
     SEM² = pooled variance within people (Weir 2005, J Strength Cond Res 19:231).
@@ -73,7 +73,7 @@ def repeatability(values: Sequence[Sequence[float]]) -> Repeatability | None:
     return Repeatability(sem, _mdc95(sem), len(repeated), sum(len(v) for v in repeated))
 
 
-def detectable(name: str, baseline: float, limb: Limb | None = None) -> ChangeLimit | None:
+def find_detectable_change(name: str, baseline: float, limb: Limb | None = None) -> ChangeLimit | None:
     """MDC of a parameter; None where no source has one.
 
     Parameters
@@ -95,7 +95,7 @@ def detectable_ratio(name: str) -> ChangeLimit | None:
     return _RATIOS.get(name)
 
 
-def relevant(name: str, limb: Limb | None = None) -> ChangeLimit | None:
+def find_relevant_change(name: str, limb: Limb | None = None) -> ChangeLimit | None:
     """MCID of a parameter or score; None where no source has one."""
     entry = CATALOGUE.get(name)
     key = name if entry is None else entry.change

@@ -16,16 +16,16 @@ from core.change.limits import (
     ChangeLimit,
     Limb,
     Repeatability,
-    detectable,
     detectable_ratio,
-    relevant,
+    find_detectable_change,
+    find_relevant_change,
 )
 from core.frames import Side
 from core.norms.values import NormValue
 from core.parameters.kinematic import is_level
 from core.parameters.result import Parameter
 from core.parameters.symmetry import Symmetry
-from core.parameters.variability import TOO_FEW, comparable
+from core.parameters.variability import TOO_FEW, has_enough_values
 from core.scores import Score
 
 Verdict = Literal["within_measurement_error", "real_change", "clinically_relevant"]
@@ -123,12 +123,12 @@ def score_changes(
         if change.difference:
             # a score in degrees is a distance from the norm, an index grows towards it
             change = replace(change, towards_norm=(change.difference < 0.0) == (s.unit == "deg"))
-        mcid = relevant(s.name) if s.mode == "raw" else None
+        mcid = find_relevant_change(s.name) if s.mode == "raw" else None
         changes.append(_judged(change, None if mine is None else mine.limit, mcid))
     return tuple(changes)
 
 
-def unjudged(change: Change) -> Change:
+def withdraw_verdicts(change: Change) -> Change:
     """The same difference between takes that were not walked alike: no verdict, no direction."""
     if change.difference is None:
         return change
@@ -150,12 +150,12 @@ def _parameter(
     change = _plain(new.name, new.side, new.unit, None if old is None else old.mean, new.mean)
     if old is None or old.mean is None or new.mean is None:
         return change
-    if not (comparable(old) and comparable(new)):
+    if not (has_enough_values(old) and has_enough_values(new)):
         return replace(change, reason=TOO_FEW)
     limb: Limb | None = None
     if affected is not None and new.side is not None:
         limb = "affected" if new.side == affected else "unaffected"
-    mdc = detectable(new.name, old.mean, limb) if own is None else own.limit
+    mdc = find_detectable_change(new.name, old.mean, limb) if own is None else own.limit
     open_by_strides = _strides(old, new)
     if mdc is not None and open_by_strides > mdc.value:
         mdc = ChangeLimit(open_by_strides, "these strides", STRIDES)
@@ -163,7 +163,7 @@ def _parameter(
         change = replace(change, towards_norm=abs(new.mean - norm.mean) < abs(old.mean - norm.mean))
     if is_level(new.name):
         change = replace(change, note="from_standing")
-    return _judged(change, mdc, relevant(new.name, limb))
+    return _judged(change, mdc, find_relevant_change(new.name, limb))
 
 
 def _strides(old: Parameter, new: Parameter) -> float:

@@ -2,7 +2,7 @@
 
 from core.events.detection import detect
 from core.events.flags import StrideParams
-from core.events.foot_pitch import FootPitchParams, warm
+from core.events.foot_pitch import FootPitchParams, compile_foot_pitch_kernel
 from core.events.strides import stride_list
 
-__all__ = ["FootPitchParams", "StrideParams", "detect", "stride_list", "warm"]
+__all__ = ["FootPitchParams", "StrideParams", "compile_foot_pitch_kernel", "detect", "stride_list"]

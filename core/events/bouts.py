@@ -114,7 +114,7 @@ def walking_bouts(
     return tuple(found)
 
 
-def bouts_of(
+def find_bouts(
     events: GaitEvents, rests: Sequence[Window] | None = None, params: BoutParams | None = None
 ) -> tuple[Bout, ...]:
     """Walking bouts of the contacts of the feet."""

@@ -86,7 +86,7 @@ def all_detectors(
     return found
 
 
-def with_confidence(found: Mapping[str, GaitEvents], params: ConsensusParams | None = None) -> GaitEvents:
+def rate_confidence(found: Mapping[str, GaitEvents], params: ConsensusParams | None = None) -> GaitEvents:
     """The lead's contacts, none added and none taken away, with the share of detectors that saw each.
 
     Parameters
@@ -117,7 +117,7 @@ def with_confidence(found: Mapping[str, GaitEvents], params: ConsensusParams | N
     return replace(lead, events=events, notices=tuple(notices))
 
 
-def consensus(found: Mapping[str, GaitEvents], params: ConsensusParams | None = None) -> GaitEvents:
+def agree_on_contacts(found: Mapping[str, GaitEvents], params: ConsensusParams | None = None) -> GaitEvents:
     """Contacts that enough detectors agree on.
 
     Parameters

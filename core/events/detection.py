@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from core.errors import Notice, SignalError
-from core.events.foot_pitch import FootPitchParams, FootPitchState, pitch_signal, push
+from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
 from core.events.result import EventKind, GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES, Bools, Floats, Side
 from core.rotation import angle_between
@@ -92,7 +92,9 @@ def _events(
     side: Side, s: Floats, valid: Bools, orientations: Orientations, params: FootPitchParams
 ) -> list[GaitEvent]:
     """Run the rule over the whole take of one foot."""
-    kind, index, known, offset = push(FootPitchState.start(orientations.rate_hz, params), s, valid)
+    kind, index, known, offset = advance_foot_pitch(
+        FootPitchState.start(orientations.rate_hz, params), s, valid
+    )
     step = 1.0 / orientations.rate_hz
     return [
         GaitEvent(

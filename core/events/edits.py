@@ -79,7 +79,7 @@ class Edit:
         return {k: v for k, v in asdict(self).items() if v is not None}
 
 
-def edit_of(values: dict[str, Any]) -> Edit:
+def read_edit(values: dict[str, Any]) -> Edit:
     """The edit that `to_json` wrote; raises ParameterError bad_edit."""
     try:
         return Edit(**values)
@@ -87,7 +87,7 @@ def edit_of(values: dict[str, Any]) -> Edit:
         raise _bad(str(error)) from None
 
 
-def edited_events(events: GaitEvents, edits: Iterable[Edit], duration_s: float) -> GaitEvents:
+def apply_event_edits(events: GaitEvents, edits: Iterable[Edit], duration_s: float) -> GaitEvents:
     """The events after all edits of events, in order of time.
 
     Raises
@@ -111,7 +111,7 @@ def edited_events(events: GaitEvents, edits: Iterable[Edit], duration_s: float) 
     return replace(events, events=tuple(found))
 
 
-def edited_strides(strides: Strides, edits: Iterable[Edit]) -> Strides:
+def apply_stride_edits(strides: Strides, edits: Iterable[Edit]) -> Strides:
     """The stride list with a person's decisions: the last one about a stride holds, over any rule.
 
     A decision about a moment that no stride contains any more has no effect.
@@ -119,14 +119,14 @@ def edited_strides(strides: Strides, edits: Iterable[Edit]) -> Strides:
     listed = list(strides.strides)
     for edit in edits:
         if edit.kind.endswith("stride"):
-            i = stride_at(listed, edit.side, edit.time_s)
+            i = find_stride(listed, edit.side, edit.time_s)
             if i is not None:
                 why = None if edit.reason is None else f"{SOURCE}:{edit.reason.strip()}"
                 listed[i] = replace(listed[i], excluded_reason=why)
     return replace(strides, strides=tuple(listed))
 
 
-def stride_at(strides: Sequence[Stride], side: Side, time_s: float) -> int | None:
+def find_stride(strides: Sequence[Stride], side: Side, time_s: float) -> int | None:
     """Place of the stride of a foot that contains a moment, None if there is none."""
     return next((i for i, s in enumerate(strides) if s.side == side and s.start_s <= time_s < s.end_s), None)
 

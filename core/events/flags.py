@@ -64,7 +64,7 @@ class StrideParams:
     min_kept: int = 3
 
 
-def flagged(own: Sequence[Stride], params: StrideParams) -> list[Stride]:
+def flag_cycles(own: Sequence[Stride], params: StrideParams) -> list[Stride]:
     """The cycles of one foot in order of time with the flags their neighbours give them added."""
     more: list[set[StrideFlag]] = [set(s.flags) for s in own]
     for run in _runs(own, params):
@@ -80,15 +80,15 @@ def flagged(own: Sequence[Stride], params: StrideParams) -> list[Stride]:
                 more[i].add("near_turn")
     for i in _outliers(own, params):
         more[i].add("outlier")
-    return [with_flag(s, *m) for s, m in zip(own, more, strict=True)]
+    return [add_flag(s, *m) for s, m in zip(own, more, strict=True)]
 
 
-def with_flag(stride: Stride, *more: StrideFlag) -> Stride:
+def add_flag(stride: Stride, *more: StrideFlag) -> Stride:
     """The cycle with these flags too, in their order."""
     return replace(stride, flags=tuple(f for f in ORDER if f in more or f in stride.flags))
 
 
-def decided(strides: Sequence[Stride], params: StrideParams) -> tuple[list[Stride], bool]:
+def decide_exclusions(strides: Sequence[Stride], params: StrideParams) -> tuple[list[Stride], bool]:
     """Set cycles aside by the first of their flags; True where those next to a turn had to count."""
     strict = [replace(s, excluded_reason=next(iter(s.flags), None)) for s in strides]
     left = Counter(s.side for s in strict if s.excluded_reason is None)

@@ -88,7 +88,7 @@ class FootPitchState:
         )
 
 
-def push(
+def advance_foot_pitch(
     state: FootPitchState, s: Floats, valid: Bools
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Floats]:
     """Advance one foot by a block of samples, in place.
@@ -122,6 +122,6 @@ def pitch_signal(q_foot: Floats) -> Floats:
     return np.asarray(2.0 * (x * z - w * y))
 
 
-def warm() -> None:
+def compile_foot_pitch_kernel() -> None:
     """Compile (or load from the cache) the kernel, so that the first analysis does not wait for it."""
-    push(FootPitchState.start(100.0, FootPitchParams()), np.zeros(1), np.ones(1, np.bool_))
+    advance_foot_pitch(FootPitchState.start(100.0, FootPitchParams()), np.zeros(1), np.ones(1, np.bool_))

@@ -10,19 +10,19 @@ from typing import NamedTuple
 
 from core.errors import SignalError
 from core.events.detection import KINDS, SOURCE
-from core.events.foot_pitch import FootPitchParams, FootPitchState, pitch_signal, push
+from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
 from core.events.result import GaitEvent
 from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
 
 
-class Known(NamedTuple):
+class KnownContact(NamedTuple):
     """A contact and the sample, counted from the start of the chain, at which it is known."""
 
     at: int
     event: GaitEvent
 
 
-class Contacts:
+class ContactDetector:
     """Initial and terminal contacts of the feet that carry a sensor.
 
     Raises
@@ -43,7 +43,7 @@ class Contacts:
         self._rules = [FootPitchState.start(rate_hz, params) for _ in self.sides]
         self._rate_hz = rate_hz
 
-    def push(self, q: Floats, valid: Bools, first: int) -> list[Known]:
+    def push(self, q: Floats, valid: Bools, first: int) -> list[KnownContact]:
         """Contacts that these samples make known, in the order in which they become known.
 
         Parameters
@@ -52,7 +52,7 @@ class Contacts:
         """
         found = []
         for i, (side, rule) in enumerate(zip(self.sides, self._rules, strict=True)):
-            told = push(rule, pitch_signal(q[:, i]), valid[:, i])
+            told = advance_foot_pitch(rule, pitch_signal(q[:, i]), valid[:, i])
             for kind, index, known, offset in zip(*told, strict=True):
                 event = GaitEvent(
                     time_s=(first + int(index) + float(offset)) / self._rate_hz,
@@ -61,5 +61,5 @@ class Contacts:
                     source=SOURCE,
                     detected_s=(first + int(known)) / self._rate_hz,
                 )
-                found.append(Known(int(known), event))
+                found.append(KnownContact(int(known), event))
         return sorted(found, key=lambda x: (x.at, x.event.side))

@@ -24,7 +24,7 @@ from core.events.periodicity import Periodicity, PeriodicityParams, step_times
 from core.events.steps import Step, Steps
 from core.frames import Bools, Floats, Segment, Side
 from core.recording import SensorSignals, UniformRecording
-from core.rest import rest_windows, runs
+from core.rest import find_rest_windows, find_runs
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 
@@ -104,7 +104,7 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
             sensor=segment,
         )
     signals = recording.sensors[segment]
-    vertical, yaw_rate = about_up(signals, rate, params)
+    vertical, yaw_rate = split_about_vertical(signals, rate, params)
     moving = _moving(vertical, signals.valid, rate, params)
     if not moving.any():
         return _nothing(segment, "no_walking", "The trunk hardly moved: no steps were found.")
@@ -118,7 +118,7 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
             " ten steps straight ahead.",
         )
     times = _steps(vertical, moving, rhythm, rate, params)
-    rests = rest_windows(recording, segments=(segment,))
+    rests = find_rest_windows(recording, segments=(segment,))
     bouts = tuple(
         b for b in walking_bouts(times, rests=rests, params=params.bouts) if _repeats(b, rhythm, params)
     )
@@ -149,7 +149,7 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
     return Steps(tuple(steps), bouts, segment, tuple(notices), {"score": float(rhythm.score.max())})
 
 
-def about_up(
+def split_about_vertical(
     signals: SensorSignals, rate_hz: float, params: LumbarParams | None = None
 ) -> tuple[Floats, Floats]:
     """Vertical acceleration free of gravity (n,) in m/s² and yaw rate (n,) in rad/s, left positive.
@@ -214,7 +214,7 @@ def _repeats(bout: Bout, rhythm: Periodicity, params: LumbarParams) -> bool:
 def _parts(moving: Bools, merge: float) -> list[tuple[int, int]]:
     """Runs of movement, those closer than `merge` samples joined."""
     parts: list[tuple[int, int]] = []
-    for first, end in runs(moving):
+    for first, end in find_runs(moving):
         if parts and first - parts[-1][1] < merge:
             parts[-1] = (parts[-1][0], end)
         else:

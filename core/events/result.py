@@ -113,7 +113,7 @@ class Strides:
     strides: tuple[Stride, ...]
     notices: tuple[Notice, ...] = ()
 
-    def used(self, side: Side | None = None) -> tuple[Stride, ...]:
+    def select_used(self, side: Side | None = None) -> tuple[Stride, ...]:
         """Strides that count, of one side or both."""
         return tuple(
             s for s in self.strides if s.excluded_reason is None and (side is None or s.side == side)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import Notice
-from core.events.flags import StrideParams, decided, flagged
+from core.events.flags import StrideParams, decide_exclusions, flag_cycles
 from core.events.result import COMPARED, GaitEvents, Stride, StrideFlag, Strides
 from core.frames import FOOT, SIDES, Bools, Oriented, Side
 from core.rotation import wrap_angle, yaw
@@ -48,15 +48,15 @@ def stride_list(
     plain = [
         stride
         for side in SIDES
-        for stride in flagged(side_strides(side, events, orientations, turning, params), params)
+        for stride in flag_cycles(side_strides(side, events, orientations, turning, params), params)
     ]
     plain.sort(key=lambda s: (s.start_s, s.side))
-    return counted(plain, params)
+    return count_strides(plain, params)
 
 
-def counted(strides: Sequence[Stride], params: StrideParams) -> Strides:
+def count_strides(strides: Sequence[Stride], params: StrideParams) -> Strides:
     """The list with what its flags decide, and what must be said about what is left."""
-    listed, near_turns = decided(strides, params)
+    listed, near_turns = decide_exclusions(strides, params)
     return Strides(tuple(listed), (*_short_walk(listed, near_turns), *_unused(listed)))
 
 

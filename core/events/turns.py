@@ -16,7 +16,7 @@ import numpy as np
 
 from core.filtering import low_pass
 from core.frames import Bools, Floats, Oriented, Segment
-from core.rest import runs
+from core.rest import find_runs
 from core.rotation import conjugate, log, multiply
 
 LEVELS: Final[tuple[tuple[Segment, ...], ...]] = (
@@ -69,7 +69,7 @@ class Turn:
         return "left" if self.angle_rad > 0.0 else "right"
 
 
-def turns(
+def find_turns(
     yaw_rate: Floats, valid: Bools, rate_hz: float, params: TurnParams | None = None
 ) -> tuple[Turn, ...]:
     """Turns of a take in order of time.
@@ -86,7 +86,7 @@ def turns(
     quick = low_pass(yaw_rate, params.peak_cutoff_hz, rate_hz)
     found: list[tuple[int, int]] = []
     for sign in (1.0, -1.0):
-        for first, end in _joined(runs(sign * smooth > params.edge_rad_s), params.join_s * rate_hz):
+        for first, end in _joined(find_runs(sign * smooth > params.edge_rad_s), params.join_s * rate_hz):
             if (sign * smooth[first:end]).max() >= params.peak_rad_s and valid[first:end].all():
                 found.append((first, end))
     listed = [

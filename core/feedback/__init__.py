@@ -6,10 +6,10 @@ from core.feedback.baseline import Baseline
 from core.feedback.cue import Cue, FeedbackState, GuardState, SideEffect, Summary, Tone
 from core.feedback.engine import Command, FeedbackEngine
 from core.feedback.prescription import (
-    Guard,
     Prescription,
     Progression,
     Schedule,
+    SideEffectGuard,
     StopRule,
     Target,
 )
@@ -24,12 +24,12 @@ __all__ = [
     "FeedbackEngine",
     "FeedbackSplit",
     "FeedbackState",
-    "Guard",
     "GuardState",
     "Prescription",
     "Progression",
     "Schedule",
     "SideEffect",
+    "SideEffectGuard",
     "StopRule",
     "StrideLike",
     "Summary",

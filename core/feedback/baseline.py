@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
-from core.feedback.fields import Fields
+from core.feedback.fields import RecordFields
 from core.feedback.prescription import LEVELS
 
 
@@ -38,7 +38,7 @@ class Baseline:
     @staticmethod
     def from_json(data: Mapping[str, object]) -> Baseline:
         """Read what `to_json` wrote; raises ParameterError bad_prescription."""
-        f = Fields("baseline", data)
+        f = RecordFields("baseline", data)
         baseline = Baseline(
             f.number_or_none("mean", None),
             f.number_or_none("sd", None, 0.0),
@@ -49,5 +49,5 @@ class Baseline:
             f.text("other_mdc_source", None),
             f.flag("after_training", False),
         )
-        f.done()
+        f.refuse_unknown()
         return baseline

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Final, Literal, get_args
 
-from core.feedback.fields import Fields
+from core.feedback.fields import RecordFields
 from core.frames import SIDES, Side
 
 Zone = Literal["in", "near_low", "near_high", "low", "high"]
@@ -77,7 +77,7 @@ class Cue:
     @staticmethod
     def from_json(data: Mapping[str, object]) -> Cue:
         """Read what `to_json` wrote; raises ParameterError bad_prescription."""
-        f = Fields("cue", data)
+        f = RecordFields("cue", data)
         tone = None
         if data.get("tone") is not None:
             t = f.part("tone")

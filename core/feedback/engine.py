@@ -15,10 +15,10 @@ from core.feedback.cue import Cue, FeedbackState, Phase, Stop, WhyNot, Zone
 from core.feedback.guard import GuardWatch
 from core.feedback.levels import Ladder
 from core.feedback.prescription import Prescription
-from core.feedback.schedule import Place, place
+from core.feedback.schedule import ScheduleSlot, find_slot
 from core.feedback.stride import StrideLike
-from core.feedback.tally import Tally
-from core.feedback.zones import zones_of
+from core.feedback.tally import RunningStatistics
+from core.feedback.zones import make_zones
 
 OPENING: Final = 10
 """Strides without feedback that give the start level where no earlier session does (our choice)."""
@@ -45,7 +45,7 @@ class FeedbackEngine:
     """
 
     def __init__(self, prescription: Prescription, baseline: Baseline | None = None) -> None:
-        zones = zones_of(prescription, prescription.progression.worse)
+        zones = make_zones(prescription, prescription.progression.worse)
         if zones is None:
             raise ParameterError(
                 "no_target",
@@ -67,7 +67,7 @@ class FeedbackEngine:
         self._first_s: float | None = None
         self._strides = 0
         self._position = 0
-        self._with, self._without = Tally(), Tally()
+        self._with, self._without = RunningStatistics(), RunningStatistics()
         self._told: deque[int] = deque(maxlen=REMEMBERED)
 
     def push(self, stride: StrideLike, now_s: float | None = None) -> Cue | None:
@@ -87,7 +87,7 @@ class FeedbackEngine:
         self._told.append(stride.n)
         if self._first_s is None:
             self._first_s = stride.start_s
-        self._guard.see(stride.side, value, stride.curves)
+        self._guard.add_stride(stride.side, value, stride.curves)
         if self.prescription.side not in (None, stride.side):
             return None
         late = now_s is not None and now_s - stride.detected_s > LATE_S
@@ -154,15 +154,15 @@ class FeedbackEngine:
             guard=self._guard.state,
         )
 
-    def _phase(self, at: Place) -> Phase:
+    def _phase(self, at: ScheduleSlot) -> Phase:
         if self._opening_left:
             return self._opening
         if self._stopped is not None:
             return "stopped"
         return "probe" if at.block is not None else "training"
 
-    def _place(self) -> Place:
-        return place(self.prescription.schedule, self._position)
+    def _place(self) -> ScheduleSlot:
+        return find_slot(self.prescription.schedule, self._position)
 
     def _judge(self, stride: StrideLike, value: float, late: bool) -> Cue:
         zone = self._ladder.zone(value)
@@ -170,7 +170,7 @@ class FeedbackEngine:
         why = self._why_not(at, zone, late)
         running = self._running(why)
         if running and at.block is None:
-            self._ladder.see(zone)
+            self._ladder.add_stride(zone)
         low, high = self._ladder.limits
         shown = why is None
         sound = shown and "tone" in self.prescription.modes
@@ -192,7 +192,7 @@ class FeedbackEngine:
             share_in_zone_last20=self._ladder.share("in"),
         )
 
-    def _why_not(self, at: Place, zone: Zone, late: bool) -> WhyNot | None:
+    def _why_not(self, at: ScheduleSlot, zone: Zone, late: bool) -> WhyNot | None:
         """The first of all reasons against showing this stride."""
         p = self.prescription
         reasons: tuple[tuple[bool, WhyNot], ...] = (
@@ -219,7 +219,7 @@ class FeedbackEngine:
             self._opened.append(value)
             self._opening_left -= 1
             if not self._opening_left:
-                self._ladder.open(self._opened)
+                self._ladder.end_first_strides(self._opened)
             return
         (self._with if cue.with_feedback else self._without).add(value, cue.zone == "in")
         if self._running(cue.why_not):

@@ -15,11 +15,11 @@ CODE: Final = "bad_prescription"
 _MISSING: Final = object()
 
 
-class Fields:
+class RecordFields:
     """The fields of one object of a record.
 
     Every reader returns the default where the field is absent, and raises ParameterError bad_prescription
-    with what was expected and what was found; `done` refuses fields nobody read.
+    with what was expected and what was found; `refuse_unknown` refuses fields nobody read.
     """
 
     def __init__(self, path: str, data: object) -> None:
@@ -29,10 +29,10 @@ class Fields:
         self._data: Mapping[Any, object] = data
         self._read: set[str] = set()
 
-    def part(self, name: str) -> Fields:
+    def part(self, name: str) -> RecordFields:
         """An object inside this one; absent = all its defaults."""
         found = self._take(name, {})
-        return Fields(name if self._path == "prescription" else f"{self._path}.{name}", found)
+        return RecordFields(name if self._path == "prescription" else f"{self._path}.{name}", found)
 
     def number(self, name: str, default: float, least: float, most: float) -> float:
         """A finite number within limits."""
@@ -93,7 +93,7 @@ class Fields:
             return found
         raise self._wrong(name, found, "text of at most 500 characters")
 
-    def done(self) -> None:
+    def refuse_unknown(self) -> None:
         """Refuse what nobody asked for: a misspelt field must not be silently ignored."""
         unknown = sorted(str(k) for k in self._data.keys() - self._read)
         if unknown:

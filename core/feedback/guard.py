@@ -51,7 +51,7 @@ class GuardWatch:
         """As of the last stride."""
         return self._state
 
-    def see(self, side: Side, value: float, curves: Mapping[str, Floats]) -> None:
+    def add_stride(self, side: Side, value: float, curves: Mapping[str, Floats]) -> None:
         """Take in a counted stride: its value of the parameter and its curves (101,) in rad."""
         self._values[side].append(value)
         if all(v in curves for v in SAGITTAL):

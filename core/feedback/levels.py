@@ -55,11 +55,11 @@ class Ladder:
         """Share of the strides at this level that lay in a zone; None without any."""
         return sum(z == zone for z in self._recent) / len(self._recent) if self._recent else None
 
-    def see(self, zone: Zone) -> None:
+    def add_stride(self, zone: Zone) -> None:
         """Take in a training stride."""
         self._recent.append(zone)
 
-    def open(self, values: Sequence[float]) -> None:
+    def end_first_strides(self, values: Sequence[float]) -> None:
         """End of the strides a visit begins with: they say what nothing else has said."""
         usual = fmean(values)
         self._know_side(usual)

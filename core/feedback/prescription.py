@@ -12,7 +12,7 @@ from math import isfinite
 from typing import Final, Literal, get_args
 
 from core.errors import ParameterError
-from core.feedback.fields import Fields
+from core.feedback.fields import RecordFields
 from core.frames import SIDES, Side
 from core.parameters.catalogue import list_trainable
 
@@ -114,7 +114,7 @@ class StopRule:
 
 
 @dataclass(frozen=True)
-class Guard:
+class SideEffectGuard:
     """Side effects that are looked for while training (Legrand et al. 2025: feedback on
     stance time cost 7.9 points of the GDI).
 
@@ -150,7 +150,7 @@ class Prescription:
     schedule: Schedule = field(default_factory=Schedule)
     progression: Progression = field(default_factory=Progression)
     stop_rule: StopRule = field(default_factory=StopRule)
-    guard: Guard = field(default_factory=Guard)
+    guard: SideEffectGuard = field(default_factory=SideEffectGuard)
 
     def to_json(self) -> dict[str, object]:
         """Plain values; `from_json` reads them back."""
@@ -169,7 +169,7 @@ class Prescription:
 
 
 def _prescription(data: Mapping[str, object]) -> Prescription:
-    f = Fields("prescription", data)
+    f = RecordFields("prescription", data)
     target = _target(f.part("target"))
     parameter = f.choice("parameter", list_trainable())
     side = f.choice("side", (*SIDES, None), None)
@@ -187,7 +187,7 @@ def _prescription(data: Mapping[str, object]) -> Prescription:
         _stop_rule(f.part("stop_rule")),
         _guard(f.part("guard")),
     )
-    f.done()
+    f.refuse_unknown()
     if made.positive_only and made.bandwidth:
         raise _refused(
             "positive_only and bandwidth are both on, and leave no stride to show. Expected at most one."
@@ -200,11 +200,11 @@ def _prescription(data: Mapping[str, object]) -> Prescription:
     return made
 
 
-def _target(f: Fields) -> Target:
+def _target(f: RecordFields) -> Target:
     source = f.choice("source", SOURCES, "norm")
     mean, sd = f.number_or_none("mean", None), f.number_or_none("sd", None)
     target = Target(source, mean, sd, f.text("words", "") or "", f.text("session_id", None))
-    f.done()
+    f.refuse_unknown()
     if (mean is None) != (sd is None) or (source == "manual" and mean is None):
         raise _refused(f"target.mean is {mean} and target.sd {sd}. Expected both numbers, or neither.")
     if sd is not None and not (isfinite(sd) and sd > 0.0):
@@ -212,7 +212,7 @@ def _target(f: Fields) -> Target:
     return target
 
 
-def _schedule(f: Fields) -> Schedule:
+def _schedule(f: RecordFields) -> Schedule:
     d = Schedule()
     found = Schedule(
         f.choice("kind", KINDS, d.kind),
@@ -222,7 +222,7 @@ def _schedule(f: Fields) -> Schedule:
         f.whole("probe_strides", d.probe_strides, 1, 1000),
         f.whole("retention_strides", d.retention_strides, 0, 1000),
     )
-    f.done()
+    f.refuse_unknown()
     if list(found.shares_pct) != sorted(found.shares_pct, reverse=True):
         raise _refused(
             f"schedule.shares_pct is {list(found.shares_pct)}. Expected no share above the one before."
@@ -230,7 +230,7 @@ def _schedule(f: Fields) -> Schedule:
     return found
 
 
-def _progression(f: Fields) -> Progression:
+def _progression(f: RecordFields) -> Progression:
     d = Progression()
     found = Progression(
         f.flag("automatic", d.automatic),
@@ -241,7 +241,7 @@ def _progression(f: Fields) -> Progression:
         f.whole_or_none("start_level", None, 0, LEVELS),
         f.choice("worse", ("low", "high", None), None),
     )
-    f.done()
+    f.refuse_unknown()
     if found.share + found.away_share < 1.0:
         raise _refused(
             f"progression.share is {found.share:g} and away_share {found.away_share:g}: the same strides "
@@ -250,24 +250,24 @@ def _progression(f: Fields) -> Progression:
     return found
 
 
-def _stop_rule(f: Fields) -> StopRule:
+def _stop_rule(f: RecordFields) -> StopRule:
     d = StopRule()
     found = StopRule(
         f.whole_or_none("max_strides", d.max_strides, 1, 100_000),
         f.number_or_none("max_minutes", d.max_minutes, 0.5, 240.0),
         f.number_or_none("gps_rise_deg", d.gps_rise_deg, 0.1, 60.0),
     )
-    f.done()
+    f.refuse_unknown()
     return found
 
 
-def _guard(f: Fields) -> Guard:
-    d = Guard()
-    found = Guard(
+def _guard(f: RecordFields) -> SideEffectGuard:
+    d = SideEffectGuard()
+    found = SideEffectGuard(
         f.number_or_none("other_change", d.other_change, 0.0),
         f.number_or_none("gps_rise_deg", d.gps_rise_deg, 0.1, 60.0),
     )
-    f.done()
+    f.refuse_unknown()
     return found
 
 

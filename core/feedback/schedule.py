@@ -8,7 +8,7 @@ from core.feedback.prescription import Schedule
 
 
 @dataclass(frozen=True)
-class Place:
+class ScheduleSlot:
     """A stride's place in a schedule.
 
     Parameters
@@ -26,7 +26,7 @@ class Place:
     block_left: int | None
 
 
-def place(schedule: Schedule, position: int) -> Place:
+def find_slot(schedule: Schedule, position: int) -> ScheduleSlot:
     """Where the stride of this number, from 0 and probes included, lies.
 
     Fading counts training strides only. Of every step exactly its share is shown, spread evenly: after k
@@ -43,7 +43,7 @@ def place(schedule: Schedule, position: int) -> Place:
             next_probe = every - at
     share, index = _step(schedule, trained)
     shown = block is None and (index + 1) * share // 100 > index * share // 100
-    return Place(shown, share, block, next_probe, left)
+    return ScheduleSlot(shown, share, block, next_probe, left)
 
 
 def _step(schedule: Schedule, trained: int) -> tuple[int, int]:

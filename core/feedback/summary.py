@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from core.feedback.cue import Cue, Summary, WhyNot
-from core.feedback.tally import Tally
+from core.feedback.tally import RunningStatistics
 from core.frames import SIDES, Side
 
 TOLERANCE_S: Final = 0.1
@@ -122,33 +122,33 @@ def split(strides: Sequence[AnalysedStride], cues: Sequence[Cue]) -> FeedbackSpl
             matched.append(MatchedStride(cue, stride.value, inside))
     kinds: dict[Kind, list[MatchedStride]] = {}
     for m in matched:
-        kind = kind_of(m.cue)
+        kind = classify_stride(m.cue)
         kinds.setdefault(kind, []).append(m)
         if kind in WITHOUT:
             kinds.setdefault("without", []).append(m)
-    difference = Tally()
+    difference = RunningStatistics()
     for m in matched:
         difference.add(m.cue.value - m.value, False)
     return FeedbackSplit(
         strides=tuple(matched),
-        kinds={kind: summary(found) for kind, found in kinds.items()},
+        kinds={kind: summarise_strides(found) for kind, found in kinds.items()},
         probes=_probes(matched),
         levels=_levels(matched),
-        end=summary([m for m in matched if kind_of(m.cue) in {"with", "faded"}][-END:]),
+        end=summarise_strides([m for m in matched if classify_stride(m.cue) in {"with", "faded"}][-END:]),
         unmatched=unmatched,
         left_out=left_out,
         live_difference=difference.summary,
     )
 
 
-def kind_of(cue: Cue) -> Kind:
+def classify_stride(cue: Cue) -> Kind:
     """Which kind of stride this was."""
     return "with" if cue.with_feedback or cue.why_not is None else _KINDS[cue.why_not]
 
 
-def summary(strides: Iterable[MatchedStride]) -> Summary:
+def summarise_strides(strides: Iterable[MatchedStride]) -> Summary:
     """Number, mean, sd and share in the zone."""
-    tally = Tally()
+    tally = RunningStatistics()
     for m in strides:
         tally.add(m.value, m.inside)
     return tally.summary
@@ -177,9 +177,11 @@ def _probes(matched: Sequence[MatchedStride]) -> tuple[ProbeBlock, ...]:
     blocks: list[ProbeBlock] = []
     for number in sorted({m.cue.block for m in matched if m.cue.block is not None}):
         own = [i for i, m in enumerate(matched) if m.cue.block == number]
-        before = [m for m in matched[: own[0]] if kind_of(m.cue) in {"with", "faded"}][-len(own) :]
+        before = [m for m in matched[: own[0]] if classify_stride(m.cue) in {"with", "faded"}][-len(own) :]
         probe = [matched[i] for i in own]
-        blocks.append(ProbeBlock(number, probe[0].cue.start_s, summary(probe), summary(before)))
+        blocks.append(
+            ProbeBlock(number, probe[0].cue.start_s, summarise_strides(probe), summarise_strides(before))
+        )
     return tuple(blocks)
 
 

@@ -7,7 +7,7 @@ from math import sqrt
 from core.feedback.cue import Summary
 
 
-class Tally:
+class RunningStatistics:
     """Counts strides one by one (Welford 1962: mean and squares in one pass)."""
 
     def __init__(self) -> None:

@@ -77,7 +77,7 @@ class Zones:
         return Tone(pitch, min(QUIETEST + (1.0 - QUIETEST) * size / LOUDEST_SD, 1.0))
 
 
-def zones_of(prescription: Prescription, worse: Towards | None) -> Zones | None:
+def make_zones(prescription: Prescription, worse: Towards | None) -> Zones | None:
     """Zones of a record; None where its target has no numbers yet."""
     t = prescription.target
     if t.mean is None or t.sd is None:

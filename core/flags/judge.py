@@ -82,7 +82,7 @@ class _Values:
     anatomical: Mapping[tuple[str, Side], _Value] = field(default_factory=dict)
 
 
-def flags(
+def judge_flags(
     curves: CycleCurves | None,
     parameters: Sequence[Parameter],
     standing_deg: Mapping[str, float] | None = None,

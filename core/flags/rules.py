@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from core.norms.tables import WBDS, rows
+from core.norms.tables import WBDS, read_rows
 from core.norms.values import single_side_sd
 from core.parameters.catalogue import CurveFigure, list_curve_figures
 
@@ -67,7 +67,7 @@ _OVERALL: Final = "Patterson et al. 2008 (Arch Phys Med Rehabil 89:304): 0.9 to 
 
 def _wbds(parameter: str) -> tuple[float, float, float]:
     """Mean, sd of both sides' mean, and sd of left − right, of one row, all adults."""
-    row = next(r for r in rows("kinematic_parameters_wbds") if r["parameter"] == parameter)
+    row = next(r for r in read_rows("kinematic_parameters_wbds") if r["parameter"] == parameter)
     return float(row["all_mean"]), float(row["all_std"]), float(row["LR_diff_sd"])
 
 
@@ -137,7 +137,7 @@ PERRY_MPS: Final = (0.4, 0.8)
 Ambulation = Literal["household", "limited_community", "community"]
 
 
-def ambulation(speed_mps: float) -> Ambulation:
+def classify_ambulation(speed_mps: float) -> Ambulation:
     """Class of walking after stroke: below 0.4, to 0.8, above 0.8 m/s."""
     if speed_mps < PERRY_MPS[0]:
         return "household"

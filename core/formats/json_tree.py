@@ -83,7 +83,7 @@ def _too_deep() -> ValueError:
     return ValueError(f"it has more than {MOST_DEPTH} levels")
 
 
-class Node:
+class JsonNode:
     """One place in the JSON tree that knows its own path."""
 
     def __init__(self, value: object, path: str) -> None:
@@ -111,16 +111,16 @@ class Node:
                 hint = f"did you mean '{near[0]}'?" if near else f"known here: {', '.join(allowed)}."
                 raise ManifestError("manifest_unknown_key", f"{self.at(key)} is not known; {hint}")
 
-    def child(self, key: str) -> Node:
+    def child(self, key: str) -> JsonNode:
         """The object under a key, empty if absent."""
-        return Node(self.value.get(key), self.at(key))
+        return JsonNode(self.value.get(key), self.at(key))
 
-    def children(self, key: str) -> list[Node]:
+    def children(self, key: str) -> list[JsonNode]:
         """The objects of a list under a key."""
         value = self.value.get(key)
         if value is not None and not isinstance(value, list):
             raise ManifestError("manifest_bad_value", f"{self.at(key)} is {_kind(value)}; expected a list.")
-        return [Node(v, f"{self.at(key)}[{i}]") for i, v in enumerate(value or [])]
+        return [JsonNode(v, f"{self.at(key)}[{i}]") for i, v in enumerate(value or [])]
 
     def text(self, key: str) -> str | None:
         """Text or None."""

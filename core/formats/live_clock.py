@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.formats.live_hello import Hello
-from core.formats.live_log import Batch
+from core.formats.live_log import SampleBatch
 
 SETTLING_US: Final = 1_000_000
 """Samples of a clock by which it is aligned."""
@@ -23,7 +23,7 @@ SETTLING_US: Final = 1_000_000
 Micros = NDArray[np.int64]
 
 
-def sample_times_us(batch: Batch, rate_hz: float) -> Micros:
+def sample_times_us(batch: SampleBatch, rate_hz: float) -> Micros:
     """Device clock (n,) of a batch's samples: by its offsets, else evenly by the stream's rate."""
     if batch.offsets_us is not None:
         return batch.t0_us + batch.offsets_us.astype(np.int64)

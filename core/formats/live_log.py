@@ -37,12 +37,12 @@ __all__ = [
     "PROTOCOL",
     "RECORD_HEAD",
     "RECORD_STARTS",
-    "Batch",
     "Clock",
     "Finish",
     "Header",
     "Hello",
-    "Record",
+    "LogRecord",
+    "SampleBatch",
     "SensorInfo",
     "Source",
     "StreamInfo",
@@ -50,14 +50,14 @@ __all__ = [
     "check_fits",
     "decode_batch",
     "encode_batch",
+    "encode_samples",
     "finish_json",
     "hello_json",
     "hello_of",
     "is_whole_length",
     "parse_finish",
     "parse_hello",
-    "payload",
-    "peek",
+    "read_batch_header",
     "record",
     "scan",
     "scan_records",
@@ -101,7 +101,7 @@ class Header(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
+class SampleBatch:
     """Samples of one stream in a row.
 
     Parameters
@@ -128,7 +128,7 @@ class Finish:
     sha256: str
 
 
-class Record(NamedTuple):
+class LogRecord(NamedTuple):
     """One record of a log: its kind, what follows the kind's letter, and where it ends in the data."""
 
     kind: Kind
@@ -136,12 +136,12 @@ class Record(NamedTuple):
     end: int
 
 
-def encode_batch(batch: Batch) -> bytes:
+def encode_batch(batch: SampleBatch) -> bytes:
     """A batch as the frame that is sent.
 
     Raises
     ------
-    InputError `batch_shape`, `batch_time`, as `peek` would.
+    InputError `batch_shape`, `batch_time`, as `read_batch_header` would.
     """
     samples = np.ascontiguousarray(batch.samples, "<f4")
     if samples.ndim != 3 or samples.shape[2] != CHANNELS:
@@ -159,7 +159,7 @@ def encode_batch(batch: Batch) -> bytes:
     return body + _CRC.pack(crc32(body))
 
 
-def peek(frame: Buffer) -> Header:
+def read_batch_header(frame: Buffer) -> Header:
     """Check a frame's mark, shape and checksum and give its header; the samples are not looked at.
 
     Raises
@@ -220,30 +220,30 @@ def check_fits(header: Header, hello: Hello) -> StreamInfo:
     return info
 
 
-def decode_batch(frame: Buffer, header: Header | None = None) -> Batch:
+def decode_batch(frame: Buffer, header: Header | None = None) -> SampleBatch:
     """The batch in a frame; its arrays look into the frame's memory.
 
     Parameters
     ----------
-    header : of `peek`, when the frame is checked already.
+    header : of `read_batch_header`, when the frame is checked already.
 
     Raises
     ------
-    InputError of `peek`.
+    InputError of `read_batch_header`.
     """
-    h = header or peek(frame)
+    h = header or read_batch_header(frame)
     count = h.n_samples * h.n_imu * CHANNELS
     samples = np.frombuffer(frame, "<f4", count, _HEAD.size).reshape(h.n_samples, h.n_imu, CHANNELS)
     offsets = np.frombuffer(frame, "<u4", h.n_samples, _HEAD.size + 4 * count) if h.flags else None
-    return Batch(h.stream, h.seq, h.t0_us, h.sent_us, samples, offsets)
+    return SampleBatch(h.stream, h.seq, h.t0_us, h.sent_us, samples, offsets)
 
 
-def payload(frame: Buffer, header: Header) -> memoryview:
+def encode_samples(frame: Buffer, header: Header) -> memoryview:
     """The bytes of the samples, which the finish hash is taken over."""
     return memoryview(frame)[_HEAD.size : _HEAD.size + 4 * header.n_samples * header.n_imu * CHANNELS]
 
 
-def batch_of_json(root: Mapping[str, object]) -> Batch:
+def batch_of_json(root: Mapping[str, object]) -> SampleBatch:
     """A batch that came as JSON: {"type": "batch", "stream", "seq", "t0_us", "sent_us", "samples"}.
 
     `samples` is n lists of one list of 9 numbers per sensor, null = not measured; `offsets_us` may follow.
@@ -265,7 +265,7 @@ def batch_of_json(root: Mapping[str, object]) -> Batch:
         offsets = None if given is None else np.array(given, np.uint32)
     except (TypeError, ValueError, OverflowError) as e:
         raise InputError("batch_shape", f"Samples or offsets of batch {seq} are not numbers: {e}.") from e
-    batch = Batch(stream, seq, t0_us, sent_us, samples, offsets)
+    batch = SampleBatch(stream, seq, t0_us, sent_us, samples, offsets)
     encode_batch(batch)  # the one place that knows what a frame can hold
     return batch
 
@@ -316,7 +316,7 @@ def is_whole_length(head: bytes, size: int) -> bool:
     return 1 <= length <= min(MOST_FRAME_BYTES + 1, size - _RECORD.size)
 
 
-def scan(data: Buffer, start: int = 0) -> tuple[list[Record], int]:
+def scan(data: Buffer, start: int = 0) -> tuple[list[LogRecord], int]:
     """The whole records of a log and how many bytes of the data they and what is before them take.
 
     Parameters
@@ -334,7 +334,7 @@ def scan(data: Buffer, start: int = 0) -> tuple[list[Record], int]:
     return scan_records(data, start)
 
 
-def scan_records(data: Buffer, start: int = 0) -> tuple[list[Record], int]:
+def scan_records(data: Buffer, start: int = 0) -> tuple[list[LogRecord], int]:
     """As `scan` for data that begins with a record at `start`, such as the new end of a log."""
     view, found = memoryview(data), []
     while len(view) - start >= _RECORD.size:
@@ -347,5 +347,5 @@ def scan_records(data: Buffer, start: int = 0) -> tuple[list[Record], int]:
             break
         start = first + length
         kind: Kind = chr(body[0])  # type: ignore[assignment]
-        found.append(Record(kind, bytes(body[1:]), start))
+        found.append(LogRecord(kind, bytes(body[1:]), start))
     return found, start

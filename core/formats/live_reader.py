@@ -13,18 +13,18 @@ from core.formats.draft import MOST_OUT_OF_ORDER, signal_digest
 from core.formats.live_clock import LiveClock, Micros, sample_times_us
 from core.formats.live_log import (
     FILE_MARK,
-    Batch,
     Finish,
     Hello,
-    Record,
+    LogRecord,
+    SampleBatch,
     SensorInfo,
     StreamInfo,
     check_fits,
     decode_batch,
+    encode_samples,
     parse_finish,
     parse_hello,
-    payload,
-    peek,
+    read_batch_header,
     scan,
 )
 from core.frames import Floats
@@ -41,7 +41,7 @@ class _Taken:
     """What the records say."""
 
     hello: Hello
-    batches: list[Batch] = field(default_factory=list)
+    batches: list[SampleBatch] = field(default_factory=list)
     digest: str = ""
     finish: Finish | None = None
     notices: list[Notice] = field(default_factory=list)
@@ -85,7 +85,7 @@ def read_live_log(data: bytes, source: str) -> Recording:
     )
 
 
-def _taken(records: Sequence[Record], source: str) -> _Taken:
+def _taken(records: Sequence[LogRecord], source: str) -> _Taken:
     """Decode the records up to the first that does not follow."""
     if not records or records[0].kind != "H":
         raise FormatError(
@@ -102,11 +102,11 @@ def _taken(records: Sequence[Record], source: str) -> _Taken:
             if r.kind == "F":
                 taken.finish = parse_finish(r.body)
                 continue
-            header = peek(r.body)
+            header = read_batch_header(r.body)
             check_fits(header, taken.hello)
             if r.kind == "H" or header.seq != len(taken.batches):
                 raise InputError("batch_shape", f"batch {header.seq} follows {len(taken.batches) - 1}")
-            digest.update(payload(r.body, header))
+            digest.update(encode_samples(r.body, header))
             taken.batches.append(decode_batch(r.body, header))
     except InputError as e:
         message = f"Record {number} of {source} does not belong there ({e.message}); the rest was left out."
@@ -136,7 +136,7 @@ def _compare_finish(taken: _Taken, source: str) -> None:
 def _streams(taken: _Taken, source: str) -> tuple[dict[str, ImuStream], list[Notice]]:
     """Streams by sensor, in the order of the hello, and what is to be said of them."""
     clock = LiveClock(taken.hello)
-    by_number: dict[int, list[Batch]] = {}
+    by_number: dict[int, list[SampleBatch]] = {}
     times: dict[int, list[Micros]] = {}
     rate = {s.stream: s.rate_hz for s in taken.hello.streams}
     for batch in taken.batches:
@@ -179,7 +179,7 @@ def _missing(sensors: Sequence[SensorInfo]) -> Notice:
 
 
 def _in_order(
-    t_us: Micros, batches: Sequence[Batch], info: StreamInfo
+    t_us: Micros, batches: Sequence[SampleBatch], info: StreamInfo
 ) -> tuple[Micros, Floats, list[Notice]]:
     """Samples (n, k, 9) whose time is above all before; the others are left out and counted."""
     samples: Floats = np.concatenate([b.samples for b in batches]).astype(np.float64)

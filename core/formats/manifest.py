@@ -13,7 +13,7 @@ from typing import Final
 
 from core.errors import ManifestError, ParameterError
 from core.formats.aliases import segment_named
-from core.formats.json_tree import Node, read_json
+from core.formats.json_tree import JsonNode, read_json
 from core.formats.source_spec import SourceSpec, read_source
 from core.frames import PROTOCOLS, SEGMENTS, Protocol, Segment
 from core.recording import Subject, check_belt
@@ -44,7 +44,7 @@ class Manifest:
         """First entry of `sources` that covers a file."""
         return next((s for s in self.sources if s.covers(name)), None)
 
-    def completed(self, other: Manifest) -> Manifest:
+    def complete_from(self, other: Manifest) -> Manifest:
         """This manifest, with what it leaves open taken from another.
 
         `sensors` are taken as a whole, since one of them says who wears what; everything else by its parts.
@@ -53,7 +53,7 @@ class Manifest:
         protocol = self.protocol or other.protocol
         belt = other.belt_speed_mps if other.protocol == protocol else None
         return Manifest(
-            subject=self.subject.completed(other.subject),
+            subject=self.subject.complete_from(other.subject),
             protocol=protocol,
             mounting=MappingProxyType({**other.mounting, **self.mounting}),
             sensors=self.sensors or other.sensors,
@@ -89,7 +89,7 @@ def parse_manifest(data: bytes) -> Manifest:
 
 def manifest_of(root: object) -> Manifest:
     """Build a manifest from decoded JSON; errors as in `parse_manifest`."""
-    top = Node(root, "")
+    top = JsonNode(root, "")
     top.only("subject", "protocol", "mounting", "sensors", "sources", "belt_speed_mps")
     subject = top.child("subject")
     who = _subject(subject)
@@ -115,7 +115,7 @@ def manifest_of(root: object) -> Manifest:
     )
 
 
-def _subject(node: Node) -> Subject:
+def _subject(node: JsonNode) -> Subject:
     node.only("height_m", "standing_width_m", "standing_angles_deg", "shoe")
     standing = node.child("standing_angles_deg")
     angles = {name: value for name in standing.keys if (value := standing.number(name)) is not None}
@@ -128,7 +128,7 @@ def _subject(node: Node) -> Subject:
         raise ManifestError(error.code, f"subject.{key}: {error.message}") from error
 
 
-def _shoe(node: Node) -> Shoe | None:
+def _shoe(node: JsonNode) -> Shoe | None:
     node.only("back_m", "front_m", "tip_up_m")
     if not node.keys:
         return None
@@ -148,7 +148,7 @@ _SUBJECT_KEYS: Final = {
 """What `Subject` refuses → where the manifest says it."""
 
 
-def _sensors(node: Node) -> dict[str, Segment | None]:
+def _sensors(node: JsonNode) -> dict[str, Segment | None]:
     out: dict[str, Segment | None] = {}
     worn: dict[str, str] = {}
     for device in node.keys:

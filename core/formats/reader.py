@@ -80,7 +80,7 @@ def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload
     if not upload.manifests:
         return given
     found = parse_manifest(upload.manifests[0][1])
-    return found if given is None else given.completed(found)
+    return found if given is None else given.complete_from(found)
 
 
 def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> None:
@@ -103,7 +103,7 @@ def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> Non
         elif kind == "mapping":
             upload.mapping |= mapping_xml.read(data, member.name)
         elif spec and spec.columns and kind != "empty" and text.is_text(data):
-            upload.drafts += table.read(data, member.name, spec)
+            upload.drafts += table.read_table(data, member.name, spec)
         elif kind == "empty":
             raise FormatError("empty", f"{member.name} is empty; copy or export it again.")
         elif kind == "table":
@@ -183,7 +183,7 @@ def _declared(recording: Recording, manifest: Manifest | None, upload: _Upload) 
     return replace(
         recording,
         segments=segments,
-        subject=manifest.subject.completed(recording.subject) if manifest else recording.subject,
+        subject=manifest.subject.complete_from(recording.subject) if manifest else recording.subject,
         protocol=(manifest.protocol if manifest else None) or recording.protocol,
         belt_speed_mps=(manifest.belt_speed_mps if manifest else None) or recording.belt_speed_mps,
         mounting={**recording.mounting, **(manifest.mounting if manifest else {})},

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Final
 
 from core.errors import ManifestError
-from core.formats.json_tree import Node
+from core.formats.json_tree import JsonNode
 from core.frames import GRAVITY
 
 ACC_UNITS: Final[dict[str, float]] = {
@@ -104,7 +104,7 @@ _SOURCE_KEYS: Final = (
 )  # fmt: skip
 
 
-def read_source(node: Node) -> SourceSpec:
+def read_source(node: JsonNode) -> SourceSpec:
     """One entry of the manifest's `sources`.
 
     Raises
@@ -141,7 +141,7 @@ def read_source(node: Node) -> SourceSpec:
     )
 
 
-def _counter(node: Node) -> tuple[Counter | None, float | None]:
+def _counter(node: JsonNode) -> tuple[Counter | None, float | None]:
     """What counts the samples of a table, if anything does, and samples per second."""
     rate = _rate(node)
     inner = node.child("counter")
@@ -167,7 +167,7 @@ def _counter(node: Node) -> tuple[Counter | None, float | None]:
     return Counter(inner.string("column"), wrap), rate if counted is None else counted
 
 
-def _rate(node: Node) -> float | None:
+def _rate(node: JsonNode) -> float | None:
     rate = node.number("rate_hz")
     if rate is not None and not 1.0 <= rate <= 10_000.0:
         raise ManifestError(
@@ -176,7 +176,7 @@ def _rate(node: Node) -> float | None:
     return rate
 
 
-def _channels(node: Node) -> Channels:
+def _channels(node: JsonNode) -> Channels:
     node.only("acc", "gyr", "mag", "quat")
     acc = node.names("acc", 3)
     if acc is None:

@@ -16,7 +16,7 @@ from core.frames import Floats
 _ROWS_TO_LOOK_AT = 4
 
 
-def read(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
+def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
     """Read all sensors of one table.
 
     Parameters
@@ -97,7 +97,7 @@ def _names(header: list[bytes], row: bytes, separator: bytes, spec: SourceSpec) 
     if spec.index_column and width == cells - 1:
         names = ["", *names]
     names += [""] * (cells - len(names))
-    return text.unique(names)
+    return text.make_names_unique(names)
 
 
 def _wanted(spec: SourceSpec, names: list[str], source: str) -> list[str]:

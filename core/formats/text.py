@@ -199,7 +199,7 @@ def guess_separator(lines: Sequence[bytes]) -> bytes | None:
     return best
 
 
-def unique(names: Sequence[str]) -> list[str]:
+def make_names_unique(names: Sequence[str]) -> list[str]:
     """Make column names unique: a second "acc_x" becomes "acc_x#2"; a blank one gets its position."""
     seen: dict[str, int] = {}
     out = []

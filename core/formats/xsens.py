@@ -93,7 +93,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> Draft:
         )
     body, names = _row_names(body, lines[0], layout, source, device)
     body, cut = _without_cut_end(body, layout.separator)
-    names = text.unique(names)
+    names = text.make_names_unique(names)
     groups = [g for g in _GROUPS if set(g) <= set(names)]
     if _ACC not in groups:
         raise _no_acc(source, device, names)

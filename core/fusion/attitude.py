@@ -161,7 +161,7 @@ def advance(
     return out, AttitudeState(x[:4].copy(), x[4:7].copy(), float(x[7]), float(x[8]))
 
 
-def orientation(
+def estimate_orientation(
     q_rest: Floats,
     at: int,
     gyr: Floats,
@@ -228,7 +228,7 @@ def _stretches(valid: Bools, bridge: int) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]
 
 
-def warm() -> None:
+def compile_attitude_kernel() -> None:
     """Compile or load the kernel, so that the first recording does not wait for it."""
     state = AttitudeState(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3))
     up = np.tile([0.0, 0.0, 9.81], (2, 1))

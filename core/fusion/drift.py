@@ -20,7 +20,7 @@ import numpy as np
 from core.calibration.result import Calibration
 from core.errors import Notice
 from core.frames import Bools, Floats, Segment
-from core.rest import runs, samples
+from core.rest import find_runs, index_window
 from core.rotation import about, multiply, yaw
 
 
@@ -64,7 +64,7 @@ def remove_relative_drift(
     n = len(next(iter(q.values())))
     straight = np.zeros(n, bool)
     for window in calibration.walking:
-        straight[samples(window, rate_hz)] = True
+        straight[index_window(window, rate_hz)] = True
     gaps = any((~v).any() for v in valid.values())
     if len(q) < 2 or (np.count_nonzero(straight) <= params.reference_s * rate_hz and not gaps):
         return corrected, {}, []
@@ -103,7 +103,7 @@ def _drift(
     params: DriftParams,
 ) -> Floats:
     """Drift (n,) in rad of one segment's relative heading (n,) complex, zero around standing."""
-    zero = samples(calibration.zero, rate_hz)
+    zero = index_window(calibration.zero, rate_hz)
     middle = (zero.start + zero.stop) // 2
     turn = np.zeros(len(straight))
     edges = [0, *(b for _, b in _gaps(valid, rate_hz)), len(straight)]
@@ -127,7 +127,7 @@ def _drift(
 def _gaps(valid: Bools, rate_hz: float) -> list[tuple[int, int]]:
     """Gaps that interrupt the heading: longer than the 0.1 s that are interpolated
     (docs/science/timeline.md, "Rule")."""
-    return [r for r in runs(~valid) if r[1] - r[0] > 0.1 * rate_hz]
+    return [r for r in find_runs(~valid) if r[1] - r[0] > 0.1 * rate_hz]
 
 
 def _smooth(relative: Floats, used: Bools, rate_hz: float, params: DriftParams) -> Floats:

@@ -35,7 +35,7 @@ def _turn(acc, gyr, valid, which, bias, norm, mount, dt, kp, relearn_s, state, o
             out[k, s, 3] = -a * m[3] - b * m[2] + c * m[1] + d * m[0]
 
 
-class Attitudes:
+class AttitudeTracker:
     """Tilt and turn of some sensors by themselves, from standing on; blocks do not matter.
 
     Parameters

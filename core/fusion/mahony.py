@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from core.calibration.result import CalibratedRecording, SegmentCalibration
 from core.errors import EstimationError
 from core.frames import R_NEUTRAL, Bools, Floats, Segment
-from core.fusion.attitude import AttitudeParams, orientation
+from core.fusion.attitude import AttitudeParams, estimate_orientation
 from core.fusion.drift import DriftParams, remove_relative_drift
 from core.fusion.orientations import Orientations
 from core.recording import SensorSignals
@@ -77,5 +77,7 @@ def segment_orientation(
     start = from_matrix(R_NEUTRAL @ mounted.R_segment_sensor)
     at = min(round(0.5 * (zero[0] + zero[1]) * rate_hz), len(signals.acc) - 1)
     gyr = signals.gyr - mounted.gyro_bias
-    sensor = orientation(start, at, gyr, signals.acc, signals.valid, rate_hz, mounted.rest_norm, params)
+    sensor = estimate_orientation(
+        start, at, gyr, signals.acc, signals.valid, rate_hz, mounted.rest_norm, params
+    )
     return multiply(sensor, conjugate(from_matrix(mounted.R_segment_sensor)))

@@ -2,21 +2,21 @@
 
 from core.norms.adults import adult_reference
 from core.norms.kinematics import NormBand, NormBands, adult_kinematics
-from core.norms.lookup import Norms, norms_for
-from core.norms.place import Place
-from core.norms.values import NormValue, NormValues, angle_values, expected_at_speed, temporal_values
+from core.norms.lookup import Norms, look_up_norms
+from core.norms.place import NormPlacement
+from core.norms.values import NormValue, NormValues, angle_values, predict_at_speed, temporal_values
 
 __all__ = [
     "NormBand",
     "NormBands",
+    "NormPlacement",
     "NormValue",
     "NormValues",
     "Norms",
-    "Place",
     "adult_kinematics",
     "adult_reference",
     "angle_values",
-    "expected_at_speed",
-    "norms_for",
+    "look_up_norms",
+    "predict_at_speed",
     "temporal_values",
 ]

@@ -7,7 +7,7 @@ from typing import Final
 
 from core.norms.kinematics import adult_kinematics
 from core.norms.profile import MODES, CurveReference, Mode, ScoreSpread
-from core.norms.tables import WBDS, WBDS_N, rows
+from core.norms.tables import WBDS, WBDS_N, read_rows
 
 _KEYS: Final = {
     "GPS_side_9var": "gps_side",
@@ -46,6 +46,6 @@ def _spreads(mode: Mode) -> dict[str, ScoreSpread]:
             mean_ln=float(r["mean_ln"]) if r["mean_ln"] else None,
             sd_ln=float(r["sd_ln"]) if r["sd_ln"] else None,
         )
-        for r in (*rows("gps_reference_wbds"), *rows("gps_sagittal_wbds"))
+        for r in (*read_rows("gps_reference_wbds"), *read_rows("gps_sagittal_wbds"))
         if r["mode"] == mode
     }

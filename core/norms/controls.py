@@ -22,7 +22,7 @@ from core.norms.speed import walking_speed
 from core.norms.values import NormValue, Sex
 from core.parameters.kinematic import MEAN_ZERO, mean_curve
 from core.parameters.result import CycleCurves, Parameter
-from core.parameters.variability import comparable
+from core.parameters.variability import has_enough_values
 
 FEWEST: Final = 5
 """People below which there is no group (our choice; percentiles allow for small groups, see `place`)."""
@@ -159,7 +159,7 @@ def _mean_values(sessions: Sequence[ControlSession]) -> Values:
     found: dict[tuple[str, Side | None], list[float]] = {}
     for s in sessions:
         for p in s.parameters:
-            if p.mean is not None and comparable(p):
+            if p.mean is not None and has_enough_values(p):
                 found.setdefault((p.name, p.side), []).append(p.mean)
     return {key: float(np.mean(v)) for key, v in found.items()}
 

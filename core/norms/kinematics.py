@@ -16,7 +16,7 @@ import numpy as np
 
 from core.frames import Floats
 from core.norms.speed import SLOW_MPS
-from core.norms.tables import LEVEL, WBDS, WBDS_N, rows, wbds_group
+from core.norms.tables import LEVEL, WBDS, WBDS_N, read_rows, wbds_group
 
 Zero = Literal["anatomical", "standing", "stride_mean"]
 """What a curve is measured from: anatomy, the person's own standing, its own mean over each stride."""
@@ -88,7 +88,7 @@ def adult_kinematics(age: float | None, speed_mps: float | None = None) -> NormB
 
 @cache
 def _bands(group: str) -> Mapping[str, NormBand]:
-    table = [r for r in rows("kinematics_wbds_adult") if r["group"] == group]
+    table = [r for r in read_rows("kinematics_wbds_adult") if r["group"] == group]
     bands = {}
     for variable, (confidence, note) in _JUDGEMENT.items():
         own = sorted((r for r in table if r["variable"] == variable), key=lambda r: float(r["pct_cycle"]))

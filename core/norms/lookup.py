@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from core.norms.kinematics import NormBand, adult_kinematics
-from core.norms.place import Place, place, place_difference
+from core.norms.place import NormPlacement, place_difference, place_value
 from core.norms.speed import WalkingSpeed, walking_speed
 from core.norms.values import (
     NormValue,
@@ -14,9 +14,9 @@ from core.norms.values import (
     Sex,
     angle_values,
     comfortable_speed,
-    expected_at_speed,
     is_angle,
     pace_of,
+    predict_at_speed,
     temporal_values,
 )
 
@@ -45,17 +45,17 @@ class Norms:
     reason: str | None = None
     timing_reason: str | None = None
 
-    def place(self, name: str, value: float | None) -> Place:
+    def place(self, name: str, value: float | None) -> NormPlacement:
         """Where a value of a parameter stands."""
         reason = self.reason if is_angle(name) else self.timing_reason
-        return place(value, self.values.get(name), reason or "no_norm")
+        return place_value(value, self.values.get(name), reason or "no_norm")
 
-    def place_difference(self, name: str, left: float | None, right: float | None) -> Place:
+    def place_difference(self, name: str, left: float | None, right: float | None) -> NormPlacement:
         """Where left minus right stands among healthy differences."""
         return place_difference(left, right, self.values.get(name))
 
 
-def norms_for(
+def look_up_norms(
     age: float | None,
     sex: Sex | None = None,
     speed_mps: float | None = None,
@@ -87,7 +87,7 @@ def norms_for(
         # how fast somebody likes to walk is not a matter of how fast they walk
         values["gait_speed_mps"] = usual
     if speed is not None and not bands.reason:
-        expected = expected_at_speed(speed.speed_mps, age, speed.leg_m)
+        expected = predict_at_speed(speed.speed_mps, age, speed.leg_m)
     return Norms(
         speed,
         None if missing else pace,

@@ -16,7 +16,7 @@ Grade = Literal[0, 1, 2]
 
 
 @dataclass(frozen=True)
-class Place:
+class NormPlacement:
     """A value among reference people, or why it has no place.
 
     Parameters
@@ -35,26 +35,26 @@ class Place:
     reason: str | None = None
 
 
-def place(value: float | None, norm: NormValue | None, reason: str = "no_norm") -> Place:
+def place_value(value: float | None, norm: NormValue | None, reason: str = "no_norm") -> NormPlacement:
     """Place one value; `reason` says why there is no norm where the lookup knows it."""
     if norm is None:
-        return Place(None, None, None, None, reason)
+        return NormPlacement(None, None, None, None, reason)
     if not norm.comparable:
-        return Place(None, None, None, norm, "not_comparable")
+        return NormPlacement(None, None, None, norm, "not_comparable")
     if value is None:
-        return Place(None, None, None, norm, "no_value")
+        return NormPlacement(None, None, None, norm, "no_value")
     return _placed(value - norm.mean, norm.sd, norm)
 
 
-def place_difference(left: float | None, right: float | None, norm: NormValue | None) -> Place:
+def place_difference(left: float | None, right: float | None, norm: NormValue | None) -> NormPlacement:
     """Place left minus right among the left-right differences of healthy people, whose mean is taken as 0.
 
     Needs no level: a norm that is not comparable in itself serves, if both sides have the same zero.
     """
     if norm is None or norm.difference_sd is None:
-        return Place(None, None, None, norm, "no_norm")
+        return NormPlacement(None, None, None, norm, "no_norm")
     if left is None or right is None:
-        return Place(None, None, None, norm, "no_value")
+        return NormPlacement(None, None, None, norm, "no_value")
     return _placed(left - right, norm.difference_sd, norm)
 
 
@@ -74,10 +74,10 @@ def percentile_of_sample(z: float, n: int) -> float:
     return float(100.0 * stdtr(n - 1, z / sqrt(1.0 + 1.0 / n)))
 
 
-def _placed(distance: float, sd: float, norm: NormValue) -> Place:
+def _placed(distance: float, sd: float, norm: NormValue) -> NormPlacement:
     if sd <= 0.0:
-        return Place(None, None, None, norm, "no_spread")
+        return NormPlacement(None, None, None, norm, "no_spread")
     z = distance / sd
     below = percentile_of_z(z) if norm.n is None else percentile_of_sample(z, norm.n)
     grade: Grade = 0 if abs(z) <= GRADES_SD[0] else 1 if abs(z) <= GRADES_SD[1] else 2
-    return Place(z, below, grade, norm)
+    return NormPlacement(z, below, grade, norm)

@@ -21,7 +21,7 @@ ADULT_AGE = 18.0
 
 
 @cache
-def rows(name: str) -> tuple[Mapping[str, str], ...]:
+def read_rows(name: str) -> tuple[Mapping[str, str], ...]:
     """Rows of one table by column name."""
     text = files("core.norms").joinpath("data", f"{name}.csv").read_text(encoding="utf-8")
     return tuple(csv.DictReader(text.splitlines()))

@@ -9,7 +9,7 @@ from typing import Final, Literal, cast
 
 from core.frames import GRAVITY
 from core.norms.speed import WBDS_MPS
-from core.norms.tables import LEVEL, WBDS, WBDS_N, rows, wbds_group
+from core.norms.tables import LEVEL, WBDS, WBDS_N, read_rows, wbds_group
 from core.parameters.catalogue import CATALOGUE, NormKey
 
 Sex = Literal["female", "male"]
@@ -84,7 +84,7 @@ def angle_values(age: float | None, anatomical: Collection[str] = ()) -> NormVal
     if group is None:
         return NormValues(reason="no_norm_for_age")
     column = "all" if group == "adult_21_84" else group
-    table = {r["parameter"]: r for r in rows("kinematic_parameters_wbds")}
+    table = {r["parameter"]: r for r in read_rows("kinematic_parameters_wbds")}
     values = {}
     for name, key in list_norm_keys("angles").items():
         row = table[key.row]
@@ -173,7 +173,7 @@ def pace_of(age: float | None, sex: Sex | None, speed_mps: float | None) -> Pace
     return None
 
 
-def expected_at_speed(
+def predict_at_speed(
     speed_mps: float, age: float | None, leg_m: float | None = None
 ) -> Mapping[str, NormValue]:
     """Step length and cadence expected at a walking speed, 0.5 to 1.5 m/s on a treadmill; empty outside.
@@ -190,7 +190,7 @@ def expected_at_speed(
     else:
         x, scale = speed_mps / sqrt(GRAVITY * leg_m), {"SLhat": leg_m, "fhat": 60.0 * sqrt(GRAVITY / leg_m)}
     values = {}
-    for row in rows("spatiotemporal_speed_regression_h2a"):
+    for row in read_rows("spatiotemporal_speed_regression_h2a"):
         if row["y"] not in scale or row["group"] != group:
             continue
         name = _EXPECTED[row["y"]]
@@ -223,6 +223,6 @@ def _people(age: float, sex: Sex) -> list[Mapping[str, str]]:
     letter = "F" if sex == "female" else "M"
     return [
         r
-        for r in rows("spatiotemporal_age_sex")
+        for r in read_rows("spatiotemporal_age_sex")
         if r["sex"] == letter and float(r["age_min"]) <= age < float(r["age_max"]) + 1
     ]

@@ -4,28 +4,28 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from core.online.frame import CalibrationView, LiveFrame, SegmentCheck, SensorHealth, Trail
+from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SegmentCheck, SensorHealth
 from core.parameters.live_stride import LiveStride
 
 if TYPE_CHECKING:
-    from core.online.session import Online, OnlineParams, warm
+    from core.online.session import OnlineParams, OnlineSession, compile_live_kernels
 
 __all__ = [
+    "AngleTrail",
     "CalibrationView",
     "LiveFrame",
     "LiveStride",
-    "Online",
     "OnlineParams",
+    "OnlineSession",
     "SegmentCheck",
     "SensorHealth",
-    "Trail",
-    "warm",
+    "compile_live_kernels",
 ]
 
 
 def __getattr__(name: str) -> object:
     """The estimator itself, on demand: it brings numba, which readers of frames do without."""
-    if name in ("Online", "OnlineParams", "warm"):
+    if name in ("OnlineSession", "OnlineParams", "compile_live_kernels"):
         from core.online import session
 
         return getattr(session, name)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from core.body.erkf.headings import told
+from core.body.erkf.headings import report_turned_axes
 from core.body.erkf.params import ErkfParams
-from core.body.estimate import warm as warm_erkf
+from core.body.estimate import compile_pose_kernels as warm_erkf
 from core.body.model import BodyModel
 from core.body.mounting import mount_sensors
 from core.body.pose_params import PoseParams
@@ -15,7 +15,7 @@ from core.calibration import CalibrationParams
 from core.calibration.result import CalibratedRecording
 from core.errors import Notice
 from core.frames import Segment
-from core.fusion.attitude import warm as warm_attitude
+from core.fusion.attitude import compile_attitude_kernel as warm_attitude
 from core.fusion.mahony import MahonyParams, estimate_orientations
 from core.fusion.orientations import Orientations
 from core.online.frame import SegmentCheck
@@ -63,7 +63,7 @@ class LiveCalibration:
     ok: bool
 
 
-def finished(
+def finish_calibration(
     calibrated: CalibratedRecording,
     first: int,
     worn: Sequence[Segment],
@@ -86,7 +86,7 @@ def finished(
     every = PoseParams(erkf=params.erkf, least_valid=0.0)
     mounted = mount_sensors(calibrated, estimate_orientations(calibrated, params.fusion), every)
     calibrated, failure = mounted.calibrated, mounted.failure
-    notices = [*calibrated.calibration.notices, *mounted.assumed, *told(mounted.turned_rad)]
+    notices = [*calibrated.calibration.notices, *mounted.assumed, *report_turned_axes(mounted.turned_rad)]
     if failure is not None:
         notices.append(Notice(failure.code, failure.message, failure.sensor))
     notices += _missing(recording, [s for s in worn if s not in out])
@@ -125,7 +125,7 @@ def _check(segment: Segment, calibrated: CalibratedRecording, notices: Sequence[
     return SegmentCheck(segment, False, mounted.method, mounted.score, own)
 
 
-def warm() -> None:
+def compile_calibration_kernels() -> None:
     """Load and compile all that a calibration needs, so that the first one does not take a second longer."""
     import scipy.ndimage
     import scipy.signal  # noqa: F401

@@ -16,13 +16,13 @@ import numpy as np
 
 from core.calibration import calibrate
 from core.calibration.calibrate import FEW_STEPS
-from core.calibration.live_attempt import Attempt, Wearer
-from core.calibration.live_standing import StandingNow, last_part, standing_now, upwards
+from core.calibration.live_attempt import CalibrationSamples, WornSensors
+from core.calibration.live_standing import StandingNow, cut_last_part, find_upward_axes, judge_standing
 from core.calibration.result import Calibration
 from core.calibration.walking import moving_mask
 from core.errors import Notice, SagittalError
 from core.frames import Bools, Floats, Segment
-from core.online.calibrated import LiveCalibration, MountingParams, finished
+from core.online.calibrated import LiveCalibration, MountingParams, finish_calibration
 from core.online.frame import CalibrationView, SegmentCheck, Stage
 from core.recording import UniformRecording
 from core.timeline.live import UniformBlock
@@ -73,7 +73,7 @@ class LiveCalibrator:
     wearer : segments in the order of the blocks' columns, rate, subject, protocol, mounting.
     """
 
-    def __init__(self, wearer: Wearer, params: CalibratingParams | None = None) -> None:
+    def __init__(self, wearer: WornSensors, params: CalibratingParams | None = None) -> None:
         self.wearer = wearer
         self.params = params or CalibratingParams()
         self.stage: Stage = "waiting"
@@ -81,7 +81,7 @@ class LiveCalibrator:
         self._tick = max(1, round(self.params.tick_s * wearer.rate_hz))
         self._length = 0
         self._begun = 0
-        self._attempt = Attempt(wearer, 0)
+        self._attempt = CalibrationSamples(wearer, 0)
         self._working: tuple[Segment, ...] = ()
         self._out: frozenset[Segment] = frozenset()
         self._walked = 0.0
@@ -95,7 +95,7 @@ class LiveCalibrator:
         """
         if block.first != self._length:
             self._length = self._begun = block.first
-            self._attempt = Attempt(self.wearer, block.first)
+            self._attempt = CalibrationSamples(self.wearer, block.first)
         start, found = 0, None
         while start < len(block):
             stop = min(len(block), start + self._tick - self._length % self._tick)
@@ -127,7 +127,7 @@ class LiveCalibrator:
     def _restart(self, problem: Notice | None) -> None:
         self.stage = "waiting"
         self._begun = self._length
-        self._attempt = Attempt(self.wearer, self._length)
+        self._attempt = CalibrationSamples(self.wearer, self._length)
         if problem is not None:
             self.stage = "stand"
             self.view = replace(self.view, ok=False, problem=problem)
@@ -147,7 +147,7 @@ class LiveCalibrator:
         patient = self._length - self._begun >= p.wait_s * rate
         self.stage = "stand" if there and (complete or patient) else "waiting"
         recording = self._attempt.recording(there)
-        seen = standing_now(recording, p.mounting.calibration.rest)
+        seen = judge_standing(recording, p.mounting.calibration.rest)
         self.view = replace(self.view, stood_s=seen.stood_s, walked_s=0.0, steps=0, checks=self._checks(seen))
         if self.stage == "stand" and seen.stood_s >= p.stand_s:
             self.stage, self._working = "walk", there
@@ -157,7 +157,7 @@ class LiveCalibrator:
     def _stand(self, recording: UniformRecording, seen: StandingNow) -> None:
         """Begin with this standing; what was before it is of no attempt, walking least of all."""
         self._attempt.keep_last(round(seen.stood_s * self.wearer.rate_hz))
-        self._up, self._walked = upwards(recording), 0.0
+        self._up, self._walked = find_upward_axes(recording), 0.0
         self.view = replace(self.view, walked_s=0.0, steps=0)
 
     def _there(self) -> tuple[Segment, ...]:
@@ -170,7 +170,7 @@ class LiveCalibrator:
         """Standing is there: has enough been walked since?"""
         p, rate = self.params, self.wearer.rate_hz
         recording = self._attempt.recording(self._working)
-        seen = standing_now(last_part(recording, p.kept_s), p.mounting.calibration.rest)
+        seen = judge_standing(cut_last_part(recording, p.kept_s), p.mounting.calibration.rest)
         walked = float(np.count_nonzero(moving_mask(recording, p.mounting.calibration.walking)) / rate)
         stood = self.view.stood_s if walked and not seen.stood_s else seen.stood_s
         self._walked, before = walked, self._walked
@@ -199,7 +199,7 @@ class LiveCalibrator:
 
     def _moved(self, recording: UniformRecording) -> list[Segment]:
         """Segments whose sensor is turned against the vertical since the standing that began the attempt."""
-        now = upwards(recording)
+        now = find_upward_axes(recording)
         limit = np.cos(self.params.moved)
         return [s for s, x in self._up.items() if s in now and float(x @ now[s]) < limit]
 
@@ -219,13 +219,15 @@ class LiveCalibrator:
                 if late:
                     self._restart(_why(found, steps, p))
                 return None
-            made = finished(calibrated, self._attempt.first, self.wearer.segments, p.mounting, self._out)
+            made = finish_calibration(
+                calibrated, self._attempt.first, self.wearer.segments, p.mounting, self._out
+            )
         except SagittalError as error:
             if late:
                 self._restart(Notice(error.code, error.message, error.sensor))
             return None
         self.stage = "running"
-        self._attempt = Attempt(self.wearer, self._length)
+        self._attempt = CalibrationSamples(self.wearer, self._length)
         self.view = replace(self.view, checks=made.checks, ok=made.ok, problem=None)
         return made
 

@@ -13,31 +13,31 @@ from typing import Final
 import numpy as np
 
 from core.angles.kernel import AngleKernel, mean_angles, subtract_zero
-from core.body.choice import WHOLE, possible
+from core.body.choice import WHOLE, list_possible_estimators
 from core.body.erkf.live_erkf import HEADING_SD, live_params
-from core.body.erkf.live_figure import Linked, Unlinked
-from core.body.erkf.live_sensors import Filtered, FootPaths
+from core.body.erkf.live_figure import LinkedBody, UnlinkedSensors
+from core.body.erkf.live_sensors import FilteredSensors, FootPaths
 from core.body.erkf.params import ErkfParams
 from core.body.l7s.filter import L7sParams
 from core.body.l7s.live_figure import LiveL7s
-from core.body.live_estimator import Estimator, Placed, Raw, worn_feet
+from core.body.live_estimator import BodyBlock, LivePoseEstimator, MeasuredBlock, list_worn_feet
 from core.body.still import FOOT_STILL
 from core.errors import Notice
 from core.estimators import ERKF, L7S_2I, L7S_3I
 from core.events.flags import StrideParams
 from core.events.foot_pitch import FootPitchParams
-from core.events.live_contacts import Contacts
+from core.events.live_contacts import ContactDetector
 from core.events.result import GaitEvent
 from core.frames import Bools, Floats, Segment, Side
 from core.fusion.attitude import AttitudeParams
-from core.fusion.live_attitude import Attitudes
+from core.fusion.live_attitude import AttitudeTracker
 from core.fusion.live_drift import HeadingHold
 from core.online.calibrated import LiveCalibration
-from core.parameters.live_history import MOST, History
+from core.parameters.live_history import MOST, SampleHistory
 from core.parameters.live_stride import LiveStride
-from core.parameters.live_strides import LiveStrides, Setup
+from core.parameters.live_strides import HistoryColumns, LiveStrides
 from core.parameters.spatial import Surface
-from core.rest import samples
+from core.rest import index_window
 
 NOT_LIVE: Final = (
     "The sensors that are worn ({}) show no figure while they stream: for one, wear both feet, or the pelvis "
@@ -63,17 +63,17 @@ class ChainParams:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class ChainOutput:
     """What a block gave: the body, angles (T, names) in rad, the rest in order of being known."""
 
-    placed: Placed
+    placed: BodyBlock
     angles: Floats
     events: tuple[GaitEvent, ...]
     strides: tuple[LiveStride, ...]
     notices: tuple[Notice, ...]
 
 
-class Chain:
+class LiveChain:
     """Everything behind calibration.
 
     Parameters
@@ -101,19 +101,19 @@ class Chain:
         mounted = calibrated.calibration.segments
         self.segments = tuple(s for s in columns if s in mounted)
         self._columns = np.array([columns.index(s) for s in self.segments], np.int64)
-        zero = samples(calibrated.calibration.zero, rate)
+        zero = index_window(calibrated.calibration.zero, rate)
         self.first = calibration.first + zero.start
         self.body = calibration.body
         self._notices: list[Notice] = []
         self.estimator = self._choose(calibration)
-        feet = worn_feet(self.segments)
+        feet = list_worn_feet(self.segments)
         turned = tuple(dict.fromkeys((*feet, *self.estimator.attitudes)))
         index = [self.segments.index(s) for s in turned]
         self._turned = turned
         self._index = np.array(index, np.int64)
         self._hold = HeadingHold(turned, rate, FOOT_STILL.gyr_limit)
-        self._attitudes = Attitudes(index, [mounted[s] for s in turned], rate, self.params.attitude)
-        self._contacts = Contacts(feet, rate, self.params.events)
+        self._attitudes = AttitudeTracker(index, [mounted[s] for s in turned], rate, self.params.attitude)
+        self._contacts = ContactDetector(feet, rate, self.params.events)
         self._feet = np.array([self.segments.index(f) for f in feet], np.int64)
         self._courses = tuple(s for s in COURSES if s in self.segments)
         # a pelvis that carries a sensor tilts as that says, not as a model of the legs wants it
@@ -123,7 +123,7 @@ class Chain:
         self._told_broken = False
         self.contact: dict[Side, bool] = dict.fromkeys(self._contacts.sides, True)
         self._strides = LiveStrides(
-            Setup(
+            HistoryColumns(
                 first=self.first,
                 rate_hz=rate,
                 angles=self._angles.names,
@@ -145,12 +145,12 @@ class Chain:
         """Names of the angles."""
         return self._angles.names
 
-    def push(self, acc: Floats, gyr: Floats, valid: Bools) -> Outcome:
+    def push(self, acc: Floats, gyr: Floats, valid: Bools) -> ChainOutput:
         """The next samples (T, columns, …) of the axis."""
         k = self._columns
         return self._advance(acc.take(k, axis=1), gyr.take(k, axis=1), valid.take(k, axis=1))
 
-    def _choose(self, calibration: LiveCalibration) -> Estimator:
+    def _choose(self, calibration: LiveCalibration) -> LivePoseEstimator:
         """The estimator that the calibrated sensors allow, best first as offline."""
         calibrated, body, rate = calibration.calibrated, calibration.body, self.rate_hz
         mounted = calibrated.calibration.segments
@@ -159,24 +159,24 @@ class Chain:
         if calibration.turned:
             params = replace(params, start_heading_sd=HEADING_SD)
 
-        def filtered(segments: Sequence[Segment]) -> Filtered:
-            return Filtered(segments, column, mounted, body, rate, params)
+        def filtered(segments: Sequence[Segment]) -> FilteredSensors:
+            return FilteredSensors(segments, column, mounted, body, rate, params)
 
-        best = next(iter(possible(self.segments)), None)
+        best = next(iter(list_possible_estimators(self.segments)), None)
         if best == ERKF.name:
             worn = tuple(s for s in WHOLE if s in column)
-            return Linked(worn, filtered(worn), body.ankle_height, rate)
-        alone = worn_feet(self.segments)
+            return LinkedBody(worn, filtered(worn), body.ankle_height, rate)
+        alone = list_worn_feet(self.segments)
         feet = FootPaths(filtered(alone)) if alone else None
         if best in (L7S_3I.name, L7S_2I.name) and feet is not None:
             return LiveL7s(column, mounted, body, rate, feet, self.params.l7s)
         message = NOT_LIVE.format(", ".join(self.segments))
         self._notices.append(Notice("no_live_figure", message, severity="info"))
-        return Unlinked(self.segments, feet)
+        return UnlinkedSensors(self.segments, feet)
 
-    def _new_history(self) -> History:
+    def _new_history(self) -> SampleHistory:
         feet = len(self._contacts.sides)
-        return History(
+        return SampleHistory(
             self.rate_hz,
             {
                 "angles": (len(self.names),),
@@ -187,7 +187,7 @@ class Chain:
             {"course_valid": (len(self._courses),), "feet_still": (feet,), "feet_valid": (feet,)},
         )
 
-    def _catch_up(self, calibration: LiveCalibration, zero: slice) -> Outcome:
+    def _catch_up(self, calibration: LiveCalibration, zero: slice) -> ChainOutput:
         """Through the standing window as one block, then through what was walked."""
         signals = calibration.calibrated.recording.sensors
         acc = np.stack([signals[s].acc for s in self.segments], axis=1)
@@ -199,7 +199,7 @@ class Chain:
             found.append(self._advance(acc[k], gyr[k], valid[k]))
         return _joined(found)
 
-    def _advance(self, acc: Floats, gyr: Floats, valid: Bools) -> Outcome:
+    def _advance(self, acc: Floats, gyr: Floats, valid: Bools) -> ChainOutput:
         if len(acc) > MOST and self._count:
             parts = [slice(k, k + MOST) for k in range(0, len(acc), MOST)]
             return _joined([self._advance(acc[k], gyr[k], valid[k]) for k in parts])
@@ -208,22 +208,22 @@ class Chain:
             k = self._index
             self._hold.push(q, gyr.take(k, axis=1), valid.take(k, axis=1))
         turned = {s: q[:, i] for i, s in enumerate(self._turned)}
-        placed = self.estimator.push(Raw(acc, gyr, valid, turned))
+        placed = self.estimator.push(MeasuredBlock(acc, gyr, valid, turned))
         angles = self._measure(placed, turned, valid)
         known = self._contacts.push(q[:, : len(self._feet)], valid[:, self._feet], self.first)
         self._remember(placed, turned, valid, angles)
         self._count += len(acc)
         for x in known:
             self.contact[x.event.side] = x.event.kind == "ic"
-        self._notices += self.estimator.told()
+        self._notices += self.estimator.drain_notices()
         if self.estimator.broken and not self._told_broken:
             self._told_broken = True
             self._notices.append(Notice("live_figure_lost", BROKEN))
         notices, self._notices = tuple(self._notices), []
         strides = tuple(self._strides.push(known, self.history))
-        return Outcome(placed, angles, tuple(x.event for x in known), strides, notices)
+        return ChainOutput(placed, angles, tuple(x.event for x in known), strides, notices)
 
-    def _measure(self, placed: Placed, turned: Mapping[Segment, Floats], valid: Bools) -> Floats:
+    def _measure(self, placed: BodyBlock, turned: Mapping[Segment, Floats], valid: Bools) -> Floats:
         """Angles (T, names) over those of standing; the first block is the standing."""
         q, known = placed.q, placed.known
         if self._tilting:
@@ -237,7 +237,7 @@ class Chain:
         return angles
 
     def _remember(
-        self, placed: Placed, turned: Mapping[Segment, Floats], valid: Bools, angles: Floats
+        self, placed: BodyBlock, turned: Mapping[Segment, Floats], valid: Bools, angles: Floats
     ) -> None:
         index = {s: i for i, s in enumerate(self.estimator.segments)}
         course = np.empty((len(angles), len(self._courses), 4))
@@ -253,10 +253,10 @@ class Chain:
             self.history.append({name: x[start : start + MOST] for name, x in rows.items()})
 
 
-def _joined(found: Sequence[Outcome]) -> Outcome:
+def _joined(found: Sequence[ChainOutput]) -> ChainOutput:
     """Outcomes of blocks that follow each other as one."""
     last = found[-1]
-    return Outcome(
+    return ChainOutput(
         placed=last.placed,
         angles=np.concatenate([x.angles for x in found]),
         events=tuple(e for x in found for e in x.events),

@@ -77,7 +77,7 @@ class SensorHealth:
 
 
 @dataclass(frozen=True, eq=False)
-class Trail:
+class AngleTrail:
     """Angles since the frame before: t_s (m,), names (k), values (m, k) in rad, NaN where lost."""
 
     t_s: Floats
@@ -85,7 +85,7 @@ class Trail:
     values: Floats
 
 
-EMPTY_TRAIL: Final = Trail(np.zeros(0), (), np.zeros((0, 0)))
+EMPTY_TRAIL: Final = AngleTrail(np.zeros(0), (), np.zeros((0, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,7 @@ class LiveFrame:
     valid: bool = False
     contact: Mapping[Side, bool] = field(default_factory=dict)
     angles: Mapping[str, float] = field(default_factory=dict)
-    trail: Trail = EMPTY_TRAIL
+    trail: AngleTrail = EMPTY_TRAIL
     events: tuple[GaitEvent, ...] = ()
     strides: tuple[LiveStride, ...] = ()
     notices: tuple[Notice, ...] = ()

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.formats.live_log import Batch, Hello, StreamInfo
+from core.formats.live_log import Hello, SampleBatch, StreamInfo
 from core.frames import Segment
 from core.online.frame import SensorHealth
 
@@ -42,7 +42,7 @@ class _StreamHealth:
         self._total = np.zeros((len(info.sensors), 2), np.int64)
         self.sent_us: int | None = None
 
-    def push(self, batch: Batch) -> None:
+    def push(self, batch: SampleBatch) -> None:
         """Take a batch."""
         self.sent_us = batch.sent_us
         x = batch.samples[:, :, :6]
@@ -58,7 +58,7 @@ class _StreamHealth:
         while end_us - self._pieces[0].end_us > OVER_S * 1e6:
             self._total -= self._pieces.popleft().counts
 
-    def now(
+    def read_health(
         self, silent_s: float, still: Collection[Segment], stuck: Collection[Segment]
     ) -> list[SensorHealth]:
         """Health of its sensors."""
@@ -79,7 +79,7 @@ class _StreamHealth:
         ]
 
 
-class Health:
+class SensorHealthMonitor:
     """All sensors of a take, those without a segment too."""
 
     def __init__(self, hello: Hello) -> None:
@@ -87,18 +87,20 @@ class Health:
         self._begun_us: int | None = None
         self._now_us = 0
 
-    def push(self, batch: Batch) -> None:
+    def push(self, batch: SampleBatch) -> None:
         """Take a batch of a known stream."""
         self._streams[batch.stream].push(batch)
         if self._begun_us is None:
             self._begun_us = batch.sent_us
         self._now_us = max(self._now_us, batch.sent_us)
 
-    def now(self, still: Collection[Segment], stuck: Collection[Segment] = ()) -> tuple[SensorHealth, ...]:
+    def read_health(
+        self, still: Collection[Segment], stuck: Collection[Segment] = ()
+    ) -> tuple[SensorHealth, ...]:
         """Every sensor in the order of the hello; `still` : segments at rest. stuck : that do not measure."""
         found: list[SensorHealth] = []
         for stream in self._streams.values():
             since = stream.sent_us if stream.sent_us is not None else self._begun_us
             silent_s = 0.0 if since is None else 1e-6 * (self._now_us - since)
-            found += stream.now(silent_s, still, stuck)
+            found += stream.read_health(silent_s, still, stuck)
         return tuple(found)

@@ -7,28 +7,28 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from core.body.live_still import Stillness
+from core.body.live_still import StillnessDetector
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.tree import PRESETS
-from core.calibration.live_attempt import Wearer
+from core.calibration.live_attempt import WornSensors
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
 from core.errors import Notice, SagittalError
-from core.formats.live_log import Batch, Hello
+from core.formats.live_log import Hello, SampleBatch
 from core.frames import GRAVITY, R_NEUTRAL, Protocol, Segment
 from core.fusion.orientations import Orientations
 from core.online.calibrated import LiveCalibration
-from core.online.calibrated import warm as warm_calibration
+from core.online.calibrated import compile_calibration_kernels as warm_calibration
 from core.online.calibrating import CalibratingParams, LiveCalibrator
-from core.online.chain import Chain, ChainParams, Outcome
-from core.online.frame import EMPTY_TRAIL, LiveFrame, Trail
-from core.online.health import Health
+from core.online.chain import ChainOutput, ChainParams, LiveChain
+from core.online.frame import EMPTY_TRAIL, AngleTrail, LiveFrame
+from core.online.health import SensorHealthMonitor
 from core.parameters.spatial import Surface
 from core.quality.live_stuck import StuckSensors
-from core.quality.stuck import warm as warm_stuck
+from core.quality.stuck import compile_stuck_kernel as warm_stuck
 from core.recording import SensorSignals, Subject, UniformRecording, check_belt
 from core.rotation import from_matrix
 from core.timeline.live import LiveAxis, LiveAxisParams, UniformBlock
-from core.timeline.live import warm as warm_axis
+from core.timeline.live import compile_axis_kernels as warm_axis
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class OnlineParams:
     chain: ChainParams = field(default_factory=ChainParams)
 
 
-class Online:
+class OnlineSession:
     """A take as it comes: a pure function of its batches and commands in order.
 
     Parameters
@@ -68,20 +68,22 @@ class Online:
         self._axis = LiveAxis(hello, self.params.axis)
         self._surface = Surface(protocol, belt_speed_mps)
         self._calibrating = LiveCalibrator(
-            Wearer(self._axis.segments, self._axis.rate_hz, subject or Subject(), protocol, mounting or {}),
+            WornSensors(
+                self._axis.segments, self._axis.rate_hz, subject or Subject(), protocol, mounting or {}
+            ),
             self.params.calibrating,
         )
-        self._health = Health(hello)
-        self._still = Stillness(len(self._axis.segments), self._axis.rate_hz)
+        self._health = SensorHealthMonitor(hello)
+        self._still = StillnessDetector(len(self._axis.segments), self._axis.rate_hz)
         self._stuck = StuckSensors(self._axis.segments, self._axis.rate_hz)
-        self.chain: Chain | None = None
+        self.chain: LiveChain | None = None
 
     @property
     def segments(self) -> tuple[Segment, ...]:
         """Worn segments in the order of the axis' columns."""
         return self._axis.segments
 
-    def push(self, batch: Batch) -> LiveFrame | None:
+    def push(self, batch: SampleBatch) -> LiveFrame | None:
         """Take the next batch of the log; the state after the samples it completes, None when it does not."""
         self._health.push(batch)
         block = self._axis.push(batch)
@@ -90,7 +92,7 @@ class Online:
         block, stuck = self._stuck.push(block)
         rests = self._still.push(block.acc, block.gyr, block.valid)[-1, :, 1]
         notices = [*self._axis.drain_notices(), *stuck]
-        outcomes: list[Outcome] = []
+        outcomes: list[ChainOutput] = []
         start = 0
         if self.chain is None:
             start = len(block)
@@ -105,7 +107,7 @@ class Online:
             t_s=float(block.t_s[-1]),
             seq=batch.seq,
             stage=self._calibrating.stage,
-            health=self._health.now(
+            health=self._health.read_health(
                 [s for s, x in zip(self.segments, rests, strict=True) if x], self._stuck.now
             ),
             calibration=self._calibrating.view,
@@ -119,10 +121,10 @@ class Online:
             self.chain = None
             self._calibrating.redo()
 
-    def _begin(self, found: LiveCalibration, notices: list[Notice]) -> list[Outcome]:
+    def _begin(self, found: LiveCalibration, notices: list[Notice]) -> list[ChainOutput]:
         """Start the chain and catch up; a calibration that no chain can run on is begun anew."""
         try:
-            self.chain = Chain(found, self.segments, self._surface, self.params.chain)
+            self.chain = LiveChain(found, self.segments, self._surface, self.params.chain)
         except SagittalError as error:
             notices.append(Notice(error.code, error.message, error.sensor))
             self._calibrating.redo()
@@ -130,7 +132,9 @@ class Online:
         return [self.chain.caught_up]
 
 
-def _told(frame: LiveFrame, block: UniformBlock, chain: Chain, outcomes: Sequence[Outcome]) -> LiveFrame:
+def _told(
+    frame: LiveFrame, block: UniformBlock, chain: LiveChain, outcomes: Sequence[ChainOutput]
+) -> LiveFrame:
     """The frame with what the chain says after the block's last sample."""
     placed, angles = outcomes[-1].placed, outcomes[-1].angles
     here = min(len(angles), len(block))
@@ -144,14 +148,14 @@ def _told(frame: LiveFrame, block: UniformBlock, chain: Chain, outcomes: Sequenc
         valid=bool(placed.whole[-1]),
         contact=dict(chain.contact),
         angles=dict(zip(chain.names, angles[-1].tolist(), strict=True)),
-        trail=Trail(block.t_s[-here:], chain.names, angles[-here:]) if here else EMPTY_TRAIL,
+        trail=AngleTrail(block.t_s[-here:], chain.names, angles[-here:]) if here else EMPTY_TRAIL,
         events=tuple(e for x in outcomes for e in x.events),
         strides=tuple(s for x in outcomes for s in x.strides),
         notices=(*frame.notices, *(n for x in outcomes for n in x.notices)),
     )
 
 
-def warm() -> None:
+def compile_live_kernels() -> None:
     """Compile or load every kernel of the chain, so that the first take does not wait for it."""
     warm_calibration()
     _warm_chain(PRESETS["lower_body7"])
@@ -170,7 +174,7 @@ def warm_rest() -> None:
 
 
 def _warm_chain(worn: tuple[Segment, ...]) -> None:
-    chain = Chain(_standing(worn), worn)
+    chain = LiveChain(_standing(worn), worn)
     acc = np.tile([0.0, GRAVITY, 0.0], (10, len(worn), 1))
     chain.push(acc, np.zeros_like(acc), np.ones(acc.shape[:2], np.bool_))
 

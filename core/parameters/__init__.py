@@ -5,14 +5,14 @@ from __future__ import annotations
 from core.parameters.kinematic import (
     cycle_curves,
     foot_pitch,
-    kinematic,
     mean_curve,
     per_stride_figures,
     stride_figures,
+    summarise_angles,
 )
 from core.parameters.spatial import Surface, per_stride_spatial, spatial_rows, surface_of
 from core.parameters.take import TakeFigures, gait_parameters, take_figures
-from core.parameters.temporal import per_stride, stride_values, temporal
+from core.parameters.temporal import per_stride, stride_values, summarise_times
 
 __all__ = [
     "Surface",
@@ -20,7 +20,6 @@ __all__ = [
     "cycle_curves",
     "foot_pitch",
     "gait_parameters",
-    "kinematic",
     "mean_curve",
     "per_stride",
     "per_stride_figures",
@@ -28,7 +27,8 @@ __all__ = [
     "spatial_rows",
     "stride_figures",
     "stride_values",
+    "summarise_angles",
+    "summarise_times",
     "surface_of",
     "take_figures",
-    "temporal",
 ]

@@ -10,7 +10,7 @@ import numpy as np
 
 from core.frames import SIDES, SUFFIX, Floats, Side
 from core.parameters.catalogue import list_curve_figures
-from core.parameters.kinematic import is_level, kinematic
+from core.parameters.kinematic import is_level, summarise_angles
 from core.parameters.result import CycleCurves, Parameter
 from core.standing_angles import JOINTS, PELVIS, check_standing
 
@@ -60,7 +60,7 @@ def anatomical_parameters(curves: CycleCurves, standing_deg: Mapping[str, float]
     level, figures = anatomical_curves(curves, standing_deg), list_curve_figures()
     return tuple(
         p
-        for p in kinematic(level)
+        for p in summarise_angles(level)
         if p.side is not None
         and is_level(p.name)
         and p.side in level.curves.get(figures[p.name].variable, {})

@@ -44,7 +44,9 @@ def sole_heights(feet: FootTracks, side: Side) -> SoleHeights | None:
     )
 
 
-def over_floor(heights: SoleHeights, first: int, last: int, ankle_height: float) -> tuple[Floats, Floats]:
+def measure_floor_heights(
+    heights: SoleHeights, first: int, last: int, ankle_height: float
+) -> tuple[Floats, Floats]:
     """Heights of heel and tip over the floor from the flat at sample `first` to that at `last`, m."""
     a, b = float(heights.ankle[first]) - ankle_height, float(heights.ankle[last]) - ankle_height
     floor = a + (b - a) / (last - first) * np.arange(last - first + 1.0)

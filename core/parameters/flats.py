@@ -14,7 +14,7 @@ import numpy as np
 from core.body.feet import FootTracks
 from core.events.result import Stride
 from core.frames import Side
-from core.rest import runs
+from core.rest import find_runs
 
 STANCE_SHARE: Final = 0.7
 """Part of the stride in which its flat is looked for when no foot-off was found."""
@@ -25,7 +25,7 @@ Places = Mapping[tuple[Side, float], int | None]
 """Foot and initial contact → sample of the flat that follows, None when the foot never rests."""
 
 
-def places(strides: Sequence[Stride], feet: FootTracks) -> Places:
+def find_flats(strides: Sequence[Stride], feet: FootTracks) -> Places:
     """The flat after every initial contact that a stride begins, ends or crosses with."""
     until: dict[tuple[Side, float], float] = {}
     for s in strides:
@@ -48,7 +48,7 @@ def places(strides: Sequence[Stride], feet: FootTracks) -> Places:
 def rest_runs(feet: FootTracks, side: Side) -> tuple[list[int], list[int]]:
     """First and past-the-last samples of every rest of a foot, in order."""
     resting = feet.still[side] & feet.valid[side]
-    found = runs(resting)
+    found = find_runs(resting)
     return [start for start, _ in found], [stop for _, stop in found]
 
 

@@ -21,7 +21,7 @@ from core.parameters.resample import resample
 from core.parameters.result import CycleCurves, Parameter
 from core.parameters.rows import Column, as_column
 from core.parameters.stance import foot_pitches
-from core.parameters.variability import summary
+from core.parameters.variability import summarise_values
 
 POINTS: Final = 101
 """Points of a curve: 0, 1, … 100 % of the cycle."""
@@ -188,7 +188,7 @@ def turning_angle(strides: Strides) -> dict[str, dict[Side, Floats]]:
     return {"turning_angle_deg": {side: np.degrees(values) for side, values in turns.items()}}
 
 
-def kinematic(
+def summarise_angles(
     curves: CycleCurves, more: Mapping[str, Mapping[Side, Floats]] | None = None
 ) -> tuple[Parameter, ...]:
     """Angle parameters over the counted strides of each side, degrees.
@@ -222,7 +222,7 @@ def kinematic(
                 if np.count_nonzero(resting) > 0.5 * len(counted):
                     reason, counted = AT_BOUND, counted[:0]
                 values = counted[np.isfinite(counted)].tolist()
-            parameters.append(summary(name, side, values, "deg", None if values else reason))
+            parameters.append(summarise_values(name, side, values, "deg", None if values else reason))
     return tuple(parameters)
 
 

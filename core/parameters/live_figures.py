@@ -23,16 +23,16 @@ from core.parameters.kinematic import (
 )
 from core.parameters.live_stride import NOT_YET
 from core.parameters.phases import phase_rows
-from core.parameters.plausible import IMPOSSIBLE, impossible
+from core.parameters.plausible import IMPOSSIBLE, is_impossible
 from core.parameters.rows import Value
 from core.parameters.spatial import NAMES as SPATIAL
 from core.parameters.spatial import Surface, spatial_row
-from core.parameters.stance import foot_pitches, stances
-from core.parameters.temporal import missing, temporal_values
+from core.parameters.stance import find_stances, foot_pitches
+from core.parameters.temporal import explain_missing, temporal_values
 
 
 @dataclass(frozen=True, eq=False)
-class Span:
+class StrideSpan:
     """Part of a take that holds a stride, `Oriented` of pelvis and feet.
 
     Parameters
@@ -53,17 +53,17 @@ Figures = tuple[dict[str, Value], dict[str, Floats]]
 """Value or reason by name; curve (101,) rad by variable."""
 
 
-def early_figures(stride: Stride, span: Span, surface: Surface) -> Figures:
+def early_figures(stride: Stride, span: StrideSpan, surface: Surface) -> Figures:
     """All that is known when the contact that ends the stride is; of distances what a belt tells."""
     one = Strides((stride,))
     found: dict[str, Value] = {}
     for name, column in temporal_values((stride,)).items():
         value = float(column[0])
-        found[name] = missing(name, (stride,)) if isnan(value) else value
-        if impossible(name, value):
+        found[name] = explain_missing(name, (stride,)) if isnan(value) else value
+        if is_impossible(name, value):
             found[name] = IMPOSSIBLE
     pitch = foot_pitches(span)
-    flat = stances(one, span.t_s, pitch)
+    flat = find_stances(one, span.t_s, pitch)
     curves = cycle_curves(span.angles or NO_ANGLES, one)
     found |= flat.rows[0]
     found |= phase_rows(one, flat, span.angles, pitch, span.feet)[0]
@@ -87,7 +87,9 @@ def early_figures(stride: Stride, span: Span, surface: Surface) -> Figures:
     return found, {name: row for name, row in rows.items() if bool(np.isfinite(row).all())}
 
 
-def distances(stride: Stride, context: Sequence[Stride], span: Span, surface: Surface) -> dict[str, Value]:
+def measure_distances(
+    stride: Stride, context: Sequence[Stride], span: StrideSpan, surface: Surface
+) -> dict[str, Value]:
     """Figures between the flats, once both feet have left the floor again.
 
     Parameters

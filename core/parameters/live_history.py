@@ -17,7 +17,7 @@ MOST: Final = 64
 """Samples that may be added at once."""
 
 
-class History:
+class SampleHistory:
     """Named columns of the samples 0, 1, 2 …, of which the last are kept.
 
     Parameters

@@ -16,18 +16,18 @@ from typing import Final
 
 import numpy as np
 
-from core.angles import JointAngles, headings
+from core.angles import JointAngles, compute_headings
 from core.body.feet import FootTracks
 from core.body.model import BodyModel
-from core.events.flags import StrideParams, flagged, with_flag
-from core.events.live_contacts import Known
+from core.events.flags import StrideParams, add_flag, flag_cycles
+from core.events.live_contacts import KnownContact
 from core.events.result import GaitEvent, GaitEvents, Stride, StrideFlag
 from core.events.strides import side_strides
 from core.frames import Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.parameters.flats import OTHER
-from core.parameters.live_figures import Span, distances, early_figures
-from core.parameters.live_history import KEPT_S, History
+from core.parameters.live_figures import StrideSpan, early_figures, measure_distances
+from core.parameters.live_history import KEPT_S, SampleHistory
 from core.parameters.live_stride import LiveStride
 from core.parameters.rows import Value
 from core.parameters.spatial import NAMES as SPATIAL
@@ -41,7 +41,7 @@ LATER: Final[frozenset[StrideFlag]] = frozenset(("last", "non_periodic"))
 
 
 @dataclass(frozen=True)
-class Setup:
+class HistoryColumns:
     """What the columns of the history mean.
 
     Parameters
@@ -73,14 +73,14 @@ class _Pending:
 class LiveStrides:
     """The strides of a live take, in the order in which they become known."""
 
-    def __init__(self, setup: Setup, params: StrideParams | None = None) -> None:
+    def __init__(self, setup: HistoryColumns, params: StrideParams | None = None) -> None:
         self._setup, self._params = setup, params or StrideParams()
         self._events: deque[GaitEvent] = deque()
         self._recent: dict[Side, deque[Stride]] = {s: deque(maxlen=REMEMBERED) for s in OTHER}
         self._pending: list[_Pending] = []
         self._count = 0
 
-    def push(self, known: Iterable[Known], history: History) -> list[LiveStride]:
+    def push(self, known: Iterable[KnownContact], history: SampleHistory) -> list[LiveStride]:
         """Strides that the contacts known since the last call, or the mere time since then, complete."""
         told: list[LiveStride] = []
         for at, event in known:
@@ -94,7 +94,7 @@ class LiveStrides:
                 told += self._landed(at, event, history)
         return told + self._given_up(history.length - 1, history)
 
-    def _landed(self, at: int, event: GaitEvent, history: History) -> list[LiveStride]:
+    def _landed(self, at: int, event: GaitEvent, history: SampleHistory) -> list[LiveStride]:
         """The stride that this contact ends, if it began within reach."""
         own = [e.time_s for e in self._events if e.side == event.side and e.kind == "ic"]
         if len(own) < 2:
@@ -109,7 +109,7 @@ class LiveStrides:
         if recent and recent[-1].end_s != stride.start_s:
             recent.clear()
         recent.append(stride)
-        flags = tuple(f for f in flagged(tuple(recent), self._params)[-1].flags if f not in LATER)
+        flags = tuple(f for f in flag_cycles(tuple(recent), self._params)[-1].flags if f not in LATER)
         found, curves = early_figures(stride, span, self._setup.surface)
         values, reasons = _split(found)
         final = self._setup.surface.protocol == "treadmill" or event.side not in self._setup.feet
@@ -134,12 +134,12 @@ class LiveStrides:
             self._pending.append(_Pending(told, stride, self._sample(stride.end_s) + wait))
         return [told]
 
-    def _completed(self, at: int, history: History) -> list[LiveStride]:
+    def _completed(self, at: int, history: SampleHistory) -> list[LiveStride]:
         ready = [p for p in self._pending if self._left_again(p.stride)]
         self._pending = [p for p in self._pending if p not in ready]
         return [self._complete(p, at, history) for p in ready]
 
-    def _given_up(self, at: int, history: History) -> list[LiveStride]:
+    def _given_up(self, at: int, history: SampleHistory) -> list[LiveStride]:
         """Those nobody steps on after: a stop. Each at its own sample, whatever the blocks are."""
         ready = sorted((p for p in self._pending if p.until <= at), key=lambda p: p.until)
         self._pending = [p for p in self._pending if p.until > at]
@@ -150,17 +150,17 @@ class LiveStrides:
         on = any(e.side == stride.side and e.time_s > stride.end_s for e in self._events)
         return () if on else ("last",)
 
-    def _complete(self, pending: _Pending, at: int, history: History, *late: StrideFlag) -> LiveStride:
+    def _complete(self, pending: _Pending, at: int, history: SampleHistory, *late: StrideFlag) -> LiveStride:
         context = self._context(pending.stride.start_s)
         first = self._sample(pending.stride.start_s) - 1
         found: dict[str, Value] = dict.fromkeys(SPATIAL, "gap")
         if history.reaches(first, at + 1):
             span = self._span(first, at + 1, history, whole=False)
-            found = distances(pending.stride, context, span, self._setup.surface)
+            found = measure_distances(pending.stride, context, span, self._setup.surface)
         told, (values, reasons) = pending.told, _split(found)
         if found["stride_length_m"] == "in_place":
             late = (*late, "in_place")
-        flags = with_flag(replace(pending.stride, flags=told.flags), *late).flags
+        flags = add_flag(replace(pending.stride, flags=told.flags), *late).flags
         return replace(
             told,
             flags=flags,
@@ -207,7 +207,7 @@ class LiveStrides:
     def _sample(self, time_s: float) -> int:
         return floor(time_s * self._setup.rate_hz + 1e-6) - self._setup.first
 
-    def _span(self, first: int, past: int, history: History, whole: bool = True) -> Span:
+    def _span(self, first: int, past: int, history: SampleHistory, whole: bool = True) -> StrideSpan:
         """Samples first … past − 1 as the functions of a whole take want them; not `whole`: no angles."""
         x = self._setup
         t_s = np.arange(x.first + first, x.first + past) / x.rate_hz
@@ -220,7 +220,7 @@ class LiveStrides:
         if whole:
             columns = history.floats("angles", first, past)
             named = {name: columns[:, i] for i, name in enumerate(x.angles)}
-            angles = JointAngles(t_s, named, {}, headings=headings(take))
+            angles = JointAngles(t_s, named, {}, headings=compute_headings(take))
         feet = None
         if x.feet:
             p, turned = history.floats("feet_p", first, past), history.floats("feet_q", first, past)
@@ -236,7 +236,7 @@ class LiveStrides:
                 source=x.source,
                 body=x.body,
             )
-        return Span(t_s, take.q, take.valid, angles, feet)
+        return StrideSpan(t_s, take.q, take.valid, angles, feet)
 
 
 def _split(found: Mapping[str, Value]) -> tuple[dict[str, float | None], dict[str, str]]:

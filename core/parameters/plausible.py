@@ -15,7 +15,7 @@ LEAST_KNEE: Final = radians(-20.0)
 where nobody entered the standing angle: who stands with bent knees walks with them bent."""
 
 
-def impossible(name: str, value: float) -> bool:
+def is_impossible(name: str, value: float) -> bool:
     """Tell whether no person can have this value of a parameter."""
     entry = CATALOGUE.get(name)
     return entry is not None and (value < entry.plausible[0] or value > entry.plausible[1])

@@ -10,7 +10,7 @@ from core.events.result import Strides
 from core.frames import SIDES, Floats, Side
 from core.parameters.catalogue import unit_of
 from core.parameters.result import Parameter
-from core.parameters.variability import summary
+from core.parameters.variability import summarise_values
 
 Value = float | str
 """A figure of one stride, or the code of the reason why it has none."""
@@ -36,9 +36,11 @@ def row_parameter(name: str, side: Side | None, rows: Sequence[Row]) -> Paramete
     """Parameter over these strides; without a value the most frequent reason, "no_strides" without any."""
     values = [v for row in rows if isinstance(v := row[name], float)]
     if values:
-        return summary(name, side, values, unit_of(name))
+        return summarise_values(name, side, values, unit_of(name))
     reasons = Counter(v for row in rows if isinstance(v := row[name], str))
-    return summary(name, side, [], unit_of(name), reasons.most_common(1)[0][0] if reasons else "no_strides")
+    return summarise_values(
+        name, side, [], unit_of(name), reasons.most_common(1)[0][0] if reasons else "no_strides"
+    )
 
 
 def side_parameters(strides: Strides, rows: Sequence[Row], names: Iterable[str]) -> tuple[Parameter, ...]:

@@ -16,7 +16,7 @@ import numpy as np
 from core.frames import GRAVITY, Floats, Segment
 from core.parameters.resample import resample
 from core.parameters.result import Parameter
-from core.parameters.variability import summary
+from core.parameters.variability import summarise_values
 from core.rest import Window
 
 NAME: Final = "stride_sparc"
@@ -47,15 +47,15 @@ def stride_smoothness(strides: Sequence[Window], t_s: Floats, trunk: Mapping[Seg
     without a value a reason: "no_pelvis_sensor", "no_strides", "no_forward", "gap".
     """
     if "pelvis" not in trunk:
-        return summary(NAME, None, [], "", "no_pelvis_sensor")
+        return summarise_values(NAME, None, [], "", "no_pelvis_sensor")
     if not strides:
-        return summary(NAME, None, [], "", "no_strides")
+        return summarise_values(NAME, None, [], "", "no_strides")
     force = np.linalg.norm(trunk["pelvis"] + (0.0, 0.0, GRAVITY), axis=1)
     bounds = np.array(strides)
     pieces = resample(np.abs(force - GRAVITY)[None], t_s, bounds, POINTS + 1)[0, :, :-1]
     values = spectral_arc_length(pieces, (bounds[:, 1] - bounds[:, 0]) / POINTS)
     known = values[np.isfinite(values)].tolist()
-    return summary(NAME, None, known, "", "gap" if np.isfinite(force).any() else "no_forward")
+    return summarise_values(NAME, None, known, "", "gap" if np.isfinite(force).any() else "no_forward")
 
 
 def spectral_arc_length(pieces: Floats, step_s: Floats) -> Floats:

@@ -21,13 +21,13 @@ from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Protocol, Side
 from core.parameters.catalogue import list_names
 from core.parameters.catalogue.entry import DISTANCES
-from core.parameters.clearance import SoleHeights, over_floor, sole_heights, toe_clearance
-from core.parameters.flats import OTHER, Places, places
+from core.parameters.clearance import SoleHeights, measure_floor_heights, sole_heights, toe_clearance
+from core.parameters.flats import OTHER, Places, find_flats
 from core.parameters.result import Parameter
 from core.parameters.rows import Column, Row, Value, row_columns, row_parameter
-from core.parameters.variability import summary
+from core.parameters.variability import summarise_values
 from core.recording import UniformRecording
-from core.rest import runs
+from core.rest import find_runs
 from core.rotation import wrap_angle, yaw
 
 NAMES: Final[tuple[str, ...]] = (*list_names(DISTANCES, of="stride"), "toe_out_deg")
@@ -98,7 +98,7 @@ def in_place(strides: Strides, feet: FootTracks | None, surface: Surface = GROUN
     """
     if feet is None or surface.protocol == "treadmill":
         return frozenset()
-    found = places(strides.strides, feet)
+    found = find_flats(strides.strides, feet)
     return frozenset(
         i
         for i, s in enumerate(strides.strides)
@@ -114,7 +114,7 @@ def per_stride_spatial(rows: Sequence[Row]) -> dict[str, Column]:
     return row_columns(rows, NAMES)
 
 
-def spatial(
+def summarise_distances(
     strides: Strides, feet: FootTracks | None, rows: Sequence[Row], surface: Surface = GROUND
 ) -> tuple[Parameter, ...]:
     """Distances over the counted strides: speed and way of the take, the others by side.
@@ -139,20 +139,20 @@ def _total(feet: FootTracks | None, surface: Surface) -> Parameter:
     """Way of the take: from rest to rest of a foot, turns and short steps too; mean of the feet."""
     name = "total_distance_m"
     if surface.protocol == "treadmill":
-        return summary(name, None, [], "m", "treadmill")
+        return summarise_values(name, None, [], "m", "treadmill")
     if feet is None:
-        return summary(name, None, [], "m", "no_foot_track")
+        return summarise_values(name, None, [], "m", "no_foot_track")
     ways = []
     told = {side: still for side, still in feet.still.items() if side not in feet.withheld}
     if not told and feet.withheld:
-        return summary(name, None, [], "m", next(iter(feet.withheld.values())))
+        return summarise_values(name, None, [], "m", next(iter(feet.withheld.values())))
     for side, still in told.items():
-        middles = [(start + stop) // 2 for start, stop in runs(still & feet.valid[side])]
+        middles = [(start + stop) // 2 for start, stop in find_runs(still & feet.valid[side])]
         lengths = np.linalg.norm(np.diff(feet.p[side][middles, :2], axis=0), axis=1)
         if len(middles):
             ways.append(float(lengths[lengths > STEP_M].sum()))
     if not ways:
-        return summary(name, None, [], "m", "no_foot_flat")
+        return summarise_values(name, None, [], "m", "no_foot_flat")
     return Parameter(name, None, len(ways), float(np.mean(ways)), None, "m")
 
 
@@ -177,7 +177,7 @@ class _Paths:
 
 
 def _paths(strides: Strides, feet: FootTracks) -> _Paths:
-    found = places(strides.strides, feet)
+    found = find_flats(strides.strides, feet)
     heading: dict[tuple[Side, int], float] = {}
     for side in feet.p:
         flats = [at for (foot, _), at in found.items() if foot == side and at is not None]
@@ -227,7 +227,7 @@ def _clearance(
     """Of the sole between the two flats."""
     if heights is None:
         return {"max_heel_clearance_m": "no_shoe_geometry", "min_toe_clearance_m": "no_shoe_geometry"}
-    heel, tip = over_floor(heights, first, last, feet.body.ankle_height)
+    heel, tip = measure_floor_heights(heights, first, last, feet.body.ankle_height)
     toe: Value = "no_terminal_contact"
     if s.tc_s is not None:
         a, b = (max(ceil((t - feet.t_s[0]) * feet.rate_hz) - first, 0) for t in (s.tc_s, s.end_s))

@@ -59,7 +59,7 @@ def foot_pitches(orientations: Oriented) -> dict[Segment, Floats]:
     return found
 
 
-def stances(strides: Strides, t_s: Floats, pitch: dict[Segment, Floats]) -> Stances:
+def find_stances(strides: Strides, t_s: Floats, pitch: dict[Segment, Floats]) -> Stances:
     """Find when each foot is flat in every stride.
 
     Parameters

@@ -22,9 +22,9 @@ from core.parameters.variability import (
     CV_STRIDES,
     STEADY_STRIDES,
     Spread,
-    comparable,
     cv_pct,
     difference_interval,
+    has_enough_values,
 )
 
 KNOWN_TO: Final[Mapping[str, float]] = {"s": 0.01, "m": 0.01, "%": 0.4, "m/s": 0.01}
@@ -71,7 +71,7 @@ class Symmetry:
         return told and abs(self.difference) >= KNOWN_TO.get(self.unit, 0.0)
 
 
-def symmetries(parameters: Sequence[Parameter], affected: Side | None = None) -> tuple[Symmetry, ...]:
+def compare_sides(parameters: Sequence[Parameter], affected: Side | None = None) -> tuple[Symmetry, ...]:
     """Compare the sides of every parameter that has a value of enough strides on both, in the order given.
 
     Parameters
@@ -87,8 +87,8 @@ def symmetries(parameters: Sequence[Parameter], affected: Side | None = None) ->
     return tuple(
         _symmetry(a, Spread(a.mean, a.sd, a.n), Spread(b.mean, b.sd, b.n), first, reference)
         for a, b in pairs
-        if a is not None and a.mean is not None and comparable(a)
-        if b is not None and b.mean is not None and comparable(b)
+        if a is not None and a.mean is not None and has_enough_values(a)
+        if b is not None and b.mean is not None and has_enough_values(b)
     )
 
 
@@ -119,16 +119,22 @@ def phase_coordination(strides: Strides) -> Parameter:
     (below 10, like every variation).
     """
     name = "pci_pct"
-    swings = {side: [s.end_s - s.tc_s for s in strides.used(side) if s.tc_s is not None] for side in SIDES}
-    if not strides.used():
+    swings = {
+        side: [s.end_s - s.tc_s for s in strides.select_used(side) if s.tc_s is not None] for side in SIDES
+    }
+    if not strides.select_used():
         return Parameter(name, None, 0, None, None, "%", "no_strides")
     if not all(swings.values()):
-        reason = "opposite_foot_missing" if not all(strides.used(x) for x in SIDES) else "no_terminal_contact"
+        reason = (
+            "opposite_foot_missing"
+            if not all(strides.select_used(x) for x in SIDES)
+            else "no_terminal_contact"
+        )
         return Parameter(name, None, 0, None, None, "%", reason)
     longer = max(SIDES, key=lambda side: float(np.mean(swings[side])))
     phi = np.array([
         360.0 * (s.opposite_ic_s - s.start_s) / s.duration_s
-        for s in strides.used(longer)
+        for s in strides.select_used(longer)
         if s.opposite_ic_s is not None
     ])  # fmt: skip
     cv = cv_pct(phi, "") if len(phi) >= CV_STRIDES else None

@@ -12,9 +12,9 @@ from core.frames import Floats, Oriented, Segment, Side
 from core.parameters.kinematic import (
     cycle_curves,
     foot_pitch,
-    kinematic,
     per_stride_figures,
     stride_figures,
+    summarise_angles,
     turning_angle,
     without_bounds,
 )
@@ -23,12 +23,12 @@ from core.parameters.phases import phase_rows
 from core.parameters.result import Parameter
 from core.parameters.rows import Column, row_columns, side_parameters
 from core.parameters.smoothness import stride_smoothness
-from core.parameters.spatial import GROUND, Surface, per_stride_spatial, spatial, spatial_rows
+from core.parameters.spatial import GROUND, Surface, per_stride_spatial, spatial_rows, summarise_distances
 from core.parameters.stance import NAMES as PARTS
-from core.parameters.stance import foot_pitches, stances
+from core.parameters.stance import find_stances, foot_pitches
 from core.parameters.symmetry import phase_coordination
-from core.parameters.temporal import per_stride, temporal
-from core.parameters.trunk import one_foot, trunk_regularity
+from core.parameters.temporal import per_stride, summarise_times
+from core.parameters.trunk import choose_foot, trunk_regularity
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
@@ -65,11 +65,11 @@ def take_figures(
     trunk : pelvis → (n, 3) acceleration in the walking frame, on the axis of the angles.
     """
     columns = per_stride(strides)
-    times = (*temporal(strides), phase_coordination(strides))
+    times = (*summarise_times(strides), phase_coordination(strides))
     if angles is None:
         return TakeFigures(times, columns)
     pitch = {} if orientations is None else foot_pitches(orientations)
-    flat = stances(strides, angles.t_s, pitch)
+    flat = find_stances(strides, angles.t_s, pitch)
     rows = spatial_rows(strides, feet, surface)
     phases = phase_rows(strides, flat, angles, pitch, feet)
     curves = cycle_curves(angles, strides)
@@ -80,12 +80,12 @@ def take_figures(
     return TakeFigures(
         parameters=(
             *times,
-            *spatial(strides, feet, rows, surface),
+            *summarise_distances(strides, feet, rows, surface),
             *side_parameters(strides, flat.rows, PARTS),
             *side_parameters(strides, phases, PHASES),
-            *kinematic(curves, of_feet),
-            *trunk_regularity(one_foot(strides), angles.t_s, trunk or {}),
-            stride_smoothness(one_foot(strides), angles.t_s, trunk or {}),
+            *summarise_angles(curves, of_feet),
+            *trunk_regularity(choose_foot(strides), angles.t_s, trunk or {}),
+            stride_smoothness(choose_foot(strides), angles.t_s, trunk or {}),
         ),
         columns={
             **columns,

@@ -15,10 +15,10 @@ import numpy as np
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats
 from core.parameters.catalogue import CATALOGUE, unit_of
-from core.parameters.plausible import IMPOSSIBLE, impossible
+from core.parameters.plausible import IMPOSSIBLE, is_impossible
 from core.parameters.result import Parameter
 from core.parameters.rows import Column, as_column
-from core.parameters.variability import summary
+from core.parameters.variability import summarise_values
 
 
 def stride_values(stride: Stride) -> dict[str, float | None]:
@@ -65,7 +65,7 @@ def possible_values(strides: Sequence[Stride]) -> dict[str, Floats]:
     return found
 
 
-def temporal(strides: Strides) -> tuple[Parameter, ...]:
+def summarise_times(strides: Strides) -> tuple[Parameter, ...]:
     """Temporal parameters over the counted strides of each side, and the cadence of both.
 
     Returns
@@ -76,23 +76,23 @@ def temporal(strides: Strides) -> tuple[Parameter, ...]:
     parameters: list[Parameter] = []
     steps: list[float] = []
     for side in SIDES:
-        used = strides.used(side)
+        used = strides.select_used(side)
         found = temporal_values(used)
         for name, column in possible_values(used).items():
             values = column[~np.isnan(column)].tolist()
             there = not np.isnan(found[name]).all()
-            why = None if values else IMPOSSIBLE if there else missing(name, used)
-            parameters.append(summary(name, side, values, unit_of(name), why))
+            why = None if values else IMPOSSIBLE if there else explain_missing(name, used)
+            parameters.append(summarise_values(name, side, values, unit_of(name), why))
             if name == "step_time_s":
                 steps.extend(values)
-    reason = "opposite_foot_missing" if strides.used() else "no_strides"
+    reason = "opposite_foot_missing" if strides.select_used() else "no_strides"
     if not steps and any(p.reason == IMPOSSIBLE and p.name == "step_time_s" for p in parameters):
         reason = IMPOSSIBLE
-    parameters.append(cadence(summary("step_time_s", None, steps, "s", reason)))
+    parameters.append(cadence(summarise_values("step_time_s", None, steps, "s", reason)))
     return tuple(parameters)
 
 
-def missing(name: str, used: Sequence[Stride]) -> str:
+def explain_missing(name: str, used: Sequence[Stride]) -> str:
     """Why a parameter has no value over these strides of a side."""
     if not used:
         return "no_strides"
@@ -110,8 +110,8 @@ def cadence(step: Parameter) -> Parameter:
     named = replace(step, name="cadence_spm", unit="steps/min")
     if step.mean is None:
         return named
-    if impossible(named.name, 60.0 / step.mean):
-        return summary(named.name, step.side, [], named.unit, IMPOSSIBLE)
+    if is_impossible(named.name, 60.0 / step.mean):
+        return summarise_values(named.name, step.side, [], named.unit, IMPOSSIBLE)
     low, high = step.ci_low, step.ci_high
     # two wildly different steps say nothing about how few a minute may have
     known = low is not None and high is not None and low > 0.0

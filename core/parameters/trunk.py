@@ -20,7 +20,7 @@ from core.events.result import Strides
 from core.frames import SIDES, Floats, Segment
 from core.parameters.resample import resample
 from core.parameters.result import Parameter
-from core.parameters.variability import STEADY_STRIDES, summary
+from core.parameters.variability import STEADY_STRIDES, summarise_values
 from core.rest import Window
 
 AXES: Final[Mapping[str, int]] = {"v": 2, "ap": 0, "ml": 1}
@@ -50,9 +50,9 @@ NAMES: Final = (
 """In the order of the tables."""
 
 
-def one_foot(strides: Strides) -> tuple[Window, ...]:
+def choose_foot(strides: Strides) -> tuple[Window, ...]:
     """Counted strides of the foot that has more of them: those of both overlap, one foot's tell all once."""
-    return tuple((s.start_s, s.end_s) for s in max((strides.used(side) for side in SIDES), key=len))
+    return tuple((s.start_s, s.end_s) for s in max((strides.select_used(side) for side in SIDES), key=len))
 
 
 def trunk_regularity(
@@ -73,9 +73,9 @@ def trunk_regularity(
     three strides in a row).
     """
     if "pelvis" not in trunk:
-        return tuple(summary(name, None, [], "", "no_pelvis_sensor") for name in NAMES)
+        return tuple(summarise_values(name, None, [], "", "no_pelvis_sensor") for name in NAMES)
     if not strides:
-        return tuple(summary(name, None, [], "", "no_strides") for name in NAMES)
+        return tuple(summarise_values(name, None, [], "", "no_strides") for name in NAMES)
     acceleration = trunk["pelvis"]
     return (*_harmonic_ratios(strides, t_s, acceleration), *_regularity(strides, t_s, acceleration))
 
@@ -100,7 +100,7 @@ def _harmonic_ratios(own: Sequence[Window], t_s: Floats, acceleration: Floats) -
     pieces = resample(acceleration.T, t_s, np.array(own), POINTS + 1)[..., :-1]
     for axis, values in harmonic_ratios(pieces).items():
         known = values[np.isfinite(values)]
-        yield summary(f"harmonic_ratio_{axis}", None, known.tolist(), "", _why(acceleration, axis))
+        yield summarise_values(f"harmonic_ratio_{axis}", None, known.tolist(), "", _why(acceleration, axis))
 
 
 def _regularity(own: Sequence[Window], t_s: Floats, acceleration: Floats) -> Iterator[Parameter]:
@@ -114,7 +114,7 @@ def _regularity(own: Sequence[Window], t_s: Floats, acceleration: Floats) -> Ite
             whole = [(len(r), a) for r, a in zip(runs, along, strict=True) if np.isfinite(a).all()]
             n = sum(strides for strides, _ in whole)
             if not whole:
-                yield summary(label, None, [], "", _why(acceleration, axis) if runs else "no_run")
+                yield summarise_values(label, None, [], "", _why(acceleration, axis) if runs else "no_run")
                 continue
             alike = _autocorrelation([a for _, a in whole], lags)
             note = "few_strides" if n < STEADY_STRIDES else None

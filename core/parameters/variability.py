@@ -32,12 +32,12 @@ TOO_FEW: Final = "too_few_strides"
 """Reason of a comparison that is not made for want of strides."""
 
 
-def comparable(p: Parameter) -> bool:
+def has_enough_values(p: Parameter) -> bool:
     """Enough strides, or steps, to be held against the other side, a norm, a limit or another visit."""
     return p.n >= COMPARED or name_counted(p.name) not in {"strides", "steps"}
 
 
-def summary(
+def summarise_values(
     name: str, side: Side | None, values: Sequence[float], unit: str, reason: str | None = None
 ) -> Parameter:
     """One parameter from its values; without values the reason stands instead."""

@@ -11,10 +11,10 @@ from core.events.bouts import Bout
 from core.events.steps import EDGE_STEPS, Steps
 from core.events.turns import Turn
 from core.parameters.catalogue import unit_of
-from core.parameters.plausible import IMPOSSIBLE, impossible
+from core.parameters.plausible import IMPOSSIBLE, is_impossible
 from core.parameters.result import Parameter
 from core.parameters.temporal import cadence
-from core.parameters.variability import summary
+from core.parameters.variability import summarise_values
 from core.rest import Window
 
 
@@ -40,7 +40,10 @@ def turn_parameters(turns: Sequence[Turn]) -> tuple[Parameter, ...]:
     return (
         Parameter("turn_count", None, len(turns), float(len(turns)), None, ""),
         # the note on few strides is none on turns
-        *(replace(summary(n, None, x, unit_of(n), "no_turns"), note=None) for n, x in figures.items()),
+        *(
+            replace(summarise_values(n, None, x, unit_of(n), "no_turns"), note=None)
+            for n, x in figures.items()
+        ),
     )
 
 
@@ -63,9 +66,9 @@ def step_parameters(steps: Steps) -> tuple[Parameter, ...]:
     two ends have errors of different feet.
     """
     found = steps.step_times_s
-    times = [t for t in found if not impossible("step_time_s", t)]
+    times = [t for t in found if not is_impossible("step_time_s", t)]
     reason = None if times else next((n.code for n in steps.notices), IMPOSSIBLE if found else "no_strides")
-    step = summary("step_time_s", None, times, "s", reason)
+    step = summarise_values("step_time_s", None, times, "s", reason)
     n = len(steps.steps)
     return (cadence(step), step, Parameter("step_count", None, n, float(n), None, ""))
 

@@ -4,11 +4,18 @@
 `recipes` their order. The same code serves the command line, the worker and the tests.
 """
 
-from core.pipeline.analysis import Analysis
+from core.pipeline.analysis import TakeAnalysis
 from core.pipeline.config import PipelineConfig
 from core.pipeline.recipes import TRUNK_ONLY, WALK, Progress, analyse, resume
 from core.pipeline.stages import PipelineStage
 
 __all__ = [
-    "TRUNK_ONLY", "WALK", "Analysis", "PipelineConfig", "PipelineStage", "Progress", "analyse", "resume",
+    "TRUNK_ONLY",
+    "WALK",
+    "PipelineConfig",
+    "PipelineStage",
+    "Progress",
+    "TakeAnalysis",
+    "analyse",
+    "resume",
 ]  # fmt: skip

@@ -17,7 +17,7 @@ from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
 from core.events.turns import Turn
 from core.fusion.orientations import Orientations
-from core.measure import Measured, Tracks
+from core.measure import MeasuredGait, Tracks
 from core.parameters.result import Parameter
 from core.pipeline.config import PipelineConfig
 from core.quality import QualityReport
@@ -56,7 +56,7 @@ class DetectedContacts:
 
 
 @dataclass(frozen=True, eq=False)
-class Analysis:
+class TakeAnalysis:
     """Everything one take gave; what was not reached is None and `problem` says why.
 
     A stage sets its own field and none of another stage, so that the chain can go on from any stage
@@ -91,7 +91,7 @@ class Analysis:
     posed: PoseEstimate | None = None
     angles: JointAngles | None = None
     tracks: Tracks | None = None
-    measured: Measured | None = None
+    measured: MeasuredGait | None = None
     problem: Notice | None = None
     stopped_at: str | None = None
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from core.errors import Notice, ParameterError, SagittalError
-from core.pipeline.analysis import Analysis
+from core.pipeline.analysis import TakeAnalysis
 from core.pipeline.config import PipelineConfig
 from core.pipeline.stages import (
     ANGLES,
@@ -28,7 +28,7 @@ from core.pipeline.stages import (
     TRUNK_PARAMETERS,
     PipelineStage,
 )
-from core.quality.stuck import working
+from core.quality.stuck import drop_stuck_sensors
 from core.recording import Recording
 
 Progress = Callable[[str, float], None]
@@ -53,7 +53,7 @@ def analyse(
     config: PipelineConfig | None = None,
     progress: Progress = say_nothing,
     version: str = "",
-) -> Analysis:
+) -> TakeAnalysis:
     """Run all stages on one recording.
 
     Parameters
@@ -67,17 +67,17 @@ def analyse(
     ------
     SagittalError
         When not even a common time axis can be made. Later stages never raise: what stops them is
-        `Analysis.problem`.
+        `TakeAnalysis.problem`.
     """
-    return _run_from(Analysis(recording, config or PipelineConfig(), version), 0, progress)
+    return _run_from(TakeAnalysis(recording, config or PipelineConfig(), version), 0, progress)
 
 
-def choose_recipe(analysis: Analysis) -> tuple[PipelineStage, ...]:
+def choose_recipe(analysis: TakeAnalysis) -> tuple[PipelineStage, ...]:
     """The recipe of the sensors that work; the stages timeline and quality have run."""
-    return TRUNK_ONLY if all(s in TRUNK for s in working(analysis.recording).sensors) else WALK
+    return TRUNK_ONLY if all(s in TRUNK for s in drop_stuck_sensors(analysis.recording).sensors) else WALK
 
 
-def run_stages(analysis: Analysis, stages: Sequence[PipelineStage], progress: Progress) -> Analysis:
+def run_stages(analysis: TakeAnalysis, stages: Sequence[PipelineStage], progress: Progress) -> TakeAnalysis:
     """Run stages in order; after a problem only what measures what is there.
 
     Raises
@@ -102,11 +102,11 @@ def run_stages(analysis: Analysis, stages: Sequence[PipelineStage], progress: Pr
 
 
 def resume(
-    analysis: Analysis,
+    analysis: TakeAnalysis,
     stage: str,
     config: PipelineConfig | None = None,
     progress: Progress = say_nothing,
-) -> Analysis:
+) -> TakeAnalysis:
     """Run an analysis again from one stage on; the results before it are taken as they are.
 
     Parameters
@@ -150,7 +150,7 @@ def resume(
     return _run_from(replace(analysis, config=config, **forgotten), first, progress)
 
 
-def _run_from(analysis: Analysis, first: int, progress: Progress) -> Analysis:
+def _run_from(analysis: TakeAnalysis, first: int, progress: Progress) -> TakeAnalysis:
     """Run the stages from this place in the recipe on; which recipe it is, the signals' stages decide."""
     analysis = run_stages(analysis, SIGNALS[first:], progress)
     analysis = run_stages(analysis, choose_recipe(analysis)[max(first, len(SIGNALS)) :], progress)

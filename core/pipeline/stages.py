@@ -18,18 +18,18 @@ from core.body.estimate import estimate_poses
 from core.body.l7s.inputs import free_acceleration
 from core.body.mounting import mount_sensors
 from core.body.walking_frame import in_walking_frame
-from core.events.consensus import all_detectors, consensus, with_confidence
-from core.events.lumbar import about_up, detect_steps, trunk_sensor
+from core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
+from core.events.lumbar import detect_steps, split_about_vertical, trunk_sensor
 from core.events.result import GaitEvents
-from core.events.turns import body_yaw_rate, turns
+from core.events.turns import body_yaw_rate, find_turns
 from core.frames import FOOT, SIDES, Floats, Segment
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
-from core.measure import Tracks, measure
+from core.measure import Tracks, measure_gait
 from core.parameters.spatial import surface_of
-from core.pipeline.analysis import Analysis, DetectedContacts, require_stage
+from core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
 from core.pipeline.config import PipelineConfig
-from core.quality.stuck import mark_stuck, working
+from core.quality.stuck import drop_stuck_sensors, mark_stuck
 from core.withheld import withhold, withhold_distances
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
@@ -50,70 +50,70 @@ class PipelineStage:
 
     name: str
     share: float
-    run: Callable[[Analysis, PipelineConfig], Analysis]
+    run: Callable[[TakeAnalysis, PipelineConfig], TakeAnalysis]
     results: tuple[str, ...]
     reads: tuple[str, ...] = ()
     runs_after_problem: bool = False
 
 
-def lay_on_one_axis(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def lay_on_one_axis(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """All sensors on one time axis; samples of a sensor that does not measure are not valid."""
     uniform = timeline.synchronise(analysis.source, config.timeline)
     return replace(analysis, uniform=mark_stuck(uniform, config.stuck))
 
 
-def judge_signals(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def judge_signals(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """The quality report; an error among its notices is the problem of the analysis."""
     uniform = analysis.recording
-    report = quality.assess(analysis.source, uniform, config.quality, working(uniform).sensors)
+    report = quality.assess(analysis.source, uniform, config.quality, drop_stuck_sensors(uniform).sensors)
     problem = next((n for n in report.notices if n.severity == "error"), None)
     return replace(analysis, report=report, problem=problem)
 
 
-def calibrate_sensors(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def calibrate_sensors(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """How each working sensor sits on its segment."""
-    calibrated = calibration.calibrate(working(analysis.recording), config.calibration)
+    calibrated = calibration.calibrate(drop_stuck_sensors(analysis.recording), config.calibration)
     # the poses say what could not be had for want of a sensor that failed
     return replace(analysis, calibrated=replace(calibrated, recording=analysis.recording))
 
 
-def orient_segments(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def orient_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Orientation of every segment on its own."""
     calibrated = require_stage(analysis.calibrated, "calibration")
     return replace(analysis, fused=estimate_orientations(calibrated, config.fusion))
 
 
-def detect_contacts(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Contacts of the feet, turns of the body, and steps of the trunk where no contact was found."""
-    fused, uniform = require_stage(analysis.fused, "orientation"), working(analysis.recording)
+    fused, uniform = require_stage(analysis.fused, "orientation"), drop_stuck_sensors(analysis.recording)
     events = _contacts(fused, config)
     alone = not events.events and trunk_sensor(uniform) is not None
     contacts = DetectedContacts(
         events,
-        turns(*body_yaw_rate(fused, uniform.rate_hz), uniform.rate_hz, config.turns),
+        find_turns(*body_yaw_rate(fused, uniform.rate_hz), uniform.rate_hz, config.turns),
         detect_steps(uniform, config.lumbar) if alone else None,
     )
     return replace(analysis, contacts=contacts)
 
 
-def detect_trunk_steps(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def detect_trunk_steps(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Steps and turns of a single trunk sensor: they need neither rest nor calibration."""
-    uniform = working(analysis.recording)
+    uniform = drop_stuck_sensors(analysis.recording)
     steps = detect_steps(uniform, config.lumbar)
     signals = uniform.sensors[steps.source]
-    _, yaw_rate = about_up(signals, uniform.rate_hz, config.lumbar)
-    found = turns(yaw_rate, signals.valid, uniform.rate_hz, config.turns)
+    _, yaw_rate = split_about_vertical(signals, uniform.rate_hz, config.lumbar)
+    found = find_turns(yaw_rate, signals.valid, uniform.rate_hz, config.turns)
     return replace(analysis, contacts=DetectedContacts(GaitEvents(()), found, steps))
 
 
-def mount_on_segments(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def mount_on_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Mountings as standing width and joints show them; everything behind takes these."""
     calibrated = require_stage(analysis.calibrated, "calibration")
     mounted = mount_sensors(calibrated, require_stage(analysis.fused, "orientation"), config.poses)
     return replace(analysis, mounted=mounted)
 
 
-def build_figure(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def build_figure(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Poses of the segments and paths of the feet; distances that cannot be stood behind are withheld."""
     mounted = require_stage(analysis.mounted, "mounting")
     events, t_s = require_stage(analysis.contacts, "events").events, analysis.recording.t_s
@@ -123,7 +123,7 @@ def build_figure(analysis: Analysis, config: PipelineConfig) -> Analysis:
     return replace(analysis, posed=withhold_distances(estimate_poses(mounted, contacts, config.poses)))
 
 
-def compute_angles(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Joint angles; those that the estimator cannot stand behind are withheld."""
     posed, mounted = require_stage(analysis.posed, "poses"), require_stage(analysis.mounted, "mounting")
     standing = analysis.recording.subject.standing_angles_deg
@@ -132,7 +132,7 @@ def compute_angles(analysis: Analysis, config: PipelineConfig) -> Analysis:
     return replace(analysis, angles=withhold(joint, posed.poses, posed.orientations))
 
 
-def measure_walk(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Strides and parameters of what was reached; nothing before the contacts are known."""
     fused, contacts, calibrated = analysis.fused, analysis.contacts, analysis.calibration
     if fused is None or contacts is None or calibrated is None:
@@ -158,17 +158,17 @@ def measure_walk(analysis: Analysis, config: PipelineConfig) -> Analysis:
         turns=contacts.turns,
         steps=contacts.steps,
     )
-    return replace(analysis, tracks=tracks, measured=measure(tracks))
+    return replace(analysis, tracks=tracks, measured=measure_gait(tracks))
 
 
-def measure_trunk(analysis: Analysis, config: PipelineConfig) -> Analysis:
+def measure_trunk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Parameters of the steps of a single trunk sensor."""
     contacts, uniform = analysis.contacts, analysis.recording
     if contacts is None or contacts.steps is None:
         return analysis
     source = contacts.steps.source
     signals = uniform.sensors[source]
-    vertical, _ = about_up(signals, uniform.rate_hz, config.lumbar)
+    vertical, _ = split_about_vertical(signals, uniform.rate_hz, config.lumbar)
     # which way is forward nobody knows without a calibration
     upwards = np.full((len(vertical), 3), np.nan)
     upwards[:, 2] = np.where(signals.valid, vertical, np.nan)
@@ -185,7 +185,7 @@ def measure_trunk(analysis: Analysis, config: PipelineConfig) -> Analysis:
         turns=contacts.turns,
         steps=contacts.steps,
     )
-    return replace(analysis, tracks=tracks, measured=measure(tracks))
+    return replace(analysis, tracks=tracks, measured=measure_gait(tracks))
 
 
 def _contacts(orientations: Orientations, config: PipelineConfig) -> GaitEvents:
@@ -195,11 +195,11 @@ def _contacts(orientations: Orientations, config: PipelineConfig) -> GaitEvents:
     """
     found = all_detectors(orientations, config.events, config.consensus)
     feet = any(s in orientations.q for s in FOOT.values())
-    agree = with_confidence if feet and config.detector == "foot_pitch" else consensus
+    agree = rate_confidence if feet and config.detector == "foot_pitch" else agree_on_contacts
     return agree(found, config.consensus)
 
 
-def _trunk_acceleration(analysis: Analysis) -> dict[Segment, Floats]:
+def _trunk_acceleration(analysis: TakeAnalysis) -> dict[Segment, Floats]:
     """Segment → (n, 3) acceleration free of gravity, forward, left, up, m/s²; NaN = not measured."""
     mounted, posed = analysis.mounted, analysis.posed
     if mounted is None or posed is None:

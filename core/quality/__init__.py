@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from core.quality.assessment import QualityParams, QualityReport, SensorQuality, assess, shown_level
+from core.quality.assessment import QualityParams, QualityReport, SensorQuality, assess, find_shown_level
 from core.quality.inspection import DeviceFacts, Inspection, describe
 from core.quality.suggestion import Suggestion, suggest, suggest_segments
 
@@ -15,7 +15,7 @@ __all__ = [
     "Suggestion",
     "assess",
     "describe",
-    "shown_level",
+    "find_shown_level",
     "suggest",
     "suggest_segments",
 ]

@@ -11,11 +11,11 @@ import numpy as np
 
 from core.errors import Notice
 from core.frames import GRAVITY, Segment
-from core.quality.inspection import losses
-from core.quality.signals import facts, magnetic_share, saturation
-from core.quality.suspicion import suspicions
+from core.quality.inspection import measure_losses
+from core.quality.signals import magnetic_share, measure_signal, saturation
+from core.quality.suspicion import list_suspicions
 from core.recording import Recording, SensorSignals, UniformRecording
-from core.rest import RestParams, Window, rest_windows, runs, samples
+from core.rest import RestParams, Window, find_rest_windows, find_runs, index_window
 
 Level = Literal["good", "usable", "poor"]
 """Best first."""
@@ -129,7 +129,7 @@ class QualityReport:
         }
 
 
-def shown_level(level: Level, verdict: Verdict | None) -> Level:
+def find_shown_level(level: Level, verdict: Verdict | None) -> Level:
     """The level that people see: the worse of the signals' and the pose estimator's, None = none ran."""
     of_estimator: dict[Verdict | None, Level] = {"warn": "usable", "bad": "poor"}
     return max(level, of_estimator.get(verdict, "good"), key=get_args(Level).index)
@@ -150,7 +150,7 @@ def assess(
     working : segments whose sensor measures (core/quality/stuck.py); rest is asked of those. None = all.
     """
     params = params or QualityParams()
-    rest = rest_windows(uniform, params.rest, working)
+    rest = find_rest_windows(uniform, params.rest, working)
     sensors: dict[Segment, SensorQuality] = {}
     notices: list[Notice] = [n for n in (*recording.notices, *uniform.notices) if n.severity == "error"]
     if not rest:
@@ -189,13 +189,13 @@ def _sensor(
     params: QualityParams,
 ) -> tuple[SensorQuality, list[Notice]]:
     stream = recording.streams[signals.device_id]
-    f = facts(stream.acc, stream.gyr, stream.rate_hz)
-    notices = suspicions(signals.device_id, f, stream.acc, stream.quat)
-    lost, longest = losses(stream)
-    gaps = runs(~signals.valid | signals.interpolated)
+    f = measure_signal(stream.acc, stream.gyr, stream.rate_hz)
+    notices = list_suspicions(signals.device_id, f, stream.acc, stream.quat)
+    lost, longest = measure_losses(stream)
+    gaps = find_runs(~signals.valid | signals.interpolated)
     at_rest = np.zeros(len(uniform.t_s), np.bool_)
     for window in rest:
-        at_rest[samples(window, uniform.rate_hz)] = True
+        at_rest[index_window(window, uniform.rate_hz)] = True
     at_rest &= signals.valid
     norm = bias = None
     if at_rest.any():
@@ -247,7 +247,7 @@ def _sensor(
 def _gap_notice(
     segment: Segment, signals: SensorSignals, uniform: UniformRecording, invalid: float, params: QualityParams
 ) -> list[Notice]:
-    holes = runs(~signals.valid)
+    holes = find_runs(~signals.valid)
     if not holes:
         return []
     start, end = max(holes, key=lambda h: h[1] - h[0])

@@ -8,9 +8,9 @@ import numpy as np
 
 from core.errors import Notice
 from core.frames import Segment
-from core.quality.signals import facts
+from core.quality.signals import measure_signal
 from core.quality.suggestion import Suggestion, suggest
-from core.quality.suspicion import suspicions
+from core.quality.suspicion import list_suspicions
 from core.recording import ImuStream, Recording, Subject
 
 
@@ -135,9 +135,9 @@ def _device(
     suggestion: Suggestion,
     duplicate_of: str | None,
 ) -> DeviceFacts:
-    f = facts(s.acc, s.gyr, s.rate_hz)
-    lost, longest = losses(s)
-    notices = [*s.notices, *suspicions(s.device_id, f, s.acc, s.quat)]
+    f = measure_signal(s.acc, s.gyr, s.rate_hz)
+    lost, longest = measure_losses(s)
+    notices = [*s.notices, *list_suspicions(s.device_id, f, s.acc, s.quat)]
     if duplicate_of is not None:
         notices.append(
             Notice(
@@ -169,7 +169,7 @@ def _device(
     )
 
 
-def losses(s: ImuStream) -> tuple[float, float]:
+def measure_losses(s: ImuStream) -> tuple[float, float]:
     """Share (0 to 1) of samples missing between a stream's first and last, and its longest hole in s."""
     good = np.isfinite(s.acc).all(axis=1)
     if s.gyr is not None:

@@ -47,7 +47,7 @@ class _Walk:
     straight: Bools
 
 
-def left_leg(acc: Floats, gyr: Floats, first: Floats, second: Floats, rate_hz: float) -> int | None:
+def find_left_leg(acc: Floats, gyr: Floats, first: Floats, second: Floats, rate_hz: float) -> int | None:
     """Say which leg is the left one: 1, 2 or None when it cannot honestly be said.
 
     Parameters

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.frames import GRAVITY, Floats
-from core.rest import runs
+from core.rest import find_runs
 
 STILL: Final = 0.03
 """A second is still when acc varies less than this share of its mean (0.25 m/s²:
@@ -50,7 +50,7 @@ class Facts:
     gyro_top: float | None
 
 
-def facts(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
+def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
     """Measure a sensor; rows with a missing value are left out.
 
     Parameters
@@ -117,7 +117,7 @@ def saturation(x: Floats, floor: float) -> tuple[float, float | None]:
             if any(abs(top / full - 1) < 0.01 for full in RANGES) and np.count_nonzero(crowd) >= CROWD:
                 clipped |= crowd
                 value = max(top, value or 0.0)
-            for start, end in runs(at_top):
+            for start, end in find_runs(at_top):
                 if end - start >= PLATEAU:
                     clipped[start:end] = True
                     value = max(top, value or 0.0)

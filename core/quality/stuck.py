@@ -20,7 +20,7 @@ from core.errors import Notice
 from core.frames import GRAVITY, Bools, Floats, Segment
 from core.quality.signals import RANGES
 from core.recording import UniformRecording
-from core.rest import runs
+from core.rest import find_runs
 
 CHANNELS: Final = 6
 """Of a sensor: three axes of the accelerometer, three of the gyroscope."""
@@ -306,7 +306,7 @@ def mark_stuck(recording: UniformRecording, params: StuckParams | None = None) -
     Returns
     -------
     the recording itself when all of them do. With `no_working_sensor` (an error) among its notices when no
-    sensor measures for long enough (`working`).
+    sensor measures for long enough (`drop_stuck_sensors`).
     """
     segments = tuple(recording.sensors)
     signals = [recording.sensors[s] for s in segments]
@@ -321,7 +321,7 @@ def mark_stuck(recording: UniformRecording, params: StuckParams | None = None) -
     for i in np.flatnonzero(bad.any(axis=0)).tolist():
         valid = signals[i].valid.copy()
         said: set[int] = set()
-        for start, stop in runs(bad[:, i] > 0):
+        for start, stop in find_runs(bad[:, i] > 0):
             # one fault may turn into another without a sample between
             for k in (start, *(np.flatnonzero(np.diff(bad[start:stop, i])) + start + 1).tolist()):
                 first = k - int(back[k, i])
@@ -331,7 +331,7 @@ def mark_stuck(recording: UniformRecording, params: StuckParams | None = None) -
                     notices.append(watch.describe(segments[i], i, kind, first / recording.rate_hz))
         sensors[segments[i]] = replace(signals[i], valid=valid, interpolated=signals[i].interpolated & valid)
     marked = replace(recording, sensors=sensors, notices=tuple(notices))
-    if not working(marked).sensors:
+    if not drop_stuck_sensors(marked).sensors:
         marked = replace(marked, notices=(*notices, Notice("no_working_sensor", NONE_LEFT, severity="error")))
     return marked
 
@@ -342,7 +342,7 @@ NONE_LEFT: Final = (
 )
 
 
-def working(recording: UniformRecording) -> UniformRecording:
+def drop_stuck_sensors(recording: UniformRecording) -> UniformRecording:
     """The recording without sensors that were found stuck and measure for less than `LEAST` of it."""
     stuck = {n.sensor for n in recording.notices if n.code in CODES}
     kept = {s: x for s, x in recording.sensors.items() if s not in stuck or x.valid.mean() >= LEAST}
@@ -353,7 +353,7 @@ LEAST: Final = 0.5
 """Share of the take, as `PoseParams.least_valid`: below it a sensor is taken for one that is not there."""
 
 
-def warm() -> None:
+def compile_stuck_kernel() -> None:
     """Compile the kernel or load it."""
     one = np.zeros((1, 1, 3))
     StuckWatch(1, 100.0).push(one, one, np.ones((1, 1), np.bool_))

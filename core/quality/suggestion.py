@@ -16,7 +16,7 @@ import numpy as np
 
 from core.formats.aliases import segment_in, segment_named
 from core.frames import Floats, Segment
-from core.quality.sides import left_leg, smooth
+from core.quality.sides import find_left_leg, smooth
 from core.recording import ImuStream, Recording
 
 Part = Literal["foot", "shank", "thigh", "pelvis"]
@@ -114,7 +114,7 @@ def _by_movement(streams: list[ImuStream]) -> dict[str, Suggestion]:
     left = None
     if pelvis is not None:
         feet = [max(leg, key=lambda i: energy[i]) for leg in legs]
-        left = left_leg(acc[pelvis], gyr[pelvis], speed[feet[0]], speed[feet[1]], GRID_HZ)
+        left = find_left_leg(acc[pelvis], gyr[pelvis], speed[feet[0]], speed[feet[1]], GRID_HZ)
     out = {s.device_id: Suggestion() for s in distinct}
     for number, leg in enumerate(legs, start=1):
         bodies = _bodies(leg, alike)

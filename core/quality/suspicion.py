@@ -31,7 +31,7 @@ _FIX_ACC = 'declare the unit in the manifest (sources[].acc_unit: "g" or "m/s2")
 _FIX_GYR = 'declare the unit in the manifest (sources[].gyr_unit: "deg/s" or "rad/s")'
 
 
-def suspicions(device: str, f: Facts, acc: Floats, quat: Floats | None) -> list[Notice]:
+def list_suspicions(device: str, f: Facts, acc: Floats, quat: Floats | None) -> list[Notice]:
     """All suspicions about one sensor, the grave ones as errors."""
     found = [*_acceleration(device, f), *_rate(device, f)]
     if quat is not None:

@@ -1,20 +1,20 @@
 """Simulated walkers and sensors with exact truth, for tests, demo and CLI (docs/simulation.md)."""
 
-from core.simulate.chest import ChestSimulation, ChestTruth, Hold, simulate_day
+from core.simulate.chest import ChestSimulation, ChestTruth, PostureHold, simulate_day
 from core.simulate.magnetics import Dipole
 from core.simulate.mems import SensorNoise
 from core.simulate.movements import MOVEMENTS, Movement, simulate_movement
 from core.simulate.mt_text import mt_files, mt_text
-from core.simulate.patients import PATIENTS, Patient
+from core.simulate.patients import PATIENTS, SimulatedPatient
 from core.simulate.phases import Phase, phase_table
-from core.simulate.script import Arc, Pivot, Script, Stand, Steps, Straight
+from core.simulate.script import Arc, Pivot, Script, SingleSteps, Stand, Straight
 from core.simulate.scripts import SCRIPTS, Scenario, simulate_scenario
-from core.simulate.setup import Dropout, Lag, Setup
+from core.simulate.setup import Dropout, Lag, RecordingSetup
 from core.simulate.simulation import Simulation, simulate
 from core.simulate.soft_tissue import SoftTissue
 from core.simulate.squat import Squats, SquatSimulation, SquatTruth, simulate_squats
 from core.simulate.tables import angle_table, event_table, stride_table
-from core.simulate.truth import Truth
+from core.simulate.truth import WalkTruth
 from core.simulate.walker import STEADY, SideGait, Variability, Walker
 
 __all__ = [
@@ -27,27 +27,27 @@ __all__ = [
     "ChestTruth",
     "Dipole",
     "Dropout",
-    "Hold",
     "Lag",
     "Movement",
-    "Patient",
     "Phase",
     "Pivot",
+    "PostureHold",
+    "RecordingSetup",
     "Scenario",
     "Script",
     "SensorNoise",
-    "Setup",
     "SideGait",
+    "SimulatedPatient",
     "Simulation",
+    "SingleSteps",
     "SoftTissue",
     "SquatSimulation",
     "SquatTruth",
     "Squats",
     "Stand",
-    "Steps",
     "Straight",
-    "Truth",
     "Variability",
+    "WalkTruth",
     "Walker",
     "angle_table",
     "event_table",

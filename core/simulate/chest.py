@@ -20,8 +20,8 @@ from core.frames import Floats
 from core.rotation import about, multiply, rotate
 from core.simulate.phases import Phase
 from core.simulate.recorder import Draws, Recorded, oversampling, record
-from core.simulate.sensors import Mount, Path, draw_mounts
-from core.simulate.setup import Setup
+from core.simulate.sensors import Mount, SensorPath, draw_mounts
+from core.simulate.setup import RecordingSetup
 from core.simulate.shapes import bump, smoothstep
 from core.simulate.spline import sign_continuous
 from core.simulate.stance import Q_NEUTRAL
@@ -31,19 +31,19 @@ Posture = Literal["stand", "sit", "lie", "walk"]
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldPosture:
     """A posture of the reference person: height of the breastbone in m, trunk pitch (forward positive)."""
 
     height_m: float
     pitch_rad: float
 
 
-POSTURES: Final[Mapping[Posture, Held]] = MappingProxyType(
+POSTURES: Final[Mapping[Posture, HeldPosture]] = MappingProxyType(
     {
-        "stand": Held(1.30, radians(3.0)),
-        "walk": Held(1.30, radians(3.0)),
-        "sit": Held(0.90, radians(8.0)),
-        "lie": Held(0.65, radians(-88.0)),
+        "stand": HeldPosture(1.30, radians(3.0)),
+        "walk": HeldPosture(1.30, radians(3.0)),
+        "sit": HeldPosture(0.90, radians(8.0)),
+        "lie": HeldPosture(0.65, radians(-88.0)),
     }
 )
 
@@ -72,7 +72,7 @@ STARTING_S: Final = 0.8
 
 
 @dataclass(frozen=True)
-class Hold:
+class PostureHold:
     """Stay in a posture; `steps_per_min` counts for walking."""
 
     posture: Posture
@@ -80,7 +80,7 @@ class Hold:
     steps_per_min: float = 110.0
 
 
-Day = tuple[Hold, ...]
+Day = tuple[PostureHold, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ class ChestSimulation(Recorded):
 
 
 def simulate_day(
-    day: Day, height_m: float = 1.75, seed: int = 0, setup: Setup | None = None
+    day: Day, height_m: float = 1.75, seed: int = 0, setup: RecordingSetup | None = None
 ) -> ChestSimulation:
     """Let a person of a height go through postures with one sensor on the chest.
 
@@ -121,7 +121,7 @@ def simulate_day(
     ParameterError : "day_item", "height_implausible".
     """
     _check(day)
-    setup, draws, scale = setup or Setup(), Draws(seed), Walker.of_height(height_m).scale
+    setup, draws, scale = setup or RecordingSetup(), Draws(seed), Walker.of_height(height_m).scale
     every = oversampling(setup.rate_hz)
     phases = _phases(day)
     t = np.arange(round(phases[-1].end_s * every * setup.rate_hz) + 1) / (every * setup.rate_hz)
@@ -131,7 +131,7 @@ def simulate_day(
     mount = draw_mounts({"chest": (0.0, 0.0, 0.0)}, scale, setup.mount_spread_rad, draws.mounts)["chest"]
     q = multiply(Q_NEUTRAL, about(2, -pitch))
     way = np.stack((forward, np.zeros(len(t)), height), axis=-1) + rotate(q, mount.position_m)
-    path = Path(t, way, sign_continuous(multiply(q, mount.q_segment_sensor)))
+    path = SensorPath(t, way, sign_continuous(multiply(q, mount.q_segment_sensor)))
     made = record({"chest": path}, setup, draws, height_m, protocol="activity")
     truth = ChestTruth(
         t[::every], setup.rate_hz, pitch[::every], height[::every], forward[::every], phases, steps, mount

@@ -65,10 +65,10 @@ def move(plan: Plan, walker: Walker, rate_hz: float) -> Motion:
     paths = {s: stances[s].path(t) for s in SIDES}
     ankles = {s: paths[s][0] for s in SIDES}
     xy, heading = pelvis.floor_path(t, plan, walker, phase, scale, rate_hz)
-    q_pelvis = pelvis.orientation(walker, heading, phase, phases, scale)
+    q_pelvis = pelvis.orient_pelvis(walker, heading, phase, phases, scale)
 
     shares = {s: pelvis.load_share(t, plan, timings, s) for s in SIDES}
-    z = pelvis.height(plan, walker, phases, scale, shares, xy, q_pelvis, ankles, rate_hz)
+    z = pelvis.compute_pelvis_height(plan, walker, phases, scale, shares, xy, q_pelvis, ankles, rate_hz)
     touching = {s: _touching(t, timings[s], margin_s=0.01) for s in SIDES}
     z, lowered = pelvis.guard(z, walker, xy, q_pelvis, ankles, touching, rate_hz)
 

@@ -83,7 +83,7 @@ def draw_impacts(motion: Motion, rng: np.random.Generator) -> tuple[Impact, ...]
     return tuple(impacts)
 
 
-def shaken(t: Floats, segment: Segment, impacts: tuple[Impact, ...]) -> tuple[Floats, Floats]:
+def shake_sensor(t: Floats, segment: Segment, impacts: tuple[Impact, ...]) -> tuple[Floats, Floats]:
     """Displacement (n, 3) in m in the world and turn (n,) in rad about the segment's z axis of its sensor.
 
     Both are exactly zero from foot-flat on for a foot, and once the shake is over for the others.

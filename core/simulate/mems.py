@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from core.frames import GRAVITY, Bools, Floats
-from core.simulate.sensors import Signals
+from core.simulate.sensors import SimulatedSignals
 
 ACC_RANGE: Final = 16.0 * GRAVITY
 GYR_RANGE: Final = radians(2000.0)
@@ -59,9 +59,13 @@ class DrawnErrors:
     hard_iron: Floats
 
 
-def with_errors(
-    ideal: Signals, noise: SensorNoise, rate_hz: float, rng: np.random.Generator, of_iron: np.random.Generator
-) -> tuple[Signals, DrawnErrors]:
+def add_sensor_errors(
+    ideal: SimulatedSignals,
+    noise: SensorNoise,
+    rate_hz: float,
+    rng: np.random.Generator,
+    of_iron: np.random.Generator,
+) -> tuple[SimulatedSignals, DrawnErrors]:
     """Add scale errors, constant and wandering biases, white noise and hard iron.
 
     Parameters
@@ -84,14 +88,16 @@ def with_errors(
     gyr = ideal.gyr * drawn.gyr_scale + drawn.gyr_bias + wander(noise.gyr_walk, noise.gyr_density)
     acc = ideal.acc * drawn.acc_scale + drawn.acc_bias + wander(noise.acc_walk, noise.acc_density)
     mag = ideal.mag + drawn.hard_iron + rng.normal(0.0, noise.mag_density * root, shape)
-    return Signals(acc, gyr, mag), drawn
+    return SimulatedSignals(acc, gyr, mag), drawn
 
 
-def clipped(signals: Signals, acc_range: float, gyr_range: float) -> tuple[Signals, Bools]:
+def clip_signals(
+    signals: SimulatedSignals, acc_range: float, gyr_range: float
+) -> tuple[SimulatedSignals, Bools]:
     """The signals held within the ranges (m/s², rad/s per axis), and where (n,) any axis was beyond."""
     too_much = (np.abs(signals.acc) > acc_range) | (np.abs(signals.gyr) > gyr_range)
     beyond: Bools = np.any(too_much, axis=1)
     if not beyond.any():
         return signals, beyond
     acc, gyr = np.clip(signals.acc, -acc_range, acc_range), np.clip(signals.gyr, -gyr_range, gyr_range)
-    return Signals(acc, gyr, signals.mag), beyond
+    return SimulatedSignals(acc, gyr, signals.mag), beyond

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from core.errors import ParameterError
-from core.simulate.chest import ChestSimulation, Day, Hold, simulate_day
+from core.simulate.chest import ChestSimulation, Day, PostureHold, simulate_day
 from core.simulate.scripts import ON_SKIN
 from core.simulate.squat import Squats, SquatSimulation, simulate_squats
 
@@ -27,24 +27,24 @@ MOVEMENTS: Mapping[str, Movement] = MappingProxyType(
         "chair_rises": Movement(
             "Five rises from a chair",
             (
-                Hold("sit", 5.0),
-                *(Hold("stand", 1.0), Hold("sit", 1.0)) * 4,
-                Hold("stand", 1.0),
-                Hold("sit", 4.0),
+                PostureHold("sit", 5.0),
+                *(PostureHold("stand", 1.0), PostureHold("sit", 1.0)) * 4,
+                PostureHold("stand", 1.0),
+                PostureHold("sit", 4.0),
             ),
         ),
         "postures": Movement(
             "Sitting, standing, walking and lying",
             (
-                Hold("stand", 8.0),
-                Hold("sit", 5.0),
-                Hold("stand", 3.0),
-                Hold("walk", 8.0, 110.0),
-                Hold("stand", 2.0),
-                Hold("sit", 4.0),
-                Hold("lie", 6.0),
-                Hold("sit", 3.0),
-                Hold("stand", 3.0),
+                PostureHold("stand", 8.0),
+                PostureHold("sit", 5.0),
+                PostureHold("stand", 3.0),
+                PostureHold("walk", 8.0, 110.0),
+                PostureHold("stand", 2.0),
+                PostureHold("sit", 4.0),
+                PostureHold("lie", 6.0),
+                PostureHold("sit", 3.0),
+                PostureHold("stand", 3.0),
             ),
         ),
     }

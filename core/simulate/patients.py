@@ -19,7 +19,7 @@ from core.simulate.walker import SideGait, Variability, Walker
 
 
 @dataclass(frozen=True)
-class Patient:
+class SimulatedPatient:
     """A person and the steps this person takes: length in m at the reference height, duration in s."""
 
     title: str
@@ -207,19 +207,19 @@ ELDERLY: Final = Walker(
     ),
 )
 
-PATIENTS: Mapping[str, Patient] = MappingProxyType(
+PATIENTS: Mapping[str, SimulatedPatient] = MappingProxyType(
     {
-        "healthy": Patient("Healthy person", 0.64, 0.54, Walker()),
-        "healthy_slow": Patient("Healthy person walking slowly", 0.45, 0.68, Walker()),
-        "hemiparetic": Patient("Left hemiparesis", 0.40, 0.72, HEMIPARETIC),
-        "hemi_mild": Patient("Mild left hemiparesis", 0.52, 0.60, HEMI_MILD),
-        "stiff_knee": Patient("Stiff left knee", 0.55, 0.60, STIFF_KNEE),
-        "drop_foot": Patient("Left drop foot", 0.55, 0.57, DROP_FOOT),
-        "crouch": Patient("Crouch gait", 0.48, 0.56, CROUCH),
-        "antalgic": Patient("Pain in the left leg", 0.52, 0.58, ANTALGIC),
-        "parkinson": Patient("Short quick steps", 0.27, 0.43, PARKINSON),
-        "severe_shuffle": Patient("Severe shuffling", 0.18, 0.45, SEVERE_SHUFFLE),
-        "step_asym": Patient("Steps of unequal length", 0.56, 0.56, STEP_ASYMMETRY),
-        "elderly": Patient("Cautious elderly person", 0.42, 0.66, ELDERLY),
+        "healthy": SimulatedPatient("Healthy person", 0.64, 0.54, Walker()),
+        "healthy_slow": SimulatedPatient("Healthy person walking slowly", 0.45, 0.68, Walker()),
+        "hemiparetic": SimulatedPatient("Left hemiparesis", 0.40, 0.72, HEMIPARETIC),
+        "hemi_mild": SimulatedPatient("Mild left hemiparesis", 0.52, 0.60, HEMI_MILD),
+        "stiff_knee": SimulatedPatient("Stiff left knee", 0.55, 0.60, STIFF_KNEE),
+        "drop_foot": SimulatedPatient("Left drop foot", 0.55, 0.57, DROP_FOOT),
+        "crouch": SimulatedPatient("Crouch gait", 0.48, 0.56, CROUCH),
+        "antalgic": SimulatedPatient("Pain in the left leg", 0.52, 0.58, ANTALGIC),
+        "parkinson": SimulatedPatient("Short quick steps", 0.27, 0.43, PARKINSON),
+        "severe_shuffle": SimulatedPatient("Severe shuffling", 0.18, 0.45, SEVERE_SHUFFLE),
+        "step_asym": SimulatedPatient("Steps of unequal length", 0.56, 0.56, STEP_ASYMMETRY),
+        "elderly": SimulatedPatient("Cautious elderly person", 0.42, 0.66, ELDERLY),
     }
 )

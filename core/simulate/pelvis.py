@@ -18,7 +18,7 @@ from core.simulate.script import Plan
 from core.simulate.shapes import phase_bump, smooth, smooth_max, smoothstep
 from core.simulate.stance import Q_NEUTRAL
 from core.simulate.targets import DEGREE, knee_flexion
-from core.simulate.timing import FootTiming, window
+from core.simulate.timing import FootTiming, size_window
 from core.simulate.walker import SIGN, Walker, leg_reach
 
 FULL_FORWARD = 0.94
@@ -63,7 +63,7 @@ def floor_path(
         times += [step.time_s - 0.5 * step.step_s, step.time_s]
         places += [middle, place]
         yaws += [0.5 * (yaws[-1] + yaw), yaw]
-    width = window(plan, rate_hz, 0.16)
+    width = size_window(plan, rate_hz, 0.16)
     knots = np.array(places)
     xy = np.stack([smooth(np.interp(t, times, knots[:, k]), width) for k in (0, 1)], axis=-1)
     heading = smooth(np.interp(t, times, np.array(yaws)), width)
@@ -72,7 +72,7 @@ def floor_path(
     return xy + wave[:, None] * np.stack((np.cos(heading), np.sin(heading)), axis=-1), heading
 
 
-def orientation(
+def orient_pelvis(
     walker: Walker, heading: Floats, phase: Floats, phases: Mapping[Side, Floats], amplitude: Floats
 ) -> Floats:
     """Pelvis quaternions (n, 4): rotation, then obliquity, then tilt (Baker 2001).
@@ -112,7 +112,7 @@ def load_share(t: Floats, plan: Plan, timings: Mapping[Side, FootTiming], side: 
     return 0.5 + share + np.cumsum(jumps[:-1])
 
 
-def height(
+def compute_pelvis_height(
     plan: Plan,
     walker: Walker,
     phases: Mapping[Side, Floats],
@@ -129,9 +129,9 @@ def height(
         rest, gait = walker.standing_knee_rad, walker.sides[side]
         target = rest + amplitude * (knee_flexion(gait, phases[side]) - rest)
         knee = smooth_max(target, gait.knee_min_rad, DEGREE)
-        reach = leg_reach(walker.anatomy, smooth(knee, window(plan, rate_hz, 0.02)))
+        reach = leg_reach(walker.anatomy, smooth(knee, size_window(plan, rate_hz, 0.02)))
         total += shares[side] * _hip_height(walker, side, xy, q, ankles[side], reach)
-    return smooth(total, window(plan, rate_hz, 0.01))
+    return smooth(total, size_window(plan, rate_hz, 0.01))
 
 
 def guard(

@@ -16,7 +16,7 @@ import numpy as np
 from core.frames import GRAVITY, SIDES, Bools, Floats, Side
 from core.rotation import about, conjugate, multiply, rotate
 from core.simulate.shapes import bump, smoothstep
-from core.simulate.spline import kinematics
+from core.simulate.spline import differentiate_pose
 from core.simulate.stance import Q_NEUTRAL
 from core.simulate.walker import SIGN
 
@@ -86,7 +86,7 @@ class PotterWalk:
     footfalls: Mapping[Side, tuple[int, ...]]
     footfall_still: int
 
-    def measured(
+    def add_noise(
         self, acc_sd: float = ACC_SD, gyr_sd: float = GYR_SD, seed: int = 0
     ) -> tuple[Floats, Floats]:
         """Signals (n, 3, 3) with white noise of so much per sample, the paper's only error."""
@@ -173,5 +173,5 @@ def potter_walk(strides: int = 200, rate_hz: float = 512.0) -> PotterWalk:
 
 def _signals(t: Floats, p: Floats, q: Floats) -> tuple[Floats, Floats, Floats]:
     """Specific force, angular rate and velocity (n, 3) of one sensor."""
-    velocity, acceleration, rate = kinematics(t, p, q)
+    velocity, acceleration, rate = differentiate_pose(t, p, q)
     return rotate(conjugate(q), acceleration + np.array([0.0, 0.0, GRAVITY])), rate, velocity

@@ -12,9 +12,9 @@ import numpy as np
 from core.formats.draft import signal_digest
 from core.frames import Bools, Floats, Protocol, Segment
 from core.recording import ImuStream, Recording, Subject
-from core.simulate.mems import DrawnErrors, clipped, with_errors
-from core.simulate.sensors import Path, Signals, ideal_signals
-from core.simulate.setup import Setup
+from core.simulate.mems import DrawnErrors, add_sensor_errors, clip_signals
+from core.simulate.sensors import SensorPath, SimulatedSignals, ideal_signals
+from core.simulate.setup import RecordingSetup
 
 FINE_RATE_HZ: Final = 400.0
 """The motion is worked out at least this fine, and at least four times as fine as the recording."""
@@ -45,7 +45,7 @@ class Recorded:
     """
 
     recording: Recording
-    ideal: Mapping[Segment, Signals]
+    ideal: Mapping[Segment, SimulatedSignals]
     errors: Mapping[Segment, DrawnErrors]
     clipped: Mapping[Segment, Bools]
     first_counter: int
@@ -57,8 +57,8 @@ def oversampling(rate_hz: float) -> int:
 
 
 def record(
-    paths: Mapping[Segment, Path],
-    setup: Setup,
+    paths: Mapping[Segment, SensorPath],
+    setup: RecordingSetup,
     draws: Draws,
     height_m: float | None = None,
     protocol: Protocol = "walk",
@@ -75,7 +75,7 @@ def record(
     first_id = int(draws.mounts.integers(0x00B40000, 0x00B4F000))
     ids = draws.mounts.permutation(np.arange(first_id, first_id + len(paths)))
 
-    ideal: dict[Segment, Signals] = {}
+    ideal: dict[Segment, SimulatedSignals] = {}
     errors: dict[Segment, DrawnErrors] = {}
     beyond: dict[Segment, Bools] = {}
     streams: dict[str, ImuStream] = {}
@@ -84,13 +84,13 @@ def record(
         t = path.t_s[::every]
         ideal[segment] = measured = ideal_signals(path, every, setup.sampling, north, setup.dipoles)
         if late := sum(lag.late_s for lag in setup.lags if lag.segment == segment):
-            measured = ideal_signals(path.later(late), every, setup.sampling, north, setup.dipoles)
+            measured = ideal_signals(path.delay(late), every, setup.sampling, north, setup.dipoles)
         beyond[segment] = np.zeros(len(t), bool)
         if setup.noise is not None:
-            measured, errors[segment] = with_errors(
+            measured, errors[segment] = add_sensor_errors(
                 measured, setup.noise, setup.rate_hz, draws.errors, draws.iron
             )
-            measured, beyond[segment] = clipped(measured, setup.acc_range, setup.gyr_range)
+            measured, beyond[segment] = clip_signals(measured, setup.acc_range, setup.gyr_range)
         arrived = _arrived(t, segment, setup, draws.losses)
         if segment in setup.worn:
             device = f"{number:08X}"
@@ -102,7 +102,7 @@ def record(
     return Recorded(recording, ideal, errors, beyond, first_counter)
 
 
-def _arrived(t: Floats, segment: Segment, setup: Setup, rng: np.random.Generator) -> Bools:
+def _arrived(t: Floats, segment: Segment, setup: RecordingSetup, rng: np.random.Generator) -> Bools:
     """Samples (n,) that reach the receiver: not lost in short runs, not inside a dropout."""
     arrived = np.ones(len(t), bool)
     if setup.packet_loss:
@@ -117,7 +117,7 @@ def _arrived(t: Floats, segment: Segment, setup: Setup, rng: np.random.Generator
     return arrived
 
 
-def _stream(device: str, t: Floats, signals: Signals, arrived: Bools, rate_hz: float) -> ImuStream:
+def _stream(device: str, t: Floats, signals: SimulatedSignals, arrived: Bools, rate_hz: float) -> ImuStream:
     acc, gyr, mag = (np.ascontiguousarray(a[arrived]) for a in (signals.acc, signals.gyr, signals.mag))
     return ImuStream(
         device_id=device,

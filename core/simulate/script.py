@@ -84,7 +84,7 @@ class Pivot:
 
 
 @dataclass(frozen=True)
-class Steps:
+class SingleSteps:
     """Single steps, each (forward length in m, turn in rad to the left, duration in s): e.g. festination."""
 
     steps: tuple[tuple[float, float, float], ...]
@@ -94,15 +94,15 @@ class Steps:
         return [Move(*step) for step in self.steps]
 
 
-Item = Stand | Straight | Arc | Pivot | Steps
+Item = Stand | Straight | Arc | Pivot | SingleSteps
 Script = tuple[Item, ...]
 
 
-def scaled(script: Script, k: float) -> Script:
+def scale_script(script: Script, k: float) -> Script:
     """The same script with all lengths k times as long, for a person k times as tall."""
     return tuple(
-        Steps(tuple((k * length, turn, duration) for length, turn, duration in item.steps))
-        if isinstance(item, Steps)
+        SingleSteps(tuple((k * length, turn, duration) for length, turn, duration in item.steps))
+        if isinstance(item, SingleSteps)
         else replace(item, **{name: k * value for name, value in vars(item).items() if name.endswith("_m")})
         for item in script
     )
@@ -241,7 +241,7 @@ def _check(script: Script) -> None:
             "script_standing", "A script starts and ends with standing; add Stand(5) at both ends."
         )
     for i, item in enumerate(script):
-        if isinstance(item, Steps):
+        if isinstance(item, SingleSteps):
             _check_steps(i, item)
             continue
         for name, value in vars(item).items():
@@ -252,7 +252,7 @@ def _check(script: Script) -> None:
                 )
 
 
-def _check_steps(i: int, item: Steps) -> None:
+def _check_steps(i: int, item: SingleSteps) -> None:
     for j, (length, turn, duration) in enumerate(item.steps):
         if not (np.isfinite((length, turn, duration)).all() and length >= 0.0 and duration > 0.0):
             raise ParameterError(

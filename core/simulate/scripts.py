@@ -11,14 +11,14 @@ from typing import Final
 from core.errors import ParameterError
 from core.frames import Segment
 from core.simulate.mems import MEMS
-from core.simulate.patients import PATIENTS, Patient
-from core.simulate.script import Arc, Pivot, Script, Stand, Steps, Straight, scaled
-from core.simulate.setup import Dropout, Setup
+from core.simulate.patients import PATIENTS, SimulatedPatient
+from core.simulate.script import Arc, Pivot, Script, SingleSteps, Stand, Straight, scale_script
+from core.simulate.setup import Dropout, RecordingSetup
 from core.simulate.simulation import Simulation, simulate
 from core.simulate.soft_tissue import SoftTissue
 from core.simulate.walker import Walker
 
-ON_SKIN: Final = Setup(tissue=SoftTissue(), impacts=True)
+ON_SKIN: Final = RecordingSetup(tissue=SoftTissue(), impacts=True)
 """Named scripts are recorded with sensors on skin and the shock of contact: fixed to the bone, without
 shocks, they would flatter every analysis."""
 
@@ -32,7 +32,7 @@ class Scenario:
 
     title: str
     script: Script
-    setup: Setup = ON_SKIN
+    setup: RecordingSetup = ON_SKIN
     walker: Walker = REFERENCE_PERSON
 
 
@@ -57,16 +57,16 @@ _LAP: Script = (
 )
 
 
-def _bouts(patient: Patient, bout_m: float = 12.0) -> Scenario:
+def _bouts(patient: SimulatedPatient, bout_m: float = 12.0) -> Scenario:
     """Two straight bouts with a stop, the take the signatures of virtual people were measured on."""
     bout = Straight(bout_m, patient.step_m, patient.step_s)
     return Scenario(patient.title, (Stand(6.0), bout, Stand(2.0), bout, Stand(4.0)), walker=patient.walker)
 
 
-def _festination(start: Patient, steps: int = 14) -> Scenario:
+def _festination(start: SimulatedPatient, steps: int = 14) -> Scenario:
     """Steps that grow shorter and quicker, a freeze of 4 s, and the same again
     (docs/science/simulation.md, "Virtual people")."""
-    hurry = Steps(
+    hurry = SingleSteps(
         tuple((start.step_m * (1 - 0.035 * i), 0.0, start.step_s * (1 - 0.02 * i)) for i in range(steps))
     )
     script = (Stand(6.0), hurry, Stand(4.0), hurry, Stand(4.0))
@@ -152,4 +152,4 @@ def simulate_scenario(
         worn=scenario.setup.worn if worn is None else worn,
         dropouts=scenario.setup.dropouts if dropouts is None else dropouts,
     )
-    return simulate(scaled(scenario.script, walker.scale), walker, seed, setup)
+    return simulate(scale_script(scenario.script, walker.scale), walker, seed, setup)

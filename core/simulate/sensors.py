@@ -15,10 +15,10 @@ import numpy as np
 from core.frames import GRAVITY, Floats, Segment
 from core.rotation import about, conjugate, exp, log, multiply, rotate
 from core.simulate.human import Motion
-from core.simulate.impacts import Impact, shaken
+from core.simulate.impacts import Impact, shake_sensor
 from core.simulate.magnetics import Dipole, field_at
 from core.simulate.soft_tissue import SoftTissue, skin_motion
-from core.simulate.spline import kinematics, resampled, sign_continuous
+from core.simulate.spline import differentiate_pose, resample_pose, sign_continuous
 
 Sampling = Literal["instant", "increment"]
 """instant: values at the sample; increment: mean over the interval before it, as strapdown devices send."""
@@ -52,24 +52,24 @@ class Mount:
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class SensorPath:
     """Where a sensor is and how it is turned at times t_s (n,): p (n, 3) m, q (n, 4) sensor to world."""
 
     t_s: Floats
     p: Floats
     q: Floats
 
-    def later(self, by_s: float) -> Path:
+    def delay(self, by_s: float) -> SensorPath:
         """The same way, done `by_s` later; standing still before its start and after its end."""
         if by_s == 0.0:
             return self
         at = np.clip(self.t_s - by_s, self.t_s[0], self.t_s[-1])
-        p, q = resampled(self.t_s, self.p, self.q, at)
-        return Path(self.t_s, p, q)
+        p, q = resample_pose(self.t_s, self.p, self.q, at)
+        return SensorPath(self.t_s, p, q)
 
 
 @dataclass(frozen=True, eq=False)
-class Signals:
+class SimulatedSignals:
     """What one sensor measures; (n, 3) each, sensor axes, at the recording's rate.
 
     acc m/s², gyr rad/s, mag in units of the Earth's field.
@@ -96,9 +96,9 @@ def draw_mounts(
     return mounts
 
 
-def worn(
+def place_sensor(
     motion: Motion, segment: Segment, mount: Mount, tissue: SoftTissue | None, impacts: tuple[Impact, ...]
-) -> Path:
+) -> SensorPath:
     """The way of a walker's sensor.
 
     Parameters
@@ -111,21 +111,21 @@ def worn(
         place, turn = place + skin[1], multiply(skin[0], turn)
     p = motion.p[segment] + rotate(bone, place)
     if impacts:
-        shift, angle = shaken(motion.t_s, segment, impacts)
+        shift, angle = shake_sensor(motion.t_s, segment, impacts)
         p, bone = p + shift, multiply(bone, about(2, angle))
-    return Path(motion.t_s, p, sign_continuous(multiply(bone, turn)))
+    return SensorPath(motion.t_s, p, sign_continuous(multiply(bone, turn)))
 
 
 def ideal_signals(
-    path: Path, every: int, sampling: Sampling, north_rad: float = 0.0, dipoles: tuple[Dipole, ...] = ()
-) -> Signals:
+    path: SensorPath, every: int, sampling: Sampling, north_rad: float = 0.0, dipoles: tuple[Dipole, ...] = ()
+) -> SimulatedSignals:
     """Signals of an errorless sensor at every `every`-th sample of its path.
 
     Parameters
     ----------
     north_rad : heading of magnetic north in the world. dipoles : iron that disturbs the field.
     """
-    velocity, acceleration, rate = kinematics(path.t_s, path.p, path.q)
+    velocity, acceleration, rate = differentiate_pose(path.t_s, path.p, path.q)
     up = np.array([0.0, 0.0, GRAVITY])
     q = path.q[::every]
     gyr, force = rate[::every], acceleration[::every] + up
@@ -138,4 +138,4 @@ def ideal_signals(
         mean_force = np.diff(velocity[::every], axis=0) / step + up
         acc = np.concatenate((acc[:1], rotate(start, mean_force)))
     mag = rotate(conjugate(q), field_at(path.p[::every], north_rad, dipoles))
-    return Signals(acc, gyr, mag)
+    return SimulatedSignals(acc, gyr, mag)

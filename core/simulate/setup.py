@@ -38,7 +38,7 @@ class Lag:
 
 
 @dataclass(frozen=True)
-class Setup:
+class RecordingSetup:
     """How it is recorded.
 
     Parameters

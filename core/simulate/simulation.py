@@ -11,9 +11,9 @@ from core.simulate.human import move
 from core.simulate.impacts import draw_impacts
 from core.simulate.recorder import Draws, Recorded, oversampling, record
 from core.simulate.script import Script, plan
-from core.simulate.sensors import PLACES, draw_mounts, worn
-from core.simulate.setup import Setup
-from core.simulate.truth import Truth, truth_of
+from core.simulate.sensors import PLACES, draw_mounts, place_sensor
+from core.simulate.setup import RecordingSetup
+from core.simulate.truth import WalkTruth, truth_of
 from core.simulate.walker import Walker
 
 
@@ -21,7 +21,7 @@ from core.simulate.walker import Walker
 class Simulation(Recorded):
     """A recorded walk and what really happened."""
 
-    truth: Truth
+    truth: WalkTruth
 
     def peaks(self) -> dict[Segment, tuple[float, float]]:
         """Segment → largest |specific force| in m/s² and |angular rate| in rad/s of the ideal signals."""
@@ -35,7 +35,7 @@ class Simulation(Recorded):
 
 
 def simulate(
-    script: Script, walker: Walker | None = None, seed: int = 0, setup: Setup | None = None
+    script: Script, walker: Walker | None = None, seed: int = 0, setup: RecordingSetup | None = None
 ) -> Simulation:
     """Let a walker do a script with seven sensors on; the same arguments give the same bits.
 
@@ -48,12 +48,12 @@ def simulate(
     ------
     ParameterError : "script_standing", "script_item", "step_too_long".
     """
-    walker, setup, draws = walker or Walker(), setup or Setup(), Draws(seed)
+    walker, setup, draws = walker or Walker(), setup or RecordingSetup(), Draws(seed)
     every = oversampling(setup.rate_hz)
     motion = move(plan(script, walker, draws.steps), walker, every * setup.rate_hz)
     mounts = draw_mounts(PLACES, walker.scale, setup.mount_spread_rad, draws.mounts)
     impacts = draw_impacts(motion, draws.impacts) if setup.impacts else ()
-    paths = {s: worn(motion, s, mount, setup.tissue, impacts) for s, mount in mounts.items()}
+    paths = {s: place_sensor(motion, s, mount, setup.tissue, impacts) for s, mount in mounts.items()}
     made = record(paths, setup, draws, walker.height_m)
     truth = truth_of(motion, every, mounts, made.errors, seed)
     return Simulation(**vars(made), truth=truth)

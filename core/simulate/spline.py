@@ -13,7 +13,7 @@ from core.frames import Floats
 from core.rotation import conjugate, multiply, normalise
 
 
-def kinematics(t: Floats, p: Floats, q: Floats) -> tuple[Floats, Floats, Floats]:
+def differentiate_pose(t: Floats, p: Floats, q: Floats) -> tuple[Floats, Floats, Floats]:
     """Differentiate a pose at its own samples.
 
     Parameters
@@ -38,7 +38,7 @@ def sign_continuous(q: Floats) -> Floats:
     return q * np.concatenate(([1.0], np.cumprod(flips)))[:, None]
 
 
-def resampled(t: Floats, p: Floats, q: Floats, at: Floats) -> tuple[Floats, Floats]:
+def resample_pose(t: Floats, p: Floats, q: Floats, at: Floats) -> tuple[Floats, Floats]:
     """The pose between its samples: p (m, 3) and unit q (m, 4) at times `at` (m,) within those of t."""
     pose = make_interp_spline(t, np.column_stack((p, q)), k=5)(at)
     return np.ascontiguousarray(pose[:, :3]), normalise(pose[:, 3:])

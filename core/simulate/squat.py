@@ -19,8 +19,8 @@ from core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
 from core.rotation import about, multiply, rotate
 from core.simulate.phases import Phase
 from core.simulate.recorder import Draws, Recorded, oversampling, record
-from core.simulate.sensors import PLACES, Mount, Path, draw_mounts
-from core.simulate.setup import Setup
+from core.simulate.sensors import PLACES, Mount, SensorPath, draw_mounts
+from core.simulate.setup import RecordingSetup
 from core.simulate.shapes import smoothstep
 from core.simulate.soft_tissue import skin_motion
 from core.simulate.spline import sign_continuous
@@ -100,7 +100,7 @@ class SquatTruth:
     depths_rad: tuple[float, ...]
     mounts: Mapping[Segment, Mount]
 
-    def zeroed(self) -> dict[str, Floats]:
+    def subtract_standing(self) -> dict[str, Floats]:
         """Angles (n,) in rad minus their standing value."""
         return {name: values - self.zero_offset[name] for name, values in self.angles.items()}
 
@@ -113,7 +113,7 @@ class SquatSimulation(Recorded):
 
 
 def simulate_squats(
-    squats: Squats | None = None, height_m: float = 1.75, seed: int = 0, setup: Setup | None = None
+    squats: Squats | None = None, height_m: float = 1.75, seed: int = 0, setup: RecordingSetup | None = None
 ) -> SquatSimulation:
     """Let a person of a height squat on one leg, with sensors on its foot, shank, thigh and on the pelvis.
 
@@ -121,7 +121,7 @@ def simulate_squats(
     ------
     ParameterError : "squat_depth", "squat_times", "height_implausible".
     """
-    squats, setup, draws = squats or Squats(), setup or Setup(), Draws(seed)
+    squats, setup, draws = squats or Squats(), setup or RecordingSetup(), Draws(seed)
     person = Walker.of_height(height_m)
     every = oversampling(setup.rate_hz)
     rate = every * setup.rate_hz
@@ -134,14 +134,14 @@ def simulate_squats(
 
     places = {segment: PLACES[segment] for segment in q}
     mounts = draw_mounts(places, person.scale, setup.mount_spread_rad, draws.mounts)
-    paths: dict[Segment, Path] = {}
+    paths: dict[Segment, SensorPath] = {}
     for segment, mount in mounts.items():
         place, turn = mount.position_m, mount.q_segment_sensor
         skin = None if setup.tissue is None else skin_motion(q, segment, setup.tissue)
         if skin is not None:
             place, turn = place + skin[1], multiply(skin[0], turn)
         way = p[segment] + rotate(q[segment], place)
-        paths[segment] = Path(t, way, sign_continuous(multiply(q[segment], turn)))
+        paths[segment] = SensorPath(t, way, sign_continuous(multiply(q[segment], turn)))
     made = record(paths, setup, draws, height_m, protocol="squat")
 
     q, p = ({s: a[::every] for s, a in of.items()} for of in (q, p))

@@ -6,17 +6,17 @@ Writing degrees and bytes is the business of the server (spec: one place where d
 from __future__ import annotations
 
 from core.frames import SIDES, Floats
-from core.simulate.truth import Truth
+from core.simulate.truth import WalkTruth
 
 Column = list[float] | list[float | None] | list[str]
 
 
-def angle_table(truth: Truth) -> dict[str, Floats]:
+def angle_table(truth: WalkTruth) -> dict[str, Floats]:
     """`t_s` and one column (n,) in rad per angle, zeroed to the truth's own standing."""
-    return {"t_s": truth.t_s, **truth.zeroed()}
+    return {"t_s": truth.t_s, **truth.subtract_standing()}
 
 
-def event_table(truth: Truth) -> dict[str, Column]:
+def event_table(truth: WalkTruth) -> dict[str, Column]:
     """`time_s`, `side`, `kind` and `source` of all contacts in order of time.
 
     Terminal contact has two rows: source "truth_release" (last touch) and "truth_lift5" (sole 5 mm up, what
@@ -38,7 +38,7 @@ def event_table(truth: Truth) -> dict[str, Column]:
     }
 
 
-def stride_table(truth: Truth) -> dict[str, Column]:
+def stride_table(truth: WalkTruth) -> dict[str, Column]:
     """One row per true stride; `tc_s` is the 5 mm lift, `release_s` the last touch."""
     strides = truth.strides
     return {

@@ -71,7 +71,7 @@ def foot_timing(plan: Plan, walker: Walker, side: Side) -> FootTiming:
     return FootTiming(heel_off, opposite, release, contact, flat, table[:, 5].astype(bool))
 
 
-def window(plan: Plan, rate_hz: float, share: float) -> int:
+def size_window(plan: Plan, rate_hz: float, share: float) -> int:
     """Odd number of samples of a smoothing window of `share` of a typical stride."""
     return max(3, int(share * 2.0 * plan.typical_step_s * rate_hz) | 1)
 
@@ -96,7 +96,7 @@ def gait_phase(t: Floats, plan: Plan, timing: FootTiming, rate_hz: float) -> Flo
         knots += [(timing.opposite[i], i + 0.5), (timing.release[i], i + RELEASE_PHASE), (contact, i + 1.0)]
     knots.append((knots[-1][0] + 0.6 * plan.typical_step_s, knots[-1][1] + STANDING_PHASE))
     at, value = np.array(sorted(knots)).T
-    return smooth(np.interp(t, at, value), window(plan, rate_hz, 0.025))
+    return smooth(np.interp(t, at, value), size_window(plan, rate_hz, 0.025))
 
 
 def body_phase(t: Floats, plan: Plan, rate_hz: float) -> Floats:
@@ -107,7 +107,7 @@ def body_phase(t: Floats, plan: Plan, rate_hz: float) -> Floats:
         knots += [(step.start_s, phase), (step.time_s, phase + 0.5)]
         phase += 0.5
     at, value = np.array(knots).T
-    return smooth(np.interp(t, at, value), window(plan, rate_hz, 0.04))
+    return smooth(np.interp(t, at, value), size_window(plan, rate_hz, 0.04))
 
 
 def amplitude(t: Floats, plan: Plan, walker: Walker, rate_hz: float) -> Floats:
@@ -121,4 +121,4 @@ def amplitude(t: Floats, plan: Plan, walker: Walker, rate_hz: float) -> Floats:
         if step.closes:
             knots += [(step.time_s - 0.2 * step.step_s, 0.6 * a), (step.time_s + 0.25, 0.0)]
     at, value = np.array(sorted(knots)).T
-    return smooth(np.interp(t, at, value), window(plan, rate_hz, 0.05))
+    return smooth(np.interp(t, at, value), size_window(plan, rate_hz, 0.05))

@@ -30,7 +30,7 @@ ZERO_MARGIN_S = (0.5, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
+class TrueContacts:
     """Exact events of one foot in s, one entry per swing.
 
     Parameters
@@ -68,7 +68,7 @@ class TrueStride:
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class WalkTruth:
     """Exact truth at the samples of the recording.
 
     Parameters
@@ -91,7 +91,7 @@ class Truth:
     zero: tuple[float, float]
     zero_offset: Mapping[str, float]
     stands: tuple[tuple[float, float], ...]
-    contacts: Mapping[Side, Contacts]
+    contacts: Mapping[Side, TrueContacts]
     contact: Mapping[Side, Bools]
     flat: Mapping[Side, Bools]
     footprints: Mapping[Side, tuple[Footprint, ...]]
@@ -101,7 +101,7 @@ class Truth:
     guard_m: float
     lifts_m: Mapping[Side, tuple[float, ...]]
 
-    def zeroed(self) -> dict[str, Floats]:
+    def subtract_standing(self) -> dict[str, Floats]:
         """Angles (n,) in rad minus their own standing value."""
         return {name: values - self.zero_offset[name] for name, values in self.angles.items()}
 
@@ -112,7 +112,7 @@ def truth_of(
     mounts: Mapping[Segment, Mount],
     errors: Mapping[Segment, DrawnErrors],
     seed: int,
-) -> Truth:
+) -> WalkTruth:
     """Take every `every`-th sample of a motion as truth, with its events and strides."""
     t = motion.t_s[::every]
     q = {s: a[::every] for s, a in motion.q.items()}
@@ -124,7 +124,7 @@ def truth_of(
     standing = (t >= zero[0]) & (t < zero[1])
     contacts = {s: _contacts(motion, s) for s in SIDES}
     touching = {s: ~_between(t, contacts[s].release, contacts[s].contact) for s in SIDES}
-    return Truth(
+    return WalkTruth(
         t_s=t,
         rate_hz=motion.rate_hz / every,
         seed=seed,
@@ -190,9 +190,9 @@ def _cardan(proximal: Floats, distal: Floats) -> tuple[Floats, Floats, Floats]:
     )
 
 
-def _contacts(motion: Motion, side: Side) -> Contacts:
+def _contacts(motion: Motion, side: Side) -> TrueContacts:
     timing = motion.timings[side]
-    return Contacts(
+    return TrueContacts(
         timing.heel_off, timing.release, _lift5(motion, side, timing), timing.contact, timing.flat
     )
 
@@ -218,7 +218,7 @@ def _between(t: Floats, starts: Floats, ends: Floats) -> Bools:
     return inside
 
 
-def _strides(motion: Motion, contacts: Mapping[Side, Contacts]) -> tuple[TrueStride, ...]:
+def _strides(motion: Motion, contacts: Mapping[Side, TrueContacts]) -> tuple[TrueStride, ...]:
     strides = []
     for side in SIDES:
         other = motion.plan.footprints["left" if side == "right" else "right"]

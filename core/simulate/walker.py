@@ -39,7 +39,7 @@ class Anatomy:
     rocker_radius: float = 0.10
     toe: float = 0.18
 
-    def scaled(self, k: float) -> Anatomy:
+    def scale_by(self, k: float) -> Anatomy:
         """The same shape, k times as large."""
         return Anatomy(**{name: k * length for name, length in vars(self).items()})
 
@@ -173,7 +173,7 @@ class Walker:
         return replace(
             self,
             height_m=height_m,
-            anatomy=self.anatomy.scaled(k),
+            anatomy=self.anatomy.scale_by(k),
             sides={s: replace(g, clearance_m=k * g.clearance_m) for s, g in self.sides.items()},
             width_m=k * self.width_m,
             forward_m=k * self.forward_m,

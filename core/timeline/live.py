@@ -15,7 +15,7 @@ import numpy as np
 
 from core.errors import Notice, SignalError
 from core.formats.live_clock import LiveClock, sample_times_us
-from core.formats.live_log import Batch, Hello, SensorInfo, StreamInfo, decode_batch, encode_batch
+from core.formats.live_log import Hello, SampleBatch, SensorInfo, StreamInfo, decode_batch, encode_batch
 from core.frames import Bools, Floats, Segment
 from core.timeline.buffer import SampleBuffer
 from core.timeline.params import TimelineParams
@@ -109,7 +109,7 @@ class LiveAxis:
         """Samples of the axis so far."""
         return self._next
 
-    def push(self, batch: Batch) -> UniformBlock | None:
+    def push(self, batch: SampleBatch) -> UniformBlock | None:
         """Take the next batch; the samples of the axis that are now known, None when none is."""
         rate = self._rates[batch.stream]
         t_us = sample_times_us(batch, rate)
@@ -213,10 +213,10 @@ def _common_rate(queues: Sequence[StreamQueue], hello: Hello, params: TimelinePa
     return max(x.rate_hz for x in queues)
 
 
-def warm() -> None:
+def compile_axis_kernels() -> None:
     """Compile or load the kernels, for samples that look into a frame as decoded ones do."""
     hello = Hello("", "cli", (StreamInfo(0, 100.0, "shared", (SensorInfo("", "pelvis"),)),))
     axis = LiveAxis(hello)
     for seq in range(2):
         at = 10_000 * seq
-        axis.push(decode_batch(encode_batch(Batch(0, seq, at, at, np.zeros((1, 1, 9), np.float32)))))
+        axis.push(decode_batch(encode_batch(SampleBatch(0, seq, at, at, np.zeros((1, 1, 9), np.float32)))))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from core.formats.live_clock import Micros
 from core.formats.live_hello import StreamInfo
-from core.formats.live_log import Batch
+from core.formats.live_log import SampleBatch
 
 LONGEST_SPAN_US: Final = 1_000_000
 """A sender may gather samples for so long; a stream is not overdue while its usual batch can be gathered."""
@@ -31,7 +31,7 @@ class StreamQueue:
         self._sent_us = 0
         self._span_us = 0
 
-    def hold(self, t_us: Micros, batch: Batch) -> bool:
+    def hold(self, t_us: Micros, batch: SampleBatch) -> bool:
         """Take a batch; tell whether samples of it ran backwards in time and were left out."""
         if not self.heard:
             self.heard, self.first_us = True, int(t_us[0])

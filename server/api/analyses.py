@@ -45,7 +45,7 @@ def list_analyses(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list
     with db.read() as c:
         sessions.get(c, session_id)
         made = analyses.of_session(c, session_id)
-    trail.watched(who, "analyses.opened", "session", session_id)
+    trail.record_watched(who, "analyses.opened", "session", session_id)
     return [_shown(found) for found in made]
 
 
@@ -54,7 +54,7 @@ def read_analysis(analysis_id: Id, db: Db, trail: OpenTrail, who: Reader) -> sch
     """Open an analysis: what went in, by what version, and which files came out."""
     with db.read() as c:
         found = analyses.get(c, analysis_id)
-    trail.opened(who, "analysis.opened", "analysis", analysis_id)
+    trail.record_opened(who, "analysis.opened", "analysis", analysis_id)
     return _shown(found)
 
 
@@ -73,11 +73,11 @@ def read_file(analysis_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail
     with db.read() as c:
         found = analyses.get(c, analysis_id)
     content = analyses.file_bytes(blobs, found, name)
-    trail.opened(who, "analysis.file_opened", "analysis", analysis_id, {"file": name})
+    trail.record_opened(who, "analysis.file_opened", "analysis", analysis_id, {"file": name})
     stem, dot, ending = name.rpartition(".")
     return attachment(content, f"{stem}-{analysis_id[:8]}{dot}{ending}")
 
 
-def _shown(found: analyses.Analysis) -> schemas.AnalysisAnswer:
+def _shown(found: analyses.AnalysisRecord) -> schemas.AnalysisAnswer:
     files = [recordings.RecordedFile(name, blob.size, blob.sha256) for name, blob in found.files.items()]
     return schemas.make_answer(schemas.AnalysisAnswer, found, files=files)

@@ -26,5 +26,6 @@ def list_audit(
     """The newest rows first."""
     with db.read() as c:
         return [
-            schemas.make_answer(schemas.AuditRow, row) for row in audit.entries(c, before=before, limit=limit)
+            schemas.make_answer(schemas.AuditRow, row)
+            for row in audit.list_entries(c, before=before, limit=limit)
         ]

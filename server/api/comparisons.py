@@ -15,13 +15,13 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail, Reviewed
-from server.report.columns import plain
+from server.report.columns import reduce_to_plain
 from server.report.comparison import comparison_csv
 from server.services import comparisons
-from server.services.comparisons import Pair
-from server.services.histories import Analysed
+from server.services.comparisons import SessionPair
+from server.services.histories import AnalysedSession
 from server.storage.db import Database
-from server.trail import Trail
+from server.trail import AuditTrail
 
 router = APIRouter(prefix="/sessions/{session_id}/compare", tags=["trends"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -43,9 +43,12 @@ def compare(
         "after": _session(found.after),
         "comparable": found.comparable,
         "cautions": found.cautions,
-        "changes": [{**vars(r.change), "words": r.words.verdict} for r in comparisons.rows(reviewed, found)],
+        "changes": [
+            {**vars(r.change), "words": r.words.verdict}
+            for r in comparisons.compare_sessions(reviewed, found)
+        ],
     }
-    return JSONResponse(plain(content))
+    return JSONResponse(reduce_to_plain(content))
 
 
 @router.get("/{other_id}/changes.csv", response_class=Response, responses=_CSV)
@@ -55,17 +58,17 @@ def compare_as_table(
     """The same as a table."""
     found = _opened(db, trail, who, session_id, other_id)
     name = f"changes-{found.before.session.id[:8]}-{found.after.session.id[:8]}.csv"
-    return attachment(comparison_csv(comparisons.rows(reviewed, found)), name)
+    return attachment(comparison_csv(comparisons.compare_sessions(reviewed, found)), name)
 
 
-def _opened(db: Database, trail: Trail, who: Identity, session_id: str, other_id: str) -> Pair:
+def _opened(db: Database, trail: AuditTrail, who: Identity, session_id: str, other_id: str) -> SessionPair:
     with db.read() as c:
         found = comparisons.pair(c, session_id, other_id)
-    trail.opened(who, "comparison.opened", "session", session_id, {"with": other_id})
+    trail.record_opened(who, "comparison.opened", "session", session_id, {"with": other_id})
     return found
 
 
-def _session(a: Analysed) -> dict[str, Any]:
+def _session(a: AnalysedSession) -> dict[str, Any]:
     return {
         "session_id": a.session.id,
         "performed_on": a.session.performed_on.isoformat(),

@@ -140,7 +140,7 @@ def read_file(
     with db.read() as c:
         recording = recordings.require_current(c, session_id)
         content = recordings.file_bytes(c, blobs, recording.id, name)
-    trail.opened(who, "recording.file_opened", "recording", recording.id)
+    trail.record_opened(who, "recording.file_opened", "recording", recording.id)
     return attachment(content, name.rpartition("/")[2], "application/octet-stream")
 
 

@@ -41,8 +41,8 @@ def list_jobs(
 ) -> list[jobs.ListedJob]:
     """Jobs, the newest first."""
     with db.read() as c:
-        rows = jobs.listing(c, active_only=active, limit=limit)
-    trail.watched(who, "job.listed", "job", None)
+        rows = jobs.list_jobs(c, active_only=active, limit=limit)
+    trail.record_watched(who, "job.listed", "job", None)
     return rows
 
 
@@ -51,7 +51,7 @@ def read_job(job_id: Id, db: Db, trail: OpenTrail, who: Reader) -> jobs.ListedJo
     """One job: its progress, or why it failed."""
     with db.read() as c:
         found = jobs.get(c, job_id)
-    trail.watched(who, "job.opened", "job", job_id)
+    trail.record_watched(who, "job.opened", "job", job_id)
     return found
 
 

@@ -28,7 +28,7 @@ SOCKET = "/api/v1/live"
 async def open_take(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> schemas.OpenedTake:
     """Open a take; a tablet joins it with the code within ten minutes."""
 
-    def write() -> tuple[live.Take, str]:
+    def write() -> tuple[live.LiveTakeRecord, str]:
         with db.write() as c:
             return live.open_take(c, who, session_id)
 
@@ -42,7 +42,7 @@ def read_take(session_id: Id, db: Db, hub: LiveHub, trail: OpenTrail, who: Thera
     """Where the session's newest take stands."""
     with db.read() as c:
         sessions.get(c, session_id)
-    trail.watched(who, "live.watched", "session", session_id)
+    trail.record_watched(who, "live.watched", "session", session_id)
     return hub.standing(session_id)
 
 
@@ -55,7 +55,7 @@ def read_take(session_id: Id, db: Db, hub: LiveHub, trail: OpenTrail, who: Thera
 async def give_code(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> schemas.OpenedTake:
     """Give another code; the one before ends, and when it is used the tablet before is sent away."""
 
-    def write() -> tuple[live.Take, str]:
+    def write() -> tuple[live.LiveTakeRecord, str]:
         with db.write() as c:
             return live.new_code(c, who, session_id)
 
@@ -86,7 +86,7 @@ def list_events(session_id: Id, db: Db, trail: OpenTrail, who: Therapist) -> lis
     with db.read() as c:
         sessions.get(c, session_id)
         found = [event for take in live.takes_of(c, session_id) for event in live.events(c, take.id)]
-    trail.watched(who, "live.events_opened", "session", session_id)
+    trail.record_watched(who, "live.events_opened", "session", session_id)
     return found
 
 
@@ -107,7 +107,7 @@ async def pair(
     who = f"pairing from {address}"
     failures.check(who, address)
 
-    def write() -> tuple[live.Paired, live.Take]:
+    def write() -> tuple[live.TabletAccess, live.LiveTakeRecord]:
         with db.write() as c:
             paired = live.pair(c, body.code)
             return paired, live.get(c, paired.take)
@@ -116,12 +116,12 @@ async def pair(
         paired, take = await run_in_threadpool(write)
     except live.CodeNotValid:
         failures.fail(who, address)
-        await run_in_threadpool(trail.refused, "live.pairing_failed", "live", None, address)
+        await run_in_threadpool(trail.record_refused, "live.pairing_failed", "live", None, address)
         raise
     failures.succeed(who, address)
     hub.tell_row(take)
     return make_answer(schemas.PairedTablet, paired, socket=SOCKET)
 
 
-def _opened(take: live.Take, code: str) -> schemas.OpenedTake:
+def _opened(take: live.LiveTakeRecord, code: str) -> schemas.OpenedTake:
     return make_answer(schemas.OpenedTake, take, code=code, expires_at=take.code_expires_at)

@@ -22,7 +22,7 @@ from server.auth.roles import Action
 from server.auth.sessions import CHECK_EVERY_S
 from server.context import Id
 from server.live.hub import Hub
-from server.live.room import Viewer
+from server.live.room import BrowserQueue
 from server.services import sessions
 
 router = APIRouter(include_in_schema=False)
@@ -41,7 +41,7 @@ async def feed(ws: WebSocket, sid: Id, who: Annotated[Identity, require(Action.R
     def look() -> bytes:
         with db.read() as c:
             sessions.get(c, sid)
-        ws.app.state.trail.watched(who, "live.watched", "session", sid)
+        ws.app.state.trail.record_watched(who, "live.watched", "session", sid)
         return msgspec.json.encode(hub.standing(sid))
 
     try:
@@ -69,7 +69,7 @@ async def feed(ws: WebSocket, sid: Id, who: Annotated[Identity, require(Action.R
     hub.leave(sid)
 
 
-async def _down(ws: WebSocket, viewer: Viewer) -> None:
+async def _down(ws: WebSocket, viewer: BrowserQueue) -> None:
     while True:
         for message in await viewer.take():
             await ws.send_text(message.decode())

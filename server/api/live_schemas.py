@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, StringConstraints
 
 from server.api.schemas import HexId, Request
-from server.live.take import Mark
+from server.live.take import TherapistMark
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class LiveState:
     sensors: Annotated[
         list[LiveSensor], Field(description="empty until a tablet has joined and once the take is over")
     ]
-    marks: list[Mark]
+    marks: list[TherapistMark]
     ghost: str | None
     stale: bool
     stopping: bool

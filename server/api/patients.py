@@ -29,8 +29,8 @@ def list_patients(
 ) -> list[patients.Patient]:
     """All patients, the latest visit first."""
     with db.read() as c:
-        found = patients.listing(c, search=q, limit=limit, offset=offset)
-    trail.watched(who, "patient.listed", "patient", None)
+        found = patients.list_patients(c, search=q, limit=limit, offset=offset)
+    trail.record_watched(who, "patient.listed", "patient", None)
     return found
 
 
@@ -50,7 +50,7 @@ def read_patient(
     """Open a patient."""
     with db.read() as c:
         found = patients.get(c, patient_id)
-    trail.opened(who, "patient.opened", "patient", patient_id)
+    trail.record_opened(who, "patient.opened", "patient", patient_id)
     return found
 
 
@@ -94,7 +94,7 @@ def list_sessions(
     with db.read() as c:
         patients.get(c, patient_id)
         found = sessions.of_patient(c, patient_id)
-    trail.opened(who, "sessions.opened", "patient", patient_id)
+    trail.record_opened(who, "sessions.opened", "patient", patient_id)
     return found
 
 

@@ -22,9 +22,9 @@ from server.http.problems import Problem
 from server.report.feedback_words import prescription_words
 from server.report.tables import feedback_csv
 from server.services import feedback, histories, patients, prescriptions, sessions, targets
-from server.services.prescriptions import Written
+from server.services.prescriptions import PatientPrescription
 from server.storage.db import Database
-from server.trail import Trail
+from server.trail import AuditTrail
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["feedback"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -40,7 +40,7 @@ def list_prescriptions(patient_id: Id, db: Db, trail: OpenTrail, who: Reader) ->
     with db.read() as c:
         patients.get(c, patient_id)
         written = prescriptions.of_patient(c, patient_id)
-    trail.opened(who, "prescriptions.opened", "patient", patient_id)
+    trail.record_opened(who, "prescriptions.opened", "patient", patient_id)
     return [_shown(w) for w in written]
 
 
@@ -82,7 +82,7 @@ def read_targets(
         )
     with db.read() as c:
         walk = targets.last_walk(c, reviewed, patients.get(c, patient_id))
-    trail.watched(who, "targets.opened", "patient", patient_id)
+    trail.record_watched(who, "targets.opened", "patient", patient_id)
     offers = [(source, targets.offer(walk, source, parameter, side)) for source in SOURCES]
     return [
         {
@@ -117,14 +117,14 @@ def read_feedback_table(
     return attachment(feedback_csv(view), f"feedback-{session_id[:8]}.csv")
 
 
-def _opened(db: Database, trail: Trail, who: Identity, session_id: str) -> feedback.Gathered:
+def _opened(db: Database, trail: AuditTrail, who: Identity, session_id: str) -> feedback.FeedbackRecords:
     with db.read() as c:
         patient = patients.get(c, sessions.get(c, session_id).patient_id)
-        found = feedback.gather(c, patient, session_id, histories.analysed(c, patient.id))
-    trail.opened(who, "feedback.opened", "session", session_id)
+        found = feedback.gather(c, patient, session_id, histories.list_analysed(c, patient.id))
+    trail.record_opened(who, "feedback.opened", "session", session_id)
     return found
 
 
-def _shown(written: Written) -> dict[str, Any]:
+def _shown(written: PatientPrescription) -> dict[str, Any]:
     said = [f"{label}: {text}" for label, text in prescription_words(written.content)]
     return {**vars(written), "content": written.content.to_json(), "words": said}

@@ -27,7 +27,7 @@ def list_programmes(
     with db.read() as c:
         patients.get(c, patient_id)
         found = programmes.of_patient(c, patient_id)
-    trail.opened(who, "programmes.opened", "patient", patient_id)
+    trail.record_opened(who, "programmes.opened", "patient", patient_id)
     return found
 
 

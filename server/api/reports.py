@@ -27,7 +27,7 @@ from server.services import (
 )
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
-from server.trail import Trail
+from server.trail import AuditTrail
 
 router = APIRouter(prefix="/sessions/{session_id}", tags=["report"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -64,10 +64,10 @@ def read_parameter(
     with db.read() as c:
         session = sessions.get(c, session_id)
         patient = patients.get(c, session.patient_id)
-        found = analyses.shown(c, session_id)
+        found = analyses.get_shown(c, session_id)
         edits = edit_log.edits_of(c, found.id)
-        known = controls.visits(c, patient, session)
-    trail.opened(who, "parameter.opened", "session", session_id, {"parameter": name})
+        known = controls.list_visits(c, patient, session)
+    trail.record_opened(who, "parameter.opened", "session", session_id, {"parameter": name})
     return reports.behind_number(reviewed, found, edits, patient, session, name, known).to_json()
 
 
@@ -80,14 +80,14 @@ def read_curves(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, wh
 
 
 def _opened(
-    db: Database, reviewed: ReviewedAnalyses, trail: Trail, who: Identity, session_id: str
+    db: Database, reviewed: ReviewedAnalyses, trail: AuditTrail, who: Identity, session_id: str
 ) -> ReportModel:
     with db.read() as c:
         session = sessions.get(c, session_id)
         patient = patients.get(c, session.patient_id)
-        found = analyses.shown(c, session_id)
+        found = analyses.get_shown(c, session_id)
         edits = edit_log.edits_of(c, found.id)
-        before = comparisons.before(c, session, histories.analysed(c, patient.id))
-        known = controls.visits(c, patient, session)
-    trail.opened(who, "report.opened", "session", session_id, {"analysis_id": found.id})
+        before = comparisons.find_previous(c, session, histories.list_analysed(c, patient.id))
+        known = controls.list_visits(c, patient, session)
+    trail.record_opened(who, "report.opened", "session", session_id, {"analysis_id": found.id})
     return reports.read(reviewed, found, edits, patient, session, before, known)[1]

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 from fastapi.responses import JSONResponse
 from starlette.responses import Response
 
-from core.events.edits import edit_of
+from core.events.edits import read_edit
 from server.api import review_schemas as schemas
 from server.api.documents import refusals
 from server.api.downloads import BINARY, attachment
@@ -19,11 +19,11 @@ from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail, Reviewed
 from server.http.json_body import StrictJsonRoute
 from server.report.exports import events_csv, parameter_row, strides_csv
-from server.report.wording import excluded_words
+from server.report.wording import explain_exclusion
 from server.services import analyses, edit_log, reviews, signals
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
-from server.trail import Trail
+from server.trail import AuditTrail
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}", tags=["review"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -50,7 +50,7 @@ def make_edit(
     session_id: Id, body: schemas.EditNew, db: Db, reviewed: Reviewed, who: Reviewer, seen: Seen = None
 ) -> Response:
     """Move, add or delete an event, leave a stride out or count it; everything is measured again."""
-    edit = edit_of(body.model_dump(exclude_none=True))
+    edit = read_edit(body.model_dump(exclude_none=True))
     found, edits = reviews.make(db, reviewed, who, session_id, edit, seen=seen)
     return _review(reviewed, found, edits, 201)
 
@@ -88,10 +88,10 @@ def list_signals(
 ) -> tuple[signals.SignalLane, ...]:
     """Which signals there are: derived ones of feet and joints, raw ones of every sensor."""
     found = _watched(db, trail, who, session_id)
-    return signals.lanes(reviewed, found)
+    return signals.list_lanes(reviewed, found)
 
 
-@router.get("/signals/{name}", response_model=None, responses={200: {"model": signals.Piece}})
+@router.get("/signals/{name}", response_model=None, responses={200: {"model": signals.SignalWindow}})
 def read_signal(
     session_id: Id,
     name: str,
@@ -105,29 +105,29 @@ def read_signal(
 ) -> Response:
     """A window of a signal in at most so many parts, the least and the greatest value of each."""
     found = _watched(db, trail, who, session_id)
-    return JSONResponse(asdict(signals.piece(reviewed, found, name, start_s, end_s, points)))
+    return JSONResponse(asdict(signals.read_window(reviewed, found, name, start_s, end_s, points)))
 
 
-def _watched(db: Database, trail: Trail, who: Identity, session_id: str) -> analyses.Analysis:
+def _watched(db: Database, trail: AuditTrail, who: Identity, session_id: str) -> analyses.AnalysisRecord:
     """Signals are asked for at every zoom and step."""
     with db.read() as c:
-        found = analyses.shown(c, session_id)
-    trail.watched(who, "signals.opened", "session", session_id, {"analysis_id": found.id})
+        found = analyses.get_shown(c, session_id)
+    trail.record_watched(who, "signals.opened", "session", session_id, {"analysis_id": found.id})
     return found
 
 
 def _opened(
-    db: Database, trail: Trail, who: Identity, session_id: str, what: str
-) -> tuple[analyses.Analysis, edit_log.Edits]:
+    db: Database, trail: AuditTrail, who: Identity, session_id: str, what: str
+) -> tuple[analyses.AnalysisRecord, edit_log.EditHistory]:
     with db.read() as c:
-        found = analyses.shown(c, session_id)
+        found = analyses.get_shown(c, session_id)
         edits = edit_log.edits_of(c, found.id)
-    trail.opened(who, f"{what}.opened", "session", session_id, {"analysis_id": found.id})
+    trail.record_opened(who, f"{what}.opened", "session", session_id, {"analysis_id": found.id})
     return found, edits
 
 
 def _review(
-    reviewed: ReviewedAnalyses, found: analyses.Analysis, edits: edit_log.Edits, status: int = 200
+    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, edits: edit_log.EditHistory, status: int = 200
 ) -> Response:
     """Written without a model: two thousand events would be checked longer than they are measured."""
     bundle = reviewed.read_bundle(found, edits)
@@ -154,7 +154,7 @@ def _review(
                 "end_s": round(s.end_s, 6),
                 "flags": s.flags,
                 "excluded_by": s.excluded_by,
-                "excluded": None if s.excluded_reason is None else excluded_words(s.excluded_reason),
+                "excluded": None if s.excluded_reason is None else explain_exclusion(s.excluded_reason),
             }
             for s in bundle.strides.strides
         ],

@@ -28,7 +28,7 @@ def read_session(
     """Open a session."""
     with db.read() as c:
         found = sessions.get(c, session_id)
-    trail.opened(who, "session.opened", "session", session_id)
+    trail.record_opened(who, "session.opened", "session", session_id)
     return found
 
 
@@ -65,7 +65,7 @@ def read_recording(
     """The current upload set: its files, what was found in them, the mapping."""
     with db.read() as c:
         found = recordings.current(c, session_id)
-    trail.watched(who, "recording.opened", "session", session_id)
+    trail.record_watched(who, "recording.opened", "session", session_id)
     if found is None:
         raise NotFound("recording of session", session_id)
     return make_answer(schemas.RecordingAnswer, found)

@@ -31,7 +31,7 @@ from server.context import Db, Failures, OpenLogins, OpenTrail, address_of
 from server.http.json_body import StrictJsonRoute
 from server.http.problems import SENTENCES, Problem
 from server.storage.refusal import refusal_of
-from server.trail import Trail
+from server.trail import AuditTrail
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["account"])
 address_router = APIRouter(include_in_schema=False)
@@ -86,7 +86,7 @@ def sign_in(
         if kept is None:
             raise
         token = kept
-        trail.opened(_identity(row, token), "sign_in", "user", row.id)
+        trail.record_opened(_identity(row, token), "sign_in", "user", row.id)
     response: Response
     if request.headers.get("content-type", "").startswith(_FORM):
         response = RedirectResponse(local_path(body.next), status_code=303)
@@ -105,7 +105,7 @@ def sign_out(
 ) -> Response:
     """End this sign-in."""
     logins.close(who.login_id)
-    trail.opened(who, "sign_out", "user", who.user_id)
+    trail.record_opened(who, "sign_out", "user", who.user_id)
     response = Response(status_code=204)
     clear_token(response, request)
     return response
@@ -200,10 +200,10 @@ def _identity(row: Row[Any], token: str) -> Identity:
 
 
 @contextlib.contextmanager
-def _told(trail: Trail, request: Request) -> Iterator[None]:
+def _told(trail: AuditTrail, request: Request) -> Iterator[None]:
     """Write down a one-time address that was not valid."""
     try:
         yield
-    except one_time.NotValid:
-        trail.refused("sign_in.failed", "user", None, address_of(request))
+    except one_time.LinkNotValid:
+        trail.record_refused("sign_in.failed", "user", None, address_of(request))
         raise

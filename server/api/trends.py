@@ -19,14 +19,14 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail, Reviewed
 from server.report.change_words import change_words
-from server.report.columns import plain
+from server.report.columns import reduce_to_plain
 from server.report.tables import trends_csv
-from server.report.trends import Line, Trend, names_in, trends
+from server.report.trends import Trend, TrendSeries, follow_figures, names_in
 from server.services import histories, patients
-from server.services.histories import History
+from server.services.histories import PatientHistory
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
-from server.trail import Trail
+from server.trail import AuditTrail
 
 router = APIRouter(prefix="/patients/{patient_id}", tags=["trends"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -85,7 +85,7 @@ def read_trends(
         "others": [{**vars(o), "condition": _condition(o.condition)} for o in known.others],
         "trends": [_trend(t) for t in found],
     }
-    return JSONResponse(plain(content))
+    return JSONResponse(reduce_to_plain(content))
 
 
 @router.get("/trends.csv", response_class=Response, responses=_CSV)
@@ -107,21 +107,21 @@ def read_trends_table(
 def _opened(
     db: Database,
     reviewed: ReviewedAnalyses,
-    trail: Trail,
+    trail: AuditTrail,
     who: Identity,
     patient_id: str,
     names: list[str],
     protocol: str | None,
     like: str | None,
-) -> tuple[History, tuple[Trend, ...]]:
+) -> tuple[PatientHistory, tuple[Trend, ...]]:
     with db.read() as c:
         patient = patients.get(c, patient_id)
         done, plans = histories.read(c, patient)
-    trail.opened(who, "trends.opened", "patient", patient_id)
-    known = histories.history(reviewed, patient, done, plans, protocol, like)
+    trail.record_opened(who, "trends.opened", "patient", patient_id)
+    known = histories.read_history(reviewed, patient, done, plans, protocol, like)
     there = names_in(known.visits)
     wanted = [n for n in names if n in there] if names else there
-    return known, trends(known.visits, wanted, known.norms, known.usual, known.patient.affected_side)
+    return known, follow_figures(known.visits, wanted, known.norms, known.usual, known.patient.affected_side)
 
 
 def _condition(walked: WalkingCondition) -> dict[str, Any]:
@@ -138,7 +138,7 @@ def _trend(trend: Trend) -> dict[str, Any]:
     }
 
 
-def _line(line: Line) -> dict[str, Any]:
+def _line(line: TrendSeries) -> dict[str, Any]:
     change = line.change
     return {
         "side": line.side,

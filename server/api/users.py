@@ -26,7 +26,7 @@ Admin = Annotated[Identity, require(Action.MANAGE_USERS)]
 def list_users(db: Db, who: Admin) -> list[schemas.User]:
     """All accounts in order of their names."""
     with db.read() as c:
-        return [user_answer(row) for row in accounts.everyone(c)]
+        return [user_answer(row) for row in accounts.list_accounts(c)]
 
 
 @router.post("", status_code=201, response_model=schemas.User, responses=refusals(409))

@@ -13,7 +13,7 @@ from server.auth.roles import PUBLIC, Action
 from server.http.problems import SENTENCES, Problem
 
 
-class Door:
+class RouteAccess:
     """Dependency of one route; `action` is what the walk over all routes reads."""
 
     def __init__(self, action: Action) -> None:
@@ -33,7 +33,7 @@ class Door:
 
 def require(action: Action) -> Any:
     """Declare a route's action: `who: Annotated[Identity, require(Action.UPLOAD)]`, http or websocket."""
-    return Depends(Door(action))
+    return Depends(RouteAccess(action))
 
 
 def identify(connection: HTTPConnection) -> Identity | None:

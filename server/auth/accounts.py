@@ -13,7 +13,7 @@ from server.auth.throttle import Throttle
 from server.http.problems import Problem
 from server.storage.db import Database
 from server.storage.tables import new_id, now, user
-from server.trail import Trail
+from server.trail import AuditTrail
 
 
 def create(c: Connection, name: str, display_name: str | None, role: Role, password_hash: str) -> Row[Any]:
@@ -42,7 +42,7 @@ def get(c: Connection, user_id: str) -> Row[Any]:
     return row
 
 
-def everyone(c: Connection) -> list[Row[Any]]:
+def list_accounts(c: Connection) -> list[Row[Any]]:
     """Return all accounts in order of their names."""
     return list(c.execute(select(user).order_by(user.c.name)).all())
 
@@ -65,7 +65,7 @@ def change(c: Connection, user_id: str, values: dict[str, object]) -> Row[Any]:
 def check_password(
     db: Database,
     throttle: Throttle,
-    trail: Trail,
+    trail: AuditTrail,
     name: str,
     password: str,
     address: str,
@@ -87,7 +87,7 @@ def check_password(
     stored = row.password_hash if row is not None and row.active else None
     if not verify_password(password, stored) or row is None:
         throttle.fail(name, address)
-        trail.refused("sign_in.failed", "user", None if row is None else row.id, address)
+        trail.record_refused("sign_in.failed", "user", None if row is None else row.id, address)
         raise Problem(status, "wrong_password", "Name or password is wrong. Check both and try again.")
     throttle.succeed(name, address)
     return row

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from server.auth.roles import Action, Role, may
+from server.auth.roles import Action, Role, is_permitted
 
 
 @dataclass(frozen=True)
@@ -25,4 +25,4 @@ class Identity:
 
     def may(self, action: Action) -> bool:
         """Tell whether this person's role allows the action; pages ask it what to offer."""
-        return may(self.role, action)
+        return is_permitted(self.role, action)

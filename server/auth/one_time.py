@@ -13,7 +13,7 @@ from server.storage.tables import now, one_time_token, user
 LIFE = dt.timedelta(hours=24)
 
 
-class NotValid(Problem):
+class LinkNotValid(Problem):
     """The address cannot be used, for whatever reason."""
 
     def __init__(self) -> None:
@@ -50,7 +50,7 @@ def use(c: Connection, token: str, purpose: str) -> str | None:
     row = _find(c, token, purpose)
     # one answer for unknown, used and expired: nothing to learn by guessing
     if row is None:
-        raise NotValid
+        raise LinkNotValid
     hashed = token_hash(token)
     c.execute(update(one_time_token).where(one_time_token.c.token_sha256 == hashed).values(used_at=now()))
     return row[0]

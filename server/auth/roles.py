@@ -86,6 +86,6 @@ POLICY: dict[Action, frozenset[Role]] = {
 }
 
 
-def may(role: Role, action: Action) -> bool:
+def is_permitted(role: Role, action: Action) -> bool:
     """Tell whether a signed-in person with this role may do this; an action without a row is refused."""
     return action in PUBLIC or role in POLICY.get(action, frozenset())

@@ -9,7 +9,7 @@ from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute, APIWebSocketRoute
 from starlette.routing import BaseRoute
 
-from server.auth.access import Door
+from server.auth.access import RouteAccess
 from server.auth.roles import Action
 
 
@@ -17,7 +17,7 @@ class UndeclaredRouteError(RuntimeError):
     """A route says not exactly one action; name it with `require(Action.…)`."""
 
 
-def declared_actions(routes: Sequence[BaseRoute]) -> dict[str, Action]:
+def list_declared_actions(routes: Sequence[BaseRoute]) -> dict[str, Action]:
     """Return each route's action by its methods and path, websockets and static mounts included.
 
     Raises
@@ -48,7 +48,7 @@ def _leaves(routes: Sequence[BaseRoute]) -> Iterator[tuple[str, BaseRoute]]:
 
 def _actions(route: BaseRoute) -> set[Action]:
     if isinstance(route, APIRoute | APIWebSocketRoute):
-        return {d.call.action for d in _walk(route.dependant) if isinstance(d.call, Door)}
+        return {d.call.action for d in _walk(route.dependant) if isinstance(d.call, RouteAccess)}
     # a mounted application names its action itself
     action = getattr(getattr(route, "app", None), "action", None)
     return {action} if isinstance(action, Action) else set()

@@ -33,7 +33,7 @@ def _list(settings: Settings) -> int:
     from server.storage.db import Database
 
     with closing(Database(settings.database)) as db, db.read() as c:
-        strangers = [log for log in live_logs.logs(c, settings.live) if not log.known]
+        strangers = [log for log in live_logs.list_logs(c, settings.live) if not log.known]
     for log in strangers:
         sys.stdout.write(f"{log.take_id}  {log.words}\n")
     sys.stdout.write(

@@ -12,8 +12,8 @@ from core.errors import InputError, SagittalError
 
 if TYPE_CHECKING:
     from core.recording import Recording
-    from server.live.client import Report
-    from server.live.playback import Due
+    from server.live.client import StreamReport
+    from server.live.playback import DueBatch
 
 
 def replay(
@@ -37,9 +37,9 @@ def replay(
     -------
     0 when everything is acknowledged and the take is finished, 1 when not.
     """
-    from server.live.client import Faults, stream
+    from server.live.client import StreamFaults, stream
     from server.live.pairing import pair
-    from server.live.playback import cut, hello_of, paced
+    from server.live.playback import cut, hello_of, pace_batches
 
     try:
         _check(speed, drop, jitter)
@@ -58,8 +58,8 @@ def replay(
                 pairing.socket,
                 pairing.token,
                 hello,
-                paced(batches, speed),
-                faults=Faults(drop, jitter / 1000.0),
+                pace_batches(batches, speed),
+                faults=StreamFaults(drop, jitter / 1000.0),
                 hear=_heard,
             )
         )
@@ -92,7 +92,7 @@ def _heard(message: Mapping[str, Any]) -> None:
         _say(f"The therapist asks: {message.get('command')}.")
 
 
-def _summary(report: Report, batches: Sequence[Due]) -> str:
+def _summary(report: StreamReport, batches: Sequence[DueBatch]) -> str:
     half, most = (1000.0 * report.ack_quantile(share) for share in (0.5, 0.99))
     text = (
         f"{report.sent} of {len(batches)} batches acknowledged, half within {half:.0f} ms, 99 % within "

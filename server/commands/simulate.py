@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from server.storage import fs
 
 if TYPE_CHECKING:
-    from core.simulate import ChestTruth, SquatTruth, Truth
+    from core.simulate import ChestTruth, SquatTruth, WalkTruth
 
 
 def simulate(out: Path, script: str, seed: int) -> int:
@@ -53,7 +53,7 @@ def simulate(out: Path, script: str, seed: int) -> int:
 Made = tuple[dict[str, bytes], dict[str, object]]
 
 
-def _walk(truth: Truth) -> Made:
+def _walk(truth: WalkTruth) -> Made:
     from core.angles import JointAngles
     from core.simulate import event_table, stride_table
     from server.report.exports import angles_parquet
@@ -62,7 +62,9 @@ def _walk(truth: Truth) -> Made:
     del strides["turn_rad"]
     strides["turn_deg"] = [math.degrees(s.turn_rad) for s in truth.strides]
     files = {
-        "truth/angles.parquet": angles_parquet(JointAngles(truth.t_s, truth.zeroed(), truth.zero_offset)),
+        "truth/angles.parquet": angles_parquet(
+            JointAngles(truth.t_s, truth.subtract_standing(), truth.zero_offset)
+        ),
         "truth/events.csv": _csv(event_table(truth)),
         "truth/strides.csv": _csv(strides),
     }
@@ -76,7 +78,9 @@ def _squats(truth: SquatTruth) -> Made:
     from server.report.exports import angles_parquet
 
     files = {
-        "truth/angles.parquet": angles_parquet(JointAngles(truth.t_s, truth.zeroed(), truth.zero_offset)),
+        "truth/angles.parquet": angles_parquet(
+            JointAngles(truth.t_s, truth.subtract_standing(), truth.zero_offset)
+        ),
         "truth/phases.csv": _csv(phase_table(truth.phases)),
     }
     return files, {"depths_deg": [math.degrees(depth) for depth in truth.depths_rad]}

@@ -33,7 +33,7 @@ FEET: tuple[Segment, ...] = ("foot_l", "foot_r")
 
 
 @dataclass(frozen=True)
-class Person:
+class DemoPerson:
     """A simulated patient."""
 
     code: str
@@ -45,7 +45,7 @@ class Person:
 
 
 @dataclass(frozen=True)
-class Visit:
+class DemoVisit:
     """One visit.
 
     Parameters
@@ -54,7 +54,7 @@ class Visit:
     condition : how it is walked. fails : a sensor and the second of the take from which on it is silent.
     """
 
-    person: Person
+    person: DemoPerson
     title: str
     script: str
     days_ago: int
@@ -65,28 +65,34 @@ class Visit:
     condition: WalkingCondition = USUAL
 
 
-VOLUNTEER = Person("REF-004", "female", 1989, 1.70, "Simulated. Healthy volunteer, no complaints.")
-STROKE = Person("NR-2107", "male", 1961, 1.76, "Simulated. Left hemiparesis, walks without an aid.", "left")
-KNEE = Person(
+VOLUNTEER = DemoPerson("REF-004", "female", 1989, 1.70, "Simulated. Healthy volunteer, no complaints.")
+STROKE = DemoPerson(
+    "NR-2107", "male", 1961, 1.76, "Simulated. Left hemiparesis, walks without an aid.", "left"
+)
+KNEE = DemoPerson(
     "OR-1188", "female", 1974, 1.66, "Simulated. Left knee replaced, little flexion in swing.", "left"
 )
-NERVE = Person("NR-2133", "male", 1983, 1.81, "Simulated. Left peroneal palsy, drop foot.", "left")
-PARKINSON = Person("NR-2090", "male", 1953, 1.72, "Simulated. Parkinson's disease, short quick steps.")
-CROUCH = Person("PD-0412", "female", 2009, 1.58, "Simulated. Bilateral cerebral palsy, crouch gait.")
-HIP = Person("OR-1203", "male", 1966, 1.79, "Simulated. Pain in the left hip, waiting for surgery.", "left")
-FALLS = Person("GE-0317", "female", 1943, 1.62, "Simulated. Two falls in the last year.")
+NERVE = DemoPerson("NR-2133", "male", 1983, 1.81, "Simulated. Left peroneal palsy, drop foot.", "left")
+PARKINSON = DemoPerson("NR-2090", "male", 1953, 1.72, "Simulated. Parkinson's disease, short quick steps.")
+CROUCH = DemoPerson("PD-0412", "female", 2009, 1.58, "Simulated. Bilateral cerebral palsy, crouch gait.")
+HIP = DemoPerson(
+    "OR-1203", "male", 1966, 1.79, "Simulated. Pain in the left hip, waiting for surgery.", "left"
+)
+FALLS = DemoPerson("GE-0317", "female", 1943, 1.62, "Simulated. Two falls in the last year.")
 
 VISITS = (
-    Visit(VOLUNTEER, "Reference walk, comfortable speed", "healthy", 3, 11),
-    Visit(STROKE, "Discharge from rehabilitation", "hemi_mild", 2, 22, "After six weeks of gait training."),
-    Visit(
+    DemoVisit(VOLUNTEER, "Reference walk, comfortable speed", "healthy", 3, 11),
+    DemoVisit(
+        STROKE, "Discharge from rehabilitation", "hemi_mild", 2, 22, "After six weeks of gait training."
+    ),
+    DemoVisit(
         NERVE, "Barefoot, without orthosis", "drop_foot", 5, 41, condition=replace(USUAL, shoes="barefoot")
     ),
-    Visit(FALLS, "Falls clinic, corridor walk", "elderly", 6, 61, "Two sensors, feet only.", FEET),
-    Visit(HIP, "Before surgery, short set-up", "antalgic", 8, 71, "Pelvis and feet.", ("pelvis", *FEET)),
-    Visit(PARKINSON, "Medication review, on", "parkinson", 9, 51),
-    Visit(KNEE, "Twelve weeks after surgery", "stiff_knee", 12, 31),
-    Visit(
+    DemoVisit(FALLS, "Falls clinic, corridor walk", "elderly", 6, 61, "Two sensors, feet only.", FEET),
+    DemoVisit(HIP, "Before surgery, short set-up", "antalgic", 8, 71, "Pelvis and feet.", ("pelvis", *FEET)),
+    DemoVisit(PARKINSON, "Medication review, on", "parkinson", 9, 51),
+    DemoVisit(KNEE, "Twelve weeks after surgery", "stiff_knee", 12, 31),
+    DemoVisit(
         CROUCH,
         "Annual review",
         "crouch",
@@ -95,15 +101,15 @@ VISITS = (
         "The sensor on the left shank stopped in the second walk.",
         fails=("shank_l", 18.0),
     ),
-    Visit(STROKE, "Admission to rehabilitation", "hemiparetic", 44, 21),
-    Visit(
+    DemoVisit(STROKE, "Admission to rehabilitation", "hemiparetic", 44, 21),
+    DemoVisit(
         VOLUNTEER, "Course with turns, fast", "fast_with_turns", 31, 12, condition=replace(USUAL, pace="fast")
     ),
 )
 """In the order of their analyses: the newest visit of each patient first."""
 
 
-PRESCRIBED: tuple[Person, Mapping[str, object]] = (
+PRESCRIBED: tuple[DemoPerson, Mapping[str, object]] = (
     STROKE,
     {
         "parameter": "stride_length_m",
@@ -116,7 +122,7 @@ PRESCRIBED: tuple[Person, Mapping[str, object]] = (
 """Who is trained in live walks, and how: longer strides (server/demo/live.py)."""
 
 
-def record(visit: Visit) -> Simulation:
+def record(visit: DemoVisit) -> Simulation:
     """Simulate the take of a visit."""
     from core.simulate import Dropout, simulate_scenario
 
@@ -156,7 +162,7 @@ def _add(
     db: Database,
     blobs: BlobStore,
     settings: Settings,
-    visit: Visit,
+    visit: DemoVisit,
     patient_id: str,
     manifest: Mapping[str, object],
     files: Mapping[str, bytes],

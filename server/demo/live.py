@@ -17,7 +17,7 @@ from core.condition import USUAL
 from server.demo.clinic import STROKE
 from server.live.client import stream
 from server.live.pairing import pair
-from server.live.playback import Due, cut, hello_of, paced
+from server.live.playback import DueBatch, cut, hello_of, pace_batches
 from server.services import live, patients, sessions
 from server.settings import Settings, load_settings
 from server.storage.db import Database
@@ -33,10 +33,10 @@ GROWTH: Final = 0.025
 PER_BATCH: Final = 5
 
 
-def training(laps: int = LAPS, seed: int = 5) -> Simulation:
+def plan_training(laps: int = LAPS, seed: int = 5) -> Simulation:
     """Laps of a corridor for about eight minutes, the steps longer from lap to lap."""
     from core.simulate import PATIENTS, Arc, Script, Stand, Straight, simulate
-    from core.simulate.script import scaled
+    from core.simulate.script import scale_script
     from core.simulate.scripts import ON_SKIN
 
     man = PATIENTS["hemi_mild"]
@@ -48,19 +48,19 @@ def training(laps: int = LAPS, seed: int = 5) -> Simulation:
         for way in (pi, -pi):
             course += [Straight(16.0, length, man.step_s), Arc(1.2, way, turn_m, turn_s)]
     script: Script = (Stand(8.0), *course, Stand(5.0))
-    return simulate(scaled(script, walker.scale), walker, seed, ON_SKIN)
+    return simulate(scale_script(script, walker.scale), walker, seed, ON_SKIN)
 
 
 def open_take(settings: Settings) -> str:
     """A session of the patient with an open take; returns its code."""
     with closing(Database(settings.database)) as db, db.write() as c:
-        patient = next(p for p in patients.listing(c) if p.code == STROKE.code)
+        patient = next(p for p in patients.list_patients(c) if p.code == STROKE.code)
         day = now().date()
         session = sessions.create(c, None, patient.id, title=TITLE, performed_on=day, **USUAL.stated)
         return live.open_take(c, None, session.id)[1]
 
 
-async def walk(address: str, code: str, made: Simulation, speed: float = 1.0) -> None:
+async def stream_walk(address: str, code: str, made: Simulation, speed: float = 1.0) -> None:
     """Stream the walk until its end or until the therapist stops it."""
     pairing = pair(address, code)
     stopped = asyncio.Event()
@@ -73,12 +73,12 @@ async def walk(address: str, code: str, made: Simulation, speed: float = 1.0) ->
     await stream(pairing.socket, pairing.token, hello_of(made.recording, pairing.take), frames, hear=hear)
 
 
-async def _until(stopped: asyncio.Event, batches: Sequence[Due], speed: float) -> AsyncIterator[bytes]:
-    async for frame in paced(batches, speed):
+async def _until(stopped: asyncio.Event, batches: Sequence[DueBatch], speed: float) -> AsyncIterator[bytes]:
+    async for frame in pace_batches(batches, speed):
         if stopped.is_set():
             return
         yield frame
 
 
 if __name__ == "__main__":
-    asyncio.run(walk(sys.argv[1], open_take(load_settings()), training()))
+    asyncio.run(stream_walk(sys.argv[1], open_take(load_settings()), plan_training()))

@@ -64,7 +64,7 @@ class JobFeed:
         with self._db.watch() as changes:
             while self._watchers:
                 try:
-                    if await asyncio.to_thread(changes.changed):
+                    if await asyncio.to_thread(changes.has_changed):
                         watched = set(self._watchers)
                         self._deliver(watched, await asyncio.to_thread(self._read, watched))
                 except (SQLAlchemyError, sqlite3.Error):

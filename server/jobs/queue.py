@@ -79,7 +79,7 @@ class Claim:
     params: Mapping[str, Any]
 
 
-class Hold(Enum):
+class LeaseState(Enum):
     """What a heartbeat found: the job is still ours, is to be stopped, or is somebody else's."""
 
     OURS = "ours"
@@ -112,10 +112,10 @@ class JobQueue(Protocol):
     def claim(self, worker: str, kinds: Collection[str]) -> Claim | None:
         """Take the next job of these kinds, if there is one."""
 
-    def heartbeat(self, claim: Claim) -> Hold:
+    def heartbeat(self, claim: Claim) -> LeaseState:
         """Renew the lease."""
 
-    def look(self, claim: Claim) -> Hold:
+    def look(self, claim: Claim) -> LeaseState:
         """Ask whether the job is still ours, without renewing anything."""
 
     def progress(self, claim: Claim, stage: str, fraction: float, message: str | None = None) -> bool:
@@ -130,7 +130,7 @@ class JobQueue(Protocol):
     def stop(self, claim: Claim) -> bool:
         """Confirm a requested cancel."""
 
-    def died(self, claim: Claim) -> bool:
+    def note_death(self, claim: Claim) -> bool:
         """Report that the attempt ended without a word: run again, the third time give up."""
 
     def release(self, claim: Claim) -> bool:

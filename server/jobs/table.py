@@ -12,7 +12,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, and_, insert, or_, select, update
 
-from server.jobs.queue import VIEW_COLUMNS, Claim, Hold, JobView, Publish, job_view
+from server.jobs.queue import VIEW_COLUMNS, Claim, JobView, LeaseState, Publish, job_view
 from server.storage.db import Database
 from server.storage.tables import ACTIVE_STATES, job, new_id, now
 
@@ -136,17 +136,21 @@ class TableQueue:
             return None
         return Claim(row.id, row.attempt, worker, row.kind, row.recording_id, row.requested_by, row.params)
 
-    def heartbeat(self, claim: Claim) -> Hold:
+    def heartbeat(self, claim: Claim) -> LeaseState:
         """See JobQueue."""
-        return self.look(claim) if self._fenced(claim, lease_until=self._clock() + self._lease) else Hold.LOST
+        return (
+            self.look(claim)
+            if self._fenced(claim, lease_until=self._clock() + self._lease)
+            else LeaseState.LOST
+        )
 
-    def look(self, claim: Claim) -> Hold:
+    def look(self, claim: Claim) -> LeaseState:
         """See JobQueue."""
         with self._db.read() as c:
             row = c.execute(select(job.c.cancel_requested).where(_fence(claim))).first()
         if row is None:
-            return Hold.LOST
-        return Hold.CANCEL if row.cancel_requested else Hold.OURS
+            return LeaseState.LOST
+        return LeaseState.CANCEL if row.cancel_requested else LeaseState.OURS
 
     def progress(self, claim: Claim, stage: str, fraction: float, message: str | None = None) -> bool:
         """See JobQueue."""
@@ -170,7 +174,7 @@ class TableQueue:
         """See JobQueue."""
         return self._fenced(claim, **self._ended("cancelled"))
 
-    def died(self, claim: Claim) -> bool:
+    def note_death(self, claim: Claim) -> bool:
         """See JobQueue."""
         with self._db.write() as c:
             return self._bury(c, _fence(claim)) == 1

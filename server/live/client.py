@@ -17,9 +17,9 @@ from websockets.typing import Subprotocol
 
 from core.formats.live_log import PROTOCOL, Hello, hello_json
 from server.live.protocol import FINAL, MOST_MESSAGE_BYTES
-from server.live.sender import Faults, LiveError, Report, Sender
+from server.live.sender import LiveError, Sender, StreamFaults, StreamReport
 
-__all__ = ["Faults", "LiveError", "Report", "stream"]
+__all__ = ["LiveError", "StreamFaults", "StreamReport", "stream"]
 
 FIRST_PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 2.0
@@ -35,12 +35,12 @@ async def stream(
     hello: Hello,
     frames: AsyncIterable[bytes],
     *,
-    faults: Faults | None = None,
+    faults: StreamFaults | None = None,
     patience_s: float = 60.0,
     hear: Callable[[Mapping[str, Any]], None] = lambda _: None,
     seed: int | None = None,
-    report: Report | None = None,
-) -> Report:
+    report: StreamReport | None = None,
+) -> StreamReport:
     """Stream a take and finish it.
 
     Parameters
@@ -58,10 +58,10 @@ async def stream(
     chance = random.Random(seed)  # noqa: S311 - of faults, not of secrets
     sender = Sender(
         hello_json(hello, token).decode(),
-        faults or Faults(),
+        faults or StreamFaults(),
         hear,
         chance,
-        Report() if report is None else report,
+        StreamReport() if report is None else report,
     )
     producing = sender.start(frames)
     try:

@@ -38,7 +38,7 @@ Post = Callable[[Callable[[Any], None], Any], None]
 """How the thread tells the event loop: call this with that; tests call directly."""
 
 
-class Letters:
+class LoopMailbox:
     """Calls to make on an event loop, many of them with one wake-up; may be posted from any thread."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
@@ -62,20 +62,20 @@ class Letters:
             what(value)
 
 
-class Owner(Protocol):
+class LaneOwner(Protocol):
     """Who is told about a lane; all calls are posted to the event loop, in the order they happened."""
 
-    def written(self, size: int) -> None:
+    def note_written(self, size: int) -> None:
         """The log has `size` bytes that can be read."""
 
-    def synced(self, records: int) -> None:
+    def note_synced(self, records: int) -> None:
         """The first `records` records put into the lane survive a power cut."""
 
-    def broke(self, error: OSError) -> None:
+    def note_failure(self, error: OSError) -> None:
         """The disk refused; nothing more is written until the lane is mended."""
 
 
-class Lane:
+class LogLane:
     """One log and the records on their way to it.
 
     The event loop only puts records in; everything else touches the disk and belongs into a thread.
@@ -85,7 +85,7 @@ class Lane:
     log : owned by the lane from now on. owner : told what happens.
     """
 
-    def __init__(self, log: TakeLog, owner: Owner, post: Post) -> None:
+    def __init__(self, log: TakeLog, owner: LaneOwner, post: Post) -> None:
         self.log = log
         self._owner, self._post = owner, post
         self._queue: deque[bytes] = deque()
@@ -110,7 +110,7 @@ class Lane:
                     self._break(error)
                 else:
                     self._written += len(records)
-                    self._post(self._owner.written, self.log.size)
+                    self._post(self._owner.note_written, self.log.size)
             return self._written > self._synced and not self._broken
 
     def sync(self) -> None:
@@ -125,7 +125,7 @@ class Lane:
                 self._break(error)
             else:
                 self._synced = self._written
-                self._post(self._owner.synced, self._synced)
+                self._post(self._owner.note_synced, self._synced)
 
     def mend(self) -> None:
         """Go back to what was synced and count records anew; OSError when the disk still refuses.
@@ -135,7 +135,7 @@ class Lane:
         """
         with self._lock:
             self._queue.clear()
-            self.log.back()
+            self.log.drop_unsynced()
             self._written = self._synced = 0
             self._broken = False
 
@@ -150,7 +150,9 @@ class Lane:
     def _break(self, error: Exception) -> None:
         """Whatever it is (no memory, a mistake of ours): this take says so, the others go on."""
         self._broken = True
-        self._post(self._owner.broke, error if isinstance(error, OSError) else OSError(errno.EIO, str(error)))
+        self._post(
+            self._owner.note_failure, error if isinstance(error, OSError) else OSError(errno.EIO, str(error))
+        )
 
 
 class Committer:
@@ -163,12 +165,12 @@ class Committer:
 
     def __init__(self, interval_s: float = INTERVAL_S) -> None:
         self._interval_s = interval_s
-        self._woken: deque[Lane] = deque()
-        self._dirty: dict[Lane, None] = {}
+        self._woken: deque[LogLane] = deque()
+        self._dirty: dict[LogLane, None] = {}
         self._work = threading.Event()
         self._stopping = False
         self._thread: threading.Thread | None = None
-        self._letters: Letters | None = None
+        self._letters: LoopMailbox | None = None
         self._syncers = ThreadPoolExecutor(SYNCERS, "live-sync")
 
     def start(self) -> None:
@@ -187,10 +189,10 @@ class Committer:
     def post_to(self, loop: asyncio.AbstractEventLoop) -> Post:
         """The way to an event loop, one for all lanes of it."""
         if self._letters is None or self._letters.loop is not loop:
-            self._letters = Letters(loop)
+            self._letters = LoopMailbox(loop)
         return self._letters.post
 
-    def wake(self, lane: Lane) -> None:
+    def wake(self, lane: LogLane) -> None:
         """Say that a lane has something to write; never waits."""
         self._woken.append(lane)
         self._work.set()

@@ -15,12 +15,12 @@ from typing import Final
 from server import audit
 from server.jobs.queue import JobQueue
 from server.live import protocol
-from server.live.intake import Ended
+from server.live.intake import TakeEnd
 from server.live.journal import Journal
 from server.live.pool import EstimatorPool
-from server.live.protocol import Close
+from server.live.protocol import CloseCode
 from server.live.rows import Rows
-from server.live.take import LiveTake
+from server.live.take import ActiveTake
 from server.services import live, live_recordings
 from server.services.errors import NotFound
 from server.settings import Settings
@@ -53,28 +53,28 @@ class Ending:
         rows: Rows,
         journal: Journal,
         pool: EstimatorPool,
-        over: Callable[[live.Take], None],
+        over: Callable[[live.LiveTakeRecord], None],
     ) -> None:
         self._keep = (db, blobs, settings, queue)
         self._settings = settings
         self._rows = rows
         self._journal, self._pool, self._over = journal, pool, over
         self._asked: dict[str, audit.Actor | None] = {}
-        self._draining: dict[str, LiveTake] = {}
+        self._draining: dict[str, ActiveTake] = {}
 
-    def ask(self, take: LiveTake, actor: audit.Actor | None) -> None:
+    def ask(self, take: ActiveTake, actor: audit.Actor | None) -> None:
         """Somebody (None: the program) ends this take here, not the tablet."""
         self._asked[take.id] = actor
 
-    def unask(self, take: LiveTake) -> None:
+    def unask(self, take: ActiveTake) -> None:
         """It did not work."""
         del self._asked[take.id]
 
-    def draining(self, take_id: str) -> LiveTake | None:
+    def draining(self, take_id: str) -> ActiveTake | None:
         """A take that is over and whose estimator still speaks."""
         return self._draining.get(take_id)
 
-    async def complete(self, take: LiveTake, end: Ended, forget: Callable[[], None]) -> None:
+    async def complete(self, take: ActiveTake, end: TakeEnd, forget: Callable[[], None]) -> None:
         """Take all steps; `forget` is called once the take is over in the database."""
         here = take.id in self._asked
         actor = self._asked.pop(take.id, None)
@@ -102,13 +102,13 @@ class Ending:
             self._draining.pop(take.id, None)
             self._pool.leave(take.id)
 
-    def _tell(self, take: LiveTake, here: bool) -> None:
+    def _tell(self, take: ActiveTake, here: bool) -> None:
         if take.tablet is None:
             return
         if take.recording_id is not None:
-            take.tablet.say(protocol.finished(take.recording_id, take.problem))
+            take.tablet.say(protocol.announce_finish(take.recording_id, take.problem))
         if here or take.recording_id is None:
-            take.tablet.shut(Close.ENDED, "take_ended")
+            take.tablet.shut(CloseCode.ENDED, "take_ended")
 
     async def _store(self, take_id: str) -> str | None:
         """Store until it works: the log holds acknowledged samples."""
@@ -119,7 +119,7 @@ class Ending:
                 log.exception("live take %s is not stored yet; trying again", take_id)
             await asyncio.sleep(AGAIN_S)
 
-    async def _drain(self, take: LiveTake) -> None:
+    async def _drain(self, take: ActiveTake) -> None:
         """Hear the estimator out: the last strides and cues are still on their way."""
         if self._pool.follows(take.id) and take.estimate != "failed":
             with contextlib.suppress(TimeoutError):

@@ -16,14 +16,14 @@ from core.errors import SagittalError
 from server.live import follower
 from server.live.follower import Follower
 from server.live.messages import (
-    Begin,
-    Broken,
     Charge,
     Command,
-    End,
-    Grow,
+    EstimateFailed,
+    EstimatorReady,
+    FollowTake,
+    ForgetTake,
+    LogGrown,
     Order,
-    Ready,
     Report,
     decode_order,
     encode,
@@ -34,7 +34,7 @@ from server.processes.child import enter_child
 log = logging.getLogger("server.live.estimator")
 
 
-class Estimator:
+class EstimatorWorker:
     """The takes of this process; one that throws is given up, the others go on."""
 
     def __init__(self, say: Callable[[Report], None]) -> None:
@@ -54,10 +54,10 @@ class Estimator:
     def obey(self, order: Order) -> None:
         """Take one order; about a take that was given up there is nothing to do."""
         match order:
-            case Begin():
+            case FollowTake():
                 self._drop(order.take)
                 self._guarded(order.take, lambda: self._begin(order))
-            case Grow():
+            case LogGrown():
                 for take, size in order.sizes.items():
                     if take in self._takes:
                         self._takes[take].grow(size, order.at)
@@ -65,7 +65,7 @@ class Estimator:
                 self._guarded(order.take, lambda: self._takes[order.take].command(order))
             case Charge() if order.take in self._takes:
                 self._takes[order.take].charge(order.percent)
-            case End():
+            case ForgetTake():
                 self._drop(order.take)
 
     def work(self) -> None:
@@ -80,7 +80,7 @@ class Estimator:
         for name, take in list(self._takes.items()):
             self._guarded(name, take.show)
 
-    def _begin(self, order: Begin) -> None:
+    def _begin(self, order: FollowTake) -> None:
         self._takes[order.take] = Follower(order, self._say)
 
     def _drop(self, take: str) -> None:
@@ -97,17 +97,17 @@ class Estimator:
             if not isinstance(error, SagittalError):
                 log.exception("the estimate of live take %s failed", take)
             self._drop(take)
-            said = follower.broken(error)
-            self._say(Broken(take, said.code, said.message))
+            said = follower.describe_failure(error)
+            self._say(EstimateFailed(take, said.code, said.message))
 
 
 def main() -> None:
     """Follow takes until the web process closes the socket."""
     line, _ = enter_child()
-    warm()
+    compile_kernels()
     gc.collect()
     gc.freeze()  # what libraries hold is never garbage: looking through it again costs every take 50 ms
-    line.send(encode(Ready()))
+    line.send(encode(EstimatorReady()))
     try:
         follow(line)
     except (EOFError, BrokenPipeError, ConnectionError):
@@ -116,7 +116,7 @@ def main() -> None:
 
 def follow(line: Channel) -> None:
     """Read orders and logs in turn; raises EOFError when the other side has gone."""
-    estimator = Estimator(lambda report: line.send(encode(report)))
+    estimator = EstimatorWorker(lambda report: line.send(encode(report)))
     # one poll object for all: this is asked hundreds of times a second
     orders = select.poll()
     orders.register(line.fileno(), select.POLLIN)
@@ -132,9 +132,9 @@ def follow(line: Channel) -> None:
         estimator.work()
 
 
-def warm() -> None:
+def compile_kernels() -> None:
     """Compile the kernels or load them from the cache, before a patient stands there."""
-    from core.online import warm as warm_online
+    from core.online import compile_live_kernels as warm_online
 
     warm_online()
 

@@ -16,14 +16,24 @@ from core.errors import InputError, Notice, SagittalError
 from core.events.result import GaitEvent
 from core.feedback import Baseline, Prescription
 from core.feedback.engine import COMMANDS, FeedbackEngine
-from core.formats.live_log import Batch, Hello, Record, decode_batch, parse_hello, scan, scan_records
+from core.formats.live_log import Hello, LogRecord, SampleBatch, decode_batch, parse_hello, scan, scan_records
 from core.frames import SIDES, Protocol, Side
-from core.online import Online
-from core.online.frame import LiveFrame, Trail
+from core.online import OnlineSession
+from core.online.frame import AngleTrail, LiveFrame
 from core.parameters.live_stride import LiveStride
 from core.recording import Subject
 from server.live import wire
-from server.live.messages import STALE_S, Begin, Command, Item, Kind, Picture, Report, Standing, Through
+from server.live.messages import (
+    STALE_S,
+    Command,
+    FeedbackStatus,
+    FeedItem,
+    FollowTake,
+    Kind,
+    LogProcessed,
+    Picture,
+    Report,
+)
 
 CHUNK_BYTES: Final = 1 << 14
 """Read and estimated in one turn, half a second of seven sensors: who catches up lets others through."""
@@ -46,7 +56,7 @@ class Follower:
     """
 
     def __init__(
-        self, begin: Begin, say: Callable[[Report], None], clock: Callable[[], float] = time.monotonic
+        self, begin: FollowTake, say: Callable[[Report], None], clock: Callable[[], float] = time.monotonic
     ) -> None:
         self.take = begin.take
         self._begin = begin
@@ -57,7 +67,7 @@ class Follower:
         self._size = begin.size
         self._arrived: deque[tuple[int, float]] = deque()
         self._commands: deque[Command] = deque(begin.commands)
-        self._online: Online | None = None
+        self._online: OnlineSession | None = None
         self._hello: Hello | None = None
         self._engine = _engine(begin)
         self._battery: Mapping[str, float] = {}
@@ -70,7 +80,7 @@ class Follower:
         self._delays = _Delays()
         self._late = False
         self._last: LiveFrame | None = None
-        self._trail: deque[Trail] = deque(maxlen=PICTURE_TRAILS)
+        self._trail: deque[AngleTrail] = deque(maxlen=PICTURE_TRAILS)
         self._sent_at = self._slow_at = -1.0
         self._slow: Mapping[str, Any] = {}
         self._slow_stage = ""
@@ -142,10 +152,10 @@ class Follower:
         if self._file is not None:
             self._file.close()
 
-    def _use(self, record: Record, end: int) -> None:
+    def _use(self, record: LogRecord, end: int) -> None:
         if record.kind == "H":
             self._hello = parse_hello(record.body)
-            self._online = Online(
+            self._online = OnlineSession(
                 self._hello,
                 Subject(height_m=self._begin.height_m),
                 _protocol(self._begin.protocol),
@@ -161,7 +171,7 @@ class Follower:
                 self._tell(frame)
             self._obey()
         elif record.kind == "F":
-            self._say(Through(self.take))
+            self._say(LogProcessed(self.take))
 
     def _obey(self) -> None:
         """Carry out the commands whose batch is the next one."""
@@ -184,7 +194,7 @@ class Follower:
         for notice in frame.notices:
             self._item("notice", notice.t_s, wire.notice(notice))
         if frame.stage == "running" and self._stage != "running":
-            self._item("calibration", frame.t_s, wire.calibrated(frame))
+            self._item("calibration", frame.t_s, wire.announce_calibration(frame))
         self._stage = frame.stage
         self._last = frame
         self._trail.append(frame.trail)
@@ -209,15 +219,15 @@ class Follower:
         body = wire.encode(wire.feedback(state))
         if body != self._standing:
             self._standing = body
-            self._say(Standing(self.take, body))
+            self._say(FeedbackStatus(self.take, body))
 
     def _item(self, kind: Kind, t_s: float | None, content: dict[str, Any]) -> None:
         if self._late:
             content["late"] = True
-        self._say(Item(self.take, kind, self._said[kind], t_s, wire.encode(content), self._late))
+        self._say(FeedItem(self.take, kind, self._said[kind], t_s, wire.encode(content), self._late))
         self._said[kind] += 1
 
-    def _note_arrival(self, batch: Batch, end: int) -> None:
+    def _note_arrival(self, batch: SampleBatch, end: int) -> None:
         """Find out whether this batch is fresh; what was in the log before we came is not."""
         if end <= self._begin.size:
             self._late = True
@@ -237,7 +247,7 @@ class _Delays:
         self._fastest: dict[int, tuple[float, float]] = {}
         self._due: float | None = None
 
-    def arrived(self, batch: Batch, rate_hz: float, at: float) -> None:
+    def arrived(self, batch: SampleBatch, rate_hz: float, at: float) -> None:
         n = len(batch.samples)
         last = (n - 1) / rate_hz if batch.offsets_us is None else float(batch.offsets_us[-1]) * 1e-6
         sampled = batch.t0_us * 1e-6 + last
@@ -285,7 +295,7 @@ def _open_log(path: str) -> BinaryIO:
         ) from None
 
 
-def _engine(begin: Begin) -> FeedbackEngine | None:
+def _engine(begin: FollowTake) -> FeedbackEngine | None:
     if begin.prescription is None:
         return None
     baseline = None if begin.baseline is None else Baseline.from_json(begin.baseline)
@@ -296,7 +306,7 @@ def _protocol(name: str) -> Protocol:
     return cast("Protocol", name)  # the database holds only known ones
 
 
-def broken(error: Exception) -> Notice:
+def describe_failure(error: Exception) -> Notice:
     """What is said of a take whose estimate threw; what core itself refuses it says why."""
     if isinstance(error, SagittalError):
         return Notice(error.code, error.message, severity="error")

@@ -20,15 +20,23 @@ from server.jobs.queue import JobQueue
 from server.live import protocol
 from server.live.committer import Committer
 from server.live.ending import Ending
-from server.live.intake import Ended
+from server.live.intake import TakeEnd
 from server.live.journal import Journal
-from server.live.messages import Begin, Broken, Item, Picture, Report, Standing, Through
+from server.live.messages import (
+    EstimateFailed,
+    FeedbackStatus,
+    FeedItem,
+    FollowTake,
+    LogProcessed,
+    Picture,
+    Report,
+)
 from server.live.pool import EstimatorPool
-from server.live.protocol import Close
+from server.live.protocol import CloseCode
 from server.live.recorder import open_recorder
 from server.live.room import Room
 from server.live.rows import Rows
-from server.live.take import Line, LiveTake, standing_of
+from server.live.take import ActiveTake, TabletLink, describe_unjoined
 from server.services import live, live_recordings
 from server.services.errors import Conflict
 from server.services.reviewed import ReviewedAnalyses
@@ -59,7 +67,7 @@ class Hub:
             settings, db, reviewed.blobs, queue, self.rows, self.journal, self.pool, self._tell_over
         )
         self._committer = Committer()
-        self._takes: dict[str, LiveTake] = {}
+        self._takes: dict[str, ActiveTake] = {}
         self._rooms: dict[str, Room] = {}
         self._entering = asyncio.Lock()
         self._ticking: asyncio.Task[None] | None = None
@@ -96,7 +104,7 @@ class Hub:
         for take in tuple(self._takes.values()):
             await take.recorder.close()
             if take.tablet is not None:
-                take.tablet.shut(Close.GOING_AWAY, "server_stops")
+                take.tablet.shut(CloseCode.GOING_AWAY, "server_stops")
         # the acknowledgements of what close has just synced are on their way through the loop
         await asyncio.sleep(0)
         await self.pool.stop()
@@ -106,7 +114,7 @@ class Hub:
 
     # the tablet
 
-    async def enter(self, row: live.Take, hello: Hello | None) -> LiveTake:
+    async def enter(self, row: live.LiveTakeRecord, hello: Hello | None) -> ActiveTake:
         """The open take of a tablet, with its log; raises ProtocolError, InputError."""
         async with self._entering:
             take = self._takes.get(row.id)
@@ -117,12 +125,12 @@ class Hub:
             training, earlier = await asyncio.to_thread(self.rows.prepare, row)
             room = self.room(row.session_id)
             room.clear()
-            take = LiveTake(self, row, room, training, earlier)
+            take = ActiveTake(self, row, room, training, earlier)
             path = live_recordings.log_path(self._settings.live, row.id)
             take.recorder = await open_recorder(path, hello, self._committer, take)
             take.source = take.recorder.hello.source
             self._takes[row.id] = take
-            take.grown(take.recorder.size)
+            take.note_growth(take.recorder.size)
         if take.recorder.damage is not None:
             _notify(take, "bad", take.recorder.damage.sentence)
             self._note(take, live.DAMAGED, take.recorder.damage.sentence)
@@ -133,15 +141,15 @@ class Hub:
         self.tell_state(take)
         return take
 
-    def attach(self, take: LiveTake, tablet: Line) -> None:
+    def attach(self, take: ActiveTake, tablet: TabletLink) -> None:
         """A tablet has been greeted; one that was there before is sent away."""
         if take.tablet is not None:
-            take.tablet.shut(Close.REPLACED, "replaced")
+            take.tablet.shut(CloseCode.REPLACED, "replaced")
         take.tablet = tablet
         take.tell_stage()
         self.tell_state(take)
 
-    def detach(self, take: LiveTake, tablet: Line) -> None:
+    def detach(self, take: ActiveTake, tablet: TabletLink) -> None:
         """A tablet has gone."""
         if take.tablet is tablet:
             take.tablet = None
@@ -179,12 +187,12 @@ class Hub:
         self.tell_state(take)
         return take.standing()
 
-    async def close(self, actor: audit.Actor | None, session_id: str) -> live.Take:
+    async def close(self, actor: audit.Actor | None, session_id: str) -> live.LiveTakeRecord:
         """End a take without the tablet; what has come becomes the recording; raises Conflict."""
         row = await asyncio.to_thread(self.rows.open_take, session_id)
         take = self._takes.get(row.id)
         if take is None:
-            over = await asyncio.to_thread(self.rows.end, actor, row.id, "closed", Ended(0, ""))
+            over = await asyncio.to_thread(self.rows.end, actor, row.id, "closed", TakeEnd(0, ""))
             self._tell_over(over)
             return over
         self._ending.ask(take, actor)
@@ -207,7 +215,7 @@ class Hub:
             del self._takes[take.id]
             await take.recorder.close()
             if take.tablet is not None:
-                take.tablet.shut(Close.ENDED, "take_ended")
+                take.tablet.shut(CloseCode.ENDED, "take_ended")
 
     # browsers
 
@@ -221,7 +229,7 @@ class Hub:
         if room is not None and room.is_empty and self.take_of(session_id) is None:
             del self._rooms[session_id]
 
-    def take_of(self, session_id: str) -> LiveTake | None:
+    def take_of(self, session_id: str) -> ActiveTake | None:
         """The session's take that a tablet has joined, None when there is none."""
         return next((t for t in self._takes.values() if t.session_id == session_id), None)
 
@@ -230,36 +238,36 @@ class Hub:
         take = self.take_of(session_id)
         if take is not None:
             return take.standing()
-        return standing_of(self.rows.current(session_id))
+        return describe_unjoined(self.rows.current(session_id))
 
-    def tell_state(self, take: LiveTake) -> None:
+    def tell_state(self, take: ActiveTake) -> None:
         """Tell the browsers where a take stands; of one that is over `_tell_over` has the last word."""
         if self._takes.get(take.id) is take:
             take.room.say("state", msgspec.json.encode(take.standing()))
 
-    def tell_row(self, row: live.Take) -> None:
+    def tell_row(self, row: live.LiveTakeRecord) -> None:
         """Tell the browsers of a take that no tablet has joined yet."""
         take = self._takes.get(row.id)
         if take is None:
             self.room(row.session_id).clear()
-            self.room(row.session_id).say("state", msgspec.json.encode(standing_of(row)))
+            self.room(row.session_id).say("state", msgspec.json.encode(describe_unjoined(row)))
         else:
             self.tell_state(take)
 
     # what the take tells
 
-    def note_started(self, take: LiveTake) -> None:
+    def note_started(self, take: ActiveTake) -> None:
         """The first batch has come."""
         self._spawn(asyncio.to_thread(self.rows.start, take.id, take.recorder.hello.source))
         self.tell_state(take)
 
-    def note_ended(self, take: LiveTake, end: Ended) -> None:
+    def note_ended(self, take: ActiveTake, end: TakeEnd) -> None:
         """The end is durable."""
         self._spawn(self._ending.complete(take, end, lambda: self._forget(take)))
 
     # the estimators
 
-    def _begin(self, take_id: str) -> Begin | None:
+    def _begin(self, take_id: str) -> FollowTake | None:
         take = self._takes.get(take_id)
         return None if take is None else take.begin()
 
@@ -276,37 +284,37 @@ class Hub:
         if take is None:
             return
         match report:
-            case Picture() | Standing() if draining is not None:
+            case Picture() | FeedbackStatus() if draining is not None:
                 pass  # the session may have another take by now
-            case Through():
+            case LogProcessed():
                 take.told.set()
             case Picture():
                 if take.estimate != "ok":
                     take.estimate = "ok"
                     self.tell_state(take)
                 take.show(report)
-            case Item():
+            case FeedItem():
                 take.tell(report)
-            case Standing():
+            case FeedbackStatus():
                 take.room.say("feedback", report.body)
-            case Broken():
+            case EstimateFailed():
                 take.estimate = "failed"
                 take.told.set()
                 _notify(take, "bad", report.message)
                 self._note(take, report.code, report.message)
                 self.tell_state(take)
 
-    def _note(self, take: LiveTake, code: str, text: str) -> None:
+    def _note(self, take: ActiveTake, code: str, text: str) -> None:
         """Keep with the take what the server has to say of it."""
         self.journal.add(take.id, "notice", take.t_s, live.own_notice(code, text))
 
     # threads and tasks
 
-    def _forget(self, take: LiveTake) -> None:
+    def _forget(self, take: ActiveTake) -> None:
         self._takes.pop(take.id, None)
 
-    def _tell_over(self, row: live.Take) -> None:
-        self.room(row.session_id).say("state", msgspec.json.encode(standing_of(row)))
+    def _tell_over(self, row: live.LiveTakeRecord) -> None:
+        self.room(row.session_id).say("state", msgspec.json.encode(describe_unjoined(row)))
         self.leave(row.session_id)
 
     async def _tick(self) -> None:
@@ -335,5 +343,5 @@ class Hub:
             log.error("a live task failed", exc_info=task.exception())
 
 
-def _notify(take: LiveTake, severity: str, text: str) -> None:
+def _notify(take: ActiveTake, severity: str, text: str) -> None:
     take.room.say("notice", msgspec.json.encode({"type": "notice", "severity": severity, "text": text}))

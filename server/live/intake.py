@@ -1,7 +1,7 @@
 """The rules of one take's stream as a state machine: no socket, no clock, no disk.
 
 seq below the next one → a duplicate, ignored · the next one → kept · above → closed, the tablet resumes.
-Acknowledged is only what `synced` has been told of.
+Acknowledged is only what `note_synced` has been told of.
 """
 
 from __future__ import annotations
@@ -12,28 +12,28 @@ from dataclasses import dataclass
 
 from core.errors import InputError
 from core.formats.live_log import (
-    Batch,
     Finish,
     Header,
     Hello,
     Kind,
-    Record,
+    LogRecord,
+    SampleBatch,
     check_fits,
     encode_batch,
+    encode_samples,
     finish_json,
     parse_finish,
     parse_hello,
-    payload,
-    peek,
+    read_batch_header,
 )
 from server.live import protocol
-from server.live.protocol import MOST_UNACKED, Close, ProtocolError
+from server.live.protocol import MOST_UNACKED, CloseCode, ProtocolError
 
 MISMATCH = "finish_mismatch"
 
 
 @dataclass(frozen=True)
-class Ended:
+class TakeEnd:
     """How a take has ended; it takes no more batches.
 
     Parameters
@@ -48,7 +48,7 @@ class Ended:
 
 
 @dataclass(frozen=True)
-class Answer:
+class IntakeAnswer:
     """What to do with one message.
 
     Parameters
@@ -59,19 +59,19 @@ class Answer:
     """
 
     say: str | None = None
-    close: Close | None = None
+    close: CloseCode | None = None
     reason: str = ""
     keep: tuple[Kind, bytes] | None = None
     battery: Mapping[str, float] | None = None
-    ended: Ended | None = None
+    ended: TakeEnd | None = None
 
 
-NOTHING = Answer()
+NOTHING = IntakeAnswer()
 
 
-def refusal(error: ProtocolError) -> Answer:
+def refuse(error: ProtocolError) -> IntakeAnswer:
     """Say why and close."""
-    return Answer(protocol.error(error.code, error.message), error.close, error.code)
+    return IntakeAnswer(protocol.error(error.code, error.message), error.close, error.code)
 
 
 @dataclass
@@ -99,7 +99,7 @@ class Intake:
         self._spans: dict[int, _Span] = {}
 
     @property
-    def ended(self) -> Ended | None:
+    def ended(self) -> TakeEnd | None:
         """The end, once it is durable."""
         return self._ended() if self._end_durable else None
 
@@ -118,7 +118,7 @@ class Intake:
         """Whether an end was said, durable or not."""
         return self._said is not None
 
-    def replay(self, record: Record) -> None:
+    def replay(self, record: LogRecord) -> None:
         """Learn from a record of the log, all of which is durable.
 
         Raises
@@ -130,7 +130,7 @@ class Intake:
         if record.kind == "H":
             self.hello = parse_hello(record.body)
         elif record.kind == "B":
-            header = peek(record.body)
+            header = read_batch_header(record.body)
             if header.seq != self.next_seq:
                 raise InputError("live_log_order", f"Batch {header.seq} follows {self.next_seq - 1}.")
             self._take(record.body, header)
@@ -139,12 +139,12 @@ class Intake:
             self._said = parse_finish(record.body)
             self._end_durable = True
 
-    def greet(self, hello: Hello) -> Answer:
+    def greet(self, hello: Hello) -> IntakeAnswer:
         """Answer a hello; a tablet that comes back must describe the same sensors."""
         if self.hello is None:
             self.hello = hello
         if hello != self.hello:
-            return refusal(
+            return refuse(
                 ProtocolError(
                     "hello_changed",
                     "The hello differs from the one this take began with; end the take and begin a new one "
@@ -153,9 +153,9 @@ class Intake:
             )
         # not `next_seq`: whoever takes a welcome for an acknowledgement must not be wrong; what is sent
         # twice for it is a duplicate
-        return Answer(protocol.welcome(self.durable))
+        return IntakeAnswer(protocol.welcome(self.durable))
 
-    def offer(self, message: bytes | str) -> Answer:
+    def offer(self, message: bytes | str) -> IntakeAnswer:
         """Answer one message of a greeted tablet; what is to be kept is in the answer."""
         try:
             if isinstance(message, bytes):
@@ -164,63 +164,65 @@ class Intake:
             match protocol.parse(message):
                 case Hello() as hello:
                     return self.greet(hello)
-                case Batch() as batch:
+                case SampleBatch() as batch:
                     return self._batch(encode_batch(batch))
                 case Finish() as finish:
                     return self._finish(finish)
                 case battery:
-                    return Answer(battery=battery.percent)
+                    return IntakeAnswer(battery=battery.percent)
         except ProtocolError as error:
-            return refusal(error)
+            return refuse(error)
         except InputError as error:
-            return refusal(ProtocolError(error.code, error.message))
+            return refuse(ProtocolError(error.code, error.message))
 
-    def end(self) -> Answer:
+    def end(self) -> IntakeAnswer:
         """End the take from this side, with what has come so far."""
         if self._said is not None:
-            return Answer(ended=self.ended)
+            return IntakeAnswer(ended=self.ended)
         return self._keep_end(Finish(self.next_seq, self._hash.hexdigest()))
 
-    def synced(self, records: int) -> None:
+    def note_synced(self, records: int) -> None:
         """The first `records` records kept since the take was opened are durable."""
         self.durable = min(self._base + records, self.next_seq)
         self._end_durable = self._end_durable or self._base + records > self.next_seq
 
-    def _batch(self, frame: bytes) -> Answer:
-        header = peek(frame)
+    def _batch(self, frame: bytes) -> IntakeAnswer:
+        header = read_batch_header(frame)
         if self.hello is None:
             raise ProtocolError("hello_missing", "A batch came before the hello.")
         check_fits(header, self.hello)
         if header.seq < self.next_seq:
-            return Answer(protocol.ack(self.durable))
+            return IntakeAnswer(protocol.ack(self.durable))
         if self._said is not None:
-            raise ProtocolError("take_ended", "The take has ended; it takes no more batches.", Close.ENDED)
+            raise ProtocolError(
+                "take_ended", "The take has ended; it takes no more batches.", CloseCode.ENDED
+            )
         if header.seq > self.next_seq:
             raise ProtocolError(
-                "gap", f"Batch {header.seq} came, {self.next_seq} is next; connect again.", Close.GAP
+                "gap", f"Batch {header.seq} came, {self.next_seq} is next; connect again.", CloseCode.GAP
             )
         if self.next_seq - self.durable >= MOST_UNACKED:
             raise ProtocolError(
                 "too_many_unacked",
                 f"{MOST_UNACKED} batches are not acknowledged yet; wait at {protocol.MAX_UNACKED}.",
-                Close.TOO_MANY,
+                CloseCode.TOO_MANY,
             )
         self._take(frame, header)
-        return Answer(keep=("B", frame))
+        return IntakeAnswer(keep=("B", frame))
 
     def _take(self, frame: bytes, header: Header) -> None:
-        self._hash.update(payload(frame, header))
+        self._hash.update(encode_samples(frame, header))
         self.next_seq += 1
         if self.hello is not None:
             span = self._spans.setdefault(header.stream, _Span(header.t0_us))
             lasted = (header.n_samples - 1) / self.hello.stream(header.stream).rate_hz
             span.length_s = max(span.length_s, 1e-6 * (header.t0_us - span.began_us) + lasted)
 
-    def _finish(self, finish: Finish) -> Answer:
+    def _finish(self, finish: Finish) -> IntakeAnswer:
         if self._said is not None:
-            return Answer(ended=self.ended)
+            return IntakeAnswer(ended=self.ended)
         if finish.count > self.next_seq:
-            return Answer(
+            return IntakeAnswer(
                 protocol.error(
                     MISMATCH,
                     f"The tablet counts {finish.count} batches, {self.next_seq} have come; send the rest and "
@@ -230,10 +232,10 @@ class Intake:
             )
         return self._keep_end(finish)
 
-    def _keep_end(self, finish: Finish) -> Answer:
+    def _keep_end(self, finish: Finish) -> IntakeAnswer:
         self._said = finish
-        return Answer(keep=("F", finish_json(finish)))
+        return IntakeAnswer(keep=("F", finish_json(finish)))
 
-    def _ended(self) -> Ended:
+    def _ended(self) -> TakeEnd:
         own = Finish(self.next_seq, self._hash.hexdigest())
-        return Ended(own.count, own.sha256, None if self._said == own else MISMATCH)
+        return TakeEnd(own.count, own.sha256, None if self._said == own else MISMATCH)

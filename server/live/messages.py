@@ -27,7 +27,7 @@ class Command(msgspec.Struct, frozen=True, tag=True):
     value: Any = None
 
 
-class Begin(msgspec.Struct, frozen=True, tag=True):
+class FollowTake(msgspec.Struct, frozen=True, tag=True):
     """Web to estimator: follow this take from the start of its log.
 
     Parameters
@@ -46,7 +46,7 @@ class Begin(msgspec.Struct, frozen=True, tag=True):
     commands: list[Command]
 
 
-class Grow(msgspec.Struct, frozen=True, tag=True):
+class LogGrown(msgspec.Struct, frozen=True, tag=True):
     """Web to estimator: logs have so many bytes now; `at` = monotonic time of the newest."""
 
     sizes: dict[str, int]
@@ -60,17 +60,17 @@ class Charge(msgspec.Struct, frozen=True, tag=True):
     percent: dict[str, float]
 
 
-class End(msgspec.Struct, frozen=True, tag=True):
+class ForgetTake(msgspec.Struct, frozen=True, tag=True):
     """Web to estimator: forget this take."""
 
     take: str
 
 
-class Ready(msgspec.Struct, frozen=True, tag=True):
+class EstimatorReady(msgspec.Struct, frozen=True, tag=True):
     """Estimator to web: everything is imported and compiled."""
 
 
-class Pose(msgspec.Struct, frozen=True, tag=True):
+class FigurePose(msgspec.Struct, frozen=True, tag=True):
     """The figure at one moment: float32 q (n, 4) and p (n, 3) of the named segments, as `LiveFrame`."""
 
     segments: list[str]
@@ -96,10 +96,10 @@ class Picture(msgspec.Struct, frozen=True, tag=True):
     body: bytes
     delay_s: float | None
     size: int
-    pose: Pose | None
+    pose: FigurePose | None
 
 
-class Item(msgspec.Struct, frozen=True, tag=True):
+class FeedItem(msgspec.Struct, frozen=True, tag=True):
     """Estimator to web: something that happens once, the `k`th of its kind; a replay says it again.
 
     Parameters
@@ -115,20 +115,20 @@ class Item(msgspec.Struct, frozen=True, tag=True):
     late: bool
 
 
-class Standing(msgspec.Struct, frozen=True, tag=True):
+class FeedbackStatus(msgspec.Struct, frozen=True, tag=True):
     """Estimator to web: where the feedback stands, JSON for the browsers."""
 
     take: str
     body: bytes
 
 
-class Through(msgspec.Struct, frozen=True, tag=True):
+class LogProcessed(msgspec.Struct, frozen=True, tag=True):
     """Estimator to web: the log has its end, and everything before it has been told."""
 
     take: str
 
 
-class Broken(msgspec.Struct, frozen=True, tag=True):
+class EstimateFailed(msgspec.Struct, frozen=True, tag=True):
     """Estimator to web: this take cannot be estimated any further; it is recorded all the same."""
 
     take: str
@@ -136,8 +136,8 @@ class Broken(msgspec.Struct, frozen=True, tag=True):
     message: str
 
 
-Order = Begin | Grow | Command | Charge | End
-Report = Ready | Picture | Item | Standing | Through | Broken
+Order = FollowTake | LogGrown | Command | Charge | ForgetTake
+Report = EstimatorReady | Picture | FeedItem | FeedbackStatus | LogProcessed | EstimateFailed
 
 encode = msgspec.msgpack.encode
 decode_order = msgspec.msgpack.Decoder(Order).decode

@@ -14,7 +14,7 @@ from server.live.sender import LiveError
 
 
 @dataclass(frozen=True)
-class Pairing:
+class PairingResult:
     """What a code opens: `socket` is a whole ws:// or wss:// address."""
 
     token: str
@@ -24,7 +24,7 @@ class Pairing:
     socket: str
 
 
-def pair(address: str, code: str) -> Pairing:
+def pair(address: str, code: str) -> PairingResult:
     """Pair with the server at an http:// or https:// address.
 
     Raises
@@ -51,7 +51,7 @@ def pair(address: str, code: str) -> Pairing:
     except (OSError, ValueError) as error:
         raise LiveError("unreachable", f"{base} cannot be reached: {error}.") from None
     scheme = "wss" if parts.scheme == "https" else "ws"
-    return Pairing(
+    return PairingResult(
         token=said["token"],
         take=said["take"],
         session_title=said.get("session_title") or "",

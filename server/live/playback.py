@@ -18,22 +18,22 @@ from core.errors import InputError
 from core.formats.live_log import (
     CHANNELS,
     MOST_SAMPLES,
-    Batch,
     Hello,
+    SampleBatch,
     SensorInfo,
     StreamInfo,
     encode_batch,
 )
 from core.frames import Floats
 from core.recording import ImuStream, Recording
-from core.rest import runs
+from core.rest import find_runs
 
 ON_GRID: Final = 0.01
 """Largest distance from the grid in samples, as core/timeline takes it."""
 
 
 @dataclass(frozen=True)
-class Due:
+class DueBatch:
     """A batch and when its last sample is there, in seconds from the first sample of the recording."""
 
     at_s: float
@@ -72,7 +72,7 @@ def hello_of(recording: Recording, take: str) -> Hello:
     )
 
 
-def cut(recording: Recording, per_batch: int) -> list[Due]:
+def cut(recording: Recording, per_batch: int) -> list[DueBatch]:
     """All batches in the order in which they are due.
 
     Parameters
@@ -93,12 +93,12 @@ def cut(recording: Recording, per_batch: int) -> list[Due]:
     )
     found = []
     for seq, (at_us, b) in enumerate(pieces):
-        batch = Batch(b.stream, seq, b.t0_us, at_us, b.samples, b.offsets_us)
-        found.append(Due(at_us * 1e-6, encode_batch(batch)))
+        batch = SampleBatch(b.stream, seq, b.t0_us, at_us, b.samples, b.offsets_us)
+        found.append(DueBatch(at_us * 1e-6, encode_batch(batch)))
     return found
 
 
-async def paced(batches: Sequence[Due], speed: float) -> AsyncIterator[bytes]:
+async def pace_batches(batches: Sequence[DueBatch], speed: float) -> AsyncIterator[bytes]:
     """The batches when they are due; `speed` 2 = twice as fast, 0 = at once."""
     loop = asyncio.get_running_loop()
     began = loop.time()
@@ -124,7 +124,7 @@ def _grids(recording: Recording) -> list[_Grid]:
     return grids
 
 
-def _pieces(number: int, grid: _Grid, per_batch: int, begin_s: float) -> Iterator[tuple[int, Batch]]:
+def _pieces(number: int, grid: _Grid, per_batch: int, begin_s: float) -> Iterator[tuple[int, SampleBatch]]:
     """When a batch is due in µs, and the batch without its place in the sequence."""
     first = grid.sensors[0][1]
     if grid.ticks(first) is None:
@@ -133,7 +133,7 @@ def _pieces(number: int, grid: _Grid, per_batch: int, begin_s: float) -> Iterato
         for i in range(0, len(t_us), per_batch):
             t = t_us[i : i + per_batch]
             offsets = (t - t[0]).astype(np.uint32)
-            yield int(t[-1]), Batch(number, 0, int(t[0]), 0, samples[i : i + per_batch], offsets)
+            yield int(t[-1]), SampleBatch(number, 0, int(t[0]), 0, samples[i : i + per_batch], offsets)
         return
     ticks = [np.asarray(grid.ticks(s), np.int64) for _, s in grid.sensors]
     lowest = min(int(t[0]) for t in ticks)
@@ -144,12 +144,12 @@ def _pieces(number: int, grid: _Grid, per_batch: int, begin_s: float) -> Iterato
     there[np.concatenate(ticks) - lowest] = True
     for i, j in _runs(there, per_batch):
         t0, last = (round((grid.start_s - begin_s + (lowest + x) / grid.rate_hz) * 1e6) for x in (i, j - 1))
-        yield last, Batch(number, 0, t0, 0, samples[i:j])
+        yield last, SampleBatch(number, 0, t0, 0, samples[i:j])
 
 
 def _runs(there: np.ndarray[tuple[int], np.dtype[np.bool_]], most: int) -> Iterator[tuple[int, int]]:
     """Stretches of at most so many samples without a tick at which no sensor measured."""
-    for start, stop in runs(there):
+    for start, stop in find_runs(there):
         for i in range(start, stop, most):
             yield i, min(i + most, stop)
 

@@ -11,13 +11,13 @@ from collections.abc import Callable
 from typing import Final
 
 from server.live.messages import (
-    Begin,
     Charge,
     Command,
-    End,
-    Grow,
+    EstimatorReady,
+    FollowTake,
+    ForgetTake,
+    LogGrown,
     Order,
-    Ready,
     Report,
     decode_report,
     encode,
@@ -45,7 +45,7 @@ class EstimatorPool:
         self,
         settings: Settings,
         report: Callable[[Report], None],
-        begin: Callable[[str], Begin | None],
+        begin: Callable[[str], FollowTake | None],
         restarted: Callable[[list[str]], None],
     ) -> None:
         self._settings = settings
@@ -109,7 +109,7 @@ class EstimatorPool:
         worker = self._of(take)
         if worker is not None:
             worker.takes.discard(take)
-            worker.send(End(take))
+            worker.send(ForgetTake(take))
 
     def follows(self, take: str) -> bool:
         """Whether a process follows this take."""
@@ -126,17 +126,17 @@ class EstimatorPool:
 
     # what a worker tells
 
-    def said(self, report: Report) -> None:
+    def handle_message(self, report: Report) -> None:
         """Called by a worker with every report."""
         self._report(report)
 
-    def again(self, takes: set[str]) -> list[Order]:
+    def list_orders(self, takes: set[str]) -> list[Order]:
         """Called by a worker that starts: what it is to follow."""
         orders = {take: self._begin(take) for take in takes}
         takes.difference_update(take for take, order in orders.items() if order is None)
         return [order for order in orders.values() if order is not None]
 
-    def died(self, takes: set[str]) -> None:
+    def note_death(self, takes: set[str]) -> None:
         """Called by a worker whose process has ended unasked."""
         self._restarted(sorted(takes))
 
@@ -186,17 +186,17 @@ class _Estimator:
             return
         sizes, self._sizes = self._sizes, {}
         self.process.expect_answer()
-        self.process.send(encode(Grow(sizes, self._at)))
+        self.process.send(encode(LogGrown(sizes, self._at)))
 
     def _greet(self) -> list[bytes]:
         self._sizes.clear()
-        return [encode(order) for order in self._pool.again(self.takes)]
+        return [encode(order) for order in self._pool.list_orders(self.takes)]
 
     def _hear(self, message: bytes) -> None:
         report = decode_report(message)
-        if isinstance(report, Ready):
+        if isinstance(report, EstimatorReady):
             self.process.is_warm = True
-        self._pool.said(report)
+        self._pool.handle_message(report)
 
     def _mourn(self) -> None:
-        self._pool.died(self.takes)
+        self._pool.note_death(self.takes)

@@ -15,9 +15,9 @@ from core.errors import InputError
 from core.formats.json_tree import read_json
 from core.formats.live_log import (
     MOST_FRAME_BYTES,
-    Batch,
     Finish,
     Hello,
+    SampleBatch,
     batch_of_json,
     finish_of,
     hello_of,
@@ -32,7 +32,7 @@ HELLO_WITHIN_S: Final = 10.0
 MOST_MESSAGE_BYTES: Final = MOST_FRAME_BYTES
 
 
-class Close(IntEnum):
+class CloseCode(IntEnum):
     """Why a live socket is closed; below 4000 the codes of RFC 6455, 4000 + an HTTP status where one fits."""
 
     DONE = 1000
@@ -48,14 +48,16 @@ class Close(IntEnum):
     STORAGE = 4507
 
 
-FINAL: Final = frozenset({Close.TOO_BIG, Close.MALFORMED, Close.UNAUTHORISED, Close.ENDED, Close.REPLACED})
+FINAL: Final = frozenset(
+    {CloseCode.TOO_BIG, CloseCode.MALFORMED, CloseCode.UNAUTHORISED, CloseCode.ENDED, CloseCode.REPLACED}
+)
 """A client that is closed so does not come back with the same messages; after any other it resumes."""
 
 
 class ProtocolError(InputError):
     """A message that is not taken: `code` and `message` say why, `close` is how the socket is closed."""
 
-    def __init__(self, code: str, message: str, close: Close = Close.MALFORMED) -> None:
+    def __init__(self, code: str, message: str, close: CloseCode = CloseCode.MALFORMED) -> None:
         super().__init__(code, message)
         self.close = close
 
@@ -70,7 +72,7 @@ class Battery:
     percent: Mapping[str, float]
 
 
-Said = Hello | Batch | Finish | Battery
+Said = Hello | SampleBatch | Finish | Battery
 """A text message of the tablet."""
 
 
@@ -119,7 +121,7 @@ def check_size(message: bytes | str) -> None:
             "message_too_big",
             f"A message of {len(message)} bytes came, at most {MOST_MESSAGE_BYTES} are taken; "
             "send fewer samples in a batch.",
-            Close.TOO_BIG,
+            CloseCode.TOO_BIG,
         )
 
 
@@ -158,7 +160,7 @@ def state(stage: str) -> str:
     return _text("state", stage=stage)
 
 
-def finished(recording: str, problem: str | None = None) -> str:
+def announce_finish(recording: str, problem: str | None = None) -> str:
     """The take is a recording now; `problem` (finish_mismatch): it was kept although the end did not fit."""
     return _text("finished", recording=recording, **({"problem": problem} if problem else {}))
 

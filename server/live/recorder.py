@@ -17,30 +17,30 @@ from pathlib import Path
 from typing import Protocol
 
 from core.formats.live_log import Hello, hello_json, record
-from server.live.committer import Committer, Lane, Post
-from server.live.intake import Answer, Ended, Intake, refusal
-from server.live.protocol import Close, ProtocolError
+from server.live.committer import Committer, LogLane, Post
+from server.live.intake import Intake, IntakeAnswer, TakeEnd, refuse
+from server.live.protocol import CloseCode, ProtocolError
 from server.storage import segments
 from server.storage.refusal import FULL
 
 
-class Listener(Protocol):
+class RecorderListener(Protocol):
     """Who is told what happens to a take; all calls come on the event loop and must not block it."""
 
-    def grown(self, size: int) -> None:
+    def note_growth(self, size: int) -> None:
         """The log has `size` bytes of whole records now; readers of the file may go so far.
 
         After a failure of the disk it can be less than before: what had not been synced was cut off, and
         whoever has read beyond `size` starts anew.
         """
 
-    def acknowledged(self, below: int) -> None:
+    def note_acknowledged(self, below: int) -> None:
         """All batches below this one survive a power cut: tell the tablet (`protocol.ack`)."""
 
-    def ended(self, end: Ended) -> None:
+    def note_end(self, end: TakeEnd) -> None:
         """The end is durable and the log file complete."""
 
-    def failed(self, error: ProtocolError) -> None:
+    def note_failure(self, error: ProtocolError) -> None:
         """The disk refuses (storage_full, storage_failed): say so and close with `error.close`.
 
         The tablet keeps what is not acknowledged and comes back; `reopen` before greeting it.
@@ -60,7 +60,12 @@ class Recorder:
     """
 
     def __init__(
-        self, intake: Intake, log: segments.TakeLog, committer: Committer, listener: Listener, post: Post
+        self,
+        intake: Intake,
+        log: segments.TakeLog,
+        committer: Committer,
+        listener: RecorderListener,
+        post: Post,
     ) -> None:
         if intake.hello is None:
             raise ValueError("A recorder needs a take that has been greeted.")
@@ -68,7 +73,7 @@ class Recorder:
         self.hello = intake.hello
         self._intake = intake
         self.damage = log.damage
-        self._lane = Lane(log, self, post)
+        self._lane = LogLane(log, self, post)
         self._committer = committer
         self._listener = listener
         self._size = log.size
@@ -100,7 +105,7 @@ class Recorder:
         return self._size
 
     @property
-    def end(self) -> Ended | None:
+    def end(self) -> TakeEnd | None:
         """How the take ended, once that is durable."""
         return self._intake.ended
 
@@ -109,20 +114,20 @@ class Recorder:
         """Why nothing is taken until `reopen`, None = all is well."""
         return self._failure
 
-    def greet(self, hello: Hello) -> Answer:
+    def greet(self, hello: Hello) -> IntakeAnswer:
         """Answer the hello of a connection, the first or a later one."""
-        return refusal(self._failure) if self._failure else self._intake.greet(hello)
+        return refuse(self._failure) if self._failure else self._intake.greet(hello)
 
-    def offer(self, message: bytes | str) -> Answer:
+    def offer(self, message: bytes | str) -> IntakeAnswer:
         """Answer one message; never waits, never raises for what a tablet can send."""
         if self._failure:
-            return refusal(self._failure)
+            return refuse(self._failure)
         return self._kept(self._intake.offer(message))
 
-    def finish(self) -> Answer:
-        """End the take from this side; `Listener.ended` follows, or the answer says it is there already."""
+    def finish(self) -> IntakeAnswer:
+        """End the take here; `RecorderListener.note_end` follows, or the answer says it is there already."""
         if self._failure:
-            return refusal(self._failure)
+            return refuse(self._failure)
         return self._kept(self._intake.end())
 
     async def reopen(self) -> None:
@@ -138,32 +143,32 @@ class Recorder:
             self._failure = _refused(error)
             raise self._failure from error
         self._failure = None
-        self.written(self._lane.log.size)
+        self.note_written(self._lane.log.size)
 
     async def close(self) -> None:
         """Write and sync what has been taken and let go of the file."""
         await asyncio.to_thread(self._lane.close)
 
-    def written(self, size: int) -> None:
+    def note_written(self, size: int) -> None:
         """Called by the lane."""
         self._size = size
-        self._listener.grown(size)
+        self._listener.note_growth(size)
 
-    def synced(self, records: int) -> None:
+    def note_synced(self, records: int) -> None:
         """Called by the lane."""
         before, was_over = self._intake.durable, self._intake.ended
-        self._intake.synced(records)
+        self._intake.note_synced(records)
         if self._intake.durable > before:
-            self._listener.acknowledged(self._intake.durable)
+            self._listener.note_acknowledged(self._intake.durable)
         if self._intake.ended and not was_over:
-            self._listener.ended(self._intake.ended)
+            self._listener.note_end(self._intake.ended)
 
-    def broke(self, error: OSError) -> None:
+    def note_failure(self, error: OSError) -> None:
         """Called by the lane."""
         self._failure = _refused(error)
-        self._listener.failed(self._failure)
+        self._listener.note_failure(self._failure)
 
-    def _kept(self, answer: Answer) -> Answer:
+    def _kept(self, answer: IntakeAnswer) -> IntakeAnswer:
         if answer.keep is not None:
             kind, body = answer.keep
             self._lane.put(record(kind, body))
@@ -173,13 +178,13 @@ class Recorder:
     def _restart(self) -> Intake:
         self._lane.mend()
         intake = Intake()
-        for _, one in segments.records(self.path):
+        for _, one in segments.read_records(self.path):
             intake.replay(one)
         return intake
 
 
 async def open_recorder(
-    path: Path, hello: Hello | None, committer: Committer, listener: Listener
+    path: Path, hello: Hello | None, committer: Committer, listener: RecorderListener
 ) -> Recorder:
     """Open the take at `path`, or begin it with this hello.
 
@@ -211,7 +216,7 @@ def restore(path: Path, hello: Hello | None) -> tuple[Intake, segments.TakeLog]:
         if log is not None:
             return intake, log
     if hello is None:
-        raise ProtocolError("take_empty", "Nothing has been streamed into this take.", Close.ENDED)
+        raise ProtocolError("take_empty", "Nothing has been streamed into this take.", CloseCode.ENDED)
     intake.greet(hello)
     return intake, segments.create(path, hello_json(hello))
 
@@ -222,11 +227,11 @@ def _refused(error: OSError) -> ProtocolError:
             "storage_full",
             "The server's disk is full; nothing is acknowledged until there is room. The tablet keeps its "
             "batches and tries again.",
-            Close.STORAGE,
+            CloseCode.STORAGE,
         )
     return ProtocolError(
         "storage_failed",
         f"The server's disk refuses ({error.strerror}); nothing is acknowledged until it works. The tablet "
         "keeps its batches and tries again.",
-        Close.STORAGE,
+        CloseCode.STORAGE,
     )

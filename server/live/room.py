@@ -22,7 +22,7 @@ STATES: Final = ("state", "feedback", "frame")
 """Kinds of which only the newest counts, in the order in which a new browser gets them."""
 
 
-class Viewer:
+class BrowserQueue:
     """One browser's letter box."""
 
     def __init__(self) -> None:
@@ -53,7 +53,7 @@ class Room:
     """The browsers of one session and what one that comes later gets first."""
 
     def __init__(self) -> None:
-        self.viewers: set[Viewer] = set()
+        self.viewers: set[BrowserQueue] = set()
         self.picture: Picture | None = None
         self._newest: dict[str, bytes] = {}
         self._strides: dict[int, bytes] = {}
@@ -99,9 +99,9 @@ class Room:
             watcher(picture)
 
     @contextmanager
-    def viewing(self) -> Iterator[Viewer]:
+    def viewing(self) -> Iterator[BrowserQueue]:
         """A browser, while it is there."""
-        viewer = Viewer()
+        viewer = BrowserQueue()
         if "state" in self._newest:
             viewer.put("state", self._newest["state"])
         for k in sorted(self._strides):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import contextlib
 
 from server import audit
-from server.live.intake import Ended
+from server.live.intake import TakeEnd
 from server.services import live
 from server.services.errors import NotFound
-from server.services.live_training import Training, training_of
+from server.services.live_training import LiveTraining, training_of
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
 
@@ -19,27 +19,27 @@ class Rows:
     def __init__(self, db: Database, reviewed: ReviewedAnalyses) -> None:
         self._db, self._reviewed = db, reviewed
 
-    def admit(self, take_id: str, token: str) -> live.Take | None:
+    def admit(self, take_id: str, token: str) -> live.LiveTakeRecord | None:
         """The take a token opens, over or not."""
         with self._db.read() as c:
             return live.by_token(c, take_id, token)
 
-    def take(self, take_id: str) -> live.Take:
+    def take(self, take_id: str) -> live.LiveTakeRecord:
         """One take; raises NotFound."""
         with self._db.read() as c:
             return live.get(c, take_id)
 
-    def current(self, session_id: str) -> live.Take | None:
+    def current(self, session_id: str) -> live.LiveTakeRecord | None:
         """The session's newest take."""
         with self._db.read() as c:
             return live.current(c, session_id)
 
-    def open_take(self, session_id: str) -> live.Take:
+    def open_take(self, session_id: str) -> live.LiveTakeRecord:
         """The session's open take; raises NotFound, Conflict no_open_take."""
         with self._db.read() as c:
             return live.require_open(c, session_id)
 
-    def prepare(self, row: live.Take) -> tuple[Training, list[live.LiveEvent]]:
+    def prepare(self, row: live.LiveTakeRecord) -> tuple[LiveTraining, list[live.LiveEvent]]:
         """What a take is coached with, and what happened in it so far."""
         training = training_of(self._db, self._reviewed, row)
         with self._db.read() as c:
@@ -55,9 +55,9 @@ class Rows:
     def start(self, take_id: str, source: str) -> None:
         """Note the first batch; a take that was erased meanwhile is none."""
         with contextlib.suppress(NotFound), self._db.write() as c:
-            live.started(c, take_id, source)
+            live.note_start(c, take_id, source)
 
-    def end(self, actor: audit.Actor | None, take_id: str, state: str, end: Ended) -> live.Take:
+    def end(self, actor: audit.Actor | None, take_id: str, state: str, end: TakeEnd) -> live.LiveTakeRecord:
         """End a take; raises NotFound when it was erased meanwhile."""
         with self._db.write() as c:
             return live.end(

@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed
 
 from core.errors import SagittalError
 from core.formats.json_tree import read_json
-from core.formats.live_log import Finish, finish_json, payload, peek
+from core.formats.live_log import Finish, encode_samples, finish_json, read_batch_header
 
 
 class LiveError(SagittalError):
@@ -31,7 +31,7 @@ class LiveError(SagittalError):
 
 
 @dataclass(frozen=True)
-class Faults:
+class StreamFaults:
     """Troubles made on purpose.
 
     Parameters
@@ -44,7 +44,7 @@ class Faults:
 
 
 @dataclass
-class Report:
+class StreamReport:
     """How a stream went.
 
     Parameters
@@ -80,10 +80,10 @@ class Sender:
     def __init__(
         self,
         hello: str,
-        faults: Faults,
+        faults: StreamFaults,
         hear: Callable[[Mapping[str, Any]], None],
         chance: random.Random,
-        report: Report,
+        report: StreamReport,
     ) -> None:
         self.report = report
         self.finished = False
@@ -120,7 +120,7 @@ class Sender:
 
     async def _produce(self, frames: AsyncIterable[bytes]) -> None:
         async for frame in frames:
-            self._hash.update(payload(frame, peek(frame)))
+            self._hash.update(encode_samples(frame, read_batch_header(frame)))
             if not self._kept:
                 self.progressed_at = time.monotonic()  # nothing could be acknowledged before
             self._kept.append(frame)

@@ -19,9 +19,9 @@ from server.auth.access import require
 from server.auth.roles import Action
 from server.live import protocol
 from server.live.hub import Hub
-from server.live.intake import Answer
-from server.live.protocol import HELLO_WITHIN_S, Close, ProtocolError
-from server.live.take import LiveTake
+from server.live.intake import IntakeAnswer
+from server.live.protocol import HELLO_WITHIN_S, CloseCode, ProtocolError
+from server.live.take import ActiveTake
 from server.services import live
 
 router = APIRouter(include_in_schema=False)
@@ -99,7 +99,7 @@ async def stream(ws: WebSocket) -> None:
         await asyncio.gather(sending, return_exceptions=True)
 
 
-async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> LiveTake | None:
+async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None:
     """The take that the first message opens; None after a refusal, which is on its way then."""
     try:
         async with asyncio.timeout(HELLO_WITHIN_S):
@@ -114,14 +114,16 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> LiveTake | None:
             raise ProtocolError(
                 "token_not_valid",
                 "The token is not valid for this take, or has expired; pair with a new code.",
-                Close.UNAUTHORISED,
+                CloseCode.UNAUTHORISED,
             )
         if not row.is_open:
             _say_over(tablet, row)
             return None
         take = await hub.enter(row, said)
     except TimeoutError:
-        _refuse(tablet, ProtocolError("no_hello", "No hello came in time; connect again.", Close.NO_HELLO))
+        _refuse(
+            tablet, ProtocolError("no_hello", "No hello came in time; connect again.", CloseCode.NO_HELLO)
+        )
     except ProtocolError as error:
         _refuse(tablet, error)
     except InputError as error:
@@ -135,7 +137,7 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> LiveTake | None:
     return None
 
 
-async def _receive(ws: WebSocket, take: LiveTake, tablet: Tablet) -> None:
+async def _receive(ws: WebSocket, take: ActiveTake, tablet: Tablet) -> None:
     while True:
         message = await _message(ws)
         if message is None:
@@ -150,25 +152,25 @@ async def _receive(ws: WebSocket, take: LiveTake, tablet: Tablet) -> None:
             return
 
 
-def _heed(tablet: Tablet, take: LiveTake, answer: Answer) -> None:
+def _heed(tablet: Tablet, take: ActiveTake, answer: IntakeAnswer) -> None:
     """Do what the rules say of a message."""
     if answer.say is not None:
         tablet.say(answer.say)
     if answer.battery is not None:
         take.charge(answer.battery)
     if answer.ended is not None and take.recording_id is not None:
-        tablet.say(protocol.finished(take.recording_id, take.problem))
+        tablet.say(protocol.announce_finish(take.recording_id, take.problem))
     if answer.close is not None:
         tablet.shut(answer.close, answer.reason)
 
 
-def _say_over(tablet: Tablet, row: live.Take) -> None:
+def _say_over(tablet: Tablet, row: live.LiveTakeRecord) -> None:
     """Tell a tablet that comes back to a take that is over what became of it."""
     if row.recording_id is not None:
-        tablet.say(protocol.finished(row.recording_id, row.problem))
-        tablet.shut(Close.DONE if row.state == "finished" else Close.ENDED, "take_ended")
+        tablet.say(protocol.announce_finish(row.recording_id, row.problem))
+        tablet.shut(CloseCode.DONE if row.state == "finished" else CloseCode.ENDED, "take_ended")
     else:
-        _refuse(tablet, ProtocolError("take_ended", "This take is over.", Close.ENDED))
+        _refuse(tablet, ProtocolError("take_ended", "This take is over.", CloseCode.ENDED))
 
 
 def _refuse(tablet: Tablet, error: ProtocolError) -> None:

@@ -15,16 +15,16 @@ from typing import Any, Final, Protocol
 import msgspec
 
 from server.live import protocol
-from server.live.intake import Answer, Ended
+from server.live.intake import IntakeAnswer, TakeEnd
 from server.live.journal import Journal
-from server.live.messages import STALE_S, Begin, Charge, Command, Item, Picture
+from server.live.messages import STALE_S, Charge, Command, FeedItem, FollowTake, Picture
 from server.live.pool import EstimatorPool
 from server.live.protocol import ProtocolError
 from server.live.recorder import Recorder
 from server.live.room import Room
 from server.live.sensors import sensor_rows
-from server.services.live import LiveEvent, Take, is_own_notice
-from server.services.live_training import Training
+from server.services.live import LiveEvent, LiveTakeRecord, is_own_notice
+from server.services.live_training import LiveTraining
 
 STEERING: Final = frozenset({"feedback", "level", "pause", "stale", "redo_calibration"})
 """Commands that change what the estimator says; each holds from a batch on."""
@@ -32,7 +32,7 @@ TOLD: Final = frozenset({"cue", "calibration", "guard", "notice"})
 """Kinds of items that become events."""
 
 
-class Line(Protocol):
+class TabletLink(Protocol):
     """The way to a tablet (server/live/tablet.py)."""
 
     def say(self, text: str) -> None:
@@ -45,7 +45,7 @@ class Line(Protocol):
         """Close."""
 
 
-class TakeHouse(Protocol):
+class TakeRegistry(Protocol):
     """What a take needs of the registry it belongs to (server/live/hub.py)."""
 
     @property
@@ -56,18 +56,18 @@ class TakeHouse(Protocol):
     def journal(self) -> Journal:
         """Where events are kept."""
 
-    def note_started(self, take: LiveTake) -> None:
+    def note_started(self, take: ActiveTake) -> None:
         """The first batch of this take has come."""
 
-    def note_ended(self, take: LiveTake, end: Ended) -> None:
+    def note_ended(self, take: ActiveTake, end: TakeEnd) -> None:
         """The end of this take is on the disk."""
 
-    def tell_state(self, take: LiveTake) -> None:
+    def tell_state(self, take: ActiveTake) -> None:
         """Tell the browsers where this take stands."""
 
 
 @dataclass(frozen=True)
-class Mark:
+class TherapistMark:
     """A moment the therapist marked."""
 
     t_s: float | None
@@ -79,16 +79,16 @@ class Mark:
 
 
 @dataclass
-class Steered:
+class TakeSteering:
     """What people (and silence) did in a take so far, as its events say."""
 
     commands: list[Command] = field(default_factory=list)
-    marks: list[Mark] = field(default_factory=list)
+    marks: list[TherapistMark] = field(default_factory=list)
     ghost: Any = None
     stale: bool = False
     stopping: bool = False
 
-    def see(self, take_id: str, kind: str, t_s: float | None, content: Mapping[str, Any]) -> None:
+    def note_event(self, take_id: str, kind: str, t_s: float | None, content: Mapping[str, Any]) -> None:
         """Take in one event."""
         value = content.get("value")
         if kind in STEERING:
@@ -100,12 +100,12 @@ class Steered:
         elif kind == "ghost":
             self.ghost = value
         elif kind == "mark":
-            self.marks.append(Mark(t_s, value))
+            self.marks.append(TherapistMark(t_s, value))
         elif kind == "undo_mark" and self.marks:
             self.marks.pop()
 
 
-class LiveTake:
+class ActiveTake:
     """A take that a tablet has spoken to.
 
     Parameters
@@ -117,7 +117,12 @@ class LiveTake:
     recorder: Recorder
 
     def __init__(
-        self, house: TakeHouse, row: Take, room: Room, training: Training, earlier: Iterable[LiveEvent]
+        self,
+        house: TakeRegistry,
+        row: LiveTakeRecord,
+        room: Room,
+        training: LiveTraining,
+        earlier: Iterable[LiveEvent],
     ) -> None:
         self.id = row.id
         self.session_id = row.session_id
@@ -125,7 +130,7 @@ class LiveTake:
         self.source = row.source
         self.room = room
         self.training = training
-        self.tablet: Line | None = None
+        self.tablet: TabletLink | None = None
         self.over = asyncio.Event()
         self.told = asyncio.Event()
         self.recording_id: str | None = None
@@ -135,9 +140,9 @@ class LiveTake:
         self.stage: str | None = None
         self._house = house
         self._seen: Counter[str] = Counter()
-        self.steered = Steered()
+        self.steered = TakeSteering()
         for event in earlier:
-            self.steered.see(self.id, event.kind, event.t_s, event.content)
+            self.steered.note_event(self.id, event.kind, event.t_s, event.content)
             if event.kind in TOLD and not is_own_notice(event.content):  # those are no item of the estimator
                 self._seen[event.kind] += 1
         self.grown_at = time.monotonic()
@@ -146,7 +151,7 @@ class LiveTake:
 
     # the socket
 
-    def offer(self, message: bytes | str) -> Answer:
+    def offer(self, message: bytes | str) -> IntakeAnswer:
         """Hand a message to the recorder; never waits."""
         answer = self.recorder.offer(message)
         if answer.keep is not None and self.state != "streaming" and answer.keep[0] == "B":
@@ -164,7 +169,7 @@ class LiveTake:
 
     # the recorder's listener
 
-    def grown(self, size: int) -> None:
+    def note_growth(self, size: int) -> None:
         """The log can be read so far; if it was longer before, what was read of it is read again."""
         self.grown_at = time.monotonic()
         before, self._size = self._size, size
@@ -175,26 +180,26 @@ class LiveTake:
         if self.steered.stale and not self._house.pool.follows(self.id):
             self.mind_silence(False)
 
-    def acknowledged(self, below: int) -> None:
+    def note_acknowledged(self, below: int) -> None:
         """Batches are on the disk."""
         if self.tablet is not None:
             self.tablet.ack(below)
 
-    def ended(self, end: Ended) -> None:
+    def note_end(self, end: TakeEnd) -> None:
         """The end is on the disk."""
         self._house.note_ended(self, end)
 
-    def failed(self, error: ProtocolError) -> None:
+    def note_failure(self, error: ProtocolError) -> None:
         """The disk refuses."""
         if self.tablet is not None:
             self.tablet.shut(error.close, error.code)
 
     # the estimator
 
-    def begin(self) -> Begin:
+    def begin(self) -> FollowTake:
         """The order to follow this take from its start."""
         t = self.training
-        return Begin(
+        return FollowTake(
             self.id,
             str(self.recorder.path),
             self.recorder.size,
@@ -210,7 +215,7 @@ class LiveTake:
         content: dict[str, Any] = {"value": value}
         if name in STEERING:
             content["before"] = self.recorder.next_seq
-        self.steered.see(self.id, name, t_s, content)
+        self.steered.note_event(self.id, name, t_s, content)
         if name in STEERING:
             self._house.pool.send(self.steered.commands[-1])
         return content
@@ -234,7 +239,7 @@ class LiveTake:
         if self.tablet is not None and self.stage is not None:
             self.tablet.say(protocol.state(self.stage))
 
-    def tell(self, item: Item) -> None:
+    def tell(self, item: FeedItem) -> None:
         """Pass on what happens once; what a new process says again is known already."""
         if item.kind == "stride":
             self.room.keep_stride(item.k, item.body)
@@ -286,7 +291,7 @@ class LiveTake:
         }
 
 
-def standing_of(row: Take | None) -> dict[str, Any]:
+def describe_unjoined(row: LiveTakeRecord | None) -> dict[str, Any]:
     """The same of a take that no tablet has joined yet or that is over; None = there was none."""
     return {
         "type": "state",

@@ -15,9 +15,9 @@ import numpy as np
 from core.errors import Notice
 from core.feedback import Cue, FeedbackState
 from core.frames import SIDES, SUFFIX, Floats, Side
-from core.online.frame import CalibrationView, LiveFrame, SensorHealth, Trail
+from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SensorHealth
 from core.parameters.live_stride import LiveStride
-from server.live.messages import BATTERY_WARN_PCT, STALE_S, Pose
+from server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
 
 LOST_WARN, LOST_BAD = 0.01, 0.20
 """Shares of lost samples, as the report judges a whole take (core/quality/assessment.py)."""
@@ -33,7 +33,7 @@ encode = msgspec.json.encode
 
 
 def frame(
-    shown: LiveFrame, trail: Iterable[Trail], slow: Mapping[str, Any], phase: Mapping[Side, float | None]
+    shown: LiveFrame, trail: Iterable[AngleTrail], slow: Mapping[str, Any], phase: Mapping[Side, float | None]
 ) -> bytes:
     """A frame with the angles since the last one that was sent, without the closing brace.
 
@@ -65,12 +65,12 @@ def slow_part(shown: LiveFrame, battery: Mapping[str, float]) -> dict[str, Any]:
     }
 
 
-def pose(shown: LiveFrame) -> Pose | None:
+def pose(shown: LiveFrame) -> FigurePose | None:
     """The figure of a frame, None while there is none."""
     segments = [name for name in shown.q if name in shown.p]
     if not segments:
         return None
-    return Pose(
+    return FigurePose(
         list(segments),
         np.array([shown.q[s] for s in segments], np.float32).tobytes(),
         np.array([shown.p[s] for s in segments], np.float32).tobytes(),
@@ -110,7 +110,7 @@ def feedback(state: FeedbackState) -> dict[str, Any]:
     return {"type": "feedback", **state.to_json()}
 
 
-def calibrated(shown: LiveFrame) -> dict[str, Any]:
+def announce_calibration(shown: LiveFrame) -> dict[str, Any]:
     """That calibration has come to an end, and how."""
     return {"type": "calibration", "method": shown.method, "calibration": _calibration(shown.calibration)}
 
@@ -188,7 +188,7 @@ def _judged(row: SensorHealth, battery_pct: float | None) -> tuple[str, str]:
     return "ok", ""
 
 
-def _trace(trail: Iterable[Trail]) -> dict[str, list[float | None]]:
+def _trace(trail: Iterable[AngleTrail]) -> dict[str, list[float | None]]:
     pieces = [piece for piece in trail if len(piece.t_s)]
     if not pieces:
         return {"t": []}

@@ -29,6 +29,6 @@ def show_audit_log(
 ) -> Response:
     """Who opened or changed what, the newest first."""
     with db.read() as c:
-        rows = audit.entries(c, before=before, limit=AUDIT_ROWS)
+        rows = audit.list_entries(c, before=before, limit=AUDIT_ROWS)
     older = rows[-1].seq if len(rows) == AUDIT_ROWS else None
     return render_page(request, db, who, "audit.html", "audit", rows=rows, older=older)

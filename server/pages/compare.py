@@ -21,7 +21,7 @@ from server.report.comparison import ComparedRow
 from server.report.curves import cycle_svg
 from server.report.panels import CurvePanel, same_zero
 from server.services import comparisons, patients, reports
-from server.services.comparisons import Pair
+from server.services.comparisons import SessionPair
 from server.services.reviewed import ReviewedAnalyses
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -60,9 +60,9 @@ def show_comparison(
     )
 
 
-def view_comparison(reviewed: ReviewedAnalyses, found: Pair) -> dict[str, Any]:
+def view_comparison(reviewed: ReviewedAnalyses, found: SessionPair) -> dict[str, Any]:
     """The comparison page: charts with the earlier means behind, the table under its headings, sources."""
-    rows = comparisons.rows(reviewed, found)
+    rows = comparisons.compare_sessions(reviewed, found)
     _, old = reports.read(
         reviewed, found.before.found, found.before.edits, found.patient, found.before.session
     )

@@ -78,7 +78,7 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
     }
 
 
-def _estimator(blobs: BlobStore, shown: analyses.Analysis) -> EstimatorView | None:
+def _estimator(blobs: BlobStore, shown: analyses.AnalysisRecord) -> EstimatorView | None:
     return estimator_view(json.loads(analyses.file_bytes(blobs, shown, "analysis.json")).get("estimator"))
 
 
@@ -88,7 +88,7 @@ def _asked_for(config: Mapping[str, Any]) -> str | None:
     return None if asked is None else choice_label(asked)
 
 
-def _provenance(shown: analyses.Analysis) -> list[tuple[str, str]]:
+def _provenance(shown: analyses.AnalysisRecord) -> list[tuple[str, str]]:
     return [
         ("Input sha256", shown.input_sha256),
         ("Settings sha256", shown.config_sha256),

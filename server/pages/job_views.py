@@ -36,6 +36,6 @@ def find_active_jobs(
 ) -> dict[str | None, dict[str, Any]]:
     """The running job, else the newest that waits, by what `whose` takes of it (patient or session)."""
     found: dict[str | None, dict[str, Any]] = {}
-    for listed in jobs.active(c):
+    for listed in jobs.list_active(c):
         found.setdefault(whose(listed), view_job(listed))
     return found

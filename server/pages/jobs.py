@@ -46,7 +46,7 @@ def show_jobs(request: Request, db: Db, who: Annotated[Identity, require(Action.
 def list_jobs(c: Connection) -> list[dict[str, Any]]:
     """The newest jobs, each with its visit."""
     rows = []
-    for view in jobs.listing(c, limit=JOBS_SHOWN):
+    for view in jobs.list_jobs(c, limit=JOBS_SHOWN):
         shape, word = JOB_WORDS[view.state]
         ended = view.started_at and view.finished_at
         visit = {"id": view.session_id, "code": view.patient_code, "title": view.session_title}

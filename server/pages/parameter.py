@@ -31,7 +31,7 @@ def show_parameter(
     """One parameter of a session with every stride behind it."""
     with db.read() as c:
         context = read_context(c, sid)
-        found = analyses.shown(c, sid)
+        found = analyses.get_shown(c, sid)
         edits = edit_log.edits_of(c, found.id)
     number = reports.behind_number(
         reviewed, found, edits, context["patient"], context["session"], name, context["controls"]

@@ -55,7 +55,7 @@ def show_patient(
     record_opening(request, who, "patient", pid)
     trend = None
     if who.may(Action.READ_RESULT):
-        trend = draw_teaser(histories.history(reviewed, patient, done, plans))
+        trend = draw_teaser(histories.read_history(reviewed, patient, done, plans))
     return render_page(
         request, db, who, "patient.html", "patients",
         patient=view_patient(patient), visits=visits, keys=KEY_PARAMETERS,
@@ -70,7 +70,7 @@ def list_visits(
 ) -> list[dict[str, Any]]:
     """The visits of a patient, newest first, with the key parameters of each visit's latest analysis."""
     rows = []
-    streaming = {take.session_id for take in live.streaming(c)}
+    streaming = {take.session_id for take in live.list_streaming(c)}
     running = find_active_jobs(c, lambda j: j.session_id)
     there = sessions.of_patient(c, patient_id)
     shown = analyses.latest_of(c, [s.id for s in there]) if results else {}

@@ -37,7 +37,7 @@ def show_patients(
 ) -> Response:
     """All patients, the latest visit first."""
     with db.read() as c:
-        found = patients.listing(c, search=q, limit=PATIENTS_SHOWN)
+        found = patients.list_patients(c, search=q, limit=PATIENTS_SHOWN)
         rows = list_patients(c, reviewed, found, results=who.may(Action.READ_RESULT))
         total = patients.count(c)
     record_listing(request, who, "patient")
@@ -54,7 +54,7 @@ def list_patients(
 ) -> list[dict[str, Any]]:
     """Rows of the patients list, each with the state of its latest visit; with `results`, of its data."""
     rows = []
-    streaming = {take.patient_id: take.session_id for take in live.streaming(c)}
+    streaming = {take.patient_id: take.session_id for take in live.list_streaming(c)}
     newest = sessions.newest_of(c, [p.id for p in found])
     running = find_active_jobs(c, lambda j: j.patient_id)
     shown = analyses.latest_of(c, [s.id for s in newest.values()]) if results else {}

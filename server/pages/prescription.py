@@ -18,9 +18,9 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id
 from server.pages.shell import record_opening, render_page
-from server.report.feedback_words import prescription_words, title
+from server.report.feedback_words import name_target, prescription_words
 from server.services import patients, prescriptions
-from server.services.prescriptions import Written
+from server.services.prescriptions import PatientPrescription
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -48,10 +48,10 @@ SOURCES: Final = (
 class PrescriptionCard:
     """The prescription in force, in words, and the ones that ended, newest first."""
 
-    now: Written | None
+    now: PatientPrescription | None
     title: str
     lines: tuple[tuple[str, str], ...]
-    ended: tuple[tuple[str, Written], ...]
+    ended: tuple[tuple[str, PatientPrescription], ...]
 
 
 @dataclass(frozen=True)
@@ -80,15 +80,15 @@ def show_prescription(
     )  # fmt: skip
 
 
-def make_card(written: Sequence[Written]) -> PrescriptionCard:
+def make_card(written: Sequence[PatientPrescription]) -> PrescriptionCard:
     """The card of a patient's page."""
     now = next((w for w in written if w.ended_at is None), None)
     lines = () if now is None else tuple(x for x in prescription_words(now.content) if x[0] in ON_CARD)
     return PrescriptionCard(
         now,
-        "" if now is None else title(now.content),
+        "" if now is None else name_target(now.content),
         lines,
-        tuple((title(w.content), w) for w in written if w.ended_at is not None),
+        tuple((name_target(w.content), w) for w in written if w.ended_at is not None),
     )
 
 
@@ -101,7 +101,7 @@ def group_trainable() -> list[tuple[str, list[TrainableParameter]]]:
     return list(groups.items())
 
 
-def fill_form(now: Written | None, affected: Side | None) -> Prescription:
+def fill_form(now: PatientPrescription | None, affected: Side | None) -> Prescription:
     """What the form is filled with: the prescription in force, else the defaults for this person."""
     if now is not None:
         return now.content

@@ -15,7 +15,7 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id
 from server.pages.shell import record_opening, render_page
-from server.report.wording import number
+from server.report.wording import format_number
 from server.services import patients, programmes, sessions
 from server.services.course import SIX_WEEKS
 from server.services.programmes import PlannedVisit, Programme
@@ -83,7 +83,7 @@ def _week(programme: Programme, week: int, *, now: bool) -> dict[str, Any]:
     said = f"{done} of {len(trainings)} trainings done" + (f", {missing} missing" if missing else "")
     # the course counts weeks without a week 0: the one before the first training is −1
     return {
-        "name": "now" if now else f"wk {number(week if week > 0 else week - 1)}",
+        "name": "now" if now else f"wk {format_number(week if week > 0 else week - 1)}",
         "now": now,
         "gap": not mine,
         "assessments": [v for v in mine if v.kind == "assessment"],

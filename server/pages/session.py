@@ -20,7 +20,7 @@ from server.pages.words import PROTOCOL_NAMES, describe_person
 from server.report import level
 from server.report.curves import strip_svg
 from server.report.model import ReportModel
-from server.report.table import Row
+from server.report.table import ParameterRow
 from server.services import analyses, comparisons, edit_log, feedback, histories, reports
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
@@ -113,10 +113,10 @@ def _show_report(
     with db.read() as c:
         context = read_context(c, sid)
         patient = context["patient"]
-        done = histories.analysed(c, patient.id) if who.may(Action.READ_RESULT) else []
+        done = histories.list_analysed(c, patient.id) if who.may(Action.READ_RESULT) else []
         this = next((a for a in done if a.session.id == sid), None)
         if this is not None:
-            context["before"] = comparisons.before(c, this.session, done)
+            context["before"] = comparisons.find_previous(c, this.session, done)
             trained = feedback.gather(c, patient, sid, done)
     if this is None and paper:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
@@ -129,8 +129,8 @@ def _show_report(
 
 def view_report(
     reviewed: ReviewedAnalyses,
-    found: analyses.Analysis,
-    edits: edit_log.Edits,
+    found: analyses.AnalysisRecord,
+    edits: edit_log.EditHistory,
     context: Mapping[str, Any],
     *,
     paper: bool,
@@ -170,7 +170,7 @@ def view_report(
     }
 
 
-def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[Row, ...]]]:
+def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[ParameterRow, ...]]]:
     """The parameter table; empty when not one number was found, because then one sentence says more.
 
     On paper only what was measured has a row; `missing` says the rest in one line.

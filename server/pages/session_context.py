@@ -34,11 +34,11 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
     return {
         "session": session,
         "patient": patient,
-        "controls": controls.visits(c, patient, session),
+        "controls": controls.list_visits(c, patient, session),
         "recording": session.state != "empty",
         "job": None if job is None else view_job(job),
         "stages": list(STAGE_NAMES.items()),
         "live_now": take.state if take is not None and take.is_open else None,
-        "damages": live.damages(c, session_id),
+        "damages": live.list_damages(c, session_id),
         "report": None,
     }

@@ -11,7 +11,7 @@ from server.http.templates import TEMPLATES
 from server.services import jobs
 from server.services.provenance import CODE_VERSION
 from server.storage.db import Database
-from server.trail import Trail
+from server.trail import AuditTrail
 
 NAVIGATION = (
     ("patients", "people", "Patients", "/patients", Action.READ_PATIENT),
@@ -24,14 +24,14 @@ NAVIGATION = (
 
 def record_opening(request: Request, who: Identity, resource: str, resource_id: str) -> None:
     """Write down that somebody looked at it."""
-    trail: Trail = request.app.state.trail
-    trail.opened(who, f"{resource}.opened", resource, resource_id)
+    trail: AuditTrail = request.app.state.trail
+    trail.record_opened(who, f"{resource}.opened", resource, resource_id)
 
 
 def record_listing(request: Request, who: Identity, resource: str) -> None:
     """Write down that somebody looks at the list of all."""
-    trail: Trail = request.app.state.trail
-    trail.watched(who, f"{resource}.listed", resource, None)
+    trail: AuditTrail = request.app.state.trail
+    trail.record_watched(who, f"{resource}.listed", resource, None)
 
 
 def render_page(

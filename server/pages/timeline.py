@@ -39,10 +39,10 @@ def show_timeline(
     with db.read() as c:
         context = read_context(c, sid)
         latest = analyses.latest(c, sid)
-        edits = edit_log.Edits() if latest is None else edit_log.edits_of(c, latest.id)
+        edits = edit_log.EditHistory() if latest is None else edit_log.edits_of(c, latest.id)
     if latest is not None:
         context["numbers"] = view_numbers(reviewed, latest, edits, context)
-        context["lanes"] = [vars(lane) for lane in signals.lanes(reviewed, latest)]
+        context["lanes"] = [vars(lane) for lane in signals.list_lanes(reviewed, latest)]
         context["fixed_because"] = reviewed.open(latest).fixed_because
         context["editable"] = context["fixed_because"] is None and who.may(Action.REVIEW)
     record_opening(request, who, "session", sid)
@@ -63,15 +63,18 @@ def show_numbers(
         return RedirectResponse(f"/sessions/{sid}/timeline#numbers", status_code=303)
     with db.read() as c:
         context = read_context(c, sid)
-        latest = analyses.shown(c, sid)
+        latest = analyses.get_shown(c, sid)
         edits = edit_log.edits_of(c, latest.id)
-    trail.watched(who, "numbers.opened", "session", sid)
+    trail.record_watched(who, "numbers.opened", "session", sid)
     numbers = view_numbers(reviewed, latest, edits, context)
     return TEMPLATES.TemplateResponse(request, "_numbers.html", {"numbers": numbers})
 
 
 def view_numbers(
-    reviewed: ReviewedAnalyses, found: analyses.Analysis, edits: edit_log.Edits, context: Mapping[str, Any]
+    reviewed: ReviewedAnalyses,
+    found: analyses.AnalysisRecord,
+    edits: edit_log.EditHistory,
+    context: Mapping[str, Any],
 ) -> dict[str, Any]:
     """What of the report stands beside the timeline and changes with every edit."""
     _, model = reports.read(

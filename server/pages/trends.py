@@ -15,13 +15,13 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import HEX_ID, Db, Id, Reviewed
 from server.pages.shell import record_opening, render_page
-from server.report.change_words import change_words, term_of
+from server.report.change_words import change_words, find_term
 from server.report.notes import GROUPS
-from server.report.trend_chart import Ahead, trend_svg
-from server.report.trends import PRIMARY, Line, Trend, Visit, names_in, trends
-from server.report.wording import number
+from server.report.trend_chart import PlannedAssessment, trend_svg
+from server.report.trends import PRIMARY, AnalysedVisit, Trend, TrendSeries, follow_figures, names_in
+from server.report.wording import format_number
 from server.services import histories, patients
-from server.services.histories import History
+from server.services.histories import PatientHistory
 from web.words import day
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -49,41 +49,43 @@ def show_trends(
     with db.read() as c:
         patient = patients.get(c, pid)
         done, plans = histories.read(c, patient)
-    history = histories.history(reviewed, patient, done, plans, protocol, like)
+    history = histories.read_history(reviewed, patient, done, plans, protocol, like)
     record_opening(request, who, "patient", pid)
     view = view_trends(history, show)
     return render_page(request, db, who, "trends.html", "patients", patient=patient, trends=view)
 
 
-def list_ahead(history: History) -> list[Ahead]:
+def list_ahead(history: PatientHistory) -> list[PlannedAssessment]:
     """Assessments of the newest programme that are still to come."""
     plans = history.programmes[:1]
     return [
-        Ahead(v.label, v.planned_on)
+        PlannedAssessment(v.label, v.planned_on)
         for plan in plans
         for v in plan.visits
         if v.kind == "assessment" and v.state in {"next", "planned"}
     ]
 
 
-def draw_teaser(history: History) -> dict[str, Any] | None:
+def draw_teaser(history: PatientHistory) -> dict[str, Any] | None:
     """The first figure of the trends, once there is something to compare."""
     there = [n for n in names_in(history.visits) if n in TEASERS]
     if len(history.visits) < 2 or not there:
         return None
     name = min(there, key=TEASERS.index)
-    found = trends(history.visits, [name], history.norms, history.usual, history.patient.affected_side)
+    found = follow_figures(
+        history.visits, [name], history.norms, history.usual, history.patient.affected_side
+    )
     return _shown(history, found, height=168)
 
 
-def view_trends(history: History, chosen: Sequence[str]) -> dict[str, Any]:
+def view_trends(history: PatientHistory, chosen: Sequence[str]) -> dict[str, Any]:
     """The trends page: charts of the chosen figures, the choice, limits with sources, and the table."""
     there = names_in(history.visits)
     names = [n for n in there if n in chosen] or [n for n in PRIMARY if n in there]
-    found = trends(history.visits, names, history.norms, history.usual, history.patient.affected_side)
+    found = follow_figures(history.visits, names, history.norms, history.usual, history.patient.affected_side)
     groups: dict[str, list[dict[str, Any]]] = {}
     for name in there:
-        term = term_of(name)
+        term = find_term(name)
         groups.setdefault(term.group, []).append(
             {"name": name, "title": term.label, "unit": term.unit, "on": name in names}
         )
@@ -99,7 +101,7 @@ def view_trends(history: History, chosen: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _shown(history: History, found: Sequence[Trend], height: int) -> dict[str, Any]:
+def _shown(history: PatientHistory, found: Sequence[Trend], height: int) -> dict[str, Any]:
     coming = list_ahead(history)
     lines = [(t, line) for t in found for line in t.lines]
     sources: dict[str, list[str]] = {}
@@ -124,7 +126,11 @@ def _shown(history: History, found: Sequence[Trend], height: int) -> dict[str, A
 
 
 def _figure(
-    trend: Trend, line: Line, visits: Sequence[Visit], coming: Sequence[Ahead], height: int
+    trend: Trend,
+    line: TrendSeries,
+    visits: Sequence[AnalysedVisit],
+    coming: Sequence[PlannedAssessment],
+    height: int,
 ) -> dict[str, Any]:
     change = line.change
     base = None if line.base is None else visits[line.points[line.base].visit]
@@ -139,12 +145,12 @@ def _figure(
     }
 
 
-def _waiting(line: Line) -> str:
+def _waiting(line: TrendSeries) -> str:
     """What is said as long as there are not two assessments."""
     return "no assessment yet" if line.base is None else "one assessment so far"
 
 
-def _column(v: Visit) -> dict[str, Any]:
+def _column(v: AnalysedVisit) -> dict[str, Any]:
     return {
         "href": f"/sessions/{v.session_id}",
         "label": v.label,
@@ -153,7 +159,7 @@ def _column(v: Visit) -> dict[str, Any]:
     }
 
 
-def _rows(trend: Trend, visits: Sequence[Visit]) -> list[dict[str, Any]]:
+def _rows(trend: Trend, visits: Sequence[AnalysedVisit]) -> list[dict[str, Any]]:
     """A row per side: the value of every visit, then the verdict."""
     rows = []
     for line in trend.lines:
@@ -162,7 +168,7 @@ def _rows(trend: Trend, visits: Sequence[Visit]) -> list[dict[str, Any]]:
         for i in range(len(visits)):
             p = by_visit.get(i)
             mark = "" if p is None or p.change is None else change_words(p.change).mark
-            text = None if p is None else number(p.value, trend.term.digits)
+            text = None if p is None else format_number(p.value, trend.term.digits)
             cells.append({"text": text, "mark": mark})
         change = line.change
         rows.append(

@@ -22,7 +22,7 @@ from server.pages.words import SEGMENT_NAMES
 from server.report.bundle import ABOUT_FILES
 from server.services import histories, patients, recordings, sessions
 from server.services.patients import Patient
-from server.services.recordings import Recording
+from server.services.recordings import StoredRecording
 from server.services.sessions import Session
 from web.words import number, seconds
 
@@ -74,7 +74,7 @@ def show_upload(
     return render_page(request, db, who, "upload.html", "patients", session=session, patient=patient, **view)
 
 
-def view_upload(c: Connection, this: Recording | None, s: Session, p: Patient) -> dict[str, Any]:
+def view_upload(c: Connection, this: StoredRecording | None, s: Session, p: Patient) -> dict[str, Any]:
     """Files of the session, the waiting inspection, what was found."""
     files = [
         {"name": f.name, "size": f.size, "href": f"/api/v1/sessions/{s.id}/files/{quote(f.name)}"}
@@ -117,7 +117,7 @@ def _paths(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, obj
 
 def find_remembered(c: Connection, s: Session) -> Mapping[str, str | None]:
     """Which sensor sat where at this patient's other visits, the newest analysed one that says so."""
-    for other in reversed(histories.analysed(c, s.patient_id)):
+    for other in reversed(histories.list_analysed(c, s.patient_id)):
         if other.session.id == s.id:
             continue
         sensors: Mapping[str, str | None] = (other.found.manifest or {}).get("sensors") or {}
@@ -145,7 +145,7 @@ def fits_movement(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, st
     return all(len(found) <= 1 for found in sides.values()) and not sides[1] & sides[2]
 
 
-def view_inspection(this: Recording, earlier: Mapping[str, str | None]) -> dict[str, Any]:
+def view_inspection(this: StoredRecording, earlier: Mapping[str, str | None]) -> dict[str, Any]:
     """What the inspection found: facts, sensors with their most likely segment, notices.
 
     Parameters

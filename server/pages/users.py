@@ -24,7 +24,7 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 def show_users(request: Request, db: Db, who: Annotated[Identity, require(Action.MANAGE_USERS)]) -> Response:
     """Who may sign in, and as what."""
     with db.read() as c:
-        rows = accounts.everyone(c)
+        rows = accounts.list_accounts(c)
     roles = [(role.value, ROLE_WORDS[role]) for role in Role]
     options = [(role.value, role.value) for role in Role]
     return render_page(

@@ -29,8 +29,8 @@ def describe_state(state: str) -> dict[str, str]:
 def judge_visit(
     reviewed: ReviewedAnalyses,
     s: sessions.Session,
-    shown: analyses.Analysis | None,
-    edits: Mapping[str, edit_log.Edits],
+    shown: analyses.AnalysisRecord | None,
+    edits: Mapping[str, edit_log.EditHistory],
 ) -> dict[str, str]:
     """What a list says of a session: of one that is analysed how good its data are, as its own page does."""
     if s.state != "done" or shown is None or "analysis.json" not in shown.files:

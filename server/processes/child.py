@@ -19,7 +19,7 @@ import sys
 
 from server.processes.channel import Channel
 from server.processes.environment import make_environment
-from server.processes.lifeline import die_with, when_parent_ends
+from server.processes.lifeline import call_when_parent_ends, die_with
 from server.settings import Settings, load_settings
 
 
@@ -61,7 +61,7 @@ def enter_child() -> tuple[Channel, Settings]:
     end = socket.socket(fileno=int(sys.argv[1]))
     die_with(int(sys.argv[2]))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent ends us
-    when_parent_ends(lambda: os._exit(1))
+    call_when_parent_ends(lambda: os._exit(1))
     logging.basicConfig(level=logging.INFO)
     settings = load_settings()
     if settings.child_memory_bytes:

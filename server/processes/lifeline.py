@@ -17,7 +17,7 @@ PR_SET_PDEATHSIG = 1
 """prctl(2): the signal to get when the parent dies; linux/prctl.h."""
 
 
-def when_parent_ends(action: Callable[[], None]) -> None:
+def call_when_parent_ends(action: Callable[[], None]) -> None:
     """Call `action` in a thread when the starter has gone."""
 
     def wait() -> None:

@@ -11,11 +11,11 @@ from core.events.result import Strides
 from core.frames import SIDES, Side
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.rows import Column
-from server.report.columns import plain
+from server.report.columns import reduce_to_plain
 from server.report.level import from_standing
 from server.report.svg import KEY, make_label, make_time_labels
-from server.report.table import Row
-from server.report.wording import excluded_words, number
+from server.report.table import ParameterRow
+from server.report.wording import explain_exclusion, format_number
 
 HEIGHT: Final = 220
 TOP, BOTTOM = 12, 24
@@ -43,7 +43,7 @@ class StrideValue:
 
 
 @dataclass(frozen=True)
-class Behind:
+class ParameterStrides:
     """One parameter and its strides.
 
     Parameters
@@ -52,7 +52,7 @@ class Behind:
         not one of strides. svg : its strides over time, empty without any.
     """
 
-    row: Row
+    row: ParameterRow
     definition: str
     strides: tuple[StrideValue, ...]
     svg: str
@@ -64,11 +64,13 @@ class Behind:
             "definition": self.definition,
             "strides": [asdict(s) for s in self.strides],
         }
-        result = plain(content)
+        result = reduce_to_plain(content)
         return result if isinstance(result, dict) else {}
 
 
-def behind(row: Row, strides: Strides, column: Column | None, duration_s: float) -> Behind:
+def open_row(
+    row: ParameterRow, strides: Strides, column: Column | None, duration_s: float
+) -> ParameterStrides:
     """Open a row of the table.
 
     Parameters
@@ -83,9 +85,9 @@ def behind(row: Row, strides: Strides, column: Column | None, duration_s: float)
             start_s=s.start_s,
             end_s=s.end_s,
             value=v,
-            text="–" if v is None else number(v, max(digits, 2)),
+            text="–" if v is None else format_number(v, max(digits, 2)),
             counted=s.excluded_reason is None,
-            excluded=None if s.excluded_reason is None else excluded_words(s.excluded_reason),
+            excluded=None if s.excluded_reason is None else explain_exclusion(s.excluded_reason),
         )
         for i, (s, v) in enumerate(zip(strides.strides, column, strict=True))
     )  # fmt: skip
@@ -93,10 +95,10 @@ def behind(row: Row, strides: Strides, column: Column | None, duration_s: float)
     definition = "" if entry is None else entry.definition
     if from_standing(row.name) is not None:
         definition = definition.replace(STANDING, "from the anatomical zero")
-    return Behind(row, definition, values, _chart(row, values, duration_s))
+    return ParameterStrides(row, definition, values, _chart(row, values, duration_s))
 
 
-def _chart(row: Row, values: Sequence[StrideValue], duration_s: float) -> str:
+def _chart(row: ParameterRow, values: Sequence[StrideValue], duration_s: float) -> str:
     """Every stride as a mark that leads to its moment, the norm as a band, means of the counted as lines."""
     shown = [s for s in values if s.value is not None]
     if not shown or duration_s <= 0.0:
@@ -120,7 +122,7 @@ def _chart(row: Row, values: Sequence[StrideValue], duration_s: float) -> str:
     for k in range(TICKS):
         at = low + pad + (high - low - 2 * pad) * k / (TICKS - 1)
         parts.append(f'<line class="g" x1="0" x2="100%" y1="{y(at):.1f}" y2="{y(at):.1f}"/>')
-        parts.append(make_label("0", y(at), number(at, digits), "", "end", dx=-7, dy=4))
+        parts.append(make_label("0", y(at), format_number(at, digits), "", "end", dx=-7, dy=4))
     parts.append(make_time_labels(duration_s, HEIGHT, -6))
     for side, cell in zip(SIDES, (row.left, row.right), strict=True):
         if cell is not None:

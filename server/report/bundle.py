@@ -21,7 +21,7 @@ from core.events.edits import Edit, EditKind
 from core.events.result import EventKind, GaitEvent, GaitEvents, Stride, StrideFlag, Strides
 from core.events.strides import NOTICES
 from core.frames import SEGMENTS, Segment, Side
-from core.measure import Measured
+from core.measure import MeasuredGait
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
 from server.report.columns import SCHEMA, bools_of, floats_of, read_table
@@ -98,7 +98,7 @@ def read_warnings(data: Mapping[str, Any]) -> tuple[Notice, ...]:
     return tuple(n for n in notices if n.severity == "error" or n.code not in told)
 
 
-def reviewed(bundle: Bundle, measured: Measured, edits: Sequence[Edit]) -> Bundle:
+def apply_review(bundle: Bundle, measured: MeasuredGait, edits: Sequence[Edit]) -> Bundle:
     """The same analysis with what a person's edits give, and a notice that says so."""
     done = Counter(EDIT_WORDS[e.kind] for e in edits)
     notice = Notice(

@@ -9,7 +9,7 @@ from typing import Final
 from core.change import UNLIKE, Change
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.variability import TOO_FEW
-from server.report.wording import Term, number, parameter_term, title_of
+from server.report.wording import Term, format_number, parameter_term, title_of
 
 VERDICTS: Final[Mapping[str, str]] = {
     "within_measurement_error": "within measurement error",
@@ -51,7 +51,7 @@ class ChangeWords:
     limits: tuple[str, ...]
 
 
-def term_of(name: str, unit: str = "") -> Term:
+def find_term(name: str, unit: str = "") -> Term:
     """How a figure is called; one without wording shows its own name."""
     if name in CATALOGUE:
         term = parameter_term(name)
@@ -63,33 +63,35 @@ def term_of(name: str, unit: str = "") -> Term:
 
 def change_words(change: Change) -> ChangeWords:
     """Say a change in words."""
-    term = term_of(change.name, change.unit)
+    term = find_term(change.name, change.unit)
     if change.difference is None:
         return ChangeWords(change.side, "–", "none", "not measured in both", limit_words(change))
     mark = "none" if change.verdict is None else ""
     if change.verdict in {"real_change", "clinically_relevant"}:
         mark = "up" if change.difference > 0 else "down"
     return ChangeWords(
-        change.side, signed(change.difference, term), mark, _verdict(change), limit_words(change)
+        change.side, format_difference(change.difference, term), mark, _verdict(change), limit_words(change)
     )
 
 
-def signed(difference: float, term: Term) -> str:
+def format_difference(difference: float, term: Term) -> str:
     """A difference with its sign, "+0.22"; without one where it rounds to nothing."""
-    text = number(difference, term.digits)
+    text = format_number(difference, term.digits)
     return f"+{text}" if difference > 0 and float(f"{difference:.{term.digits}f}") else text
 
 
 def limit_words(change: Change) -> tuple[str, ...]:
     """The limits of a figure with their sources, whoever they were found on."""
-    term = term_of(change.name, change.unit)
+    term = find_term(change.name, change.unit)
     unit = "" if not term.unit else term.unit if term.unit in "°%" else f"\u202f{term.unit}"
     said = []
     if change.limit is not None:
         people = f" ({change.people})" if change.people else ""
-        said.append(f"MDC {number(change.limit, _limit_digits(term))}{unit}: {change.limit_source}{people}.")
+        said.append(
+            f"MDC {format_number(change.limit, _limit_digits(term))}{unit}: {change.limit_source}{people}."
+        )
     if change.mcid is not None:
-        said.append(f"MCID {number(change.mcid, _limit_digits(term))}{unit}: {change.mcid_source}.")
+        said.append(f"MCID {format_number(change.mcid, _limit_digits(term))}{unit}: {change.mcid_source}.")
     return tuple(said)
 
 

@@ -18,16 +18,16 @@ SCHEMA = 1
 """Version of analysis.json and of the columns beside it; readers refuse a newer one."""
 
 
-def plain(value: object) -> object:
+def reduce_to_plain(value: object) -> object:
     """Reduce mappings, sequences and numpy values to what JSON knows; non-finite numbers become null."""
     if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
+        return {str(k): reduce_to_plain(v) for k, v in value.items()}
     if isinstance(value, np.ndarray):
-        return plain(value.tolist())
+        return reduce_to_plain(value.tolist())
     if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(v) for v in value]
+        return [reduce_to_plain(v) for v in value]
     if isinstance(value, np.generic):
-        return plain(value.item())
+        return reduce_to_plain(value.item())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if value is None or isinstance(value, (str, bool, int)):
@@ -38,7 +38,7 @@ def plain(value: object) -> object:
 def parquet_file(t_s: Floats, columns: Mapping[str, np.ndarray], meta: Mapping[str, object]) -> bytes:
     """Columns over time as Parquet with `meta` as JSON under "sagittal"; NaN becomes null."""
     arrays = {"t_s": pa.array(t_s)} | {k: pa.array(v, from_pandas=True) for k, v in columns.items()}
-    table = pa.table(arrays).replace_schema_metadata({"sagittal": json.dumps(plain(meta))})
+    table = pa.table(arrays).replace_schema_metadata({"sagittal": json.dumps(reduce_to_plain(meta))})
     # neighbouring samples share their high bytes: splitting the bytes halves the file
     split = [k for k, a in arrays.items() if pa.types.is_floating(a.type)]
     sink = io.BytesIO()

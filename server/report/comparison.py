@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from core.change import Change, parameter_changes, unjudged
+from core.change import Change, parameter_changes, withdraw_verdicts
 from core.frames import Side
 from core.norms import Norms, NormValue
 from core.parameters.catalogue import CATALOGUE
-from server.report.change_words import SCORE_TERMS, ChangeWords, change_words, term_of
+from server.report.change_words import SCORE_TERMS, ChangeWords, change_words, find_term
 from server.report.exports import write_csv
 from server.report.numbers import Numbers
-from server.report.table import Row
-from server.report.trends import figures
-from server.report.wording import number, reason_words
+from server.report.table import ParameterRow
+from server.report.trends import collect_figures
+from server.report.wording import format_number, reason_words
 
-Group = tuple[str, tuple[Row, ...]]
+Group = tuple[str, tuple[ParameterRow, ...]]
 
 
 @dataclass(frozen=True)
@@ -39,22 +39,22 @@ class ComparedRow:
     change: Change
 
 
-def changes(
+def compare_figures(
     before: Numbers, after: Numbers, norms: Norms | None = None, affected: Side | None = None
 ) -> tuple[Change, ...]:
     """What changed of every figure that either session has, in the order of the table."""
     known: Mapping[str, NormValue] = {} if norms is None else norms.values
-    there = {(p.name, p.side) for n in (before, after) for p in figures(n) if p.mean is not None}
+    there = {(p.name, p.side) for n in (before, after) for p in collect_figures(n) if p.mean is not None}
     order = {name: i for i, name in enumerate((*CATALOGUE, *SCORE_TERMS))}
     found = [
         c
-        for c in parameter_changes(figures(before), figures(after), affected, known)
+        for c in parameter_changes(collect_figures(before), collect_figures(after), affected, known)
         if (c.name, c.side) in there
     ]
     return tuple(sorted(found, key=lambda c: order.get(c.name, len(order))))
 
 
-def compared_rows(
+def compare_rows(
     before: Numbers,
     after: Numbers,
     norms: Norms | None = None,
@@ -63,12 +63,14 @@ def compared_rows(
     comparable: bool = True,
 ) -> tuple[ComparedRow, ...]:
     """The table of a comparison; without verdicts where the two were not walked alike."""
-    reasons = {(p.name, p.side): p.reason for p in figures(after)}
+    reasons = {(p.name, p.side): p.reason for p in collect_figures(after)}
     rows = []
-    for found in changes(before, after, norms, affected):
-        c = found if comparable else unjudged(found)
-        term = term_of(c.name, c.unit)
-        old, new = ("–" if value is None else number(value, term.digits) for value in (c.before, c.after))
+    for found in compare_figures(before, after, norms, affected):
+        c = found if comparable else withdraw_verdicts(found)
+        term = find_term(c.name, c.unit)
+        old, new = (
+            "–" if value is None else format_number(value, term.digits) for value in (c.before, c.after)
+        )
         reason = reason_words(reasons.get((c.name, c.side))) if c.after is None else None
         rows.append(
             ComparedRow(term.label, term.unit, term.group, c.side, old, new, change_words(c), reason, c)
@@ -76,7 +78,7 @@ def compared_rows(
     return tuple(rows)
 
 
-def with_changes(groups: Sequence[Group], found: Sequence[Change]) -> tuple[Group, ...]:
+def add_changes(groups: Sequence[Group], found: Sequence[Change]) -> tuple[Group, ...]:
     """Rows of a session's table with their change since an earlier one, where both have a number."""
     words: dict[str, list[ChangeWords]] = {}
     for c in found:

@@ -20,7 +20,7 @@ from server.report.svg import (
     make_time_labels,
     stretch,
 )
-from server.report.wording import excluded_words, number
+from server.report.wording import explain_exclusion, format_number
 
 X_TICKS: Final = (0, 20, 40, 60, 80, 100)
 _TOP, _BOTTOM, _BOTTOM_WITH_UNIT = 18, 20, 34
@@ -120,7 +120,7 @@ def _stride_mark(index: int, s: Stride, duration_s: float) -> str:
     said = f"{s.side} stride, {s.start_s:.2f} to {s.end_s:.2f} s"
     cross = ""
     if s.excluded_reason is not None:
-        said += f", left out: {excluded_words(s.excluded_reason)}"
+        said += f", left out: {explain_exclusion(s.excluded_reason)}"
         a, b = f"{start:.2f}", f"{end:.2f}"
         cross = f'<path class="xx" d="M{a} {top + 60}L{b} {top + 360}M{a} {top + 360}L{b} {top + 60}"/>'
     faded = " x" if out else ""
@@ -142,7 +142,7 @@ class _CyclePlot(PlotArea):
 
     def grid(self, ticks: Sequence[float]) -> None:
         for tick in ticks:
-            self.add_tick("z" if tick == 0 else "g", tick, f"{number(tick)}°")
+            self.add_tick("z" if tick == 0 else "g", tick, f"{format_number(tick)}°")
 
     def foot_off_spread(self, side: Side, curve: SideCurve) -> None:
         if curve.foot_off_pct is not None and curve.foot_off_sd is not None:

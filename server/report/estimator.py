@@ -15,7 +15,7 @@ from core.estimators import (
     NO_FIGURE_NOTE,
     PaperReference,
 )
-from server.report.wording import number, place_words
+from server.report.wording import format_number, place_words
 
 KINDS: Final[Mapping[str, str]] = {"good": "ok", "warn": "warn", "bad": "bad"}
 VERDICTS: Final[Mapping[str, str]] = {"good": "consistent", "warn": "doubtful in part", "bad": "inconsistent"}
@@ -106,7 +106,7 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
             (AUTO, "Automatic: the best for what is worn", asked == AUTO),
             *((x, choice_label(x), asked == x) for x in e["possible"]),
         ),
-        estimated=_estimated(estimated_angles(e)),
+        estimated=_estimated(list_estimated_angles(e)),
         paper=BY_METHOD[name].paper if name in BY_METHOD else None,
     )
 
@@ -127,14 +127,14 @@ def _method_note(method: str) -> str:
     return known.note if known is not None else NO_FIGURE_NOTE if method == NO_FIGURE else ""
 
 
-def estimated_angles(e: Mapping[str, Any] | None) -> frozenset[str]:
+def list_estimated_angles(e: Mapping[str, Any] | None) -> frozenset[str]:
     """Angles with their side that the estimator's model gives rather than two sensors."""
     return frozenset() if e is None else frozenset(e["estimated_angles"])
 
 
-def estimated_variables(e: Mapping[str, Any] | None) -> frozenset[str]:
+def list_estimated_variables(e: Mapping[str, Any] | None) -> frozenset[str]:
     """The same without the side."""
-    return frozenset(a.removesuffix("_l").removesuffix("_r") for a in estimated_angles(e))
+    return frozenset(a.removesuffix("_l").removesuffix("_r") for a in list_estimated_angles(e))
 
 
 def _estimated(angles: frozenset[str]) -> str:
@@ -171,7 +171,9 @@ def _row(f: Mapping[str, Any]) -> HealthRow:
     return HealthRow(
         label=label,
         where=where,
-        text="not measured" if f["value"] is None else f"{number(float(f['value']), digits)}{gap}{unit}",
-        limit="" if limit is None else f"≤ {number(float(limit), 0)}{gap}{unit}",
+        text="not measured"
+        if f["value"] is None
+        else f"{format_number(float(f['value']), digits)}{gap}{unit}",
+        limit="" if limit is None else f"≤ {format_number(float(limit), 0)}{gap}{unit}",
         kind=KINDS[str(f["verdict"])],
     )

@@ -25,31 +25,31 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from core.angles import JointAngles
-from core.body.health import worst
+from core.body.health import find_worst_verdict
 from core.body.poses import Poses
 from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
 from core.parameters import cycle_curves
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
-from core.quality import shown_level
-from core.scores import Scores, scores
+from core.quality import find_shown_level
+from core.scores import Scores, score_curves
 from server.report import signals, tracks
-from server.report.columns import SCHEMA, parquet_file, plain
-from server.report.estimator import estimated_variables
+from server.report.columns import SCHEMA, parquet_file, reduce_to_plain
+from server.report.estimator import list_estimated_variables
 
 if TYPE_CHECKING:
     # these packages bring numba, which the web process does without
     from core.calibration.result import Calibration
-    from core.pipeline import Analysis
+    from core.pipeline import TakeAnalysis
 
 STRIDE_COLUMNS = ("side", "start_s", "tc_s", "end_s", "opposite_tc_s", "opposite_ic_s", "turn_deg")
 """What a stride is; its parameters, `flags` and `excluded_reason` follow in strides.csv."""
 
 
-def analysis_files(analysis: Analysis) -> dict[str, bytes]:
+def analysis_files(analysis: TakeAnalysis) -> dict[str, bytes]:
     """Write an analysis as files, name → bytes; a stage that gave nothing leaves its file out."""
-    files = {"analysis.json": _json_bytes(summary(analysis))}
+    files = {"analysis.json": _json_bytes(summarise_analysis(analysis))}
     if analysis.measured is not None:
         files["events.csv"] = events_csv(analysis.measured.events)
         files["strides.csv"] = strides_csv(analysis.measured.strides, analysis.measured.columns)
@@ -66,7 +66,7 @@ def analysis_files(analysis: Analysis) -> dict[str, bytes]:
     return files
 
 
-def summary(analysis: Analysis) -> dict[str, object]:
+def summarise_analysis(analysis: TakeAnalysis) -> dict[str, object]:
     """Content of analysis.json (schema 1) as plain JSON values."""
     return {
         "schema": SCHEMA,
@@ -77,16 +77,16 @@ def summary(analysis: Analysis) -> dict[str, object]:
         "scores": _scores(analysis),
         "walking": _walking(analysis),
         "warnings": [n.to_json() for n in analysis.notices],
-        "provenance": plain(analysis.provenance),
+        "provenance": reduce_to_plain(analysis.provenance),
     }
 
 
-def _quality(analysis: Analysis) -> dict[str, object]:
+def _quality(analysis: TakeAnalysis) -> dict[str, object]:
     """The quality report; its level is the worse of signals and estimator, `signals_level` the signals'."""
-    found = plain(analysis.quality.to_json())
-    assert isinstance(found, dict)  # noqa: S101 (narrows the type; `plain` keeps mappings)
-    verdict = None if analysis.poses is None else worst(analysis.poses.health)
-    level = shown_level(analysis.quality.level, verdict)
+    found = reduce_to_plain(analysis.quality.to_json())
+    assert isinstance(found, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
+    verdict = None if analysis.poses is None else find_worst_verdict(analysis.poses.health)
+    level = find_shown_level(analysis.quality.level, verdict)
     reasons = [*analysis.quality.reasons, *([JUDGED[verdict]] if verdict in JUDGED else [])]
     return {**found, "level": level, "signals_level": analysis.quality.level, "reasons": reasons}
 
@@ -98,19 +98,19 @@ JUDGED: Final[Mapping[str | None, str]] = {
 """Verdict of the estimator → reason of the level."""
 
 
-def _scores(analysis: Analysis) -> list[dict[str, object]]:
+def _scores(analysis: TakeAnalysis) -> list[dict[str, object]]:
     """Profiles and indices over several curves, so that a trend over many visits reads no signals."""
     if analysis.angles is None or analysis.measured is None:
         return []
     curves = cycle_curves(analysis.angles, analysis.measured.strides)
-    unsure = estimated_variables(_estimator(analysis))
-    return score_rows(scores(curves, analysis.angles.standing_deg, estimated=unsure))
+    unsure = list_estimated_variables(_estimator(analysis))
+    return score_rows(score_curves(curves, analysis.angles.standing_deg, estimated=unsure))
 
 
 def score_rows(found: Scores) -> list[dict[str, object]]:
     """Profiles and indices as JSON; what belongs to one curve is left out."""
     return [
-        {name: plain(value) for name, value in asdict(s).items() if name != "variable"}
+        {name: reduce_to_plain(value) for name, value in asdict(s).items() if name != "variable"}
         for s in found.scores
         if s.variable is None
     ]
@@ -122,13 +122,13 @@ def parameter_row(p: Parameter) -> dict[str, object]:
         "name": p.name,
         "side": p.side,
         "n": p.n,
-        "mean": plain(p.mean),
-        "sd": plain(p.sd),
+        "mean": reduce_to_plain(p.mean),
+        "sd": reduce_to_plain(p.sd),
         "unit": p.unit,
         "reason": p.reason,
-        "cv_pct": plain(p.cv_pct),
-        "ci_low": plain(p.ci_low),
-        "ci_high": plain(p.ci_high),
+        "cv_pct": reduce_to_plain(p.cv_pct),
+        "ci_low": reduce_to_plain(p.ci_low),
+        "ci_high": reduce_to_plain(p.ci_high),
         "note": p.note,
     }
 
@@ -223,7 +223,7 @@ def _calibration(calibration: Calibration | None, angles: JointAngles | None) ->
         }
         for name, s in calibration.segments.items()
     }
-    result = plain(
+    result = reduce_to_plain(
         {
             "method": calibration.method,
             "segments": segments,
@@ -235,11 +235,11 @@ def _calibration(calibration: Calibration | None, angles: JointAngles | None) ->
             "diagnostics": calibration.diagnostics,
         }
     )
-    assert isinstance(result, dict)  # noqa: S101 (narrows the type; `plain` keeps mappings)
+    assert isinstance(result, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
     return result
 
 
-def _walking(analysis: Analysis) -> dict[str, object] | None:
+def _walking(analysis: TakeAnalysis) -> dict[str, object] | None:
     """Walking bouts with their stops, and turns."""
     measured = analysis.measured
     if measured is None:
@@ -251,7 +251,7 @@ def _walking(analysis: Analysis) -> dict[str, object] | None:
                 "end_s": b.end_s,
                 "contacts": b.contacts,
                 "initiation_s": b.initiation_s,
-                "stops_s": plain(b.stops),
+                "stops_s": reduce_to_plain(b.stops),
                 "from_rest": b.from_rest,
                 "to_rest": b.to_rest,
             }
@@ -271,7 +271,7 @@ def _walking(analysis: Analysis) -> dict[str, object] | None:
     }
 
 
-def _estimator(analysis: Analysis) -> dict[str, object] | None:
+def _estimator(analysis: TakeAnalysis) -> dict[str, object] | None:
     """Which pose estimator ran on what, and its health (docs/estimators.md, "Health")."""
     poses = analysis.poses
     if poses is None:
@@ -283,14 +283,14 @@ def _estimator(analysis: Analysis) -> dict[str, object] | None:
         "name": poses.method,
         "requested": facts.pop("requested", None),
         "reduced": poses.reduced,
-        "sensors": plain(facts.pop("sensors", ())),
-        "possible": plain(facts.pop("possible", ())),
-        "verdict": worst(poses.health),
+        "sensors": reduce_to_plain(facts.pop("sensors", ())),
+        "possible": reduce_to_plain(facts.pop("possible", ())),
+        "verdict": find_worst_verdict(poses.health),
         "health": [
             {
                 "name": f.name,
                 "of": f.of,
-                "value": plain(f.value),
+                "value": reduce_to_plain(f.value),
                 "warn": f.warn,
                 "bad": f.bad,
                 "verdict": f.verdict,
@@ -298,8 +298,8 @@ def _estimator(analysis: Analysis) -> dict[str, object] | None:
             for f in poses.health
         ],
         "feet": None if feet is None else {"source": feet.source, "linked": feet.linked},
-        "estimated_angles": plain(angles.get("estimated", ())),
-        "diagnostics": plain(facts),
+        "estimated_angles": reduce_to_plain(angles.get("estimated", ())),
+        "diagnostics": reduce_to_plain(facts),
     }
 
 

@@ -12,12 +12,24 @@ from core.feedback.cue import Summary
 from core.feedback.guard import FIRST, LAST
 from core.feedback.summary import Kind
 from core.parameters.rows import Column
-from server.report.columns import plain
-from server.report.feedback_beside import Before, Effect, Retention, effects, retention
+from server.report.columns import reduce_to_plain
+from server.report.feedback_beside import (
+    PreviousTraining,
+    Retention,
+    SideEffectRow,
+    compare_retention,
+    describe_effects,
+)
 from server.report.feedback_chart import feedback_svg
-from server.report.feedback_rows import Row, row, signed
-from server.report.feedback_words import digits_of, prescription_words, quantity, target_words, title
-from server.report.wording import Term, number, parameter_term
+from server.report.feedback_rows import FeedbackRow, describe_summary, format_signed
+from server.report.feedback_words import (
+    digits_of,
+    format_quantity,
+    name_target,
+    prescription_words,
+    target_words,
+)
+from server.report.wording import Term, format_number, parameter_term
 
 KINDS: Final[tuple[tuple[Kind, str, bool], ...]] = (
     ("baseline", "Before feedback, first strides", False),
@@ -38,13 +50,13 @@ _HOW_TO_READ: Final = (
 
 
 @dataclass(frozen=True)
-class Probe:
+class ProbeComparison:
     """A probe block beside the training strides right before it."""
 
     number: int
     start_s: float
-    before: Row
-    probe: Row
+    before: FeedbackRow
+    probe: FeedbackRow
 
 
 @dataclass(frozen=True)
@@ -55,10 +67,10 @@ class FeedbackView:
     words: tuple[tuple[str, str], ...]
     content: Prescription
     term: Term
-    rows: tuple[Row, ...]
-    probes: tuple[Probe, ...]
+    rows: tuple[FeedbackRow, ...]
+    probes: tuple[ProbeComparison, ...]
     levels: tuple[tuple[int, float, int], ...]
-    effects: tuple[Effect, ...]
+    effects: tuple[SideEffectRow, ...]
     retention: Retention | None
     notes: tuple[str, ...]
     svg: str
@@ -72,11 +84,11 @@ class FeedbackView:
     @property
     def retention_words(self) -> str:
         """How much the first strides of this visit differ from the last ones trained."""
-        return "" if self.retention is None else signed(self.retention.difference, self.term)
+        return "" if self.retention is None else format_signed(self.retention.difference, self.term)
 
     def to_json(self) -> dict[str, object]:
         """Plain JSON with every stride."""
-        shown = plain(
+        shown = reduce_to_plain(
             {
                 "prescription": self.content.to_json(),
                 "words": [f"{label}: {text}" for label, text in self.words],
@@ -99,7 +111,7 @@ class FeedbackView:
         return shown if isinstance(shown, dict) else {}
 
 
-def analysed_strides(strides: Strides, column: Column) -> tuple[AnalysedStride, ...]:
+def list_analysed_strides(strides: Strides, column: Column) -> tuple[AnalysedStride, ...]:
     """The stride list with the value of the trained parameter."""
     return tuple(
         AnalysedStride(s.side, s.start_s, value, s.excluded_reason is None)
@@ -111,7 +123,7 @@ def feedback_view(
     content: Prescription,
     split: FeedbackSplit,
     guard: GuardState,
-    before: Before | None = None,
+    before: PreviousTraining | None = None,
     limb: Limb | None = None,
 ) -> FeedbackView:
     """Put the result of a take into words.
@@ -122,28 +134,28 @@ def feedback_view(
     """
     term = parameter_term(content.parameter)
     rows = tuple(
-        row(kind, label, part, split.kinds.get(kind, Summary()), digits_of(content))
+        describe_summary(kind, label, part, split.kinds.get(kind, Summary()), digits_of(content))
         for kind, label, part in KINDS
         if kind in {"with", "without"} or kind in split.kinds
     )
     return FeedbackView(
-        title=title(content),
+        title=name_target(content),
         words=tuple(prescription_words(content)),
         content=content,
         term=term,
         rows=rows,
         probes=tuple(
-            Probe(
+            ProbeComparison(
                 p.number,
                 p.start_s,
-                row("with", "before", False, p.before, digits_of(content)),
-                row("probe", "probe", False, p.probe, digits_of(content)),
+                describe_summary("with", "before", False, p.before, digits_of(content)),
+                describe_summary("probe", "probe", False, p.probe, digits_of(content)),
             )
             for p in split.probes
         ),
         levels=tuple((s.n, s.t_s, s.level) for s in split.levels),
-        effects=effects(content, guard, term),
-        retention=None if before is None else retention(content, split, before, term, limb),
+        effects=describe_effects(content, guard, term),
+        retention=None if before is None else compare_retention(content, split, before, term, limb),
         notes=_notes(split, term),
         svg=feedback_svg(split, content, term) if split.strides else "",
         split=split,
@@ -156,8 +168,8 @@ def _notes(split: FeedbackSplit, term: Term) -> tuple[str, ...]:
     live = split.live_difference
     if live.mean is not None and live.sd is not None:
         said.append(
-            f"What was fed back differed from the analysis by {number(live.mean, term.digits + 1)} ± "
-            f"{quantity(live.sd, term, term.digits + 1)}."
+            f"What was fed back differed from the analysis by {format_number(live.mean, term.digits + 1)} ± "
+            f"{format_quantity(live.sd, term, term.digits + 1)}."
         )
     for n, what in ((split.unmatched, "no stride"), (split.left_out, "a stride that does not count")):
         if n:

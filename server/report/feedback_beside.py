@@ -9,13 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from core.change import detectable
+from core.change import find_detectable_change
 from core.change.limits import Limb
 from core.feedback import AnalysedStride, Baseline, FeedbackSplit, GuardState, Prescription, SideEffect
 from core.feedback.guard import FIRST, GuardWatch
 from core.parameters.result import CycleCurves
-from server.report.feedback_rows import NO_STRIDES, Row, row, signed
-from server.report.feedback_words import digits_of, quantity
+from server.report.feedback_rows import NO_STRIDES, FeedbackRow, describe_summary, format_signed
+from server.report.feedback_words import digits_of, format_quantity
 from server.report.wording import Term
 
 EFFECT_REASONS: Final = {
@@ -27,7 +27,7 @@ EFFECT_REASONS: Final = {
 
 
 @dataclass(frozen=True)
-class Effect:
+class SideEffectRow:
     """A side effect; `kind` is ok, warn, or none where it cannot be judged."""
 
     name: str
@@ -51,8 +51,8 @@ class Retention:
 
     session_id: str
     performed_on: dt.date
-    end: Row
-    now: Row
+    end: FeedbackRow
+    now: FeedbackRow
     difference: float
     limit: float | None
     limit_source: str | None
@@ -60,7 +60,7 @@ class Retention:
 
 
 @dataclass(frozen=True)
-class Before:
+class PreviousTraining:
     """The visit of the same training before this one."""
 
     session_id: str
@@ -86,11 +86,11 @@ def side_effects(
                 row = sides[s.side][rows[s.side, i]] if s.side in sides else None
                 if row is not None and np.isfinite(row).all():
                     found[variable] = row
-        watch.see(s.side, s.value, found)
+        watch.add_stride(s.side, s.value, found)
     return watch.state
 
 
-def effects(content: Prescription, guard: GuardState, term: Term) -> tuple[Effect, ...]:
+def describe_effects(content: Prescription, guard: GuardState, term: Term) -> tuple[SideEffectRow, ...]:
     """The other side and the sagittal profile in words."""
     other = "other side" if content.side is None else "right" if content.side == "left" else "left"
     gps = Term("Sagittal profile score", "°", "", 1, (0, 20), ("larger", "smaller"))
@@ -100,41 +100,43 @@ def effects(content: Prescription, guard: GuardState, term: Term) -> tuple[Effec
     )
 
 
-def _effect(name: str, label: str, effect: SideEffect, term: Term) -> Effect:
+def _effect(name: str, label: str, effect: SideEffect, term: Term) -> SideEffectRow:
     if effect.change is None:
         why = EFFECT_REASONS.get(effect.reason or "", effect.reason or "")
-        return Effect(name, label, "none", None, None, None, NO_STRIDES, f"not judged: {why}")
-    text = signed(effect.change, term)
+        return SideEffectRow(name, label, "none", None, None, None, NO_STRIDES, f"not judged: {why}")
+    text = format_signed(effect.change, term)
     if effect.limit is None:
-        return Effect(
+        return SideEffectRow(
             name, label, "none", effect.change, None, None, text, EFFECT_REASONS[effect.reason or "no_limit"]
         )
-    limit = f"{quantity(effect.limit, term, max(term.digits, 1))} ({effect.source})"
+    limit = f"{format_quantity(effect.limit, term, max(term.digits, 1))} ({effect.source})"
     words = f"more than {limit}" if effect.beyond else f"within {limit}"
     kind = "warn" if effect.beyond else "ok"
-    return Effect(name, label, kind, effect.change, effect.limit, effect.source, text, words)
+    return SideEffectRow(name, label, kind, effect.change, effect.limit, effect.source, text, words)
 
 
-def retention(
-    content: Prescription, split: FeedbackSplit, before: Before, term: Term, limb: Limb | None
+def compare_retention(
+    content: Prescription, split: FeedbackSplit, before: PreviousTraining, term: Term, limb: Limb | None
 ) -> Retention | None:
     """Compare the retention block with the end of the training before; None without either."""
     now, end = split.kinds.get("retention"), before.split.end
     if now is None or now.mean is None or end.mean is None:
         return None
     difference = now.mean - end.mean
-    limit = detectable(content.parameter, end.mean, limb)
+    limit = find_detectable_change(content.parameter, end.mean, limb)
     if limit is None:
         verdict = "no measurement error of this parameter is known"
     elif abs(difference) <= limit.value:
-        verdict = f"within the measurement error of {quantity(limit.value, term, term.digits + 1)}"
+        verdict = f"within the measurement error of {format_quantity(limit.value, term, term.digits + 1)}"
     else:
-        verdict = f"more than the measurement error of {quantity(limit.value, term, term.digits + 1)}"
+        verdict = f"more than the measurement error of {format_quantity(limit.value, term, term.digits + 1)}"
     return Retention(
         before.session_id,
         before.performed_on,
-        row("end", "End of the last training", False, end, digits_of(content)),
-        row("retention", "Start of this visit, without feedback", False, now, digits_of(content)),
+        describe_summary("end", "End of the last training", False, end, digits_of(content)),
+        describe_summary(
+            "retention", "Start of this visit, without feedback", False, now, digits_of(content)
+        ),
         difference,
         None if limit is None else limit.value,
         None if limit is None else limit.source,

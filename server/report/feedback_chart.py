@@ -12,7 +12,7 @@ from typing import Final
 from core.feedback import FeedbackSplit, Prescription
 from core.feedback.summary import MatchedStride
 from server.report.svg import KEY, PlotArea, find_round_ticks, format_coordinate
-from server.report.wording import Term, number
+from server.report.wording import Term, format_number
 
 HEIGHT: Final = 190
 TOP, BOTTOM = 12, 34
@@ -52,7 +52,7 @@ def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str
         plot.add_band("band", m.cue.zone_low, m.cue.zone_high, x(i - 0.5), x(j + 0.5) - x(i - 0.5))
     ticks, digits = find_round_ticks(low, high)
     for tick in ticks:
-        plot.add_tick("g", tick, number(tick, digits))
+        plot.add_tick("g", tick, format_number(tick, digits))
     mean = content.target.mean
     if mean is not None and low <= mean <= high:
         plot.add_level("nm", mean)

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from core.feedback.cue import Summary
-from server.report.feedback_words import NBSP, quantity
-from server.report.wording import Term, number
+from server.report.feedback_words import NBSP, format_quantity
+from server.report.wording import Term, format_number
 
 NO_STRIDES: Final = "–"
 
 
 @dataclass(frozen=True)
-class Row:
+class FeedbackRow:
     """Strides of one kind; `text` is "0.52 ± 0.03", `zone` "65 %"; "–" where there is nothing."""
 
     kind: str
@@ -27,17 +27,17 @@ class Row:
     zone: str
 
 
-def row(kind: str, label: str, part: bool, s: Summary, digits: int) -> Row:
+def describe_summary(kind: str, label: str, part: bool, s: Summary, digits: int) -> FeedbackRow:
     """Put a summary into words."""
     text = NO_STRIDES
     if s.mean is not None:
-        spread = "" if s.sd is None else f" ± {number(s.sd, digits)}"
-        text = f"{number(s.mean, digits)}{spread}"
-    zone = NO_STRIDES if s.in_zone is None else f"{number(100.0 * s.in_zone)}{NBSP}%"
-    return Row(kind, label, part, s.n, s.mean, s.sd, s.in_zone, text, zone)
+        spread = "" if s.sd is None else f" ± {format_number(s.sd, digits)}"
+        text = f"{format_number(s.mean, digits)}{spread}"
+    zone = NO_STRIDES if s.in_zone is None else f"{format_number(100.0 * s.in_zone)}{NBSP}%"
+    return FeedbackRow(kind, label, part, s.n, s.mean, s.sd, s.in_zone, text, zone)
 
 
-def signed(value: float, term: Term) -> str:
+def format_signed(value: float, term: Term) -> str:
     """A difference with its sign, unless it rounds to nothing."""
-    shown = quantity(value, term)
+    shown = format_quantity(value, term)
     return f"+{shown}" if value > 0 and float(f"{value:.{term.digits}f}") else shown

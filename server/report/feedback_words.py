@@ -7,7 +7,7 @@ from typing import Final
 from core.feedback import Prescription
 from core.frames import Side
 from core.parameters.catalogue import CATALOGUE
-from server.report.wording import Term, number, parameter_term
+from server.report.wording import Term, format_number, parameter_term
 
 SOURCE_WORDS: Final = {
     "norm": "healthy people at this person's speed",
@@ -24,7 +24,7 @@ MODE_WORDS: Final = {
 NBSP: Final = "\u202f"
 
 
-def title(content: Prescription) -> str:
+def name_target(content: Prescription) -> str:
     """ "Step length, left"."""
     return f"{CATALOGUE[content.parameter].label}, {side_words(content.side)}"
 
@@ -34,10 +34,10 @@ def side_words(side: Side | None) -> str:
     return "both sides" if side is None else side
 
 
-def quantity(value: float, term: Term, digits: int | None = None) -> str:
+def format_quantity(value: float, term: Term, digits: int | None = None) -> str:
     """A value with its unit."""
     unit = term.unit if term.unit in {"", "°"} else f"{NBSP}{term.unit}"
-    return f"{number(value, term.digits if digits is None else digits)}{unit}"
+    return f"{format_number(value, term.digits if digits is None else digits)}{unit}"
 
 
 def digits_of(content: Prescription) -> int:
@@ -53,13 +53,13 @@ def target_words(content: Prescription) -> str:
         return SOURCE_WORDS[t.source]
     digits = digits_of(content)
     who = "entered" if t.source == "manual" else t.words or SOURCE_WORDS[t.source]
-    return f"{number(t.mean, digits)} ± {quantity(t.sd, term, digits)}, {who}"
+    return f"{format_number(t.mean, digits)} ± {format_quantity(t.sd, term, digits)}, {who}"
 
 
 def prescription_words(content: Prescription) -> list[tuple[str, str]]:
     """The record as label and text, in reading order."""
     return [
-        ("Trained", title(content)),
+        ("Trained", name_target(content)),
         ("Target", target_words(content)),
         ("Zone", _zone(content)),
         ("Shown as", _shown(content)),
@@ -123,7 +123,7 @@ def _watched(content: Prescription) -> str:
     g, term = content.guard, parameter_term(content.parameter)
     said = []
     if content.side is not None:
-        limit = "its MDC" if g.other_change is None else quantity(g.other_change, term)
+        limit = "its MDC" if g.other_change is None else format_quantity(g.other_change, term)
         said.append(f"a change of the other side by {limit}")
     if g.gps_rise_deg is not None:
         said.append(f"a rise of the sagittal profile score by {g.gps_rise_deg:g}°")

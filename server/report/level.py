@@ -13,7 +13,7 @@ from core.parameters.anatomical_zero import anatomical_parameters, standing_name
 from core.parameters.result import CycleCurves
 from core.parameters.rows import Column
 from core.standing_angles import JOINTS, PELVIS
-from server.report.table import Row, parameter_rows
+from server.report.table import ParameterRow, parameter_rows
 
 GROUP = "Angles from the anatomical zero"
 
@@ -46,7 +46,7 @@ def level_rows(
     standing_deg: Mapping[str, float],
     norms: Norms,
     estimated: Collection[str] = (),
-) -> tuple[Row, ...]:
+) -> tuple[ParameterRow, ...]:
     """Rows of the variables and sides whose standing angle was entered, named "…_anatomical_deg".
 
     Parameters

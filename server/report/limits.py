@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from core.flags import Flag
-from server.report.wording import number, reason_words
+from server.report.wording import format_number, reason_words
 
 NAMES: Final[Mapping[str, str]] = {
     "stiff_knee": "Swing peak of the knee below the other side's",
@@ -98,8 +98,8 @@ def _row(f: Flag) -> LimitRow:
     return LimitRow(
         name=NAMES.get(f.name, f.name.replace("_", " ").capitalize()),
         side=f.side or "",
-        value="–" if f.value is None else f"{number(f.value, digits)}{unit}",
-        limit="" if f.limit is None else f"{sign} {number(f.limit, digits)}{unit}",
+        value="–" if f.value is None else f"{format_number(f.value, digits)}{unit}",
+        limit="" if f.limit is None else f"{sign} {format_number(f.limit, digits)}{unit}",
         kind=kind,
         source=f.source,
         note="; ".join(words),

@@ -13,25 +13,25 @@ from typing import Final, Literal
 import numpy as np
 
 from core.errors import Notice
-from core.flags import flags
+from core.flags import judge_flags
 from core.frames import SIDES, Floats, Side
 from core.norms.controls import ControlGroup
-from core.norms.lookup import Norms, norms_for
+from core.norms.lookup import Norms, look_up_norms
 from core.parameters import cycle_curves
 from core.parameters.anatomical_zero import anatomical_variables
 from core.parameters.result import CycleCurves
-from core.scores import Scores, scores
+from core.scores import Scores, score_curves
 from server.report.bundle import Bundle
-from server.report.columns import plain
-from server.report.estimator import EstimatorView, estimated_variables, estimator_view
+from server.report.columns import reduce_to_plain
+from server.report.estimator import EstimatorView, estimator_view, list_estimated_variables
 from server.report.level import level_rows
 from server.report.limits import LimitsView, limits_view
 from server.report.notes import curve_notes, norm_note
 from server.report.panels import CurvePanel, SideCurve, curve_panels
 from server.report.profile import ProfileView, profile_view
 from server.report.quality_box import QualityBox, quality_box
-from server.report.table import Row, grouped, parameter_rows
-from server.report.wording import excluded_words, place_words
+from server.report.table import ParameterRow, group_rows, parameter_rows
+from server.report.wording import explain_exclusion, place_words
 
 Sex = Literal["female", "male"]
 
@@ -68,7 +68,7 @@ class KeyNumber:
 
 
 @dataclass(frozen=True)
-class Warning_:  # noqa: N801 (Warning is Python's own)
+class ReportWarning:
     """A notice for the reader: `kind` is bad, warn or info."""
 
     kind: str
@@ -92,7 +92,7 @@ class StrideRow:
 
 
 @dataclass(frozen=True)
-class Since:
+class PreviousVisit:
     """The visit before this one that its table is compared with."""
 
     session_id: str
@@ -118,9 +118,9 @@ class ReportModel:
 
     problem: str | None
     quality: QualityBox
-    warnings: tuple[Warning_, ...]
+    warnings: tuple[ReportWarning, ...]
     kpis: tuple[KeyNumber, ...]
-    groups: tuple[tuple[str, tuple[Row, ...]], ...]
+    groups: tuple[tuple[str, tuple[ParameterRow, ...]], ...]
     panels: tuple[CurvePanel, ...]
     strides: tuple[StrideRow, ...]
     duration_s: float
@@ -133,7 +133,7 @@ class ReportModel:
     estimator: EstimatorView | None = None
     profile: ProfileView | None = None
     limits: LimitsView | None = None
-    since: Since | None = None
+    since: PreviousVisit | None = None
     condition: str = ""
 
     @property
@@ -155,14 +155,14 @@ class ReportModel:
                 {"side": s.side, "start_s": s.start_s, "end_s": s.end_s, "used": s.used} for s in self.strides
             ],
             "curves": {
-                p.variable.name: {side: rounded(c.mean_deg) for side, c in p.sides.items()}
+                p.variable.name: {side: round_curve(c.mean_deg) for side, c in p.sides.items()}
                 for p in self.panels
             },
         }
 
     def to_json(self) -> dict[str, object]:
         """Plain JSON; single strides are left to curves.csv and angles.parquet."""
-        result = plain(
+        result = reduce_to_plain(
             {
                 "problem": self.problem,
                 "quality": asdict(self.quality),
@@ -208,18 +208,18 @@ def report_model(
     """
     if speed_mps is None:
         speed_mps = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
-    norms = norms_for(age, sex, speed_mps, height_m)
+    norms = look_up_norms(age, sex, speed_mps, height_m)
     own = None if controls is None else controls.norms(speed_mps, height_m)
     if own is not None:
         compared = {name: v for name, v in norms.values.items() if v.comparable or name not in own.values}
         norms = replace(norms, values={**own.values, **compared})
-    rows = parameter_rows(bundle.parameters, norms, estimated_variables(bundle.estimator), affected)
+    rows = parameter_rows(bundle.parameters, norms, list_estimated_variables(bundle.estimator), affected)
     curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
     panels = curve_panels(bundle, curves, norms, own)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
     if curves is not None and standing:
-        level = norms_for(age, sex, speed_mps, height_m, anatomical_variables(standing))
-        rows += level_rows(curves, standing, level, estimated_variables(bundle.estimator))
+        level = look_up_norms(age, sex, speed_mps, height_m, anatomical_variables(standing))
+        rows += level_rows(curves, standing, level, list_estimated_variables(bundle.estimator))
     stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
     angles = bundle.angles
     return ReportModel(
@@ -232,7 +232,7 @@ def report_model(
             for r in rows
             if r.name == name and r.reason is None and not r.low_confidence
         )[:SHOWN_LARGE],
-        groups=grouped(rows),
+        groups=group_rows(rows),
         panels=panels,
         strides=tuple(
             StrideRow(
@@ -241,7 +241,7 @@ def report_model(
                 s.tc_s,
                 s.end_s,
                 s.excluded_reason is None,
-                None if s.excluded_reason is None else excluded_words(s.excluded_reason),
+                None if s.excluded_reason is None else explain_exclusion(s.excluded_reason),
             )
             for s in bundle.strides.strides
         ),
@@ -262,7 +262,7 @@ def report_model(
 
 def _scores(bundle: Bundle, curves: CycleCurves, age: float | None) -> Scores:
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
-    return scores(curves, standing, estimated=estimated_variables(bundle.estimator), age=age)
+    return score_curves(curves, standing, estimated=list_estimated_variables(bundle.estimator), age=age)
 
 
 def _limits(
@@ -273,17 +273,17 @@ def _limits(
     own: Norms | None,
 ) -> LimitsView | None:
     """Estimated angles are not held against anything."""
-    if not bundle.strides.used():
+    if not bundle.strides.select_used():
         return None
-    unsure = estimated_variables(bundle.estimator)
+    unsure = list_estimated_variables(bundle.estimator)
     if curves is not None:
         measured = {v: c for v, c in curves.curves.items() if v not in unsure}
         curves = replace(curves, curves=measured)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
-    return limits_view(flags(curves, bundle.parameters, standing, height_m, own, age))
+    return limits_view(judge_flags(curves, bundle.parameters, standing, height_m, own, age))
 
 
-def rounded(values: Floats | None) -> list[float] | None:
+def round_curve(values: Floats | None) -> list[float] | None:
     """A curve for the wire, to 0.01°."""
     return None if values is None else np.round(values, 2).tolist()
 
@@ -294,10 +294,10 @@ def _duration(bundle: Bundle) -> float:
     return float(bundle.quality.get("duration_s") or 0.0)
 
 
-def _warning(n: Notice) -> Warning_:
+def _warning(n: Notice) -> ReportWarning:
     title = n.code.replace("_", " ").capitalize()
     where = "" if n.sensor is None else f", {place_words(n.sensor)}"
-    return Warning_(
+    return ReportWarning(
         kind=_KINDS[n.severity],
         code=n.code,
         title=f"{title}{where}",
@@ -307,7 +307,7 @@ def _warning(n: Notice) -> Warning_:
     )
 
 
-def _key_number(row: Row) -> KeyNumber:
+def _key_number(row: ParameterRow) -> KeyNumber:
     pair = row.both is None
     norm = f"norm {row.norm}" if row.norm else ""
     cells = {"": row.both} if row.both is not None else {" left": row.left, " right": row.right}
@@ -334,8 +334,8 @@ def _panel_json(p: CurvePanel) -> dict[str, object]:
     norm = None
     if p.norm is not None:
         norm = {
-            "mean_deg": rounded(p.norm.mean_deg),
-            "sd_deg": rounded(p.norm.sd_deg),
+            "mean_deg": round_curve(p.norm.mean_deg),
+            "sd_deg": round_curve(p.norm.sd_deg),
             "n": p.norm.n,
             "group": p.norm.group,
             "source": p.norm.source,
@@ -359,8 +359,8 @@ def _panel_json(p: CurvePanel) -> dict[str, object]:
 def _side_json(c: SideCurve) -> dict[str, object]:
     return {
         "n": c.n,
-        "mean_deg": rounded(c.mean_deg),
-        "sd_deg": rounded(c.sd_deg),
+        "mean_deg": round_curve(c.mean_deg),
+        "sd_deg": round_curve(c.sd_deg),
         "foot_off_pct": c.foot_off_pct,
         "foot_off_sd": c.foot_off_sd,
     }

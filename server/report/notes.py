@@ -13,8 +13,8 @@ from core.norms.values import is_angle
 from server.report.bundle import Bundle
 from server.report.estimator import estimator_view
 from server.report.panels import DRAWN_STRIDES, CurvePanel
-from server.report.table import Row
-from server.report.wording import NO_NORM, VARIABLES, number
+from server.report.table import ParameterRow
+from server.report.wording import NO_NORM, VARIABLES, format_number
 
 SPEED: Final = "gait_speed_mps"
 
@@ -27,7 +27,10 @@ GROUPS: Final = {
 
 
 def norm_note(
-    rows: Sequence[Row], panels: Sequence[CurvePanel], norms: Norms, controls: ControlGroup | None = None
+    rows: Sequence[ParameterRow],
+    panels: Sequence[CurvePanel],
+    norms: Norms,
+    controls: ControlGroup | None = None,
 ) -> str:
     """Who the reference people are, or why there are none; always something."""
     sentences = []
@@ -74,7 +77,7 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
         side = {"l": " left", "r": " right"}.get(suffix)
         label = labels.get(base if side else name)
         if label is not None:
-            offsets.append(f"{label}{side or ''} {number(float(np.degrees(value)))}°")
+            offsets.append(f"{label}{side or ''} {format_number(float(np.degrees(value)))}°")
     about_zero = []
     if any(p.zero == "standing" and p.reason is None for p in panels):
         about_zero.append(

@@ -10,9 +10,9 @@ from typing import Any
 from core.norms.profile import ScoreSpread
 from core.parameters import cycle_curves
 from core.parameters.result import Parameter
-from core.scores import Score, scores
+from core.scores import Score, score_curves
 from server.report.bundle import Bundle, read_warnings
-from server.report.estimator import estimated_variables
+from server.report.estimator import list_estimated_variables
 from server.report.quality_box import data_verdict
 
 
@@ -45,7 +45,9 @@ def numbers_of(bundle: Bundle) -> Numbers:
     if bundle.angles is None:
         return Numbers(bundle.parameters, (), judged)
     curves = cycle_curves(bundle.angles, bundle.strides)
-    found = scores(curves, bundle.angles.standing_deg, estimated=estimated_variables(bundle.estimator))
+    found = score_curves(
+        curves, bundle.angles.standing_deg, estimated=list_estimated_variables(bundle.estimator)
+    )
     return Numbers(bundle.parameters, tuple(s for s in found.scores if s.variable is None), judged)
 
 

@@ -17,7 +17,7 @@ from core.parameters.anatomical_zero import anatomical_variables, standing_offse
 from core.parameters.kinematic import MEAN_ZERO
 from core.parameters.result import CycleCurves
 from server.report.bundle import Bundle
-from server.report.estimator import estimated_variables
+from server.report.estimator import list_estimated_variables
 from server.report.wording import VARIABLES, ZERO_WORDS, Variable, reason_words
 
 NO_BAND: Final[Mapping[Zero, str]] = {
@@ -90,7 +90,7 @@ def curve_panels(
     norms, own : published reference, and the clinic's own controls; the first that has a band of the same
         zero gives it, to a variable that sensors measure.
     """
-    estimated = estimated_variables(bundle.estimator)
+    estimated = list_estimated_variables(bundle.estimator)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
     level = set(anatomical_variables(standing)).difference(estimated)
     known = () if own is None else (own.bands,)

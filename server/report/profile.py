@@ -9,7 +9,7 @@ from core.frames import SIDES, Side
 from core.norms.profile import Mode
 from core.scores import Score, Scores
 from server.report.svg import draw_bar
-from server.report.wording import VARIABLES, number, reason_words
+from server.report.wording import VARIABLES, format_number, reason_words
 
 SCALE_DEG: Final = 24.0
 """Right end of the bars; a GVS of 24° is beyond any pathology in the tables."""
@@ -79,7 +79,7 @@ def _row(title: str, found: dict[Side, Score], *, low: bool, total: bool) -> Pro
         title=title,
         left=_text(found["left"]),
         right=_text(found["right"]),
-        healthy="" if healthy is None else number(healthy.median_deg, 1),
+        healthy="" if healthy is None else format_number(healthy.median_deg, 1),
         svg=_bar(marks, ends),
         low_confidence=low,
         total=total,
@@ -87,7 +87,7 @@ def _row(title: str, found: dict[Side, Score], *, low: bool, total: bool) -> Pro
 
 
 def _text(score: Score) -> str:
-    return "–" if score.value is None else number(score.value, 1)
+    return "–" if score.value is None else format_number(score.value, 1)
 
 
 def _bar(marks: dict[Side, float], healthy: tuple[float, float, float] | None) -> str:
@@ -103,7 +103,7 @@ def _index(scores: Scores) -> str:
     for side in SIDES:
         s = scores.find("gdi_star_sagittal", MODE, side)
         if s.value is not None:
-            parts.append(f"{side} {number(s.value)}")
+            parts.append(f"{side} {format_number(s.value)}")
     return (
         f"GDI*, sagittal: {', '.join(parts)} (100 is the middle of healthy adults, 10 is one SD)."
         if parts

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any, Final, cast
 
 from core.parameters.result import Parameter
-from core.quality import shown_level
+from core.quality import find_shown_level
 from core.quality.assessment import Verdict
 from server.report.bundle import Bundle
 from server.report.estimator import estimator_view
-from server.report.wording import number, place_words
+from server.report.wording import format_number, place_words
 
 _METHODS: Final[Mapping[str, str]] = {
     "walking_direction": "from standing and walking",
@@ -83,7 +83,7 @@ def data_verdict(
     quality, estimator : of analysis.json. severities : of its notices. parameters : as they count.
     """
     health = None if estimator is None else cast("Verdict", estimator["verdict"])
-    level = shown_level(quality.get("level", "good"), health)
+    level = find_shown_level(quality.get("level", "good"), health)
     if "error" in severities:
         return "bad", "Analysis stopped"
     if not any(p.name == "stride_time_s" and p.n for p in parameters) and not _trunk_steps(parameters):
@@ -128,15 +128,15 @@ def _signals(quality: Mapping[str, Any]) -> list[QualityItem]:
     if lost:
         worst, name = max(lost)
         extra = "" if worst == 0 else f"at most, {name}"
-        items.append(QualityItem("Lost samples", f"{number(worst, 1)} %", extra))
+        items.append(QualityItem("Lost samples", f"{format_number(worst, 1)} %", extra))
     rest = quality.get("rest_s")
     if rest is not None:
         total = sum(end - start for start, end in rest)
         times = f"in {len(rest)} parts" if len(rest) > 1 else ""
-        items.append(QualityItem("Standing still", f"{number(total, 1)} s", times))
+        items.append(QualityItem("Standing still", f"{format_number(total, 1)} s", times))
     magnetic = [float(s["magnetic_pct"]) for s in sensors if s.get("magnetic_pct") is not None]
     if magnetic:
-        share = f"disturbed {number(max(magnetic))} % of the time" if max(magnetic) >= 1 else "steady"
+        share = f"disturbed {format_number(max(magnetic))} % of the time" if max(magnetic) >= 1 else "steady"
         items.append(QualityItem("Magnetic field", share, "not used"))
     return items
 
@@ -147,7 +147,7 @@ def _calibration(calibration: Mapping[str, Any] | None, *, needed: bool) -> list
         return [] if not needed else [QualityItem("Calibration", "not reached", kind="bad")]
     scores = [float(s["score"]) for s in calibration["segments"].values() if s.get("score") is not None]
     method = _METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
-    value = f"{number(100 * min(scores))}" if scores else method
+    value = f"{format_number(100 * min(scores))}" if scores else method
     items = [QualityItem("Calibration", value, f"/ 100, {method}" if scores else "")]
     if calibration.get("angle_zero") is not None:
         items.append(QualityItem("Angle zero", str(calibration["angle_zero"])))

@@ -11,15 +11,15 @@ from core.norms.kinematics import Zero
 from core.norms.lookup import Norms
 from core.parameters.catalogue import CATALOGUE, name_counted
 from core.parameters.result import Parameter
-from core.parameters.symmetry import Symmetry, symmetries
-from core.parameters.variability import comparable
+from core.parameters.symmetry import Symmetry, compare_sides
+from core.parameters.variability import has_enough_values
 from server.report.change_words import ChangeWords
 from server.report.curves import range_svg
 from server.report.wording import (
     NO_DIFFERENCE,
     Term,
     difference_words,
-    number,
+    format_number,
     parameter_term,
     reason_words,
     symmetry_words,
@@ -31,7 +31,7 @@ NOBODY: Final = Norms(None, None)
 
 
 @dataclass(frozen=True)
-class Cell:
+class TableCell:
     """One number with what is behind it; `title` says it in full.
 
     Parameters
@@ -54,7 +54,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Row:
+class ParameterRow:
     """One parameter.
 
     Parameters
@@ -72,9 +72,9 @@ class Row:
     title: str
     unit: str
     group: str
-    both: Cell | None
-    left: Cell | None
-    right: Cell | None
+    both: TableCell | None
+    left: TableCell | None
+    right: TableCell | None
     difference: str | None
     reason: str | None
     scale: tuple[float, float]
@@ -100,7 +100,7 @@ class Row:
         cells = (self.both,) if self.both is not None else (self.left, self.right)
         if all(c is None or c.z is None for c in cells):
             return ""
-        return "z " + " | ".join("–" if c is None or c.z is None else number(c.z, 1) for c in cells)
+        return "z " + " | ".join("–" if c is None or c.z is None else format_number(c.z, 1) for c in cells)
 
     @property
     def plot(self) -> str:
@@ -118,7 +118,7 @@ def parameter_rows(
     estimated: Collection[str] = (),
     affected: Side | None = None,
     zero: Zero = "standing",
-) -> tuple[Row, ...]:
+) -> tuple[ParameterRow, ...]:
     """Rows in the order of the table; parameters without wording come last under their own name.
 
     Parameters
@@ -136,7 +136,7 @@ def parameter_rows(
     return tuple(_unsure(r) if any(r.name.startswith(f"{v}_") for v in estimated) else r for r in rows)
 
 
-def grouped(rows: Sequence[Row]) -> tuple[tuple[str, tuple[Row, ...]], ...]:
+def group_rows(rows: Sequence[ParameterRow]) -> tuple[tuple[str, tuple[ParameterRow, ...]], ...]:
     """Rows under their headings, in order."""
     names = dict.fromkeys(r.group for r in rows)
     return tuple((name, tuple(r for r in rows if r.group == name)) for name in names)
@@ -144,14 +144,14 @@ def grouped(rows: Sequence[Row]) -> tuple[tuple[str, tuple[Row, ...]], ...]:
 
 def _row(
     name: str, sides: Mapping[str | None, Parameter], norms: Norms, affected: Side | None, zero: Zero
-) -> Row:
+) -> ParameterRow:
     term = parameter_term(name) if name in CATALOGUE else _unknown(name, sides)
     norm = norms.values.get(name)
     both, left, right = (_cell(sides.get(side), term, norms) for side in (None, "left", "right"))
     missing = both is None and left is None and right is None
-    symmetry = next(iter(symmetries(tuple(sides.values()), affected)), None)
+    symmetry = next(iter(compare_sides(tuple(sides.values()), affected)), None)
     shown = norm if norm is not None and norm.comparable else None
-    return Row(
+    return ParameterRow(
         name=name,
         title=title_of(name, term.label, zero),
         unit=term.unit,
@@ -164,7 +164,7 @@ def _row(
         scale=term.scale,
         norm=None
         if shown is None
-        else f"{number(shown.mean, term.digits)} ± {number(shown.sd, _sd_digits(term))}",
+        else f"{format_number(shown.mean, term.digits)} ± {format_number(shown.sd, _sd_digits(term))}",
         norm_mean=None if shown is None else shown.mean,
         norm_sd=None if shown is None else shown.sd,
         norm_n=None if shown is None else shown.n,
@@ -174,10 +174,10 @@ def _row(
     )
 
 
-def _unsure(row: Row) -> Row:
+def _unsure(row: ParameterRow) -> ParameterRow:
     """An estimated angle is not held against anybody."""
 
-    def bare(cell: Cell | None) -> Cell | None:
+    def bare(cell: TableCell | None) -> TableCell | None:
         return None if cell is None else replace(cell, z=None, percentile=None)
 
     return replace(
@@ -195,8 +195,8 @@ def _unsure(row: Row) -> Row:
 
 
 def _difference(
-    left: Cell | None,
-    right: Cell | None,
+    left: TableCell | None,
+    right: TableCell | None,
     sides: Mapping[str | None, Parameter],
     term: Term,
     symmetry: Symmetry | None,
@@ -212,27 +212,31 @@ def _difference(
     return f"{side} {reason_words(None if absent is None else absent.reason)}"
 
 
-def _cell(p: Parameter | None, term: Term, norms: Norms) -> Cell | None:
+def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
     if p is None or p.mean is None:
         return None
     digits = max(term.digits, 1)
-    spread = "" if p.sd is None else f" ± {number(p.sd, _sd_digits(term))}"
+    spread = "" if p.sd is None else f" ± {format_number(p.sd, _sd_digits(term))}"
     what = name_counted(p.name)
-    told = [f"{number(p.mean, digits)}{spread}\u202f{term.unit}, mean ± SD of {p.n} {what}"]
+    told = [f"{format_number(p.mean, digits)}{spread}\u202f{term.unit}, mean ± SD of {p.n} {what}"]
     ci = None if p.ci_low is None or p.ci_high is None else (p.ci_low, p.ci_high)
     if ci is not None:
-        told.append(f"95 % CI {number(ci[0], digits)} to {number(ci[1], digits)}")
+        told.append(f"95 % CI {format_number(ci[0], digits)} to {format_number(ci[1], digits)}")
     if p.cv_pct is not None:
-        told.append(f"CV {number(p.cv_pct, 1)} %{' of few strides' if p.note == 'few_strides' else ''}")
-    enough = comparable(p)
+        told.append(
+            f"CV {format_number(p.cv_pct, 1)} %{' of few strides' if p.note == 'few_strides' else ''}"
+        )
+    enough = has_enough_values(p)
     place = norms.place(p.name, p.mean if enough else None)
     if place.z is not None and place.percentile is not None:
-        told.append(f"z {number(place.z, 1)}, percentile {number(place.percentile)} of the norm")
-    return Cell(
+        told.append(
+            f"z {format_number(place.z, 1)}, percentile {format_number(place.percentile)} of the norm"
+        )
+    return TableCell(
         p.mean,
         p.sd,
         p.n,
-        number(p.mean, term.digits),
+        format_number(p.mean, term.digits),
         "; ".join(told),
         ci,
         p.cv_pct,

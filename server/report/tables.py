@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from core.change import Change
-from core.feedback.summary import kind_of
+from core.feedback.summary import classify_stride
 from core.parameters.catalogue import unit_of
 from core.parameters.kinematic import POINTS
 from server.report.exports import write_csv
 from server.report.feedback import FeedbackView
 from server.report.model import ReportModel
-from server.report.trends import Trend, Visit
+from server.report.trends import AnalysedVisit, Trend
 
 SYMMETRY = {
     "ratio": "ratio_left_right",
@@ -61,7 +61,7 @@ def parameters_csv(report: ReportModel) -> bytes:
     return write_csv(header, rows())
 
 
-def trends_csv(visits: Sequence[Visit], found: Sequence[Trend]) -> bytes:
+def trends_csv(visits: Sequence[AnalysedVisit], found: Sequence[Trend]) -> bytes:
     """One row per figure, side and visit, with its change against the first assessment and the limits."""
     header = (
         *("name", "side", "unit", "date", "session_id", "visit", "kind"),
@@ -135,7 +135,7 @@ def feedback_csv(view: FeedbackView | None) -> bytes:
         for m in () if view is None else view.split.strides:
             c, name = m.cue, "" if view is None else view.content.parameter
             yield (
-                *(c.n, c.side, c.start_s, name, m.value, c.value, unit_of(name), kind_of(c), c.shown),
+                *(c.n, c.side, c.start_s, name, m.value, c.value, unit_of(name), classify_stride(c), c.shown),
                 *(c.why_not, m.inside, c.level, c.zone_low, c.zone_high, c.block),
             )
 

@@ -33,7 +33,7 @@ _Made = TypeVar("_Made")
 
 
 def tracks_parquet(tracks: Tracks) -> bytes:
-    """Write what `core.measure.measure` needs beside angles.parquet and events.csv."""
+    """Write what `core.measure.measure_gait` needs beside angles.parquet and events.csv."""
     columns: dict[str, np.ndarray] = {}
     for segment, q in tracks.q.items():
         columns |= _spread(f"{segment}_q", q, "wxyz")

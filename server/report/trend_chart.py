@@ -13,8 +13,8 @@ from itertools import pairwise
 from typing import Final
 
 from server.report.svg import KEY, PlotArea, find_round_ticks, format_coordinate
-from server.report.trends import Line, Trend, Visit
-from server.report.wording import number
+from server.report.trends import AnalysedVisit, Trend, TrendSeries
+from server.report.wording import format_number
 from web.words import MONTHS
 
 TOP, BOTTOM, LEFT, RIGHT = 22, 22, 44, 12
@@ -31,7 +31,7 @@ WIDTH_PX: Final = 420
 
 
 @dataclass(frozen=True)
-class Ahead:
+class PlannedAssessment:
     """A planned assessment that is still to come."""
 
     label: str
@@ -53,7 +53,11 @@ def value_range(trend: Trend) -> tuple[float, float]:
 
 
 def trend_svg(
-    trend: Trend, line: Line, visits: Sequence[Visit], ahead: Sequence[Ahead] = (), height: int = 196
+    trend: Trend,
+    line: TrendSeries,
+    visits: Sequence[AnalysedVisit],
+    ahead: Sequence[PlannedAssessment] = (),
+    height: int = 196,
 ) -> str:
     """Draw one side of a trend over the days of all visits, so that all charts of a person share their axis.
 
@@ -69,7 +73,7 @@ def trend_svg(
         plot.add_band("mdc", base - line.mdc, base + line.mdc)
     ticks, digits = find_round_ticks(plot.low, plot.high)
     for tick in ticks:
-        plot.add_tick("g", tick, number(tick, digits))
+        plot.add_tick("g", tick, format_number(tick, digits))
     if trend.norm is not None:
         plot.add_level("nm", trend.norm.mean)
     if line.mdc is not None:
@@ -91,8 +95,8 @@ class _TrendPlot(PlotArea):
     def __init__(
         self,
         y_range: tuple[float, float],
-        visits: Sequence[Visit],
-        ahead: Sequence[Ahead],
+        visits: Sequence[AnalysedVisit],
+        ahead: Sequence[PlannedAssessment],
         height: int,
     ) -> None:
         super().__init__(y_range, height)
@@ -118,7 +122,7 @@ class _TrendPlot(PlotArea):
         for planned in self._ahead:
             self.add_upright("ax", self._x(planned.day))
 
-    def points(self, line: Line, digits: int) -> None:
+    def points(self, line: TrendSeries, digits: int) -> None:
         key = "b" if line.side is None else KEY[line.side]
         assessed = [p for p in line.points if self._visits[p.visit].kind == "assessment"]
         for a, b in pairwise(assessed):
@@ -132,9 +136,9 @@ class _TrendPlot(PlotArea):
         for i in sorted({i for i in (line.base, line.latest) if i is not None}):
             p = line.points[i]
             x, y = _pct(self._at(p.visit)), self.px(p.value)
-            self.add_text(x, y, number(p.value, digits), "strong halo", "middle", dy=-11)
+            self.add_text(x, y, format_number(p.value, digits), "strong halo", "middle", dy=-11)
 
-    def labels(self, line: Line) -> None:
+    def labels(self, line: TrendSeries) -> None:
         """Name band and limit where nothing is measured yet, else in the middle, away from the two values."""
         base = line.start
         last = max(v.performed_on for v in self._visits)

@@ -12,14 +12,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from core.change import Change, detectable, parameter_changes, relevant
+from core.change import Change, find_detectable_change, find_relevant_change, parameter_changes
 from core.change.limits import Limb
 from core.condition import WalkingCondition
 from core.frames import SIDES, Side
 from core.norms import Norms, NormValue
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.result import Parameter
-from server.report.change_words import SCORE_TERMS, term_of
+from server.report.change_words import SCORE_TERMS, find_term
 from server.report.numbers import Numbers
 from server.report.wording import Term
 
@@ -40,7 +40,7 @@ SCORE_MODE: Final = "offset_removed"
 
 
 @dataclass(frozen=True, eq=False)
-class Visit:
+class AnalysedVisit:
     """An analysed session.
 
     Parameters
@@ -65,7 +65,7 @@ class Visit:
 
 
 @dataclass(frozen=True)
-class Point:
+class TrendValue:
     """A value at a visit; `change` = against the base, None for the base itself and with feedback."""
 
     visit: int
@@ -78,7 +78,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Line:
+class TrendSeries:
     """One side of a figure, or the whole take.
 
     Parameters
@@ -89,7 +89,7 @@ class Line:
     """
 
     side: Side | None
-    points: tuple[Point, ...]
+    points: tuple[TrendValue, ...]
     base: int | None
     latest: int | None
     mdc: float | None
@@ -112,19 +112,19 @@ class Trend:
 
     name: str
     term: Term
-    lines: tuple[Line, ...]
+    lines: tuple[TrendSeries, ...]
     norm: NormValue | None
 
 
-def names_in(visits: Sequence[Visit]) -> tuple[str, ...]:
+def names_in(visits: Sequence[AnalysedVisit]) -> tuple[str, ...]:
     """Figures with a value in any visit, in the order of the table."""
-    found = {p.name for visit in visits for p in figures(visit.numbers) if p.mean is not None}
+    found = {p.name for visit in visits for p in collect_figures(visit.numbers) if p.mean is not None}
     known = (*CATALOGUE, *SCORE_TERMS)
     return (*(n for n in known if n in found), *sorted(found.difference(known)))
 
 
-def trends(
-    visits: Sequence[Visit],
+def follow_figures(
+    visits: Sequence[AnalysedVisit],
     names: Sequence[str],
     norms: Norms | None = None,
     usual: Mapping[str, NormValue] | None = None,
@@ -138,18 +138,18 @@ def trends(
         comfortable speed; the reference of speed itself, which cannot be matched by speed.
     affected : side, None = none or both.
     """
-    tables = [{(p.name, p.side): p for p in figures(visit.numbers)} for visit in visits]
+    tables = [{(p.name, p.side): p for p in collect_figures(visit.numbers)} for visit in visits]
     found = []
     for name in names:
         norm = _norm(name, visits, norms, usual or {})
         lines = [_line(name, side, visits, tables, norm, affected) for side in (None, *SIDES)]
         kept = tuple(line for line in lines if line is not None)
         if kept:
-            found.append(Trend(name, term_of(name, _unit(name, tables)), kept, norm))
+            found.append(Trend(name, find_term(name, _unit(name, tables)), kept, norm))
     return tuple(found)
 
 
-def figures(numbers: Numbers) -> tuple[Parameter, ...]:
+def collect_figures(numbers: Numbers) -> tuple[Parameter, ...]:
     """Parameters, and the scores of the two legs as if they were."""
     made = [
         Parameter(s.name, s.side, s.n, s.value, None, s.unit, s.reason)
@@ -167,7 +167,7 @@ def _unit(name: str, tables: Sequence[Table]) -> str:
 
 
 def _norm(
-    name: str, visits: Sequence[Visit], norms: Norms | None, usual: Mapping[str, NormValue]
+    name: str, visits: Sequence[AnalysedVisit], norms: Norms | None, usual: Mapping[str, NormValue]
 ) -> NormValue | None:
     if name in SCORE_TERMS:
         return _score_norm(name, visits)
@@ -177,7 +177,7 @@ def _norm(
     return norm if norm is not None and norm.comparable else None
 
 
-def _score_norm(name: str, visits: Sequence[Visit]) -> NormValue | None:
+def _score_norm(name: str, visits: Sequence[AnalysedVisit]) -> NormValue | None:
     spread = next(
         (
             s.healthy
@@ -197,11 +197,11 @@ def _score_norm(name: str, visits: Sequence[Visit]) -> NormValue | None:
 def _line(
     name: str,
     side: Side | None,
-    visits: Sequence[Visit],
+    visits: Sequence[AnalysedVisit],
     tables: Sequence[Table],
     norm: NormValue | None,
     affected: Side | None,
-) -> Line | None:
+) -> TrendSeries | None:
     measured = [
         (i, p, p.mean)
         for i, table in enumerate(tables)
@@ -221,15 +221,16 @@ def _line(
         return parameter_changes([first], [p], affected, known)[0]
 
     points = [
-        Point(i, value, p.sd, p.n, p.ci_low, p.ci_high, change(k)) for k, (i, p, value) in enumerate(measured)
+        TrendValue(i, value, p.sd, p.n, p.ci_low, p.ci_high, change(k))
+        for k, (i, p, value) in enumerate(measured)
     ]
     latest = assessed[-1] if len(assessed) > 1 else None
     mdc, mcid = (None, None) if first is None else _limits(first, points, latest, affected)
-    return Line(side, tuple(points), base, latest, mdc, mcid)
+    return TrendSeries(side, tuple(points), base, latest, mdc, mcid)
 
 
 def _limits(
-    first: Parameter, points: Sequence[Point], latest: int | None, affected: Side | None
+    first: Parameter, points: Sequence[TrendValue], latest: int | None, affected: Side | None
 ) -> tuple[float | None, float | None]:
     """What the last assessment is judged by; before there is one, what it will be."""
     change = None if latest is None else points[latest].change
@@ -238,6 +239,6 @@ def _limits(
     limb: Limb | None = None
     if affected is not None and first.side is not None:
         limb = "affected" if first.side == affected else "unaffected"
-    mdc = None if first.mean is None else detectable(first.name, first.mean, limb)
-    mcid = relevant(first.name, limb)
+    mdc = None if first.mean is None else find_detectable_change(first.name, first.mean, limb)
+    mcid = find_relevant_change(first.name, limb)
     return None if mdc is None else mdc.value, None if mcid is None else mcid.value

@@ -181,12 +181,12 @@ def place_words(sensor: str) -> str:
     return sensor if side is None or not name else f"{side} {name}"
 
 
-def excluded_words(code: str) -> str:
+def explain_exclusion(code: str) -> str:
     """Words for a stride left out; a therapist's own reason is shown as typed."""
     return code.removeprefix("manual:").strip() if code.startswith("manual:") else EXCLUDED.get(code, code)
 
 
-def number(value: float, digits: int = 0) -> str:
+def format_number(value: float, digits: int = 0) -> str:
     """A number with a real minus sign and without a negative zero."""
     text = f"{value:.{digits}f}"
     return text.removeprefix("-") if float(text) == 0 else text.replace("-", "−")
@@ -198,14 +198,15 @@ def symmetry_words(s: Symmetry) -> str:
         return "a side is too near zero for a ratio" if s.reason == "near_zero" else ""
     first, other = s.reference.split("/")
     return (
-        f"{first} / {other} {number(s.ratio, 2)}, symmetry index {_signed(s.index_pct)} % (positive: {first} "
+        f"{first} / {other} {format_number(s.ratio, 2)}, "
+        f"symmetry index {_signed(s.index_pct)} % (positive: {first} "
         f"larger), symmetry angle {_signed(s.angle_pct)} % (negative: {first} larger)"
     )
 
 
 def _signed(value: float, digits: int = 1) -> str:
     """A number that always carries its sign, unless it rounds to 0."""
-    text = number(value, digits)
+    text = format_number(value, digits)
     return f"+{text}" if value > 0 and float(f"{value:.{digits}f}") else text
 
 
@@ -224,4 +225,4 @@ def difference_words(left: float, right: float, term: Term) -> str:
     if shown == 0:
         return NO_DIFFERENCE
     unit = {"%": " points", "°": "°"}.get(term.unit, f"\u202f{term.unit}")
-    return f"left {term.comparison[0 if left > right else 1]} by {number(shown, digits)}{unit}"
+    return f"left {term.comparison[0 if left > right else 1]} by {format_number(shown, digits)}{unit}"

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Analysis:
+class AnalysisRecord:
     """A finished analysis: what went in, by what, and which files came out (name → stored bytes)."""
 
     id: str
@@ -111,7 +111,7 @@ def submit(
         no_files. NotFound: the session.
     """
     this = recordings.require_current(c, session_id)
-    manifest = completed(c, session_id, this.manifest)
+    manifest = complete_manifest(c, session_id, this.manifest)
     chosen = dict(config or {})
     params = {**recordings.job_inputs(this), "manifest": manifest, "config": chosen}
     key = f"{this.id}:{recordings.ANALYSE}:{_digest(params)}:{CODE_VERSION}"
@@ -154,7 +154,7 @@ def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob], config_sha2
         c.execute(insert(analysis_file).values(file))
 
 
-def get(c: Connection, analysis_id: str) -> Analysis:
+def get(c: Connection, analysis_id: str) -> AnalysisRecord:
     """One analysis; raises NotFound."""
     row = c.execute(_QUERY.where(analysis.c.id == analysis_id)).first()
     if row is None:
@@ -162,18 +162,18 @@ def get(c: Connection, analysis_id: str) -> Analysis:
     return _analyses(c, [row])[0]
 
 
-def of_session(c: Connection, session_id: str) -> list[Analysis]:
+def of_session(c: Connection, session_id: str) -> list[AnalysisRecord]:
     """All analyses of a session, the one that counts first: last asked for, else newest."""
     rows = c.execute(_QUERY.where(session.c.id == session_id).order_by(*_COUNTS_FIRST)).all()
     return _analyses(c, rows)
 
 
-def latest(c: Connection, session_id: str) -> Analysis | None:
+def latest(c: Connection, session_id: str) -> AnalysisRecord | None:
     """The analysis a session's pages show, None before the first result."""
     return latest_of(c, [session_id]).get(session_id)
 
 
-def latest_of(c: Connection, session_ids: Collection[str] | Select[tuple[str]]) -> dict[str, Analysis]:
+def latest_of(c: Connection, session_ids: Collection[str] | Select[tuple[str]]) -> dict[str, AnalysisRecord]:
     """`latest` of many sessions, by session, in two statements; a session without a result is left out.
 
     Parameters
@@ -186,7 +186,7 @@ def latest_of(c: Connection, session_ids: Collection[str] | Select[tuple[str]]) 
     return {found.session_id: found for found in _analyses(c, rows)}
 
 
-def shown(c: Connection, session_id: str) -> Analysis:
+def get_shown(c: Connection, session_id: str) -> AnalysisRecord:
     """The same; raises NotFound when there is no session or no result."""
     sessions.get(c, session_id)
     found = latest(c, session_id)
@@ -195,7 +195,7 @@ def shown(c: Connection, session_id: str) -> Analysis:
     return found
 
 
-def file_bytes(blobs: BlobStore, found: Analysis, name: str) -> bytes:
+def file_bytes(blobs: BlobStore, found: AnalysisRecord, name: str) -> bytes:
     """A result file, verified; raises NotFound, IntegrityError."""
     if name not in found.files:
         raise NotFound("file", name)
@@ -219,16 +219,16 @@ _COUNTS_FIRST = (
 )
 
 
-def _analyses(c: Connection, rows: Sequence[Any]) -> list[Analysis]:
+def _analyses(c: Connection, rows: Sequence[Any]) -> list[AnalysisRecord]:
     """Analyses with their files, all read in one statement."""
     files: dict[str, dict[str, Blob]] = {row.id: {} for row in rows}
     query = select(analysis_file).where(analysis_file.c.analysis_id.in_(files))
     for f in c.execute(query.order_by(analysis_file.c.name)) if files else ():
         files[f.analysis_id][f.name] = Blob(f.sha256, f.size)
-    return [Analysis(**row._asdict(), files=files[row.id]) for row in rows]
+    return [AnalysisRecord(**row._asdict(), files=files[row.id]) for row in rows]
 
 
-def completed(c: Connection, session_id: str, manifest: Mapping[str, Any] | None) -> dict[str, Any]:
+def complete_manifest(c: Connection, session_id: str, manifest: Mapping[str, Any] | None) -> dict[str, Any]:
     """A manifest with height and protocol of the session (or the patient) where it leaves them open."""
     said = dict(manifest or {})
     row = c.execute(

@@ -10,15 +10,15 @@ from sqlalchemy.exc import DatabaseError
 from core.errors import SagittalError
 from server import audit
 from server.services import custody, live_logs
-from server.services.references import referenced
+from server.services.references import list_referenced
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
-from server.storage.trash import Discarded, Trash
+from server.storage.trash import Trash, TrashedFile
 
 
 @dataclass(frozen=True)
-class Finding:
+class StorageDefect:
     """One thing that is wrong.
 
     Parameters
@@ -31,19 +31,19 @@ class Finding:
     message: str
 
 
-def check(db: Database, blobs: BlobStore, settings: Settings) -> list[Finding]:
+def check(db: Database, blobs: BlobStore, settings: Settings) -> list[StorageDefect]:
     """Check database, stored files by their hash, live logs, trash and audit chain."""
     try:
-        found = [Finding("database", text) for text in db.problems()]
+        found = [StorageDefect("database", text) for text in db.problems()]
         with db.read() as c:
-            used = sorted(referenced(c))
-            found += [Finding("audit", text) for text in audit.problems(c)]
-            doubted = custody.doubt(c, settings)
+            used = sorted(list_referenced(c))
+            found += [StorageDefect("audit", text) for text in audit.find_problems(c)]
+            doubted = custody.find_doubt(c, settings)
     except DatabaseError as error:
-        return [Finding("database", f"cannot be read ({error.orig}); restore it from a backup")]
+        return [StorageDefect("database", f"cannot be read ({error.orig}); restore it from a backup")]
     if doubted is not None:
         text = f"{doubted} No stored file is taken away until the right one is back or `sagittal accept`."
-        found.append(Finding("audit", text))
+        found.append(StorageDefect("audit", text))
     trash = list(Trash(settings.trash).files())
     waiting = {(one.space, one.name) for one in trash}
     for space, sha256 in used:
@@ -53,30 +53,30 @@ def check(db: Database, blobs: BlobStore, settings: Settings) -> list[Finding]:
             text = f"patient {space}: {error.message}"
             if (space, sha256) in waiting:
                 text = f"patient {space}: {sha256[:12]}… lies in the trash; run `sagittal trash --restore`."
-            found.append(Finding("files", text))
+            found.append(StorageDefect("files", text))
         except OSError as error:
-            found.append(Finding("files", f"patient {space}, file {sha256[:12]}…: {error.strerror}"))
+            found.append(StorageDefect("files", f"patient {space}, file {sha256[:12]}…: {error.strerror}"))
     return [*found, *_check_live(db, settings), *(f for one in trash for f in _check_discarded(one))]
 
 
-def _check_live(db: Database, settings: Settings) -> list[Finding]:
+def _check_live(db: Database, settings: Settings) -> list[StorageDefect]:
     found = []
     with db.read() as c:
-        for log in live_logs.logs(c, settings.live):
+        for log in live_logs.list_logs(c, settings.live):
             if not log.known:
                 text = f"the database knows nothing of {log.path.name} ({log.words}); see `sagittal adopt`."
-                found.append(Finding("live", text))
+                found.append(StorageDefect("live", text))
             if log.damage is not None:
-                found.append(Finding("live", f"{log.path.name}: {log.damage.sentence}"))
-    for path in live_logs.originals(settings.live):
+                found.append(StorageDefect("live", f"{log.path.name}: {log.damage.sentence}"))
+    for path in live_logs.list_originals(settings.live):
         text = f"{path.name} is the original of a damaged log; remove it when nobody needs it any more."
-        found.append(Finding("live", text))
+        found.append(StorageDefect("live", text))
     return found
 
 
-def _check_discarded(one: Discarded) -> list[Finding]:
+def _check_discarded(one: TrashedFile) -> list[StorageDefect]:
     try:
         whole = hashlib.sha256(one.path.read_bytes()).hexdigest() == one.name
     except OSError as error:
-        return [Finding("trash", f"{one.path}: {error.strerror}")]
-    return [] if whole else [Finding("trash", f"{one.path} has changed on the disk.")]
+        return [StorageDefect("trash", f"{one.path}: {error.strerror}")]
+    return [] if whole else [StorageDefect("trash", f"{one.path} has changed on the disk.")]

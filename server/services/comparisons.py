@@ -8,25 +8,25 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
-from core.condition import differences, is_comparable
-from core.norms import Norms, norms_for
-from server.report.comparison import ComparedRow, compared_rows
+from core.condition import compare_conditions, is_comparable
+from core.norms import Norms, look_up_norms
+from server.report.comparison import ComparedRow, compare_rows
 from server.report.numbers import Numbers
 from server.services import analyses, edit_log, patients, programmes, sessions
 from server.services.errors import Conflict
-from server.services.histories import Analysed, kind_of
+from server.services.histories import AnalysedSession, classify_visit
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
 
 
 @dataclass(frozen=True)
-class Pair:
+class SessionPair:
     """Two analysed sessions of a patient, the earlier one first."""
 
     patient: Patient
-    before: Analysed
-    after: Analysed
+    before: AnalysedSession
+    after: AnalysedSession
 
     @property
     def comparable(self) -> bool:
@@ -38,7 +38,7 @@ class Pair:
         """Why a difference may come from how was walked or measured, in sentences."""
         said = []
         old, new = self.before, self.after
-        if unlike := differences(old.condition, new.condition):
+        if unlike := compare_conditions(old.condition, new.condition):
             said.append(
                 f"The conditions differ: {'; '.join(unlike)}. What differs may come from that, so no "
                 "difference is called a change."
@@ -59,7 +59,7 @@ class Pair:
         return tuple(said)
 
 
-def pair(c: Connection, session_id: str, other_id: str) -> Pair:
+def pair(c: Connection, session_id: str, other_id: str) -> SessionPair:
     """Two sessions to compare, in whatever order they are named.
 
     Raises
@@ -72,10 +72,10 @@ def pair(c: Connection, session_id: str, other_id: str) -> Pair:
     if both[0].session.patient_id != both[1].session.patient_id:
         raise Conflict("other_patient", "These sessions belong to different patients.")
     both.sort(key=lambda a: _moment(a.session))
-    return Pair(patients.get(c, both[0].session.patient_id), *both)
+    return SessionPair(patients.get(c, both[0].session.patient_id), *both)
 
 
-def before(c: Connection, session: Session, done: Sequence[Analysed]) -> Analysed | None:
+def find_previous(c: Connection, session: Session, done: Sequence[AnalysedSession]) -> AnalysedSession | None:
     """The analysed session walked under the same condition that a session's own table is compared with.
 
     It is the one that came last before it; for an assessment the assessment that did, so that a single
@@ -90,12 +90,12 @@ def before(c: Connection, session: Session, done: Sequence[Analysed]) -> Analyse
         return None
     plans = programmes.of_patient(c, session.patient_id)
     planned = {v.session_id: v.kind for plan in plans for v in plan.visits}
-    kind = kind_of(session, planned.get(session.id))
+    kind = classify_visit(session, planned.get(session.id))
     for a in reversed(done):
         s = a.session
         if not is_comparable(a.condition, this.condition) or _moment(s) >= _moment(session):
             continue
-        if kind == "assessment" and kind_of(s, planned.get(s.id)) == "training":
+        if kind == "assessment" and classify_visit(s, planned.get(s.id)) == "training":
             continue
         return a
     return None
@@ -105,28 +105,28 @@ def _moment(session: Session) -> tuple[dt.date, dt.datetime]:
     return session.performed_on, session.created_at
 
 
-def rows(reviewed: ReviewedAnalyses, found: Pair) -> tuple[ComparedRow, ...]:
+def compare_sessions(reviewed: ReviewedAnalyses, found: SessionPair) -> tuple[ComparedRow, ...]:
     """The table of a comparison; raises IntegrityError."""
     old = reviewed.read_numbers(found.before.found, found.before.edits)
     new = reviewed.read_numbers(found.after.found, found.after.edits)
-    known = norms(found.patient, found.after.session, new)
-    return compared_rows(old, new, known, found.patient.affected_side, comparable=found.comparable)
+    known = find_norms(found.patient, found.after.session, new)
+    return compare_rows(old, new, known, found.patient.affected_side, comparable=found.comparable)
 
 
-def norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
+def find_norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
     """The reference of a person on the day of a session, at its speed."""
     speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
     age = session.performed_on.year - patient.birth_year if patient.birth_year else None
     height = session.height_m if session.height_m is not None else patient.height_m
-    return norms_for(age, patient.sex, speed, height)
+    return look_up_norms(age, patient.sex, speed, height)
 
 
-def _analysed(c: Connection, session_id: str) -> Analysed:
+def _analysed(c: Connection, session_id: str) -> AnalysedSession:
     session = sessions.get(c, session_id)
-    found = analyses.shown(c, session_id)
-    return Analysed(session, found, edit_log.edits_of(c, found.id))
+    found = analyses.get_shown(c, session_id)
+    return AnalysedSession(session, found, edit_log.edits_of(c, found.id))
 
 
-def _sensors(a: Analysed) -> frozenset[str]:
+def _sensors(a: AnalysedSession) -> frozenset[str]:
     mapped = (a.found.manifest or {}).get("sensors") or {}
     return frozenset(segment for segment in mapped.values() if segment)

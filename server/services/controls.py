@@ -32,14 +32,14 @@ class ControlVisit:
     sex: str | None
     birth_year: int | None
     performed_on: dt.date
-    found: analyses.Analysis
-    edits: edit_log.Edits
+    found: analyses.AnalysisRecord
+    edits: edit_log.EditHistory
 
 
-def visits(c: Connection, this: Patient, session: Session) -> tuple[ControlVisit, ...]:
+def list_visits(c: Connection, this: Patient, session: Session) -> tuple[ControlVisit, ...]:
     """Unaided visits of controls with the protocol of a session; nobody is a control of themselves.
 
-    The pace is theirs: of these visits those count that are as fast as the person (`group`).
+    The pace is theirs: of these visits those count that are as fast as the person (`make_group`).
     """
     theirs = (
         select(session_table.c.id)
@@ -66,7 +66,7 @@ def visits(c: Connection, this: Patient, session: Session) -> tuple[ControlVisit
     )
 
 
-def group(
+def make_group(
     reviewed: ReviewedAnalyses, known: Sequence[ControlVisit], speed_mps: float | None
 ) -> ControlGroup | None:
     """The controls who walk as fast as a person; None without any control or without a speed."""

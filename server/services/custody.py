@@ -17,7 +17,7 @@ from server.services import erasure
 from server.settings import Settings
 from server.storage.blobs import INCOMING, BlobStore
 from server.storage.db import Database
-from server.storage.high_water import gone_back, set_mark
+from server.storage.high_water import explain_lost_rows, set_mark
 from server.storage.tables import audit as audit_table
 from server.storage.tables import patient
 
@@ -48,15 +48,15 @@ def refuse_strangers(settings: Settings) -> None:
         raise StrangersError(text)
 
 
-def doubt(c: Connection, settings: Settings) -> str | None:
+def find_doubt(c: Connection, settings: Settings) -> str | None:
     """Why no stored file may be taken away on the word of this database, as a sentence; None = it may."""
-    return gone_back(c, settings.mark) or _strangers_of(c, settings)
+    return explain_lost_rows(c, settings.mark) or _strangers_of(c, settings)
 
 
 def accept(db: Database, settings: Settings) -> str | None:
     """Trust this database from now on; returns what was doubted, None = nothing was."""
     with db.write() as c:
-        doubted = doubt(c, settings)
+        doubted = find_doubt(c, settings)
         if doubted is not None:
             audit.record(c, None, ACCEPTED, "database", None, {"by": "console", "doubt": doubted})
     set_mark(db, settings.mark)
@@ -68,11 +68,11 @@ def _strangers_of(c: Connection, settings: Settings) -> str | None:
         return None
     if c.execute(select(audit_table.c.seq).where(audit_table.c.action == ACCEPTED).limit(1)).first():
         return None
-    return _strangers(settings, erasure.erased_spaces(c))
+    return _strangers(settings, erasure.list_erased_spaces(c))
 
 
 def _strangers(settings: Settings, erased: set[str]) -> str | None:
-    spaces, takes = erasure.noted(settings)
+    spaces, takes = erasure.list_unfinished(settings)
     leaving = erased | spaces | {INCOMING}
     files = sum(1 for f in BlobStore(settings.blobs).files() if f.space not in leaving)
     logs = sum(1 for p in settings.live.glob("*.log") if p.stem not in takes)

@@ -9,7 +9,7 @@ from typing import Final
 
 from sqlalchemy import Connection, select
 
-from core.events.edits import Edit, edit_of
+from core.events.edits import Edit, read_edit
 from server.storage.tables import edit as rows
 from server.storage.tables import user
 
@@ -28,7 +28,7 @@ class MadeEdit:
 
 
 @dataclass(frozen=True)
-class Edits:
+class EditHistory:
     """The edits of an analysis that count, oldest first.
 
     Parameters
@@ -50,12 +50,12 @@ class Edits:
         return tuple(m.seq for m in self.made)
 
 
-def edits_of(c: Connection, analysis_id: str) -> Edits:
+def edits_of(c: Connection, analysis_id: str) -> EditHistory:
     """The live edits of an analysis."""
     return edits_of_all(c, [analysis_id])[analysis_id]
 
 
-def edits_of_all(c: Connection, analysis_ids: Collection[str]) -> dict[str, Edits]:
+def edits_of_all(c: Connection, analysis_ids: Collection[str]) -> dict[str, EditHistory]:
     """The live edits of many analyses by analysis, in one statement."""
     query = (
         select(rows, user.c.display_name)
@@ -70,5 +70,5 @@ def edits_of_all(c: Connection, analysis_ids: Collection[str]) -> dict[str, Edit
         if row.kind == UNDO:
             made[row.analysis_id].pop()
         else:
-            made[row.analysis_id].append(MadeEdit(row.seq, edit_of(row.content), row.display_name, row.at))
-    return {found: Edits(version[found], tuple(live)) for found, live in made.items()}
+            made[row.analysis_id].append(MadeEdit(row.seq, read_edit(row.content), row.display_name, row.at))
+    return {found: EditHistory(version[found], tuple(live)) for found, live in made.items()}

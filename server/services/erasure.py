@@ -22,7 +22,7 @@ from core.formats.json_tree import read_json
 from server import audit
 from server.services import patients, sessions
 from server.services.errors import Conflict
-from server.services.references import referenced
+from server.services.references import list_referenced
 from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
 from server.storage import fs
@@ -144,19 +144,19 @@ def finish(db: Database, blobs: BlobStore, settings: Settings) -> None:
 def discard(db: Database, blobs: BlobStore, space: str, names: Iterable[str]) -> None:
     """Remove files for good that were stored for something that has been erased meanwhile."""
     with db.write() as c:
-        used = referenced(c)
+        used = list_referenced(c)
         for name in set(names):
             if (space, name) not in used:
                 blobs.remove(space, name)
 
 
-def erased_spaces(c: Connection) -> set[str]:
+def list_erased_spaces(c: Connection) -> set[str]:
     """Ids of all patients that were erased, as the audit log has them."""
     found = set(c.execute(select(audit_table.c.resource_id).where(audit_table.c.action == ERASED)).scalars())
     return found - set(c.execute(select(patient.c.id)).scalars())
 
 
-def noted(settings: Settings) -> tuple[set[str], set[str]]:
+def list_unfinished(settings: Settings) -> tuple[set[str], set[str]]:
     """Patients and live takes of erasures that are not finished."""
     notes = [note for path in settings.erasing.glob("*.json") if (note := _read(path)) is not None]
     return {x for note in notes for x in note["spaces"]}, {x for note in notes for x in note["takes"]}
@@ -169,7 +169,7 @@ def _files_of(c: Connection, session_id: str, patient_id: str) -> set[tuple[str,
         audit_table.c.detail["session_id"].as_string() == session_id,
     )
     earlier = {(patient_id, sha256) for sha256 in c.execute(added).scalars() if sha256}
-    return earlier | {one for one in referenced(c, session_id) if one[0] == patient_id}
+    return earlier | {one for one in list_referenced(c, session_id) if one[0] == patient_id}
 
 
 def _note(
@@ -206,7 +206,7 @@ def _remove(c: Connection, blobs: BlobStore, settings: Settings, note: dict[str,
     for space in set(note["spaces"]) - there:
         blobs.erase(space)
         trash.remove(space)
-    used = referenced(c) if note["files"] else set()
+    used = list_referenced(c) if note["files"] else set()
     for space, name in note["files"]:
         if (space, name) not in used:
             blobs.remove(space, name)

@@ -18,11 +18,11 @@ from core.parameters.rows import Column
 from server.report import feedback as report
 from server.report.bundle import Bundle
 from server.report.feedback import FeedbackView
-from server.report.feedback_beside import Before, side_effects
+from server.report.feedback_beside import PreviousTraining, side_effects
 from server.services import prescriptions
-from server.services.histories import Analysed
+from server.services.histories import AnalysedSession
 from server.services.patients import Patient
-from server.services.prescriptions import Training
+from server.services.prescriptions import TrainedTake
 from server.services.reviewed import ReviewedAnalyses
 
 REASONS: Final = {
@@ -34,16 +34,16 @@ REASONS: Final = {
 
 
 @dataclass(frozen=True, eq=False)
-class Trained:
+class TrainedSession:
     """A session with feedback: its analysis, what was trained in it, and the cues of the analysed take."""
 
-    at: Analysed
-    training: Training
+    at: AnalysedSession
+    training: TrainedTake
     cues: tuple[Cue, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Gathered:
+class FeedbackRecords:
     """What the database knows of the feedback in a session.
 
     Parameters
@@ -52,12 +52,14 @@ class Gathered:
     """
 
     patient: Patient
-    this: Trained | None
-    before: Trained | None = None
+    this: TrainedSession | None
+    before: TrainedSession | None = None
     reason: str | None = None
 
 
-def gather(c: Connection, patient: Patient, session_id: str, done: Sequence[Analysed]) -> Gathered:
+def gather(
+    c: Connection, patient: Patient, session_id: str, done: Sequence[AnalysedSession]
+) -> FeedbackRecords:
     """Read all that `view` needs of a session of this patient.
 
     Parameters
@@ -68,10 +70,10 @@ def gather(c: Connection, patient: Patient, session_id: str, done: Sequence[Anal
     given = prescriptions.trainings(c, patient.id)
     here = [t for t in given if t.session_id == session_id]
     if not here:
-        return Gathered(patient, None, reason="no_feedback")
+        return FeedbackRecords(patient, None, reason="no_feedback")
     this = _analysed_take(at.get(session_id), here)
     if isinstance(this, str):
-        return Gathered(patient, None, reason=this)
+        return FeedbackRecords(patient, None, reason=this)
     earlier = (
         t
         for t in reversed(given[: given.index(here[0])])
@@ -81,11 +83,11 @@ def gather(c: Connection, patient: Patient, session_id: str, done: Sequence[Anal
     )
     both = [this, *itertools.islice(earlier, 1)]
     cues = prescriptions.cues(c, [t.take_id for t in both])
-    trained = [Trained(at[t.session_id], t, tuple(cues[t.take_id])) for t in both]
-    return Gathered(patient, trained[0], trained[1] if len(trained) == 2 else None)
+    trained = [TrainedSession(at[t.session_id], t, tuple(cues[t.take_id])) for t in both]
+    return FeedbackRecords(patient, trained[0], trained[1] if len(trained) == 2 else None)
 
 
-def view(reviewed: ReviewedAnalyses, gathered: Gathered) -> FeedbackView | None:
+def view(reviewed: ReviewedAnalyses, gathered: FeedbackRecords) -> FeedbackView | None:
     """Put cues and strides together; None where there is nothing, `reason` says why; IntegrityError."""
     this, before = gathered.this, gathered.before
     if this is None:
@@ -96,7 +98,9 @@ def view(reviewed: ReviewedAnalyses, gathered: Gathered) -> FeedbackView | None:
     earlier = None
     if before is not None:
         there = before.at.session
-        earlier = Before(there.id, there.performed_on, split(_strides(reviewed, before)[1], before.cues))
+        earlier = PreviousTraining(
+            there.id, there.performed_on, split(_strides(reviewed, before)[1], before.cues)
+        )
     return report.feedback_view(
         content,
         split(strides, this.cues),
@@ -106,16 +110,18 @@ def view(reviewed: ReviewedAnalyses, gathered: Gathered) -> FeedbackView | None:
     )
 
 
-def _strides(reviewed: ReviewedAnalyses, trained: Trained) -> tuple[Bundle, tuple[AnalysedStride, ...]]:
+def _strides(
+    reviewed: ReviewedAnalyses, trained: TrainedSession
+) -> tuple[Bundle, tuple[AnalysedStride, ...]]:
     """The strides of an analysis with its edits, each with the value of what was trained."""
     bundle = reviewed.read_bundle(trained.at.found, trained.at.edits)
     columns = reviewed.read_columns(trained.at.found, trained.at.edits)
     nothing: Column = (None,) * len(bundle.strides.strides)
     column = columns.get(trained.training.content.parameter, nothing)
-    return bundle, report.analysed_strides(bundle.strides, column)
+    return bundle, report.list_analysed_strides(bundle.strides, column)
 
 
-def _analysed_take(at: Analysed | None, takes: Sequence[Training]) -> Training | str:
+def _analysed_take(at: AnalysedSession | None, takes: Sequence[TrainedTake]) -> TrainedTake | str:
     """The take that the analysis of a session is of, or the reason why there is none."""
     if at is None:
         return "not_analysed"

@@ -9,8 +9,8 @@ from typing import Any
 from sqlalchemy import Connection
 
 from core.condition import WalkingCondition, is_alike
-from core.norms import Norms, NormValue, norms_for, temporal_values
-from server.report.trends import Visit, VisitKind
+from core.norms import Norms, NormValue, look_up_norms, temporal_values
+from server.report.trends import AnalysedVisit, VisitKind
 from server.services import analyses, edit_log, programmes, sessions
 from server.services.errors import NotFound
 from server.services.patients import Patient
@@ -20,7 +20,7 @@ from server.services.sessions import Session
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class PatientHistory:
     """The visits of a patient that can be compared.
 
     Parameters
@@ -32,7 +32,7 @@ class History:
 
     patient: Patient
     condition: WalkingCondition | None
-    visits: tuple[Visit, ...]
+    visits: tuple[AnalysedVisit, ...]
     others: tuple[OtherWalks, ...]
     programmes: tuple[Programme, ...]
 
@@ -43,7 +43,7 @@ class History:
             return None
         numbers = next((v for v in reversed(self.visits) if not v.feedback), self.visits[-1]).numbers
         speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
-        return norms_for(self._age, self.patient.sex, speed, self.patient.height_m)
+        return look_up_norms(self._age, self.patient.sex, speed, self.patient.height_m)
 
     @property
     def usual(self) -> dict[str, NormValue]:
@@ -67,12 +67,12 @@ class OtherWalks:
 
 
 @dataclass(frozen=True)
-class Analysed:
+class AnalysedSession:
     """A session with the analysis that counts and its edits."""
 
     session: Session
-    found: analyses.Analysis
-    edits: edit_log.Edits
+    found: analyses.AnalysisRecord
+    edits: edit_log.EditHistory
 
     @property
     def condition(self) -> WalkingCondition:
@@ -80,17 +80,19 @@ class Analysed:
         return self.session.walked(_belt(self.found.manifest))
 
 
-def analysed(c: Connection, patient_id: str) -> list[Analysed]:
+def list_analysed(c: Connection, patient_id: str) -> list[AnalysedSession]:
     """The sessions of a patient with a result, oldest first."""
     there = sessions.of_patient(c, patient_id)
     shown = analyses.latest_of(c, [s.id for s in there])
     edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
     return [
-        Analysed(s, found, edits[found.id]) for s in reversed(there) if (found := shown.get(s.id)) is not None
+        AnalysedSession(s, found, edits[found.id])
+        for s in reversed(there)
+        if (found := shown.get(s.id)) is not None
     ]
 
 
-def baseline(done: Sequence[Analysed]) -> Analysed | None:
+def baseline(done: Sequence[AnalysedSession]) -> AnalysedSession | None:
     """The newest visit that says how somebody walks: at own pace where there is one, never with feedback.
 
     Parameters
@@ -101,14 +103,14 @@ def baseline(done: Sequence[Analysed]) -> Analysed | None:
     return next((a for a in untold if a.condition.is_at_own_pace), untold[0] if untold else None)
 
 
-def history(
+def read_history(
     reviewed: ReviewedAnalyses,
     patient: Patient,
-    done: Sequence[Analysed],
+    done: Sequence[AnalysedSession],
     plans: Sequence[Programme],
     protocol: str | None = None,
     like: str | None = None,
-) -> History:
+) -> PatientHistory:
     """Read the numbers of the visits walked under one condition; raises IntegrityError, NotFound.
 
     Parameters
@@ -130,12 +132,12 @@ def history(
             continue
         plan = planned.get(a.session.id)
         visits.append(
-            Visit(
+            AnalysedVisit(
                 a.session.id,
                 a.session.performed_on,
                 a.session.title,
                 None if plan is None else plan.label,
-                kind_of(a.session, None if plan is None else plan.kind),
+                classify_visit(a.session, None if plan is None else plan.kind),
                 a.condition,
                 reviewed.read_numbers(a.found, a.edits),
             )
@@ -143,19 +145,19 @@ def history(
     shown = {v.session_id for v in visits}
     rest = [a for a in done if a.session.id not in shown]
     condition = None if chosen is None else replace(chosen.condition, feedback=False)
-    return History(patient, condition, tuple(visits), _others(rest), tuple(plans))
+    return PatientHistory(patient, condition, tuple(visits), _others(rest), tuple(plans))
 
 
-def kind_of(session: Session, planned: VisitKind | None) -> VisitKind:
+def classify_visit(session: Session, planned: VisitKind | None) -> VisitKind:
     """Whether a visit is judged: a walk with feedback is a training whatever was planned."""
     if session.feedback:
         return "training"
     return planned or "assessment"
 
 
-def _others(rest: Sequence[Analysed]) -> tuple[OtherWalks, ...]:
+def _others(rest: Sequence[AnalysedSession]) -> tuple[OtherWalks, ...]:
     """Visits by condition, that of the newest first."""
-    groups: list[list[Analysed]] = []
+    groups: list[list[AnalysedSession]] = []
     for a in reversed(rest):
         alike = next((g for g in groups if is_alike(g[0].condition, a.condition)), None)
         if alike is None:
@@ -170,6 +172,6 @@ def _belt(manifest: Mapping[str, Any] | None) -> float | None:
     return None if speed is None else float(speed)
 
 
-def read(c: Connection, patient: Patient) -> tuple[list[Analysed], list[programmes.Programme]]:
-    """What `history` needs of the database."""
-    return analysed(c, patient.id), programmes.of_patient(c, patient.id)
+def read(c: Connection, patient: Patient) -> tuple[list[AnalysedSession], list[programmes.Programme]]:
+    """What `read_history` needs of the database."""
+    return list_analysed(c, patient.id), programmes.of_patient(c, patient.id)

@@ -23,7 +23,7 @@ class ListedJob(JobView):
     patient_code: str | None
 
 
-def listing(c: Connection, *, active_only: bool = False, limit: int = 100) -> list[ListedJob]:
+def list_jobs(c: Connection, *, active_only: bool = False, limit: int = 100) -> list[ListedJob]:
     """Jobs, the newest first."""
     query = _QUERY.order_by(job.c.seq.desc()).limit(limit)
     if active_only:
@@ -31,7 +31,7 @@ def listing(c: Connection, *, active_only: bool = False, limit: int = 100) -> li
     return [_listed(row) for row in c.execute(query)]
 
 
-def active(c: Connection) -> list[ListedJob]:
+def list_active(c: Connection) -> list[ListedJob]:
     """All jobs that run or wait, those that run first, then the newest."""
     query = _QUERY.where(job.c.state.in_(ACTIVE_STATES))
     return [

@@ -49,7 +49,7 @@ COMMANDS = ("start", "stop", "mark", "undo_mark", "feedback", "level", "pause", 
 
 
 @dataclass(frozen=True)
-class Take:
+class LiveTakeRecord:
     """A live take of a session.
 
     Parameters
@@ -83,7 +83,7 @@ class Take:
 
 
 @dataclass(frozen=True)
-class Paired:
+class TabletAccess:
     """What a tablet gets for a code; the token opens this take only."""
 
     token: str
@@ -106,7 +106,7 @@ class LiveEvent:
     at: dt.datetime
 
 
-def open_take(c: Connection, actor: audit.Actor | None, session_id: str) -> tuple[Take, str]:
+def open_take(c: Connection, actor: audit.Actor | None, session_id: str) -> tuple[LiveTakeRecord, str]:
     """Open a take and return it with its code; raises NotFound, Conflict take_open."""
     sessions.get(c, session_id)
     earlier = current(c, session_id)
@@ -129,7 +129,7 @@ def open_take(c: Connection, actor: audit.Actor | None, session_id: str) -> tupl
     return get(c, take_id), code
 
 
-def new_code(c: Connection, actor: audit.Actor | None, session_id: str) -> tuple[Take, str]:
+def new_code(c: Connection, actor: audit.Actor | None, session_id: str) -> tuple[LiveTakeRecord, str]:
     """Give another code; a tablet that is already joined stays so until this code is used."""
     this = require_open(c, session_id)
     code = _new_code()
@@ -150,7 +150,7 @@ class CodeNotValid(ServiceError):  # noqa: N818 - what the person reads
         )
 
 
-def pair(c: Connection, code: str) -> Paired:
+def pair(c: Connection, code: str) -> TabletAccess:
     """Use a code up; raises CodeNotValid. The caller counts the failures (server/auth/throttle.py)."""
     plain = "".join(code.split()).replace("-", "").upper()
     token, at = new_token(), now()
@@ -175,10 +175,10 @@ def pair(c: Connection, code: str) -> Paired:
     }
     c.execute(update(live_take).where(live_take.c.id == row.id).values(values))
     audit.record(c, None, "live.paired", "session", row.session_id, {"take_id": row.id})
-    return Paired(token, row.id, row.session_id, row.title, row.code)
+    return TabletAccess(token, row.id, row.session_id, row.title, row.code)
 
 
-def by_token(c: Connection, take_id: str, token: str) -> Take | None:
+def by_token(c: Connection, take_id: str, token: str) -> LiveTakeRecord | None:
     """The take that this token opens, over or not; None when the token is unknown, expired or another's."""
     row = c.execute(
         select(live_take.c.token_sha256, live_take.c.token_expires_at).where(live_take.c.id == take_id)
@@ -204,7 +204,7 @@ def check_value(name: str, value: object) -> None:
         raise ServiceError("bad_value", f"The value of the command {name} is not {expected}.")
 
 
-def started(c: Connection, take_id: str, source: str) -> Take:
+def note_start(c: Connection, take_id: str, source: str) -> LiveTakeRecord:
     """Note the first samples."""
     c.execute(
         update(live_take)
@@ -223,7 +223,7 @@ def end(
     count: int,
     sha256: str | None = None,
     problem: str | None = None,
-) -> Take:
+) -> LiveTakeRecord:
     """End a take as finished or closed; one that is over stays as it is."""
     changed = c.execute(
         update(live_take)
@@ -245,22 +245,22 @@ def end(
     return this
 
 
-def get(c: Connection, take_id: str) -> Take:
+def get(c: Connection, take_id: str) -> LiveTakeRecord:
     """One take; raises NotFound."""
     row = c.execute(_QUERY.where(live_take.c.id == take_id)).first()
     if row is None:
         raise NotFound("live take", take_id)
-    return Take(**row._asdict())
+    return LiveTakeRecord(**row._asdict())
 
 
-def current(c: Connection, session_id: str) -> Take | None:
+def current(c: Connection, session_id: str) -> LiveTakeRecord | None:
     """The session's newest take, None before the first."""
     query = _QUERY.where(live_take.c.session_id == session_id)
     row = c.execute(query.order_by(live_take.c.created_at.desc(), live_take.c.id).limit(1)).first()
-    return None if row is None else Take(**row._asdict())
+    return None if row is None else LiveTakeRecord(**row._asdict())
 
 
-def require_open(c: Connection, session_id: str) -> Take:
+def require_open(c: Connection, session_id: str) -> LiveTakeRecord:
     """The session's open take; raises NotFound, Conflict no_open_take."""
     sessions.get(c, session_id)
     this = current(c, session_id)
@@ -269,10 +269,10 @@ def require_open(c: Connection, session_id: str) -> Take:
     return this
 
 
-def streaming(c: Connection) -> list[Take]:
+def list_streaming(c: Connection) -> list[LiveTakeRecord]:
     """All takes into which samples come now."""
     rows = c.execute(_QUERY.where(live_take.c.state == "streaming").order_by(live_take.c.created_at))
-    return [Take(**row._asdict()) for row in rows]
+    return [LiveTakeRecord(**row._asdict()) for row in rows]
 
 
 def add_event(
@@ -314,7 +314,7 @@ def is_own_notice(content: Mapping[str, Any]) -> bool:
     return content.get("from") == "server"
 
 
-def damages(c: Connection, session_id: str) -> list[str]:
+def list_damages(c: Connection, session_id: str) -> list[str]:
     """What was lost of a session's live takes because the disk damaged their logs, as sentences."""
     query = (
         select(live_event.c.content["text"].as_string())
@@ -328,14 +328,14 @@ def damages(c: Connection, session_id: str) -> list[str]:
     return list(c.execute(query.order_by(live_event.c.seq)).scalars())
 
 
-def takes_of(c: Connection, session_id: str) -> list[Take]:
+def takes_of(c: Connection, session_id: str) -> list[LiveTakeRecord]:
     """All takes of a session, the oldest first."""
     query = _QUERY.where(live_take.c.session_id == session_id)
-    return [Take(**row._asdict()) for row in c.execute(query.order_by(live_take.c.created_at))]
+    return [LiveTakeRecord(**row._asdict()) for row in c.execute(query.order_by(live_take.c.created_at))]
 
 
 _EVENT_COLUMNS = tuple(live_event.c[name] for name in LiveEvent.__dataclass_fields__ if name in live_event.c)
-_COLUMNS = tuple(live_take.c[name] for name in Take.__dataclass_fields__ if name in live_take.c)
+_COLUMNS = tuple(live_take.c[name] for name in LiveTakeRecord.__dataclass_fields__ if name in live_take.c)
 _QUERY = select(*_COLUMNS, session.c.patient_id).join(session, session.c.id == live_take.c.session_id)
 
 

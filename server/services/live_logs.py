@@ -15,7 +15,7 @@ from pathlib import Path
 from sqlalchemy import Connection, insert, select
 
 from core.errors import InputError
-from core.formats.live_log import parse_hello, peek
+from core.formats.live_log import parse_hello, read_batch_header
 from server import audit
 from server.jobs.queue import JobQueue
 from server.services import live_recordings, sessions
@@ -58,7 +58,7 @@ class LiveLog:
         return f"{self.written_at:%Y-%m-%d %H:%M}Z, {self.sensors} sensors, {self.batches} batches{long}"
 
 
-def logs(c: Connection, folder: Path) -> Iterator[LiveLog]:
+def list_logs(c: Connection, folder: Path) -> Iterator[LiveLog]:
     """Every log in `live/`, by name; one that vanishes meanwhile (its take has ended) is passed over."""
     for path in sorted(folder.glob("*.log")):
         found = c.execute(select(live_take.c.id).where(live_take.c.id == path.stem)).first()
@@ -68,7 +68,7 @@ def logs(c: Connection, folder: Path) -> Iterator[LiveLog]:
             continue
 
 
-def originals(folder: Path) -> list[Path]:
+def list_originals(folder: Path) -> list[Path]:
     """The copies kept of damaged logs."""
     return sorted(folder.glob("*.damaged"))
 
@@ -77,14 +77,14 @@ def read_log(path: Path, *, known: bool) -> LiveLog:
     """Look through one log; raises OSError."""
     found = path.stat()
     source, sensors, batches, size, sent = None, 0, 0, 0, []
-    for size, one in segments.records(path):  # noqa: B007 - the last one is used
+    for size, one in segments.read_records(path):  # noqa: B007 - the last one is used
         try:
             if one.kind == "H":
                 hello = parse_hello(one.body)
                 source, sensors = hello.source, sum(len(s.sensors) for s in hello.streams)
             elif one.kind == "B":
                 batches += 1
-                sent.append(peek(one.body).sent_us)
+                sent.append(read_batch_header(one.body).sent_us)
         except InputError:
             break
     return LiveLog(

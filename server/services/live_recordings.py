@@ -41,7 +41,7 @@ def log_path(folder: Path, take_id: str) -> Path:
     return folder / f"{take_id}.log"
 
 
-def file_name(take: live.Take) -> str:
+def file_name(take: live.LiveTakeRecord) -> str:
     """Name of the recording's only file."""
     return f"live-{take.created_at:%Y%m%dT%H%M%SZ}.sagittal-live"
 
@@ -100,8 +100,8 @@ def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) 
 
 
 def _store(
-    db: Database, blobs: BlobStore, queue: JobQueue, take: live.Take, path: Path, hello: bytes
-) -> live.Take:
+    db: Database, blobs: BlobStore, queue: JobQueue, take: live.LiveTakeRecord, path: Path, hello: bytes
+) -> live.LiveTakeRecord:
     blob = _copy(blobs, take.patient_id, path)
     try:
         with db.write() as c:
@@ -114,7 +114,7 @@ def _store(
 
 def _set_aside(db: Database, take_id: str, path: Path) -> None:
     """Keep the log of a take without a readable sample when there is more in it than a crash leaves."""
-    damage = segments.find_damage(path, segments.readable(path))
+    damage = segments.find_damage(path, segments.count_readable_bytes(path))
     if damage is None:
         return
     original = segments.keep_original(path)
@@ -146,7 +146,7 @@ def _chunks(path: Path) -> Iterator[bytes]:
 def _hello_of_data(path: Path) -> bytes | None:
     """The hello of a log with at least one batch, else None."""
     hello = None
-    for _, found in segments.records(path):
+    for _, found in segments.read_records(path):
         if found.kind == "H":
             hello = found.body
         elif found.kind == "B":
@@ -156,13 +156,13 @@ def _hello_of_data(path: Path) -> bytes | None:
 
 def _publish(
     c: Connection, blobs: BlobStore, queue: JobQueue, take_id: str, blob: Blob, hello: bytes
-) -> live.Take:
+) -> live.LiveTakeRecord:
     take = live.get(c, take_id)
     if take.recording_id is not None:
         return take
     blobs.require(take.patient_id, blob.sha256)
     recording_id, at = new_id(), now()
-    manifest = analyses.completed(c, take.session_id, {"sensors": _sensors(hello)})
+    manifest = analyses.complete_manifest(c, take.session_id, {"sensors": _sensors(hello)})
     # alone in its set: files that were uploaded to this session before are another take
     c.execute(
         insert(recording).values(
@@ -195,6 +195,6 @@ def _sensors(hello: bytes) -> dict[str, Any]:
     return {sensor.id: sensor.segment for stream in parse_hello(hello).streams for sensor in stream.sensors}
 
 
-def _opener(c: Connection, take: live.Take) -> _Opener | None:
+def _opener(c: Connection, take: live.LiveTakeRecord) -> _Opener | None:
     row = c.execute(select(user.c.id, user.c.name).where(user.c.id == take.opened_by)).first()
     return None if row is None else _Opener(row.id, row.name)

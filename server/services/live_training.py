@@ -25,7 +25,7 @@ KIND = "prescription"
 
 
 @dataclass(frozen=True)
-class Training:
+class LiveTraining:
     """What the estimator needs to know beside the samples.
 
     Parameters
@@ -41,11 +41,11 @@ class Training:
     baseline: Mapping[str, Any] | None = None
 
 
-def training_of(db: Database, reviewed: ReviewedAnalyses, take: live.Take) -> Training:
+def training_of(db: Database, reviewed: ReviewedAnalyses, take: live.LiveTakeRecord) -> LiveTraining:
     """What this take began with, or begins with now."""
     query = select(live_event.c.content).where(live_event.c.take_id == take.id, live_event.c.kind == KIND)
     with db.read() as c:
-        said = analyses.completed(c, take.session_id, None)
+        said = analyses.complete_manifest(c, take.session_id, None)
         content = c.execute(query.order_by(live_event.c.seq).limit(1)).scalar()
         begins = content is None
         if content is None:
@@ -56,7 +56,7 @@ def training_of(db: Database, reviewed: ReviewedAnalyses, take: live.Take) -> Tr
             row = update(live_take).where(live_take.c.id == take.id)
             c.execute(row.values(prescription_id=content["id"]))
     height, protocol = said.get("subject", {}).get("height_m"), said["protocol"]
-    return Training(height, protocol, content["id"], content["prescription"], content["baseline"])
+    return LiveTraining(height, protocol, content["id"], content["prescription"], content["baseline"])
 
 
 def note_feedback(c: Connection, take_ids: Collection[str]) -> None:
@@ -70,7 +70,7 @@ def note_feedback(c: Connection, take_ids: Collection[str]) -> None:
         sessions.change(c, None, session_id, {"feedback": True})
 
 
-def settle_feedback(c: Connection, actor: audit.Actor | None, take: live.Take) -> None:
+def settle_feedback(c: Connection, actor: audit.Actor | None, take: live.LiveTakeRecord) -> None:
     """Where an earlier take of the session gave feedback, note whether this one did, which now counts.
 
     Without such a take what a person said stays; cues that come later are noted by themselves.
@@ -81,7 +81,7 @@ def settle_feedback(c: Connection, actor: audit.Actor | None, take: live.Take) -
         sessions.change(c, actor, take.session_id, {"feedback": told[take.id]})
 
 
-def _prescribed(c: Connection, reviewed: ReviewedAnalyses, take: live.Take) -> dict[str, Any]:
+def _prescribed(c: Connection, reviewed: ReviewedAnalyses, take: live.LiveTakeRecord) -> dict[str, Any]:
     nothing = {"id": None, "prescription": None, "baseline": None}
     try:
         written = prescriptions.in_force(c, take.patient_id)

@@ -101,7 +101,7 @@ def count(c: Connection) -> int:
     return c.execute(select(func.count()).select_from(patient)).scalar_one()
 
 
-def listing(c: Connection, *, search: str = "", limit: int = 200, offset: int = 0) -> list[Patient]:
+def list_patients(c: Connection, *, search: str = "", limit: int = 200, offset: int = 0) -> list[Patient]:
     """Patients whose code or note contains `search` (any case), the latest visit first."""
     query = _listing().order_by(_LAST_VISIT.desc().nulls_last(), patient.c.created_at.desc(), patient.c.id)
     if search.strip():

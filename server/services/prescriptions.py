@@ -13,7 +13,7 @@ from typing import Any
 
 from sqlalchemy import Connection, insert, select, update
 
-from core.change import ChangeLimit, detectable
+from core.change import ChangeLimit, find_detectable_change
 from core.change.limits import Limb
 from core.feedback import Baseline, Cue, Prescription
 from core.frames import Side
@@ -22,12 +22,12 @@ from server.services import patients, sessions, targets
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
-from server.services.targets import Walk
+from server.services.targets import AnalysedWalk
 from server.storage.tables import live_event, live_take, new_id, now, prescription, session, user
 
 
 @dataclass(frozen=True)
-class Written:
+class PatientPrescription:
     """A prescription of a patient.
 
     Parameters
@@ -50,7 +50,7 @@ def write(
     actor: audit.Actor | None,
     patient_id: str,
     content: Mapping[str, object],
-) -> Written:
+) -> PatientPrescription:
     """Prescribe feedback; what was in force ends.
 
     Raises
@@ -78,7 +78,7 @@ def write(
     return get(c, written_id)
 
 
-def end(c: Connection, actor: audit.Actor | None, prescription_id: str) -> Written:
+def end(c: Connection, actor: audit.Actor | None, prescription_id: str) -> PatientPrescription:
     """End a prescription; raises NotFound, Conflict prescription_ended."""
     this = get(c, prescription_id)
     if this.ended_at is not None:
@@ -87,7 +87,7 @@ def end(c: Connection, actor: audit.Actor | None, prescription_id: str) -> Writt
     return get(c, prescription_id)
 
 
-def get(c: Connection, prescription_id: str) -> Written:
+def get(c: Connection, prescription_id: str) -> PatientPrescription:
     """One prescription; raises NotFound."""
     row = c.execute(_QUERY.where(prescription.c.id == prescription_id)).first()
     if row is None:
@@ -95,14 +95,14 @@ def get(c: Connection, prescription_id: str) -> Written:
     return _written(row)
 
 
-def of_patient(c: Connection, patient_id: str) -> list[Written]:
+def of_patient(c: Connection, patient_id: str) -> list[PatientPrescription]:
     """All prescriptions of a patient, the newest first."""
     query = _QUERY.where(prescription.c.patient_id == patient_id)
     rows = c.execute(query.order_by(prescription.c.created_at.desc(), prescription.c.id))
     return [_written(row) for row in rows]
 
 
-def in_force(c: Connection, patient_id: str) -> Written | None:
+def in_force(c: Connection, patient_id: str) -> PatientPrescription | None:
     """The prescription that holds now, None without one."""
     return next((w for w in of_patient(c, patient_id) if w.ended_at is None), None)
 
@@ -143,7 +143,7 @@ def cues(c: Connection, take_ids: Sequence[str]) -> dict[str, list[Cue]]:
 
 
 @dataclass(frozen=True)
-class Training:
+class TrainedTake:
     """A live take with feedback.
 
     Parameters
@@ -160,7 +160,7 @@ class Training:
     baseline: Baseline
 
 
-def trainings(c: Connection, patient_id: str) -> list[Training]:
+def trainings(c: Connection, patient_id: str) -> list[TrainedTake]:
     """All live takes of a patient that gave cues, the oldest first."""
     gave = select(live_event.c.seq).where(live_event.c.take_id == live_take.c.id, live_event.c.kind == "cue")
     begun = (
@@ -184,7 +184,7 @@ def trainings(c: Connection, patient_id: str) -> list[Training]:
         .order_by(session.c.performed_on, live_take.c.created_at, live_take.c.id)
     )
     return [
-        Training(
+        TrainedTake(
             *row[:5],
             Prescription.from_json(row[5]["prescription"]),
             Baseline.from_json(row[5]["baseline"] or {}),
@@ -213,7 +213,7 @@ def _with_target(
 
 
 def _baseline(
-    c: Connection, written: Written, patient: Patient, walk: Walk | None, session_id: str
+    c: Connection, written: PatientPrescription, patient: Patient, walk: AnalysedWalk | None, session_id: str
 ) -> Baseline:
     content = written.content
     given = trainings(c, patient.id)
@@ -224,26 +224,28 @@ def _baseline(
         # the block opens the visit, not its later takes
         after_training=bool(alike) and not today,
     )
-    usual = None if walk is None else targets.usual(walk, content.parameter, content.side)
+    usual = None if walk is None else targets.find_usual_value(walk, content.parameter, content.side)
     if walk is not None and usual is not None:
         baseline = replace(baseline, mean=usual.mean, sd=usual.sd, n=usual.n, session_id=walk.session.id)
-    mdc = None if content.side is None else _mdc(patient, content, walk, targets.other(content.side))
+    mdc = None if content.side is None else _mdc(patient, content, walk, targets.opposite_side(content.side))
     if mdc is None:
         return baseline
     return replace(baseline, other_mdc=mdc.value, other_mdc_source=f"MDC, {mdc.source}")
 
 
-def _mdc(patient: Patient, content: Prescription, walk: Walk | None, side: Side) -> ChangeLimit | None:
+def _mdc(
+    patient: Patient, content: Prescription, walk: AnalysedWalk | None, side: Side
+) -> ChangeLimit | None:
     """Limit of change of the untrained side, from what it usually does, else from the target."""
-    there = None if walk is None else targets.usual(walk, content.parameter, side)
+    there = None if walk is None else targets.find_usual_value(walk, content.parameter, side)
     value = content.target.mean if there is None else there.mean
     limb: Limb | None = None
     if patient.affected_side is not None:
         limb = "affected" if side == patient.affected_side else "unaffected"
-    return None if value is None else detectable(content.parameter, value, limb)
+    return None if value is None else find_detectable_change(content.parameter, value, limb)
 
 
-def _last_level(c: Connection, own: Sequence[Training]) -> int | None:
+def _last_level(c: Connection, own: Sequence[TrainedTake]) -> int | None:
     """Level of the last cue of the training proper; a block a visit opens with may have none yet."""
     for training in reversed(own):
         given = cues(c, [training.take_id])[training.take_id]
@@ -253,7 +255,7 @@ def _last_level(c: Connection, own: Sequence[Training]) -> int | None:
     return None
 
 
-def _end(c: Connection, actor: audit.Actor | None, this: Written) -> None:
+def _end(c: Connection, actor: audit.Actor | None, this: PatientPrescription) -> None:
     c.execute(update(prescription).where(prescription.c.id == this.id).values(ended_at=now()))
     audit.record(c, actor, "prescription.ended", "patient", this.patient_id, _said(this.id, this.content))
 
@@ -267,7 +269,7 @@ _QUERY = select(prescription, user.c.display_name.label("by")).join(
 )
 
 
-def _written(row: Any) -> Written:
-    return Written(
+def _written(row: Any) -> PatientPrescription:
+    return PatientPrescription(
         row.id, row.patient_id, Prescription.from_json(row.content), row.created_at, row.by, row.ended_at
     )

@@ -210,7 +210,7 @@ def _programmes(c: Connection, which: ColumnElement[bool]) -> list[Programme]:
     for _, group in itertools.groupby(rows, key=lambda row: row.programme_id):
         planned = list(group)
         own = {name: getattr(planned[0], f"of_{name}") for name in _OWN}
-        visits = states(tuple(_planned(row) for row in planned), today)
+        visits = judge_states(tuple(_planned(row) for row in planned), today)
         found.append(Programme(**own, words=COURSES[own["template"]].words, visits=visits))
     return found
 
@@ -218,7 +218,7 @@ def _programmes(c: Connection, which: ColumnElement[bool]) -> list[Programme]:
 _OWN = ("id", "patient_id", "template", "starts_on", "created_at")
 
 
-def states(visits: tuple[PlannedVisit, ...], today: dt.date) -> tuple[PlannedVisit, ...]:
+def judge_states(visits: tuple[PlannedVisit, ...], today: dt.date) -> tuple[PlannedVisit, ...]:
     """Say of each visit whether it is done, missing, next or planned today; in the order of planned days."""
     found: list[PlannedVisit] = []
     ahead = False

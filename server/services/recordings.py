@@ -48,7 +48,7 @@ RecordingState = Literal["draft", "ready", "failed"]
 
 
 @dataclass(frozen=True)
-class Recording:
+class StoredRecording:
     """An upload set.
 
     Parameters
@@ -80,7 +80,7 @@ def input_digest(files: Iterable[tuple[str, str]]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def current(c: Connection, session_id: str) -> Recording | None:
+def current(c: Connection, session_id: str) -> StoredRecording | None:
     """The session's newest recording, None before the first file; raises NotFound for the session."""
     row = c.execute(_QUERY.where(session.c.id == session_id).order_by(*_NEWEST).limit(1)).first()
     if row is None:
@@ -89,7 +89,7 @@ def current(c: Connection, session_id: str) -> Recording | None:
     return _recording(c, row)
 
 
-def get(c: Connection, recording_id: str) -> Recording:
+def get(c: Connection, recording_id: str) -> StoredRecording:
     """One recording; raises NotFound."""
     row = c.execute(_QUERY.where(recording.c.id == recording_id)).first()
     if row is None:
@@ -99,7 +99,7 @@ def get(c: Connection, recording_id: str) -> Recording:
 
 def set_manifest(
     c: Connection, actor: audit.Actor | None, session_id: str, manifest: Mapping[str, Any] | None
-) -> Recording:
+) -> StoredRecording:
     """Keep a mapping for the current recording; raises ManifestError, Conflict no_files."""
     from core.formats.manifest import manifest_of  # slow import
 
@@ -115,7 +115,7 @@ def set_manifest(
     return get(c, this.id)
 
 
-def remove_file(c: Connection, actor: audit.Actor | None, session_id: str, name: str) -> Recording:
+def remove_file(c: Connection, actor: audit.Actor | None, session_id: str, name: str) -> StoredRecording:
     """Take a file out of the current set (of its successor, if it is already analysed); raises NotFound."""
     this = current(c, session_id)
     if this is None or name not in {f.name for f in this.files}:
@@ -157,7 +157,7 @@ def publish_inspection(c: Connection, recording_id: str, input_sha256: str, foun
     c.execute(update(recording).where(recording.c.id == recording_id).values(inspection=dict(found)))
 
 
-def require_current(c: Connection, session_id: str) -> Recording:
+def require_current(c: Connection, session_id: str) -> StoredRecording:
     """The current recording with at least one file; raises Conflict no_files."""
     this = current(c, session_id)
     if this is None or not this.files:
@@ -165,7 +165,7 @@ def require_current(c: Connection, session_id: str) -> Recording:
     return this
 
 
-def job_inputs(this: Recording) -> dict[str, Any]:
+def job_inputs(this: StoredRecording) -> dict[str, Any]:
     """What a job needs to know of the files, fixed at submission."""
     files = [{"name": f.name, "size": f.size, "sha256": f.sha256} for f in this.files]
     return {"space": this.patient_id, "files": files, "input_sha256": this.input_sha256}
@@ -207,7 +207,7 @@ class receive:  # noqa: N801 - a verb: with receive(...) as upload
     ) -> None:
         self._db, self._blobs, self._settings, self._actor = db, blobs, settings, actor
         self._session_id = session_id
-        self._name = checked_name(name)
+        self._name = check_name(name)
         with db.read() as c:
             self._space = _patient_of(c, session_id)
             self._check_set(current(c, session_id), 0)
@@ -249,7 +249,7 @@ class receive:  # noqa: N801 - a verb: with receive(...) as upload
         audit.record(c, self._actor, "recording.file_added", "recording", target, detail)
         return RecordedFile(self._name, blob.size, blob.sha256)
 
-    def _check_set(self, this: Recording | None, size: int) -> None:
+    def _check_set(self, this: StoredRecording | None, size: int) -> None:
         others = [f for f in this.files if f.name != self._name] if this else []
         if len(others) + 1 > self._settings.max_files:
             raise TooLarge("too_many_files", f"A recording has at most {self._settings.max_files} files.")
@@ -283,7 +283,7 @@ def require_room(blobs: BlobStore, settings: Settings, size: int) -> None:
         raise DiskFull
 
 
-def checked_name(name: str) -> str:
+def check_name(name: str) -> str:
     """A file's name as we keep it: forward slashes, composed Unicode; raises InputError bad_file_name."""
     plain = unicodedata.normalize("NFC", name).replace("\\", "/").strip("/")
     parts = plain.split("/")
@@ -303,7 +303,7 @@ _NEWEST = (recording.c.created_at.desc(), recording.c.id)
 _QUERY = select(recording, session.c.patient_id).join(session, session.c.id == recording.c.session_id)
 
 
-def _recording(c: Connection, row: Any) -> Recording:
+def _recording(c: Connection, row: Any) -> StoredRecording:
     files = c.execute(
         select(recording_file).where(recording_file.c.recording_id == row.id).order_by(recording_file.c.name)
     )
@@ -315,7 +315,7 @@ def _recording(c: Connection, row: Any) -> Recording:
     ).first()
     look = job_view(newest) if newest else None
     failed = look is not None and look.state == "failed"
-    return Recording(
+    return StoredRecording(
         id=row.id,
         session_id=row.session_id,
         patient_id=row.patient_id,

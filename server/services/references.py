@@ -7,7 +7,7 @@ from sqlalchemy import Connection, select, union
 from server.storage.tables import analysis, analysis_file, patient, recording, recording_file, session
 
 
-def referenced(c: Connection, session_id: str | None = None) -> set[tuple[str, str]]:
+def list_referenced(c: Connection, session_id: str | None = None) -> set[tuple[str, str]]:
     """Every (space, sha256) that a row refers to, of one session or all."""
     originals = (
         select(patient.c.id, recording_file.c.sha256)

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from server.report.behind import Behind, behind
+from server.report.behind import ParameterStrides, open_row
 from server.report.bundle import Bundle
-from server.report.comparison import changes, with_changes
+from server.report.comparison import add_changes, compare_figures
 from server.report.level import level_column
-from server.report.model import ReportModel, Since, report_model
+from server.report.model import PreviousVisit, ReportModel, report_model
 from server.services import analyses, controls, edit_log
-from server.services.comparisons import norms
+from server.services.comparisons import find_norms
 from server.services.controls import ControlVisit
 from server.services.errors import NotFound
-from server.services.histories import Analysed
+from server.services.histories import AnalysedSession
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
@@ -22,11 +22,11 @@ from server.services.sessions import Session
 
 def read(
     reviewed: ReviewedAnalyses,
-    found: analyses.Analysis,
-    edits: edit_log.Edits,
+    found: analyses.AnalysisRecord,
+    edits: edit_log.EditHistory,
     patient: Patient,
     session: Session,
-    before: Analysed | None = None,
+    before: AnalysedSession | None = None,
     control_visits: Sequence[ControlVisit] = (),
 ) -> tuple[Bundle, ReportModel]:
     """Describe an analysis with its edits for this person on that day; raises IntegrityError.
@@ -46,26 +46,26 @@ def read(
         sex=patient.sex,
         height_m=height,
         affected=patient.affected_side,
-        controls=controls.group(reviewed, control_visits, speed),
+        controls=controls.make_group(reviewed, control_visits, speed),
     )
-    model = replace(model, condition=Analysed(session, found, edits).condition.words)
+    model = replace(model, condition=AnalysedSession(session, found, edits).condition.words)
     if before is None:
         return bundle, model
     old, new = reviewed.read_numbers(before.found, before.edits), reviewed.read_numbers(found, edits)
-    changed = changes(old, new, norms(patient, session, new), patient.affected_side)
-    since = Since(before.session.id, before.session.performed_on)
-    return bundle, replace(model, groups=with_changes(model.groups, changed), since=since)
+    changed = compare_figures(old, new, find_norms(patient, session, new), patient.affected_side)
+    since = PreviousVisit(before.session.id, before.session.performed_on)
+    return bundle, replace(model, groups=add_changes(model.groups, changed), since=since)
 
 
 def behind_number(
     reviewed: ReviewedAnalyses,
-    found: analyses.Analysis,
-    edits: edit_log.Edits,
+    found: analyses.AnalysisRecord,
+    edits: edit_log.EditHistory,
     patient: Patient,
     session: Session,
     name: str,
     control_visits: Sequence[ControlVisit] = (),
-) -> Behind:
+) -> ParameterStrides:
     """One parameter with the strides behind it; raises NotFound, IntegrityError."""
     bundle, model = read(reviewed, found, edits, patient, session, control_visits=control_visits)
     row = next((r for _, rows in model.groups for r in rows if r.name == name), None)
@@ -74,4 +74,4 @@ def behind_number(
     columns = reviewed.read_columns(found, edits)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
     column = columns.get(name) or level_column(name, bundle.strides, columns, standing)
-    return behind(row, bundle.strides, column, model.duration_s)
+    return open_row(row, bundle.strides, column, model.duration_s)

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar, cast
 
 from core.events.edits import Edit
-from core.measure import Measured, Tracks, measure
+from core.measure import MeasuredGait, Tracks, measure_gait
 from core.norms.controls import ControlSession
 from core.parameters.rows import Column
 from server.report import signals, tracks
-from server.report.bundle import Bundle, load_bundle, read_columns, reviewed
+from server.report.bundle import Bundle, apply_review, load_bundle, read_columns
 from server.report.numbers import Numbers, numbers_of, read_numbers
 from server.services import analyses
-from server.services.edit_log import Edits
+from server.services.edit_log import EditHistory
 from server.services.errors import Conflict
 from server.storage.blobs import BlobStore
 
@@ -67,13 +67,13 @@ class ReviewedAnalyses:
     def __init__(self, blobs: BlobStore) -> None:
         self.blobs = blobs
         self._analyses: RecentValues[StoredAnalysis] = RecentValues(ANALYSES_KEPT)
-        self._results: RecentValues[Measured] = RecentValues(RESULTS_KEPT)
+        self._results: RecentValues[MeasuredGait] = RecentValues(RESULTS_KEPT)
         self._numbers: RecentValues[Numbers] = RecentValues(NUMBERS_KEPT)
         self._controls: RecentValues[ControlSession] = RecentValues(CONTROLS_KEPT)
         self._verdicts: RecentValues[tuple[str, str]] = RecentValues(VERDICTS_KEPT)
         self._parts: RecentValues[Any] = RecentValues(PARTS_KEPT)
 
-    def open(self, found: analyses.Analysis) -> StoredAnalysis:
+    def open(self, found: analyses.AnalysisRecord) -> StoredAnalysis:
         """Return an analysis as it is stored, read once while it is at work; raises IntegrityError."""
 
         def read() -> StoredAnalysis:
@@ -88,13 +88,13 @@ class ReviewedAnalyses:
 
         return self._analyses.get(found.id, read)
 
-    def measure(self, found: analyses.Analysis, edits: Edits) -> Measured | None:
+    def measure(self, found: analyses.AnalysisRecord, edits: EditHistory) -> MeasuredGait | None:
         """Return what the live edits give; None without an edit: then the stored analysis counts."""
         if not edits.made:
             return None
         return self._results.get((found.id, edits.key), lambda: self.measure_anew(found, edits.edits))
 
-    def measure_anew(self, found: analyses.Analysis, edits: tuple[Edit, ...]) -> Measured:
+    def measure_anew(self, found: analyses.AnalysisRecord, edits: tuple[Edit, ...]) -> MeasuredGait:
         """Measure with these edits, without looking into the memory or keeping the result.
 
         Raises
@@ -104,13 +104,13 @@ class ReviewedAnalyses:
         known = self.open(found)
         if known.tracks is None:
             raise Conflict("no_tracks", known.fixed_because or "")
-        return measure(known.tracks, edits)
+        return measure_gait(known.tracks, edits)
 
-    def keep_result(self, found: analyses.Analysis, edits: Edits, result: Measured) -> None:
+    def keep_result(self, found: analyses.AnalysisRecord, edits: EditHistory, result: MeasuredGait) -> None:
         """Keep what `measure_anew` gave for these edits."""
         self._results.put((found.id, edits.key), result)
 
-    def read_columns(self, found: analyses.Analysis, edits: Edits) -> Mapping[str, Column]:
+    def read_columns(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Mapping[str, Column]:
         """Return figures of every stride of the list as they count, by parameter; raises IntegrityError."""
         result = self.measure(found, edits)
         if result is not None:
@@ -119,12 +119,12 @@ class ReviewedAnalyses:
             return {}
         return read_columns(analyses.file_bytes(self.blobs, found, "strides.csv"))
 
-    def read_bundle(self, found: analyses.Analysis, edits: Edits) -> Bundle:
+    def read_bundle(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
         """Return the analysis with what its live edits give; raises IntegrityError."""
         stored, result = self.open(found).bundle, self.measure(found, edits)
-        return stored if result is None else reviewed(stored, result, edits.edits)
+        return stored if result is None else apply_review(stored, result, edits.edits)
 
-    def read_numbers(self, found: analyses.Analysis, edits: Edits) -> Numbers:
+    def read_numbers(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Numbers:
         """Return parameters and scores as they count; without an edit no signal is read.
 
         Raises
@@ -142,7 +142,7 @@ class ReviewedAnalyses:
 
         return self._numbers.get((found.id, edits.key), read)
 
-    def read_verdict(self, found: analyses.Analysis, edits: Edits) -> tuple[str, str]:
+    def read_verdict(self, found: analyses.AnalysisRecord, edits: EditHistory) -> tuple[str, str]:
         """Return shape and word for the data of an analysis, as lists show it; raises IntegrityError."""
         return self._verdicts.get((found.id, edits.key), lambda: self.read_numbers(found, edits).verdict)
 
@@ -151,7 +151,7 @@ class ReviewedAnalyses:
         return cast("_Value", self._parts.get(key, make_value))
 
     def keep_control(
-        self, found: analyses.Analysis, edits: Edits, make_value: Callable[[], ControlSession]
+        self, found: analyses.AnalysisRecord, edits: EditHistory, make_value: Callable[[], ControlSession]
     ) -> ControlSession:
         """Return what serves as reference of a finished analysis of a control."""
         return self._controls.get((found.id, edits.key), make_value)

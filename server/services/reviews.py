@@ -13,7 +13,7 @@ from sqlalchemy import Connection, insert
 from core.events.edits import Edit
 from server import audit
 from server.services import analyses
-from server.services.edit_log import UNDO, Edits, edits_of
+from server.services.edit_log import UNDO, EditHistory, edits_of
 from server.services.errors import Conflict
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.db import Database
@@ -39,7 +39,7 @@ def make(
     edit: Edit,
     *,
     seen: int | None = None,
-) -> tuple[analyses.Analysis, Edits]:
+) -> tuple[analyses.AnalysisRecord, EditHistory]:
     """Change the analysis that a session shows.
 
     Parameters
@@ -63,7 +63,7 @@ def make(
 
 def undo(
     db: Database, actor: audit.Actor | None, session_id: str, *, seen: int | None = None
-) -> tuple[analyses.Analysis, Edits]:
+) -> tuple[analyses.AnalysisRecord, EditHistory]:
     """Take the last live edit back; raises NotFound, Conflict nothing_to_undo, edited_meanwhile."""
     found, before = _state(db, session_id, seen)
     if not before.made:
@@ -74,16 +74,16 @@ def undo(
         return found, edits_of(c, found.id)
 
 
-def _state(db: Database, session_id: str, seen: int | None) -> tuple[analyses.Analysis, Edits]:
+def _state(db: Database, session_id: str, seen: int | None) -> tuple[analyses.AnalysisRecord, EditHistory]:
     with db.read() as c:
-        found = analyses.shown(c, session_id)
+        found = analyses.get_shown(c, session_id)
         edits = edits_of(c, found.id)
     if seen is not None and seen != edits.version:
         raise _meanwhile()
     return found, edits
 
 
-def _refuse_older(c: Connection, found: analyses.Analysis, before: Edits) -> None:
+def _refuse_older(c: Connection, found: analyses.AnalysisRecord, before: EditHistory) -> None:
     if edits_of(c, found.id).version != before.version:
         raise _meanwhile()
 
@@ -99,7 +99,7 @@ def _append(
     c: Connection,
     actor: audit.Actor | None,
     session_id: str,
-    found: analyses.Analysis,
+    found: analyses.AnalysisRecord,
     kind: str,
     content: dict[str, Any],
 ) -> None:

@@ -51,7 +51,7 @@ class SignalLane:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class SignalWindow:
     """A window of a lane.
 
     Parameters
@@ -67,15 +67,20 @@ class Piece:
     high: Mapping[str, list[float | None]]
 
 
-def lanes(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> tuple[SignalLane, ...]:
+def list_lanes(reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord) -> tuple[SignalLane, ...]:
     """What can be drawn of an analysis, feet first, then joints from the top, then sensors."""
     known = reviewed.open(found)
     return tuple(lane for lane, _ in _lanes(reviewed, found, known))
 
 
-def piece(
-    reviewed: ReviewedAnalyses, found: analyses.Analysis, name: str, start_s: float, end_s: float, points: int
-) -> Piece:
+def read_window(
+    reviewed: ReviewedAnalyses,
+    found: analyses.AnalysisRecord,
+    name: str,
+    start_s: float,
+    end_s: float,
+    points: int,
+) -> SignalWindow:
     """A window of a lane in at most `points` parts; raises NotFound for a lane that is not there."""
     known = reviewed.open(found)
     drawn = next(((lane, read) for lane, read in _lanes(reviewed, found, known) if lane.name == name), None)
@@ -91,14 +96,14 @@ def piece(
     low, high = {}, {}
     for line, values in lines.items():
         low[line], high[line] = _extremes(values[first:past], size)
-    return Piece(lane, float(t_s[first]), size / rate, low, high)
+    return SignalWindow(lane, float(t_s[first]), size / rate, low, high)
 
 
 Read = Callable[[], tuple[Floats, Mapping[str, Floats]]]
 
 
 def _lanes(
-    reviewed: ReviewedAnalyses, found: analyses.Analysis, known: StoredAnalysis
+    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, known: StoredAnalysis
 ) -> Iterator[tuple[SignalLane, Read]]:
     yield from _foot_lanes(reviewed, found, known)
     yield from _angle_lanes(known)
@@ -106,7 +111,7 @@ def _lanes(
 
 
 def _foot_lanes(
-    reviewed: ReviewedAnalyses, found: analyses.Analysis, known: StoredAnalysis
+    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, known: StoredAnalysis
 ) -> Iterator[tuple[SignalLane, Read]]:
     tracks = known.tracks
     if tracks is None:
@@ -177,7 +182,9 @@ def _angle_lanes(known: StoredAnalysis) -> Iterator[tuple[SignalLane, Read]]:
             )
 
 
-def _raw_lanes(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> Iterator[tuple[SignalLane, Read]]:
+def _raw_lanes(
+    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord
+) -> Iterator[tuple[SignalLane, Read]]:
     if file.NAME not in found.files:
         return
     names = set(_columns(reviewed, found))
@@ -196,7 +203,7 @@ def _raw_lanes(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> Iterator
 _ENDING: Final = {"gyr": "_dps", "acc": ""}
 
 
-def _columns(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> tuple[str, ...]:
+def _columns(reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord) -> tuple[str, ...]:
     def read() -> tuple[str, ...]:
         content = analyses.file_bytes(reviewed.blobs, found, file.NAME)
         return tuple(pq.read_schema(BufferReader(content)).names)
@@ -205,7 +212,7 @@ def _columns(reviewed: ReviewedAnalyses, found: analyses.Analysis) -> tuple[str,
 
 
 def _raw(
-    reviewed: ReviewedAnalyses, found: analyses.Analysis, segment: Segment, kind: str
+    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, segment: Segment, kind: str
 ) -> tuple[Floats, Mapping[str, Floats]]:
     """The three axes of a sensor; kept, for whoever looks at a signal looks again."""
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import logging
 
 from server.services import custody, erasure
-from server.services.references import referenced
+from server.services.references import list_referenced
 from server.settings import Settings
 from server.storage import fs
 from server.storage.blobs import INCOMING, BlobStore
@@ -38,8 +38,8 @@ def sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
     erasure.finish(db, blobs, settings)
     old = [f for f in blobs.files() if f.age_s >= settings.sweep_grace_s]
     with db.read() as c:
-        doubted = custody.doubt(c, settings)
-        used, erased = referenced(c), erasure.erased_spaces(c)
+        doubted = custody.find_doubt(c, settings)
+        used, erased = list_referenced(c), erasure.list_erased_spaces(c)
     if doubted is not None:
         log.warning("no stored file is taken away: %s See `sagittal check`.", doubted)
         return 0
@@ -48,7 +48,7 @@ def sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
     for group in (idle[i : i + AT_ONCE] for i in range(0, len(idle), AT_ONCE)):
         kept = []
         with db.write() as c:
-            used = referenced(c)
+            used = list_referenced(c)
             for stored in group:
                 if (stored.space, stored.name) in used or not stored.is_older(settings.sweep_grace_s):
                     continue
@@ -70,7 +70,7 @@ def put_back(db: Database, blobs: BlobStore, settings: Settings) -> int:
     trash = Trash(settings.trash)
     back = 0
     with db.write() as c:
-        used = referenced(c)
+        used = list_referenced(c)
         for one in list(trash.files()):
             target = blobs.path(one.space, one.name)
             if (one.space, one.name) in used and not target.is_file():

@@ -20,7 +20,7 @@ from server.report.notes import GROUPS
 from server.report.numbers import Numbers
 from server.report.wording import NO_NORM
 from server.services import comparisons, controls, histories
-from server.services.histories import Analysed
+from server.services.histories import AnalysedSession
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
@@ -31,7 +31,7 @@ FEWEST: Final = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
+class AnalysedWalk:
     """An analysed session of a person with what it is compared with.
 
     Parameters
@@ -61,7 +61,7 @@ def last_walk(
     session_id: str | None = None,
     *,
     with_controls: bool = True,
-) -> Walk | None:
+) -> AnalysedWalk | None:
     """The analysed walk that says how a person walks, never one with feedback; None without one.
 
     Without `before` it is that of `histories.baseline`.
@@ -73,7 +73,7 @@ def last_walk(
     """
     found = [
         a
-        for a in histories.analysed(c, patient.id)
+        for a in histories.list_analysed(c, patient.id)
         if a.session.protocol in {"walk", "treadmill"}
         and session_id in {None, a.session.id}
         and (before is None or _earlier(a, before))
@@ -83,16 +83,18 @@ def last_walk(
         return None
     numbers = reviewed.read_numbers(last.found, last.edits)
     speed = _mean(numbers, "gait_speed_mps", None)
-    visits = controls.visits(c, patient, last.session) if with_controls else ()
+    visits = controls.list_visits(c, patient, last.session) if with_controls else ()
 
     def own_controls() -> Norms | None:
-        group = controls.group(reviewed, visits, None if speed is None else speed.mean)
+        group = controls.make_group(reviewed, visits, None if speed is None else speed.mean)
         return None if group is None or speed is None else group.norms(speed.mean)
 
-    return Walk(last.session, numbers, comparisons.norms(patient, last.session, numbers), own_controls)
+    return AnalysedWalk(
+        last.session, numbers, comparisons.find_norms(patient, last.session, numbers), own_controls
+    )
 
 
-def offer(walk: Walk | None, source: TargetSource, parameter: str, side: Side | None) -> Offer:
+def offer(walk: AnalysedWalk | None, source: TargetSource, parameter: str, side: Side | None) -> Offer:
     """What a source gives as target of a parameter, from a person's last walk.
 
     Parameters
@@ -112,15 +114,15 @@ def offer(walk: Walk | None, source: TargetSource, parameter: str, side: Side | 
         return _own(walk, parameter, side)
     if side is None:
         return Offer(None, "Both sides are trained. Choose the one that is, the other is then the target.")
-    return _own(walk, parameter, other(side))
+    return _own(walk, parameter, opposite_side(side))
 
 
-def other(side: Side) -> Side:
+def opposite_side(side: Side) -> Side:
     """The opposite side."""
     return "right" if side == "left" else "left"
 
 
-def usual(walk: Walk, parameter: str, side: Side | None) -> Parameter | None:
+def find_usual_value(walk: AnalysedWalk, parameter: str, side: Side | None) -> Parameter | None:
     """What a person did in a walk: of a side, or of both together; None where it was not measured."""
     found = _mean(walk.numbers, parameter, side) or _mean(walk.numbers, parameter, None)
     if found is not None or side is not None:
@@ -129,7 +131,7 @@ def usual(walk: Walk, parameter: str, side: Side | None) -> Parameter | None:
     return _together(sides) if sides else None
 
 
-def _norm(walk: Walk, parameter: str) -> Offer:
+def _norm(walk: AnalysedWalk, parameter: str) -> Offer:
     norms = walk.norms
     values = [norms.expected.get(parameter), norms.values.get(parameter)]
     found = next((v for v in values if _serves(v)), None)
@@ -150,8 +152,8 @@ def _serves(value: NormValue | None) -> bool:
     return value is not None and value.comparable and value.sd > 0.0
 
 
-def _own(walk: Walk, parameter: str, side: Side | None) -> Offer:
-    found = usual(walk, parameter, side)
+def _own(walk: AnalysedWalk, parameter: str, side: Side | None) -> Offer:
+    found = find_usual_value(walk, parameter, side)
     where = "both sides" if side is None else f"{side} side"
     if found is None or found.mean is None or not found.sd or found.n < FEWEST:
         n = 0 if found is None else found.n
@@ -186,7 +188,7 @@ def _together(sides: list[Parameter]) -> Parameter:
     return Parameter(first.name, None, n, mean, sqrt(squares / (n - 1)) if n > 1 else None, first.unit)
 
 
-def _earlier(a: Analysed, b: Session) -> bool:
+def _earlier(a: AnalysedSession, b: Session) -> bool:
     """Whether a visit came before this session and was walked like it; how fast its belt will run is open."""
     own = a.session
     if own.id == b.id or (own.performed_on, own.created_at) >= (b.performed_on, b.created_at):

@@ -41,7 +41,7 @@ class Blob:
 
 
 @dataclass(frozen=True)
-class StoredFile:
+class BlobFile:
     """A file found in the store, referred to or not; `age_s` since it was written."""
 
     space: str
@@ -111,7 +111,7 @@ class BlobStore:
             raise ValueError(f"'{space}/{sha256}' is not the address of a blob.")
         return self.root / space / sha256
 
-    def files(self) -> Iterator[StoredFile]:
+    def files(self) -> Iterator[BlobFile]:
         """Every file of ours in the store, half-received ones too (their space is INCOMING)."""
         for folder in sorted(self.root.iterdir()):
             if not (folder.is_dir() and (folder.name == INCOMING or _HEX32.fullmatch(folder.name))):
@@ -121,7 +121,7 @@ class BlobStore:
                     age_s = time.time() - path.stat().st_mtime
                 except FileNotFoundError:
                     continue
-                yield StoredFile(folder.name, path.name, path, age_s)
+                yield BlobFile(folder.name, path.name, path, age_s)
 
     def remove(self, space: str, sha256: str) -> None:
         """Remove one file for good; gone already is fine."""
@@ -137,7 +137,7 @@ class Receiver:
 
     def __init__(self, target: Path, incoming: Path, limit: int | None) -> None:
         self._target = target
-        self._file = fs.Incoming(incoming, limit)
+        self._file = fs.IncomingFile(incoming, limit)
 
     def write(self, data: bytes) -> None:
         """Append bytes; raises fs.SizeLimitError beyond the limit."""

@@ -105,7 +105,7 @@ class ChangeWatch:
         self._connection = connection
         self._seen: int | None = None
 
-    def changed(self) -> bool:
+    def has_changed(self) -> bool:
         """True at the first call and whenever another connection has committed since the last one."""
         version = int(self._connection.execute("PRAGMA data_version").fetchone()[0])
         changed = version != self._seen

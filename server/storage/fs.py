@@ -73,7 +73,7 @@ class SizeLimitError(Exception):
         self.limit = limit
 
 
-class Incoming:
+class IncomingFile:
     """A file that is being written under a temporary name; counts and hashes what passes.
 
     Use as a context manager; leaving it without `keep` removes the file.
@@ -137,7 +137,7 @@ class Incoming:
                 system.unlink(self.path)
 
 
-class Growing:
+class AppendOnlyFile:
     """A file that only grows at its end; its first `size` bytes are whole appends.
 
     Parameters
@@ -187,7 +187,7 @@ class Growing:
 
 def write_file(path: Path, content: bytes) -> None:
     """Write a whole file so that its name never shows a part of it."""
-    with Incoming(path.parent) as incoming:
+    with IncomingFile(path.parent) as incoming:
         incoming.write(content)
         incoming.keep(path)
 

@@ -62,13 +62,13 @@ def read_mark(path: Path) -> HighWater | None:
     return mark
 
 
-def newest(c: Connection) -> HighWater | None:
+def read_newest(c: Connection) -> HighWater | None:
     """The last row of the audit log, None while there is none."""
     row = c.execute(select(audit.c.seq, audit.c.hash).order_by(audit.c.seq.desc()).limit(1)).first()
     return None if row is None else HighWater(row.seq, row.hash)
 
 
-def gone_back(c: Connection, path: Path) -> str | None:
+def explain_lost_rows(c: Connection, path: Path) -> str | None:
     """Why this is not the database that was here last, as a sentence; None when it is, or nobody can know.
 
     Parameters
@@ -81,7 +81,7 @@ def gone_back(c: Connection, path: Path) -> str | None:
         return f"{path.name} cannot be read ({error}), so nobody knows whether the audit log is whole."
     if mark is None:
         return None
-    last = newest(c)
+    last = read_newest(c)
     if last is None or last.seq < mark.seq:
         return (
             f"The audit log ends at row {last.seq if last else 0}, but had reached row {mark.seq}: the "
@@ -96,9 +96,9 @@ def gone_back(c: Connection, path: Path) -> str | None:
 def raise_mark(db: Database, path: Path) -> bool:
     """Write the newest row into the mark; False when the database has gone back and the mark stays."""
     with db.read() as c:
-        if gone_back(c, path) is not None:
+        if explain_lost_rows(c, path) is not None:
             return False
-        last = newest(c)
+        last = read_newest(c)
     _write(path, last)
     return True
 
@@ -106,7 +106,7 @@ def raise_mark(db: Database, path: Path) -> bool:
 def set_mark(db: Database, path: Path) -> None:
     """Write the newest row into the mark, whatever it says now: somebody answers for this database."""
     with db.read() as c:
-        last = newest(c)
+        last = read_newest(c)
     _write(path, last)
 
 
@@ -140,7 +140,7 @@ class MarkKeeper:
             while not last:
                 last = self._stop.wait(self._interval_s)
                 try:
-                    due = changes.changed() or due
+                    due = changes.has_changed() or due
                     if due:
                         raise_mark(self._db, self._path)
                     due = refused = False

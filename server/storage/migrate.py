@@ -41,7 +41,7 @@ def configuration(database: Path, scripts: Path | None = None) -> Config:
     return config
 
 
-def current(database: Path) -> str | None:
+def read_revision(database: Path) -> str | None:
     """The database's revision; None when there is none yet or it is empty; raises MigrationError."""
     if not database.exists():
         return None
@@ -94,7 +94,7 @@ def require_current(database: Path, scripts: Path | None = None) -> None:
 
 
 def _known(config: Config, database: Path) -> str | None:
-    at = current(database)
+    at = read_revision(database)
     known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
     if at is not None and at not in known:
         raise MigrationError(

@@ -20,7 +20,7 @@ from core.formats.live_log import (
     MOST_FRAME_BYTES,
     RECORD_HEAD,
     RECORD_STARTS,
-    Record,
+    LogRecord,
     is_whole_length,
     record,
     scan_records,
@@ -63,7 +63,7 @@ class TakeLog:
     def __init__(self, path: Path, size: int, damage: Damage | None = None) -> None:
         self.path = path
         self.damage = damage
-        self._file = fs.Growing(path, size)
+        self._file = fs.AppendOnlyFile(path, size)
         self._synced = size
 
     @property
@@ -76,11 +76,11 @@ class TakeLog:
         self._file.append(records)
 
     def sync(self) -> None:
-        """Wait until everything appended survives a power cut; after an OSError go `back`."""
+        """Wait until everything appended survives a power cut; after an OSError call `drop_unsynced`."""
         self._file.sync()
         self._synced = self._file.size
 
-    def back(self) -> None:
+    def drop_unsynced(self) -> None:
         """Cut off what has not been synced, durably."""
         self._file.cut(self._synced)
         self._file.sync()
@@ -113,7 +113,7 @@ def create(path: Path, hello: bytes) -> TakeLog:
     return TakeLog(path, len(content))
 
 
-def recover(path: Path, see: Callable[[Record], None]) -> TakeLog | None:
+def recover(path: Path, see: Callable[[LogRecord], None]) -> TakeLog | None:
     """Open a log whose writer has ended: its longest valid prefix stays, durably; the rest is cut off.
 
     Of a damaged one a whole copy is kept, and `TakeLog.damage` says so.
@@ -127,7 +127,7 @@ def recover(path: Path, see: Callable[[Record], None]) -> TakeLog | None:
     None, and nothing is touched, when there is no whole first record. A crash of ours does not leave that.
     """
     size = 0
-    for size, one in records(path):  # noqa: B007 - the last one is used
+    for size, one in read_records(path):  # noqa: B007 - the last one is used
         see(one)
     if not size:
         return None
@@ -139,7 +139,7 @@ def recover(path: Path, see: Callable[[Record], None]) -> TakeLog | None:
     # also when nothing is cut: what a killed process wrote may still be in memory only, and the sender is
     # about to be told that it is kept
     try:
-        opened.back()
+        opened.drop_unsynced()
         fs.sync_folder(path.parent)
     except OSError:
         opened.close()
@@ -169,10 +169,10 @@ def find_damage(path: Path, size: int) -> Damage | None:
     return None
 
 
-def readable(path: Path) -> int:
+def count_readable_bytes(path: Path) -> int:
     """How many of a log's bytes are whole records from its beginning on; 0 = not even the first."""
     size = 0
-    for size, _ in records(path):  # noqa: B007 - the last one is used
+    for size, _ in read_records(path):  # noqa: B007 - the last one is used
         pass
     return size
 
@@ -182,7 +182,7 @@ def keep_original(path: Path) -> Path:
     number = 1
     while (target := path.with_name(f"{path.stem}.{number}.damaged")).exists():
         number += 1
-    with fs.Incoming(path.parent) as copy, path.open("rb") as file:
+    with fs.IncomingFile(path.parent) as copy, path.open("rb") as file:
         while chunk := file.read(CHUNK):
             copy.write(chunk)
         copy.keep(target)
@@ -194,12 +194,12 @@ def _head(path: Path, size: int) -> bytes:
         return file.read(size + 1)
 
 
-def records(path: Path, start: int = 0) -> Iterator[tuple[int, Record]]:
+def read_records(path: Path, start: int = 0) -> Iterator[tuple[int, LogRecord]]:
     """Read the whole records of a log and where in the file each ends, a few megabytes at a time.
 
     Parameters
     ----------
-    start : 0, or the end of a record read before. `Record.end` is of no use here: it counts in a chunk.
+    start : 0, or the end of a record read before. `LogRecord.end` is of no use here: it counts in a chunk.
     """
     with path.open("rb") as file:
         if start == 0:

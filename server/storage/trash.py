@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from server.storage import fs
-from server.storage.blobs import StoredFile
+from server.storage.blobs import BlobFile
 
 KEPT: Final = dt.timedelta(days=30)
 """Time in which somebody notices that the wrong database was put back."""
@@ -26,7 +26,7 @@ _NAME: Final = re.compile(r"[0-9a-f]{64}")
 
 
 @dataclass(frozen=True)
-class Discarded:
+class TrashedFile:
     """One file in the trash: which blob it was, its length in bytes, and since when it lies there."""
 
     space: str
@@ -47,7 +47,7 @@ class Trash:
     def __init__(self, root: Path) -> None:
         self.root = root
 
-    def files(self) -> Iterator[Discarded]:
+    def files(self) -> Iterator[TrashedFile]:
         """Every file, the oldest first; what is not ours is passed over, and what goes meanwhile."""
         for stamp, since in self._stamps():
             for folder in _entries(stamp):
@@ -55,14 +55,14 @@ class Trash:
                     continue
                 for path in _entries(folder):
                     if _NAME.fullmatch(path.name) and (size := _size(path)) is not None:
-                        yield Discarded(folder.name, path.name, path, size, since)
+                        yield TrashedFile(folder.name, path.name, path, size, since)
 
-    def take(self, found: Iterable[StoredFile], at: dt.datetime) -> None:
+    def take(self, found: Iterable[BlobFile], at: dt.datetime) -> None:
         """Move files here; survives a power cut only after `settle` with the same."""
         for stored in found:
             fs.move_file(stored.path, self._folder(at) / stored.space / stored.name)
 
-    def settle(self, found: Iterable[StoredFile], at: dt.datetime) -> None:
+    def settle(self, found: Iterable[BlobFile], at: dt.datetime) -> None:
         """Make what `take` did survive a power cut, and write the list."""
         spaces = {(stored.path.parent, self._folder(at) / stored.space) for stored in found}
         for source, target in sorted(spaces):
@@ -70,7 +70,7 @@ class Trash:
             fs.sync_folder(source)
         self.write_list()
 
-    def put_back(self, one: Discarded, target: Path) -> None:
+    def put_back(self, one: TrashedFile, target: Path) -> None:
         """Give a file its place among the blobs again, durably."""
         fs.move_file(one.path, target)
         fs.sync_folder(target.parent)

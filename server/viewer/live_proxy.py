@@ -47,7 +47,7 @@ async def figure(
 ) -> JSONResponse:
     """Open the live figure of a session."""
     body, norm = await asyncio.to_thread(_person, db, sid)
-    await asyncio.to_thread(trail.watched, who, "live.watched", "session", sid)
+    await asyncio.to_thread(trail.record_watched, who, "live.watched", "session", sid)
     hub: Hub = request.app.state.hub
     views: FigureViews = request.app.state.views
 

@@ -8,7 +8,7 @@ from typing import Final
 import msgspec
 import numpy as np
 
-from core.angles import SIGNS, cardan_zxy, joints, pelvis_angles
+from core.angles import SIGNS, cardan_zxy, list_leg_joints, pelvis_angles
 from core.body.model import BodyModel
 from core.frames import SIDES, SUFFIX, Floats, Side
 from core.norms.speed import SLOW_MPS
@@ -109,7 +109,7 @@ def find_standing_angles(moment: FigureMoment, angles_deg: Mapping[str, float | 
         tilt, obliquity = pelvis_angles(moment.q["pelvis"])
         raw |= {"pelvis_tilt": float(tilt), "pelvis_obliquity": float(obliquity)}
     for side in SIDES:
-        for joint, proximal, distal in joints(side):
+        for joint, proximal, distal in list_leg_joints(side):
             if proximal in moment.q and distal in moment.q:
                 abc = cardan_zxy(multiply(conjugate(moment.q[proximal]), moment.q[distal])).tolist()
                 for (name, right, left), x in zip(SIGNS[joint], abc, strict=True):

@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 
 from core.frames import SIDES, SUFFIX, Segment, Side
-from server.live.messages import STALE_S, Picture, Pose
+from server.live.messages import STALE_S, FigurePose, Picture
 from server.viewer.live_figure import LiveFigure
 from server.viewer.live_reference import LiveReference, find_standing_angles
 from server.viewer.moment import FigureMoment
@@ -118,7 +118,7 @@ class LiveWatch:
         self._figure.show(moment, late=late)
 
 
-def read_moment(picture: Picture, pose: Pose, shown: FeedFrame) -> FigureMoment:
+def read_moment(picture: Picture, pose: FigurePose, shown: FeedFrame) -> FigureMoment:
     """Return poses and phases of a picture; the phases of `shown` come in % and leave as 0 to 1."""
     segments = [cast("Segment", s) for s in pose.segments]
     q = np.frombuffer(pose.q, np.float32).reshape(-1, 4).astype(np.float64)

@@ -73,7 +73,7 @@ class ViewActivity:
         self._touch = touch
         self._last = time.monotonic()
 
-    async def seen(self) -> None:
+    async def note_activity(self) -> None:
         """Note that the person did something."""
         now = time.monotonic()
         if now - self._last >= CHECK_EVERY_S:

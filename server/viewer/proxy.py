@@ -39,7 +39,7 @@ from server.auth.roles import Action
 from server.http.problems import Problem, as_problem
 from server.report.bundle import read_poses
 from server.services import analyses, comparisons, edit_log, sessions
-from server.services.histories import Analysed
+from server.services.histories import AnalysedSession
 from server.storage.blobs import BlobStore
 from server.viewer.ghost import match_ghost
 from server.viewer.motion import ReplayMotion, prepare_motion
@@ -80,7 +80,7 @@ Reader = Annotated[Identity, require(Action.READ_RESULT)]
 
 @contextlib.asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
-    async with FigureViews().running() as views:
+    async with FigureViews().run() as views:
         app.state.views = views
         yield
 
@@ -115,7 +115,7 @@ async def pipe(ws: WebSocket, view_id: str, who: Reader) -> None:
     if view is None:
         await _say_gone(ws)
         return
-    with view.watched():
+    with view.keep_open():
         try:
             up = await connect_to_viser(view.socket, find_subprotocols(ws))
         except (OSError, WebSocketException):
@@ -151,7 +151,7 @@ async def replay(
         await ws.close(_GONE, problem.code)
         return
     logins = ws.app.state.logins
-    with view.watched():
+    with view.keep_open():
         motion = view.figure.motion
         await ws.send_json(
             {
@@ -180,7 +180,7 @@ async def _open(
 ) -> FigureView[ReplayFigure]:
     db, reviewed = ws.app.state.db, ws.app.state.reviewed
 
-    def latest() -> tuple[Analysed | None, Analysed | None]:
+    def latest() -> tuple[AnalysedSession | None, AnalysedSession | None]:
         with db.read() as c:
             this = _replayable(c, sid)
             if this is None or other is None:
@@ -192,7 +192,7 @@ async def _open(
     for seen in (this, before):
         if seen is not None:
             await asyncio.to_thread(
-                ws.app.state.trail.watched, who, "replay.opened", "session", seen.session.id
+                ws.app.state.trail.record_watched, who, "replay.opened", "session", seen.session.id
             )
     if this is None:
         raise Problem(404, "no_poses", "There is nothing to replay: no analysis has reached the poses yet.")
@@ -208,19 +208,19 @@ async def _open(
     return await _views(ws).open(who.login_id, tab, shown, load, dark)
 
 
-def _replayable(c: Connection, sid: str) -> Analysed | None:
+def _replayable(c: Connection, sid: str) -> AnalysedSession | None:
     found = analyses.latest(c, sid)
     if found is None or "poses.parquet" not in found.files:
         return None
-    return Analysed(sessions.get(c, sid), found, edit_log.edits_of(c, found.id))
+    return AnalysedSession(sessions.get(c, sid), found, edit_log.edits_of(c, found.id))
 
 
-def _state(a: Analysed) -> str:
+def _state(a: AnalysedSession) -> str:
     """A ghost follows the strides, so it follows their edits."""
     return f"{a.found.id} {a.edits.key}"
 
 
-def _motion(blobs: BlobStore, a: Analysed) -> ReplayMotion:
+def _motion(blobs: BlobStore, a: AnalysedSession) -> ReplayMotion:
     return prepare_motion(read_poses(analyses.file_bytes(blobs, a.found, "poses.parquet")))
 
 
@@ -232,7 +232,7 @@ async def _follow(ws: WebSocket, view: FigureView[ReplayFigure], activity: ViewA
         except WebSocketDisconnect:
             return
         await ws.send_json(_act(view, message))
-        await activity.seen()
+        await activity.note_activity()
 
 
 def _act(view: FigureView[ReplayFigure], text: str) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from core import rotation
 from core.frames import Bools, Floats
-from core.rest import runs
+from core.rest import find_runs
 
 PIECE_M = 0.05
 """A trail is drawn in pieces of about this length: some 30 per stride, none while the foot stands."""
@@ -99,4 +99,4 @@ def find_prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats | Single
 
 def _slowest(where: Bools, speed: Floats) -> list[int]:
     """Index of the least speed in every run of a mask."""
-    return [int(start + np.argmin(speed[start:end])) for start, end in runs(where)]
+    return [int(start + np.argmin(speed[start:end])) for start, end in find_runs(where)]

@@ -20,7 +20,7 @@ from typing import Any, Generic, TypeVar
 import viser
 
 from core.errors import EstimationError
-from server.auth.roles import Action, Role, may
+from server.auth.roles import Action, Role, is_permitted
 from server.viewer.live_figure import LiveFigure
 from server.viewer.motion import ReplayMotion
 from server.viewer.replay_figure import ReplayFigure
@@ -64,7 +64,7 @@ class FigureView(Generic[Drawn]):
         return socket_of(self.server)
 
     @contextlib.contextmanager
-    def watched(self) -> Iterator[None]:
+    def keep_open(self) -> Iterator[None]:
         """Keep the view open while a connection lasts."""
         self.viewers += 1
         try:
@@ -89,7 +89,7 @@ class FigureViews:
     def find(self, view_id: str, login_id: str, role: Role) -> FigureView[Any] | None:
         """Return a view to those who may look at it, None to everybody else."""
         view = self._views.get(view_id)
-        if view is None or view.login_id not in (None, login_id) or not may(role, view.action):
+        if view is None or view.login_id not in (None, login_id) or not is_permitted(role, view.action):
             return None
         return view
 
@@ -160,7 +160,7 @@ class FigureViews:
             await self._stop(view)
 
     @contextlib.asynccontextmanager
-    async def running(self) -> AsyncIterator[FigureViews]:
+    async def run(self) -> AsyncIterator[FigureViews]:
         """Sweep in the background; stop everything at the end."""
         sweeper = asyncio.create_task(self._sweep_for_ever())
         try:

@@ -7,7 +7,7 @@ from starlette.types import ASGIApp
 
 from server.live.protocol import MOST_MESSAGE_BYTES
 from server.settings import Settings
-from server.web_server.connection import ConnectionLimits, limited
+from server.web_server.connection import ConnectionLimits, make_connection_class
 from server.web_server.proxies import TrustedProxies
 
 GRACE_S = 4
@@ -23,7 +23,7 @@ def build_server(app: ASGIApp, settings: Settings, limits: ConnectionLimits) -> 
             access_log=False,
             # the listener and the connections are made for these two
             loop="asyncio",
-            http=limited(limits),
+            http=make_connection_class(limits),
             proxy_headers=False,
             timeout_graceful_shutdown=GRACE_S,
             ws_per_message_deflate=False,

@@ -40,7 +40,7 @@ class ConnectionLimits:
 
 
 class TimedConnection(H11Protocol):
-    """uvicorn's HTTP/1.1 connection within limits; `limited` makes the class of a server."""
+    """uvicorn's HTTP/1.1 connection within limits; `make_connection_class` makes the class of a server."""
 
     limits = ConnectionLimits()
 
@@ -187,6 +187,6 @@ class TimedConnection(H11Protocol):
             self._timer = None
 
 
-def limited(limits: ConnectionLimits) -> type[TimedConnection]:
+def make_connection_class(limits: ConnectionLimits) -> type[TimedConnection]:
     """The class of connections within these limits."""
     return type("LimitedConnection", (TimedConnection,), {"limits": limits})

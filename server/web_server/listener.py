@@ -41,7 +41,7 @@ class SeldomLog:
         log.warning("%s%s", text, f" ({more} times more since this was last said)" if more else "")
 
 
-class Listener(socket.socket):
+class ListeningSocket(socket.socket):
     """A listening TCP socket for an asyncio server.
 
     Its protocol number is given, not 0: only then asyncio sets TCP_NODELAY on what it accepts, without which
@@ -103,7 +103,7 @@ class Listener(socket.socket):
             self._spare = None
 
 
-def open_listener(host: str, port: int) -> Listener:
+def open_listener(host: str, port: int) -> ListeningSocket:
     """Bind a listening socket.
 
     Raises
@@ -111,7 +111,7 @@ def open_listener(host: str, port: int) -> Listener:
     OSError
         the port cannot be used; the message says what to do.
     """
-    listener = Listener(socket.AF_INET6 if ":" in host else socket.AF_INET)
+    listener = ListeningSocket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))

@@ -12,7 +12,7 @@ from core.formats.source import SourceFile
 from server.processes.channel import Channel
 from server.processes.child import enter_child
 from server.storage.blobs import BlobStore
-from server.worker.messages import Failure, Input, Order, Ready, Result, Stage, decode_order, encode
+from server.worker.messages import ChildReady, Failure, Input, Order, Result, Stage, decode_order, encode
 from server.worker.task import TASKS, load
 
 log = logging.getLogger("server.worker.child")
@@ -25,7 +25,7 @@ def main() -> None:
     for task in TASKS.values():
         task.warm()
     store = BlobStore(settings.blobs)
-    line.send(encode(Ready()))
+    line.send(encode(ChildReady()))
     while True:
         try:
             order = decode_order(line.receive())
@@ -37,7 +37,7 @@ def main() -> None:
 def compute(order: Order, store: BlobStore, line: Channel) -> Result | Failure:
     """Carry out one order; whatever goes wrong is an answer, never the end of the process."""
     try:
-        files = [source(store, order.space, file) for file in order.files]
+        files = [open_source(store, order.space, file) for file in order.files]
         progress = lambda stage, share: line.send(encode(Stage(stage, float(share))))  # noqa: E731
         return Result(TASKS[order.kind].run(files, order.params, progress))
     except SagittalError as error:
@@ -57,7 +57,7 @@ def compute(order: Order, store: BlobStore, line: Channel) -> Result | Failure:
         )
 
 
-def source(store: BlobStore, space: str | None, file: Input) -> SourceFile:
+def open_source(store: BlobStore, space: str | None, file: Input) -> SourceFile:
     """A blob as a source, read and verified when somebody needs it."""
     if space is None:
         raise ValueError("An order with files names the space they lie in.")

@@ -27,7 +27,7 @@ class Order(msgspec.Struct, frozen=True, tag=True):
     params: dict[str, Any]
 
 
-class Ready(msgspec.Struct, frozen=True, tag=True):
+class ChildReady(msgspec.Struct, frozen=True, tag=True):
     """Child to worker: everything is imported and compiled."""
 
 
@@ -51,7 +51,7 @@ class Failure(msgspec.Struct, frozen=True, tag=True):
     message: str
 
 
-Reply = Ready | Stage | Result | Failure
+Reply = ChildReady | Stage | Result | Failure
 
 encode = msgspec.msgpack.encode
 decode_order = msgspec.msgpack.Decoder(Order).decode

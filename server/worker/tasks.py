@@ -50,9 +50,9 @@ def _warm() -> None:
     from core.events import foot_pitch
     from core.fusion import attitude
 
-    attitude.warm()
-    foot_pitch.warm()
-    estimate.warm()
+    attitude.compile_attitude_kernel()
+    foot_pitch.compile_foot_pitch_kernel()
+    estimate.compile_pose_kernels()
 
 
 register(Task(recordings.INSPECT, _inspect, _publish_inspection, keeps_files=False))

@@ -18,9 +18,9 @@ from sqlalchemy import Connection
 from sqlalchemy.exc import SQLAlchemyError
 
 from core.errors import SagittalError
-from server.jobs.queue import Claim, Hold, JobQueue
+from server.jobs.queue import Claim, JobQueue, LeaseState
 from server.jobs.table import TableQueue
-from server.processes.lifeline import when_parent_ends
+from server.processes.lifeline import call_when_parent_ends
 from server.services import erasure
 from server.services.sweep import sweep
 from server.settings import Settings, load_settings
@@ -28,7 +28,7 @@ from server.storage.blobs import Blob, BlobStore
 from server.storage.db import Database
 from server.storage.migrate import require_current
 from server.storage.tables import new_id
-from server.worker.messages import Failure, Input, Order, Ready, Result, Stage
+from server.worker.messages import ChildReady, Failure, Input, Order, Result, Stage
 from server.worker.runner import Child, ChildDiedError
 from server.worker.task import TASKS, Task, load
 
@@ -99,7 +99,7 @@ class Worker:
         self._child = child = Child(self._settings)
         limit = time.monotonic() + WARM_LIMIT_S
         while not self._stop.is_set():
-            if isinstance(child.receive(IDLE_S), Ready):
+            if isinstance(child.receive(IDLE_S), ChildReady):
                 return child
             if time.monotonic() > limit:
                 raise ChildDiedError(f"computing process {child.pid} was not ready after {WARM_LIMIT_S:g} s")
@@ -114,24 +114,24 @@ class Worker:
         except ChildDiedError as error:
             log.warning("job %s: %s", claim.job_id, error)
             self._child = None
-            self._queue.died(claim)
+            self._queue.note_death(claim)
             return
         match end:
             case Result(files):
                 self._publish(claim, files)
             case Failure(code, message):
                 self._fail(claim, code, message)
-            case Hold.CANCEL:
+            case LeaseState.CANCEL:
                 self._drop_child()
                 self._queue.stop(claim)
-            case Hold.LOST:
+            case LeaseState.LOST:
                 log.warning("job %s: the lease is lost, its result is not used", claim.job_id)
                 self._drop_child()
-            case Hold.OURS:
+            case LeaseState.OURS:
                 self._drop_child()
                 self._queue.release(claim)
 
-    def _listen(self, claim: Claim, child: Child) -> Result | Failure | Hold:
+    def _listen(self, claim: Claim, child: Child) -> Result | Failure | LeaseState:
         """Keep the lease, pass on progress until the child is done or must end (OURS: we are stopped)."""
         beat_s = self._settings.lease_s / 3
         began = time.monotonic()
@@ -154,14 +154,14 @@ class Worker:
             if time_now >= next_look or time_now >= next_beat:
                 due = time_now >= next_beat
                 hold = self._queue.heartbeat(claim) if due else self._queue.look(claim)
-                if hold is not Hold.OURS:
+                if hold is not LeaseState.OURS:
                     return hold
                 if due:
                     next_beat = time_now + beat_s
                 if stage is not None and not self._queue.progress(claim, stage.name, stage.fraction):
-                    return Hold.LOST
+                    return LeaseState.LOST
                 stage, next_look = None, time_now + LOOK_S
-        return Hold.OURS
+        return LeaseState.OURS
 
     def _publish(self, claim: Claim, files: Mapping[str, bytes]) -> None:
         """Files first, then one transaction under the fence."""
@@ -184,7 +184,7 @@ class Worker:
 
     def _put_away(self, claim: Claim, blobs: Mapping[str, Blob]) -> None:
         """Deal with a result that nobody wants any more."""
-        if self._queue.look(claim) is Hold.CANCEL:
+        if self._queue.look(claim) is LeaseState.CANCEL:
             self._queue.stop(claim)
         elif blobs and self._queue.get(claim.job_id) is None:
             # erased while it was computed: nothing of it may wait in the trash
@@ -211,7 +211,7 @@ class Worker:
         task.publish(c, claim, files, blobs)
 
     def _fail(self, claim: Claim, code: str, message: str) -> None:
-        if self._queue.look(claim) is Hold.CANCEL:
+        if self._queue.look(claim) is LeaseState.CANCEL:
             self._queue.stop(claim)
         else:
             self._queue.fail(claim, code, message)
@@ -236,7 +236,7 @@ def run_worker(settings: Settings, *, with_starter: bool = False) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     if with_starter:
-        when_parent_ends(stop.set)
+        call_when_parent_ends(stop.set)
     db = Database(settings.database)
     try:
         queue = TableQueue(db, settings.lease_s)

@@ -10,9 +10,9 @@ from typing import Any
 import httpx
 import pytest
 
-from core.online import warm
+from core.online import compile_live_kernels
 from server.demo.clinic import PRESCRIBED
-from server.demo.live import training, walk
+from server.demo.live import plan_training, stream_walk
 from tests.service import served
 
 SPEED = 6.0
@@ -22,7 +22,7 @@ SPEED = 6.0
 @pytest.mark.slow
 def test_a_training_with_feedback_ends_in_a_report_of_what_was_told(tmp_path: Path) -> None:
     # compiled before the server starts, or its estimator would still compile when the walk is over
-    warm()
+    compile_live_kernels()
     person, content = PRESCRIBED
     with served(tmp_path / "clinic") as service:
         client = service.client
@@ -31,7 +31,7 @@ def test_a_training_with_feedback_ends_in_a_report_of_what_was_told(tmp_path: Pa
         _made(client, f"/patients/{patient}/prescriptions", dict(content))
         session = _made(client, f"/patients/{patient}/sessions", {"title": "Training"})["id"]
         code = _made(client, f"/sessions/{session}/live", {})["code"]
-        asyncio.run(walk(str(client.base_url).rstrip("/"), code, training(laps=3), SPEED))
+        asyncio.run(stream_walk(str(client.base_url).rstrip("/"), code, plan_training(laps=3), SPEED))
         found = _result(client, session)
         page = client.get(f"/sessions/{session}").raise_for_status().text
     rows = {r["kind"]: r for r in found["rows"]}

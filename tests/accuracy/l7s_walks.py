@@ -27,8 +27,8 @@ from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.recording import UniformRecording
 from core.rotation import about, angle_between, multiply, rotate, to_matrix
-from core.simulate import SCRIPTS, Truth, simulate
-from core.simulate.script import Arc, Pivot, Script, Stand, Straight, scaled
+from core.simulate import SCRIPTS, WalkTruth, simulate
+from core.simulate.script import Arc, Pivot, Script, Stand, Straight, scale_script
 from core.simulate.walker import Walker
 from core.timeline import synchronise
 
@@ -72,7 +72,7 @@ class Trial:
     orientations: Orientations
     acceleration: Mapping[Segment, Floats]
     steps: Mapping[Side, Bools]
-    truth: Truth
+    truth: WalkTruth
 
     def run(self, worn: Worn, adjoint: Adjoint = "printed", body: BodyModel | None = None) -> Poses:
         """L7S on it."""
@@ -91,7 +91,7 @@ def steps_of(calibrated: CalibratedRecording) -> dict[Side, Bools]:
     return found
 
 
-def trial_of(recording: UniformRecording, truth: Truth) -> Trial:
+def trial_of(recording: UniformRecording, truth: WalkTruth) -> Trial:
     """A take as L7S meets it."""
     calibrated = calibrate(recording)
     orientations = estimate_orientations(calibrated)
@@ -104,7 +104,9 @@ def trial_of(recording: UniformRecording, truth: Truth) -> Trial:
 def trial(movement: str, height_m: float, seed: int) -> Trial:
     """A movement of `MOVEMENTS` by a person of a height."""
     walker = Walker.of_height(height_m)
-    take = simulate(scaled(MOVEMENTS[movement], walker.scale), walker, seed, SCRIPTS["comfortable"].setup)
+    take = simulate(
+        scale_script(MOVEMENTS[movement], walker.scale), walker, seed, SCRIPTS["comfortable"].setup
+    )
     return trial_of(synchronise(take.recording), take.truth)
 
 
@@ -118,7 +120,7 @@ def turned_headings(of: Trial, by_deg: Mapping[Segment, float]) -> Trial:
     return replace(of, orientations=replace(of.orientations, q=q), acceleration=acceleration)
 
 
-def straight_cycles(truth: Truth) -> list[tuple[Side, float, float]]:
+def straight_cycles(truth: WalkTruth) -> list[tuple[Side, float, float]]:
     """Side, start and end in s of the strides straight ahead, without the short ones beside standing."""
     typical = float(np.median([s.length_m for s in truth.strides]))
     return [
@@ -154,7 +156,7 @@ def trial_scores(of: Trial, poses: Poses) -> Floats:
     return np.asarray(np.mean(scores, axis=0))
 
 
-def _score(found: Mapping[str, Floats], truth: Truth, name: str, part: slice) -> tuple[float, float]:
+def _score(found: Mapping[str, Floats], truth: WalkTruth, name: str, part: slice) -> tuple[float, float]:
     a, b = found[name][part], np.degrees(truth.angles[name][part])
     return float((a - b).std()), float(np.corrcoef(a, b)[0, 1])
 

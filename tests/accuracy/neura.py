@@ -13,10 +13,10 @@ import numpy as np
 
 from core.angles.measure import measure_angles
 from core.body import BodyModel
-from core.body.corrected import corrected_signals
-from core.body.erkf.headings import agreed
+from core.body.corrected import correct_signals
+from core.body.erkf.headings import align_forward_axes
 from core.body.erkf.params import ErkfParams
-from core.body.erkf.poses import ErkfRun, refined, run_erkf
+from core.body.erkf.poses import ErkfRun, replace_orientations, run_erkf
 from core.body.pose_params import PoseParams
 from core.body.tree import PRESETS
 from core.calibration import calibrate
@@ -95,9 +95,11 @@ def chain(
     params = params or SHIPPED
     turned: dict[Segment, float] = {}
     if agree:
-        calibrated, orientations, turned = agreed(calibrated, orientations, BODY, SEGMENTS, params)
+        calibrated, orientations, turned = align_forward_axes(
+            calibrated, orientations, BODY, SEGMENTS, params
+        )
     run = run_erkf(calibrated, orientations, BODY, SEGMENTS, params)
-    return Chain(run, calibrated, refined(run, orientations), turned)
+    return Chain(run, calibrated, replace_orientations(run, orientations), turned)
 
 
 @cache
@@ -160,7 +162,7 @@ def heading_against_vicon_deg(q: Floats) -> Floats:
 
     sos = butter(2, 3.0 / (RATE / 2), output="sos")
     vicon = loadmat(str(data_folder("neura_walk") / "rawvicon" / "S02-Trial-Walk-1.mat"), squeeze_me=True)
-    acc, _, _ = corrected_signals(take()[0], SEGMENTS)
+    acc, _, _ = correct_signals(take()[0], SEGMENTS)
     off = []
     for i, segment in enumerate(SEGMENTS):
         p = np.mean([vicon[m] for m in MARKERS[segment]], axis=0) / 1000.0

@@ -10,8 +10,8 @@ from typing import Final
 
 import pytest
 
-from core.measure import Measured
-from core.parameters.symmetry import symmetries
+from core.measure import MeasuredGait
+from core.parameters.symmetry import compare_sides
 from tests.accuracy.report import record
 from tests.true_walks import measured_walk
 
@@ -45,8 +45,8 @@ SHOWN: Final = (
 )  # fmt: skip
 
 
-def differences(of: Measured) -> dict[str, float]:
-    return {s.name: s.difference for s in symmetries(of.parameters)}
+def differences(of: MeasuredGait) -> dict[str, float]:
+    return {s.name: s.difference for s in compare_sides(of.parameters)}
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from core.body.feet import FootTracks
 from core.frames import SIDES, SUFFIX, Side
 from core.parameters import gait_parameters, spatial_rows
 from core.parameters.rows import Row
-from core.pipeline import Analysis, analyse
+from core.pipeline import TakeAnalysis, analyse
 from tests.accuracy.neura import STRAIGHT
 from tests.accuracy.report import record
 from tests.data import data_folder
@@ -31,7 +31,7 @@ step and its width hang on the whole chain of seven sensors and on the standing 
 
 
 @cache
-def analysis() -> Analysis:
+def analysis() -> TakeAnalysis:
     subject = replace(neura_recording().subject, standing_width_m=round(standing_width_m(), 2))
     return analyse(replace(neura_recording(), subject=subject))
 

@@ -20,7 +20,7 @@ from core.body.erkf.start import start_state
 from core.body.tree import ImuTree
 from core.frames import Floats
 from core.rotation import about, conjugate, exp, multiply, rotate
-from core.simulate import Arc, Pivot, Setup, SoftTissue, Stand, Straight, Walker, simulate
+from core.simulate import Arc, Pivot, RecordingSetup, SoftTissue, Stand, Straight, Walker, simulate
 from tests.accuracy.erkf_scoring import HEADER, Score, largest, score
 from tests.accuracy.report import record
 from tests.core.body.erkf.walks import SEGMENTS, Take, take_of
@@ -52,19 +52,19 @@ LIVE, OFFLINE, PEOPLE = ErkfParams.live(), ErkfParams.offline(), ErkfParams.peop
 @cache
 def four_minutes() -> Take:
     """Straight and curved ways, a turn on the spot, figures of eight, standing; four times."""
-    return take_of(simulate(LONG, seed=2, setup=Setup()))
+    return take_of(simulate(LONG, seed=2, setup=RecordingSetup()))
 
 
 @cache
 def minute(seed: int) -> Take:
-    return take_of(simulate(SHORT, seed=seed, setup=Setup()))
+    return take_of(simulate(SHORT, seed=seed, setup=RecordingSetup()))
 
 
 @cache
 def on_skin() -> Take:
     """Soft tissue of 3° and 10 mm, and a shank that turns by 8° as the knee bends."""
     walker = Walker(tibial_rotation_rad=radians(8.0))
-    return take_of(simulate(SHORT, walker, seed=2, setup=Setup(tissue=SoftTissue())))
+    return take_of(simulate(SHORT, walker, seed=2, setup=RecordingSetup(tissue=SoftTissue())))
 
 
 def run(

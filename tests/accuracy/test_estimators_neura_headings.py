@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.erkf.headings import turned
+from core.body.erkf.headings import turn_forward_axes
 from core.frames import Floats, Segment
 from core.rotation import conjugate, multiply
 from tests.accuracy.neura import (
@@ -37,7 +37,7 @@ RIGHT_LEG = [SEGMENTS.index(s) for s in ("thigh_r", "shank_r", "foot_r")]
 @cache
 def perturbed(by_deg: tuple[tuple[Segment, float], ...]) -> Chain:
     """The product's chain from starts turned by these angles."""
-    return chain(*turned(*take(), {s: np.radians(x) for s, x in by_deg}))
+    return chain(*turn_forward_axes(*take(), {s: np.radians(x) for s, x in by_deg}))
 
 
 def heading_change_deg(q: Floats, base: Floats) -> Floats:
@@ -83,7 +83,7 @@ def test_the_right_leg_heads_where_vicon_says() -> None:
 
 def test_independent_filters_keep_the_heading_they_were_given() -> None:
     """A check that cannot fail is none: six axes without joints end where they start."""
-    calibrated, orientations = turned(*take(), {"shank_r": np.radians(30.0)})
+    calibrated, orientations = turn_forward_axes(*take(), {"shank_r": np.radians(30.0)})
     change = heading_change_deg(sensor_q(calibrated, orientations), sensor_q(*take()))
     assert change[SEGMENTS.index("shank_r")] == pytest.approx(30.0, abs=0.1)
 

@@ -22,7 +22,7 @@ import pytest
 from core import events
 from core.body import contact_mask, forward_kinematics
 from core.body.erkf.filter import filter_block
-from core.body.erkf.headings import turned
+from core.body.erkf.headings import turn_forward_axes
 from core.body.erkf.health import REFUSED_PCT, RESIDUAL_MM
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.start import start_state
@@ -34,7 +34,7 @@ from core.frames import FOOT, SIDES, Floats, Segment, Side
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.recording import SensorSignals, UniformRecording
-from core.rest import samples
+from core.rest import index_window
 from tests.accuracy.neura import (
     BODY,
     RATE,
@@ -116,7 +116,7 @@ def late(segment: Segment, by_s: float) -> Calibrated:
 
 def mounted(segment: Segment, by_deg: float) -> Calibrated:
     """A forward axis taken wrongly."""
-    return turned(*take(), {segment: radians(by_deg)})
+    return turn_forward_axes(*take(), {segment: radians(by_deg)})
 
 
 def pelvis_by_gyro() -> Calibrated:
@@ -125,14 +125,14 @@ def pelvis_by_gyro() -> Calibrated:
     mount = found.calibration.segments["pelvis"]
     walking = np.zeros(len(orientations.t_s), bool)
     for window in found.calibration.walking:
-        walking[samples(window, RATE)] = True
+        walking[index_window(window, RATE)] = True
     vertical = vertical_frame(mount.R_segment_sensor[1])
     rate = (found.recording.sensors["pelvis"].gyr[walking] - mount.gyro_bias) @ vertical.T
     x, z = np.linalg.svd(rate[:, [0, 2]] - rate[:, [0, 2]].mean(axis=0), full_matrices=False)[2][0]
     apart = about_vertical(np.arctan2(-x, z)) @ vertical @ mount.R_segment_sensor.T
     off = float(np.arctan2(apart[0, 2], apart[0, 0]))
     # an axis has no sign: the better one
-    return turned(found, orientations, {"pelvis": (off + pi / 2) % pi - pi / 2})
+    return turn_forward_axes(found, orientations, {"pelvis": (off + pi / 2) % pi - pi / 2})
 
 
 CASES: dict[str, tuple[Callable[[], Calibrated], bool]] = {
@@ -198,7 +198,7 @@ def test_a_wrong_forward_axis_is_not_only_caught_but_repaired(name: str) -> None
 
 def lazy(by: dict[Segment, float]) -> tuple[list[str], float, float]:
     """Row, worst stride bias in cm and worst heading of the right leg of six-axis filters without joints."""
-    found, orientations = turned(*take(), by)
+    found, orientations = turn_forward_axes(*take(), by)
     _, score = scores(angles_deg(orientations, found))
     contacts = events.detect(orientations)
     down = {

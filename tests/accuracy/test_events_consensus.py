@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from core import calibration, timeline
-from core.events.consensus import all_detectors, consensus
+from core.events.consensus import agree_on_contacts, all_detectors
 from core.events.gyro_peaks import RECONSTRUCTION, GyroPeakPresets, gyro_peak_events
 from core.events.result import EventKind, GaitEvents
 from core.frames import SIDES
@@ -47,7 +47,7 @@ def found(name: str) -> dict[str, GaitEvents]:
     detectors = all_detectors(here)
     presets = {n: gyro_peak_events(here, here.rate_hz, p) for n, p in PRESETS.items()}
     worn = {n: e for n, e in presets.items() if "segment_missing" not in {x.code for x in e.notices}}
-    return {"foot_pitch": detectors["foot_pitch"], **worn, "consensus": consensus(detectors)}
+    return {"foot_pitch": detectors["foot_pitch"], **worn, "consensus": agree_on_contacts(detectors)}
 
 
 def scores(name: str, detector: str, kind: EventKind) -> list[Score]:

@@ -71,7 +71,7 @@ def stride_errors(name: str, rate_hz: float, side: Side) -> Floats:
     """Stride time of every counted stride with both contacts in the reference, found − reference, s."""
     _, strides = found(name, rate_hz)
     errors = []
-    for s in strides.used(side):
+    for s in strides.select_used(side):
         start, end = (match([t], reference(side, "ic"), 0.05).errors for t in (s.start_s, s.end_s))
         if len(start) and len(end):
             errors.append(float(end[0] - start[0]))
@@ -92,7 +92,7 @@ def test_stride_times_agree_within_ten_milliseconds(rate_hz: float) -> None:
 def test_turning_strides_are_set_aside() -> None:
     _, strides = found(COPIES[0], RATE)
     for side in SIDES:
-        assert len(strides.used(side)) >= 21
+        assert len(strides.select_used(side)) >= 21
         turned = [
             s for s in strides.strides if s.side == side and s.excluded_reason in ("turn", "incomplete")
         ]

@@ -7,7 +7,7 @@ import pytest
 
 from core.events import detect
 from core.events.detection import KINDS
-from core.events.foot_pitch import FootPitchParams, FootPitchState, pitch_signal, push
+from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
 from core.frames import FOOT, SIDES, Side
 from core.fusion.orientations import Orientations
 from tests.accuracy.report import record
@@ -24,7 +24,7 @@ def streamed(here: Orientations, side: Side, block: int) -> list[tuple[str, floa
     events: list[tuple[str, float, float]] = []
     for first in range(0, len(s), block):
         part = slice(first, first + block)
-        for kind, index, known, offset in zip(*push(state, s[part], valid[part]), strict=True):
+        for kind, index, known, offset in zip(*advance_foot_pitch(state, s[part], valid[part]), strict=True):
             assert first <= known < first + block, "an event is told in the block in which it is known"
             time = float(here.t_s[index] + offset / here.rate_hz)
             events.append((KINDS[kind], time, float(here.t_s[known])))

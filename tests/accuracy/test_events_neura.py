@@ -116,8 +116,8 @@ def test_strides_leave_out_the_turn_the_missed_contact_and_how_the_walk_starts_a
     _, strides, notices = found()
     assert [s.excluded_reason for s in strides.strides if s.side == "left"].count("turn") == 2
     assert [s.excluded_reason for s in strides.strides if s.side == "right"].count("incomplete") == 1
-    used = strides.used()
-    assert [len(strides.used(side)) for side in SIDES] == [2, 1]
+    used = strides.select_used()
+    assert [len(strides.select_used(side)) for side in SIDES] == [2, 1]
     assert {f for s in used for f in s.flags} == {"near_turn"}
     assert all(1.2 < s.duration_s < 1.6 for s in used)
     assert all(abs(s.turn_rad) < np.radians(20.0) for s in used if s.turn_rad is not None)

@@ -15,9 +15,9 @@ from scipy.io import loadmat
 
 from core import calibration
 from core.events import detect
-from core.events.lumbar import about_up, detect_steps
+from core.events.lumbar import detect_steps, split_about_vertical
 from core.events.result import GaitEvents
-from core.events.turns import turns
+from core.events.turns import find_turns
 from core.frames import SIDES, Segment, Side
 from core.fusion.mahony import estimate_orientations
 from core.recording import SensorSignals, Subject, UniformRecording
@@ -97,7 +97,11 @@ def test_the_feet_are_told_right(place: str) -> None:
 def test_the_turns_of_the_walk_are_found(place: str) -> None:
     """Upstream's description: turns at 115 and 138.5 s of its clock, that starts at 40 s."""
     signals = take(((PLACES[place], place),)).sensors[PLACES[place]]
-    listed = [t for t in turns(about_up(signals, RATE)[1], signals.valid, RATE) if t.start_s > WALK_S[0]]
+    listed = [
+        t
+        for t in find_turns(split_about_vertical(signals, RATE)[1], signals.valid, RATE)
+        if t.start_s > WALK_S[0]
+    ]
     assert len(listed) == 2
     assert abs(np.degrees(listed[0].angle_rad)) == pytest.approx(180.0, abs=15.0)
     for turn, at in zip(listed, (75.0, 98.5), strict=True):

@@ -16,8 +16,8 @@ import numpy as np
 from core.body import nominal_body
 from core.events.result import Stride
 from core.frames import FOOT, SIDES, Floats, Side
-from core.measure import Measured, Tracks, measure
-from core.parameters.stance import FLAT_RAD, NAMES, stances
+from core.measure import MeasuredGait, Tracks, measure_gait
+from core.parameters.stance import FLAT_RAD, NAMES, find_stances
 from core.pipeline import analyse
 from core.shoe import Shoe
 from tests.accuracy.gaitmap import COPIES, MARKERS, MOCAP_RATE, RATE, recording_of, signals, table
@@ -25,7 +25,7 @@ from tests.accuracy.report import record, record_in_short
 
 
 @cache
-def analysed() -> tuple[Tracks, Measured]:
+def analysed() -> tuple[Tracks, MeasuredGait]:
     done = analyse(recording_of(signals(COPIES[0]), RATE))
     assert done.tracks is not None
     assert done.measured is not None
@@ -48,7 +48,7 @@ def marker_pitch(side: Side) -> tuple[Floats, Floats]:
     line = foot["TOE"] - foot["FCC"]
     t = np.arange(len(line)) / MOCAP_RATE
     pitch = np.arctan2(line[:, 2], np.hypot(line[:, 0], line[:, 1]))
-    own = analysed()[1].strides.used(side)
+    own = analysed()[1].strides.select_used(side)
     quiet = np.concatenate(
         [pitch[(t > s.start_s + 0.3 * stance(s)) & (t < s.start_s + 0.5 * stance(s))] for s in own]
     )
@@ -75,7 +75,7 @@ def spread(errors: Floats, form: str) -> str:
 
 
 def strides(side: Side) -> list[Stride]:
-    return list(analysed()[1].strides.used(side))
+    return list(analysed()[1].strides.select_used(side))
 
 
 def test_parts_of_stance_are_those_of_the_markers() -> None:
@@ -84,7 +84,7 @@ def test_parts_of_stance_are_those_of_the_markers() -> None:
     _, measured = analysed()
     for side in SIDES:
         t, pitch = marker_pitch(side)
-        own = stances(measured.strides, t, {FOOT[side]: pitch})
+        own = find_stances(measured.strides, t, {FOOT[side]: pitch})
         same = np.array([
             [row[n] if isinstance(row[n], float) else np.nan for n in NAMES]
             for s, row in zip(measured.strides.strides, own.rows, strict=True)
@@ -167,7 +167,7 @@ def test_heel_and_toe_pass_the_floor_as_their_markers_do() -> None:
     tracks, measured = analysed()
     assert tracks.feet is not None
     body, _ = nominal_body(None, None, SHOE)
-    again = measure(replace(tracks, feet=replace(tracks.feet, body=body)))
+    again = measure_gait(replace(tracks, feet=replace(tracks.feet, body=body)))
     rows = []
     for side in SIDES:
         foot = markers(side)

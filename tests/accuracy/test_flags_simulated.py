@@ -12,13 +12,13 @@ from typing import Final
 import numpy as np
 import pytest
 
-from core.flags import Flag, flags
+from core.flags import Flag, judge_flags
 from core.frames import Side
-from core.measure import Measured, measure
+from core.measure import MeasuredGait, measure_gait
 from core.parameters import cycle_curves
 from core.parameters.result import CycleCurves
 from core.pipeline import analyse
-from core.scores import Scores, scores
+from core.scores import Scores, score_curves
 from core.simulate import simulate_scenario
 from tests.accuracy.report import record
 from tests.true_walks import standing_width, true_tracks
@@ -37,11 +37,11 @@ SCORE_DEG: Final = 0.8
 Judged = tuple[dict[tuple[str, Side | None], Flag], Scores]
 
 
-def _judged(curves: CycleCurves, of: Measured, standing: dict[str, float]) -> Judged:
-    found = flags(curves, of.parameters, standing, HEIGHT_M)
+def _judged(curves: CycleCurves, of: MeasuredGait, standing: dict[str, float]) -> Judged:
+    found = judge_flags(curves, of.parameters, standing, HEIGHT_M)
     # a ratio has no fixed side: its own name is enough
     by = {(f.name, None if f.kind == "ratio" else f.side): f for f in found}
-    return by, scores(curves, standing)
+    return by, score_curves(curves, standing)
 
 
 @cache
@@ -58,7 +58,7 @@ def walk(name: str, seed: int = 5) -> tuple[Judged, Judged]:
     assert run.angles is not None
     assert run.angles.standing_deg == standing
     tracks = true_tracks(truth)
-    perfect = measure(tracks)
+    perfect = measure_gait(tracks)
     assert tracks.angles is not None
     exact = {k: float(np.degrees(v)) for k, v in truth.zero_offset.items()}
     return (

@@ -18,7 +18,7 @@ import pytest
 
 from core import calibration
 from core.body import BodyModel
-from core.body.corrected import corrected_signals
+from core.body.corrected import correct_signals
 from core.body.erkf.filter import ErkfTrack, erkf_inputs, filter_block
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.poses import ErkfRun, run_erkf
@@ -30,7 +30,7 @@ from core.frames import FOOT, GRAVITY, SIDES, Floats, Side
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.parameters import spatial_rows
-from core.pipeline import Analysis, analyse
+from core.pipeline import TakeAnalysis, analyse
 from core.rotation import rotate
 from core.timeline import synchronise
 from tests.accuracy.gaitmap import COPIES, RATE, block_mean, recording_of, signals, true_strides
@@ -94,7 +94,7 @@ def live(side: Side, name: str) -> ErkfTrack:
     calibrated, _ = take()
     mount = {FOOT[side]: calibrated.calibration.segments[FOOT[side]].R_segment_sensor}
     tree = person_tree(BODY, mount, (FOOT[side],))
-    inputs = erkf_inputs(tree, *corrected_signals(calibrated, (FOOT[side],)), RATE)
+    inputs = erkf_inputs(tree, *correct_signals(calibrated, (FOOT[side],)), RATE)
     first = start_state(tree, inputs, params, bias_age_s=calibrated.calibration.zero[0])
     return filter_block(first, inputs, tree, params)[0]
 
@@ -107,7 +107,7 @@ def naive(side: Side, dedrift: bool) -> Floats:
     off linearly over the swing, the usual remedy.
     """
     calibrated, orientations = take()
-    (acc, gyr, valid), segment = corrected_signals(calibrated, (FOOT[side],)), FOOT[side]
+    (acc, gyr, valid), segment = correct_signals(calibrated, (FOOT[side],)), FOOT[side]
     still = still_samples(acc[:, 0], gyr[:, 0], valid[:, 0], RATE, FOOT_STILL)
     mount = calibrated.calibration.segments[segment].R_segment_sensor
     a = rotate(orientations.q[segment], acc[:, 0] @ mount.T) - np.array([0.0, 0.0, GRAVITY])
@@ -121,7 +121,7 @@ def naive(side: Side, dedrift: bool) -> Floats:
 
 
 @cache
-def product() -> Analysis:
+def product() -> TakeAnalysis:
     return analyse(recording_of(signals(COPIES[0]), RATE))
 
 

@@ -16,14 +16,14 @@ import pytest
 
 from core.angles.measure import measure_angles
 from core.body import nominal_body
-from core.body.erkf.headings import agreed, turned
+from core.body.erkf.headings import align_forward_axes, turn_forward_axes
 from core.body.erkf.params import ErkfParams
-from core.body.erkf.poses import refined, run_erkf
+from core.body.erkf.poses import replace_orientations, run_erkf
 from core.body.tree import PRESETS
 from core.calibration import calibrate
 from core.frames import Segment
 from core.fusion.mahony import estimate_orientations
-from core.rest import samples
+from core.rest import index_window
 from tests.accuracy.report import record
 from tests.walks import rms_deg, simulated
 
@@ -43,17 +43,17 @@ def errors(walk: tuple[str, int], wrong: str, agree: bool) -> dict[str, float]:
     recording, truth = simulated(*walk)
     calibrated = calibrate(recording)
     by = {s: radians(x) for s, x in WRONG[wrong].items()}
-    calibrated, orientations = turned(calibrated, estimate_orientations(calibrated), by)
+    calibrated, orientations = turn_forward_axes(calibrated, estimate_orientations(calibrated), by)
     body, _ = nominal_body(recording.subject.height_m)
     whole, params = PRESETS["lower_body7"], ErkfParams.offline()
     if agree:
-        calibrated, orientations, _ = agreed(calibrated, orientations, body, whole, params)
+        calibrated, orientations, _ = align_forward_axes(calibrated, orientations, body, whole, params)
     run = run_erkf(calibrated, orientations, body, whole, params)
-    angles = measure_angles(refined(run, orientations), calibrated.calibration.zero).angles
+    angles = measure_angles(replace_orientations(run, orientations), calibrated.calibration.zero).angles
     walking = np.zeros(len(truth.t_s), bool)
     for window in calibrated.calibration.walking:
-        walking[samples(window, recording.rate_hz)] = True
-    true = truth.zeroed()
+        walking[index_window(window, recording.rate_hz)] = True
+    true = truth.subtract_standing()
     return {n: max(rms_deg(angles[f"{n}_{e}"] - true[f"{n}_{e}"], walking) for e in "rl") for n in ANGLES}
 
 

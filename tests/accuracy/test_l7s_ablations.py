@@ -12,7 +12,7 @@ from typing import Final, get_args
 
 import numpy as np
 
-from core.body.l7s.filter import Adjoint, L7sParams, filter_block, start
+from core.body.l7s.filter import Adjoint, L7sParams, filter_block, start_l7s_state
 from core.body.l7s.inputs import inputs_of
 from core.body.l7s.legs import LegModel, solve_legs
 from core.body.poses import Poses
@@ -83,7 +83,7 @@ def scored(name: str, adjoint: Adjoint) -> Floats:
     # the ankle at +d/2 is a middle of the foot that lies behind the ankle
     used = replace(model, foot=-model.foot) if flipped else model
     if form is None:
-        track, _ = filter_block(start(inputs, used, params), inputs, used, RATE, params)
+        track, _ = filter_block(start_l7s_state(inputs, used, params), inputs, used, RATE, params)
         p, R = track.p, track.R
     else:
         p, R = textbook(inputs, used, params, RATE, form)

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from core.body.erkf.params import ErkfParams
-from core.body.erkf.poses import foot_tracks, refined, run_erkf
+from core.body.erkf.poses import foot_tracks, replace_orientations, run_erkf
 from core.body.l7s.filter import Worn
 from core.body.l7s.inputs import free_acceleration
 from core.body.l7s.poses import l7s_poses
@@ -27,7 +27,7 @@ from core.calibration.result import CalibratedRecording
 from core.frames import FOOT, SIDES, SUFFIX, Floats, Side
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
-from core.simulate import Truth
+from core.simulate import WalkTruth
 from tests.accuracy.l7s_walks import steps_of
 from tests.accuracy.neura import BODY, TURNING, take
 from tests.accuracy.report import record
@@ -100,7 +100,7 @@ def paths(calibrated: CalibratedRecording, orientations: Orientations, body: Bod
         poses = l7s_poses(orientations, acceleration, still, body, worn=worn)
         found[f"L7S-{worn}"] = {s: poses.p[FOOT[s]] for s in SIDES}
     run = run_erkf(calibrated, orientations, body, tuple(FOOT.values()), ErkfParams.people())
-    found[OWN] = foot_tracks(run, refined(run, orientations), body).p
+    found[OWN] = foot_tracks(run, replace_orientations(run, orientations), body).p
     return found
 
 
@@ -120,7 +120,7 @@ def simulated_walk(name: str, seed: int) -> Walk:
     return Walk(name, {s: truth.p[FOOT[s]][:n] for s in SIDES}, flats, strides, made)
 
 
-def _flats(truth: Truth, side: Side, n: int) -> np.ndarray:
+def _flats(truth: WalkTruth, side: Side, n: int) -> np.ndarray:
     c = truth.contacts[side]
     ends = np.append(c.heel_off[1:], truth.t_s[-1])
     # a long rest is standing: half a second of it says where the foot is

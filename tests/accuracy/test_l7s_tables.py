@@ -24,7 +24,7 @@ from core.calibration import calibrate
 from core.frames import FOOT, SHANK, SIDES, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.rotation import angle_between, exp, multiply, to_matrix
-from core.simulate import Setup, simulate
+from core.simulate import RecordingSetup, simulate
 from core.simulate.script import Stand, Straight
 from core.timeline import synchronise
 from tests.accuracy.l7s_walks import (
@@ -187,7 +187,7 @@ def _columns(scores: Floats) -> list[tuple[Floats, float]]:
 @cache
 def given_orientations(seed: int) -> Trial:
     """The walk of the limits: 25 m, true orientations with 1° constant and 1° drifting error."""
-    take = simulate((Stand(5.0), Straight(25.0, 0.64, 0.54), Stand(3.0)), seed=seed, setup=Setup())
+    take = simulate((Stand(5.0), Straight(25.0, 0.64, 0.54), Stand(3.0)), seed=seed, setup=RecordingSetup())
     recording, truth = synchronise(take.recording), take.truth
     calibrated = calibrate(recording)
     n, rng = len(recording.t_s), np.random.default_rng(seed)

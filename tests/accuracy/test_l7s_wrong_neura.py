@@ -19,7 +19,7 @@ import pytest
 from core import calibration, events
 from core.body import contact_mask
 from core.body.estimate import estimate_poses
-from core.body.health import Finding, worst
+from core.body.health import HealthFinding, find_worst_verdict
 from core.body.mounting import mount_sensors
 from core.body.pose_params import PoseParams
 from core.body.tree import PRESETS
@@ -47,7 +47,7 @@ class Result:
 
     rmse: tuple[float, ...]
     codes: frozenset[str]
-    beyond: tuple[Finding, ...]
+    beyond: tuple[HealthFinding, ...]
 
 
 def with_sensors(recording: UniformRecording, **sensors: SensorSignals) -> UniformRecording:
@@ -159,7 +159,11 @@ def test_write_down_the_figures() -> None:
             rows.append([*cells, "–", f"error {found}", "bad"])
             continue
         shown = [f"{f.name} {f.of + ' ' if f.of else ''}{f.value:.2g}" for f in found.beyond]
-        cells += [" / ".join(f"{x:.1f}" for x in found.rmse), ", ".join(shown) or "–", worst(found.beyond)]
+        cells += [
+            " / ".join(f"{x:.1f}" for x in found.rmse),
+            ", ".join(shown) or "–",
+            find_worst_verdict(found.beyond),
+        ]
         rows.append(cells)
     record(
         "L7S: wrong handling on neura_walk",

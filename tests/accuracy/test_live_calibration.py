@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 
 from core.body import nominal_body
-from core.body.apart import legs_apart
-from core.body.erkf.headings import agreed
+from core.body.apart import lean_legs_apart
+from core.body.erkf.headings import align_forward_axes
 from core.body.erkf.params import ErkfParams
 from core.body.tree import PRESETS
 from core.calibration import calibrate
-from core.calibration.live_attempt import Wearer
+from core.calibration.live_attempt import WornSensors
 from core.calibration.result import CalibratedRecording, Calibration
 from core.frames import Segment
 from core.fusion.mahony import estimate_orientations
-from core.online.calibrated import LiveCalibration, warm
+from core.online.calibrated import LiveCalibration, compile_calibration_kernels
 from core.online.calibrating import LiveCalibrator
 from core.recording import UniformRecording
 from core.rotation import from_matrix, log
@@ -53,13 +53,13 @@ def take(name: str) -> UniformRecording:
 @cache
 def live(name: str) -> LiveCalibration:
     """The live calibration of a take."""
-    warm()
+    compile_calibration_kernels()
     recording = take(name)
     sensors = recording.sensors.values()
     acc, gyr = (np.stack([getattr(s, k) for s in sensors], axis=1) for k in ("acc", "gyr"))
     valid, filled = (np.stack([getattr(s, k) for s in sensors], axis=1) for k in ("valid", "interpolated"))
     calibrator = LiveCalibrator(
-        Wearer(
+        WornSensors(
             tuple(recording.sensors),
             recording.rate_hz,
             recording.subject,
@@ -82,8 +82,8 @@ def offline(name: str) -> CalibratedRecording:
     recording = take(name)
     calibrated = calibrate(recording)
     body, _ = nominal_body(recording.subject.height_m, recording.subject.standing_width_m)
-    calibrated, orientations = legs_apart(calibrated, estimate_orientations(calibrated), body)
-    return agreed(calibrated, orientations, body, SEGMENTS, ErkfParams.people())[0]
+    calibrated, orientations = lean_legs_apart(calibrated, estimate_orientations(calibrated), body)
+    return align_forward_axes(calibrated, orientations, body, SEGMENTS, ErkfParams.people())[0]
 
 
 def apart(a: Calibration, b: Calibration) -> dict[Segment, tuple[float, float]]:

@@ -12,7 +12,7 @@ from functools import cache
 import pytest
 
 from core.feedback import AnalysedStride, Cue, FeedbackEngine, FeedbackSplit, Prescription, split
-from core.measure import Measured
+from core.measure import MeasuredGait
 from core.online import LiveFrame
 from core.pipeline import analyse
 from core.simulate import simulate_scenario
@@ -39,7 +39,7 @@ def frames(*sizes: int) -> Sequence[LiveFrame]:
 
 
 @cache
-def offline() -> Measured:
+def offline() -> MeasuredGait:
     measured = analyse(simulate_scenario(WHO, SEED).recording).measured
     assert measured is not None
     return measured

@@ -13,11 +13,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.corrected import corrected_signals
+from core.body.corrected import correct_signals
 from core.body.erkf.filter import erkf_inputs, filter_block
 from core.body.erkf.live_erkf import live_params
 from core.body.erkf.start import start_state
-from core.body.live_still import Stillness
+from core.body.live_still import StillnessDetector
 from core.body.tree import person_tree
 from core.events import detect
 from core.events.result import GaitEvent
@@ -80,9 +80,9 @@ def gaitmap_mm(side: Side, trailing: bool) -> Floats:
     calibrated, _ = gaitmap_take()
     mount = {FOOT[side]: calibrated.calibration.segments[FOOT[side]].R_segment_sensor}
     tree = person_tree(BODY, mount, (FOOT[side],))
-    inputs = erkf_inputs(tree, *corrected_signals(calibrated, (FOOT[side],)), RATE)
+    inputs = erkf_inputs(tree, *correct_signals(calibrated, (FOOT[side],)), RATE)
     if trailing:
-        still = Stillness(1, RATE).push(inputs.acc, inputs.gyr, inputs.valid)
+        still = StillnessDetector(1, RATE).push(inputs.acc, inputs.gyr, inputs.valid)
         inputs = replace(inputs, contact=still[:, :, 0], still=still[:, :, 1])
     first = start_state(tree, inputs, live_params(), bias_age_s=calibrated.calibration.zero[0])
     return errors(filter_block(first, inputs, tree, live_params())[0].p[:, 0], side, RATE).straight

@@ -18,7 +18,7 @@ from core.frames import SIDES, Floats, Side
 from core.fusion.live_drift import HeadingHold
 from core.online.chain import COURSES
 from core.rotation import yaw
-from core.simulate import Truth
+from core.simulate import WalkTruth
 from tests.accuracy.report import record
 from tests.live_walks import Run, recorded
 from tests.walks import only, simulated
@@ -61,10 +61,10 @@ class Scored:
     contacts: Floats
 
 
-def scored(run: Run, truth: Truth) -> Scored:
+def scored(run: Run, truth: WalkTruth) -> Scored:
     began = next(f.t_s for f in run.frames if f.stage == "running")
     after = np.flatnonzero(truth.t_s > began)
-    found, true = run.angles_deg, truth.zeroed()
+    found, true = run.angles_deg, truth.subtract_standing()
     after = after[after < len(next(iter(found.values())))]
 
     def rmse(name: str) -> float:
@@ -78,7 +78,7 @@ def scored(run: Run, truth: Truth) -> Scored:
     )
 
 
-def stride_mm(run: Run, truth: Truth, side: Side, began: float) -> Floats:
+def stride_mm(run: Run, truth: WalkTruth, side: Side, began: float) -> Floats:
     """Told minus true lengths of the counted strides of a foot, matched by their contacts."""
     off: list[float] = []
     for told in run.strides:
@@ -99,7 +99,7 @@ def stride_mm(run: Run, truth: Truth, side: Side, began: float) -> Floats:
     return np.array(off)
 
 
-def contact_ms(run: Run, truth: Truth) -> Floats:
+def contact_ms(run: Run, truth: WalkTruth) -> Floats:
     """Initial contacts, told minus true."""
     off: list[float] = []
     for side in SIDES:

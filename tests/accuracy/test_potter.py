@@ -28,7 +28,7 @@ def walk() -> PotterWalk:
 def run(params: ErkfParams, seed: int = 0) -> tuple[Floats, dict[str, Floats]]:
     """Sensor positions (n, 3, 3) and hip angles (n,) in degrees by axis and side."""
     truth, tree = walk(), walker3()
-    acc, gyr = truth.measured(seed=seed)
+    acc, gyr = truth.add_noise(seed=seed)
     n = len(truth.t_s)
     step = np.full(n, 1.0 / truth.rate_hz)
     step[0] = 0.0

@@ -19,8 +19,8 @@ from core.frames import SIDES
 from core.norms.profile import NINE, SAGITTAL
 from core.parameters import cycle_curves
 from core.parameters.result import CycleCurves
-from core.pipeline import Analysis, analyse
-from core.scores import Scores, scores
+from core.pipeline import TakeAnalysis, analyse
+from core.scores import Scores, score_curves
 from tests.accuracy.neura import STRAIGHT
 from tests.accuracy.report import record, record_in_short
 from tests.data import data_folder
@@ -39,7 +39,7 @@ MARKERS = {"pelvis": ("LPSI", "RPSI"), "foot_l": ("LHEE", "LTOE"), "foot_r": ("R
 
 
 @cache
-def analysis() -> Analysis:
+def analysis() -> TakeAnalysis:
     return analyse(neura_recording())
 
 
@@ -93,7 +93,7 @@ def goniometer() -> dict[str, float]:
 def found() -> tuple[Scores, Scores]:
     ours, true = curves()
     # Vicon's curves are anatomical as they are: a goniometer of zero
-    return scores(ours, goniometer()), scores(true, dict.fromkeys(goniometer(), 0.0))
+    return score_curves(ours, goniometer()), score_curves(true, dict.fromkeys(goniometer(), 0.0))
 
 
 def test_scores_agree_with_those_of_vicon() -> None:

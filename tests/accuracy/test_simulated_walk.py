@@ -32,7 +32,7 @@ def errors(name: str, seed: int) -> dict[str, Floats]:
     recording, truth = simulated(name, seed)
     calibrated = calibrate(recording)
     angles: JointAngles = measure_angles(estimate_orientations(calibrated), calibrated.calibration.zero)
-    true = truth.zeroed()
+    true = truth.subtract_standing()
     n = min(len(recording.t_s), len(truth.t_s))
     return {k: (x[:n] - true[k][:n] + np.pi) % (2 * np.pi) - np.pi for k, x in angles.angles.items()}
 

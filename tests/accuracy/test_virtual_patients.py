@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from core.frames import SIDES, SUFFIX, Side
-from core.pipeline import Analysis, analyse
-from core.simulate import PATIENTS, Truth, simulate_scenario
+from core.pipeline import TakeAnalysis, analyse
+from core.simulate import PATIENTS, WalkTruth, simulate_scenario
 from tests.accuracy.report import record
 
 WALKING = tuple(name for name in PATIENTS if name != "severe_shuffle")
@@ -38,10 +38,10 @@ class Told:
     time_s: float
 
 
-def true(truth: Truth, side: Side) -> Told:
+def true(truth: WalkTruth, side: Side) -> Told:
     strides = [s for s in truth.strides if s.side == side]
     steps = [f.step_m for f in truth.footprints[side][1:] if not (f.opens or f.closes)]
-    knee = truth.zeroed()[f"knee_flexion_{SUFFIX[side]}"]
+    knee = truth.subtract_standing()[f"knee_flexion_{SUFFIX[side]}"]
     peaks, stances = [], []
     for s in strides:
         assert s.lift5_s is not None
@@ -52,7 +52,7 @@ def true(truth: Truth, side: Side) -> Told:
     return Told(*(float(np.mean(x)) for x in (steps, stances, peaks, times)))
 
 
-def told(found: Analysis, side: Side) -> Told:
+def told(found: TakeAnalysis, side: Side) -> Told:
     named = {p.name: p.mean for p in found.parameters if p.side == side}
     values = []
     for name in ("step_length_m", "stance_pct", "knee_flexion_max_swing_deg", "stride_time_s"):

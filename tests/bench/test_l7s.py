@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start, warm
+from core.body.l7s.filter import L7sInputs, L7sParams, Worn, compile_l7s_kernel, filter_block, start_l7s_state
 from core.body.l7s.inputs import free_acceleration, inputs_of
 from core.body.l7s.legs import LegModel
 from core.body.still import FOOT_STILL, still_samples
@@ -64,7 +64,7 @@ def test_the_compiled_step_gives_what_the_form_with_matrices_gives(worn: Worn, a
     part = inputs.part(slice(400, 1600))
     params = L7sParams(adjoint=adjoint)  # type: ignore[arg-type]
     p, R = textbook(part, model, params, RATE)
-    ours, _ = filter_block(start(part, model, params), part, model, RATE, params)
+    ours, _ = filter_block(start_l7s_state(part, model, params), part, model, RATE, params)
     np.testing.assert_allclose(ours.p, p, atol=1e-8)
     np.testing.assert_allclose(ours.R, R, atol=1e-8)
 
@@ -75,11 +75,11 @@ def test_a_step_takes_at_most_fifty_microseconds_and_a_twentieth_of_the_form_wit
 ) -> None:
     inputs, model = walk(worn)
     few = inputs.part(slice(600, 1000))
-    warm()
+    compile_l7s_kernel()
     ours, theirs = [], []
     # interleaved, so that a busy moment of the machine meets both
     for _ in range(3):
-        ours.append(best(lambda: filter_block(start(inputs, model), inputs, model, RATE), 2))
+        ours.append(best(lambda: filter_block(start_l7s_state(inputs, model), inputs, model, RATE), 2))
         theirs.append(best(lambda: textbook(few, model, L7sParams(), RATE), 1))
     step, matrices = min(ours) / len(inputs.step) * 1e6, min(theirs) / len(few.step) * 1e6
     print(f"\nL7S-{worn} {step:.1f} µs/step, with matrices {matrices:.0f}, ratio {matrices / step:.0f}")
@@ -93,7 +93,7 @@ def test_the_cost_grows_with_the_duration_and_no_faster() -> None:
     long = L7sInputs(
         np.tile(inputs.R, (8, 1, 1, 1)), np.tile(inputs.acc, (8, 1, 1)), np.tile(inputs.step, (8, 1)), "3I"
     )
-    state = start(inputs, model)
+    state = start_l7s_state(inputs, model)
     once = best(lambda: filter_block(state, inputs, model, RATE))
     eight = best(lambda: filter_block(state, long, model, RATE), 3)
     print(f"\n{n} samples {1e3 * once:.0f} ms, eight times as many {eight / once:.2f} times as long")
@@ -103,9 +103,9 @@ def test_the_cost_grows_with_the_duration_and_no_faster() -> None:
 @pytest.mark.parametrize("worn", ["3I", "2I"])
 def test_a_live_call_of_ten_samples_takes_at_most_a_millisecond(worn: Worn) -> None:
     inputs, model = walk(worn)
-    warm()
+    compile_l7s_kernel()
     part = inputs.part(slice(900, 910))
-    _, state = filter_block(start(inputs, model), inputs.part(slice(0, 900)), model, RATE)
+    _, state = filter_block(start_l7s_state(inputs, model), inputs.part(slice(0, 900)), model, RATE)
     times = []
     for _ in range(200):
         began = time.perf_counter()

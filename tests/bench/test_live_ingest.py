@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from sqlalchemy import func, select
 
-from core.formats.live_log import Batch, Hello, SensorInfo, StreamInfo, encode_batch
+from core.formats.live_log import Hello, SampleBatch, SensorInfo, StreamInfo, encode_batch
 from core.frames import SEGMENTS
-from server.live.client import Report, stream
+from server.live.client import StreamReport, stream
 from server.services import live, sessions
 from server.storage.tables import live_take
 from tests.faults.clinic import Clinic
@@ -32,7 +32,7 @@ PER_BATCH = 10
 SENSORS = tuple(SensorInfo(f"S{i}", segment) for i, segment in enumerate(SEGMENTS[:7]))
 FRAMES = [
     encode_batch(
-        Batch(
+        SampleBatch(
             0,
             seq,
             seq * 100_000,
@@ -77,7 +77,9 @@ async def metered(pid: int, began: float) -> float:
     return cpu_s(pid) - before
 
 
-async def all_tablets(socket: str, takes: list[tuple[str, str]], reports: list[Report], pid: int) -> float:
+async def all_tablets(
+    socket: str, takes: list[tuple[str, str]], reports: list[StreamReport], pid: int
+) -> float:
     """Stream from all; share of a core that the server spends on it."""
     streams = (StreamInfo(0, RATE_HZ, "shared", SENSORS),)
     began = time.monotonic() + SETTLING_S
@@ -101,7 +103,7 @@ async def all_tablets(socket: str, takes: list[tuple[str, str]], reports: list[R
 def test_two_hundred_tablets_are_recorded_without_a_loss(tmp_path: Path) -> None:
     clinic = Clinic(tmp_path, lease_s=15.0)
     clinic.settings = replace(clinic.settings, workers=0, live_workers=0)
-    reports = [Report() for _ in range(TABLETS)]
+    reports = [StreamReport() for _ in range(TABLETS)]
     takes = paired(clinic, TABLETS)
     with closing(clinic.db), serving(clinic) as (server, address):
         socket = address.replace("http", "ws") + "/api/v1/live"

@@ -26,15 +26,15 @@ from websockets.typing import Subprotocol
 
 from core.formats.live_log import (
     PROTOCOL,
-    Batch,
     Finish,
     Hello,
+    SampleBatch,
     decode_batch,
     encode_batch,
+    encode_samples,
     finish_json,
     hello_json,
-    payload,
-    peek,
+    read_batch_header,
 )
 from core.simulate import simulate_scenario
 from server.live.playback import cut, hello_of
@@ -85,7 +85,9 @@ def frames(seconds: float) -> list[bytes]:
     made = []
     for seq, start in enumerate(range(0, len(index) - PER_BATCH + 1, PER_BATCH)):
         t0 = round(start / RATE_HZ * 1e6)
-        made.append(encode_batch(Batch(0, seq, t0, t0 + 50_000, samples[index[start : start + PER_BATCH]])))
+        made.append(
+            encode_batch(SampleBatch(0, seq, t0, t0 + 50_000, samples[index[start : start + PER_BATCH]]))
+        )
     return made
 
 
@@ -221,7 +223,7 @@ async def drive(base: str, cookie: str, all_of: Sequence[Session], pids: Sequenc
     sent = frames(RUNNING_S + SETTLING_S + SECONDS)
     whole = hashlib.sha256()
     for frame in sent:
-        whole.update(payload(frame, peek(frame)))
+        whole.update(encode_samples(frame, read_batch_header(frame)))
     gates = [asyncio.Event() for _ in all_of]
     browsers = [asyncio.create_task(browser(base, s, cookie)) for s in all_of]
     tablets = [

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from core.calibration import calibrate
-from core.fusion.attitude import AttitudeParams, AttitudeState, advance, warm
+from core.fusion.attitude import AttitudeParams, AttitudeState, advance, compile_attitude_kernel
 from core.fusion.mahony import estimate_orientations
 from core.recording import UniformRecording
 from tests.walks import simulated
@@ -39,7 +39,7 @@ def test_mahony_takes_at_most_half_the_time_of_vqf_per_sample() -> None:
     acc = np.ascontiguousarray(np.array([0.0, 0.0, 9.81]) + rng.standard_normal((N, 3)))
     valid = np.ones(N, bool)
     state, params = AttitudeState(np.array([1.0, 0.0, 0.0, 0.0]), gyr[0]), AttitudeParams()
-    warm()
+    compile_attitude_kernel()
     # interleaved, so that a busy moment of the machine meets both
     ours, theirs = [], []
     for _ in range(5):

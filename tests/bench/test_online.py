@@ -19,9 +19,9 @@ import pytest
 
 from core.body.erkf.live_erkf import LiveErkf
 from core.body.tree import PRESETS
-from core.formats.live_log import Batch
+from core.formats.live_log import SampleBatch
 from core.frames import Segment
-from core.online import LiveStride, Online, warm
+from core.online import LiveStride, OnlineSession, compile_live_kernels
 from core.parameters.live_strides import LiveStrides
 from core.recording import UniformRecording
 from tests.live_walks import batches, hello_of
@@ -54,11 +54,11 @@ def walk(*segments: Segment) -> UniformRecording:
 
 
 @cache
-def begun(size: int, segments: tuple[Segment, ...] = ()) -> tuple[Online, list[Batch], float]:
+def begun(size: int, segments: tuple[Segment, ...] = ()) -> tuple[OnlineSession, list[SampleBatch], float]:
     """A session that has just been calibrated, its further batches, and what the calibrating push took, s."""
-    warm()
+    compile_live_kernels()
     take = walk(*segments)
-    online, rest = Online(hello_of(take), take.subject), iter(batches(take, size))
+    online, rest = OnlineSession(hello_of(take), take.subject), iter(batches(take, size))
     took = 0.0
     while online.chain is None:
         batch = next(rest)
@@ -68,7 +68,7 @@ def begun(size: int, segments: tuple[Segment, ...] = ()) -> tuple[Online, list[B
     return online, list(rest), took
 
 
-def quickest(online: Online, rest: Sequence[Batch], parts: int = 6) -> float:
+def quickest(online: OnlineSession, rest: Sequence[SampleBatch], parts: int = 6) -> float:
     """Time per push of the quickest of some equal parts, s: what it costs when nothing else wants a core."""
     edges = np.linspace(0, len(rest), parts + 1).astype(int).tolist()
     found: list[float] = []
@@ -140,13 +140,13 @@ def test_a_stride_is_measured_in_two_milliseconds(monkeypatch: pytest.MonkeyPatc
     assert ms <= BUSY * STRIDE_MS
 
 
-def endless(rest: Sequence[Batch], count: int) -> Iterator[Batch]:
+def endless(rest: Sequence[SampleBatch], count: int) -> Iterator[SampleBatch]:
     """The same walking again and again, on a clock that goes on."""
     part = rest[100:1300]
     span_us = part[-1].t0_us + 100_000 - part[0].t0_us
     for k in range(count):
         lap, batch = k // len(part), part[k % len(part)]
-        yield Batch(
+        yield SampleBatch(
             0, part[0].seq + k, batch.t0_us + lap * span_us, batch.sent_us + lap * span_us, batch.samples,
             batch.offsets_us,
         )  # fmt: skip

@@ -11,7 +11,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from core.measure import measure
+from core.measure import measure_gait
 from core.parameters import take_figures
 from core.simulate import Arc, Stand, Straight, simulate
 from tests.true_walks import true_tracks
@@ -32,13 +32,13 @@ def test_all_parameters_of_ten_minutes_are_there_at_once() -> None:
     tracks = true_tracks(truth)
     velocity = np.gradient(truth.p["pelvis"], truth.t_s, axis=0)
     tracks = replace(tracks, trunk={"pelvis": np.gradient(velocity, truth.t_s, axis=0)})
-    measured = measure(tracks)
-    assert len(measured.strides.used()) > 500
+    measured = measure_gait(tracks)
+    assert len(measured.strides.select_used()) > 500
     assert sum(p.mean is not None for p in measured.parameters) > 80
     whole, figures = [], []
     for _ in range(RUNS):
         began = time.process_time()
-        measure(tracks)
+        measure_gait(tracks)
         whole.append(time.process_time() - began)
         began = time.process_time()
         take_figures(measured.strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk)

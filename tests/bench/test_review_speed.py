@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from core.events.edits import Edit
-from core.measure import Tracks, measure
+from core.measure import Tracks, measure_gait
 from server.pages.timeline import FRAGMENT
 from server.services import patients, sessions
 from tests.bench.pairs import cpu_s, in_pairs, plain_python
@@ -49,7 +49,7 @@ def moves() -> list[tuple[float, float]]:
 
 def measure_with(tracks: Tracks, at: float, to: float) -> None:
     """Measure the whole take with one contact moved."""
-    found = measure(tracks, [Edit("move_event", "left", at, "ic", to)])
+    found = measure_gait(tracks, [Edit("move_event", "left", at, "ic", to)])
     assert len(found.strides.strides) > 1000
 
 

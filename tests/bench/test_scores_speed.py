@@ -8,12 +8,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from core.flags import flags
+from core.flags import judge_flags
 from core.frames import SIDES
-from core.norms import norms_for
+from core.norms import look_up_norms
 from core.norms.profile import NINE
 from core.parameters.result import CycleCurves
-from core.scores import scores
+from core.scores import score_curves
 from core.standing_angles import NAMES
 
 pytestmark = pytest.mark.bench
@@ -52,8 +52,8 @@ def best(run: Callable[[], object], times: int = 15) -> float:
 
 
 def test_all_scores_take_less_than_twenty_milliseconds(curves: CycleCurves) -> None:
-    assert best(lambda: scores(curves, STANDING)) < LIMIT_S
+    assert best(lambda: score_curves(curves, STANDING)) < LIMIT_S
 
 
 def test_flags_and_norms_take_less_than_as_much(curves: CycleCurves) -> None:
-    assert best(lambda: (flags(curves, [], STANDING), norms_for(60, "female", 1.1, 1.65))) < LIMIT_S
+    assert best(lambda: (judge_flags(curves, [], STANDING), look_up_norms(60, "female", 1.1, 1.65))) < LIMIT_S

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from server.report.trends import names_in, trends
+from server.report.trends import follow_figures, names_in
 from server.services import histories, patients, sessions
 from tests.server import analysed
 from tests.server.clinic import Clinic, open_clinic
@@ -57,8 +57,8 @@ def _read(clinic: Clinic, patient: patients.Patient) -> float:
     began = time.perf_counter()
     with clinic.db.read() as c:
         done, plans = histories.read(c, patient)
-    known = histories.history(clinic.app.state.reviewed, patient, done, plans)
-    found = trends(known.visits, names_in(known.visits), known.norms, known.usual)
+    known = histories.read_history(clinic.app.state.reviewed, patient, done, plans)
+    found = follow_figures(known.visits, names_in(known.visits), known.norms, known.usual)
     took = time.perf_counter() - began
     assert len(known.visits) == VISITS
     assert len(found) > 20

@@ -13,8 +13,8 @@ from playwright.sync_api import Page, WebSocketRoute
 
 from core.feedback.cue import Cue, FeedbackState, GuardState, SideEffect, Summary, Tone, WhyNot, Zone
 from core.frames import SUFFIX, Side
-from core.norms import norms_for
-from core.online.frame import CalibrationView, LiveFrame, SegmentCheck, SensorHealth, Stage, Trail
+from core.norms import look_up_norms
+from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SegmentCheck, SensorHealth, Stage
 from core.parameters.live_stride import LiveStride
 from server.live import wire
 
@@ -24,7 +24,7 @@ NAMES = tuple(f"{angle}_{SUFFIX[side]}" for angle in ANGLES for side in ("left",
 STRIDE_S = 1.12
 TARGET, SD = 0.53, 0.03
 TAKE = "7" * 32
-BANDS = norms_for(58, "male", None, 1.76).bands
+BANDS = look_up_norms(58, "male", None, 1.76).bands
 
 
 def angle(name: str, percent: float) -> float:
@@ -58,7 +58,7 @@ def frame(t: float, stage: Stage = "running", *, stale: bool = False, contact: s
         contact={"left": "l" in contact, "right": "r" in contact},
         angles=dict(zip(NAMES, values[-1], strict=True)),
     )  # fmt: skip
-    trail = Trail(np.array([t - 0.02, t - 0.01, t]), NAMES, values)
+    trail = AngleTrail(np.array([t - 0.02, t - 0.01, t]), NAMES, values)
     slow = wire.slow_part(shown, {"00B40B00": 84.0, "00B40B05": 9.0})
     body = wire.frame(shown, [trail], slow, phase)
     return (

@@ -15,8 +15,8 @@ import numpy as np
 from playwright.sync_api import Browser, Page, expect
 
 from core.formats import SourceFile, read_recording
-from core.formats.live_log import decode_batch, parse_finish, peek, scan
-from core.formats.live_log import payload as payload_of
+from core.formats.live_log import decode_batch, parse_finish, read_batch_header, scan
+from core.formats.live_log import encode_samples as payload_of
 from server.auth import accounts
 from server.auth.passwords import hash_password
 from server.auth.roles import Role
@@ -100,7 +100,7 @@ def test_a_walk_played_on_the_tablet_is_the_recording_though_network_and_page_we
     records, length = scan(log)
     assert length == len(log)
     frames = [r.body for r in records if r.kind == "B"]
-    headers = [peek(f) for f in frames]
+    headers = [read_batch_header(f) for f in frames]
     assert [h.seq for h in headers] == list(range(len(frames)))
     end = parse_finish(records[-1].body)
     assert end.count == len(frames)
@@ -236,7 +236,7 @@ def test_what_is_left_when_the_take_was_closed_can_be_saved(
     left = recording.streams["00B40C55"].acc.astype(np.float32)
     np.testing.assert_array_equal(left, acc[5 * acknowledged : 5 * acknowledged + len(left)])
     # nothing is missing between what the server has and what was saved
-    there = sum(peek(r.body).n_samples for r in scan(clinic.log(running))[0] if r.kind == "B")
+    there = sum(read_batch_header(r.body).n_samples for r in scan(clinic.log(running))[0] if r.kind == "B")
     assert 5 * acknowledged <= there < 5 * acknowledged + len(left)
     assert len(left) > 150
 

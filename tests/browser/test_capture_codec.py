@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from core.formats import SourceFile, read_recording
-from core.formats.live_log import Batch, encode_batch, record, scan
+from core.formats.live_log import SampleBatch, encode_batch, record, scan
 from tests.browser.conftest import RunningServer
 from tests.data import data_folder
 
@@ -65,7 +65,7 @@ def test_a_batch_has_the_bytes_that_the_server_would_write(blank: Page, offsets:
     samples[1, 2, 6:] = np.nan
     samples[3, 0, 0] = np.inf
     late = np.arange(5, dtype=np.uint32) * 10_007 if offsets else None
-    batch = Batch(3, 2**40 + 7, 1_795_000_000_123_456, 1_795_000_000_200_001, samples, late)
+    batch = SampleBatch(3, 2**40 + 7, 1_795_000_000_123_456, 1_795_000_000_200_001, samples, late)
     made = run(
         blank,
         "common/wire.js",
@@ -79,7 +79,7 @@ def test_a_batch_has_the_bytes_that_the_server_would_write(blank: Page, offsets:
 
 def test_a_batch_of_the_server_is_read_back(blank: Page) -> None:
     samples = np.arange(2 * 9, dtype=np.float32).reshape(2, 1, 9)
-    frame = encode_batch(Batch(1, 5, 10, 20, samples, np.array([0, 11], np.uint32)))
+    frame = encode_batch(SampleBatch(1, 5, 10, 20, samples, np.array([0, 11], np.uint32)))
     read = run(
         blank,
         "common/wire.js",
@@ -105,7 +105,7 @@ def test_a_batch_of_the_server_is_read_back(blank: Page) -> None:
 def test_a_saved_rest_is_a_recording_that_the_server_reads(blank: Page) -> None:
     rng = np.random.default_rng(4)
     samples = rng.normal(0, 5, (40, 5, 1, 9)).astype(np.float32)
-    frames = [encode_batch(Batch(0, n + 60, n * 50_000, n * 50_000, samples[n])) for n in range(40)]
+    frames = [encode_batch(SampleBatch(0, n + 60, n * 50_000, n * 50_000, samples[n])) for n in range(40)]
     made = run(
         blank,
         "common/wire.js",
@@ -264,7 +264,7 @@ def test_a_live_log_plays_with_its_segments_and_clocks(blank: Page) -> None:
     samples = np.random.default_rng(2).normal(0, 1, (20, 1, 9)).astype(np.float32)
     log = b"SAGLIVE1\n" + record("H", json.dumps(hello).encode())
     for n in range(4):
-        log += record("B", encode_batch(Batch(0, n, 5_000 + n * 50_000, n, samples[n * 5 : n * 5 + 5])))
+        log += record("B", encode_batch(SampleBatch(0, n, 5_000 + n * 50_000, n, samples[n * 5 : n * 5 + 5])))
     found = _read(blank, [("x.sagittal-live", log)])
     (track,) = found["tracks"]
     assert found["segments"] == {"A1": "pelvis"}

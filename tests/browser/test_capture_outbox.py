@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Error, Page
 
-from core.formats.live_log import Batch, encode_batch, peek
-from core.formats.live_log import payload as payload_of
+from core.formats.live_log import SampleBatch, encode_batch, read_batch_header
+from core.formats.live_log import encode_samples as payload_of
 from tests.browser.conftest import RunningServer
 
 OPEN = """const { Outbox } = await import('/static/js/capture/outbox.js');
@@ -43,13 +43,13 @@ def run(page: Page, body: str) -> Any:
 
 
 def frame(n: int) -> bytes:
-    return encode_batch(Batch(0, n, n * 50_000, n, np.full((5, 1, 9), n, np.float32)))
+    return encode_batch(SampleBatch(0, n, n * 50_000, n, np.full((5, 1, 9), n, np.float32)))
 
 
 def digest(count: int) -> str:
     found = hashlib.sha256()
     for n in range(count):
-        found.update(payload_of(frame(n), peek(frame(n))))
+        found.update(payload_of(frame(n), read_batch_header(frame(n))))
     return found.hexdigest()
 
 

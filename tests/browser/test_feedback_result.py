@@ -40,7 +40,7 @@ def trained(running: RunningServer) -> str:
     reviewed = ReviewedAnalyses(blobs)
     with closing(Database(running.folder / "sagittal.db")) as db:
         with db.read() as c:
-            found = analyses.shown(c, session)
+            found = analyses.get_shown(c, session)
             edits = edit_log.edits_of(c, found.id)
             given = prescriptions.for_take(c, reviewed, session)
         assert given is not None

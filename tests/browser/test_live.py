@@ -10,7 +10,7 @@ from uuid import uuid4
 import pytest
 from playwright.sync_api import Browser, expect
 
-from core.online import warm
+from core.online import compile_live_kernels
 from tests.browser import filling
 from tests.browser.capturing import choose, network, place, start, tablet, walk_files
 from tests.browser.conftest import Opener, RunningServer
@@ -76,7 +76,7 @@ WATCH = """() => {
 @pytest.fixture(scope="module", autouse=True)
 def compiled() -> None:
     """Have the kernels on disk, so that the estimator is ready before the walk is over."""
-    warm()
+    compile_live_kernels()
 
 
 def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(

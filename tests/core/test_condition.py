@@ -16,7 +16,7 @@ from core.condition import (
     WalkingAid,
     WalkingCondition,
     WalkingPace,
-    differences,
+    compare_conditions,
     is_alike,
     is_comparable,
 )
@@ -52,7 +52,7 @@ def test_a_walk_in_another_condition_is_not_compared(changed: dict[str, Any]) ->
     assert not is_comparable(USUAL, other)
     assert not is_comparable(other, USUAL)
     assert is_comparable(other, other)
-    assert len(differences(USUAL, other)) == 1
+    assert len(compare_conditions(USUAL, other)) == 1
 
 
 def test_a_walk_with_feedback_is_compared_with_nothing_though_walked_alike() -> None:
@@ -60,7 +60,7 @@ def test_a_walk_with_feedback_is_compared_with_nothing_though_walked_alike() -> 
     assert is_alike(USUAL, told)
     assert not is_comparable(USUAL, told)
     assert not is_comparable(told, told)
-    assert differences(USUAL, told) == ("without feedback, then with",)
+    assert compare_conditions(USUAL, told) == ("without feedback, then with",)
 
 
 def test_what_nobody_stated_is_like_nothing_but_itself() -> None:
@@ -102,7 +102,7 @@ def test_a_condition_is_said_in_words(condition: WalkingCondition, words: str) -
 
 def test_differences_name_both_conditions_in_their_order() -> None:
     fast = replace(USUAL, pace="fast", aid="stick")
-    assert differences(USUAL, fast) == ("own pace, then fast", "no aid, then stick")
+    assert compare_conditions(USUAL, fast) == ("own pace, then fast", "no aid, then stick")
 
 
 def test_only_unaided_walks_serve_others_as_reference() -> None:

@@ -9,7 +9,7 @@ from typing import get_args
 
 import pytest
 
-from core.body.choice import possible
+from core.body.choice import list_possible_estimators
 from core.body.tree import PRESETS
 from core.estimators import (
     AUTO,
@@ -72,7 +72,7 @@ def test_what_can_run_is_what_the_list_says_of_every_set_of_sensors() -> None:
     whole = PRESETS["lower_body7"]
     for chosen in range(2 ** len(whole)):
         worn = {s for i, s in enumerate(whole) if chosen >> i & 1}
-        assert set(possible(worn)) == {e.name for e in ESTIMATORS if e.runs_on(worn)}
+        assert set(list_possible_estimators(worn)) == {e.name for e in ESTIMATORS if e.runs_on(worn)}
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=lambda e: e.name)

@@ -10,9 +10,9 @@ import pytest
 from core.body.walking_frame import in_walking_frame
 from core.events.edits import Edit
 from core.frames import R_NEUTRAL
-from core.measure import Measured, measure
+from core.measure import MeasuredGait, measure_gait
 from core.parameters.result import Parameter
-from core.pipeline import Analysis, analyse
+from core.pipeline import TakeAnalysis, analyse
 from core.rotation import about, from_matrix, multiply, rotate
 from core.simulate import simulate_scenario
 from server.report.bundle import load_bundle
@@ -22,26 +22,26 @@ from tests.server import walk
 
 
 @pytest.fixture(scope="module")
-def analysis() -> Analysis:
+def analysis() -> TakeAnalysis:
     return analyse(simulate_scenario("comfortable", 1).recording)
 
 
-def figure(measured: Measured, name: str, side: str | None = "left") -> Parameter:
+def figure(measured: MeasuredGait, name: str, side: str | None = "left") -> Parameter:
     return next(p for p in measured.parameters if (p.name, p.side) == (name, side))
 
 
-def test_the_pipeline_gives_what_measure_gives_on_its_tracks(analysis: Analysis) -> None:
+def test_the_pipeline_gives_what_measure_gives_on_its_tracks(analysis: TakeAnalysis) -> None:
     assert analysis.tracks is not None
-    again = measure(analysis.tracks)
+    again = measure_gait(analysis.tracks)
     assert again.parameters == analysis.parameters
     assert analysis.strides is not None
     assert again.strides.strides == analysis.strides.strides
 
 
-def test_stored_and_read_again_it_gives_the_same_numbers(analysis: Analysis) -> None:
+def test_stored_and_read_again_it_gives_the_same_numbers(analysis: TakeAnalysis) -> None:
     files = analysis_files(analysis)
     bundle = load_bundle(files)
-    again = measure(read_tracks(files[NAME], bundle.events, bundle.angles))
+    again = measure_gait(read_tracks(files[NAME], bundle.events, bundle.angles))
     for read, written in zip(again.parameters, analysis.parameters, strict=True):
         assert (read.name, read.side, read.n, read.reason) == (
             written.name,
@@ -59,10 +59,10 @@ def test_stored_and_read_again_it_gives_the_same_numbers(analysis: Analysis) -> 
 
 def test_moving_a_foot_off_changes_stance_and_swing_of_its_stride_alone() -> None:
     tracks = walk.tracks()
-    before = measure(tracks)
+    before = measure_gait(tracks)
     i, stride = next((i, s) for i, s in enumerate(before.strides.strides) if s.excluded_reason is None)
     assert stride.tc_s is not None
-    after = measure(tracks, [Edit("move_event", stride.side, stride.tc_s, "tc", stride.tc_s + 0.03)])
+    after = measure_gait(tracks, [Edit("move_event", stride.side, stride.tc_s, "tc", stride.tc_s + 0.03)])
     for name, change in (("stance_time_s", 0.03), ("swing_time_s", -0.03), ("stride_time_s", 0.0)):
         old, new = before.columns[name], after.columns[name]
         assert new[i] == pytest.approx(old[i] + change, abs=1e-9)  # type: ignore[operator]
@@ -71,9 +71,9 @@ def test_moving_a_foot_off_changes_stance_and_swing_of_its_stride_alone() -> Non
 
 def test_a_deleted_contact_merges_two_strides_and_a_rule_sets_the_long_one_aside() -> None:
     tracks = walk.tracks(20.0)
-    before = measure(tracks)
+    before = measure_gait(tracks)
     contact = tracks.events.times("right", "ic")[6]
-    after = measure(tracks, [Edit("delete_event", "right", contact, "ic")])
+    after = measure_gait(tracks, [Edit("delete_event", "right", contact, "ic")])
     assert len(after.strides.strides) == len(before.strides.strides) - 1
     merged = next(s for s in after.strides.strides if s.side == "right" and s.start_s < contact < s.end_s)
     assert merged.excluded_by == "rule"
@@ -82,10 +82,10 @@ def test_a_deleted_contact_merges_two_strides_and_a_rule_sets_the_long_one_aside
 
 def test_a_person_leaves_a_stride_out_and_every_figure_counts_one_less() -> None:
     tracks = walk.tracks()
-    before = measure(tracks)
-    stride = before.strides.used("left")[2]
+    before = measure_gait(tracks)
+    stride = before.strides.select_used("left")[2]
     middle = (stride.start_s + stride.end_s) / 2
-    after = measure(tracks, [Edit("exclude_stride", "left", middle, reason="stumbled")])
+    after = measure_gait(tracks, [Edit("exclude_stride", "left", middle, reason="stumbled")])
     for name in ("stride_time_s", "stance_pct", "knee_flexion_rom_deg", "stride_length_m"):
         assert figure(after, name).n == figure(before, name).n - 1
     assert figure(after, "stride_time_s", "right") == figure(before, "stride_time_s", "right")
@@ -93,17 +93,17 @@ def test_a_person_leaves_a_stride_out_and_every_figure_counts_one_less() -> None
 
 def test_the_decision_about_a_stride_survives_a_shift_of_its_contact() -> None:
     tracks = walk.tracks()
-    stride = measure(tracks).strides.used("left")[2]
+    stride = measure_gait(tracks).strides.select_used("left")[2]
     edits = [
         Edit("exclude_stride", "left", (stride.start_s + stride.end_s) / 2, reason="stumbled"),
         Edit("move_event", "left", stride.start_s, "ic", stride.start_s + 0.02),
     ]
-    out = [s for s in measure(tracks, edits).strides.strides if s.excluded_by == "person"]
+    out = [s for s in measure_gait(tracks, edits).strides.strides if s.excluded_by == "person"]
     assert [s.start_s for s in out] == [pytest.approx(stride.start_s + 0.02)]
 
 
 def test_without_angles_and_paths_there_are_still_times() -> None:
-    measured = measure(replace(walk.tracks(), angles=None, feet=None, trunk={}))
+    measured = measure_gait(replace(walk.tracks(), angles=None, feet=None, trunk={}))
     assert figure(measured, "stride_time_s").mean == pytest.approx(walk.STRIDE_S)
     assert "knee_flexion_rom_deg" not in measured.columns
 

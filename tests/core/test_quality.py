@@ -11,7 +11,7 @@ import pytest
 from core.formats import SourceFile, manifest_of, read_recording
 from core.frames import GRAVITY, Floats, Segment
 from core.quality import QualityReport, assess, describe, suggest, suggest_segments
-from core.quality.signals import facts, magnetic_share, saturation
+from core.quality.signals import magnetic_share, measure_signal, saturation
 from core.recording import ImuStream, Recording
 from core.rotation import about
 from core.simulate import simulate_scenario
@@ -175,7 +175,7 @@ def test_errors_of_the_reader_stop_the_analysis_only_for_worn_sensors() -> None:
 def test_facts_survive_short_and_holed_signals() -> None:
     acc = np.full((5, 3), np.nan)
     acc[2] = [0.0, 0.0, 9.81]
-    f = facts(acc, None, 100.0)
+    f = measure_signal(acc, None, 100.0)
     assert f.still_norm == pytest.approx(9.81)
     assert f.gyro_top is None
 
@@ -295,9 +295,9 @@ def test_turning_on_the_spot_while_the_trunk_is_level_is_no_wrong_unit() -> None
     acc[400:600] = still[400:600]
     gyr = np.full(still.shape, 0.02)
     gyr[400:600, 2] = 0.8
-    assert facts(acc, gyr, 100.0).still_gyro == pytest.approx(0.02 * 3**0.5)
+    assert measure_signal(acc, gyr, 100.0).still_gyro == pytest.approx(0.02 * 3**0.5)
     everywhere = np.full(still.shape, 1.0)
-    assert facts(acc, everywhere, 100.0).still_gyro == pytest.approx(3**0.5)
+    assert measure_signal(acc, everywhere, 100.0).still_gyro == pytest.approx(3**0.5)
 
 
 @pytest.mark.parametrize("until_s", [6.0, np.inf], ids=["before the walk", "all the time"])

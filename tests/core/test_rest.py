@@ -9,7 +9,7 @@ import pytest
 
 from core.frames import Floats
 from core.recording import SensorSignals, Subject, UniformRecording
-from core.rest import RestParams, quietness, rest_windows, runs, samples
+from core.rest import RestParams, find_rest_windows, find_runs, index_window, measure_quietness
 from tests.data import data_folder
 from tests.walks import lost, neura_walk
 
@@ -38,7 +38,7 @@ def take(**sensors: SensorSignals) -> UniformRecording:
 
 @pytest.mark.parametrize(("start", "end"), [(5.0, 20.0), (0.0, 15.0), (3.0, 17.0)])
 def test_rest_is_found_first_later_or_at_the_end(start: float, end: float) -> None:
-    found = rest_windows(take(foot_l=with_walk(still(2000), start, end)))
+    found = find_rest_windows(take(foot_l=with_walk(still(2000), start, end)))
     assert len(found) == (start > 0) + (end < 20)
     for a, b in found:
         assert b <= start + 0.3 or a >= end - 0.3
@@ -46,50 +46,50 @@ def test_rest_is_found_first_later_or_at_the_end(start: float, end: float) -> No
 
 def test_a_gyro_offset_is_not_movement() -> None:
     offset = np.radians([1.8, -1.2, 2.5])
-    assert rest_windows(take(foot_l=still(500, offset))) == ((0.0, 5.0),)
+    assert find_rest_windows(take(foot_l=still(500, offset))) == ((0.0, 5.0),)
 
 
 def test_a_steady_turn_above_the_limit_is_not_rest() -> None:
-    assert rest_windows(take(foot_l=still(500, np.radians([0.0, 12.0, 0.0])))) == ()
+    assert find_rest_windows(take(foot_l=still(500, np.radians([0.0, 12.0, 0.0])))) == ()
 
 
 def test_rest_of_a_take_is_the_rest_of_all_its_sensors() -> None:
     recording = take(
         foot_l=with_walk(still(2000), 5.0, 12.0), foot_r=with_walk(still(2000, seed=1), 7.0, 15.0)
     )
-    (_, first_end), (second_start, _) = rest_windows(recording)
+    (_, first_end), (second_start, _) = find_rest_windows(recording)
     assert first_end == pytest.approx(4.8, abs=0.3)
     assert second_start == pytest.approx(15.2, abs=0.3)
-    assert rest_windows(recording, segments=["foot_r"])[0][1] == pytest.approx(6.8, abs=0.3)
+    assert find_rest_windows(recording, segments=["foot_r"])[0][1] == pytest.approx(6.8, abs=0.3)
 
 
 def test_a_lost_sensor_does_not_rest() -> None:
     recording = lost(take(foot_l=still(1000)), "foot_l", 4.0, 6.0)
-    (_, end), (start, _) = rest_windows(recording)
+    (_, end), (start, _) = find_rest_windows(recording)
     assert end <= 4.0
     assert start >= 6.0
 
 
 def test_a_take_shorter_than_a_window_has_no_rest() -> None:
-    assert rest_windows(take(foot_l=still(60))) == ()
-    assert not quietness(still(60), RATE).quiet.any()
+    assert find_rest_windows(take(foot_l=still(60))) == ()
+    assert not measure_quietness(still(60), RATE).quiet.any()
 
 
 def test_shortest_rest_is_respected() -> None:
     recording = take(foot_l=with_walk(still(1000), 2.0, 10.0))
-    assert len(rest_windows(recording)) == 1
-    assert rest_windows(recording, RestParams(shortest_s=3.0)) == ()
+    assert len(find_rest_windows(recording)) == 1
+    assert find_rest_windows(recording, RestParams(shortest_s=3.0)) == ()
 
 
 def test_runs_and_samples_are_half_open() -> None:
-    assert runs(np.array([True, True, False, True])) == [(0, 2), (3, 4)]
-    assert runs(np.zeros(3, bool)) == []
-    assert samples((1.0, 2.5), RATE) == slice(100, 250)
+    assert find_runs(np.array([True, True, False, True])) == [(0, 2), (3, 4)]
+    assert find_runs(np.zeros(3, bool)) == []
+    assert index_window((1.0, 2.5), RATE) == slice(100, 250)
 
 
 def test_neura_walk_stands_before_and_after_its_walk() -> None:
     data_folder("neura_walk")
-    (a, b), (c, d) = rest_windows(neura_walk())
+    (a, b), (c, d) = find_rest_windows(neura_walk())
     assert a == 0.0
     assert 10.5 < b < 11.3
     assert 21.0 < c < 22.0

@@ -14,7 +14,7 @@ from core.norms import adult_reference
 from core.norms.profile import NINE, SAGITTAL
 from core.parameters.kinematic import MEAN_ZERO
 from core.parameters.result import CycleCurves
-from core.scores import Scores, scores
+from core.scores import Scores, score_curves
 from core.standing_angles import NAMES
 from tests.wbds import people
 
@@ -46,7 +46,7 @@ def value(found: Scores, name: str, mode: str, side: Side | None = None) -> floa
 
 
 def test_the_norm_scores_zero() -> None:
-    found = scores(norm(), standing(0.0))
+    found = score_curves(norm(), standing(0.0))
     for side in (*SIDES, None):
         assert value(found, "gps_sagittal_deg", "raw", side) == pytest.approx(0.0, abs=1e-9)
         assert value(found, "gps_deg", "offset_removed", side) == pytest.approx(0.0, abs=1e-9)
@@ -55,12 +55,12 @@ def test_the_norm_scores_zero() -> None:
 def test_three_strides_have_no_score() -> None:
     reference = adult_reference().mean_deg
     curves = session({v: dict.fromkeys(SIDES, reference[v] + 1.0) for v in NINE}, 3)
-    assert {s.value for s in scores(curves, dict.fromkeys(NAMES, 0.0)).scores} == {None}
-    assert scores(curves).find("gps_deg", "offset_removed", "left").reason == "too_few_strides"
+    assert {s.value for s in score_curves(curves, dict.fromkeys(NAMES, 0.0)).scores} == {None}
+    assert score_curves(curves).find("gps_deg", "offset_removed", "left").reason == "too_few_strides"
 
 
 def test_without_goniometer_angles_there_is_no_raw_score_and_the_shape_scores_stay() -> None:
-    found = scores(norm(offset=8.0))
+    found = score_curves(norm(offset=8.0))
     assert value(found, "gps_sagittal_deg", "offset_removed") == pytest.approx(0.0, abs=1e-9)
     for side in (*SIDES, None):
         raw = found.find("gps_sagittal_deg", "raw", side)
@@ -73,17 +73,17 @@ def test_without_goniometer_angles_there_is_no_raw_score_and_the_shape_scores_st
 
 def test_goniometer_angles_give_the_level_back() -> None:
     """Somebody who stands with everything bent by 10°: measured from standing, each curve is 10° too low."""
-    found = scores(norm(offset=-10.0), standing(10.0))
+    found = score_curves(norm(offset=-10.0), standing(10.0))
     assert value(found, "gps_sagittal_deg", "raw") == pytest.approx(0.0, abs=1e-9)
-    wrong = scores(norm(offset=-10.0), standing(0.0))
+    wrong = score_curves(norm(offset=-10.0), standing(0.0))
     assert value(wrong, "gps_sagittal_deg", "raw") == pytest.approx(10.0)
-    one_side = scores(norm(), {"knee_flexion_l": 0.0})
+    one_side = score_curves(norm(), {"knee_flexion_l": 0.0})
     assert one_side.find("gvs_deg", "raw", "left", "knee_flexion").value == pytest.approx(0.0, abs=1e-9)
     assert one_side.find("gvs_deg", "raw", "right", "knee_flexion").reason == "angle_zero_standing"
 
 
 def test_three_joints_are_never_called_gps() -> None:
-    found = scores(norm(variables=SAGITTAL), standing(0.0))
+    found = score_curves(norm(variables=SAGITTAL), standing(0.0))
     full = found.find("gps_deg", "raw")
     assert (full.value, full.reason) == (None, "joint_missing")
     assert "pelvis_rotation" in full.missing
@@ -95,7 +95,7 @@ def test_three_joints_are_never_called_gps() -> None:
 
 def test_rotation_and_progression_have_a_shape_and_no_level() -> None:
     """Nobody's goniometer gives the walking direction: there is no raw GPS of all nine, and it says why."""
-    found = scores(norm(), dict.fromkeys(NAMES, 0.0))
+    found = score_curves(norm(), dict.fromkeys(NAMES, 0.0))
     for variable in MEAN_ZERO:
         assert found.find("gvs_deg", "raw", "left", variable).reason == "no_level"
         assert found.find("gvs_deg", "offset_removed", "left", variable).value == pytest.approx(0.0, abs=1e-9)
@@ -108,7 +108,7 @@ def test_pelvic_obliquity_entered_once_counts_up_on_one_side_and_down_on_the_oth
     reference = adult_reference().mean_deg["pelvis_obliquity"]
     # the right side 3° up while standing: zeroed there, it shows 3° too little, the left 3° too much
     curves = session({"pelvis_obliquity": {"left": reference + 3.0, "right": reference - 3.0}})
-    found = scores(curves, {"pelvis_obliquity": 3.0})
+    found = score_curves(curves, {"pelvis_obliquity": 3.0})
     for side in SIDES:
         one = found.find("gvs_deg", "raw", side, "pelvis_obliquity")
         assert one.value == pytest.approx(0.0, abs=1e-9)
@@ -116,7 +116,7 @@ def test_pelvic_obliquity_entered_once_counts_up_on_one_side_and_down_on_the_oth
 
 def test_healthy_people_have_an_index_of_one_hundred_in_the_middle() -> None:
     """Mean 100 and sd 10 leave one out; with the person in the reference about 42/41 closer to it."""
-    found = [scores(session({v: {s: p[s][v] for s in SIDES} for v in NINE}, 4)) for p in people()]
+    found = [score_curves(session({v: {s: p[s][v] for s in SIDES} for v in NINE}, 4)) for p in people()]
     spread = adult_reference().spreads["offset_removed"]["gps_overall"]
     assert spread.sd_ln is not None
     indices = np.array([value(f, "gdi_star", "offset_removed") for f in found], np.float64)
@@ -130,20 +130,20 @@ def test_an_index_of_ninety_is_one_standard_deviation_of_the_logarithm() -> None
     healthy = adult_reference().spreads["raw"]["gps_sagittal_overall"]
     assert healthy.mean_ln is not None
     assert healthy.sd_ln is not None
-    far = scores(norm(offset=float(np.exp(healthy.mean_ln + healthy.sd_ln))), standing(0.0))
+    far = score_curves(norm(offset=float(np.exp(healthy.mean_ln + healthy.sd_ln))), standing(0.0))
     assert value(far, "gdi_star_sagittal", "raw") == pytest.approx(90.0)
     assert far.find("gps_sagittal_deg", "raw").percentile == pytest.approx(84.13, abs=0.01)
-    middle = scores(norm(offset=float(np.exp(healthy.mean_ln))), standing(0.0))
+    middle = score_curves(norm(offset=float(np.exp(healthy.mean_ln))), standing(0.0))
     assert value(middle, "gdi_star_sagittal", "raw") == pytest.approx(100.0)
 
 
 def test_the_very_curves_of_the_norm_have_no_index() -> None:
-    score = scores(norm(), standing(0.0)).find("gdi_star_sagittal", "raw")
+    score = score_curves(norm(), standing(0.0)).find("gdi_star_sagittal", "raw")
     assert (score.value, score.percentile, score.reason) == (None, None, "score_zero")
 
 
 def test_angles_that_no_two_sensors_measure_are_not_scored() -> None:
-    found = scores(norm(), standing(0.0), estimated=("knee_flexion",))
+    found = score_curves(norm(), standing(0.0), estimated=("knee_flexion",))
     assert found.find("gvs_deg", "offset_removed", "left", "knee_flexion").reason == "estimated"
     assert value(found, "gps_sagittal_deg", "offset_removed") is None
 
@@ -153,7 +153,7 @@ def test_excluded_strides_do_not_count() -> None:
     spoiled = {v: {s: rows.copy() for s, rows in sides.items()} for v, sides in curves.curves.items()}
     spoiled["knee_flexion"]["left"][3] += 1.0
     used: dict[Side, Bools] = {"left": np.arange(12) != 3, "right": np.ones(12, np.bool_)}
-    found = scores(CycleCurves(spoiled, curves.stride_index, used, curves.foot_off_pct), standing(0.0))
+    found = score_curves(CycleCurves(spoiled, curves.stride_index, used, curves.foot_off_pct), standing(0.0))
     left = found.find("gvs_deg", "raw", "left", "knee_flexion")
     assert left.value == pytest.approx(0.0, abs=1e-9)
     assert left.n == 11
@@ -161,17 +161,17 @@ def test_excluded_strides_do_not_count() -> None:
 
 
 def test_children_are_not_scored_against_adults() -> None:
-    child = scores(norm(offset=5.0), standing(0.0), age=9)
+    child = score_curves(norm(offset=5.0), standing(0.0), age=9)
     assert {(s.value, s.percentile, s.reason) for s in child.scores} == {(None, None, "no_norm_for_age")}
-    assert value(scores(norm(offset=5.0), standing(0.0), age=18), "gps_sagittal_deg", "raw") is not None
+    assert value(score_curves(norm(offset=5.0), standing(0.0), age=18), "gps_sagittal_deg", "raw") is not None
     own = adult_reference()
-    assert value(scores(norm(), standing(0.0), own, age=9), "gps_sagittal_deg", "raw") is not None
+    assert value(score_curves(norm(), standing(0.0), own, age=9), "gps_sagittal_deg", "raw") is not None
 
 
 def test_a_session_without_strides_says_so() -> None:
     empty = norm()
     none = {s: np.zeros(12, np.bool_) for s in SIDES}
-    found = scores(CycleCurves(empty.curves, empty.stride_index, none, empty.foot_off_pct))
+    found = score_curves(CycleCurves(empty.curves, empty.stride_index, none, empty.foot_off_pct))
     assert {s.reason for s in found.scores} == {"no_strides"}
 
 

@@ -14,8 +14,8 @@ from scipy.io import loadmat
 from core.errors import Notice
 from core.formats import SourceFile, read_recording
 from core.frames import GRAVITY, Floats, Segment
-from core.pipeline import Analysis, analyse
-from core.quality.stuck import CODES, StuckWatch, mark_stuck, working
+from core.pipeline import TakeAnalysis, analyse
+from core.quality.stuck import CODES, StuckWatch, drop_stuck_sensors, mark_stuck
 from core.recording import ImuStream, Recording, SensorSignals, Subject, UniformRecording
 from core.simulate import SCRIPTS, simulate_scenario
 from core.timeline import synchronise
@@ -111,7 +111,7 @@ def test_a_sensor_that_does_not_measure_is_named_and_left_out_from_there(
         assert first - 1 <= begun <= (max(first, 600) + 300 if late else first + 30)
         assert not valid[begun + 1 :].any()
         assert all(x.valid.all() for s, x in found.sensors.items() if s != segment)
-        assert (segment in working(found).sensors) == (at_s > 0.5 * found.t_s[-1])
+        assert (segment in drop_stuck_sensors(found).sensors) == (at_s > 0.5 * found.t_s[-1])
 
 
 def test_a_sensor_that_repeats_a_sample_for_a_while_is_there_again_with_the_next_new_one() -> None:
@@ -123,7 +123,7 @@ def test_a_sensor_that_repeats_a_sample_for_a_while_is_there_again_with_the_next
     assert told(found.notices) == [("sensor_frozen", "shank_r")]
     assert 2000 <= np.flatnonzero(~valid)[0] <= 2002
     assert np.count_nonzero(~valid) == pytest.approx(150, abs=2)
-    assert "shank_r" in working(found).sensors
+    assert "shank_r" in drop_stuck_sensors(found).sensors
 
 
 def test_any_division_into_blocks_finds_the_same() -> None:
@@ -265,12 +265,12 @@ def recording_of(uniform: UniformRecording) -> Recording:
 
 
 @cache
-def sound() -> Analysis:
+def sound() -> TakeAnalysis:
     return analyse(recording_of(cut(comfortable(), 0.0, 30.0)))
 
 
 @cache
-def without(segment: Segment, spoil: Spoil) -> Analysis:
+def without(segment: Segment, spoil: Spoil) -> TakeAnalysis:
     return analyse(recording_of(spoilt(cut(comfortable(), 0.0, 30.0), segment, spoil, 0.0)))
 
 

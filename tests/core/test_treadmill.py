@@ -12,7 +12,7 @@ import pytest
 
 from core.errors import ParameterError
 from core.parameters.spatial import NAMES
-from core.pipeline import Analysis, analyse
+from core.pipeline import TakeAnalysis, analyse
 from core.recording import Recording
 from core.simulate import simulate_scenario
 
@@ -24,7 +24,7 @@ def recording() -> Recording:
 
 
 @cache
-def walked(belt_speed_mps: float | None) -> Analysis:
+def walked(belt_speed_mps: float | None) -> TakeAnalysis:
     return analyse(replace(recording(), protocol="treadmill", belt_speed_mps=belt_speed_mps))
 
 

@@ -12,17 +12,17 @@ import pytest
 from core.angles import JointAngles
 from core.body.erkf.health import REFUSED_PCT
 from core.body.estimate import PoseEstimate
-from core.body.health import Finding, worst
+from core.body.health import HealthFinding, find_worst_verdict
 from core.events.result import Stride, Strides
 from core.frames import Segment
-from core.measure import measure
+from core.measure import measure_gait
 from core.parameters.catalogue import list_curve_figures
-from core.parameters.kinematic import cycle_curves, kinematic
-from core.parameters.live_figures import Span, early_figures
+from core.parameters.kinematic import cycle_curves, summarise_angles
+from core.parameters.live_figures import StrideSpan, early_figures
 from core.parameters.spatial import GROUND, NAMES
-from core.parameters.temporal import per_stride, temporal
-from core.pipeline import Analysis, analyse
-from core.quality import shown_level
+from core.parameters.temporal import per_stride, summarise_times
+from core.pipeline import TakeAnalysis, analyse
+from core.quality import find_shown_level
 from core.recording import Recording
 from core.simulate import simulate_scenario
 from core.withheld import withhold_distances
@@ -43,7 +43,7 @@ def worn(recording: Recording, segments: dict[Segment, Segment] | None = None, *
 
 
 @cache
-def exchanged() -> Analysis:
+def exchanged() -> TakeAnalysis:
     """A simulated walk, the sensors of both thighs taken for each other."""
     return analyse(
         worn(simulate_scenario("comfortable", 0).recording, {"thigh_l": "thigh_r", "thigh_r": "thigh_l"})
@@ -51,19 +51,23 @@ def exchanged() -> Analysis:
 
 
 @cache
-def sparse() -> Analysis:
+def sparse() -> TakeAnalysis:
     """The same walk from pelvis and feet."""
     return analyse(worn(simulate_scenario("comfortable", 0).recording, None, "pelvis", "foot_l", "foot_r"))
 
 
 def test_the_level_people_see_is_the_worst_of_signals_and_estimator() -> None:
-    assert [shown_level(level, None) for level in ("good", "usable", "poor")] == ["good", "usable", "poor"]
-    assert shown_level("good", "bad") == "poor"
-    assert shown_level("good", "warn") == "usable"
-    assert shown_level("poor", "good") == "poor"
+    assert [find_shown_level(level, None) for level in ("good", "usable", "poor")] == [
+        "good",
+        "usable",
+        "poor",
+    ]
+    assert find_shown_level("good", "bad") == "poor"
+    assert find_shown_level("good", "warn") == "usable"
+    assert find_shown_level("poor", "good") == "poor"
     found = exchanged()
     assert found.poses is not None
-    assert (found.quality.level, worst(found.poses.health)) == ("good", "bad")
+    assert (found.quality.level, find_worst_verdict(found.poses.health)) == ("good", "bad")
     files = analysis_files(found)
     quality = json.loads(files["analysis.json"])["quality"]
     assert (quality["level"], quality["signals_level"]) == ("poor", "good")
@@ -105,7 +109,7 @@ def test_what_was_withheld_stays_so_in_files_pages_and_after_an_edit() -> None:
     for name in list_curve_figures():
         if name.startswith(("knee_", "hip_")) and name in header:
             assert not any(row[header.index(name)] for row in rows), name
-    again = measure(read_tracks(files["tracks.parquet"], bundle.events, bundle.angles))
+    again = measure_gait(read_tracks(files["tracks.parquet"], bundle.events, bundle.angles))
     known = {(p.name, p.side): p.reason for p in found.parameters}
     assert {(p.name, p.side): p.reason for p in again.parameters} == known
     curves = cycle_curves(bundle.angles, bundle.strides)
@@ -126,7 +130,7 @@ def test_distances_of_a_chain_that_does_not_hang_together_are_withheld_in_files_
     assert told[0].startswith("Distances of both feet are withheld: the path does not fit the sensors.")
     files = analysis_files(found)
     bundle = load_bundle(files)
-    again = measure(read_tracks(files["tracks.parquet"], bundle.events, bundle.angles))
+    again = measure_gait(read_tracks(files["tracks.parquet"], bundle.events, bundle.angles))
     assert {p.reason for p in again.parameters if p.name in DISTANCES} == {"estimator_bad"}
 
 
@@ -136,14 +140,14 @@ def test_distances_of_a_foot_that_refuses_its_own_rests_are_withheld_of_it_alone
     assert found.feet is not None
     assert found.orientations is not None
     assert not found.feet.withheld
-    refused = Finding("zero_velocity_refused_pct", "foot_l", 42.0, *REFUSED_PCT)
+    refused = HealthFinding("zero_velocity_refused_pct", "foot_l", 42.0, *REFUSED_PCT)
     assert refused.verdict == "bad"
     poses = replace(found.poses, health=(refused,))
     made = withhold_distances(PoseEstimate(found.orientations, poses, found.feet))
     assert made.feet is not None
     assert made.feet.withheld == {"left": "estimator_bad"}
     assert found.tracks is not None
-    measured = measure(replace(found.tracks, feet=made.feet))
+    measured = measure_gait(replace(found.tracks, feet=made.feet))
     of = {(p.name, p.side): p for p in measured.parameters}
     assert of["stride_length_m", "left"].reason == "estimator_bad"
     assert of["stride_length_m", "right"].mean is not None
@@ -197,7 +201,7 @@ def strides(step_s: float) -> Strides:
 
 
 def test_a_step_that_nobody_can_take_is_not_told() -> None:
-    found = {(p.name, p.side): p for p in temporal(strides(0.12))}
+    found = {(p.name, p.side): p for p in summarise_times(strides(0.12))}
     short, long = found["step_time_s", "left"], found["step_time_s", "right"]
     values = {p.reason for p in (short, long)}
     assert "impossible" in values
@@ -214,7 +218,7 @@ def test_a_cadence_that_nobody_can_walk_is_not_told(step_s: float) -> None:
         for k in range(20)
         for side, t in (("right", 2 * k * step_s), ("left", (2 * k + 1) * step_s))
     )
-    (cadence,) = (p for p in temporal(Strides(made)) if p.name == "cadence_spm")
+    (cadence,) = (p for p in summarise_times(Strides(made)) if p.name == "cadence_spm")
     assert (cadence.mean, cadence.n, cadence.reason) == (None, 0, "impossible")
 
 
@@ -228,21 +232,23 @@ def bent(lowest_deg: float) -> JointAngles:
 
 def test_a_knee_that_no_knee_can_be_is_not_told() -> None:
     curves = cycle_curves(bent(-35.0), strides(0.5))
-    knees = [p for p in kinematic(curves) if p.name.startswith("knee_") and p.side == "right"]
+    knees = [p for p in summarise_angles(curves) if p.name.startswith("knee_") and p.side == "right"]
     assert all((p.mean, p.reason) == (None, "impossible") for p in knees)
     assert np.isnan(curves.curves["knee_flexion"]["right"]).all()
-    told = [p for p in kinematic(cycle_curves(bent(-15.0), strides(0.5))) if p.name.startswith("knee_")]
+    told = [
+        p for p in summarise_angles(cycle_curves(bent(-15.0), strides(0.5))) if p.name.startswith("knee_")
+    ]
     assert all(p.mean is not None for p in told if p.side == "right")
     # who stands with the knee bent by 25° and was measured so may be 35° straighter
     crouched = replace(bent(-35.0), standing_deg={"knee_flexion_r": 25.0})
-    known = [p for p in kinematic(cycle_curves(crouched, strides(0.5))) if p.name.startswith("knee_")]
+    known = [p for p in summarise_angles(cycle_curves(crouched, strides(0.5))) if p.name.startswith("knee_")]
     assert all(p.mean is not None for p in known if p.side == "right")
 
 
 def test_what_nobody_can_do_is_not_told_live_either() -> None:
     angles = bent(-35.0)
     quick = Stride("right", 2.0, 2.6, 3.0, 2.1, 2.9)
-    found, curves = early_figures(quick, Span(angles.t_s, {}, {}, angles, None), GROUND)
+    found, curves = early_figures(quick, StrideSpan(angles.t_s, {}, {}, angles, None), GROUND)
     assert found["step_time_s"] == "impossible"
     assert found["knee_flexion_rom_deg"] == "impossible"
     assert "knee_flexion" not in curves

@@ -93,6 +93,6 @@ class Clinic:
         with self.db.read() as c:
             return c.execute(select(job).where(job.c.id == view.id)).one()
 
-    def results(self) -> list[analyses.Analysis]:
+    def results(self) -> list[analyses.AnalysisRecord]:
         with self.db.read() as c:
             return analyses.of_session(c, self.session.id)

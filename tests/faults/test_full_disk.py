@@ -56,7 +56,7 @@ class Visit:
 
     def rows(self) -> list[Any]:
         with self.clinic.db.read() as c:
-            return audit.entries(c, limit=1000)
+            return audit.list_entries(c, limit=1000)
 
 
 @pytest.fixture
@@ -163,7 +163,7 @@ async def test_on_a_full_disk_people_sign_in_read_results_and_sign_out(visit: Vi
     assert expected <= {action for action, _ in said}
     assert all(earlier.at <= later.at for earlier, later in itertools.pairwise(new))
     with clinic.db.read() as c:
-        assert audit.problems(c) == []
+        assert audit.find_problems(c) == []
 
 
 async def test_a_sign_in_from_before_the_disk_was_full_goes_on_and_can_be_ended(

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from server.live import client
-from server.live.client import Report, stream
+from server.live.client import StreamReport, stream
 from server.live.pairing import pair
 from server.processes.environment import make_environment
 from server.services import live, recordings
@@ -91,7 +91,7 @@ def a_server(clinic: Clinic) -> Iterator[Server]:
         server.end()
 
 
-async def walking(report: Report, over: asyncio.Event, frames: list[bytes]) -> AsyncIterator[bytes]:
+async def walking(report: StreamReport, over: asyncio.Event, frames: list[bytes]) -> AsyncIterator[bytes]:
     """A batch every few milliseconds until it is enough."""
     while not over.is_set() or len(report.ack_s) < KILLS:
         frames.append(frame(len(frames)))
@@ -100,7 +100,7 @@ async def walking(report: Report, over: asyncio.Event, frames: list[bytes]) -> A
 
 
 async def kill_again_and_again(
-    server: Server, path: Path, report: Report, over: asyncio.Event, frames: list[bytes]
+    server: Server, path: Path, report: StreamReport, over: asyncio.Event, frames: list[bytes]
 ) -> None:
     chance = random.Random(5)  # noqa: S311 - when to kill
     for number in range(KILLS):
@@ -125,7 +125,7 @@ def test_fifty_kills_in_one_take_lose_no_acknowledged_batch(
     with clinic.db.write() as c:
         take, code = live.open_take(c, None, clinic.session.id)
     path = log_path(clinic.settings.live, take.id)
-    report, frames = Report(), list[bytes]()
+    report, frames = StreamReport(), list[bytes]()
 
     async def run() -> None:
         over = asyncio.Event()

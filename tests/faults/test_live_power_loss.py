@@ -39,7 +39,7 @@ def record_a_take(path: Path, disk: ModelDisk, promises: Promises) -> None:
     log.sync()
     promises.make(3)
     log.append(PIECES[3])
-    log.back()
+    log.drop_unsynced()
     log.append(PIECES[3])
     torn(log, PIECES[4])
     log.append(PIECES[4])

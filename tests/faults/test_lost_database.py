@@ -22,7 +22,7 @@ from server.services.reviewed import ReviewedAnalyses
 from server.services.sweep import sweep
 from server.settings import Settings
 from server.storage import fs
-from server.storage.blobs import StoredFile
+from server.storage.blobs import BlobFile
 from server.storage.db import Database
 from server.storage.high_water import raise_mark
 from server.storage.migrate import upgrade
@@ -254,11 +254,11 @@ def test_the_mark_of_one_folder_does_not_trust_the_database_of_another(full: Cli
     assert sweep(full.db, full.blobs, at_once(full)) == 0
     put(full, other / "sagittal.db")  # a continuation of ours: trusted
     with full.db.read() as c:
-        assert custody.doubt(c, full.settings) is None
+        assert custody.find_doubt(c, full.settings) is None
     raise_mark(full.db, full.settings.mark)
     put(full, full.folder / "backup.db")
     with full.db.read() as c:
-        assert custody.doubt(c, full.settings) is not None
+        assert custody.find_doubt(c, full.settings) is not None
 
 
 def test_a_damaged_mark_stops_the_sweep_and_accept_writes_it_anew(full: Clinic) -> None:
@@ -310,7 +310,7 @@ def test_a_power_cut_in_a_move_to_the_trash_leaves_the_whole_file_here_or_there(
     disk = ModelDisk()
     disk.put(source, b"walk")
     fs.make_folder(target.parent)
-    one = StoredFile(space, name, source, 9e9)
+    one = BlobFile(space, name, source, 9e9)
     monkeypatch.setattr(fs, "system", disk)
     trash.take([one], at)
     monkeypatch.setattr(trash, "write_list", lambda: None)
@@ -407,7 +407,7 @@ def test_an_interrupted_erasure_is_finished_by_the_next_start(
             pass
         monkeypatch.setattr(fs, "system", fs.System())
         with clinic.db.read() as c:
-            committed = any("erased" in row.action for row in audit.entries(c))
+            committed = any("erased" in row.action for row in audit.list_entries(c))
         custody.refuse_strangers(clinic.settings)  # also when the only patient was half erased
         erasure.finish(clinic.db, clinic.blobs, clinic.settings)
         assert (traces(clinic) == set()) is committed

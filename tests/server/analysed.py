@@ -16,8 +16,8 @@ from core.errors import Notice
 from core.events.foot_pitch import pitch_signal
 from core.frames import FOOT, SIDES, Segment
 from core.fusion.orientations import Orientations
-from core.measure import measure
-from core.pipeline import Analysis
+from core.measure import measure_gait
+from core.pipeline import TakeAnalysis
 from core.quality import QualityReport
 from core.recording import Recording, SensorSignals, Subject, UniformRecording
 from server.report.exports import analysis_files
@@ -26,7 +26,7 @@ from tests.server import walk
 from tests.server.clinic import Clinic
 
 
-def analysis(*, duration_s: float = 12.0, reached: bool = True) -> Analysis:
+def analysis(*, duration_s: float = 12.0, reached: bool = True) -> TakeAnalysis:
     """The walk with a still sensor on the pelvis, and on each foot one that measures its pitching."""
     tracks = walk.tracks(duration_s)
     n = len(tracks.t_s)
@@ -49,7 +49,7 @@ def analysis(*, duration_s: float = 12.0, reached: bool = True) -> Analysis:
         "walking_direction",
     )
     orientations = Orientations(tracks.t_s, 100.0, dict(tracks.q), dict(tracks.valid), "mahony")
-    found = Analysis(
+    found = TakeAnalysis(
         source=Recording({}, {}, sha256={"a.txt": "ff"}),
         version="1",
         uniform=uniform,
@@ -64,7 +64,7 @@ def analysis(*, duration_s: float = 12.0, reached: bool = True) -> Analysis:
         posed=PoseEstimate(orientations, walk.poses(duration_s), None),
         angles=tracks.angles,
         tracks=tracks,
-        measured=measure(tracks),
+        measured=measure_gait(tracks),
     )
 
 
@@ -99,4 +99,4 @@ def finish(
     stored = {name: state.blobs.put(patient_id, content) for name, content in results.items()}
     assert state.queue.finish(claim, lambda c: analyses.publish(c, claim, stored, "0" * 64))
     with clinic.db.read() as c:
-        return analyses.shown(c, session_id).id
+        return analyses.get_shown(c, session_id).id

@@ -54,14 +54,14 @@ def take(
 
 def ended_take(
     db: Database, blobs: BlobStore, session: str, cues: Sequence[Cue], recording: str | None
-) -> tuple[live_training.Training, str]:
+) -> tuple[live_training.LiveTraining, str]:
     """A take that gave these cues and has ended as this recording: how it began, and its id."""
     with db.write() as c:
         made, code = live.open_take(c, None, session)
         live.pair(c, code)
     begun = live_training.training_of(db, ReviewedAnalyses(blobs), made)
     with db.write() as c:
-        live.started(c, made.id, "replay")
+        live.note_start(c, made.id, "replay")
         for cue in cues:
             live.add_event(c, None, made.id, "cue", cue.t_s, {"type": "cue", **cue.to_json()})
         live.end(c, None, made.id, "finished", count=1)

@@ -28,8 +28,8 @@ from core.body.erkf.kernel import (
     ErkfSamples,
     Links,
     Noise,
-    Record,
-    forward,
+    SmootherRecord,
+    filter_forward,
 )
 from core.body.erkf.params import ErkfParams
 from core.body.still import AT_REST, FOOT_STILL, still_samples
@@ -163,7 +163,7 @@ def filter_block(
 
 
 def run_block(
-    state: ErkfState, inputs: ErkfInputs, tree: ImuTree, params: ErkfParams, record: Record
+    state: ErkfState, inputs: ErkfInputs, tree: ImuTree, params: ErkfParams, record: SmootherRecord
 ) -> tuple[ErkfTrack, ErkfState]:
     """`filter_block` that leaves in `record` what the smoother needs, if that has room for the block."""
     T, n = inputs.valid.shape
@@ -181,7 +181,7 @@ def run_block(
     )
     output = new_output(tree, T)
     links, noise = links_of(tree, params), noise_of(params, rate)
-    broke = forward(*map(tuple, (memory, samples, links, noise, record, output)))
+    broke = filter_forward(*map(tuple, (memory, samples, links, noise, record, output)))
     if broke >= 0 or not _positive(memory.P):
         at = broke if broke >= 0 else T - 1
         raise EstimationError(
@@ -210,7 +210,7 @@ def new_output(tree: ImuTree, samples: int) -> ErkfOutput:
     )
 
 
-def new_record(tree: ImuTree, params: ErkfParams, samples: int) -> Record:
+def new_record(tree: ImuTree, params: ErkfParams, samples: int) -> SmootherRecord:
     """Room for so many samples of what the smoother needs; with 1 nothing is kept."""
     n, J = len(tree.imus), len(tree.joints)
     N = n * params.states
@@ -220,7 +220,7 @@ def new_record(tree: ImuTree, params: ErkfParams, samples: int) -> Record:
     used += sum(j.e_distal is not None for j in tree.joints) * (params.joint_axis_sd is not None)
     used += n * (params.zaru_sd is not None) + n
     K, B = samples, min(B, used)
-    return Record(
+    return SmootherRecord(
         F=np.empty((K, n, 5, 3, 3)),
         V=np.empty((K, B, 3, N)),
         E=np.empty((K, B, 9)),

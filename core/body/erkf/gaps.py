@@ -102,7 +102,7 @@ def _bridge(  # type: ignore[no-untyped-def]
         seen[0] += 1
 
 
-class Bridge:
+class GapBridge:
     """Corrected signals without holes; any division into blocks gives the same bits.
 
     Before its first sample a sensor is taken to stand upright.
@@ -122,9 +122,9 @@ class Bridge:
         self._along = np.tile(np.eye(3), (n, 1, 1))
         mount = to_matrix(tree.q_mount)
         for i in range(n):
-            found = guides(tree, i)
+            found = list_guides(tree, i)
             self._guide[i, : len(found)] = found
-            j = carrier(tree, i)
+            j = find_carrier(tree, i)
             if j is not None:
                 self._carry[i] = j
                 self._along[i] = to_matrix(multiply(conjugate(tree.q_mount[i]), tree.q_mount[j]))
@@ -138,7 +138,7 @@ class Bridge:
     @classmethod
     def from_first_samples(
         cls, tree: ImuTree, acc: Floats, gyr: Floats, valid: Bools, rate_hz: float
-    ) -> Bridge:
+    ) -> GapBridge:
         """A bridge for a whole take, from which nothing is taken off.
 
         Before its first sample a sensor holds that; its mean posture is of what the take has so far.
@@ -173,11 +173,11 @@ def bridge_gaps(
     ----------
     acc, gyr : (T, n, 3), of any value where not valid. valid : (T, n), some of every sensor's.
     """
-    bridge = Bridge.from_first_samples(tree, acc, gyr, valid, rate_hz)
+    bridge = GapBridge.from_first_samples(tree, acc, gyr, valid, rate_hz)
     return bridge.push(np.ascontiguousarray(acc), np.ascontiguousarray(gyr), np.ascontiguousarray(valid))
 
 
-def guides(tree: ImuTree, i: int) -> list[int]:
+def list_guides(tree: ImuTree, i: int) -> list[int]:
     """Sensors that turn as one does on the whole, the best last: what it hangs on up to the trunk.
 
     The nearer to the trunk, the less it tilts, and the better its rate about its mean vertical is the
@@ -191,7 +191,7 @@ def guides(tree: ImuTree, i: int) -> list[int]:
     return found or [j.distal for j in tree.joints if j.proximal == i]
 
 
-def carrier(tree: ImuTree, i: int) -> int | None:
+def find_carrier(tree: ImuTree, i: int) -> int | None:
     """What the end of a limb hangs on; None for all others."""
     ends = [(j.proximal, j.distal) for j in tree.joints if i in (j.proximal, j.distal)]
     return ends[0][0] if len(ends) == 1 and ends[0][1] == i else None

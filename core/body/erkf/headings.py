@@ -16,19 +16,19 @@ from typing import Final
 
 import numpy as np
 
-from core.body.corrected import corrected_signals
+from core.body.corrected import correct_signals
 from core.body.erkf.filter import erkf_inputs
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.smoother import smooth
 from core.body.erkf.start import start_state
-from core.body.health import Finding
+from core.body.health import HealthFinding
 from core.body.model import BodyModel
 from core.body.tree import person_tree
 from core.calibration.result import CalibratedRecording
 from core.errors import Notice, Severity
 from core.frames import Segment
 from core.fusion.orientations import Orientations
-from core.rest import samples
+from core.rest import index_window
 from core.rotation import about, from_matrix, multiply, to_matrix, wrap_angle, yaw
 
 LOOKED_AT_S: Final = 120.0
@@ -52,7 +52,7 @@ SETTLED: Final = radians(5.0)
 """A pass that turns nothing further is the last: what remains is below half a degree."""
 
 
-def agreed(
+def align_forward_axes(
     calibrated: CalibratedRecording,
     orientations: Orientations,
     body: BodyModel,
@@ -68,23 +68,23 @@ def agreed(
     total: dict[Segment, float] = {}
     for _ in range(ROUNDS):
         errors = heading_errors(calibrated, orientations, body, segments, params)
-        calibrated, orientations = turned(calibrated, orientations, errors)
+        calibrated, orientations = turn_forward_axes(calibrated, orientations, errors)
         total = {s: wrap_angle(total.get(s, 0.0) + error) for s, error in errors.items()}
         if all(abs(error) <= SETTLED for error in errors.values()):
             break
     return calibrated, orientations, total
 
 
-def findings(total: Mapping[Segment, float]) -> tuple[Finding, ...]:
-    """What `agreed` had to turn, as health of the run."""
+def judge_turned_axes(total: Mapping[Segment, float]) -> tuple[HealthFinding, ...]:
+    """What `align_forward_axes` had to turn, as health of the run."""
     return tuple(
-        Finding("forward_axis_turned_deg", s, degrees(abs(x)), warn=degrees(WARN), bad=degrees(BAD))
+        HealthFinding("forward_axis_turned_deg", s, degrees(abs(x)), warn=degrees(WARN), bad=degrees(BAD))
         for s, x in total.items()
     )
 
 
-def told(total: Mapping[Segment, float]) -> tuple[Notice, ...]:
-    """What the reader must know of what `agreed` had to turn: `heading_corrected`."""
+def report_turned_axes(total: Mapping[Segment, float]) -> tuple[Notice, ...]:
+    """What the reader must know of what `align_forward_axes` had to turn: `heading_corrected`."""
     off = [s for s in total if abs(total[s]) > TELL]
     if not off:
         return ()
@@ -115,14 +115,14 @@ def heading_errors(
     EstimationError of `person_tree` and `smooth`.
     """
     rate = calibrated.recording.rate_hz
-    zero = samples(calibrated.calibration.zero, rate)
+    zero = index_window(calibrated.calibration.zero, rate)
     n = len(calibrated.recording.t_s)
     length = round(LOOKED_AT_S * rate)
     first = max(0, min(zero.start, n - length))
     part = slice(first, min(n, first + length))
     mounts = {s: calibrated.calibration.segments[s].R_segment_sensor for s in segments}
     tree = person_tree(body, mounts, segments)
-    acc, gyr, valid = corrected_signals(calibrated, segments)
+    acc, gyr, valid = correct_signals(calibrated, segments)
     inputs = erkf_inputs(tree, acc[part], gyr[part], valid[part], rate)
     q = np.stack([multiply(orientations.q[s][first], from_matrix(mounts[s])) for s in segments])
     rest = (0, zero.stop - first) if zero.start == first else None
@@ -130,7 +130,7 @@ def heading_errors(
     track, _ = smooth(start_state(tree, inputs, coarse, rest, q=q), inputs, tree, coarse)
     walking = np.zeros(n, bool)
     for window in calibrated.calibration.walking:
-        walking[samples(window, rate)] = True
+        walking[index_window(window, rate)] = True
     change = []
     for i, segment in enumerate(segments):
         was, now = orientations.q[segment][part], tree.segment_q(track.q)[:, i]
@@ -142,7 +142,7 @@ def heading_errors(
     return dict(zip(segments, (apart - np.median(apart)).tolist(), strict=True))
 
 
-def turned(
+def turn_forward_axes(
     calibrated: CalibratedRecording, orientations: Orientations, errors: Mapping[Segment, float]
 ) -> tuple[CalibratedRecording, Orientations]:
     """The calibration with its forward axes turned by `heading_errors`, the orientations to match."""

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from core.body.erkf.poses import ErkfRun
-from core.body.erkf.start import parts
-from core.body.health import LONGEST_MOVING_S, Finding, longest_run_s
+from core.body.erkf.start import find_parts
+from core.body.health import LONGEST_MOVING_S, HealthFinding, longest_run_s
 from core.errors import Notice, Severity
 from core.frames import Floats
 from core.rotation import conjugate, multiply, wrap_angle, yaw
@@ -39,7 +39,7 @@ START_HEADING_DEG: Final = (30.0, 90.0)
 beyond up to 16° stay for a take (simulation, one sensor the wrong way round)."""
 
 
-def erkf_health(run: ErkfRun) -> tuple[Finding, ...]:
+def erkf_health(run: ErkfRun) -> tuple[HealthFinding, ...]:
     """Judge a run by its own quantities: joints, zero velocities, losses, height, covariance."""
     rate = 1.0 / float(np.median(run.inputs.step_s[run.inputs.step_s > 0.0]))
     valid, found = run.inputs.valid, []
@@ -48,23 +48,25 @@ def erkf_health(run: ErkfRun) -> tuple[Finding, ...]:
         both = valid[:, joint.proximal] & valid[:, joint.distal] & moving
         residual = run.track.joint_residual[both, k]
         value = 1e3 * float(np.sqrt(np.mean(residual**2))) if len(residual) else float("nan")
-        found.append(Finding("joint_residual_mm", joint.name, value, *RESIDUAL_MM))
+        found.append(HealthFinding("joint_residual_mm", joint.name, value, *RESIDUAL_MM))
     for i in run.tree.feet:
         name, contact = run.tree.imus[i], run.inputs.contact[:, i]
         refused = 100.0 * run.track.refused[contact, i].mean() if contact.any() else 0.0
-        found.append(Finding("zero_velocity_refused_pct", name, float(refused), *REFUSED_PCT))
-        found.append(Finding("contact_pct", name, 100.0 * float(contact.mean())))
-        found.append(Finding("longest_moving_s", name, longest_run_s(~contact, rate), *LONGEST_MOVING_S))
+        found.append(HealthFinding("zero_velocity_refused_pct", name, float(refused), *REFUSED_PCT))
+        found.append(HealthFinding("contact_pct", name, 100.0 * float(contact.mean())))
+        found.append(
+            HealthFinding("longest_moving_s", name, longest_run_s(~contact, rate), *LONGEST_MOVING_S)
+        )
         if contact.any():
-            found.append(Finding("climb_pct", name, _climb_pct(run, i), warn=CLIMB_PCT))
+            found.append(HealthFinding("climb_pct", name, _climb_pct(run, i), warn=CLIMB_PCT))
     for i, name in enumerate(run.tree.imus):
         lost = longest_run_s(~valid[:, i], rate)
         if lost > 0.0:
-            found.append(Finding("gap_s", name, lost, warn=GAP_S))
+            found.append(HealthFinding("gap_s", name, lost, warn=GAP_S))
     if run.tree.joints:
         found.append(_start_heading(run))
-    found.append(Finding("heading_sd_deg", None, float(np.degrees(run.track.heading_sd[-1].max()))))
-    found.append(Finding("min_eigenvalue", None, float(np.linalg.eigvalsh(run.final.P)[0])))
+    found.append(HealthFinding("heading_sd_deg", None, float(np.degrees(run.track.heading_sd[-1].max()))))
+    found.append(HealthFinding("min_eigenvalue", None, float(np.linalg.eigvalsh(run.final.P)[0])))
     return tuple(found)
 
 
@@ -126,7 +128,7 @@ STARTED_MOVING: Final = (
 )
 
 
-def erkf_notices(run: ErkfRun, findings: tuple[Finding, ...]) -> tuple[Notice, ...]:
+def erkf_notices(run: ErkfRun, findings: tuple[HealthFinding, ...]) -> tuple[Notice, ...]:
     """What of it a person must be told."""
     told = []
     for f in findings:
@@ -139,17 +141,17 @@ def erkf_notices(run: ErkfRun, findings: tuple[Finding, ...]) -> tuple[Notice, .
     return tuple(told)
 
 
-def _start_heading(run: ErkfRun) -> Finding:
+def _start_heading(run: ErkfRun) -> HealthFinding:
     """How far the smoother turned the first heading of a sensor against its part's median, the largest."""
     turn = yaw(multiply(run.track.q[0], conjugate(run.start.nominal[:, 6:10])))
-    part = parts(run.tree)
+    part = find_parts(run.tree)
     off = np.zeros(len(turn))
     for root in set(part.tolist()):
         apart = wrap_angle(turn[part == root] - turn[root])
         off[part == root] = wrap_angle(apart - np.median(apart))
     most = int(np.argmax(np.abs(off)))
     value = float(np.degrees(abs(off[most])))
-    return Finding("start_heading_off_deg", run.tree.imus[most], value, *START_HEADING_DEG)
+    return HealthFinding("start_heading_off_deg", run.tree.imus[most], value, *START_HEADING_DEG)
 
 
 def _climb_pct(run: ErkfRun, foot: int) -> float:

@@ -2,7 +2,8 @@
 
 A sample is one `advance`: predict, add noise, judge contacts, correct, inject. It serves live blocks, whole
 recordings and the smoother's second pass, so all give the same bits. What the smoother needs is written to a
-`Record`; without one the same slot is overwritten every sample.
+`SmootherRecord`; without one the same slot is overwritten
+every sample.
 """
 
 from __future__ import annotations
@@ -13,15 +14,15 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.erkf.predict import back, move, propagate, reset_before
+from core.body.erkf.predict import move, propagate, propagate_back, reset_before
 from core.body.erkf.updates import (
     GYRO_BIAS,
     VELOCITY,
     back_correct,
-    bent,
+    error_state_rows,
     heading_rows,
     joint_rows,
-    known_rows,
+    second_order_variance,
     take_block,
     tilt_rows,
 )
@@ -32,7 +33,7 @@ INVALID, CONTACT, STILL = 1, 2, 4
 """Bits of a sample's flags."""
 
 
-class Record(NamedTuple):
+class SmootherRecord(NamedTuple):
     """What one segment of the forward pass leaves for the backward pass; K samples or 1.
 
     F (K, n, 5, 3, 3) · V (K, B, 3, N) · E (K, B, 9) · H (K, B, 2, 3, 3) · place (K, B, 4) · blocks (K,) ·
@@ -135,7 +136,7 @@ class Links(NamedTuple):
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def passes(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
+def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     """vᵀ S⁻¹ v ≤ gate for the zero velocity of the IMU whose errors begin at b."""
     S = P[b + 3 : b + 6, b + 3 : b + 6]
     a, d, f = S[0, 0] + sd * sd, S[1, 1] + sd * sd, S[2, 2] + sd * sd
@@ -197,7 +198,7 @@ def judge_contacts(memory, flags, noise, taken, refused):  # type: ignore[no-unt
             count[i] = 0
             continue
         b, v = i * noise.m, x[i, 3:6]
-        taken[i] = noise.gate < 0.0 or passes(P, b, v, noise.zero_velocity, noise.gate)
+        taken[i] = noise.gate < 0.0 or is_within_gate(P, b, v, noise.zero_velocity, noise.gate)
         refused[i] = not taken[i]
         count[i] = 0 if taken[i] else count[i] + 1
         if count[i] >= noise.reaccept:
@@ -218,7 +219,8 @@ def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: i
     for j in range(links.ends.shape[0]):
         a, c = links.ends[j, 0], links.ends[j, 1]
         scratch.slack[j] = np.sqrt(
-            max(noise.centre, 0.0) ** 2 + bent(P, R, m, a, c, links.lever[j, 0], links.lever[j, 1])
+            max(noise.centre, 0.0) ** 2
+            + second_order_variance(P, R, m, a, c, links.lever[j, 0], links.lever[j, 1])
         )
     dx[:] = 0.0
     B = 0
@@ -236,7 +238,7 @@ def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: i
     for i in range(x.shape[0]):
         rests = samples.flags[k, i] & STILL
         if scratch.taken[i]:
-            known_rows(place[B], m, i, VELOCITY, x[i, 3:6], scratch.zero, y)
+            error_state_rows(place[B], m, i, VELOCITY, x[i, 3:6], scratch.zero, y)
             good &= take_block(P, dx, place[B], H[B], y, noise.zero_velocity, V[B], E[B], U)
             B += 1
         if noise.tilt > 0.0 and (scratch.taken[i] or rests):
@@ -244,7 +246,7 @@ def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: i
             good &= take_block(P, dx, place[B], H[B], y, noise.tilt, V[B], E[B], U)
             B += 1
         if noise.zaru > 0.0 and m == 15 and rests:
-            known_rows(place[B], m, i, GYRO_BIAS, x[i, 10:13], samples.gyr[k, i], y)
+            error_state_rows(place[B], m, i, GYRO_BIAS, x[i, 10:13], samples.gyr[k, i], y)
             good &= take_block(P, dx, place[B], H[B], y, noise.zaru, V[B], E[B], U)
             B += 1
         # nested: heading_rows writes the block and may only run where a heading was measured
@@ -307,7 +309,7 @@ def advance(memory, samples, k, links, noise, scratch, record, slot, output):  #
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def forward(memory, samples, links, noise, record, output):  # type: ignore[no-untyped-def]
+def filter_forward(memory, samples, links, noise, record, output):  # type: ignore[no-untyped-def]
     """Filter a block, `memory` in place; sample at which the covariance broke, or −1.
 
     All are given as plain tuples: numba looks at the fields of a named one anew in every call, 0.3 µs each.
@@ -316,7 +318,7 @@ def forward(memory, samples, links, noise, record, output):  # type: ignore[no-u
     samples = ErkfSamples(*samples)
     links = Links(*links)
     noise = Noise(*noise)
-    record = Record(*record)
+    record = SmootherRecord(*record)
     output = ErkfOutput(*output)
     n, J = memory.x.shape[0], links.ends.shape[0]
     scratch = ErkfScratch(
@@ -335,7 +337,7 @@ def forward(memory, samples, links, noise, record, output):  # type: ignore[no-u
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def backward(lam, step, record, m, out):  # type: ignore[no-untyped-def]
+def smooth_backward(lam, step, record, m, out):  # type: ignore[no-untyped-def]
     """Sweep λ (N,) back over a recorded segment and turn its filtered states `out` into smoothed ones."""
     T, n = out.shape[0], out.shape[1]
     d = np.empty(len(lam))
@@ -360,4 +362,4 @@ def backward(lam, step, record, m, out):  # type: ignore[no-untyped-def]
             turn(x[6:10], t0 - (a1 * t2 - a2 * t1), t1 - (a2 * t0 - a0 * t2), t2 - (a0 * t1 - a1 * t0))
         for B in range(record.blocks[k] - 1, -1, -1):
             back_correct(lam, record.place[k, B], record.H[k, B], record.V[k, B], record.E[k, B])
-        back(lam, record.F[k], m, step[k])
+        propagate_back(lam, record.F[k], m, step[k])

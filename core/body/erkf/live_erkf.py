@@ -18,7 +18,7 @@ import numpy as np
 
 from core.body.erkf.filter import ErkfInputs, links_of, memory_of, new_output, new_record, noise_of
 from core.body.erkf.gaps import HOLD_S
-from core.body.erkf.kernel import CONTACT, INVALID, STILL, ErkfSamples, forward
+from core.body.erkf.kernel import CONTACT, INVALID, STILL, ErkfSamples, filter_forward
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.start import start_state
 from core.body.live_still import ROLLING_MPS
@@ -50,19 +50,19 @@ def live_params() -> ErkfParams:
 
 
 @dataclass(frozen=True, eq=False)
-class Signals:
+class SignalBlock:
     """A block as the filters take it: acc, gyr (T, n, 3) corrected and bridged, valid (T, n), still (T, n, 2)
-    as `Stillness` tells."""
+    as `StillnessDetector` tells."""
 
     acc: Floats
     gyr: Floats
     valid: Bools
     still: Bools
 
-    def part(self, first: int, past: int) -> Signals:
+    def part(self, first: int, past: int) -> SignalBlock:
         """Samples first … past − 1."""
         k = slice(first, past)
-        return Signals(self.acc[k], self.gyr[k], self.valid[k], self.still[k])
+        return SignalBlock(self.acc[k], self.gyr[k], self.valid[k], self.still[k])
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
@@ -89,7 +89,7 @@ class LiveErkf:
     """
 
     def __init__(
-        self, tree: ImuTree, params: ErkfParams, rate_hz: float, standing: Signals, q: Floats
+        self, tree: ImuTree, params: ErkfParams, rate_hz: float, standing: SignalBlock, q: Floats
     ) -> None:
         T, n = standing.valid.shape
         self.tree = tree
@@ -111,7 +111,7 @@ class LiveErkf:
         self._hold, self._params = round(HOLD_S * rate_hz), params
         self.broken = False
 
-    def push(self, signals: Signals) -> tuple[Floats, Floats]:
+    def push(self, signals: SignalBlock) -> tuple[Floats, Floats]:
         """States (T, n, 16) and distances (T, joints) of the ends of each joint; NaN once it is `broken`.
 
         NaN too is a foot that was lost for long, until it rests again.
@@ -135,7 +135,7 @@ class LiveErkf:
             k = slice(first, past)
             samples = ErkfSamples(step[k], signals.acc[k], signals.gyr[k], flags[k], self._heading)
             part = output.part(first, past)
-            broke = forward(
+            broke = filter_forward(
                 *map(tuple, (self._memory, samples, self._links, self._noise, self._record, part))
             )
             if broke >= 0:
@@ -144,7 +144,7 @@ class LiveErkf:
         states[adrift] = np.nan
         return states, residual
 
-    def _settles(self, signals: Signals, adrift: Bools) -> Iterator[tuple[int, int]]:
+    def _settles(self, signals: SignalBlock, adrift: Bools) -> Iterator[tuple[int, int]]:
         """Sample and foot where one that hangs on nothing rests again after a loss; marks all until they do.
 
         A foot that is lost in mid-swing turns on by a right angle while its last rate is held. The joints

@@ -8,9 +8,9 @@ from typing import Final
 import numba
 import numpy as np
 
-from core.body.erkf.live_sensors import Filtered, FootPaths
+from core.body.erkf.live_sensors import FilteredSensors, FootPaths
 from core.body.erkf.live_watch import JointWatch
-from core.body.live_estimator import Paths, Placed, Raw, worn_feet
+from core.body.live_estimator import BodyBlock, FootBlock, MeasuredBlock, list_worn_feet
 from core.errors import Notice
 from core.estimators import ERKF, LIVE_LINKED_PATHS, LIVE_SINGLE_PATHS, NO_FIGURE, LiveMethod
 from core.frames import FOOT, SHANK, SIDES, THIGH, Segment
@@ -34,19 +34,19 @@ def _level(p, feet, still, valid, ankle, share, floor):  # type: ignore[no-untyp
             p[k, i, 2] -= floor[0]
 
 
-class Linked:
+class LinkedBody:
     """Pelvis and legs that hang together."""
 
     method: LiveMethod = ERKF.name
     attitudes: tuple[Segment, ...] = ()
 
     def __init__(
-        self, segments: Sequence[Segment], filtered: Filtered, ankle_height: float, rate_hz: float
+        self, segments: Sequence[Segment], filtered: FilteredSensors, ankle_height: float, rate_hz: float
     ) -> None:
         self.segments = tuple(segments)
         tree = filtered.tree
         self._filtered, self._ankle = filtered, ankle_height
-        feet = worn_feet(segments)
+        feet = list_worn_feet(segments)
         self._feet = np.array([self.segments.index(f) for f in feet], np.int64)
         legs = [s for s in SIDES if {THIGH[s], SHANK[s], FOOT[s]} <= set(segments)]
         shown: list[Segment] = ["pelvis", *(x for s in legs for x in (THIGH[s], SHANK[s], FOOT[s]))]
@@ -61,7 +61,7 @@ class Linked:
         """The filter gave up."""
         return self._filtered.broken
 
-    def push(self, raw: Raw) -> Placed:
+    def push(self, raw: MeasuredBlock) -> BodyBlock:
         """The next samples; the first block is the whole standing window."""
         tracked = self._filtered.push(raw)
         signals, q, p = tracked.signals, tracked.q, tracked.p
@@ -69,17 +69,19 @@ class Linked:
         known = signals.valid & np.isfinite(q[:, :, 0])
         still = np.ascontiguousarray(signals.still[:, self._feet, 0])
         feet = self._feet
-        paths = Paths(p.take(feet, axis=1), q.take(feet, axis=1), still, np.asarray(known).take(feet, axis=1))
+        paths = FootBlock(
+            p.take(feet, axis=1), q.take(feet, axis=1), still, np.asarray(known).take(feet, axis=1)
+        )
         _level(p, self._feet, still, paths.valid, self._ankle, self._share, self._floor)
-        return Placed(q, p, known, np.asarray(known[:, self._shown].all(axis=1)), paths)
+        return BodyBlock(q, p, known, np.asarray(known[:, self._shown].all(axis=1)), paths)
 
-    def told(self) -> list[Notice]:
+    def drain_notices(self) -> list[Notice]:
         """Joints whose ends are too far apart."""
         fresh, self._notices = self._notices, []
         return fresh
 
 
-class Unlinked:
+class UnlinkedSensors:
     """Sensors that make no figure: each by itself, and the paths of the feet among them."""
 
     method: LiveMethod = NO_FIGURE
@@ -95,19 +97,19 @@ class Unlinked:
         """The filter of the feet gave up."""
         return self._feet is not None and self._feet.broken
 
-    def push(self, raw: Raw) -> Placed:
+    def push(self, raw: MeasuredBlock) -> BodyBlock:
         """The next samples; the first block is the whole standing window."""
         T = len(raw.valid)
         q = np.stack([raw.turned[s] for s in self.segments], axis=1)
-        paths = no_paths(T) if self._feet is None else self._feet.push(raw)
-        return Placed(q, np.full((*q.shape[:2], 3), np.nan), raw.valid, np.zeros(T, np.bool_), paths)
+        paths = make_empty_paths(T) if self._feet is None else self._feet.push(raw)
+        return BodyBlock(q, np.full((*q.shape[:2], 3), np.nan), raw.valid, np.zeros(T, np.bool_), paths)
 
-    def told(self) -> list[Notice]:
+    def drain_notices(self) -> list[Notice]:
         """Nothing."""
         return []
 
 
-def no_paths(samples: int) -> Paths:
+def make_empty_paths(samples: int) -> FootBlock:
     """Of a set without feet."""
     none = np.zeros((samples, 0), np.bool_)
-    return Paths(np.zeros((samples, 0, 3)), np.zeros((samples, 0, 4)), none, none)
+    return FootBlock(np.zeros((samples, 0, 3)), np.zeros((samples, 0, 4)), none, none)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.body.erkf.gaps import Bridge
-from core.body.erkf.live_erkf import LiveErkf, Signals
+from core.body.erkf.gaps import GapBridge
+from core.body.erkf.live_erkf import LiveErkf, SignalBlock
 from core.body.erkf.params import ErkfParams
-from core.body.live_estimator import Paths, Raw
-from core.body.live_still import Stillness
+from core.body.live_estimator import FootBlock, MeasuredBlock
+from core.body.live_still import StillnessDetector
 from core.body.model import BodyModel
 from core.body.tree import person_tree
 from core.calibration.result import SegmentCalibration
@@ -20,16 +20,16 @@ from core.rotation import from_matrix, multiply
 
 
 @dataclass(frozen=True, eq=False)
-class Tracked:
+class FilteredBlock:
     """Signals as filtered; q (T, n, 4), p (T, n, 3) origins of segments; (T, joints) their ends apart, m."""
 
-    signals: Signals
+    signals: SignalBlock
     q: Floats
     p: Floats
     residual: Floats
 
 
-class Filtered:
+class FilteredSensors:
     """Some sensors through bridge, stillness and ErKF; the first block is the whole standing window.
 
     Parameters
@@ -51,8 +51,8 @@ class Filtered:
         self._columns = np.array([column[s] for s in segments], np.int64)
         excess = [(mounted[s].rest_norm - GRAVITY) * mounts[s][1] for s in segments]
         bias = [mounted[s].gyro_bias for s in segments]
-        self._bridge = Bridge(self.tree, np.array(excess), np.array(bias), rate_hz)
-        self._still = Stillness(len(segments), rate_hz)
+        self._bridge = GapBridge(self.tree, np.array(excess), np.array(bias), rate_hz)
+        self._still = StillnessDetector(len(segments), rate_hz)
         self._rate_hz, self._params = rate_hz, params
         # by convention all segments face ahead while standing (core/fusion/mahony.py)
         self._start = multiply(from_matrix(R_NEUTRAL), self.tree.q_mount)
@@ -63,23 +63,23 @@ class Filtered:
         """The filter gave up."""
         return self._filter is not None and self._filter.broken
 
-    def push(self, raw: Raw) -> Tracked:
+    def push(self, raw: MeasuredBlock) -> FilteredBlock:
         """The next samples."""
         # `take` lays its result out in order; an index would not, and another layout is another kernel
         k, valid = self._columns, raw.valid.take(self._columns, axis=1)
         acc, gyr = self._bridge.push(raw.acc.take(k, axis=1), raw.gyr.take(k, axis=1), valid)
-        signals = Signals(acc, gyr, valid, self._still.push(acc, gyr, valid))
+        signals = SignalBlock(acc, gyr, valid, self._still.push(acc, gyr, valid))
         if self._filter is None:
             self._filter = LiveErkf(self.tree, self._params, self._rate_hz, signals, self._start)
         states, residual = self._filter.push(signals)
         q, p = self.tree.segments(states[..., :3], states[..., 6:10])
-        return Tracked(signals, q, p, residual)
+        return FilteredBlock(signals, q, p, residual)
 
 
 class FootPaths:
     """Paths of feet, each by its own sensor: what distances are measured on where no chain links them."""
 
-    def __init__(self, filtered: Filtered) -> None:
+    def __init__(self, filtered: FilteredSensors) -> None:
         self._filtered = filtered
 
     @property
@@ -87,8 +87,8 @@ class FootPaths:
         """The filter gave up."""
         return self._filtered.broken
 
-    def push(self, raw: Raw) -> Paths:
+    def push(self, raw: MeasuredBlock) -> FootBlock:
         """The next samples."""
         x = self._filtered.push(raw)
         valid = x.signals.valid & np.isfinite(x.p[:, :, 0])
-        return Paths(x.p, x.q, np.ascontiguousarray(x.signals.still[:, :, 0]), valid)
+        return FootBlock(x.p, x.q, np.ascontiguousarray(x.signals.still[:, :, 0]), valid)

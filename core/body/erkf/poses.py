@@ -8,7 +8,7 @@ from typing import cast
 
 import numpy as np
 
-from core.body.corrected import corrected_signals
+from core.body.corrected import correct_signals
 from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, erkf_inputs
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.smoother import smooth
@@ -60,7 +60,7 @@ def run_erkf(
     """
     mounts = {s: calibrated.calibration.segments[s].R_segment_sensor for s in segments}
     tree = person_tree(body, mounts, segments)
-    acc, gyr, valid = corrected_signals(calibrated, segments)
+    acc, gyr, valid = correct_signals(calibrated, segments)
     rate = calibrated.recording.rate_hz
     inputs = erkf_inputs(tree, acc, gyr, valid, rate)
     first = np.stack([multiply(orientations.q[s][0], from_matrix(mounts[s])) for s in segments])
@@ -78,14 +78,14 @@ def run_erkf(
     return ErkfRun(tree, inputs, start, rest, track, final)
 
 
-def refined(run: ErkfRun, orientations: Orientations) -> Orientations:
+def replace_orientations(run: ErkfRun, orientations: Orientations) -> Orientations:
     """The given orientations with those of the run's segments in their place."""
     q = run.tree.segment_q(run.track.q)
     found = {s: np.ascontiguousarray(q[:, i]) for i, s in enumerate(run.segments)}
     return replace(orientations, q={**orientations.q, **found}, engine=ERKF.method)
 
 
-def figure(
+def place_figure(
     run: ErkfRun, orientations: Orientations, contacts: Mapping[Side, Bools], body: BodyModel
 ) -> Poses:
     """The pelvis and every whole leg where they are in the room.

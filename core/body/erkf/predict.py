@@ -136,7 +136,7 @@ def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def back(lam, F, m, dt):  # type: ignore[no-untyped-def]
+def propagate_back(lam, F, m, dt):  # type: ignore[no-untyped-def]
     """λ ← Fᵀ λ, the same step for the smoother."""
     for j in range(len(lam) // m):
         x = lam[j * m : (j + 1) * m]

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, filter_block, new_record, run_block
-from core.body.erkf.kernel import backward
+from core.body.erkf.kernel import smooth_backward
 from core.body.erkf.params import ErkfParams
 from core.body.tree import ImuTree
 from core.errors import ParameterError
@@ -56,7 +56,7 @@ def smooth(
     for a in reversed(starts):
         part = inputs.part(a, a + segment)
         track, _ = run_block(checkpoints.pop(), part, tree, params, record)
-        backward(lam, np.ascontiguousarray(part.step_s), record, params.states, track.nominal)
+        smooth_backward(lam, np.ascontiguousarray(part.step_s), record, params.states, track.nominal)
         b = a + len(part.step_s)
         nominal[a:b], sd[a:b], refused[a:b] = track.nominal, track.heading_sd, track.refused
         for k, joint in enumerate(tree.joints):

@@ -66,7 +66,7 @@ def start_state(
         bias = float(np.hypot(params.start_gyr_bias_sd, params.gyr_walk * np.sqrt(age_s)))
     sd = np.repeat((params.start_position_sd, velocity, tilt, bias, params.start_acc_bias_sd), 3)[:m]
     P = np.diag(np.tile(sd**2, n))
-    up, part, heading = to_matrix(q)[:, 2, :], parts(tree), np.eye(n)
+    up, part, heading = to_matrix(q)[:, 2, :], find_parts(tree), np.eye(n)
     if inputs.heading is None:
         # the heading that all have in common is nobody's error: it is what W's x means
         same = part[:, None] == part
@@ -87,7 +87,7 @@ def start_state(
 
 def chain_positions(tree: ImuTree, q: Floats) -> Floats:
     """Sensor positions (n, 3) in W that make the joint centres coincide, given orientations (n, 4)."""
-    p, part = np.full((len(tree.imus), 3), np.nan), parts(tree)
+    p, part = np.full((len(tree.imus), 3), np.nan), find_parts(tree)
     for root in tree.roots():
         p[root] = tree.origin[root] + rotate(tree.segment_q(q)[root], tree.place[root])
     for joint in _outward(tree):
@@ -101,7 +101,7 @@ def chain_positions(tree: ImuTree, q: Floats) -> Floats:
     return p
 
 
-def parts(tree: ImuTree) -> NDArray[np.int64]:
+def find_parts(tree: ImuTree) -> NDArray[np.int64]:
     """Root (n,) of the connected part of the tree that each sensor belongs to."""
     part = np.arange(len(tree.imus))
     for joint in _outward(tree):

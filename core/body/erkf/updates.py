@@ -37,7 +37,7 @@ def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-u
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def bent(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
+def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
     """Variance of the joint centre's second-order term, ½ σ⁴ |r_xy|² of both levers, in m².
 
     σ² is the variance of the two sensors' relative heading: where that is off by ψ, a lever's end is off by
@@ -60,7 +60,7 @@ def bent(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def known_rows(place, m, i, offset, value, measured, y):  # type: ignore[no-untyped-def]
+def error_state_rows(place, m, i, offset, value, measured, y):  # type: ignore[no-untyped-def]
     """Zero velocity (measured 0) or the gyroscope at rest showing its bias: an error itself is observed."""
     place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, offset, 0
     for k in range(3):

@@ -163,7 +163,7 @@ def filter_block(
         )
     now = L7sState(*(np.array(x, np.float64, order="C") for x in vars(state).values()))
     track = L7sTrack(np.empty((n, 3, 3, 3)), np.empty((n, 3, 3)), np.empty((n, 3, 3)), np.empty((n, SIZE)))
-    failed = kernel.run(
+    failed = kernel.run_l7s_kernel(
         now.R, now.p, now.v, now.P, now.since, R, acc, step, inputs.worn == "3I", 1.0 / rate_hz,
         np.array([0.5 * model.hip_width, 0.5 * model.foot, model.thigh + model.shank]),
         np.array([model.hip_height, model.foot_height]),
@@ -183,7 +183,7 @@ def filter_block(
     return track, now
 
 
-def start(inputs: L7sInputs, model: LegModel, params: L7sParams | None = None) -> L7sState:
+def start_l7s_state(inputs: L7sInputs, model: LegModel, params: L7sParams | None = None) -> L7sState:
     """The state at the first sample: standing straight, ankles under the hips, pelvis over the origin of W.
 
     Sy 2021 §III-A takes the start from Vicon; here it is the body model at the measured headings.
@@ -222,11 +222,11 @@ def start(inputs: L7sInputs, model: LegModel, params: L7sParams | None = None) -
     return L7sState(R, p, np.zeros((3, 3)), P, np.zeros(2))
 
 
-def warm() -> None:
+def compile_l7s_kernel() -> None:
     """Compile or load the kernel, so that the first take does not wait for it."""
     model = LegModel.of(BodyModel.from_height(NOMINAL_HEIGHT_M))
     foot = model.to_isb("foot_l").T
     R = np.tile(np.stack((np.eye(3), R_NEUTRAL @ foot, R_NEUTRAL @ foot)), (2, 1, 1, 1))
     for worn in get_args(Worn):
         inputs = L7sInputs(R, np.zeros((2, 3, 3)), np.ones((2, 2), bool), worn)
-        filter_block(start(inputs, model), inputs, model, 100.0)
+        filter_block(start_l7s_state(inputs, model), inputs, model, 100.0)

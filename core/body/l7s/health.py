@@ -8,7 +8,7 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from core.body.health import LONGEST_MOVING_S, Finding, longest_run_s
+from core.body.health import LONGEST_MOVING_S, HealthFinding, longest_run_s
 from core.body.poses import Poses
 from core.errors import Notice
 from core.frames import Protocol, Segment
@@ -52,7 +52,7 @@ LEVEL: Final[tuple[Protocol, ...]] = ("squat", "activity", "tug")
 """Protocols in which the pelvis does not keep its height, as L7S takes it to."""
 
 
-def l7s_health(poses: Poses) -> tuple[Finding, ...]:
+def l7s_health(poses: Poses) -> tuple[HealthFinding, ...]:
     """Judge a run of `l7s_poses` by its own quantities."""
     d = cast("dict[str, Any]", poses.diagnostics)
     found = []
@@ -61,22 +61,24 @@ def l7s_health(poses: Poses) -> tuple[Finding, ...]:
         leg = f"leg_{side[0]}"
         moving = longest_run_s(~np.asarray(poses.contact[foot]), poses.rate_hz)
         found += [
-            Finding("longest_moving_s", foot, moving, *LONGEST_MOVING_S),
-            Finding("leg_excess_mm", leg, 1e3 * d["excess_m"][side], *CONSTRAINT_MM),
-            Finding("hinge_mm", leg, 1e3 * d["hinge_m"][side], *CONSTRAINT_MM),
+            HealthFinding("longest_moving_s", foot, moving, *LONGEST_MOVING_S),
+            HealthFinding("leg_excess_mm", leg, 1e3 * d["excess_m"][side], *CONSTRAINT_MM),
+            HealthFinding("hinge_mm", leg, 1e3 * d["hinge_m"][side], *CONSTRAINT_MM),
             # the leg's length is only bounded from above: at the bound the knee is straight, whatever it did
-            Finding("knee_straight_pct", leg, 100.0 * d["knee_straight_share"][side], *STRAIGHT_PCT),
-            Finding("foot_turned_deg", foot, float(np.degrees(d["foot_turned_rad"][side]))),
+            HealthFinding("knee_straight_pct", leg, 100.0 * d["knee_straight_share"][side], *STRAIGHT_PCT),
+            HealthFinding("foot_turned_deg", foot, float(np.degrees(d["foot_turned_rad"][side]))),
         ]
     for segment, lost_s in d["gap_s"].items():
         if lost_s > 0.0:
             found.append(
-                Finding("gap_s", segment, lost_s, *(PELVIS_GAP_S if segment == "pelvis" else FOOT_GAP_S))
+                HealthFinding(
+                    "gap_s", segment, lost_s, *(PELVIS_GAP_S if segment == "pelvis" else FOOT_GAP_S)
+                )
             )
     for key, name, scale, limits in JUDGED:
         if key in d:
-            found.append(Finding(name, None, scale * d[key], *limits))
-    found.append(Finding("min_eigenvalue", None, float(d["min_eigenvalue"])))
+            found.append(HealthFinding(name, None, scale * d[key], *limits))
+    found.append(HealthFinding("min_eigenvalue", None, float(d["min_eigenvalue"])))
     return tuple(found)
 
 
@@ -159,7 +161,7 @@ SIDES_UNCHECKED: Final = (
 )
 
 
-def told(findings: Sequence[Finding]) -> tuple[Notice, ...]:
+def list_health_notices(findings: Sequence[HealthFinding]) -> tuple[Notice, ...]:
     """What of it a person must be told; the worst of each kind."""
     notices = {}
     for f in sorted(findings, key=lambda f: f.value):

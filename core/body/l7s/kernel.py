@@ -88,7 +88,7 @@ def yaw_row(R, leg, out):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def measure(R, p, v, P, measured, three, step, z_variance, heights, r, dx, work):  # type: ignore[no-untyped-def]
+def apply_measurement(R, p, v, P, measured, three, step, z_variance, heights, r, dx, work):  # type: ignore[no-untyped-def]
     """The stacked update: leaves the correction in dx and injects it (docs/science/l7s.md, "Measurements").
 
     heights : pelvis, foot. r : variances (orientation, mid-pelvis, pelvis z, yaw, zero velocity).
@@ -141,7 +141,7 @@ def measure(R, p, v, P, measured, three, step, z_variance, heights, r, dx, work)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def run(  # type: ignore[no-untyped-def]
+def run_l7s_kernel(  # type: ignore[no-untyped-def]
     R, p, v, P, since, measured, acc, step, three, dt, lengths, heights, r, swing, q, printed, projections,
     R_out, p_out, v_out, variance_out,
 ):  # fmt: skip
@@ -158,7 +158,7 @@ def run(  # type: ignore[no-untyped-def]
             z_variance[leg] = swing[1]
             if not step[n, leg]:
                 z_variance[leg] = max(swing[0] * np.exp(-4.0 * since[leg] * dt / swing[2]), swing[1])
-        measure(R, p, v, P, measured[n], three, step[n], z_variance, heights, r, dx, work)
+        apply_measurement(R, p, v, P, measured[n], three, step[n], z_variance, heights, r, dx, work)
         reset(P, dx, work)
         for _ in range(projections):
             if not project(R, p, v, P, lengths[0], lengths[1], lengths[2], dx, work):

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from core.body.erkf.live_sensors import FootPaths
-from core.body.l7s.filter import L7sInputs, L7sParams, L7sState, L7sTrack, Worn, filter_block, start
+from core.body.l7s.filter import L7sInputs, L7sParams, L7sState, L7sTrack, Worn, filter_block, start_l7s_state
 from core.body.l7s.inputs import KnownSamples, arrange_inputs, bodies_of, remove_gravity
 from core.body.l7s.legs import FIGURE, LegModel, solve_legs
-from core.body.live_estimator import Placed, Raw
+from core.body.live_estimator import BodyBlock, MeasuredBlock
 from core.body.model import BodyModel
 from core.calibration.result import SegmentCalibration
 from core.errors import EstimationError, Notice
@@ -50,23 +50,23 @@ class LiveL7s:
         """The filter gave up."""
         return self._broken or self._feet.broken
 
-    def push(self, raw: Raw) -> Placed:
+    def push(self, raw: MeasuredBlock) -> BodyBlock:
         """The next samples; the first block is the whole standing window."""
         paths = self._feet.push(raw)
         inputs = self._inputs(raw, paths.still & paths.valid)
         if self._state is None:
-            self._state = start(inputs, self._model, self._params)
+            self._state = start_l7s_state(inputs, self._model, self._params)
         track = self._filtered(inputs)
         legs = solve_legs(track.R, track.p, self._model)
         valid = [raw.valid[:, i] for i in self._column.values()]
         whole = np.asarray(self._known.push(valid, inputs.step) & np.isfinite(track.p[:, 0, 0]))
-        return Placed(legs.q, legs.p, np.repeat(whole[:, None], len(FIGURE), axis=1), whole, paths)
+        return BodyBlock(legs.q, legs.p, np.repeat(whole[:, None], len(FIGURE), axis=1), whole, paths)
 
-    def told(self) -> list[Notice]:
+    def drain_notices(self) -> list[Notice]:
         """What is new to be said of itself."""
         return []
 
-    def _inputs(self, raw: Raw, step: Bools) -> L7sInputs:
+    def _inputs(self, raw: MeasuredBlock, step: Bools) -> L7sInputs:
         acceleration = {
             s: remove_gravity(raw.acc[:, i], raw.valid[:, i], raw.turned[s], self._mounted[s])
             for s, i in self._column.items()

@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 
 from core.body.l7s.checks import longest_gaps, walking_checks
-from core.body.l7s.filter import L7sParams, Worn, filter_block, start
-from core.body.l7s.health import l7s_health, told
+from core.body.l7s.filter import L7sParams, Worn, filter_block, start_l7s_state
+from core.body.l7s.health import l7s_health, list_health_notices
 from core.body.l7s.inputs import KnownSamples, bodies_of, inputs_of
 from core.body.l7s.legs import BODIES, LEGS, LegModel, solve_legs
 from core.body.model import BodyModel
@@ -68,7 +68,9 @@ def l7s_poses(
     worn = worn or ("3I" if "pelvis" in orientations.q else "2I")
     model = LegModel.of(body)
     inputs = inputs_of(orientations, acceleration, steps, model, worn)
-    track, state = filter_block(start(inputs, model, params), inputs, model, orientations.rate_hz, params)
+    track, state = filter_block(
+        start_l7s_state(inputs, model, params), inputs, model, orientations.rate_hz, params
+    )
     legs = solve_legs(track.R, track.p, model)
     length = model.thigh + model.shank
     moving = ~inputs.step.all(axis=1) | inputs.step.all()
@@ -105,7 +107,7 @@ def l7s_poses(
         },
     )
     health = l7s_health(poses)
-    return replace(poses, health=health, notices=(*poses.notices, *told(health)))
+    return replace(poses, health=health, notices=(*poses.notices, *list_health_notices(health)))
 
 
 def _never_still(steps: Mapping[Side, Bools]) -> tuple[Notice, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.angles import SIGNS, cardan_zxy, joints, pelvis_angles
+from core.angles import SIGNS, cardan_zxy, list_leg_joints, pelvis_angles
 from core.angles.inverse import leg_orientations, pelvis_orientation
 from core.frames import SIDES, Floats, Side
 from core.norms import adult_kinematics
@@ -25,7 +25,7 @@ def measured(curves: dict[str, Floats], side: Side) -> dict[str, Floats]:
     }
     q = {s: multiply(pelvis, turn) for s, turn in leg_orientations(curves, side).items()}
     q["pelvis"] = pelvis
-    for joint, proximal, distal in joints(side):
+    for joint, proximal, distal in list_leg_joints(side):
         abc = cardan_zxy(multiply(conjugate(q[proximal]), q[distal]))
         for (name, right, left), value in zip(SIGNS[joint], abc.T, strict=True):
             found[name] = (right if side == "right" else left) * value

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.angles import SIGNS, cardan_zxy, joints, pelvis_angles
+from core.angles import SIGNS, cardan_zxy, list_leg_joints, pelvis_angles
 from core.angles.kernel import AngleKernel, subtract_zero
 from core.body.tree import PRESETS
 from core.frames import SIDES, SUFFIX, Bools, Floats
@@ -34,7 +34,7 @@ def test_compiled_angles_are_those_of_the_decomposition() -> None:
     ):
         expected[name] = np.where(here, value, np.nan)
     for side in SIDES:
-        for joint, proximal, distal in joints(side):
+        for joint, proximal, distal in list_leg_joints(side):
             i, j = column[proximal], column[distal]
             abc = cardan_zxy(multiply(conjugate(q[:, i]), q[:, j]))
             for (base, right, left), value in zip(SIGNS[joint], abc.T, strict=True):

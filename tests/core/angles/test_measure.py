@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.angles import SIGNS, cardan_zxy, headings, pelvis_angles
+from core.angles import SIGNS, cardan_zxy, compute_headings, pelvis_angles
 from core.angles.measure import measure_angles
 from core.frames import R_NEUTRAL, SIDES, SUFFIX, Bools, Floats, Segment
 from core.fusion.orientations import Orientations
@@ -174,7 +174,7 @@ def test_headings_are_continuous_over_turns_and_only_of_sensors() -> None:
     q = multiply(about(2, turning), np.tile(NEUTRAL, (n, 1)))
     valid: dict[Segment, Bools] = {"pelvis": np.ones(n, bool)}
     valid["pelvis"][50:60] = False
-    course = headings(Orientations(np.arange(n) / 100.0, 100.0, {"pelvis": q}, valid, "test"))
+    course = compute_headings(Orientations(np.arange(n) / 100.0, 100.0, {"pelvis": q}, valid, "test"))
     assert set(course) == {"pelvis"}
     assert np.isnan(course["pelvis"][50:60]).all()
     known = np.isfinite(course["pelvis"])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from core.frames import SIDES, Floats, Side
-from core.pipeline import Analysis, analyse
+from core.pipeline import TakeAnalysis, analyse
 from core.recording import Recording, Subject
 from core.simulate import simulate_scenario
 from core.timeline import synchronise
@@ -22,11 +22,11 @@ def recording() -> Recording:
 
 
 @cache
-def analysed(standing_width_m: float | None) -> Analysis:
+def analysed(standing_width_m: float | None) -> TakeAnalysis:
     return analyse(replace(recording(), subject=Subject(HEIGHT, standing_width_m)))
 
 
-def apart_m(analysis: Analysis) -> Floats:
+def apart_m(analysis: TakeAnalysis) -> Floats:
     """Distance of the ankles across the line from hip to hip, per sample."""
     assert analysis.poses is not None
     p = analysis.poses.p
@@ -35,7 +35,7 @@ def apart_m(analysis: Analysis) -> Floats:
     return np.asarray(np.sum((p["foot_l"] - p["foot_r"]) * across, axis=1))
 
 
-def standing(analysis: Analysis) -> slice:
+def standing(analysis: TakeAnalysis) -> slice:
     assert analysis.calibration is not None
     a, b = analysis.calibration.zero
     return slice(round(a * 100), round(b * 100))
@@ -49,7 +49,7 @@ def test_the_figure_stands_as_wide_as_measured(width: float) -> None:
 
 
 def test_steps_are_wider_by_what_standing_was_wider() -> None:
-    def width(of: Analysis, side: Side) -> float:
+    def width(of: TakeAnalysis, side: Side) -> float:
         mean = next(p.mean for p in of.parameters if (p.name, p.side) == ("step_width_m", side))
         assert mean is not None
         return mean

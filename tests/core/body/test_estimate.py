@@ -11,7 +11,7 @@ import pytest
 from core import calibration, events
 from core.angles.measure import measure_angles
 from core.body import contact_mask
-from core.body.choice import possible
+from core.body.choice import list_possible_estimators
 from core.body.estimate import PoseEstimate, estimate_poses
 from core.body.mounting import MountedSensors, mount_sensors
 from core.body.pose_params import PoseParams
@@ -20,7 +20,7 @@ from core.errors import EstimationError
 from core.frames import FOOT, SEGMENTS, SIDES, Floats, Segment
 from core.fusion.mahony import estimate_orientations
 from core.recording import UniformRecording
-from core.simulate import Truth
+from core.simulate import WalkTruth
 from tests.walks import only, simulated
 
 WHOLE = PRESETS["lower_body7"]
@@ -45,7 +45,7 @@ def walk(*worn: Segment) -> PoseEstimate:
     return estimated(only(simulated("fast_with_turns", 3)[0], *(worn or WHOLE)))
 
 
-def truth() -> Truth:
+def truth() -> WalkTruth:
     return simulated("fast_with_turns", 3)[1]
 
 
@@ -71,7 +71,7 @@ def failing(take: UniformRecording, segment: Segment, from_s: float) -> UniformR
     ],
 )
 def test_what_is_worn_decides(worn: set[Segment], first: str | None) -> None:
-    assert (possible(worn) or (None,))[0] == first
+    assert (list_possible_estimators(worn) or (None,))[0] == first
 
 
 def test_seven_sensors_walk_through_the_room_as_the_person_did() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from core.body.estimate import PoseEstimate
-from core.body.health import Finding, longest_run_s, worst
+from core.body.health import HealthFinding, find_worst_verdict, longest_run_s
 from core.frames import FOOT, Segment
-from core.pipeline import Analysis, analyse
+from core.pipeline import TakeAnalysis, analyse
 from core.recording import Recording, UniformRecording
 from core.rotation import about, rotate
 from core.simulate import simulate_scenario
@@ -42,11 +42,13 @@ def residuals(made: PoseEstimate) -> dict[str | None, float]:
 
 
 def test_a_verdict_follows_the_limits() -> None:
-    assert [Finding("x", None, v, 1.0, 2.0).verdict for v in (1.0, 1.5, 2.5)] == ["good", "warn", "bad"]
-    assert Finding("x", None, float("nan"), 1.0, 2.0).verdict == "bad"
-    assert Finding("x", None, 9.0).verdict == "good"
-    assert worst([Finding("x", None, 0.0, 1.0), Finding("y", None, 3.0, 1.0)]) == "warn"
-    assert worst([]) == "good"
+    assert [HealthFinding("x", None, v, 1.0, 2.0).verdict for v in (1.0, 1.5, 2.5)] == ["good", "warn", "bad"]
+    assert HealthFinding("x", None, float("nan"), 1.0, 2.0).verdict == "bad"
+    assert HealthFinding("x", None, 9.0).verdict == "good"
+    assert (
+        find_worst_verdict([HealthFinding("x", None, 0.0, 1.0), HealthFinding("y", None, 3.0, 1.0)]) == "warn"
+    )
+    assert find_worst_verdict([]) == "good"
 
 
 def test_the_longest_run_is_found_wherever_it_lies() -> None:
@@ -63,7 +65,7 @@ def test_a_right_set_up_is_not_accused(name: str, seed: int) -> None:
     accused = {"sensors_do_not_hang_together", "zero_velocity_refused", "foot_never_still", "started_moving"}
     assert not codes(made) & accused
     assert max(residuals(made).values()) < 10.0
-    assert worst([f for f in made.poses.health if f.name != "forward_axis_turned_deg"]) == "good"
+    assert find_worst_verdict([f for f in made.poses.health if f.name != "forward_axis_turned_deg"]) == "good"
 
 
 @pytest.mark.slow
@@ -77,7 +79,7 @@ def test_exchanged_sides_do_not_hang_together(a: Segment, b: Segment) -> None:
 @pytest.mark.slow
 def test_exchanged_segments_of_one_leg_are_told() -> None:
     made = estimated(swapped(take(), "thigh_l", "shank_l"))
-    assert worst(made.poses.health) != "good"
+    assert find_worst_verdict(made.poses.health) != "good"
     assert codes(made) & {"sensors_do_not_hang_together", "heading_corrected"}
 
 
@@ -147,7 +149,7 @@ def test_a_burst_of_no_numbers_is_a_gap() -> None:
         made.recording,
         streams={**made.recording.streams, device: replace(stream, acc=acc, gyr=gyr)},
     )
-    done: Analysis = analyse(broken)
+    done: TakeAnalysis = analyse(broken)
     assert done.problem is None
     assert done.poses is not None
     assert done.poses.method == "erkf_smoothed"

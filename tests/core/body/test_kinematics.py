@@ -15,25 +15,25 @@ from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Side
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import rotate
-from core.simulate import Truth
+from core.simulate import WalkTruth
 from tests.walks import only, simulated
 
 BODY = BodyModel.from_height(1.75)
 
 
-def true_contacts(truth: Truth, t_s: np.ndarray) -> dict[Side, Bools]:
+def true_contacts(truth: WalkTruth, t_s: np.ndarray) -> dict[Side, Bools]:
     return {
         s: contact_mask(t_s, truth.contacts[s].contact.tolist(), truth.contacts[s].release.tolist())
         for s in SIDES
     }
 
 
-def from_truth(truth: Truth) -> Orientations:
+def from_truth(truth: WalkTruth) -> Orientations:
     valid = {s: np.ones(len(truth.t_s), bool) for s in truth.q}
     return Orientations(truth.t_s, truth.rate_hz, truth.q, valid, "truth")
 
 
-def figure(name: str = "comfortable") -> tuple[Poses, Truth]:
+def figure(name: str = "comfortable") -> tuple[Poses, WalkTruth]:
     _, truth = simulated(name)
     return forward_kinematics(from_truth(truth), truth.body, true_contacts(truth, truth.t_s)), truth
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from core.body import BodyModel
-from core.body.erkf.gaps import Bridge, bridge_gaps
-from core.body.live_still import Stillness
+from core.body.erkf.gaps import GapBridge, bridge_gaps
+from core.body.live_still import StillnessDetector
 from core.body.still import AT_REST, FOOT_STILL, still_samples
 from core.body.tree import PRESETS, person_tree
 from core.frames import GRAVITY, Bools, Floats
@@ -43,7 +43,7 @@ def in_blocks(n: int, seed: int) -> list[slice]:
 def test_a_live_gap_is_bridged_as_a_stored_one() -> None:
     acc, gyr = moving()
     valid = holes(len(acc))
-    live = Bridge(TREE, np.zeros((7, 3)), np.zeros((7, 3)), RATE).push(acc, gyr, valid)
+    live = GapBridge(TREE, np.zeros((7, 3)), np.zeros((7, 3)), RATE).push(acc, gyr, valid)
     stored = bridge_gaps(TREE, acc, gyr, valid, RATE)
     for ours, theirs in zip(live, stored, strict=True):
         assert np.array_equal(ours, theirs)
@@ -53,8 +53,8 @@ def test_a_live_gap_is_bridged_as_a_stored_one() -> None:
 def test_blocks_of_any_size_give_the_same_bits(seed: int) -> None:
     acc, gyr = moving(seed=seed)
     valid, noise = holes(len(acc)), np.full((7, 3), 0.01)
-    whole, pieces = (Bridge(TREE, noise, noise, RATE) for _ in range(2))
-    still, parts = Stillness(7, RATE), Stillness(7, RATE)
+    whole, pieces = (GapBridge(TREE, noise, noise, RATE) for _ in range(2))
+    still, parts = StillnessDetector(7, RATE), StillnessDetector(7, RATE)
     a, w = whole.push(acc, gyr, valid)
     rests = still.push(a, w, valid)
     for k in in_blocks(len(acc), seed):
@@ -68,7 +68,7 @@ def test_a_sensor_that_was_never_heard_stands_upright() -> None:
     acc, gyr = moving()
     valid = np.ones((len(acc), 7), bool)
     valid[:, 5] = False
-    f, w = Bridge(TREE, np.zeros((7, 3)), np.zeros((7, 3)), RATE).push(acc, gyr, valid)
+    f, w = GapBridge(TREE, np.zeros((7, 3)), np.zeros((7, 3)), RATE).push(acc, gyr, valid)
     assert np.isfinite(f).all()
     assert np.isfinite(w).all()
 
@@ -80,7 +80,7 @@ def test_live_stillness_trails_and_never_looks_ahead() -> None:
     gyr = np.zeros((n, 1, 3))
     gyr[:100], gyr[300:500] = 3.0, 3.0
     valid = np.ones((n, 1), bool)
-    stands, rests = Stillness(1, RATE).push(acc, gyr, valid)[:, 0].T
+    stands, rests = StillnessDetector(1, RATE).push(acc, gyr, valid)[:, 0].T
     assert np.flatnonzero(stands)[0] == 102
     assert not stands[300:500].any()
     assert stands[102:300].all()

@@ -14,13 +14,13 @@ from core.errors import CalibrationError, SignalError
 from core.frames import SEGMENTS, Floats, Segment
 from core.recording import UniformRecording
 from core.rotation import exp, from_matrix, log, normalise, rotate, to_matrix
-from core.simulate import Arc, Pivot, Stand, Straight, Truth
+from core.simulate import Arc, Pivot, Stand, Straight, WalkTruth
 from tests.walks import cut, only, scripted, simulated, turned
 
 LEGS: tuple[Segment, ...] = ("thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r")
 
 
-def axial_error_deg(calibration: Calibration, truth: Truth, segment: Segment) -> float:
+def axial_error_deg(calibration: Calibration, truth: WalkTruth, segment: Segment) -> float:
     """Error of the anterior axis about the segment's long axis."""
     R = to_matrix(truth.mounts[segment].q_segment_sensor)
     E = calibration.segments[segment].R_segment_sensor @ R.T

@@ -8,11 +8,11 @@ import pytest
 from core.calibration.heading import (
     HeadingParams,
     acceleration_axis,
-    difference,
     nearest_sign,
     rest_to_rest_velocity,
     start_direction,
     step_time,
+    subtract_angles,
     velocity_direction,
 )
 
@@ -32,7 +32,7 @@ def test_velocity_out_less_back_is_the_direction_in_spite_of_a_bias(direction: f
     v = rest_to_rest_velocity(out_and_back(direction, 0.05 - 0.03j), True, RATE)
     found = velocity_direction(v, 0, [(200, 700), (900, 1400)], [0.0, np.pi], PARAMS)
     assert found is not None
-    assert abs(difference(found.angle, direction)) < np.radians(1.0)
+    assert abs(subtract_angles(found.angle, direction)) < np.radians(1.0)
     assert found.score > 0.99
 
 
@@ -49,7 +49,7 @@ def test_velocity_next_to_a_rest_tells_the_sign(leads: bool) -> None:
     rest, part, turn = ((0.0, 1.0), (110, 700), 0.0) if leads else ((15.0, 16.0), (900, 1490), np.pi)
     found = start_direction(a, rest, part, turn, leads, RATE, 1.5, PARAMS)
     assert found is not None
-    assert abs(difference(found.angle, 0.7)) < np.radians(2.0)
+    assert abs(subtract_angles(found.angle, 0.7)) < np.radians(2.0)
 
 
 def test_a_rest_far_from_the_walk_tells_no_sign() -> None:
@@ -62,8 +62,8 @@ def test_axis_of_a_leg_is_where_it_swings_most(direction: float) -> None:
     a = (3.0 * np.sin(6 * t) + 1j * np.sin(6 * t + 1.3)) * np.exp(1j * direction)
     found = acceleration_axis(a, [(0, 1000)], [0.0], RATE, PARAMS)
     turned_part = acceleration_axis(a * np.exp(0.5j), [(0, 1000)], [0.5], RATE, PARAMS)
-    assert abs(difference(nearest_sign(found.angle, turned_part.angle), turned_part.angle)) < 1e-9
-    assert abs(difference(nearest_sign(found.angle, direction), direction)) < np.radians(8.0)
+    assert abs(subtract_angles(nearest_sign(found.angle, turned_part.angle), turned_part.angle)) < 1e-9
+    assert abs(subtract_angles(nearest_sign(found.angle, direction), direction)) < np.radians(8.0)
 
 
 def test_sway_of_the_trunk_does_not_turn_the_axis() -> None:
@@ -73,8 +73,8 @@ def test_sway_of_the_trunk_does_not_turn_the_axis() -> None:
     a = (np.sin(2 * np.pi * t / step) + 2.0j * np.sin(np.pi * t / step)) * np.exp(0.4j)
     across = acceleration_axis(a, [(0, 2000)], [0.0], RATE, PARAMS)
     along = acceleration_axis(a, [(0, 2000)], [0.0], RATE, PARAMS, [step])
-    assert abs(difference(nearest_sign(across.angle, 0.4), 0.4)) > np.radians(60.0)
-    assert abs(difference(nearest_sign(along.angle, 0.4), 0.4)) < np.radians(1.0)
+    assert abs(subtract_angles(nearest_sign(across.angle, 0.4), 0.4)) > np.radians(60.0)
+    assert abs(subtract_angles(nearest_sign(along.angle, 0.4), 0.4)) < np.radians(1.0)
 
 
 @pytest.mark.parametrize("step", [0.4, 0.55, 0.7, 0.95])

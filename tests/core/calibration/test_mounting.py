@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.calibration.mounting import declared_angle, declared_direction
+from core.calibration.mounting import read_declared_angle, read_declared_direction
 from core.calibration.standing import vertical_frame
 
 
@@ -22,7 +22,7 @@ from core.calibration.standing import vertical_frame
     ],
 )
 def test_words_become_a_direction(text: str, axis: tuple[int, int, int], degrees: float) -> None:
-    found = declared_direction(text)
+    found = read_declared_direction(text)
     assert found is not None
     np.testing.assert_allclose(found[0], axis)
     assert np.degrees(found[1]) == pytest.approx(degrees)
@@ -30,17 +30,17 @@ def test_words_become_a_direction(text: str, axis: tuple[int, int, int], degrees
 
 @pytest.mark.parametrize("text", ["", "sacrum", "with tape", "surface forwarded by mail"])
 def test_words_that_say_nothing_are_nothing(text: str) -> None:
-    assert declared_direction(text) is None
+    assert read_declared_direction(text) is None
 
 
 def test_an_axis_along_the_vertical_says_nothing() -> None:
-    assert declared_angle("face forward", vertical_frame(np.array([0.0, 0.0, 1.0])), "pelvis") is None
+    assert read_declared_angle("face forward", vertical_frame(np.array([0.0, 0.0, 1.0])), "pelvis") is None
 
 
 def test_angle_is_that_of_anterior_in_the_rest_world() -> None:
     """A sensor upright (y up) with its face (z) backwards: anterior is −z, which in the rest world is +y."""
     R = vertical_frame(np.array([0.0, 1.0, 0.0]))
-    angle = declared_angle("face backwards", R, "pelvis")
+    angle = read_declared_angle("face backwards", R, "pelvis")
     assert angle is not None
     v = R @ np.array([0.0, 0.0, -1.0])
     assert angle == pytest.approx(np.arctan2(-v[2], v[0]))

@@ -58,4 +58,4 @@ def test_flexion_is_right_at_any_sampling_rate(rate_hz: float) -> None:
     angles = measure_angles(estimate_orientations(calibrated), calibrated.calibration.zero).angles
     n = min(len(recording.t_s), len(truth.t_s))
     for name in ("hip_flexion_l", "knee_flexion_r", "ankle_dorsiflexion_l"):
-        assert rms_deg(angles[name][:n] - truth.zeroed()[name][:n]) < 1.5
+        assert rms_deg(angles[name][:n] - truth.subtract_standing()[name][:n]) < 1.5

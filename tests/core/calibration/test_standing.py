@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.calibration.standing import choose_rest, find_rests, stand, vertical_frame
+from core.calibration.standing import choose_rest, find_rests, measure_standing, vertical_frame
 from core.errors import SignalError
 from core.frames import Floats
 from core.recording import SensorSignals, Subject, UniformRecording
@@ -54,7 +54,7 @@ def test_sensor_x_along_the_vertical_works() -> None:
 
 def test_standing_gives_up_bias_and_norm() -> None:
     bias = np.radians([1.0, -0.5, 0.2])
-    found = stand(sensor(np.tile(bias, (500, 1))), RATE, (1.0, 4.0), "foot_l")
+    found = measure_standing(sensor(np.tile(bias, (500, 1))), RATE, (1.0, 4.0), "foot_l")
     np.testing.assert_allclose(found.up, [0, 1, 0])
     np.testing.assert_allclose(found.gyro_bias, bias)
     assert found.rest_norm == pytest.approx(9.81)
@@ -64,7 +64,7 @@ def test_standing_gives_up_bias_and_norm() -> None:
 def test_rest_that_cannot_be_gravity_is_a_unit_error(norm: float) -> None:
     acc = np.tile([0.0, norm, 0.0], (500, 1))
     with pytest.raises(SignalError) as caught:
-        stand(sensor(np.zeros((500, 3)), acc), RATE, (0.0, 5.0), "foot_l")
+        measure_standing(sensor(np.zeros((500, 3)), acc), RATE, (0.0, 5.0), "foot_l")
     assert caught.value.code == "unit_suspect"
     assert f"{norm:.2f}" in caught.value.message
 
@@ -125,5 +125,5 @@ def test_invalid_samples_do_not_enter_the_mean() -> None:
     x = sensor(gyr)
     valid = np.ones(500, bool)
     valid[100:200] = False
-    found = stand(replace(x, valid=valid), RATE, (0.0, 5.0), "foot_l")
+    found = measure_standing(replace(x, valid=valid), RATE, (0.0, 5.0), "foot_l")
     np.testing.assert_allclose(found.gyro_bias, 0.0)

@@ -9,20 +9,20 @@ import pytest
 
 from core.change import (
     Change,
-    detectable,
     detectable_ratio,
+    estimate_repeatability,
+    find_detectable_change,
+    find_relevant_change,
     parameter_changes,
     ratio_changes,
-    relevant,
-    repeatability,
     score_changes,
     score_name,
 )
 from core.frames import SIDES, Side
 from core.norms import NormValue
 from core.parameters.result import Parameter
-from core.parameters.symmetry import symmetries
-from core.parameters.variability import summary
+from core.parameters.symmetry import compare_sides
+from core.parameters.variability import summarise_values
 from core.scores import Score
 
 
@@ -99,20 +99,22 @@ def test_few_wild_strides_widen_the_limit() -> None:
     """The published 6.7 cm takes a steady mean for granted; five strides ± 8 cm are not one."""
     rng = np.random.default_rng(1)
     before, after = (
-        summary("step_length_m", "left", (m + 0.08 * rng.standard_normal(5)).tolist(), "m")
+        summarise_values("step_length_m", "left", (m + 0.08 * rng.standard_normal(5)).tolist(), "m")
         for m in (0.40, 0.50)
     )
     (found,) = parameter_changes([before], [after])
     assert found.limit is not None
     assert found.limit > 0.067
     assert found.limit_source == "strides of the two sessions, 95 %"
-    many = [summary("step_length_m", "left", [m - 0.01, m + 0.01] * 30, "m") for m in (0.40, 0.50)]
+    many = [summarise_values("step_length_m", "left", [m - 0.01, m + 0.01] * 30, "m") for m in (0.40, 0.50)]
     (steady,) = parameter_changes([many[0]], [many[1]])
     assert (steady.limit, steady.verdict) == (0.067, "real_change")
 
 
 def test_own_repeated_measurements_go_before_published_limits() -> None:
-    found = repeatability([[60.0, 62.0], [50.0, 51.0], [55.0, 55.0], [70.0, 72.0], [64.0, 63.0], [9.0]])
+    found = estimate_repeatability(
+        [[60.0, 62.0], [50.0, 51.0], [55.0, 55.0], [70.0, 72.0], [64.0, 63.0], [9.0]]
+    )
     assert found is not None
     # pooled within-person variance (2 + .5 + 0 + 2 + .5) / 5 = 1
     assert found.sem == pytest.approx(1.0)
@@ -121,7 +123,7 @@ def test_own_repeated_measurements_go_before_published_limits() -> None:
     change = one("knee_flexion_rom_deg", 50.0, 53.0, "left", own={"knee_flexion_rom_deg": found})
     assert change.verdict == "real_change"
     assert "own repeated" in str(change.limit_source)
-    assert repeatability([[1.0, 2.0]] * 4) is None
+    assert estimate_repeatability([[1.0, 2.0]] * 4) is None
 
 
 def test_a_change_towards_the_norm_is_told_where_the_norm_compares() -> None:
@@ -143,7 +145,7 @@ def test_ratios_have_limits_with_the_affected_side_first() -> None:
     def session(left: float, right: float, affected: Side | None) -> tuple[Change, ...]:
         rows = [parameter("stance_time_s", v, s, "s") for s, v in zip(SIDES, (left, right), strict=True)]
         even = [parameter("stance_time_s", 0.70, s, "s") for s in SIDES]
-        return ratio_changes(symmetries(rows, affected), symmetries(even, affected))
+        return ratio_changes(compare_sides(rows, affected), compare_sides(even, affected))
 
     (change,) = session(0.60, 0.75, "left")
     assert change.difference == pytest.approx(0.2)
@@ -166,7 +168,7 @@ def test_scores_know_their_way_but_no_error_of_their_own() -> None:
         [score(70.0, name="gdi_star", unit="points")], [score(80.0, name="gdi_star", unit="points")]
     )
     assert (index.towards_norm, index.mcid) == (True, None)
-    own = repeatability([[5.0, 5.4]] * 6)
+    own = estimate_repeatability([[5.0, 5.4]] * 6)
     assert own is not None
     (judged,) = score_changes([score(9.0)], [score(7.0)], {score_name(score(1.0)): own})
     assert judged.verdict == "clinically_relevant"
@@ -182,11 +184,14 @@ def test_every_limit_names_people_and_source() -> None:
         "gait_speed_mps", "step_length_m", "stance_pct", "knee_flexion_rom_deg", "hip_flexion_rom_deg",
         "hip_flexion_min_deg", "knee_flexion_max_swing_deg",
     ]  # fmt: skip
-    limits = [detectable(n, 0.5) for n in names] + [detectable_ratio("step_length_m"), relevant("gps_deg")]
+    limits = [find_detectable_change(n, 0.5) for n in names] + [
+        detectable_ratio("step_length_m"),
+        find_relevant_change("gps_deg"),
+    ]
     for limit in limits:
         assert limit is not None
         assert limit.value > 0
         assert limit.people
         assert limit.source
-    assert detectable("stance_time_s", 0.7) is None
-    assert relevant("step_width_m") is None
+    assert find_detectable_change("stance_time_s", 0.7) is None
+    assert find_relevant_change("step_width_m") is None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from core.events.bouts import bouts_of, walking_bouts
+from core.events.bouts import find_bouts, walking_bouts
 from core.events.result import GaitEvent, GaitEvents
 
 
@@ -50,7 +50,7 @@ def test_a_bout_starts_when_the_first_foot_leaves_and_knows_of_rest() -> None:
         GaitEvent(t, "right" if i % 2 else "left", "ic", "manual", t) for i, t in enumerate(steps(5.0, 10))
     ]
     events += [GaitEvent(t, "left", "tc", "manual", t) for t in (4.6, 5.6)]
-    (bout,) = bouts_of(GaitEvents(tuple(events)), rests=((0.0, 4.0), (12.5, 20.0)))
+    (bout,) = find_bouts(GaitEvents(tuple(events)), rests=((0.0, 4.0), (12.5, 20.0)))
     assert bout.start_s == 4.6
     assert bout.initiation_s == pytest.approx(0.4)
     assert (bout.from_rest, bout.to_rest) == (True, False)
@@ -66,4 +66,4 @@ def test_the_foot_that_left_in_the_walk_before_starts_no_new_one() -> None:
 
 def test_no_contacts_are_no_bouts() -> None:
     assert walking_bouts([]) == ()
-    assert bouts_of(GaitEvents(())) == ()
+    assert find_bouts(GaitEvents(())) == ()

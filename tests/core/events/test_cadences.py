@@ -6,13 +6,13 @@ import pytest
 
 from core import calibration
 from core.errors import CalibrationError
-from core.events.consensus import all_detectors, consensus
+from core.events.consensus import agree_on_contacts, all_detectors
 from core.events.lumbar import detect_steps
 from core.frames import SIDES
 from core.fusion.mahony import estimate_orientations
 from core.recording import UniformRecording
 from core.simulate.script import Stand, Straight
-from core.simulate.truth import Truth
+from core.simulate.truth import WalkTruth
 from tests.accuracy.event_scoring import match
 from tests.walks import only, scripted
 
@@ -20,7 +20,7 @@ CADENCES = ((0.35, 0.27), (0.64, 0.27), (0.30, 0.22), (0.40, 0.90), (0.30, 1.10)
 """Step length in m, step time in s: twice the usual cadence, quicker still, slow, slower."""
 
 
-def walk(step_m: float, step_s: float) -> tuple[UniformRecording, Truth]:
+def walk(step_m: float, step_s: float) -> tuple[UniformRecording, WalkTruth]:
     return scripted((Stand(5.0), Straight(24 * step_m, step_m, step_s), Stand(4.0)))
 
 
@@ -28,7 +28,7 @@ def walk(step_m: float, step_s: float) -> tuple[UniformRecording, Truth]:
 def test_the_feet_are_found_at_any_cadence(step_m: float, step_s: float) -> None:
     recording, truth = walk(step_m, step_s)
     detectors = all_detectors(estimate_orientations(calibration.calibrate(recording)))
-    for events in (detectors["foot_pitch"], consensus(detectors)):
+    for events in (detectors["foot_pitch"], agree_on_contacts(detectors)):
         for side in SIDES:
             result = match(events.times(side, "ic"), truth.contacts[side].contact.tolist(), 0.15)
             # the closing step hardly lifts the foot

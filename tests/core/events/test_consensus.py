@@ -9,7 +9,7 @@ import pytest
 
 from core import calibration
 from core.events import detect
-from core.events.consensus import all_detectors, consensus, with_confidence
+from core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
 from core.events.result import GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES
 from core.fusion.mahony import estimate_orientations
@@ -34,7 +34,7 @@ def detectors(name: str) -> dict[str, GaitEvents]:
 
 def test_contacts_that_all_saw_have_full_confidence_and_the_leads_time() -> None:
     found = {"a": contacts(1, 2, 3, 4), "b": contacts(1.05, 2.06, 3.05, 4.05), "c": contacts(0.99, 2, 3, 4)}
-    agreed = consensus(found)
+    agreed = agree_on_contacts(found)
     assert agreed.times("left", "ic") == (1, 2, 3, 4)
     assert {e.confidence for e in agreed.events} == {1.0}
     assert {e.source for e in agreed.events} == {"consensus"}
@@ -43,42 +43,42 @@ def test_contacts_that_all_saw_have_full_confidence_and_the_leads_time() -> None
 
 def test_a_contact_of_one_detector_in_three_is_left_out_and_counted() -> None:
     found = {"a": contacts(1, 2, 3, 4, 4.5), "b": contacts(1, 2, 3, 4), "c": contacts(1, 2, 3, 4)}
-    agreed = consensus(found)
+    agreed = agree_on_contacts(found)
     assert agreed.times("left", "ic") == (1, 2, 3, 4)
     assert [n.code for n in agreed.notices] == ["detectors_disagree"]
 
 
 def test_a_contact_that_the_lead_missed_is_added_when_most_saw_it() -> None:
     found = {"a": contacts(1, 2, 4, 5), "b": contacts(1, 2, 3, 4, 5), "c": contacts(1, 2, 3.02, 4, 5)}
-    agreed = consensus(found)
+    agreed = agree_on_contacts(found)
     (added,) = (e for e in agreed.events if 2.5 < e.time_s < 3.5)
     assert added.confidence == pytest.approx(2 / 3)
 
 
 def test_of_two_detectors_the_lead_is_believed_and_the_other_not() -> None:
-    agreed = consensus({"a": contacts(1, 2, 3), "b": contacts(1, 2, 4)})
+    agreed = agree_on_contacts({"a": contacts(1, 2, 3), "b": contacts(1, 2, 4)})
     assert agreed.times("left", "ic") == (1, 2, 3)
     assert [e.confidence for e in agreed.events] == [1.0, 1.0, 0.5]
 
 
 def test_a_detector_that_means_a_later_moment_still_agrees() -> None:
     late = tuple(t + 0.2 for t in (1, 2, 3, 4, 5))
-    agreed = consensus({"a": contacts(1, 2, 3, 4, 5), "b": contacts(*late)})
+    agreed = agree_on_contacts({"a": contacts(1, 2, 3, 4, 5), "b": contacts(*late)})
     assert {e.confidence for e in agreed.events} == {1.0}
 
 
 def test_confidence_alone_adds_and_takes_away_nothing() -> None:
     lead = contacts(1, 2, 4)
-    told = with_confidence({"a": lead, "b": contacts(1, 2, 3)})
+    told = rate_confidence({"a": lead, "b": contacts(1, 2, 3)})
     assert [e.time_s for e in told.events] == [1, 2, 4]
     assert [e.confidence for e in told.events] == [1.0, 1.0, 0.5]
-    alone = with_confidence({"a": lead})
+    alone = rate_confidence({"a": lead})
     assert [e.confidence for e in alone.events] == [None] * 3
 
 
 @pytest.mark.parametrize("name", slow_beyond(4, PEOPLE))
 def test_simulated_people_are_found_whole_or_said_to_be_led_by_another_detector(name: str) -> None:
-    agreed = consensus(detectors(name))
+    agreed = agree_on_contacts(detectors(name))
     truth = simulated(name)[1]
     for side in SIDES:
         result = match(agreed.times(side, "ic"), truth.contacts[side].contact.tolist(), 0.25)
@@ -90,7 +90,7 @@ def test_simulated_people_are_found_whole_or_said_to_be_led_by_another_detector(
 def test_with_feet_alone_the_shuffle_stays_refused() -> None:
     take = estimate_orientations(calibration.calibrate(simulated("severe_shuffle")[0]))
     feet = replace(take, q={s: take.q[s] for s in FOOT.values()})
-    agreed = consensus(all_detectors(feet))
+    agreed = agree_on_contacts(all_detectors(feet))
     assert agreed.events == ()
     assert "no_toe_off" in {n.code for n in agreed.notices}
 
@@ -98,7 +98,7 @@ def test_with_feet_alone_the_shuffle_stays_refused() -> None:
 def test_the_foot_pitch_events_keep_their_times_with_confidence() -> None:
     take = estimate_orientations(calibration.calibrate(simulated("comfortable")[0]))
     lead = detect(take)
-    told = with_confidence(all_detectors(take))
+    told = rate_confidence(all_detectors(take))
     assert [(e.time_s, e.kind, e.side) for e in told.events] == [
         (e.time_s, e.kind, e.side) for e in lead.events
     ]
@@ -106,6 +106,6 @@ def test_the_foot_pitch_events_keep_their_times_with_confidence() -> None:
 
 
 def test_where_the_foot_pitch_rule_abstains_the_others_are_pointed_to() -> None:
-    told = with_confidence(detectors("severe_shuffle"))
+    told = rate_confidence(detectors("severe_shuffle"))
     assert told.events == ()
     assert [n.code for n in told.notices] == ["no_toe_off"] * 2 + ["others_found_contacts"] * 2

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core.errors import ParameterError
-from core.events.edits import APART_S, Edit, edit_of, edited_events, edited_strides
+from core.events.edits import APART_S, Edit, apply_event_edits, apply_stride_edits, read_edit
 from core.events.result import GaitEvent, GaitEvents, Stride, Strides
 from core.frames import SIDES
 
@@ -36,16 +36,16 @@ def listed() -> Strides:
 
 
 def times(events: GaitEvents, *edits: Edit) -> tuple[float, ...]:
-    return edited_events(events, edits, END).times("left", "ic")
+    return apply_event_edits(events, edits, END).times("left", "ic")
 
 
 def test_no_edit_changes_nothing() -> None:
-    assert edited_events(found(), (), END).events == found().events
-    assert edited_strides(listed(), ()).strides == listed().strides
+    assert apply_event_edits(found(), (), END).events == found().events
+    assert apply_stride_edits(listed(), ()).strides == listed().strides
 
 
 def test_an_event_is_moved_and_says_that_a_person_placed_it() -> None:
-    moved = edited_events(found(), [Edit("move_event", "left", 2.0, "ic", 2.05)], END)
+    moved = apply_event_edits(found(), [Edit("move_event", "left", 2.0, "ic", 2.05)], END)
     assert moved.times("left", "ic") == (1.0, 2.05, 3.0)
     assert [e.source for e in moved.events].count("manual") == 1
     assert moved.times("left", "tc") == found().times("left", "tc")
@@ -53,10 +53,10 @@ def test_an_event_is_moved_and_says_that_a_person_placed_it() -> None:
 
 def test_an_event_is_added_in_order_of_time_and_deleted_again() -> None:
     new = Edit("add_event", "left", 3.6, "tc")
-    added = edited_events(found(), [new], END)
+    added = apply_event_edits(found(), [new], END)
     assert added.times("left", "tc") == (1.6, 2.6, 3.6)
     assert [e.time_s for e in added.events] == sorted(e.time_s for e in added.events)
-    assert edited_events(added, [Edit("delete_event", "left", 3.6, "tc")], END).events == found().events
+    assert apply_event_edits(added, [Edit("delete_event", "left", 3.6, "tc")], END).events == found().events
 
 
 def test_edits_are_applied_in_the_order_in_which_they_were_made() -> None:
@@ -87,30 +87,30 @@ def test_undo_is_leaving_the_last_edit_out() -> None:
 )
 def test_what_cannot_be_is_refused_with_its_reason(edit: Edit, code: str) -> None:
     with pytest.raises(ParameterError) as refused:
-        edited_events(found(), [edit], END)
+        apply_event_edits(found(), [edit], END)
     assert refused.value.code == code
 
 
 def test_feet_do_not_stand_in_each_others_way() -> None:
-    moved = edited_events(found(), [Edit("move_event", "right", 1.5, "ic", 2.02)], END)
+    moved = apply_event_edits(found(), [Edit("move_event", "right", 1.5, "ic", 2.02)], END)
     assert moved.times("right", "ic") == (2.02,)
 
 
 def test_a_stride_is_left_out_with_its_reason_and_counted_again() -> None:
     out = Edit("exclude_stride", "left", 2.4, reason="stumbled")
-    assert edited_strides(listed(), [out]).strides[1].excluded_reason == "manual:stumbled"
-    assert edited_strides(listed(), [out]).strides[1].excluded_by == "person"
+    assert apply_stride_edits(listed(), [out]).strides[1].excluded_reason == "manual:stumbled"
+    assert apply_stride_edits(listed(), [out]).strides[1].excluded_by == "person"
     back = Edit("include_stride", "left", 2.4)
-    assert edited_strides(listed(), [out, back]).strides == listed().strides
+    assert apply_stride_edits(listed(), [out, back]).strides == listed().strides
 
 
 def test_a_person_may_count_what_a_rule_left_out_and_the_flag_stays() -> None:
-    counted = edited_strides(listed(), [Edit("include_stride", "left", 1.2)]).strides[0]
+    counted = apply_stride_edits(listed(), [Edit("include_stride", "left", 1.2)]).strides[0]
     assert (counted.excluded_reason, counted.flags) == (None, ("first",))
 
 
 def test_a_decision_about_a_stride_that_is_gone_has_no_effect() -> None:
-    after = edited_strides(listed(), [Edit("exclude_stride", "left", 9.0, reason="x")])
+    after = apply_stride_edits(listed(), [Edit("exclude_stride", "left", 9.0, reason="x")])
     assert after.strides == listed().strides
 
 
@@ -132,7 +132,7 @@ def test_a_decision_about_a_stride_that_is_gone_has_no_effect() -> None:
 )
 def test_an_edit_that_is_not_whole_is_refused(values: dict[str, Any]) -> None:
     with pytest.raises(ParameterError) as refused:
-        edit_of(values)
+        read_edit(values)
     assert refused.value.code == "bad_edit"
 
 
@@ -141,7 +141,7 @@ def test_an_edit_comes_back_from_json() -> None:
         Edit("move_event", "left", 2.0, "ic", 2.1),
         Edit("exclude_stride", "right", 2.0, reason="x"),
     ):
-        assert edit_of(edit.to_json()) == edit
+        assert read_edit(edit.to_json()) == edit
 
 
 @given(
@@ -159,16 +159,16 @@ def test_an_edit_comes_back_from_json() -> None:
 def test_whatever_is_done_events_stay_in_order_apart_and_inside(steps: list[Any]) -> None:
     edits: list[Edit] = []
     for kind, side, event, time, to in steps:
-        own = edited_events(found(), edits, END).times(side, event)
+        own = apply_event_edits(found(), edits, END).times(side, event)
         # an event that is there, where one is named; else the time as it came
         at = time if kind == "add_event" or not own else own[int(np.argmin(np.abs(np.subtract(own, time))))]
         edit = Edit(kind, side, at, event, to if kind == "move_event" else None)
         try:
-            edited_events(found(), [*edits, edit], END)
+            apply_event_edits(found(), [*edits, edit], END)
         except ParameterError:
             continue
         edits.append(edit)
-    after = edited_events(found(), edits, END).events
+    after = apply_event_edits(found(), edits, END).events
     assert [e.time_s for e in after] == sorted(e.time_s for e in after)
     assert all(0.0 <= e.time_s <= END for e in after)
     for side in SIDES:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.events.foot_pitch import FootPitchParams, FootPitchState, push
+from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch
 from core.frames import Floats
 from tests.core.events.foot_signal import extremes, foot_pitch
 
@@ -22,7 +22,7 @@ def signal(rate_hz: float, stride_s: float = 1.1, cycles: int = 15, scale: float
 def run(s: Floats, rate_hz: float, cuts: list[int] | None = None) -> tuple[Floats, Floats]:
     """Times of TC and IC; `cuts` splits the run into blocks."""
     state = FootPitchState.start(rate_hz, FootPitchParams())
-    parts = [push(state, b, np.ones(len(b), np.bool_)) for b in np.split(s, cuts or [])]
+    parts = [advance_foot_pitch(state, b, np.ones(len(b), np.bool_)) for b in np.split(s, cuts or [])]
     kind, index, offset = (np.concatenate([p[i] for p in parts]) for i in (0, 1, 3))
     times = (index + offset) / rate_hz
     return times[kind == 0], times[kind == 1]
@@ -56,9 +56,12 @@ def test_any_split_into_blocks_gives_the_same_bits(cuts: list[int], seed: int) -
     s = signal(RATE) + rng.normal(0.0, 0.02, len(signal(RATE)))
     valid = rng.random(len(s)) > 0.002
     whole, split = (FootPitchState.start(RATE, FootPitchParams()) for _ in range(2))
-    one = push(whole, s, valid)
+    one = advance_foot_pitch(whole, s, valid)
     places = sorted(cuts)
-    parts = [push(split, a, b) for a, b in zip(np.split(s, places), np.split(valid, places), strict=True)]
+    parts = [
+        advance_foot_pitch(split, a, b)
+        for a, b in zip(np.split(s, places), np.split(valid, places), strict=True)
+    ]
     for i in range(4):
         assert np.array_equal(one[i], np.concatenate([p[i] for p in parts]))
     assert np.array_equal(whole.ring, split.ring)
@@ -72,7 +75,7 @@ def test_contacts_alternate_and_start_with_the_foot_leaving(seed: int, roughness
     rng = np.random.default_rng(seed)
     s = signal(RATE, rng.uniform(0.5, 2.0), 8) * rng.uniform(0.3, 1.0)
     s = s + np.cumsum(rng.normal(0.0, roughness / 20, len(s)))
-    kind, index, known, offset = push(
+    kind, index, known, offset = advance_foot_pitch(
         FootPitchState.start(RATE, FootPitchParams()), s, np.ones(len(s), np.bool_)
     )
     assert np.array_equal(kind, np.arange(len(kind)) % 2)
@@ -83,13 +86,15 @@ def test_contacts_alternate_and_start_with_the_foot_leaving(seed: int, roughness
 
 def test_a_stream_knows_the_event_when_it_says_so_and_soon() -> None:
     s = signal(RATE)
-    kind, index, known, _ = push(FootPitchState.start(RATE, FootPitchParams()), s, np.ones(len(s), np.bool_))
+    kind, index, known, _ = advance_foot_pitch(
+        FootPitchState.start(RATE, FootPitchParams()), s, np.ones(len(s), np.bool_)
+    )
     assert np.all(known[kind == 0] == index[kind == 0] + 1)
     assert np.all(known[kind == 1] <= index[kind == 1] + 4)
     for j, at in zip(index[:6], known[:6], strict=True):
         state = FootPitchState.start(RATE, FootPitchParams())
-        before = push(state, s[:at], np.ones(at, np.bool_))[1]
-        after = push(state, s[at : at + 1], np.ones(1, np.bool_))[1]
+        before = advance_foot_pitch(state, s[:at], np.ones(at, np.bool_))[1]
+        after = advance_foot_pitch(state, s[at : at + 1], np.ones(1, np.bool_))[1]
         assert j not in before
         assert after.tolist() == [j]
 
@@ -117,7 +122,7 @@ def test_nothing_is_concluded_across_lost_samples() -> None:
     valid[lost] = False
     garbage = s.copy()
     garbage[lost] = np.nan
-    kind, index, _, _ = push(FootPitchState.start(RATE, FootPitchParams()), garbage, valid)
+    kind, index, _, _ = advance_foot_pitch(FootPitchState.start(RATE, FootPitchParams()), garbage, valid)
     ic = index[kind == 1] / RATE
     assert not np.any(np.abs(ic - true_ic[5]) < 0.1), "the phase of the foot is unknown after a gap"
     assert len(ic) == 14

@@ -16,7 +16,7 @@ from core.events.result import GaitEvents, Stride, Strides
 from core.frames import SIDES
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
-from core.parameters import stride_values, temporal
+from core.parameters import stride_values, summarise_times
 from core.simulate import Simulation, simulate_scenario
 from tests.accuracy.event_scoring import match
 
@@ -69,7 +69,7 @@ def test_counted_strides_have_the_true_times(walked: Walked) -> None:
     true = walked.simulation.truth.strides
     errors = []
     stance = []
-    for s in walked.strides.used():
+    for s in walked.strides.select_used():
         (own,) = (t for t in true if t.side == s.side and abs(t.start_s - s.start_s) < 0.2)
         errors.append(s.duration_s - (own.end_s - own.start_s))
         assert own.lift5_s is not None
@@ -99,8 +99,8 @@ def test_turning_strides_are_those_that_turn(walked: Walked) -> None:
 
 
 def test_parameters_have_the_true_means(walked: Walked) -> None:
-    found = {(p.name, p.side): p for p in temporal(walked.strides)}
-    used = walked.strides.used()
+    found = {(p.name, p.side): p for p in summarise_times(walked.strides)}
+    used = walked.strides.select_used()
     true = [
         t
         for t in walked.simulation.truth.strides
@@ -122,7 +122,7 @@ def test_parameters_have_the_true_means(walked: Walked) -> None:
 
 
 def test_symmetric_walking_is_symmetric(walked: Walked) -> None:
-    found = {(p.name, p.side): p.mean for p in temporal(walked.strides)}
+    found = {(p.name, p.side): p.mean for p in summarise_times(walked.strides)}
     left, right = found["stance_time_s", "left"], found["stance_time_s", "right"]
     assert left is not None
     assert right is not None

@@ -76,7 +76,7 @@ def test_starting_and_stopping_strides_never_count_however_short_the_walk(contac
 
 def test_a_walk_of_three_metres_counts_nothing_and_says_why() -> None:
     found = stride_list(straight(3), standing())
-    assert not found.used()
+    assert not found.select_used()
     assert [n.code for n in found.notices] == ["no_strides", "no_strides"]
     assert found.notices[0].message.startswith("None of the 2 left strides counts: 1 first, 1 last.")
     assert "walk further" in found.notices[0].message

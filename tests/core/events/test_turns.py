@@ -8,8 +8,8 @@ from math import pi, radians
 import numpy as np
 import pytest
 
-from core.events.lumbar import about_up
-from core.events.turns import Turn, body_yaw_rate, turns
+from core.events.lumbar import split_about_vertical
+from core.events.turns import Turn, body_yaw_rate, find_turns
 from core.frames import Floats, Segment
 from core.fusion.orientations import Orientations
 from tests.walks import simulated
@@ -33,12 +33,12 @@ def found(name: str, *worn: Segment) -> tuple[Turn, ...]:
     truth = simulated(name)[1]
     valid = {s: always(truth.t_s) for s in worn}
     take = Orientations(truth.t_s, RATE, {s: truth.q[s] for s in worn}, valid, "truth")
-    return turns(*body_yaw_rate(take, RATE), RATE)
+    return find_turns(*body_yaw_rate(take, RATE), RATE)
 
 
 @pytest.mark.parametrize("angle", [pi, -pi, pi / 2, -2 * pi])
 def test_a_turn_has_its_angle_direction_and_peak(angle: float) -> None:
-    (turn,) = turns(bump(angle, 5.0, 3.0), always(np.zeros(2000)), RATE)
+    (turn,) = find_turns(bump(angle, 5.0, 3.0), always(np.zeros(2000)), RATE)
     assert turn.angle_rad == pytest.approx(angle, rel=0.02)
     assert turn.direction == ("left" if angle > 0 else "right")
     assert turn.peak_rad_s == pytest.approx(abs(angle) / 1.5, rel=0.05)
@@ -47,32 +47,32 @@ def test_a_turn_has_its_angle_direction_and_peak(angle: float) -> None:
 
 
 def test_a_turn_there_and_one_back_are_two() -> None:
-    there, back = turns(bump(pi, 3.0, 3.0) + bump(-pi, 9.0, 3.0), always(np.zeros(2000)), RATE)
+    there, back = find_turns(bump(pi, 3.0, 3.0) + bump(-pi, 9.0, 3.0), always(np.zeros(2000)), RATE)
     assert (there.direction, back.direction) == ("left", "right")
 
 
 def test_the_swing_of_the_pelvis_is_no_turn() -> None:
     t = np.arange(3000) / RATE
     for stride_hz in (0.6, 0.9, 1.2):
-        assert turns(radians(40.0) * np.sin(2 * pi * stride_hz * t), always(t), RATE) == ()
+        assert find_turns(radians(40.0) * np.sin(2 * pi * stride_hz * t), always(t), RATE) == ()
 
 
 def test_a_small_or_endless_change_of_heading_is_no_turn() -> None:
-    assert turns(bump(radians(35.0), 5.0, 2.0), always(np.zeros(2000)), RATE) == ()
+    assert find_turns(bump(radians(35.0), 5.0, 2.0), always(np.zeros(2000)), RATE) == ()
     circle = np.full(6000, radians(20.0))
-    assert turns(circle, always(circle), RATE) == ()
+    assert find_turns(circle, always(circle), RATE) == ()
 
 
 def test_a_turn_in_which_the_sensor_was_lost_is_not_reported() -> None:
     rate = bump(pi, 5.0, 3.0)
     lost = always(rate)
     lost[620:640] = False
-    assert turns(rate, lost, RATE) == ()
+    assert find_turns(rate, lost, RATE) == ()
 
 
 @pytest.mark.parametrize("n", [0, 1, 10, 40])
 def test_a_take_of_a_moment_has_none(n: int) -> None:
-    assert turns(np.full(n, 3.0), np.ones(n, np.bool_), RATE) == ()
+    assert find_turns(np.full(n, 3.0), np.ones(n, np.bool_), RATE) == ()
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_a_turn_on_the_spot_is_found_and_a_straight_walk_has_none() -> None:
 
 def test_a_trunk_sensor_alone_shows_them_without_calibration() -> None:
     signals = simulated("fast_with_turns")[0].sensors["pelvis"]
-    listed = turns(about_up(signals, RATE)[1], signals.valid, RATE)
+    listed = find_turns(split_about_vertical(signals, RATE)[1], signals.valid, RATE)
     assert [round(np.degrees(t.angle_rad) / 10) for t in listed] == [18, -18, -18]
 
 
@@ -112,6 +112,6 @@ def test_the_steadiest_sensor_that_was_there_is_taken() -> None:
         {"pelvis": gone, "shank_l": ~gone, "shank_r": ~gone},
         "truth",
     )
-    assert len(turns(*body_yaw_rate(take, RATE), RATE)) == 3
+    assert len(find_turns(*body_yaw_rate(take, RATE), RATE)) == 3
     nothing = replace(take, q={}, valid={})
-    assert turns(*body_yaw_rate(nothing, RATE), RATE) == ()
+    assert find_turns(*body_yaw_rate(nothing, RATE), RATE) == ()

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core.feedback import Schedule
-from core.feedback.schedule import place
+from core.feedback.schedule import find_slot
 
 shares = st.lists(st.integers(0, 100), min_size=1, max_size=5).map(lambda s: tuple(sorted(s, reverse=True)))
 schedules = st.builds(
@@ -23,7 +23,7 @@ schedules = st.builds(
 
 @given(schedule=schedules)
 def test_of_any_part_of_a_step_the_share_is_shown_to_less_than_a_stride(schedule: Schedule) -> None:
-    training = [p for i in range(400) if (p := place(schedule, i)).block is None]
+    training = [p for i in range(400) if (p := find_slot(schedule, i)).block is None]
     steps = len(schedule.shares_pct)
     for step in range(steps if schedule.kind == "fading" else 1):
         first = step * schedule.strides_per_share
@@ -38,7 +38,7 @@ def test_of_any_part_of_a_step_the_share_is_shown_to_less_than_a_stride(schedule
 
 @given(schedule=schedules)
 def test_probe_blocks_have_their_length_and_distance_and_no_feedback(schedule: Schedule) -> None:
-    places = [place(schedule, i) for i in range(300)]
+    places = [find_slot(schedule, i) for i in range(300)]
     if schedule.probe_every is None:
         assert all(p.block is None and p.next_probe is None for p in places)
         return
@@ -54,9 +54,9 @@ def test_probe_blocks_have_their_length_and_distance_and_no_feedback(schedule: S
 
 def test_half_is_every_second_stride() -> None:
     schedule = Schedule(shares_pct=(50,), probe_every=None)
-    assert [place(schedule, i).shown for i in range(6)] == [False, True, False, True, False, True]
+    assert [find_slot(schedule, i).shown for i in range(6)] == [False, True, False, True, False, True]
 
 
 def test_the_last_step_stays() -> None:
     schedule = Schedule(shares_pct=(100, 0), strides_per_share=3, probe_every=None)
-    assert [place(schedule, i).shown for i in (2, 3, 1000)] == [True, False, False]
+    assert [find_slot(schedule, i).shown for i in (2, 3, 1000)] == [True, False, False]

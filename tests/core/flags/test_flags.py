@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from core.flags import RULES, Flag, ambulation, flags
+from core.flags import RULES, Flag, classify_ambulation, judge_flags
 from core.frames import SIDES, Floats, Side
 from core.norms.controls import ControlSession, control_group
 from core.norms.tables import WBDS
@@ -62,7 +62,7 @@ def test_every_rule_names_its_source_and_says_whether_it_was_read() -> None:
 
 
 def test_a_stiff_knee_is_found_by_the_other_knee() -> None:
-    found = flags(curves({"knee_flexion": (40.0, 58.0)}), [])
+    found = judge_flags(curves({"knee_flexion": (40.0, 58.0)}), [])
     left, right = (flag(found, "stiff_knee", s) for s in SIDES)
     assert (left.exceeded, right.exceeded) == (True, False)
     assert left.value == pytest.approx(18.0)
@@ -73,11 +73,11 @@ def test_a_stiff_knee_is_found_by_the_other_knee() -> None:
 
 def test_a_knee_that_stands_bent_is_not_stiff_once_the_goniometer_says_so() -> None:
     bent = curves({"knee_flexion": (40.0, 58.0)})
-    found = flags(bent, [], {"knee_flexion_l": 12.0, "knee_flexion_r": 0.0})
+    found = judge_flags(bent, [], {"knee_flexion_l": 12.0, "knee_flexion_r": 0.0})
     left = flag(found, "stiff_knee", "left")
     assert (left.exceeded, left.zero, left.note) == (False, "anatomical", None)
     assert left.value == pytest.approx(6.0)
-    half = flag(flags(bent, [], {"knee_flexion_l": 12.0}), "stiff_knee", "left")
+    half = flag(judge_flags(bent, [], {"knee_flexion_l": 12.0}), "stiff_knee", "left")
     assert half.value == pytest.approx(18.0), "one side entered: both are compared from standing"
 
 
@@ -98,18 +98,18 @@ def test_levels_are_judged_from_the_anatomical_zero_only(
     name: str, variable: str, angle: float, exceeded: bool, marked: bool
 ) -> None:
     walked = curves({variable: (angle - 4.0, angle - 4.0)})
-    blind = flag(flags(walked, []), name, "left")
+    blind = flag(judge_flags(walked, []), name, "left")
     assert (blind.exceeded, blind.marked, blind.reason) == (None, False, "angle_zero_standing")
     assert blind.value == pytest.approx(angle - 4.0)
     assert blind.zero == "standing"
-    known = flag(flags(walked, [], {f"{variable}_l": 4.0}), name, "left")
+    known = flag(judge_flags(walked, [], {f"{variable}_l": 4.0}), name, "left")
     assert (known.exceeded, known.marked, known.zero) == (exceeded, marked, "anatomical")
     assert known.value == pytest.approx(angle)
 
 
 def test_hip_hiking_is_two_standard_deviations_of_a_single_side_above_the_norm() -> None:
     """0.35 + 2 · 1.63: the 1.10 of the table is of the mean of both sides, where one side's rise is lost."""
-    found = flags(curves({"pelvis_obliquity": (3.7, -3.7)}), [])
+    found = judge_flags(curves({"pelvis_obliquity": (3.7, -3.7)}), [])
     left = flag(found, "hip_hiking", "left")
     assert left.limit == pytest.approx(3.61, abs=0.01)
     assert (left.exceeded, flag(found, "hip_hiking", "right").exceeded) == (True, False)
@@ -124,7 +124,7 @@ def test_ranges_compare_without_any_zero() -> None:
     made = CycleCurves(
         {"knee_flexion": {"left": stiff, "right": swing}}, made.stride_index, made.used, made.foot_off_pct
     )
-    left = flag(flags(made, []), "knee_range_asymmetry", "left")
+    left = flag(judge_flags(made, []), "knee_range_asymmetry", "left")
     assert left.value == pytest.approx(12.0)
     assert left.limit == pytest.approx(2 * 3.77)
     assert (left.exceeded, left.zero, left.note) == (True, None, None)
@@ -132,49 +132,53 @@ def test_ranges_compare_without_any_zero() -> None:
 
 def test_a_ratio_belongs_to_the_larger_side() -> None:
     steps = sides("step_length_m", 0.50, 0.56)
-    found = flag(flags(None, steps), "step_length_asymmetry", "right")
+    found = flag(judge_flags(None, steps), "step_length_asymmetry", "right")
     assert (found.exceeded, found.verified, found.note) == (True, False, None)
     assert found.value == pytest.approx(1.12)
     times = sides("stance_time_s", 0.70, 0.71, "s") + sides("swing_time_s", 0.40, 0.39, "s")
-    even = flags(None, times)
+    even = judge_flags(None, times)
     assert flag(even, "stance_asymmetry", "right").exceeded is False
     assert flag(even, "temporal_asymmetry", "left").value == pytest.approx((0.40 / 0.70) / (0.39 / 0.71))
     assert flag(even, "temporal_asymmetry", "left").note == "late_foot_off"
 
 
 def test_three_strides_of_a_side_are_held_against_no_limit() -> None:
-    found = flag(flags(None, sides("step_length_m", 0.50, 0.70, n=3)), "step_length_asymmetry", "right")
+    found = flag(judge_flags(None, sides("step_length_m", 0.50, 0.70, n=3)), "step_length_asymmetry", "right")
     assert (found.exceeded, found.reason) == (None, "too_few_strides")
     assert found.value == pytest.approx(1.4)
     foot = sides("foot_pitch_ic_deg", -9.0, 20.0, "deg", n=3)
-    assert flag(flags(None, foot), "flat_contact", "left").reason == "too_few_strides"
-    stiff = flag(flags(curves({"knee_flexion": (20.0, 60.0)}, strides=3), []), "stiff_knee", "left")
+    assert flag(judge_flags(None, foot), "flat_contact", "left").reason == "too_few_strides"
+    stiff = flag(judge_flags(curves({"knee_flexion": (20.0, 60.0)}, strides=3), []), "stiff_knee", "left")
     assert (stiff.exceeded, stiff.reason) == (None, "too_few_strides")
 
 
 def test_a_difference_that_the_strides_leave_open_is_beyond_no_limit() -> None:
     """0.50 ± 0.20 and 0.60 ± 0.20 m over ten strides: 95 % of the difference −0.29 … 0.09 m."""
-    open_ = flag(flags(None, sides("step_length_m", 0.50, 0.60, sd=0.2)), "step_length_asymmetry", "right")
+    open_ = flag(
+        judge_flags(None, sides("step_length_m", 0.50, 0.60, sd=0.2)), "step_length_asymmetry", "right"
+    )
     assert (open_.exceeded, open_.marked, open_.reason) == (None, False, "sides_alike")
-    within = flag(flags(None, sides("step_length_m", 0.50, 0.52, sd=0.2)), "step_length_asymmetry", "right")
+    within = flag(
+        judge_flags(None, sides("step_length_m", 0.50, 0.52, sd=0.2)), "step_length_asymmetry", "right"
+    )
     assert within.exceeded is False
 
 
 def test_a_step_of_no_length_has_no_ratio() -> None:
-    found = flag(flags(None, sides("step_length_m", 0.5, -0.01)), "step_length_asymmetry", None)
+    found = flag(judge_flags(None, sides("step_length_m", 0.5, -0.01)), "step_length_asymmetry", None)
     assert (found.value, found.exceeded, found.reason) == (None, None, "near_zero")
 
 
 def test_circumduction_is_held_against_own_controls_or_nothing() -> None:
     """No table knows how far healthy feet swing out: limits are own controls'."""
     wide = sides("circumduction_m", 0.12, 0.03)
-    alone = flag(flags(None, wide), "circumduction", "left")
+    alone = flag(judge_flags(None, wide), "circumduction", "left")
     assert (alone.value, alone.limit, alone.exceeded, alone.reason) == (0.12, None, None, "no_controls")
     people = [
         ControlSession(f"c{i}", 40.0, "male", sides("circumduction_m", 0.02 + 0.002 * i, 0.03), {})
         for i in range(6)
     ]
-    found = flags(None, wide, controls=control_group(people).norms())
+    found = judge_flags(None, wide, controls=control_group(people).norms())
     left, right = (flag(found, "circumduction", s) for s in SIDES)
     assert left.limit is not None
     assert 0.03 < left.limit < 0.04
@@ -184,7 +188,7 @@ def test_circumduction_is_held_against_own_controls_or_nothing() -> None:
 
 def test_who_walks_slower_than_any_norm_is_told_so() -> None:
     slow = [Parameter("gait_speed_mps", None, 20, 0.5, 0.1, "m/s")]
-    found = flags(curves({"pelvis_obliquity": (5.0, 0.0), "knee_flexion": (30.0, 60.0)}), slow)
+    found = judge_flags(curves({"pelvis_obliquity": (5.0, 0.0), "knee_flexion": (30.0, 60.0)}), slow)
     hike = flag(found, "hip_hiking", "left")
     assert (hike.exceeded, hike.note) == (True, "no_speed_matched_norm")
     assert flag(found, "stiff_knee", "left").note == "sides_stand_differently", "its limit is of patients"
@@ -192,20 +196,20 @@ def test_who_walks_slower_than_any_norm_is_told_so() -> None:
 
 def test_children_are_not_held_against_adult_norms() -> None:
     walked = curves({"pelvis_obliquity": (5.0, 0.0), "knee_flexion": (30.0, 60.0)})
-    hike = flag(flags(walked, [], age=9), "hip_hiking", "left")
+    hike = flag(judge_flags(walked, [], age=9), "hip_hiking", "left")
     assert hike.value == pytest.approx(5.0)
     assert (hike.limit, hike.exceeded, hike.reason) == (None, None, "no_norm_for_age")
-    assert flag(flags(walked, [], age=9), "stiff_knee", "left").exceeded is True
-    assert flag(flags(walked, [], age=40), "hip_hiking", "left").exceeded is True
+    assert flag(judge_flags(walked, [], age=9), "stiff_knee", "left").exceeded is True
+    assert flag(judge_flags(walked, [], age=40), "hip_hiking", "left").exceeded is True
 
 
 def test_nothing_measured_gives_reasons_and_no_flag() -> None:
-    found = flags(None, [])
+    found = judge_flags(None, [])
     assert {f.exceeded for f in found} == {None}
     assert all(f.reason for f in found)
     assert {f.name for f in found} == {r.name for r in RULES}
     none = curves({"knee_flexion": (50.0, 50.0)}, strides=0)
-    assert flag(flags(none, []), "stiff_knee", "left").reason == "no_strides"
+    assert flag(judge_flags(none, []), "stiff_knee", "left").reason == "no_strides"
 
 
 @pytest.mark.parametrize(
@@ -213,4 +217,4 @@ def test_nothing_measured_gives_reasons_and_no_flag() -> None:
     [(0.39, "household"), (0.4, "limited_community"), (0.8, "limited_community"), (0.81, "community")],
 )
 def test_classes_of_walking_by_speed(speed: float, group: str) -> None:
-    assert ambulation(speed) == group
+    assert classify_ambulation(speed) == group

@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 
-from core.flags import flags
+from core.flags import judge_flags
 from core.frames import SIDES
 from core.parameters.result import CycleCurves
 from core.standing_angles import NAMES
@@ -26,7 +26,7 @@ def test_one_healthy_side_in_twenty_at_most_passes_a_limit() -> None:
             {s: np.ones(4, np.bool_) for s in SIDES},
             {s: np.full(4, 62.0) for s in SIDES},
         )
-        for f in flags(curves, [], dict.fromkeys(NAMES, 0.0)):
+        for f in judge_flags(curves, [], dict.fromkeys(NAMES, 0.0)):
             if f.exceeded is not None:
                 judged[f.name] += 1
                 beyond[f.name] += f.exceeded

@@ -10,7 +10,7 @@ import pytest
 from core.angles import JointAngles
 from core.body.feet import FootTracks
 from core.events.result import Stride, Strides
-from core.flags import Flag, flags
+from core.flags import Flag, judge_flags
 from core.frames import FOOT, SIDES
 from core.fusion.orientations import Orientations
 from core.norms.controls import ControlSession, control_group
@@ -37,7 +37,7 @@ def session(name: str, seed: int = 5) -> tuple[CycleCurves, tuple[Parameter, ...
             first, last = min(tc, default=None), min(ic, default=None)
             made.append(Stride(side, s.start_s, s.release_s, s.end_s, first, last, s.turn_rad, turned))
     strides = Strides(tuple(made))
-    angles = JointAngles(truth.t_s, truth.zeroed(), truth.zero_offset)
+    angles = JointAngles(truth.t_s, truth.subtract_standing(), truth.zero_offset)
     p, q = ({s: of[FOOT[s]] for s in SIDES} for of in (truth.p, truth.q))
     there = np.ones(len(truth.t_s), np.bool_)
     feet = FootTracks(
@@ -60,7 +60,7 @@ def controls() -> Norms:
 
 def raised(name: str, *, goniometer: bool = True) -> set[tuple[str, str | None]]:
     curves, parameters, standing = session(name)
-    found = flags(curves, parameters, standing if goniometer else None, 1.7, controls())
+    found = judge_flags(curves, parameters, standing if goniometer else None, 1.7, controls())
     return {(f.name, f.side) for f in found if f.exceeded}
 
 
@@ -104,7 +104,7 @@ def test_without_a_goniometer_levels_are_not_judged_but_sides_are() -> None:
 def test_values_are_those_of_the_patient() -> None:
     curves, parameters, standing = session("stiff_knee")
     found: dict[tuple[str, str | None], Flag] = {
-        (f.name, f.side): f for f in flags(curves, parameters, standing, 1.7)
+        (f.name, f.side): f for f in judge_flags(curves, parameters, standing, 1.7)
     }
     # as the walker was made: knee 60.3 right, 39.9 left, difference 20.4
     assert found["stiff_knee", "left"].value == pytest.approx(20.4, abs=3.0)

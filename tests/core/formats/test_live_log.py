@@ -18,15 +18,15 @@ from core.errors import InputError
 from core.formats.live_log import (
     FILE_MARK,
     MOST_FRAME_BYTES,
-    Batch,
+    SampleBatch,
     batch_of_json,
     check_fits,
     decode_batch,
     encode_batch,
+    encode_samples,
     parse_finish,
     parse_hello,
-    payload,
-    peek,
+    read_batch_header,
     record,
     scan,
     scan_records,
@@ -46,7 +46,7 @@ def sealed(frame: bytearray) -> bytes:
     return bytes(frame)
 
 
-def same(a: Batch, b: Batch) -> bool:
+def same(a: SampleBatch, b: SampleBatch) -> bool:
     head = (a.stream, a.seq, a.t0_us, a.sent_us) == (b.stream, b.seq, b.t0_us, b.sent_us)
     offsets = (a.offsets_us is None) == (b.offsets_us is None) and (
         a.offsets_us is None or b.offsets_us is None or bool((a.offsets_us == b.offsets_us).all())
@@ -55,7 +55,9 @@ def same(a: Batch, b: Batch) -> bool:
 
 
 def test_the_bytes_are_those_that_the_protocol_names() -> None:
-    frame = encode_batch(Batch(3, 7, 11, 13, np.zeros((2, 1, 9), np.float32), np.array([0, 9], np.uint32)))
+    frame = encode_batch(
+        SampleBatch(3, 7, 11, 13, np.zeros((2, 1, 9), np.float32), np.array([0, 9], np.uint32))
+    )
     head = struct.pack("<IHHHHQQQ", 0x314C4753, 1, 1, 2, 3, 7, 11, 13)
     body = head + bytes(2 * 9 * 4) + struct.pack("<II", 0, 9)
     assert frame == body + struct.pack("<I", crc32(body))
@@ -71,12 +73,12 @@ def test_every_batch_comes_back_with_every_bit(
     samples: np.ndarray, numbers: tuple[int, int, int, int], with_offsets: bool
 ) -> None:
     offsets = np.arange(len(samples), dtype=np.uint32) * np.uint32(4_000_000) if with_offsets else None
-    sent = Batch(*numbers, samples, offsets)
+    sent = SampleBatch(*numbers, samples, offsets)
     frame = encode_batch(sent)
     assert same(decode_batch(frame), sent)
-    assert same(decode_batch(memoryview(frame), peek(frame)), sent)
+    assert same(decode_batch(memoryview(frame), read_batch_header(frame)), sent)
     assert encode_batch(decode_batch(frame)) == frame
-    assert bytes(payload(frame, peek(frame))) == samples.astype("<f4").tobytes()
+    assert bytes(encode_samples(frame, read_batch_header(frame))) == samples.astype("<f4").tobytes()
 
 
 def test_the_samples_of_a_decoded_batch_are_the_frames_own_memory() -> None:
@@ -135,9 +137,9 @@ def test_a_length_that_lies_allocates_nothing() -> None:
 
 def test_a_batch_too_large_is_refused_before_it_is_sent() -> None:
     with pytest.raises(InputError) as caught:
-        encode_batch(Batch(0, 0, 0, 0, np.zeros((1000, 64, 9), np.float32)))
+        encode_batch(SampleBatch(0, 0, 0, 0, np.zeros((1000, 64, 9), np.float32)))
     assert caught.value.code == "batch_shape"
-    largest = Batch(0, 0, 0, 0, np.zeros((1000, 29, 9), np.float32))
+    largest = SampleBatch(0, 0, 0, 0, np.zeros((1000, 29, 9), np.float32))
     assert len(encode_batch(largest)) <= MOST_FRAME_BYTES
 
 
@@ -150,14 +152,14 @@ def test_a_batch_too_large_is_refused_before_it_is_sent() -> None:
         replace(small_batch(), samples=np.zeros((0, 2, 9), np.float32)),
     ],
 )
-def test_samples_of_another_shape_are_no_batch(wrong: Batch) -> None:
+def test_samples_of_another_shape_are_no_batch(wrong: SampleBatch) -> None:
     with pytest.raises(InputError) as caught:
         encode_batch(wrong)
     assert caught.value.code == "batch_shape"
 
 
 def test_a_batch_must_fit_the_hello() -> None:
-    header = peek(encode_batch(small_batch()))
+    header = read_batch_header(encode_batch(small_batch()))
     assert check_fits(header, SMALL_HELLO) is SMALL_HELLO.streams[0]
     for other, code in (
         (header._replace(stream=4), "batch_stream"),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from core.errors import EstimationError, ParameterError
 from core.frames import GRAVITY, Bools, Floats
-from core.fusion.attitude import AttitudeParams, AttitudeState, advance, orientation
+from core.fusion.attitude import AttitudeParams, AttitudeState, advance, estimate_orientation
 from core.rotation import about, angle_between, conjugate, exp, multiply, rotate
 
 RATE = 100.0
@@ -38,14 +38,14 @@ def all_valid(n: int) -> Bools:
 
 def test_it_follows_a_motion_without_acceleration_exactly() -> None:
     q, rate, force = motion(2000)
-    found = orientation(q[0], 0, rate, force, all_valid(2000), RATE, GRAVITY, PARAMS)
+    found = estimate_orientation(q[0], 0, rate, force, all_valid(2000), RATE, GRAVITY, PARAMS)
     assert angle_between(found, q).max() < 1e-6
 
 
 @pytest.mark.parametrize("at", [0, 700, 1999])
 def test_it_starts_from_any_sample_of_the_take(at: int) -> None:
     q, rate, force = motion(2000, seed=3)
-    found = orientation(q[at], at, rate, force, all_valid(2000), RATE, GRAVITY, PARAMS)
+    found = estimate_orientation(q[at], at, rate, force, all_valid(2000), RATE, GRAVITY, PARAMS)
     assert angle_between(found, q).max() < 1e-6
 
 
@@ -74,11 +74,11 @@ def test_walking_does_not_tip_the_vertical() -> None:
     forward = 6.0 * np.sin(2 * np.pi * t)
     upward = 4.0 * np.sin(2 * np.pi * t) + 2.0 * np.sin(4 * np.pi * t)
     force = np.column_stack((forward, np.zeros_like(t), GRAVITY + upward))
-    q = orientation(LEVEL, 0, np.zeros((6000, 3)), force, all_valid(6000), RATE, GRAVITY, PARAMS)
+    q = estimate_orientation(LEVEL, 0, np.zeros((6000, 3)), force, all_valid(6000), RATE, GRAVITY, PARAMS)
     tilt = rotate(conjugate(q), np.array([0.0, 0.0, 1.0]))[1000:5000, 0]
     assert abs(np.degrees(tilt.mean())) < 0.05
     unit = force / np.linalg.norm(force, axis=1, keepdims=True)
-    tipped = orientation(LEVEL, 0, np.zeros((6000, 3)), unit, all_valid(6000), RATE, 1.0, PARAMS)
+    tipped = estimate_orientation(LEVEL, 0, np.zeros((6000, 3)), unit, all_valid(6000), RATE, 1.0, PARAMS)
     assert abs(np.degrees(rotate(conjugate(tipped), np.array([0.0, 0.0, 1.0]))[1000:5000, 0].mean())) > 1.0
 
 
@@ -95,7 +95,7 @@ def test_a_small_gyro_bias_tilts_by_bias_over_gain() -> None:
 def test_no_gain_is_pure_integration() -> None:
     q, rate, _ = motion(500)
     wild = np.random.default_rng(0).standard_normal((500, 3)) * 50
-    found = orientation(q[0], 0, rate, wild, all_valid(500), RATE, GRAVITY, AttitudeParams(kp=0.0))
+    found = estimate_orientation(q[0], 0, rate, wild, all_valid(500), RATE, GRAVITY, AttitudeParams(kp=0.0))
     assert angle_between(found, q).max() < 1e-9
 
 
@@ -105,7 +105,7 @@ def test_inside_a_gap_the_orientation_is_held_and_after_it_the_tilt_is_relearnt(
     valid[1000:1400] = False
     rate, force = rate.copy(), force.copy()
     rate[1000:1400], force[1000:1400] = rate[999], force[999]
-    found = orientation(q[0], 0, rate, force, valid, RATE, GRAVITY, PARAMS)
+    found = estimate_orientation(q[0], 0, rate, force, valid, RATE, GRAVITY, PARAMS)
     assert np.array_equal(found[1000:1400], np.tile(found[999], (400, 1)))
     assert angle_between(found[:1000], q[:1000]).max() < 1e-6
     up = np.array([0.0, 0.0, 1.0])
@@ -117,7 +117,7 @@ def test_a_first_stretch_before_a_gap_is_estimated_backwards() -> None:
     q, rate, force = motion(3000, seed=2)
     valid = all_valid(3000)
     valid[1000:1200] = False
-    found = orientation(q[2500], 2500, rate, force, valid, RATE, GRAVITY, PARAMS)
+    found = estimate_orientation(q[2500], 2500, rate, force, valid, RATE, GRAVITY, PARAMS)
     assert angle_between(found[1200:], q[1200:]).max() < 1e-6
     up = np.array([0.0, 0.0, 1.0])
     tilt = rotate(conjugate(found), up) - rotate(conjugate(q), up)
@@ -126,15 +126,15 @@ def test_a_first_stretch_before_a_gap_is_estimated_backwards() -> None:
 
 def test_a_sensor_that_never_was_valid_keeps_its_start() -> None:
     _, rate, force = motion(50)
-    found = orientation(LEVEL, 10, rate, force, np.zeros(50, bool), RATE, GRAVITY, PARAMS)
+    found = estimate_orientation(LEVEL, 10, rate, force, np.zeros(50, bool), RATE, GRAVITY, PARAMS)
     assert np.array_equal(found, np.tile(LEVEL, (50, 1)))
 
 
 def test_norm_stays_one_and_the_result_is_deterministic() -> None:
     _, rate, force = motion(3000, seed=5)
     noisy = force + np.random.default_rng(0).standard_normal(force.shape) * 5
-    once = orientation(LEVEL, 0, rate, noisy, all_valid(3000), RATE, GRAVITY, PARAMS)
-    again = orientation(LEVEL, 0, rate, noisy, all_valid(3000), RATE, GRAVITY, PARAMS)
+    once = estimate_orientation(LEVEL, 0, rate, noisy, all_valid(3000), RATE, GRAVITY, PARAMS)
+    again = estimate_orientation(LEVEL, 0, rate, noisy, all_valid(3000), RATE, GRAVITY, PARAMS)
     assert np.array_equal(once, again)
     assert np.abs(np.linalg.norm(once, axis=1) - 1).max() < 1e-9
 

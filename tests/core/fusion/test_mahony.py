@@ -13,10 +13,10 @@ from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError
 from core.frames import R_NEUTRAL, Floats, Segment
-from core.fusion.attitude import attitude_kernel, warm
+from core.fusion.attitude import attitude_kernel, compile_attitude_kernel
 from core.fusion.drift import DriftParams
 from core.fusion.mahony import MahonyParams, estimate_orientations
-from core.rest import samples
+from core.rest import index_window
 from core.rotation import about, angle_between, from_matrix, mean, multiply, normalise, rotate, yaw
 from tests.walks import lost, only, rms_deg, simulated, turned
 
@@ -28,7 +28,7 @@ def calibrated(name: str = "comfortable") -> CalibratedRecording:
 
 
 def test_warm_compiles_without_a_recording() -> None:
-    warm()
+    compile_attitude_kernel()
     assert attitude_kernel.signatures
 
 
@@ -36,7 +36,7 @@ def test_at_standing_every_segment_faces_forward_and_stands_upright() -> None:
     take = calibrated()
     found = estimate_orientations(take)
     for segment, q in found.q.items():
-        standing = mean(q[samples(take.calibration.zero, 100.0)])
+        standing = mean(q[index_window(take.calibration.zero, 100.0)])
         R = angle_between(standing, normalise(_neutral()))
         assert np.degrees(R) < 1.0, segment
 
@@ -60,7 +60,7 @@ def test_inclination_follows_the_truth_within_a_degree() -> None:
     take = calibrate(recording)
     found = estimate_orientations(take)
     n = min(len(recording.t_s), len(truth.t_s))
-    part = samples(take.calibration.zero, 100.0)
+    part = index_window(take.calibration.zero, 100.0)
     for segment in ("shank_l", "shank_r"):
         ours, true = (np.unwrap(_pitch(q[:n])) for q in (found.q[segment], truth.q[segment]))
         error = (ours - ours[part].mean()) - (true - true[part].mean())
@@ -137,7 +137,7 @@ def test_a_lost_sensor_is_masked_and_comes_back() -> None:
     knee = angles.angles["knee_flexion_l"]
     assert np.isnan(knee[1500:2000]).all()
     n = min(len(knee), len(truth.t_s))
-    error = knee[:n] - truth.zeroed()["knee_flexion_l"][:n]
+    error = knee[:n] - truth.subtract_standing()["knee_flexion_l"][:n]
     assert rms_deg(error[:1500]) < 1.5
     assert rms_deg(error[2100:]) < 5.0
 

@@ -14,7 +14,7 @@ from core.norms.profile import NINE
 from core.norms.values import Sex
 from core.parameters.kinematic import MEAN_ZERO
 from core.parameters.result import CycleCurves, Parameter
-from core.scores import scores
+from core.scores import score_curves
 from tests.wbds import people
 
 
@@ -111,12 +111,12 @@ def test_controls_score_raw_from_standing_because_they_stand_alike() -> None:
         {s: np.ones(4, np.bool_) for s in SIDES},
         {s: np.full(4, 62.0) for s in SIDES},
     )
-    found = scores(curves, reference=group.reference)
+    found = score_curves(curves, reference=group.reference)
     assert found.zero == "standing"
     raw = found.find("gps_deg", "raw")
     assert raw.value is not None
     assert 2.0 < raw.value < 9.0
-    assert scores(curves).find("gps_deg", "raw").reason == "variables_missing"
+    assert score_curves(curves).find("gps_deg", "raw").reason == "variables_missing"
     kept = mean_curves(curves)
     assert kept["left"]["knee_flexion"] == pytest.approx(person["left"]["knee_flexion"])
 

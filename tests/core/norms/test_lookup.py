@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from core.frames import GRAVITY
-from core.norms import NormValue, expected_at_speed, norms_for
-from core.norms.place import percentile_of_sample, percentile_of_z, place, place_difference
+from core.norms import NormValue, look_up_norms, predict_at_speed
+from core.norms.place import percentile_of_sample, percentile_of_z, place_difference, place_value
 from core.norms.speed import walking_speed
 from core.norms.values import pace_of
 
@@ -23,12 +23,12 @@ def norm(**changes: Any) -> NormValue:
 
 
 def test_a_value_gets_its_z_and_percentile() -> None:
-    above = place(68.0, norm())
+    above = place_value(68.0, norm())
     assert above.z == pytest.approx(2.0)
     assert above.percentile == pytest.approx(97.3, abs=0.1), "42 people: a little less sure than 97.7"
     assert above.grade == 1
-    assert place(60.0, norm()).percentile == pytest.approx(50.0)
-    assert (place(55.0, norm()).grade, place(38.0, norm()).grade) == (0, 2)
+    assert place_value(60.0, norm()).percentile == pytest.approx(50.0)
+    assert (place_value(55.0, norm()).grade, place_value(38.0, norm()).grade) == (0, 2)
 
 
 def test_few_controls_make_no_extreme_percentile() -> None:
@@ -48,7 +48,7 @@ def test_few_controls_make_no_extreme_percentile() -> None:
     ],
 )
 def test_no_place_says_why(value: float | None, reference: NormValue | None, reason: str) -> None:
-    found = place(value, reference)
+    found = place_value(value, reference)
     assert (found.z, found.percentile, found.grade, found.reason) == (None, None, None, reason)
 
 
@@ -73,7 +73,7 @@ def test_dimensionless_speed_makes_short_and_tall_people_alike() -> None:
 
 
 def test_slow_walking_has_no_norm_at_all() -> None:
-    slow = norms_for(60, "female", speed_mps=0.7)
+    slow = look_up_norms(60, "female", speed_mps=0.7)
     assert (set(slow.values), dict(slow.bands)) == ({"gait_speed_mps"}, {})
     assert (slow.reason, slow.timing_reason) == ("no_speed_matched_norm", "no_speed_matched_norm")
     assert slow.place("knee_flexion_rom_deg", 40.0).reason == "no_speed_matched_norm"
@@ -82,18 +82,18 @@ def test_slow_walking_has_no_norm_at_all() -> None:
 
 def test_gait_speed_itself_is_held_against_the_speed_people_like() -> None:
     """70 and older by age and sex (Hollman 2011), younger adults the 42 of the angle norms."""
-    old = norms_for(72, "female", 0.5)
+    old = look_up_norms(72, "female", 0.5)
     assert old.place("gait_speed_mps", 0.5).z == pytest.approx((0.5 - 1.16) / 0.20)
-    adult = norms_for(40, "female", 0.5)
+    adult = look_up_norms(40, "female", 0.5)
     assert adult.place("gait_speed_mps", 0.5).z == pytest.approx((0.5 - 1.25) / 0.16)
     assert adult.values["gait_speed_mps"].n == 42
-    assert norms_for(None, None, 1.25).place("gait_speed_mps", 1.25).z == pytest.approx(0.0)
-    assert norms_for(8, "male", 1.2).place("gait_speed_mps", 1.2).reason == "not_comparable"
+    assert look_up_norms(None, None, 1.25).place("gait_speed_mps", 1.25).z == pytest.approx(0.0)
+    assert look_up_norms(8, "male", 1.2).place("gait_speed_mps", 1.2).reason == "not_comparable"
 
 
 def test_the_limit_of_slowness_follows_the_legs() -> None:
-    assert norms_for(60, "female", 0.78, height_m=1.45).reason is None
-    assert norms_for(60, "female", 0.82, height_m=1.95).reason == "no_speed_matched_norm"
+    assert look_up_norms(60, "female", 0.78, height_m=1.45).reason is None
+    assert look_up_norms(60, "female", 0.82, height_m=1.95).reason == "no_speed_matched_norm"
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_the_walkway_norm_is_that_of_the_pace_walked(
     age: float, speed: float | None, pace: str | None
 ) -> None:
     assert pace_of(age, "male", speed) == pace
-    found = norms_for(age, "male", speed)
+    found = look_up_norms(age, "male", speed)
     assert found.pace == pace
     if pace is None:
         assert found.timing_reason == "no_speed_matched_norm"
@@ -116,16 +116,16 @@ def test_the_walkway_norm_is_that_of_the_pace_walked(
 
 
 def test_without_age_or_sex_angles_are_compared_and_times_are_not() -> None:
-    found = norms_for(None, None, 1.2)
+    found = look_up_norms(None, None, 1.2)
     assert found.place("knee_flexion_rom_deg", 64.69).z == pytest.approx(0.0)
     assert found.place("cadence_spm", 100.0).reason == "age_unknown"
-    assert norms_for(30, None, 1.2).place("cadence_spm", 100.0).reason == "sex_unknown"
+    assert look_up_norms(30, None, 1.2).place("cadence_spm", 100.0).reason == "sex_unknown"
 
 
 def test_levels_compare_only_where_the_anatomical_level_is_known() -> None:
-    standing = norms_for(30, "male", 1.2)
+    standing = look_up_norms(30, "male", 1.2)
     assert standing.place("knee_flexion_max_swing_deg", 61.0).reason == "not_comparable"
-    known = norms_for(30, "male", 1.2, anatomical=("knee_flexion", "pelvis_tilt"))
+    known = look_up_norms(30, "male", 1.2, anatomical=("knee_flexion", "pelvis_tilt"))
     assert known.place("knee_flexion_max_swing_deg", 61.08).z == pytest.approx(0.0)
     assert known.place("hip_flexion_min_deg", -8.0).reason == "not_comparable"
     assert "depends on the protocol" in known.bands["knee_flexion"].note
@@ -134,7 +134,7 @@ def test_levels_compare_only_where_the_anatomical_level_is_known() -> None:
 
 
 def test_every_norm_shown_has_source_group_and_number_or_none() -> None:
-    found = norms_for(72, "female", 1.1, 1.62)
+    found = look_up_norms(72, "female", 1.1, 1.62)
     for value in (*found.values.values(), *found.expected.values()):
         assert value.source
         assert value.group
@@ -144,18 +144,18 @@ def test_every_norm_shown_has_source_group_and_number_or_none() -> None:
 def test_expected_step_and_cadence_multiply_to_the_speed_on_any_legs() -> None:
     for speed in np.linspace(0.5, 1.5, 6):
         for leg in (None, 0.78, 0.9, 1.05):
-            e = expected_at_speed(float(speed), 30, leg)
+            e = predict_at_speed(float(speed), 30, leg)
             made = e["step_length_m"].mean * e["cadence_spm"].mean / 60.0
             assert made == pytest.approx(speed, rel=0.03), "two fits of the same walks"
-    short, long = expected_at_speed(1.2, 30, 0.78), expected_at_speed(1.2, 30, 1.05)
+    short, long = predict_at_speed(1.2, 30, 0.78), predict_at_speed(1.2, 30, 1.05)
     assert short["cadence_spm"].mean > long["cadence_spm"].mean
     assert sqrt(GRAVITY / 0.9) == pytest.approx(3.30, abs=0.01)
 
 
 def test_children_have_times_and_no_angles() -> None:
-    child = norms_for(8, "female", 1.2)
+    child = look_up_norms(8, "female", 1.2)
     assert (child.reason, child.timing_reason, child.pace) == ("no_norm_for_age", None, "normal")
     assert child.values["cadence_spm"].source == "Lythgo2011"
     assert child.place("knee_flexion_rom_deg", 60.0).reason == "no_norm_for_age"
     assert not child.expected
-    assert norms_for(8, "female", 0.5).timing_reason == "no_speed_matched_norm"
+    assert look_up_norms(8, "female", 0.5).timing_reason == "no_speed_matched_norm"

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from core.frames import SIDES, Floats
-from core.norms import adult_kinematics, angle_values, expected_at_speed, temporal_values
-from core.norms.tables import rows
+from core.norms import adult_kinematics, angle_values, predict_at_speed, temporal_values
+from core.norms.tables import read_rows
 from core.parameters.catalogue import CATALOGUE, list_curve_figures
 from tests.data import data_folder
 from tests.wbds import people
@@ -123,7 +123,7 @@ def test_no_temporal_reference_says_why(age: float | None, sex: str | None, reas
 @pytest.mark.parametrize("pace", ["slow", "normal", "fast"])
 def test_age_bands_do_not_overlap(sex: str, pace: str) -> None:
     bands: dict[str, list[tuple[float, float]]] = {}
-    for r in rows("spatiotemporal_age_sex"):
+    for r in read_rows("spatiotemporal_age_sex"):
         if (r["sex"], r["pace"]) == (sex, pace):
             bands.setdefault(r["parameter"], []).append((float(r["age_min"]), float(r["age_max"])))
     for ranges in bands.values():
@@ -132,13 +132,13 @@ def test_age_bands_do_not_overlap(sex: str, pace: str) -> None:
 
 
 def test_expected_step_length_and_cadence_at_a_speed() -> None:
-    young = expected_at_speed(1.0, 30)
+    young = predict_at_speed(1.0, 30)
     assert young["step_length_m"].mean == pytest.approx(0.575)
     assert young["cadence_spm"].mean == pytest.approx(104.39, abs=0.01)
-    older = expected_at_speed(1.0, 70)["cadence_spm"]
+    older = predict_at_speed(1.0, 70)["cadence_spm"]
     assert older.group.startswith("older")
     assert older.n == 21
-    assert expected_at_speed(0.3, 30) == {}
+    assert predict_at_speed(0.3, 30) == {}
 
 
 def test_a_single_side_spreads_more_than_the_mean_of_both() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from core.norms import adult_reference
 from core.norms.profile import MODES, NINE, SAGITTAL, gvs, leave_one_out, overall_profile, side_profile
-from core.norms.tables import rows
+from core.norms.tables import read_rows
 from tests.wbds import people
 
 
@@ -37,7 +37,7 @@ def test_every_shipped_spread_is_recomputed_from_the_strides() -> None:
 
 
 def test_the_sagittal_table_has_its_own_name_for_every_row() -> None:
-    assert {r["score"] for r in rows("gps_sagittal_wbds")} == {
+    assert {r["score"] for r in read_rows("gps_sagittal_wbds")} == {
         "GPS_sagittal_side_3",
         "GPS_sagittal_overall_6",
     }

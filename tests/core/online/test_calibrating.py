@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from core.body import nominal_body
-from core.body.apart import legs_apart
+from core.body.apart import lean_legs_apart
 from core.body.choice import WHOLE
-from core.body.erkf.headings import agreed
+from core.body.erkf.headings import align_forward_axes
 from core.body.erkf.params import ErkfParams
 from core.calibration import calibrate
-from core.calibration.live_attempt import Wearer
+from core.calibration.live_attempt import WornSensors
 from core.frames import Segment
 from core.fusion.mahony import estimate_orientations
 from core.online.calibrated import LiveCalibration
@@ -45,8 +45,8 @@ class Run:
         return tuple(s for i, s in enumerate(order) if i == 0 or s != order[i - 1])
 
 
-def wearer(recording: UniformRecording) -> Wearer:
-    return Wearer(
+def wearer(recording: UniformRecording) -> WornSensors:
+    return WornSensors(
         tuple(recording.sensors), recording.rate_hz, recording.subject, recording.protocol, recording.mounting
     )
 
@@ -114,8 +114,8 @@ def test_it_is_the_offline_calibration_of_the_same_samples() -> None:
     part = cut(walk(), 0.0, found.past / 100.0)
     calibrated = calibrate(part)
     body, _ = nominal_body(part.subject.height_m, part.subject.standing_width_m, part.subject.shoe)
-    calibrated, orientations = legs_apart(calibrated, estimate_orientations(calibrated), body)
-    offline, _, turned = agreed(calibrated, orientations, body, WHOLE, ErkfParams.people())
+    calibrated, orientations = lean_legs_apart(calibrated, estimate_orientations(calibrated), body)
+    offline, _, turned = align_forward_axes(calibrated, orientations, body, WHOLE, ErkfParams.people())
     assert found.turned == turned
     for segment, mounted in offline.calibration.segments.items():
         ours = found.calibrated.calibration.segments[segment]

@@ -9,15 +9,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.angles import JointAngles, headings
+from core.angles import JointAngles, compute_headings
 from core.body.feet import FootTracks
 from core.body.tree import PRESETS
 from core.events.result import GaitEvent, GaitEvents
 from core.formats.live_log import FILE_MARK, decode_batch, encode_batch, record, scan
 from core.frames import FOOT, SIDES, Segment
 from core.fusion.orientations import Orientations
-from core.measure import Measured, Tracks, measure
-from core.online import LiveFrame, LiveStride, Online
+from core.measure import MeasuredGait, Tracks, measure_gait
+from core.online import LiveFrame, LiveStride, OnlineSession
 from core.online.chain import COURSES
 from core.parameters.live_stride import NOT_YET
 from core.recording import UniformRecording
@@ -141,7 +141,7 @@ def test_a_redone_calibration_starts_at_the_next_sample_and_nothing_else_changes
     take = simulated("comfortable", 1)[0]
     again: dict[int, Told] = {}
     for size in (sizes, 20):
-        online, frames = Online(hello_of(take), take.subject), []
+        online, frames = OnlineSession(hello_of(take), take.subject), []
         for batch in batches(take, size):
             if batch.t0_us == 12_000_000:
                 online.command("redo_calibration")
@@ -158,14 +158,14 @@ def test_the_log_of_a_take_gives_the_same_bits_as_its_stream() -> None:
     take = worn("seven")
     log = FILE_MARK
     sent = []
-    online = Online(hello_of(take), take.subject)
+    online = OnlineSession(hello_of(take), take.subject)
     for batch in batches(take, 10):
         frame = encode_batch(batch)
         log += record("B", frame)
         sent.append(online.push(decode_batch(frame)))
     records, length = scan(log)
     assert length == len(log)
-    replay = Online(hello_of(take), take.subject)
+    replay = OnlineSession(hello_of(take), take.subject)
     replayed = [replay.push(decode_batch(r.body)) for r in records]
     same(told([f for f in sent if f]), told([f for f in replayed if f]))
 
@@ -185,7 +185,7 @@ def test_an_event_is_told_in_the_push_that_brings_its_sample_and_soon() -> None:
 
 
 def tracks(run: Run) -> Tracks:
-    """What `measure` wants of the whole take."""
+    """What `measure_gait` wants of the whole take."""
     chain, x = run.chain, run.rows
     t_s = np.arange(chain.first, chain.first + len(x["angles"])) / chain.rate_hz
     courses = [s for s in COURSES if s in chain.segments]
@@ -216,11 +216,11 @@ def tracks(run: Run) -> Tracks:
         q={FOOT[s]: take.q[FOOT[s]] for s in sides},
         valid={FOOT[s]: take.valid[FOOT[s]] for s in sides},
         feet=feet,
-        angles=JointAngles(t_s, angles, {}, headings=headings(take)),
+        angles=JointAngles(t_s, angles, {}, headings=compute_headings(take)),
     )
 
 
-def compared(strides: Sequence[LiveStride], whole: Measured) -> int:
+def compared(strides: Sequence[LiveStride], whole: MeasuredGait) -> int:
     """Values of the complete strides that are those of the whole take; fails at the first that is not."""
     index = {(s.side, s.start_s, s.end_s): i for i, s in enumerate(whole.strides.strides)}
     values = 0
@@ -249,7 +249,7 @@ def compared(strides: Sequence[LiveStride], whole: Measured) -> int:
 @pytest.mark.parametrize("name", [n for n in SETS if n != "without feet"])
 def test_a_live_stride_has_the_figures_of_the_whole_take(name: str) -> None:
     run = recorded(worn(name))
-    whole = measure(tracks(run))
+    whole = measure_gait(tracks(run))
     complete = [s for s in run.strides if s.complete]
     # the take ends in mid-stride: the last of each foot waits for its distances
     assert len({s.n for s in run.strides}) == len(whole.strides.strides) <= len(complete) + 2
@@ -260,20 +260,20 @@ def test_a_live_stride_has_the_figures_of_the_whole_take(name: str) -> None:
 @pytest.mark.parametrize("person", ["hemiparetic", "parkinson", "step_asym"])
 def test_it_has_them_of_other_gaits_too(person: str) -> None:
     run = recorded(simulated(person, 2)[0])
-    assert compared(run.strides, measure(tracks(run))) > 500
+    assert compared(run.strides, measure_gait(tracks(run))) > 500
 
 
 def test_the_stopping_stride_of_each_foot_is_told_again_as_not_counted() -> None:
     """neura_walk stops and stands: what is known a moment too late is taken back."""
     run = recorded(neura_walk())
-    whole = measure(tracks(run))
+    whole = measure_gait(tracks(run))
     final = {s.n: s for s in run.strides}
     for side in SIDES:
         last = max((s for s in final.values() if s.side == side), key=lambda s: s.start_s)
         assert (last.complete, last.counted) == (True, False)
         assert "last" in last.flags
     counts = {(s.side, s.start_s) for s in final.values() if s.counted}
-    assert counts <= {(s.side, s.start_s) for s in whole.strides.used()}
+    assert counts <= {(s.side, s.start_s) for s in whole.strides.select_used()}
 
 
 def test_a_stride_is_told_at_once_and_again_with_its_distances() -> None:

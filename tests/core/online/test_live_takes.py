@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.body.erkf.live_figure import Linked
+from core.body.erkf.live_figure import LinkedBody
 from core.errors import ParameterError
 from core.frames import SIDES, Segment
-from core.online import LiveFrame, LiveStride, Online
+from core.online import LiveFrame, LiveStride, OnlineSession
 from core.parameters.spatial import NAMES as SPATIAL
 from core.recording import SensorSignals, UniformRecording
 from tests.live_walks import batches, hello_of, live, recorded
@@ -34,7 +34,7 @@ def codes(frames: list[LiveFrame]) -> list[str]:
 @pytest.mark.parametrize("speed", [BELT, None])
 def test_on_a_belt_distances_are_the_belts_or_none(speed: float | None) -> None:
     take = walk()
-    online = Online(hello_of(take), take.subject, "treadmill", belt_speed_mps=speed)
+    online = OnlineSession(hello_of(take), take.subject, "treadmill", belt_speed_mps=speed)
     frames = [f for b in batches(take) if (f := online.push(b)) is not None]
     strides = strides_of(frames)
     assert len(strides) > 20
@@ -54,7 +54,7 @@ def test_on_a_belt_distances_are_the_belts_or_none(speed: float | None) -> None:
 def test_a_belts_speed_without_a_treadmill_is_refused() -> None:
     take = walk()
     with pytest.raises(ParameterError) as caught:
-        Online(hello_of(take), take.subject, "walk", belt_speed_mps=BELT)
+        OnlineSession(hello_of(take), take.subject, "walk", belt_speed_mps=BELT)
     assert caught.value.code == "belt_speed_without_treadmill"
 
 
@@ -101,7 +101,7 @@ def test_feet_by_themselves_begin_anew_at_their_next_rest(seconds: float) -> Non
 
 def test_a_filter_that_breaks_says_so_once_and_contacts_go_on() -> None:
     take = walk()
-    online = Online(hello_of(take), take.subject)
+    online = OnlineSession(hello_of(take), take.subject)
     frames, broken = [], False
     for batch in batches(take):
         frame = online.push(batch)
@@ -111,7 +111,7 @@ def test_a_filter_that_breaks_says_so_once_and_contacts_go_on() -> None:
         if frame.t_s > 14.0 and not broken:
             broken = True
             assert online.chain is not None
-            assert isinstance(online.chain.estimator, Linked)
+            assert isinstance(online.chain.estimator, LinkedBody)
             # nothing from outside breaks it
             core = online.chain.estimator._filtered._filter
             assert core is not None

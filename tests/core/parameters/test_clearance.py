@@ -11,8 +11,8 @@ from core.body.feet import FootTracks
 from core.body.kinematics import nominal_body
 from core.body.model import BodyModel
 from core.frames import FOOT, R_NEUTRAL, SIDES, Floats, Side
-from core.measure import measure
-from core.parameters.clearance import SoleHeights, over_floor, sole_heights, toe_clearance
+from core.measure import measure_gait
+from core.parameters.clearance import SoleHeights, measure_floor_heights, sole_heights, toe_clearance
 from core.rotation import about, from_matrix, multiply, rotate
 from core.shoe import Shoe
 from core.simulate import simulate_scenario
@@ -65,7 +65,7 @@ def dip(depth: float = 0.02) -> Floats:
 @pytest.mark.parametrize("climb", [0.0, 0.05, -0.08])
 def test_the_least_height_in_mid_swing_is_told_whatever_the_drift(climb: float) -> None:
     found = swing(dip(), climb)
-    heel, tip = over_floor(found, 0, 100, ANKLE)
+    heel, tip = measure_floor_heights(found, 0, 100, ANKLE)
     assert toe_clearance(tip[5:98]) == pytest.approx(0.02)
     assert heel.max() == pytest.approx(0.10)
 
@@ -96,7 +96,7 @@ def test_simulated_toes_pass_the_floor_as_their_soles_do(name: str) -> None:
     assert tracks.feet is not None
     tip_up = 0.02
     body = replace(tracks.feet.body, sole_back=0.055, sole_front=0.18, sole_tip_up=tip_up)
-    measured = measure(replace(tracks, feet=replace(tracks.feet, body=body)))
+    measured = measure_gait(replace(tracks, feet=replace(tracks.feet, body=body)))
     tip = np.array([0.18, tip_up - body.ankle_height, 0.0])
     height = {s: (truth.p[FOOT[s]] + rotate(truth.q[FOOT[s]], tip))[:, 2] for s in SIDES}
     found = list(zip(measured.strides.strides, measured.columns["min_toe_clearance_m"], strict=True))

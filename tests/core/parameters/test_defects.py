@@ -12,12 +12,12 @@ from core.body.feet import FootTracks
 from core.body.model import BodyModel
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Side
-from core.measure import measure
-from core.parameters import stride_values, temporal
+from core.measure import measure_gait
+from core.parameters import stride_values, summarise_times
 from core.parameters.catalogue import unit_of
 from core.parameters.result import Parameter
 from core.parameters.spatial import spatial_rows
-from core.parameters.symmetry import symmetries
+from core.parameters.symmetry import compare_sides
 from core.simulate import simulate_scenario
 from tests.true_walks import true_tracks
 
@@ -45,7 +45,7 @@ def test_percent_is_never_a_fraction_and_time_never_percent() -> None:
 def test_every_number_has_the_unit_that_its_name_says() -> None:
     """Seen: documentation says hours, the code gives minutes."""
     tracks = true_tracks(simulate_scenario("comfortable", 5).truth)
-    measured = measure(tracks)
+    measured = measure_gait(tracks)
     bare = ("harmonic_ratio_", "step_regularity_", "stride_regularity_", "stride_sparc")
     for p in measured.parameters:
         assert p.unit == unit_of(p.name), p.name
@@ -60,7 +60,7 @@ def test_two_zeros_are_not_symmetric_and_an_index_is_not_absolute() -> None:
             Parameter("step_length_m", side, 12, value, None, "m")
             for side, value in zip(SIDES, (left, right), strict=True)
         ]
-        return symmetries(pair)[0].index_pct
+        return compare_sides(pair)[0].index_pct
 
     assert index(0.0, 0.0) is None
     assert index(0.5, 0.6) == pytest.approx(-index(0.6, 0.5))  # type: ignore[operator]
@@ -68,7 +68,7 @@ def test_two_zeros_are_not_symmetric_and_an_index_is_not_absolute() -> None:
 
 def test_who_stands_has_no_stance_share() -> None:
     """Seen: the stance ratio falls back to 1.0 when nobody walks."""
-    found = temporal(Strides(()))
+    found = summarise_times(Strides(()))
     assert {p.mean for p in found} == {None}
     assert {p.reason for p in found} == {"no_strides"}
 
@@ -110,7 +110,7 @@ def test_the_lift_of_a_sensor_is_not_the_clearance_of_the_toe() -> None:
 def test_no_gait_gives_a_clean_empty_result() -> None:
     """Seen: crash when there is no gait, or "done" without saying anything."""
     tracks = true_tracks(simulate_scenario("comfortable", 5).truth)
-    measured = measure(replace(tracks, events=replace(tracks.events, events=())))
+    measured = measure_gait(replace(tracks, events=replace(tracks.events, events=())))
     assert measured.strides.strides == ()
     # nobody walked: the count is a true 0, the way is that of the feet
     silent = [p for p in measured.parameters if not p.name.endswith(("_count", "total_distance_m"))]

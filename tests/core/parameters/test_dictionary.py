@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.measure import measure
+from core.measure import measure_gait
 from core.parameters.catalogue import CATALOGUE
 from core.simulate import simulate_scenario
 from server.report.wording import REASONS
@@ -20,7 +20,7 @@ def names() -> set[str]:
     tracks = true_tracks(simulate_scenario("comfortable", 5).truth)
     whole = replace(tracks, trunk={"pelvis": np.zeros((len(tracks.t_s), 3))})
     # steps are those of a trunk sensor alone
-    return {p.name for p in measure(whole).parameters} | {"step_count"}
+    return {p.name for p in measure_gait(whole).parameters} | {"step_count"}
 
 
 def test_the_catalogue_knows_what_is_measured_and_nothing_else(names: set[str]) -> None:
@@ -49,6 +49,6 @@ def test_every_reason_has_words() -> None:
         replace(tracks, feet=replace(bare, linked=False)),
         replace(tracks, angles=replace(tracks.angles, angles={}) if tracks.angles else None),
     )
-    said = {p.reason for take in takes for p in measure(take).parameters if p.reason is not None}
+    said = {p.reason for take in takes for p in measure_gait(take).parameters if p.reason is not None}
     assert len(said) > 5
     assert said <= set(REASONS)

@@ -10,12 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.angles import JointAngles, headings
+from core.angles import JointAngles, compute_headings
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Bools, Floats, Side
 from core.fusion.orientations import Orientations
 from core.norms import adult_kinematics
-from core.parameters import cycle_curves, foot_pitch, gait_parameters, kinematic, mean_curve
+from core.parameters import cycle_curves, foot_pitch, gait_parameters, mean_curve, summarise_angles
 from core.parameters.catalogue import list_curve_figures
 from core.parameters.kinematic import per_stride_figures, stride_figures
 from core.parameters.result import CycleCurves
@@ -88,7 +88,7 @@ def test_a_gap_empties_the_rows_that_touch_it_and_no_other() -> None:
     assert np.array_equal(lost.any(axis=1), lost.all(axis=1))
     assert np.isfinite(curves.curves["hip_flexion"]["right"]).all()
     assert mean_curve(curves, "knee_flexion", "right").n == 6
-    (rom,) = (p for p in kinematic(curves) if p.name == "knee_flexion_rom_deg" and p.side == "right")
+    (rom,) = (p for p in summarise_angles(curves) if p.name == "knee_flexion_rom_deg" and p.side == "right")
     assert rom.n == 6
 
 
@@ -121,22 +121,22 @@ def test_figures_of_a_known_curve() -> None:
     curves = CycleCurves(
         {"knee_flexion": {"left": rows}}, {"left": (0,), "right": ()}, mask, {"left": np.array([60.0])}
     )
-    values = {p.name: p.mean for p in kinematic(curves) if p.side == "left"}
+    values = {p.name: p.mean for p in summarise_angles(curves) if p.side == "left"}
     assert values["knee_flexion_ic_deg"] == pytest.approx(-10.0)
     assert values["knee_flexion_max_loading_deg"] == pytest.approx(11.0)
     assert values["knee_flexion_min_stance_deg"] == pytest.approx(4.0)
     assert values["knee_flexion_max_swing_deg"] == pytest.approx(60.0)
     assert values["knee_flexion_rom_deg"] == pytest.approx(70.0)
     assert values["hip_flexion_rom_deg"] is None
-    reasons = {(p.name, p.side): p.reason for p in kinematic(curves)}
+    reasons = {(p.name, p.side): p.reason for p in summarise_angles(curves)}
     assert reasons["hip_flexion_rom_deg", "left"] == "joint_missing"
 
 
 def test_reasons_when_there_is_no_number() -> None:
     knee = np.full(3000, np.nan)
-    all_lost = kinematic(cycle_curves(angles(knee_flexion_r=knee), strides()))
+    all_lost = summarise_angles(cycle_curves(angles(knee_flexion_r=knee), strides()))
     assert {p.reason for p in all_lost if p.side == "right" and p.name.startswith("knee")} == {"gap"}
-    none_used = kinematic(cycle_curves(angles(knee_flexion_r=SIZE * wave()), strides(reason="turn")))
+    none_used = summarise_angles(cycle_curves(angles(knee_flexion_r=SIZE * wave()), strides(reason="turn")))
     assert {p.reason for p in none_used if p.side == "right" and p.name.startswith("knee")} == {"no_strides"}
 
 
@@ -240,7 +240,7 @@ def test_the_simulated_pelvis_rotates_as_the_norm_it_was_made_from() -> None:
     own = Strides(tuple(
         Stride(s.side, s.start_s, s.release_s, s.end_s) for s in truth.strides if abs(s.turn_rad) < 0.1
     ))  # fmt: skip
-    curves = cycle_curves(JointAngles(truth.t_s, {}, {}, headings=headings(oriented)), own)
+    curves = cycle_curves(JointAngles(truth.t_s, {}, {}, headings=compute_headings(oriented)), own)
     norm = adult_kinematics(None).bands["pelvis_rotation"].mean_deg
     for side in SIDES:
         rows = np.degrees(curves.curves["pelvis_rotation"][side])

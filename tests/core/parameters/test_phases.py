@@ -13,10 +13,10 @@ from core.body.feet import FootTracks
 from core.body.model import BodyModel
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Segment, Side
-from core.measure import measure
+from core.measure import measure_gait
 from core.parameters.phases import NAMES, phase_rows
 from core.parameters.rows import Row, side_parameters
-from core.parameters.stance import stances
+from core.parameters.stance import find_stances
 from core.simulate import simulate_scenario
 from tests.true_walks import true_tracks
 
@@ -61,7 +61,7 @@ def phases(
 ) -> Row:
     one = Strides((stride,))
     of = dict(pitch() if of_feet is None else of_feet)
-    return phase_rows(one, stances(one, T, of), joint or angles(), of, tracks or feet())[0]
+    return phase_rows(one, find_stances(one, T, of), joint or angles(), of, tracks or feet())[0]
 
 
 def test_each_phase_ends_where_its_event_is() -> None:
@@ -107,7 +107,7 @@ def test_what_is_missing_has_its_own_reason() -> None:
 @pytest.mark.parametrize("name", ["comfortable", "hemiparetic"])
 def test_the_seven_phases_are_the_whole_stride(name: str) -> None:
     truth = simulate_scenario(name, 5).truth
-    columns = measure(true_tracks(truth)).columns
+    columns = measure_gait(true_tracks(truth)).columns
     seven = [columns[n] for n in (*NAMES, "initial_double_support_pct", "terminal_double_support_pct")]
     totals = [sum(v for v in row if v is not None) for row in zip(*seven, strict=True) if None not in row]
     assert len(totals) > 20
@@ -116,7 +116,7 @@ def test_the_seven_phases_are_the_whole_stride(name: str) -> None:
 
 def test_both_sides_have_every_phase() -> None:
     one = Strides((STRIDE,))
-    rows = phase_rows(one, stances(one, T, pitch()), angles(), pitch(), feet())
+    rows = phase_rows(one, find_stances(one, T, pitch()), angles(), pitch(), feet())
     found: dict[tuple[str, Side | None], str | None] = {
         (p.name, p.side): p.reason for p in side_parameters(one, rows, NAMES)
     }

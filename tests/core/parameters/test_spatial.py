@@ -14,9 +14,16 @@ from core.body.model import BodyModel
 from core.events.result import Stride, Strides
 from core.frames import FOOT, R_NEUTRAL, SIDES, Bools, Floats, Side
 from core.parameters.result import Parameter
-from core.parameters.spatial import NAMES, Surface, in_place, per_stride_spatial, spatial, spatial_rows
+from core.parameters.spatial import (
+    NAMES,
+    Surface,
+    in_place,
+    per_stride_spatial,
+    spatial_rows,
+    summarise_distances,
+)
 from core.rotation import about, from_matrix, multiply
-from core.simulate import Truth
+from core.simulate import WalkTruth
 from tests.walks import simulated
 
 RATE = 100.0
@@ -81,7 +88,7 @@ def parameters(
     tracks: FootTracks | None, surface: Surface | None = None
 ) -> Mapping[tuple[str, Side | None], Parameter]:
     surface = surface or Surface()
-    return by_name(spatial(strides(), tracks, spatial_rows(strides(), tracks, surface), surface))
+    return by_name(summarise_distances(strides(), tracks, spatial_rows(strides(), tracks, surface), surface))
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.7, -2.5])
@@ -157,7 +164,7 @@ def test_what_cannot_be_known_has_a_reason() -> None:
     barefoot = parameters(replace(feet(), body=replace(BODY, sole_back=None)))
     assert barefoot["min_toe_clearance_m", "left"].reason == "no_shoe_geometry"
     assert barefoot["max_heel_clearance_m", "left"].reason == "no_shoe_geometry"
-    nobody = {p.reason for p in spatial(Strides(()), None, ())}
+    nobody = {p.reason for p in summarise_distances(Strides(()), None, ())}
     assert nobody == {"no_strides", "no_foot_track"}
 
 
@@ -199,14 +206,14 @@ def test_strides_have_their_own_columns() -> None:
     assert columns["step_length_m"] == (None,) * 8
 
 
-def true_tracks(truth: Truth) -> FootTracks:
+def true_tracks(truth: WalkTruth) -> FootTracks:
     """The feet as they really went."""
     p, q = ({s: of[FOOT[s]] for s in SIDES} for of in (truth.p, truth.q))
     valid = dict.fromkeys(SIDES, np.ones(len(truth.t_s), bool))
     return FootTracks(truth.t_s, RATE, p, q, truth.flat, valid, True, "truth", BODY)
 
 
-def true_strides(truth: Truth) -> Strides:
+def true_strides(truth: WalkTruth) -> Strides:
     """All true strides with the other foot's contact inside."""
     made = []
     for s in truth.strides:
@@ -229,7 +236,9 @@ def test_true_paths_give_the_true_lengths_and_widths(name: str) -> None:
 def test_an_affected_side_shows_in_sign_and_size() -> None:
     truth = simulated("hemiparetic", 5)[1]
     strides_ = true_strides(truth)
-    found = by_name(spatial(strides_, true_tracks(truth), spatial_rows(strides_, true_tracks(truth))))
+    found = by_name(
+        summarise_distances(strides_, true_tracks(truth), spatial_rows(strides_, true_tracks(truth)))
+    )
     steps = {s: found["step_length_m", s].mean for s in SIDES}
     assert steps["left"] is not None
     assert steps["right"] is not None
@@ -248,5 +257,5 @@ def test_the_way_of_a_walk_is_that_of_its_footprints() -> None:
         edges = np.flatnonzero(np.diff(np.concatenate(([False], flat, [False]))))
         places = [tracks.p[side][(a + b) // 2, :2] for a, b in zip(edges[::2], edges[1::2], strict=True)]
         ways.append(sum(float(np.linalg.norm(b - a)) for a, b in pairwise(places)))
-    found = by_name(spatial(Strides(()), tracks, ()))["total_distance_m", None]
+    found = by_name(summarise_distances(Strides(()), tracks, ()))["total_distance_m", None]
     assert found.mean == pytest.approx(np.mean(ways), abs=0.05)

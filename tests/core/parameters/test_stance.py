@@ -12,7 +12,7 @@ import pytest
 from core.events.result import Stride, Strides
 from core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
 from core.parameters.rows import side_parameters
-from core.parameters.stance import FLAT_RAD, NAMES, Stances, foot_pitches, stances
+from core.parameters.stance import FLAT_RAD, NAMES, Stances, find_stances, foot_pitches
 from core.rotation import about, from_matrix, multiply
 from core.simulate import simulate_scenario
 from tests.true_walks import true_tracks
@@ -41,7 +41,7 @@ def parts(found: Stances) -> dict[str, float | str]:
 
 @pytest.mark.parametrize("level", [0.0, 4.0, -6.0])
 def test_the_three_parts_are_where_the_pitch_passes_three_degrees(level: float) -> None:
-    found = parts(stances(strides(), T, walked(level_deg=level)))
+    found = parts(find_stances(strides(), T, walked(level_deg=level)))
     # down from 18° in a sixth of stance passes 3° after 15/18 of it; up by 60° in a third after 3/60 of it
     assert found["loading_pct"] == pytest.approx(100 / 6 * 15 / 18, abs=0.3)
     assert found["push_pct"] == pytest.approx(100 / 3 * 57 / 60, abs=0.3)
@@ -49,7 +49,7 @@ def test_the_three_parts_are_where_the_pitch_passes_three_degrees(level: float) 
 
 
 def test_the_parts_are_the_whole_stance() -> None:
-    found = stances(strides(), T, walked())
+    found = find_stances(strides(), T, walked())
     for row in found.rows:
         numbers = [v for v in row.values() if isinstance(v, float)]
         assert sum(numbers) == pytest.approx(100.0)
@@ -58,26 +58,26 @@ def test_the_parts_are_the_whole_stance() -> None:
 
 
 def test_a_flat_landing_has_no_loading() -> None:
-    assert parts(stances(strides(), T, walked(landing_deg=0.0)))["loading_pct"] == 0.0
+    assert parts(find_stances(strides(), T, walked(landing_deg=0.0)))["loading_pct"] == 0.0
 
 
 def test_who_walks_on_the_toes_has_no_flat_foot() -> None:
-    assert set(parts(stances(strides(), T, walked(level_deg=-20.0))).values()) == {"no_foot_flat"}
+    assert set(parts(find_stances(strides(), T, walked(level_deg=-20.0))).values()) == {"no_foot_flat"}
 
 
 def test_a_foot_that_never_stops_rolling_is_never_flat() -> None:
     rolling: dict[Segment, Floats] = {"foot_l": np.radians(20.0 - 80.0 * (T % 1.0))}
-    assert set(parts(stances(strides(), T, rolling)).values()) == {"no_foot_flat"}
+    assert set(parts(find_stances(strides(), T, rolling)).values()) == {"no_foot_flat"}
 
 
 def test_what_is_missing_has_its_own_reason() -> None:
-    assert set(parts(stances(strides(), T, {})).values()) == {"no_foot_sensor"}
+    assert set(parts(find_stances(strides(), T, {})).values()) == {"no_foot_sensor"}
     lost = walked()
     lost["foot_l"][150:1000] = np.nan
-    rows = stances(strides(), T, lost).rows
+    rows = find_stances(strides(), T, lost).rows
     assert rows[1]["push_pct"] == "gap"
     no_tc = Strides(tuple(Stride("left", k, None, k + 1.0) for k in range(1, 9)))
-    assert stances(no_tc, T, walked()).rows[0]["loading_pct"] == "no_terminal_contact"
+    assert find_stances(no_tc, T, walked()).rows[0]["loading_pct"] == "no_terminal_contact"
 
 
 @pytest.mark.parametrize("name", ["comfortable", "hemiparetic", "antalgic", "drop_foot"])
@@ -87,7 +87,7 @@ def test_simulated_feet_are_flat_when_they_really_are(name: str) -> None:
     tracks = true_tracks(truth)
     pitch = foot_pitches(tracks)
     made = [s for s in truth.strides if s.lift5_s is not None]
-    found = stances(
+    found = find_stances(
         Strides(tuple(Stride(s.side, s.start_s, s.lift5_s, s.end_s) for s in made)), truth.t_s, pitch
     )
     for s, flat, heel_off in zip(made, found.flat_s, found.heel_off_s, strict=True):

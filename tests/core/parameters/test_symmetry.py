@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from core.events.result import Stride, Strides
 from core.frames import Side
 from core.parameters.result import Parameter
-from core.parameters.symmetry import angle_pct, index_pct, phase_coordination, ratio, symmetries
+from core.parameters.symmetry import angle_pct, compare_sides, index_pct, phase_coordination, ratio
 
 
 def of(
@@ -29,7 +29,7 @@ def test_the_vector_of_the_literature() -> None:
 
 
 def test_left_stands_first_where_no_side_is_affected() -> None:
-    (found,) = symmetries(of("step_length_m", 0.39, 0.25, "m"))
+    (found,) = compare_sides(of("step_length_m", 0.39, 0.25, "m"))
     assert (found.first, found.reference) == ("left", "left/right")
     assert found.difference == pytest.approx(0.14)
     assert found.ratio == pytest.approx(1.56)
@@ -39,7 +39,7 @@ def test_left_stands_first_where_no_side_is_affected() -> None:
 
 @pytest.mark.parametrize(("affected", "sign"), [("left", 1.0), ("right", -1.0)])
 def test_the_affected_side_stands_first(affected: Side, sign: float) -> None:
-    (found,) = symmetries(of("step_length_m", 0.39, 0.25, "m"), affected)
+    (found,) = compare_sides(of("step_length_m", 0.39, 0.25, "m"), affected)
     assert (found.first, found.reference) == (affected, "affected/unaffected")
     assert found.index_pct == pytest.approx(sign * 43.75)
     assert found.difference == pytest.approx(sign * 0.14)
@@ -50,7 +50,7 @@ def test_the_affected_side_stands_first(affected: Side, sign: float) -> None:
 @settings(deadline=None)
 @given(st.floats(0.1, 2.0), st.floats(0.1, 2.0))
 def test_an_index_keeps_the_side_it_turns_its_sign_with_it(a: float, b: float) -> None:
-    (left,), (right,) = (symmetries(of("step_length_m", a, b, "m"), side) for side in ("left", "right"))
+    (left,), (right,) = (compare_sides(of("step_length_m", a, b, "m"), side) for side in ("left", "right"))
     assert left.index_pct == pytest.approx(-right.index_pct)  # type: ignore[operator]
     assert left.angle_pct == pytest.approx(-right.angle_pct)  # type: ignore[operator]
     assert left.ratio == pytest.approx(1.0 / right.ratio)  # type: ignore[operator]
@@ -60,29 +60,29 @@ def test_an_index_keeps_the_side_it_turns_its_sign_with_it(a: float, b: float) -
 def test_fewer_than_four_strides_of_a_side_have_no_asymmetry(n: int) -> None:
     left, right = of("step_length_m", 0.51, 0.60, "m", sd=0.01)
     few = replace(right, n=n)
-    assert symmetries((left, few)) == symmetries((replace(left, n=n), right)) == ()
-    assert symmetries((left, replace(right, n=4)))
+    assert compare_sides((left, few)) == compare_sides((replace(left, n=n), right)) == ()
+    assert compare_sides((left, replace(right, n=4)))
 
 
 def test_sides_differ_clearly_only_where_the_interval_of_the_difference_leaves_out_zero() -> None:
     """Welch's interval of 0.60 ± 0.10 and 0.50 ± 0.05 of four strides: freedom 4.4, so 4."""
     left, right = of("step_length_m", 0.60, 0.50, "m", n=4)
-    (open_,) = symmetries((replace(left, sd=0.10), replace(right, sd=0.05)))
+    (open_,) = compare_sides((replace(left, sd=0.10), replace(right, sd=0.05)))
     half = 2.7764 * np.hypot(0.10, 0.05) / 2.0
     assert open_.low == pytest.approx(0.1 - half, abs=1e-4)
     assert open_.high == pytest.approx(0.1 + half, abs=1e-4)
     assert not open_.clear
-    (plain,) = symmetries((replace(left, sd=0.02), replace(right, sd=0.02)))
+    (plain,) = compare_sides((replace(left, sd=0.02), replace(right, sd=0.02)))
     assert plain.clear
-    (unknown,) = symmetries((left, right))
+    (unknown,) = compare_sides((left, right))
     assert (unknown.low, unknown.clear) == (None, False)
-    (steady,) = symmetries(of("stride_length_m", 1.20, 1.10, "m", sd=0.0))
+    (steady,) = compare_sides(of("stride_length_m", 1.20, 1.10, "m", sd=0.0))
     assert steady.low == steady.high == pytest.approx(0.1)
     assert steady.clear
 
 
 def test_angles_have_a_difference_and_no_ratio() -> None:
-    (found,) = symmetries(of("knee_flexion_min_stance_deg", 5.0, -1.0, "deg"))
+    (found,) = compare_sides(of("knee_flexion_min_stance_deg", 5.0, -1.0, "deg"))
     assert (found.difference, found.ratio, found.index_pct, found.angle_pct) == (6.0, None, None, None)
     assert found.reason == "angle"
 
@@ -91,14 +91,14 @@ def test_angles_have_a_difference_and_no_ratio() -> None:
     ("left", "right"), [(0.03, 0.0), (0.0, 0.0), (0.14, -0.02), (-0.1, -0.1), (0.3, 0.04)]
 )
 def test_near_zero_nothing_is_divided(left: float, right: float) -> None:
-    (found,) = symmetries(of("circumduction_m", left, right, "m"))
+    (found,) = compare_sides(of("circumduction_m", left, right, "m"))
     assert (found.ratio, found.index_pct, found.angle_pct, found.reason) == (None, None, None, "near_zero")
     assert found.difference == pytest.approx(left - right)
 
 
 def test_a_side_without_a_value_is_not_compared() -> None:
-    assert symmetries(of("step_length_m", 0.5, None, "m")) == ()
-    assert symmetries((Parameter("cadence_spm", None, 9, 100.0, None, "steps/min"),)) == ()
+    assert compare_sides(of("step_length_m", 0.5, None, "m")) == ()
+    assert compare_sides((Parameter("cadence_spm", None, 9, 100.0, None, "steps/min"),)) == ()
 
 
 def strides(half: float = 0.5, n: int = 12, swing_left: float = 0.45, wobble: float = 0.0) -> Strides:

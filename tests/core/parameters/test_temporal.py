@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core.events.result import Stride, Strides
-from core.parameters import per_stride, stride_values, temporal
+from core.parameters import per_stride, stride_values, summarise_times
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.catalogue.entry import PHASES, SUPPORT, TIMING
 from core.parameters.result import Parameter
@@ -51,7 +51,7 @@ def test_mean_and_spread_over_the_counted_strides_only() -> None:
             Stride("left", 0.5, 1.1, 1.6, 0.6, 1.0),
         )
     )
-    found = temporal(strides)
+    found = summarise_times(strides)
     stride_time = by_name(found)["stride_time_s"]
     assert (stride_time.n, stride_time.unit, stride_time.reason) == (2, "s", None)
     assert stride_time.mean == pytest.approx(1.1)
@@ -67,14 +67,14 @@ def test_mean_and_spread_over_the_counted_strides_only() -> None:
 
 
 def test_every_name_stands_on_both_sides_even_with_nothing_to_say() -> None:
-    nothing = temporal(Strides(()))
+    nothing = summarise_times(Strides(()))
     assert len(nothing) == 2 * 14 + 1
     assert {p.reason for p in nothing} == {"no_strides"}
     assert all(p.mean is None and p.sd is None and p.n == 0 for p in nothing)
 
 
 def test_one_foot_alone_has_its_own_times_and_says_what_is_missing() -> None:
-    found = temporal(Strides((Stride("right", 0.0, 0.6, 1.0), Stride("right", 1.0, 1.6, 2.0))))
+    found = summarise_times(Strides((Stride("right", 0.0, 0.6, 1.0), Stride("right", 1.0, 1.6, 2.0))))
     right = by_name(found)
     assert right["stance_pct"].mean == pytest.approx(60.0)
     assert {right[n].reason for n in ("step_time_s", "double_support_pct", "single_support_s")} == {
@@ -85,11 +85,11 @@ def test_one_foot_alone_has_its_own_times_and_says_what_is_missing() -> None:
 
 
 def test_missing_terminal_contact_and_flight_have_their_own_reasons() -> None:
-    no_tc = by_name(temporal(Strides((Stride("right", 0.0, None, 1.0, 0.1, 0.5),))))
+    no_tc = by_name(summarise_times(Strides((Stride("right", 0.0, None, 1.0, 0.1, 0.5),))))
     assert no_tc["stance_pct"].reason == "no_terminal_contact"
     assert no_tc["double_support_s"].reason == "no_terminal_contact"
     assert no_tc["single_support_s"].mean == pytest.approx(0.4)
-    running = by_name(temporal(Strides((Stride("right", 0.0, 0.25, 0.7, None, 0.35),))))
+    running = by_name(summarise_times(Strides((Stride("right", 0.0, 0.25, 0.7, None, 0.35),))))
     assert running["terminal_double_support_s"].reason == "no_double_support"
     assert running["double_support_pct"].reason == "no_double_support"
     assert running["step_time_s"].mean == pytest.approx(0.35)

@@ -12,9 +12,9 @@ from core.events.bouts import Bout
 from core.events.result import Stride, Strides
 from core.events.steps import Step, Steps
 from core.frames import Floats
-from core.measure import measure
+from core.measure import measure_gait
 from core.parameters.result import Parameter
-from core.parameters.trunk import NAMES, harmonic_ratios, one_foot, trunk_regularity
+from core.parameters.trunk import NAMES, choose_foot, harmonic_ratios, trunk_regularity
 from core.parameters.walking import step_strides
 from core.simulate import simulate_scenario
 from tests.true_walks import true_tracks
@@ -41,7 +41,7 @@ def wave(*amplitudes: float) -> Floats:
 
 def found(forward: Floats, sideways: Floats, up: Floats, of: Strides | None = None) -> dict[str, Parameter]:
     acceleration = np.stack((forward, sideways, up), axis=1)
-    return {p.name: p for p in trunk_regularity(one_foot(of or strides()), T, {"pelvis": acceleration})}
+    return {p.name: p for p in trunk_regularity(choose_foot(of or strides()), T, {"pelvis": acceleration})}
 
 
 def test_the_ratio_is_that_of_the_amplitudes() -> None:
@@ -105,7 +105,7 @@ def test_strides_set_aside_are_not_looked_at() -> None:
 
 
 def test_what_is_missing_has_its_own_reason() -> None:
-    nobody = trunk_regularity(one_foot(strides()), T, {})
+    nobody = trunk_regularity(choose_foot(strides()), T, {})
     assert {p.reason for p in nobody} == {"no_pelvis_sensor"}
     assert {p.name for p in nobody} == set(NAMES)
     a = wave(0.0, 1.0)
@@ -140,10 +140,10 @@ def simulated(name: str) -> dict[str, float]:
     velocity = np.gradient(truth.p["pelvis"], truth.t_s, axis=0)
     # these walks go straight along x
     acceleration = np.gradient(velocity, truth.t_s, axis=0)
-    listed = measure(true_tracks(truth)).strides
+    listed = measure_gait(true_tracks(truth)).strides
     return {
         p.name: p.mean
-        for p in trunk_regularity(one_foot(listed), truth.t_s, {"pelvis": acceleration})
+        for p in trunk_regularity(choose_foot(listed), truth.t_s, {"pelvis": acceleration})
         if p.mean is not None
     }
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from core.events.result import Stride, Strides
-from core.parameters import temporal
-from core.parameters.variability import cv_pct, summary, t_quantile
+from core.parameters import summarise_times
+from core.parameters.variability import cv_pct, summarise_values, t_quantile
 
 
 def test_the_interval_of_the_mean_is_students() -> None:
@@ -15,7 +15,7 @@ def test_the_interval_of_the_mean_is_students() -> None:
     assert t_quantile(1) == pytest.approx(12.706, abs=5e-4)
     assert t_quantile(9) == pytest.approx(2.262, abs=5e-4)
     assert t_quantile(1000) == pytest.approx(1.962, abs=5e-4)
-    found = summary("stride_time_s", "left", [1.0, 1.1, 1.2, 1.3], "s")
+    found = summarise_values("stride_time_s", "left", [1.0, 1.1, 1.2, 1.3], "s")
     assert (found.ci_low, found.ci_high) == pytest.approx((0.9446, 1.3554), abs=1e-4)
 
 
@@ -23,7 +23,7 @@ def test_the_interval_covers_the_true_mean_as_often_as_it_says() -> None:
     rng = np.random.default_rng(4)
     hits = 0
     for values in rng.normal(1.1, 0.05, (2000, 12)):
-        found = summary("stride_time_s", "left", values.tolist(), "s")
+        found = summarise_values("stride_time_s", "left", values.tolist(), "s")
         assert found.ci_low is not None
         assert found.ci_high is not None
         hits += found.ci_low <= 1.1 <= found.ci_high
@@ -31,14 +31,14 @@ def test_the_interval_covers_the_true_mean_as_often_as_it_says() -> None:
 
 
 def test_one_stride_has_a_value_and_nothing_else() -> None:
-    found = summary("stride_time_s", "left", [1.1], "s")
+    found = summarise_values("stride_time_s", "left", [1.1], "s")
     assert (found.mean, found.sd, found.cv_pct, found.ci_low, found.ci_high) == (1.1, None, None, None, None)
     assert found.note == "few_strides"
 
 
 @pytest.mark.parametrize(("n", "cv", "note"), [(9, False, True), (10, True, True), (30, True, False)])
 def test_variation_needs_ten_strides_and_is_marked_below_thirty(n: int, cv: bool, note: bool) -> None:
-    found = summary("stride_time_s", "left", [1.0 + 0.01 * (-1) ** i for i in range(n)], "s")
+    found = summarise_values("stride_time_s", "left", [1.0 + 0.01 * (-1) ** i for i in range(n)], "s")
     assert (found.cv_pct is not None) == cv
     assert (found.note == "few_strides") == note
 
@@ -61,7 +61,7 @@ def test_cadence_carries_the_spread_of_its_steps() -> None:
         Stride("right", k * 1.1, k * 1.1 + 0.7, (k + 1) * 1.1, k * 1.1 + 0.1, k * 1.1 + 0.5 + 0.01 * (k % 2))
         for k in range(12)
     ]
-    (cadence,) = (p for p in temporal(Strides(tuple(made))) if p.name == "cadence_spm")
+    (cadence,) = (p for p in summarise_times(Strides(tuple(made))) if p.name == "cadence_spm")
     steps = np.array([0.6 - 0.01 * (k % 2) for k in range(12)])
     assert cadence.cv_pct == pytest.approx(100 * steps.std(ddof=1) / steps.mean())
     assert cadence.mean is not None

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from core import calibration
-from core.body.erkf.headings import turned
+from core.body.erkf.headings import turn_forward_axes
 from core.calibration import CalibrationParams, calibrate
 from core.calibration.result import CalibratedRecording
 from core.fusion.mahony import estimate_orientations
 from core.parameters.smoothness import NAME as SPARC
 from core.parameters.trunk import NAMES as TRUNK_NAMES
-from core.pipeline import Analysis, analyse
+from core.pipeline import TakeAnalysis, analyse
 from core.recording import UniformRecording
 from core.simulate import simulate_scenario
 
@@ -25,20 +25,20 @@ OF_TRUNK = (*TRUNK_NAMES, SPARC)
 
 
 @pytest.fixture(scope="module")
-def right() -> Analysis:
+def right() -> TakeAnalysis:
     """A simulated walk as the product analyses it."""
     return analyse(simulate_scenario("comfortable", 0).recording)
 
 
 @pytest.fixture(scope="module")
-def off() -> Analysis:
+def off() -> TakeAnalysis:
     """The same walk, the pelvis taken to face 20° to the left of where it does."""
 
     def calibrate_wrongly(
         recording: UniformRecording, params: CalibrationParams | None = None
     ) -> CalibratedRecording:
         good = calibrate(recording, params)
-        wrong, _ = turned(good, estimate_orientations(good), {"pelvis": radians(OFF_DEG)})
+        wrong, _ = turn_forward_axes(good, estimate_orientations(good), {"pelvis": radians(OFF_DEG)})
         return wrong
 
     with pytest.MonkeyPatch.context() as patch:
@@ -47,7 +47,7 @@ def off() -> Analysis:
 
 
 def test_the_trunk_of_a_pelvis_20_degrees_off_is_as_regular_as_of_one_that_is_not(
-    right: Analysis, off: Analysis
+    right: TakeAnalysis, off: TakeAnalysis
 ) -> None:
     assert any(n.code == "heading_corrected" and n.sensor == "pelvis" for n in off.notices)
     assert right.tracks is not None
@@ -62,7 +62,7 @@ def test_the_trunk_of_a_pelvis_20_degrees_off_is_as_regular_as_of_one_that_is_no
         assert value == pytest.approx(known[name], rel=0.3 if "harmonic" in name else 0.02), name
 
 
-def test_the_mounting_that_is_told_is_the_one_that_was_used(right: Analysis, off: Analysis) -> None:
+def test_the_mounting_that_is_told_is_the_one_that_was_used(right: TakeAnalysis, off: TakeAnalysis) -> None:
     assert right.calibration is not None
     assert off.calibration is not None
     was = right.calibration.segments["pelvis"].R_segment_sensor

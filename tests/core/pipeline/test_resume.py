@@ -12,7 +12,7 @@ import pytest
 from core.errors import ParameterError
 from core.events.flags import StrideParams
 from core.frames import Segment
-from core.pipeline import TRUNK_ONLY, WALK, Analysis, PipelineConfig, analyse, resume
+from core.pipeline import TRUNK_ONLY, WALK, PipelineConfig, TakeAnalysis, analyse, resume
 from core.recording import Recording
 from core.simulate import simulate_scenario
 
@@ -25,7 +25,7 @@ def take(*worn: Segment) -> Recording:
 
 
 @cache
-def whole(*worn: Segment) -> Analysis:
+def whole(*worn: Segment) -> TakeAnalysis:
     return analyse(take(*worn))
 
 

@@ -7,9 +7,9 @@ from functools import cache
 import pytest
 
 from core.frames import Segment
-from core.measure import measure
+from core.measure import measure_gait
 from core.parameters.result import Parameter
-from core.pipeline import Analysis, analyse
+from core.pipeline import TakeAnalysis, analyse
 from core.simulate import simulate_scenario
 from server.report.bundle import load_bundle
 from server.report.exports import analysis_files
@@ -18,11 +18,11 @@ from tests.accuracy.mobgap import TRIALS, recording
 
 
 @cache
-def analysis(*worn: Segment, name: str = "fast_with_turns") -> Analysis:
+def analysis(*worn: Segment, name: str = "fast_with_turns") -> TakeAnalysis:
     return analyse(simulate_scenario(name, 1, worn=worn).recording)
 
 
-def figures(a: Analysis) -> dict[str, Parameter]:
+def figures(a: TakeAnalysis) -> dict[str, Parameter]:
     return {p.name: p for p in a.parameters if p.side is None}
 
 
@@ -56,7 +56,7 @@ def test_its_files_read_back_to_the_same_numbers() -> None:
     assert len(files["steps.csv"].splitlines()) == 1 + len(a.measured.steps.steps)  # type: ignore[union-attr]
     bundle = load_bundle(files)
     assert bundle.parameters == a.parameters
-    again = measure(read_tracks(files[NAME], bundle.events, bundle.angles))
+    again = measure_gait(read_tracks(files[NAME], bundle.events, bundle.angles))
     assert [(p.name, p.n, p.reason) for p in again.parameters] == [
         (p.name, p.n, p.reason) for p in a.parameters
     ]

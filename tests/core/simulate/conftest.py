@@ -11,7 +11,7 @@ from core.simulate import (
     STEADY,
     Arc,
     Pivot,
-    Setup,
+    RecordingSetup,
     Simulation,
     Stand,
     Straight,
@@ -43,7 +43,7 @@ def comfortable() -> Simulation:
 @pytest.fixture(scope="session")
 def mixed() -> Simulation:
     """No noise, so that signals can be compared with truth."""
-    return simulate(MIXED, seed=2, setup=Setup(noise=None))
+    return simulate(MIXED, seed=2, setup=RecordingSetup(noise=None))
 
 
 @pytest.fixture(scope="session")

@@ -7,20 +7,20 @@ import pytest
 
 from core.errors import ParameterError
 from core.rotation import rotate
-from core.simulate import ChestSimulation, Hold, Setup, simulate_day
+from core.simulate import ChestSimulation, PostureHold, RecordingSetup, simulate_day
 from core.simulate.walker import REFERENCE_HEIGHT_M
 
-EXACT = Setup(noise=None, mount_spread_rad=0.0)
+EXACT = RecordingSetup(noise=None, mount_spread_rad=0.0)
 
 DAY = (
-    Hold("sit", 5.0),
-    Hold("stand", 3.0),
-    Hold("walk", 8.0, 110.0),
-    Hold("stand", 2.0),
-    Hold("sit", 4.0),
-    Hold("lie", 6.0),
-    Hold("sit", 3.0),
-    Hold("stand", 3.0),
+    PostureHold("sit", 5.0),
+    PostureHold("stand", 3.0),
+    PostureHold("walk", 8.0, 110.0),
+    PostureHold("stand", 2.0),
+    PostureHold("sit", 4.0),
+    PostureHold("lie", 6.0),
+    PostureHold("sit", 3.0),
+    PostureHold("stand", 3.0),
 )
 """The take of docs/science/simulation.md, "Chest"."""
 
@@ -68,7 +68,9 @@ def test_the_sensor_reads_gravity_along_the_trunk_in_every_posture(day: ChestSim
 
 
 def test_signals_are_derivatives_of_the_way() -> None:
-    fine = simulate_day(DAY, REFERENCE_HEIGHT_M, setup=Setup(noise=None, mount_spread_rad=0.0, rate_hz=400.0))
+    fine = simulate_day(
+        DAY, REFERENCE_HEIGHT_M, setup=RecordingSetup(noise=None, mount_spread_rad=0.0, rate_hz=400.0)
+    )
     truth, dt = fine.truth, 1.0 / fine.truth.rate_hz
     rate = -np.gradient(truth.pitch_rad, dt)
     assert fine.ideal["chest"].gyr[2:-2, 2] == pytest.approx(rate[2:-2], abs=0.02)
@@ -96,13 +98,16 @@ def test_phases_cover_the_take_without_gaps(day: ChestSimulation) -> None:
 
 def test_one_sits_down_from_walking_like_from_standing() -> None:
     kinds = [
-        p.kind for p in simulate_day((Hold("walk", 4.0), Hold("sit", 2.0), Hold("lie", 2.0))).truth.phases
+        p.kind
+        for p in simulate_day(
+            (PostureHold("walk", 4.0), PostureHold("sit", 2.0), PostureHold("lie", 2.0))
+        ).truth.phases
     ]
     assert kinds == ["walk", "stand_to_sit", "sit", "sit_to_lie", "lie"]
 
 
 def test_its_recording_is_one_sensor_on_the_chest_turned_as_mounted() -> None:
-    made = simulate_day(DAY, seed=6, setup=Setup(noise=None))
+    made = simulate_day(DAY, seed=6, setup=RecordingSetup(noise=None))
     assert made.recording.protocol == "activity"
     assert set(made.recording.segments.values()) == {"chest"}
     plain = simulate_day(DAY, seed=6, setup=EXACT)
@@ -114,14 +119,14 @@ def test_its_recording_is_one_sensor_on_the_chest_turned_as_mounted() -> None:
     "day",
     [
         (),
-        (Hold("sit", 0.0),),
-        (Hold("walk", 1.0),),
-        (Hold("walk", 9.0, 5.0),),
-        (Hold("kneel", 3.0),),  # type: ignore[arg-type]
-        (Hold("stand", float("nan")),),
+        (PostureHold("sit", 0.0),),
+        (PostureHold("walk", 1.0),),
+        (PostureHold("walk", 9.0, 5.0),),
+        (PostureHold("kneel", 3.0),),  # type: ignore[arg-type]
+        (PostureHold("stand", float("nan")),),
     ],
 )
-def test_an_impossible_day_is_refused(day: tuple[Hold, ...]) -> None:
+def test_an_impossible_day_is_refused(day: tuple[PostureHold, ...]) -> None:
     with pytest.raises(ParameterError) as caught:
         simulate_day(day)
     assert caught.value.code == "day_item"

@@ -8,29 +8,29 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.pipeline import Analysis, analyse
-from core.simulate import Dipole, Lag, Setup, Simulation, Stand, Straight, Walker, simulate
+from core.pipeline import TakeAnalysis, analyse
+from core.simulate import Dipole, Lag, RecordingSetup, Simulation, Stand, Straight, Walker, simulate
 
 SCRIPT = (Stand(5.0), Straight(16.0, 0.68, 0.5), Stand(4.0))
 
-SHAKEN = Setup(impacts=True)
+SHAKEN = RecordingSetup(impacts=True)
 
 ROOM = tuple(Dipole((x, 0.4, 0.4), (0.0, 0.05, 0.0)) for x in (2.0, 5.0, 8.0, 11.0, 14.0))
 """Iron beside the walkway every three metres."""
 
 
 @cache
-def told(setup: Setup = SHAKEN, impact: float = 1.0) -> tuple[Simulation, Analysis]:
+def told(setup: RecordingSetup = SHAKEN, impact: float = 1.0) -> tuple[Simulation, TakeAnalysis]:
     made = simulate(SCRIPT, Walker(impact=impact), 3, setup)
     return made, analyse(made.recording)
 
 
-def error_deg(made: Simulation, found: Analysis, name: str) -> float:
+def error_deg(made: Simulation, found: TakeAnalysis, name: str) -> float:
     assert found.angles is not None
     truth, angles = made.truth, found.angles.angles[name]
     walking = (truth.t_s > truth.stands[0][1]) & (truth.t_s < truth.stands[-1][0])
     n = min(len(angles), len(truth.t_s))
-    difference = (angles[:n] - truth.zeroed()[name][:n])[walking[:n]]
+    difference = (angles[:n] - truth.subtract_standing()[name][:n])[walking[:n]]
     return float(np.degrees(np.sqrt(np.mean(difference**2))))
 
 
@@ -45,10 +45,10 @@ def test_steps_beyond_the_range_of_the_feet_are_told() -> None:
 
 
 def test_iron_beside_the_walkway_is_told_and_costs_nothing() -> None:
-    made, found = told(Setup(dipoles=ROOM))
+    made, found = told(RecordingSetup(dipoles=ROOM))
     assert {n.code for n in found.notices} == {"magnetic_disturbed"}
     for name in ("hip_flexion_l", "knee_flexion_l"):
-        clean = error_deg(*told(Setup()), name)
+        clean = error_deg(*told(RecordingSetup()), name)
         assert error_deg(made, found, name) == pytest.approx(clean, abs=1e-9)
 
 

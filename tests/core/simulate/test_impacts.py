@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from core.frames import FOOT, GRAVITY, SIDES, Floats, Segment
-from core.simulate import Pivot, Setup, Simulation, Stand, Straight, Walker, simulate
+from core.simulate import Pivot, RecordingSetup, Simulation, Stand, Straight, Walker, simulate
 from core.simulate.human import Motion
-from core.simulate.impacts import SHAKES, Impact, draw_impacts, shaken
-from core.simulate.sensors import PLACES, Path, draw_mounts, ideal_signals, worn
+from core.simulate.impacts import SHAKES, Impact, draw_impacts, shake_sensor
+from core.simulate.sensors import PLACES, SensorPath, draw_mounts, ideal_signals, place_sensor
 
 SCRIPT = (Stand(3.0), Straight(12.8, 0.64, 0.54), Stand(3.0))
-BARE = Setup(noise=None)
+BARE = RecordingSetup(noise=None)
 FAST = replace(Walker(), impact=2.0)
 
 
@@ -70,7 +70,7 @@ def test_shocks_of_a_healthy_walk_are_of_the_size_the_specification_measured(har
 def test_one_shock_has_the_stated_peak_and_ends(segment: Segment) -> None:
     t = np.arange(0.0, 2.0, 1e-4)
     shake = SHAKES[segment.split("_")[0]]
-    shift, turn = shaken(t, segment, (Impact("right", 1.0, 1.1, 0.0, 1.0),))
+    shift, turn = shake_sensor(t, segment, (Impact("right", 1.0, 1.1, 0.0, 1.0),))
     up = np.gradient(np.gradient(shift[:, 2], t), t)
     assert shake.acc < np.abs(up).max() < 1.45 * shake.acc
     assert 0.8 * shake.rate < np.abs(np.gradient(turn, t)).max() < 1.45 * shake.rate
@@ -82,8 +82,8 @@ def test_one_shock_has_the_stated_peak_and_ends(segment: Segment) -> None:
 def test_the_other_leg_shakes_only_through_the_pelvis() -> None:
     t = np.arange(0.0, 2.0, 1e-3)
     hit = (Impact("right", 1.0, 1.1, 0.0, 1.0),)
-    assert np.abs(shaken(t, "shank_l", hit)[0]).max() == 0.0
-    assert np.abs(shaken(t, "pelvis", hit)[0]).max() > 0.0
+    assert np.abs(shake_sensor(t, "shank_l", hit)[0]).max() == 0.0
+    assert np.abs(shake_sensor(t, "pelvis", hit)[0]).max() > 0.0
 
 
 def test_steps_on_the_spot_land_softly() -> None:
@@ -101,7 +101,7 @@ def test_shocks_do_not_depend_on_the_grid(move_steadily: Callable[[float, float]
 
     def peak(rate: float) -> float:
         motion = move_steadily(rate, 1.745)
-        path: Path = worn(motion, "foot_r", mount, None, draw_impacts(motion, rng(1)))
+        path: SensorPath = place_sensor(motion, "foot_r", mount, None, draw_impacts(motion, rng(1)))
         return float(np.linalg.norm(ideal_signals(path, 1, "instant").acc, axis=1).max())
 
     assert peak(400.0) == pytest.approx(peak(1600.0), rel=0.12)
@@ -110,7 +110,7 @@ def test_shocks_do_not_depend_on_the_grid(move_steadily: Callable[[float, float]
 def test_hard_steps_leave_the_range_of_a_real_sensor_and_are_cut_off() -> None:
     """docs/science/simulation.md, "Impacts": at 200 Hz and twice the impact 0.3 % of the foot's samples."""
     script = (Stand(3.0), Straight(24.0, 0.72, 0.5), Stand(3.0))
-    made = simulate(script, FAST, 3, Setup(rate_hz=200.0, impacts=True))
+    made = simulate(script, FAST, 3, RecordingSetup(rate_hz=200.0, impacts=True))
     device = next(d for d, s in made.recording.segments.items() if s == "foot_r")
     acc = made.recording.streams[device].acc
     clipped = made.clipped["foot_r"]

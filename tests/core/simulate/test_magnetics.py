@@ -6,7 +6,7 @@ import pytest
 from core.errors import ParameterError
 from core.frames import Floats, Segment
 from core.rotation import multiply, rotate
-from core.simulate import Dipole, SensorNoise, Setup, Simulation, Stand, Straight, simulate
+from core.simulate import Dipole, RecordingSetup, SensorNoise, Simulation, Stand, Straight, simulate
 from core.simulate.magnetics import FIELD_DIP, IRON_SIZE_M, earth_field, field_at
 
 SCRIPT = (Stand(3.0), Straight(6.4, 0.64, 0.54), Stand(2.0))
@@ -53,7 +53,7 @@ def test_the_field_stays_finite_in_the_thing_itself() -> None:
 
 
 def test_the_field_bends_where_the_iron_is_and_nowhere_else() -> None:
-    made = simulate(SCRIPT, seed=5, setup=Setup(noise=None, dipoles=(BESIDE,)))
+    made = simulate(SCRIPT, seed=5, setup=RecordingSetup(noise=None, dipoles=(BESIDE,)))
     field = _world_field(made, "shank_l")
     away = np.linalg.norm(made.truth.p["shank_l"] - BESIDE.position_m, axis=1)
     strength = np.abs(np.linalg.norm(field, axis=1) - 1.0)
@@ -63,7 +63,7 @@ def test_the_field_bends_where_the_iron_is_and_nowhere_else() -> None:
 
 
 def test_iron_in_the_room_leaves_the_other_signals_alone() -> None:
-    plain, disturbed = (simulate(SCRIPT, seed=5, setup=Setup(dipoles=d)) for d in ((), (BESIDE,)))
+    plain, disturbed = (simulate(SCRIPT, seed=5, setup=RecordingSetup(dipoles=d)) for d in ((), (BESIDE,)))
     for device, stream in plain.recording.streams.items():
         other = disturbed.recording.streams[device]
         assert np.array_equal(stream.acc, other.acc)
@@ -77,7 +77,7 @@ def test_iron_in_the_room_leaves_the_other_signals_alone() -> None:
 
 def test_hard_iron_is_a_constant_in_the_sensor() -> None:
     noise = SensorNoise(mag_density=0.0, hard_iron=0.1)
-    made = simulate(SCRIPT, seed=6, setup=Setup(noise=noise))
+    made = simulate(SCRIPT, seed=6, setup=RecordingSetup(noise=noise))
     for device, segment in made.recording.segments.items():
         assert segment is not None
         mag = made.recording.streams[device].mag

@@ -5,7 +5,7 @@ import pytest
 
 from core.formats import xsens
 from core.formats.draft import finish
-from core.simulate import Setup, Simulation, Stand, Straight, mt_files, mt_text, simulate
+from core.simulate import RecordingSetup, Simulation, Stand, Straight, mt_files, mt_text, simulate
 
 
 @pytest.fixture(scope="module")
@@ -13,7 +13,7 @@ def lossy() -> Simulation:
     return simulate(
         (Stand(2.0), Straight(3.0, 0.6, 0.54), Stand(1.0)),
         seed=9,
-        setup=Setup(packet_loss=0.03, rate_hz=60.0),
+        setup=RecordingSetup(packet_loss=0.03, rate_hz=60.0),
     )
 
 

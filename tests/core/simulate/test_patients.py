@@ -26,8 +26,8 @@ from core.simulate import (
     Simulation,
     Stand,
     Straight,
-    Truth,
     Walker,
+    WalkTruth,
     simulate_scenario,
 )
 from core.simulate.human import move
@@ -109,7 +109,7 @@ SIGNATURES: dict[str, Check] = {
 
 
 @cache
-def walked(name: str, seed: int, rising: bool = True) -> Truth:
+def walked(name: str, seed: int, rising: bool = True) -> WalkTruth:
     """The named walk without sensors, for the person the script was written for."""
     scenario = SCRIPTS[name]
     walker = replace(scenario.walker, lands_rising=rising)

@@ -61,7 +61,7 @@ def test_the_signals_integrate_to_the_truth(walk: PotterWalk) -> None:
 
 
 def test_noise_is_white_and_of_the_paper_s_size(walk: PotterWalk) -> None:
-    acc, gyr = walk.measured(seed=3)
+    acc, gyr = walk.add_noise(seed=3)
     assert (acc - walk.acc).std() == pytest.approx(ACC_SD, rel=0.01)
     assert (gyr - walk.gyr).std() == pytest.approx(GYR_SD, rel=0.01)
-    assert np.array_equal(walk.measured(seed=3)[1], gyr)
+    assert np.array_equal(walk.add_noise(seed=3)[1], gyr)

@@ -9,11 +9,11 @@ import pytest
 
 from core.errors import ParameterError
 from core.frames import Floats, Segment
-from core.simulate import Dropout, Lag, Setup, Simulation, Stand, Straight, simulate
+from core.simulate import Dropout, Lag, RecordingSetup, Simulation, Stand, Straight, simulate
 from core.timeline import synchronise
 
 SCRIPT = (Stand(3.0), Straight(6.4, 0.64, 0.54), Stand(2.0))
-EXACT = Setup(noise=None, mount_spread_rad=0.0)
+EXACT = RecordingSetup(noise=None, mount_spread_rad=0.0)
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def test_a_lag_survives_the_common_time_axis() -> None:
 
 
 def test_readings_beyond_the_range_are_cut_and_marked() -> None:
-    made = simulate(SCRIPT, seed=4, setup=Setup(acc_range=30.0, gyr_range=4.0))
+    made = simulate(SCRIPT, seed=4, setup=RecordingSetup(acc_range=30.0, gyr_range=4.0))
     stream, clipped = _stream(made, "foot_l"), made.clipped["foot_l"]
     assert np.abs(stream.acc).max() == 30.0
     assert np.abs(stream.gyr).max() == 4.0
@@ -81,21 +81,22 @@ def test_readings_beyond_the_range_are_cut_and_marked() -> None:
 
 
 def test_a_quiet_walk_stays_in_the_range_of_a_real_sensor() -> None:
-    made = simulate(SCRIPT, seed=4, setup=Setup(impacts=True))
+    made = simulate(SCRIPT, seed=4, setup=RecordingSetup(impacts=True))
     assert not made.clipped["shank_r"].any()
     assert not made.clipped["pelvis"].any()
 
 
 def test_sensors_not_worn_have_no_stream_and_leave_the_others_as_they_are() -> None:
     whole, feet = (
-        simulate(SCRIPT, seed=4, setup=setup) for setup in (Setup(), Setup(worn=("foot_l", "foot_r")))
+        simulate(SCRIPT, seed=4, setup=setup)
+        for setup in (RecordingSetup(), RecordingSetup(worn=("foot_l", "foot_r")))
     )
     assert set(feet.recording.segments.values()) == {"foot_l", "foot_r"}
     assert np.array_equal(_stream(whole, "foot_l").acc, _stream(feet, "foot_l").acc)
 
 
 def test_a_sensor_that_fails_halfway_is_known_as_lost() -> None:
-    made = simulate(SCRIPT, seed=4, setup=Setup(dropouts=(Dropout("shank_l", 4.0, float("inf")),)))
+    made = simulate(SCRIPT, seed=4, setup=RecordingSetup(dropouts=(Dropout("shank_l", 4.0, float("inf")),)))
     valid = synchronise(made.recording).sensors["shank_l"].valid
     t = np.arange(len(valid)) / 100.0
     assert valid[t < 3.9].all()
@@ -111,7 +112,7 @@ def test_a_sensor_that_fails_halfway_is_known_as_lost() -> None:
 )
 def test_an_impossible_setup_is_refused(wrong: dict[str, object], code: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        Setup(**wrong)  # type: ignore[arg-type]
+        RecordingSetup(**wrong)  # type: ignore[arg-type]
     assert caught.value.code == code
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from core.errors import ParameterError
 from core.simulate import STEADY, Arc, Pivot, Script, Stand, Straight, Walker
-from core.simulate.script import plan, scaled
+from core.simulate.script import plan, scale_script
 
 
 def _plan(script: Script) -> tuple[list[float], list[float]]:
@@ -60,7 +60,7 @@ def test_drawn_steps_are_as_variable_as_asked() -> None:
 
 def test_scaling_changes_lengths_and_nothing_else() -> None:
     script = (Stand(2.0), Straight(6.0, 0.6, 0.5), Arc(1.5, 1.0, 0.5, 0.5), Pivot(1.0, 0.5, 0.5), Stand(1.0))
-    assert scaled(script, 1.25) == (
+    assert scale_script(script, 1.25) == (
         Stand(2.0),
         Straight(7.5, 0.75, 0.5),
         Arc(1.875, 1.0, 0.625, 0.5),

@@ -11,17 +11,17 @@ from core.rotation import angle_between, conjugate, exp, multiply, rotate
 from core.simulate import (
     Dropout,
     Pivot,
+    RecordingSetup,
     Script,
     SensorNoise,
-    Setup,
     Simulation,
     Stand,
     Straight,
     Walker,
     simulate,
 )
-from core.simulate.mems import with_errors
-from core.simulate.sensors import Signals
+from core.simulate.mems import add_sensor_errors
+from core.simulate.sensors import SimulatedSignals
 
 SHORT: Script = (Stand(3.0), Straight(5.0, 0.6, 0.54), Stand(2.0))
 
@@ -49,8 +49,8 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not() -> None:
 
 
 def test_noise_and_losses_do_not_change_the_walk() -> None:
-    plain = simulate(SHORT, seed=3, setup=Setup(noise=None))
-    rough = simulate(SHORT, seed=3, setup=Setup(noise=SensorNoise().times(5.0), packet_loss=0.1))
+    plain = simulate(SHORT, seed=3, setup=RecordingSetup(noise=None))
+    rough = simulate(SHORT, seed=3, setup=RecordingSetup(noise=SensorNoise().times(5.0), packet_loss=0.1))
     for segment, p in plain.truth.p.items():
         assert np.array_equal(p, rough.truth.p[segment])
         assert np.array_equal(plain.ideal[segment].acc, rough.ideal[segment].acc)
@@ -88,7 +88,7 @@ def test_increments_integrate_back_to_the_truth(impacts: bool) -> None:
         Straight(10.0, 0.6, 0.54),
         Stand(2.0),
     )
-    setup = Setup(noise=None, sampling="increment", impacts=impacts)
+    setup = RecordingSetup(noise=None, sampling="increment", impacts=impacts)
     simulation = simulate(script, seed=6, setup=setup)
     dt = 1.0 / simulation.truth.rate_hz
     for segment in ("shank_r", "foot_l"):
@@ -107,7 +107,7 @@ def test_increments_integrate_back_to_the_truth(impacts: bool) -> None:
 
 
 def test_instant_signals_are_derivatives_of_the_truth() -> None:
-    fine = simulate(SHORT, seed=6, setup=Setup(noise=None, rate_hz=400.0))
+    fine = simulate(SHORT, seed=6, setup=RecordingSetup(noise=None, rate_hz=400.0))
     dt = 1.0 / fine.truth.rate_hz
     q = _sensor_orientation(fine, "thigh_l")
     gyr = fine.ideal["thigh_l"].gyr
@@ -124,19 +124,19 @@ def test_the_field_is_constant_in_the_world(mixed: Simulation) -> None:
 
 
 def test_errors_are_of_the_declared_size() -> None:
-    still = Signals(*(np.zeros((20_000, 3)) for _ in range(3)))
+    still = SimulatedSignals(*(np.zeros((20_000, 3)) for _ in range(3)))
     noise = SensorNoise(gyr_walk=0.0, acc_walk=0.0)
-    measured, drawn = with_errors(still, noise, 100.0, *_streams(1))
+    measured, drawn = add_sensor_errors(still, noise, 100.0, *_streams(1))
     assert measured.gyr.mean(axis=0) == pytest.approx(drawn.gyr_bias, abs=1e-4)
     assert (measured.gyr - drawn.gyr_bias).std() == pytest.approx(10.0 * noise.gyr_density, rel=0.02)
     assert (measured.acc - drawn.acc_bias).std() == pytest.approx(10.0 * noise.acc_density, rel=0.02)
-    biases = [with_errors(still, noise, 100.0, *_streams(s))[1].gyr_bias for s in range(60)]
+    biases = [add_sensor_errors(still, noise, 100.0, *_streams(s))[1].gyr_bias for s in range(60)]
     assert np.std(biases) == pytest.approx(noise.gyr_bias, rel=0.2)
 
 
 def test_lost_packets_have_no_row() -> None:
     simulation = simulate(
-        SHORT, seed=8, setup=Setup(packet_loss=0.05, dropouts=(Dropout("shank_r", 4.0, 5.0),))
+        SHORT, seed=8, setup=RecordingSetup(packet_loss=0.05, dropouts=(Dropout("shank_r", 4.0, 5.0),))
     )
     n = len(simulation.truth.t_s)
     device = {segment: d for d, segment in simulation.recording.segments.items()}
@@ -149,7 +149,9 @@ def test_lost_packets_have_no_row() -> None:
 
 @pytest.mark.parametrize("rate", [60.0, 100.0, 512.0])
 def test_other_rates_sample_the_same_walk(rate: float) -> None:
-    simulation = simulate((Stand(2.0), Straight(1.2, 0.6, 0.54), Stand(1.0)), setup=Setup(rate_hz=rate))
+    simulation = simulate(
+        (Stand(2.0), Straight(1.2, 0.6, 0.54), Stand(1.0)), setup=RecordingSetup(rate_hz=rate)
+    )
     stream = next(iter(simulation.recording.streams.values()))
     assert np.allclose(np.diff(stream.t_s), 1.0 / rate)
     assert stream.rate_hz == rate
@@ -159,7 +161,7 @@ def test_other_rates_sample_the_same_walk(rate: float) -> None:
 
 
 def test_mounts_without_spread_follow_the_segment() -> None:
-    simulation = simulate(SHORT, Walker(), setup=Setup(mount_spread_rad=0.0))
+    simulation = simulate(SHORT, Walker(), setup=RecordingSetup(mount_spread_rad=0.0))
     for mount in simulation.truth.mounts.values():
         assert angle_between(mount.q_segment_sensor, np.array([1.0, 0.0, 0.0, 0.0])) < 1e-12
 
@@ -170,5 +172,5 @@ def test_mounts_without_spread_follow_the_segment() -> None:
 )
 def test_a_bad_setup_is_refused(rate: float, loss: float, code: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        Setup(rate_hz=rate, packet_loss=loss)
+        RecordingSetup(rate_hz=rate, packet_loss=loss)
     assert caught.value.code == code

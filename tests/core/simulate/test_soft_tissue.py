@@ -7,7 +7,7 @@ import pytest
 
 from core.frames import Segment
 from core.rotation import angle_between
-from core.simulate import Setup, SoftTissue, Stand, Straight, simulate
+from core.simulate import RecordingSetup, SoftTissue, Stand, Straight, simulate
 from core.simulate.human import Motion
 from core.simulate.soft_tissue import skin_motion
 
@@ -46,8 +46,10 @@ def test_left_and_right_are_mirror_images(steady_motion: Motion) -> None:
 
 def test_bones_do_not_know_about_skin() -> None:
     script = (Stand(2.0), Straight(2.5, 0.62, 0.54), Stand(2.0))
-    bone = simulate(script, seed=1, setup=Setup(noise=None))
-    skin = simulate(script, seed=1, setup=Setup(noise=None, tissue=SoftTissue(turn_rad=radians(6.0))))
+    bone = simulate(script, seed=1, setup=RecordingSetup(noise=None))
+    skin = simulate(
+        script, seed=1, setup=RecordingSetup(noise=None, tissue=SoftTissue(turn_rad=radians(6.0)))
+    )
     for segment, q in bone.truth.q.items():
         assert np.array_equal(q, skin.truth.q[segment])
         stiff = segment == "pelvis" or segment.startswith("foot")

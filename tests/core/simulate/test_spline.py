@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from core.rotation import about, multiply
-from core.simulate.spline import kinematics, sign_continuous
+from core.simulate.spline import differentiate_pose, sign_continuous
 
 
 def test_a_turning_body_on_a_circle_has_the_textbook_signals() -> None:
@@ -11,7 +11,7 @@ def test_a_turning_body_on_a_circle_has_the_textbook_signals() -> None:
     spin, radius = 3.0, 0.4
     p = radius * np.stack((np.cos(spin * t), np.sin(spin * t), 0.0 * t), axis=-1)
     q = multiply(about(2, spin * t), about(0, 0.3))
-    velocity, acceleration, rate = kinematics(t, p, q)
+    velocity, acceleration, rate = differentiate_pose(t, p, q)
     inside = slice(5, -5)
     assert np.allclose(velocity[inside], spin * p[inside][:, [1, 0, 2]] * [-1, 1, 0], atol=1e-9)
     assert np.allclose(acceleration[inside], -(spin**2) * p[inside], atol=1e-6)

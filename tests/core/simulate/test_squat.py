@@ -8,10 +8,10 @@ import pytest
 from core.errors import ParameterError
 from core.frames import GRAVITY, Segment
 from core.rotation import rotate
-from core.simulate import Setup, SoftTissue, Squats, SquatSimulation, simulate_squats
+from core.simulate import RecordingSetup, SoftTissue, Squats, SquatSimulation, simulate_squats
 from core.simulate.walker import REFERENCE_HEIGHT_M, Anatomy
 
-EXACT = Setup(noise=None, mount_spread_rad=0.0)
+EXACT = RecordingSetup(noise=None, mount_spread_rad=0.0)
 EQUAL = Squats(spread=0.0)
 CHAIN: tuple[Segment, ...] = ("pelvis", "thigh_r", "shank_r", "foot_r")
 
@@ -109,10 +109,10 @@ def test_the_left_leg_is_the_mirror_image(squats: SquatSimulation) -> None:
 
 
 def test_its_recording_is_one_of_squats_with_skin_and_noise() -> None:
-    made = simulate_squats(seed=3, setup=Setup(tissue=SoftTissue()))
+    made = simulate_squats(seed=3, setup=RecordingSetup(tissue=SoftTissue()))
     assert made.recording.protocol == "squat"
     assert set(made.recording.segments.values()) == set(CHAIN)
-    bone = simulate_squats(seed=3, setup=Setup())
+    bone = simulate_squats(seed=3, setup=RecordingSetup())
     for segment in CHAIN:
         same = np.array_equal(made.ideal[segment].gyr, bone.ideal[segment].gyr)
         assert same == (segment in ("pelvis", "foot_r"))

@@ -16,7 +16,7 @@ def test_truth_and_analysis_mean_the_same_angles(mixed: Simulation) -> None:
     orientations = Orientations(truth.t_s, truth.rate_hz, truth.q, valid, engine="truth")
     analysed = measure_angles(orientations, truth.zero)
     assert set(analysed.angles) == set(truth.angles)
-    for name, values in truth.zeroed().items():
+    for name, values in truth.subtract_standing().items():
         assert analysed.angles[name] == pytest.approx(values, abs=1e-9), name
         assert analysed.zero_offset[name] == pytest.approx(truth.zero_offset[name], abs=1e-9), name
 
@@ -25,7 +25,7 @@ def test_the_zero_is_quiet_standing(comfortable: Simulation) -> None:
     truth = comfortable.truth
     inside = (truth.t_s >= truth.zero[0]) & (truth.t_s < truth.zero[1])
     assert truth.zero[1] - truth.zero[0] > 3.0
-    for name, values in truth.zeroed().items():
+    for name, values in truth.subtract_standing().items():
         assert np.abs(values[inside]).max() < 1e-6, name
     assert np.degrees(truth.zero_offset["knee_flexion_l"]) == pytest.approx(5.0, abs=0.3)
 

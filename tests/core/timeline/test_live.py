@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from core.errors import Notice, SignalError
 from core.formats import SourceFile, read_recording
-from core.formats.live_log import Batch, SensorInfo, StreamInfo
+from core.formats.live_log import SampleBatch, SensorInfo, StreamInfo
 from core.frames import Bools, Floats, Segment
 from core.recording import UniformRecording
 from core.timeline import synchronise
-from core.timeline.live import LiveAxis, UniformBlock, warm
+from core.timeline.live import LiveAxis, UniformBlock, compile_axis_kernels
 from tests.live import Device, LiveTake, Samples, send, shared
 from tests.walks import cut, neura_recording
 
@@ -336,7 +336,7 @@ def test_no_clock_makes_more_samples_than_a_file_could_be_analysed_with() -> Non
     made = 0
     for k in range(60):
         at = k * 599_000_000
-        block = axis.push(Batch(0, k, at, at, clean.samples[:1]))
+        block = axis.push(SampleBatch(0, k, at, at, clean.samples[:1]))
         made += 0 if block is None else len(block)
     assert made < 20 * 60 + 60_000
 
@@ -371,7 +371,7 @@ def test_takes_that_can_have_no_axis_are_refused_with_the_reason() -> None:
 
 @pytest.mark.bench
 def test_a_push_of_seven_sensors_costs_less_than_a_sixth_of_a_millisecond() -> None:
-    warm()
+    compile_axis_kernels()
     d = device(0, 100.0, ("pelvis", "thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r"))
     take = send([d])
     spent = []

@@ -13,12 +13,12 @@ import websockets
 
 from server import audit
 from server.auth.roles import Action
-from server.auth.routes import declared_actions
+from server.auth.routes import list_declared_actions
 from server.auth.tokens import token_hash
 from server.pages.timeline import FRAGMENT
 from server.services import patients, sessions
 from server.storage.tables import job
-from server.trail import MOST_REFUSED, QUIET_S, Trail
+from server.trail import MOST_REFUSED, QUIET_S, AuditTrail
 from tests.server import analysed, walk
 from tests.server.clinic import PASSWORD, Clinic, open_clinic
 from tests.server.serving import serve
@@ -133,7 +133,7 @@ class Visits:
 
     def rows(self, limit: int = 20) -> list[Any]:
         with self.clinic.db.read() as c:
-            return audit.entries(c, limit=limit)
+            return audit.list_entries(c, limit=limit)
 
     def rows_of(self, name: str, since: int) -> list[Any]:
         """Rows about these visits by a person since a row."""
@@ -148,7 +148,7 @@ async def opened(folder: Path) -> AsyncIterator[Visits]:
 
 
 def of_patients(clinic: Clinic) -> list[str]:
-    actions = declared_actions(clinic.app.routes)
+    actions = list_declared_actions(clinic.app.routes)
     return [route for route, action in actions.items() if action not in OF_NO_PATIENT]
 
 
@@ -209,7 +209,7 @@ def test_no_route_without_a_row_is_excused_for_nothing(clinic: Clinic) -> None:
 async def test_watching_is_one_row_of_each_sign_in_and_quarter_of_an_hour(tmp_path: Path) -> None:
     time_s = 0.0
     async with opened(tmp_path) as v:
-        v.clinic.app.state.trail = Trail(v.clinic.db, lambda: time_s)
+        v.clinic.app.state.trail = AuditTrail(v.clinic.db, lambda: time_s)
         path = v.address(f"GET {SESSION}/signals/{{name}}")
 
         def rows() -> int:
@@ -263,15 +263,15 @@ async def test_a_failed_sign_in_is_a_row_without_what_was_typed(tmp_path: Path) 
 async def test_somebody_who_guesses_all_day_cannot_fill_the_disk(tmp_path: Path) -> None:
     time_s = 0.0
     async with opened(tmp_path) as v:
-        trail = Trail(v.clinic.db, lambda: time_s)
+        trail = AuditTrail(v.clinic.db, lambda: time_s)
 
         def told() -> list[dict[str, Any]]:
             return [r.detail for r in v.rows(1000) if r.action == "sign_in.failed"]
 
         for i in range(MOST_REFUSED + 50):
-            trail.refused("sign_in.failed", "user", None, f"2001:db8::{i:x}" + "x" * 1000)
+            trail.record_refused("sign_in.failed", "user", None, f"2001:db8::{i:x}" + "x" * 1000)
         assert len(told()) == MOST_REFUSED
         assert max(len(d["address"]) for d in told()) <= 64
         time_s += 3600.0
-        trail.refused("sign_in.failed", "user", None, "192.0.2.1")
+        trail.record_refused("sign_in.failed", "user", None, "192.0.2.1")
         assert told()[0] == {"address": "192.0.2.1", "more": 50}

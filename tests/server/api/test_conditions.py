@@ -222,7 +222,7 @@ async def test_only_unaided_walks_of_controls_are_a_reference(clinic: Clinic) ->
     this = feedback.walked(clinic, patient, 0, **OWN)
     with clinic.db.read() as c:
         code = patients.get(c, healthy).code
-        known = controls.visits(c, patients.get(c, patient), sessions.get(c, this))
+        known = controls.list_visits(c, patients.get(c, patient), sessions.get(c, this))
     assert {v.found.session_id for v in known if v.person == code} == {plain, fast, silent}
 
 

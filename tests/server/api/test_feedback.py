@@ -38,7 +38,7 @@ def _live(clinic: Clinic, session: str, given: Prescription, baseline: Baseline)
     """The cues that the strides of a session's analysis would have got, and its recording."""
     reviewed = clinic.app.state.reviewed
     with clinic.db.read() as c:
-        found = analyses.shown(c, session)
+        found = analyses.get_shown(c, session)
         edits = edit_log.edits_of(c, found.id)
     strides = reviewed.read_bundle(found, edits).strides.strides
     column = reviewed.read_columns(found, edits)[given.parameter]
@@ -167,7 +167,7 @@ async def test_a_take_that_is_not_the_analysed_recording_says_so(clinic: Clinic)
     session, cues = await _train(clinic, patient, prescription, 0)
     other = feedback.walked(clinic, patient, 1)
     with clinic.db.read() as c:
-        recording = analyses.shown(c, session).recording_id
+        recording = analyses.get_shown(c, session).recording_id
     feedback.take(clinic, other, prescription, cues, recording)
     waiting = feedback.visit(clinic, patient, 2)
     feedback.take(clinic, waiting, prescription, cues)

@@ -135,7 +135,7 @@ async def test_every_opened_and_changed_resource_is_one_audit_row_with_its_perso
     ]
     assert {r["user_name"] for r in mine} == {"clinician"}
     with clinic.db.read() as c:
-        assert audit.problems(c) == []
+        assert audit.find_problems(c) == []
 
 
 async def test_the_audit_log_pages_backwards(clinic: Clinic) -> None:

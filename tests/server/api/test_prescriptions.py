@@ -9,7 +9,7 @@ import pytest
 from core.feedback import Baseline, FeedbackEngine, Prescription
 from core.parameters.result import Parameter
 from server.services import prescriptions
-from server.services.histories import analysed
+from server.services.histories import list_analysed
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.tables import audit
 from tests.feedback import prescription, train
@@ -28,7 +28,7 @@ MANUAL: dict[str, Any] = {
 
 def _numbers(clinic: Clinic, patient: str, name: str, side: str) -> Parameter:
     with clinic.db.read() as c:
-        last = analysed(c, patient)[-1]
+        last = list_analysed(c, patient)[-1]
     reviewed: ReviewedAnalyses = clinic.app.state.reviewed
     numbers = reviewed.read_numbers(last.found, last.edits)
     return next(p for p in numbers.parameters if (p.name, p.side) == (name, side))

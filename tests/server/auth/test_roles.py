@@ -9,8 +9,8 @@ from starlette.applications import Starlette
 from starlette.routing import Mount
 
 from server.auth.access import require
-from server.auth.roles import POLICY, PUBLIC, Action, Role, may
-from server.auth.routes import UndeclaredRouteError, declared_actions
+from server.auth.roles import POLICY, PUBLIC, Action, Role, is_permitted
+from server.auth.routes import UndeclaredRouteError, list_declared_actions
 from tests.server.clinic import ORIGIN, Clinic
 
 pytestmark = pytest.mark.anyio
@@ -25,13 +25,13 @@ def test_every_action_is_public_or_has_a_row_and_none_is_both() -> None:
 
 def test_an_action_without_a_row_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(POLICY, Action.READ_AUDIT)
-    assert not any(may(role, Action.READ_AUDIT) for role in Role)
+    assert not any(is_permitted(role, Action.READ_AUDIT) for role in Role)
 
 
 def test_an_assistant_uploads_and_sees_no_result() -> None:
-    assert may(Role.ASSISTANT, Action.UPLOAD)
+    assert is_permitted(Role.ASSISTANT, Action.UPLOAD)
     for action in (Action.READ_RESULT, Action.ANALYSE, Action.WRITE_PATIENT, Action.DELETE_PATIENT):
-        assert not may(Role.ASSISTANT, action)
+        assert not is_permitted(Role.ASSISTANT, action)
 
 
 def _with_route() -> FastAPI:
@@ -77,13 +77,13 @@ def _with_documents() -> FastAPI:
 @pytest.mark.parametrize("planted", [_with_route, _with_websocket, _with_mount, _with_two, _with_documents])
 def test_a_route_without_exactly_one_action_is_found(planted: Any) -> None:
     with pytest.raises(UndeclaredRouteError):
-        declared_actions(planted().routes)
+        list_declared_actions(planted().routes)
 
 
 async def test_every_route_refuses_whom_the_policy_refuses_and_nobody_else(clinic: Clinic) -> None:
     """Roles × all routes of the real application: pages, API, websockets; ids that do not exist."""
     wrong = []
-    actions = declared_actions(clinic.app.routes)
+    actions = list_declared_actions(clinic.app.routes)
     assert len(actions) > 10
     for name, action in actions.items():
         methods, _, pattern = name.partition(" ")

@@ -9,7 +9,7 @@ import pytest
 from core.condition import USUAL
 from core.feedback import Cue
 from server.demo.clinic import PRESCRIBED
-from server.demo.live import open_take, training, walk
+from server.demo.live import open_take, plan_training, stream_walk
 from server.services import live, patients, prescriptions, sessions
 from server.storage.tables import session
 from tests.server.clinic import open_clinic
@@ -31,9 +31,11 @@ async def test_the_demo_s_live_patient_walks_is_told_how_and_becomes_a_recording
             someone = patients.create(c, None, code=person.code, **fields)
             prescriptions.write(c, clinic.app.state.reviewed, None, someone.id, content)
         code = open_take(clinic.settings)
-        made = training(laps=1)
+        made = plan_training(laps=1)
         # a client with a loop of its own, as in the demo
-        await asyncio.to_thread(lambda: asyncio.run(walk(f"http://127.0.0.1:{port}", code, made, speed=10.0)))
+        await asyncio.to_thread(
+            lambda: asyncio.run(stream_walk(f"http://127.0.0.1:{port}", code, made, speed=10.0))
+        )
         with clinic.db.read() as c:
             sid = c.execute(session.select()).one().id
         async with asyncio.timeout(60):

@@ -9,7 +9,7 @@ import websockets
 from starlette.types import Receive, Scope, Send
 
 from server.auth.roles import PUBLIC
-from server.auth.routes import declared_actions
+from server.auth.routes import list_declared_actions
 from server.http.cross_site import CrossSiteGuard
 from server.http.headers import SecurityHeaders
 from server.http.hosts import HostGuard
@@ -152,7 +152,9 @@ async def test_over_a_real_socket_a_foreign_origin_gets_403_before_accept(clinic
 
 async def test_the_websockets_of_the_application_refuse_foreign_pages_and_strangers(clinic: Clinic) -> None:
     token = clinic.token("viewer")
-    routes = {p.partition(" ")[2]: a for p, a in declared_actions(clinic.app.routes).items() if "SOCKET" in p}
+    routes = {
+        p.partition(" ")[2]: a for p, a in list_declared_actions(clinic.app.routes).items() if "SOCKET" in p
+    }
     assert routes
     async with serve(clinic.app) as port:
         for path, action in routes.items():

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from server.jobs.queue import Claim, Hold, JobView
+from server.jobs.queue import Claim, JobView, LeaseState
 from server.jobs.table import MAX_DEATHS, TableQueue
 from server.storage.db import Database
 from server.storage.migrate import upgrade
@@ -91,7 +91,7 @@ def test_a_job_that_is_being_cancelled_does_not_answer_for_a_new_wish(bench: Ben
     bench.cancel(first.id)
     again = bench.submit("a")
     assert again.id != first.id
-    assert bench.queue.heartbeat(claim) is Hold.LOST
+    assert bench.queue.heartbeat(claim) is LeaseState.LOST
     assert not bench.finish(claim)
 
 
@@ -111,7 +111,7 @@ def test_a_renewed_lease_is_not_taken_an_expired_one_is(bench: Bench) -> None:
     first = bench.claim("one")
     for _ in range(4):
         bench.clock.advance(LEASE_S * 0.9)
-        assert bench.queue.heartbeat(first) is Hold.OURS
+        assert bench.queue.heartbeat(first) is LeaseState.OURS
         assert bench.queue.claim("two", ("k",)) is None
     bench.clock.advance(LEASE_S * 1.1)
     second = bench.claim("two")
@@ -125,12 +125,12 @@ def test_every_write_of_a_lost_claim_is_refused(bench: Bench, taker: str) -> Non
     bench.clock.advance(LEASE_S * 1.1)
     bench.claim(taker)
     before = bench.queue.get(lost.job_id)
-    assert bench.queue.heartbeat(lost) is Hold.LOST
+    assert bench.queue.heartbeat(lost) is LeaseState.LOST
     assert not bench.queue.progress(lost, "angles", 0.5)
     assert not bench.finish(lost)
     assert not bench.queue.fail(lost, "x", "y")
     assert not bench.queue.stop(lost)
-    assert not bench.queue.died(lost)
+    assert not bench.queue.note_death(lost)
     assert not bench.queue.release(lost)
     assert bench.queue.get(lost.job_id) == before
     assert bench.published == []
@@ -153,7 +153,7 @@ def test_after_a_request_to_cancel_there_is_no_result(bench: Bench) -> None:
     view = bench.submit("a")
     claim = bench.claim()
     assert bench.cancel(view.id) is not None
-    assert bench.queue.heartbeat(claim) is Hold.CANCEL
+    assert bench.queue.heartbeat(claim) is LeaseState.CANCEL
     assert not bench.finish(claim)
     assert bench.queue.stop(claim)
     assert bench.state(view.id) == "cancelled"
@@ -187,7 +187,7 @@ def test_three_deaths_end_a_job_and_a_release_is_none(bench: Bench, way: str) ->
         if way == "expired":
             bench.clock.advance(LEASE_S * 1.1)
         else:
-            assert bench.queue.died(claim)
+            assert bench.queue.note_death(claim)
     assert bench.queue.claim("w", ("k",)) is None
     after = bench.queue.get(view.id)
     assert after is not None
@@ -247,11 +247,11 @@ class QueueModel(RuleBasedStateMachine):
             case "fail":
                 ok = queue.fail(claim, "x", "y")
             case "died":
-                ok = queue.died(claim)
+                ok = queue.note_death(claim)
             case "release":
                 ok = queue.release(claim)
             case "beat":
-                ok = queue.heartbeat(claim) is not Hold.LOST
+                ok = queue.heartbeat(claim) is not LeaseState.LOST
             case "progress":
                 ok = queue.progress(claim, "s", 0.5)
             case _:

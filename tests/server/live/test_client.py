@@ -10,7 +10,7 @@ import pytest
 
 from core.formats.live_log import Hello
 from server.live import client
-from server.live.client import Faults, LiveError, Report, stream
+from server.live.client import LiveError, StreamFaults, StreamReport, stream
 from server.services import live, recordings
 from tests.live_clinic import Visit, visit
 from tests.live_takes import HELLO, digest, frame, kept_in
@@ -53,7 +53,7 @@ async def test_a_connection_that_keeps_breaking_loses_nothing(clinic: Clinic, po
     frames = [frame(i) for i in range(150)]
     async with visit(clinic, port) as v:
         report = await stream(
-            v.socket, v.token, hello(v), given(frames, 0.002), faults=Faults(0.08, 0.002), seed=5
+            v.socket, v.token, hello(v), given(frames, 0.002), faults=StreamFaults(0.08, 0.002), seed=5
         )
     assert report.reconnects >= 5
     assert report.sent == len(report.ack_s) == 150
@@ -111,7 +111,7 @@ async def test_an_error_of_the_source_ends_it(clinic: Clinic, port: int) -> None
 
 
 async def test_a_take_that_the_therapist_ends_is_said(clinic: Clinic, port: int) -> None:
-    report = Report()
+    report = StreamReport()
 
     async def endless() -> AsyncIterator[bytes]:
         for i in range(10_000):
@@ -135,7 +135,7 @@ async def test_a_take_that_the_therapist_ends_is_said(clinic: Clinic, port: int)
 
 async def test_a_take_of_another_sender_is_not_continued(clinic: Clinic, port: int) -> None:
     async with visit(clinic, port) as v:
-        report = Report()
+        report = StreamReport()
         first = asyncio.create_task(
             stream(v.socket, v.token, hello(v), given([frame(i) for i in range(99)], 0.05), report=report)
         )

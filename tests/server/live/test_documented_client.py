@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from core.formats.live_log import decode_batch, parse_hello, record
-from server.live.protocol import FINAL, Close
+from server.live.protocol import FINAL, CloseCode
 from server.services import live
 from tests.data import ROOT
 from tests.live_clinic import new_session
@@ -66,8 +66,8 @@ def test_every_close_code_is_in_the_table_with_whether_to_come_back() -> None:
     table = TEXT.split("## Close codes")[1].split("\n## ")[0]
     rows = re.findall(r"^\| (\d{4}) \| .* \| (no|yes)\b", table, re.MULTILINE)
     said = {int(code): back for code, back in rows}
-    assert set(said) == set(Close)
-    assert {code for code, back in said.items() if back == "no"} == FINAL | {Close.DONE}
+    assert set(said) == set(CloseCode)
+    assert {code for code, back in said.items() if back == "no"} == FINAL | {CloseCode.DONE}
 
 
 def test_the_log_begins_as_described() -> None:

@@ -19,10 +19,10 @@ from websockets.asyncio.client import ClientConnection
 
 from core.feedback import Cue
 from core.formats.live_log import FILE_MARK, hello_json, record
-from server.live.client import Report, stream
-from server.live.estimator import Estimator
+from server.live.client import StreamReport, stream
+from server.live.estimator import EstimatorWorker
 from server.live.hub import Hub
-from server.live.messages import Begin, Broken, Command, End, Grow, Item, Picture
+from server.live.messages import Command, EstimateFailed, FeedItem, FollowTake, ForgetTake, LogGrown, Picture
 from server.live.messages import Report as Told
 from server.live.take import STEERING
 from server.services import live, prescriptions, recordings, sessions
@@ -85,7 +85,9 @@ async def given(frames: Sequence[bytes], gates: Sequence[asyncio.Event]) -> Asyn
             await gates[int(part) - 1].wait()
 
 
-def streaming(v: Visit, frames: Sequence[bytes], gates: Sequence[asyncio.Event] = ()) -> asyncio.Task[Report]:
+def streaming(
+    v: Visit, frames: Sequence[bytes], gates: Sequence[asyncio.Event] = ()
+) -> asyncio.Task[StreamReport]:
     return asyncio.create_task(stream(v.socket, v.token, walk_hello(v.take), given(frames, gates)))
 
 
@@ -370,19 +372,19 @@ def test_a_take_that_throws_is_told_and_leaves_the_others_alone(tmp_path: Path) 
     good.write_bytes(whole)
     bad.write_bytes(b"no log at all" * 100)
     said: list[Told] = []
-    estimator = Estimator(said.append)
+    estimator = EstimatorWorker(said.append)
     for name, path in (("good", good), ("bad", bad)):
-        estimator.obey(Begin(name, str(path), 0, 1.75, "walk", None, None, []))
-    estimator.obey(Begin("gone", str(tmp_path / "gone.log"), 0, 1.75, "walk", None, None, []))
-    estimator.obey(Grow({"good": len(whole), "bad": 1300, "gone": 5}, 0.0))
+        estimator.obey(FollowTake(name, str(path), 0, 1.75, "walk", None, None, []))
+    estimator.obey(FollowTake("gone", str(tmp_path / "gone.log"), 0, 1.75, "walk", None, None, []))
+    estimator.obey(LogGrown({"good": len(whole), "bad": 1300, "gone": 5}, 0.0))
     while estimator.has_work:
         estimator.work()
-    estimator.obey(End("good"))
-    broken = {s.take: s.code for s in said if isinstance(s, Broken)}
+    estimator.obey(ForgetTake("good"))
+    broken = {s.take: s.code for s in said if isinstance(s, EstimateFailed)}
     assert broken == {"gone": "live_log_gone", "bad": "live_estimate_failed"}
     shown = [s for s in said if isinstance(s, Picture)]
     assert {s.take for s in shown} == {"good"}
-    assert not [s for s in said if isinstance(s, Item) and s.take != "good"]
+    assert not [s for s in said if isinstance(s, FeedItem) and s.take != "good"]
     estimator.obey(Command("bad", 0, "pause", True))  # of a take that was given up: nothing to do
 
 
@@ -394,11 +396,11 @@ def test_a_take_without_a_mapped_sensor_is_told_why_it_cannot_be_estimated(tmp_p
     whole = FILE_MARK + record("H", hello_json(replace(hello, streams=(replace(stream_, sensors=nothing),))))
     log.write_bytes(whole + record("B", walk()[0].frame))
     said: list[Told] = []
-    estimator = Estimator(said.append)
-    estimator.obey(Begin("one", str(log), log.stat().st_size, None, "walk", None, None, []))
+    estimator = EstimatorWorker(said.append)
+    estimator.obey(FollowTake("one", str(log), log.stat().st_size, None, "walk", None, None, []))
     estimator.work()
     (only,) = said
-    assert isinstance(only, Broken)
+    assert isinstance(only, EstimateFailed)
     assert only.code == "no_mapping"
     assert not estimator.has_work
 

@@ -16,11 +16,11 @@ from core.frames import Floats
 from core.recording import ImuStream, Recording
 from core.simulate import simulate_scenario
 from core.timeline import synchronise
-from server.live.playback import Due, cut, hello_of, paced
+from server.live.playback import DueBatch, cut, hello_of, pace_batches
 from tests.walks import neura_recording
 
 
-def log_of(recording: Recording, batches: list[Due]) -> bytes:
+def log_of(recording: Recording, batches: list[DueBatch]) -> bytes:
     hello = record("H", hello_json(hello_of(recording, "t")))
     return FILE_MARK + hello + b"".join(record("B", one.frame) for one in batches)
 
@@ -113,11 +113,11 @@ def test_a_batch_size_that_is_not_possible_is_refused(size: int) -> None:
 
 
 def test_batches_are_paced_by_the_speed() -> None:
-    batches = [Due(0.1, b"a"), Due(0.3, b"b"), Due(0.4, b"c")]
+    batches = [DueBatch(0.1, b"a"), DueBatch(0.3, b"b"), DueBatch(0.4, b"c")]
 
     async def took(speed: float) -> float:
         began = time.monotonic()
-        assert [one async for one in paced(batches, speed)] == [b"a", b"b", b"c"]
+        assert [one async for one in pace_batches(batches, speed)] == [b"a", b"b", b"c"]
         return time.monotonic() - began
 
     assert 0.2 <= asyncio.run(took(2.0)) < 0.4

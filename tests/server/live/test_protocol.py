@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from core.formats.live_log import Finish, Hello, decode_batch, hello_json
 from server.live import protocol
-from server.live.intake import MISMATCH, Answer, Intake
-from server.live.protocol import FINAL, MAX_UNACKED, MOST_UNACKED, Close, ProtocolError, parse
+from server.live.intake import MISMATCH, Intake, IntakeAnswer
+from server.live.protocol import FINAL, MAX_UNACKED, MOST_UNACKED, CloseCode, ProtocolError, parse
 from tests.live_takes import HELLO, digest, finish_text, frame
 
 JSON = st.recursive(
@@ -32,11 +32,11 @@ def greeted(batches: int = 0, synced: bool = True) -> Intake:
     for seq in range(batches):
         assert intake.offer(frame(seq)).close is None
     if synced:
-        intake.synced(batches)
+        intake.note_synced(batches)
     return intake
 
 
-def said(answer: Answer) -> dict[str, Any]:
+def said(answer: IntakeAnswer) -> dict[str, Any]:
     assert answer.say is not None
     return dict(json.loads(answer.say))
 
@@ -81,7 +81,7 @@ def test_a_changed_hello_is_refused(changed: str) -> None:
     other = parse(json.dumps(root))
     assert isinstance(other, Hello)
     answer = greeted(2).greet(other)
-    assert (answer.close, answer.reason) == (Close.MALFORMED, "hello_changed")
+    assert (answer.close, answer.reason) == (CloseCode.MALFORMED, "hello_changed")
     assert said(answer)["code"] == "hello_changed"
 
 
@@ -91,7 +91,7 @@ def test_a_hello_in_the_middle_of_the_stream_is_answered_like_the_first() -> Non
 
 def test_the_next_batch_is_kept_as_received() -> None:
     whole = frame(0)
-    assert greeted().offer(whole) == Answer(keep=("B", whole))
+    assert greeted().offer(whole) == IntakeAnswer(keep=("B", whole))
 
 
 def test_a_duplicate_is_ignored_and_the_last_acknowledgement_repeated() -> None:
@@ -105,8 +105,8 @@ def test_a_duplicate_is_ignored_and_the_last_acknowledgement_repeated() -> None:
 def test_a_reordered_batch_is_a_gap_and_closes_with_resume() -> None:
     intake = greeted(3)
     answer = intake.offer(frame(4))
-    assert (answer.close, answer.reason, answer.keep) == (Close.GAP, "gap", None)
-    assert Close.GAP not in FINAL
+    assert (answer.close, answer.reason, answer.keep) == (CloseCode.GAP, "gap", None)
+    assert CloseCode.GAP not in FINAL
     assert intake.offer(frame(3)).keep is not None
 
 
@@ -131,7 +131,7 @@ def test_a_batch_before_any_hello_is_refused() -> None:
 def test_a_malformed_batch_closes_with_its_reason(damage: Callable[[bytes], bytes], code: str) -> None:
     intake = greeted(1)
     answer = intake.offer(damage(frame(1)))
-    assert (answer.close, answer.reason, answer.keep) == (Close.MALFORMED, code, None)
+    assert (answer.close, answer.reason, answer.keep) == (CloseCode.MALFORMED, code, None)
     assert said(answer)["detail"]
     assert intake.next_seq == 1
 
@@ -139,7 +139,7 @@ def test_a_malformed_batch_closes_with_its_reason(damage: Callable[[bytes], byte
 @pytest.mark.parametrize("message", [b"\0" * ((1 << 20) + 1), " " * ((1 << 20) + 1)])
 def test_an_oversized_message_closes_as_too_big(message: bytes | str) -> None:
     answer = greeted().offer(message)
-    assert (answer.close, answer.reason) == (Close.TOO_BIG, "message_too_big")
+    assert (answer.close, answer.reason) == (CloseCode.TOO_BIG, "message_too_big")
 
 
 def test_values_that_cannot_be_measured_are_kept() -> None:
@@ -158,8 +158,8 @@ def test_clocks_that_jump_change_nothing_in_the_order() -> None:
 def test_a_tablet_that_does_not_wait_for_acknowledgements_is_closed() -> None:
     intake = greeted(MOST_UNACKED, synced=False)
     answer = intake.offer(frame(MOST_UNACKED))
-    assert (answer.close, answer.reason) == (Close.TOO_MANY, "too_many_unacked")
-    intake.synced(1)
+    assert (answer.close, answer.reason) == (CloseCode.TOO_MANY, "too_many_unacked")
+    intake.note_synced(1)
     assert intake.offer(frame(MOST_UNACKED)).keep is not None
 
 
@@ -181,7 +181,7 @@ def test_a_json_batch_is_kept_in_binary_form() -> None:
 def test_battery_is_handed_on_and_not_kept() -> None:
     intake = greeted(1)
     answer = intake.offer('{"type":"battery","sensors":{"A1":80,"B1":7.5}}')
-    assert answer == Answer(battery={"A1": 80.0, "B1": 7.5})
+    assert answer == IntakeAnswer(battery={"A1": 80.0, "B1": 7.5})
     assert intake.next_seq == 1
 
 
@@ -211,7 +211,7 @@ def test_battery_is_handed_on_and_not_kept() -> None:
 )
 def test_a_malformed_text_message_closes_with_its_reason(text: str, code: str) -> None:
     answer = greeted().offer(text)
-    assert (answer.close, answer.reason) == (Close.MALFORMED, code)
+    assert (answer.close, answer.reason) == (CloseCode.MALFORMED, code)
     with pytest.raises(ProtocolError) as refused:
         parse(text)
     assert refused.value.code == code
@@ -250,7 +250,7 @@ def test_a_finish_that_fits_is_kept_and_ends_the_take_once_it_is_durable() -> No
     answer = intake.offer(finish_text(frames))
     assert answer.keep is not None
     assert (answer.keep[0], answer.say, intake.is_over, intake.ended) == ("F", None, True, None)
-    intake.synced(4)
+    intake.note_synced(4)
     assert intake.ended is not None
     assert (intake.ended.count, intake.ended.sha256, intake.ended.problem) == (3, digest(frames), None)
 
@@ -259,9 +259,9 @@ def test_a_finish_is_answered_again_with_the_same_end() -> None:
     frames = [frame(i) for i in range(3)]
     intake = greeted(3)
     intake.offer(finish_text(frames))
-    assert intake.offer(finish_text(frames)) == Answer()  # not durable yet: the answer follows
-    intake.synced(4)
-    assert intake.offer(finish_text(frames)) == Answer(ended=intake.ended)
+    assert intake.offer(finish_text(frames)) == IntakeAnswer()  # not durable yet: the answer follows
+    intake.note_synced(4)
+    assert intake.offer(finish_text(frames)) == IntakeAnswer(ended=intake.ended)
     assert said(intake.greet(HELLO))["next_seq"] == 3
 
 
@@ -277,7 +277,7 @@ def test_a_finish_with_another_hash_or_fewer_batches_keeps_the_take_and_marks_it
     intake = greeted(3)
     answer = intake.offer(json.dumps({"type": "finish", "count": finish.count, "sha256": finish.sha256}))
     assert answer.keep is not None
-    intake.synced(4)
+    intake.note_synced(4)
     assert intake.ended is not None
     assert (intake.ended.count, intake.ended.problem) == (3, MISMATCH)
     assert intake.ended.sha256 == digest([frame(i) for i in range(3)])
@@ -287,20 +287,20 @@ def test_after_the_end_new_batches_are_refused_and_old_ones_acknowledged() -> No
     intake = greeted(3)
     intake.end()
     answer = intake.offer(frame(3))
-    assert (answer.close, answer.reason) == (Close.ENDED, "take_ended")
+    assert (answer.close, answer.reason) == (CloseCode.ENDED, "take_ended")
     assert said(intake.offer(frame(2))) == {"type": "ack", "ack": 3}
 
 
 def test_the_server_can_end_a_take_with_its_own_count() -> None:
     intake = greeted(2)
     assert intake.end().keep is not None
-    intake.synced(3)
+    intake.note_synced(3)
     assert intake.ended is not None
     assert intake.ended.problem is None
-    assert intake.end() == Answer(ended=intake.ended)
+    assert intake.end() == IntakeAnswer(ended=intake.ended)
 
 
 def test_what_the_server_says_is_plain_json() -> None:
     assert json.loads(protocol.ack(7)) == {"type": "ack", "ack": 7}
     assert json.loads(protocol.command("start")) == {"type": "command", "command": "start"}
-    assert json.loads(protocol.finished("r")) == {"type": "finished", "recording": "r"}
+    assert json.loads(protocol.announce_finish("r")) == {"type": "finished", "recording": "r"}

@@ -15,7 +15,7 @@ from websockets.asyncio.client import ClientConnection
 
 from server.live import ending, estimator
 from server.live.hub import Hub
-from server.live.messages import Begin, Broken, End, Grow, decode_report, encode
+from server.live.messages import EstimateFailed, FollowTake, ForgetTake, LogGrown, decode_report, encode
 from server.processes.channel import Channel
 from server.services.live_recordings import log_path
 from tests.data import ROOT
@@ -136,27 +136,32 @@ async def test_a_take_that_ended_before_the_estimator_was_ready_leaves_no_error(
 def test_a_log_that_is_gone_is_told_in_a_sentence(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     ours, theirs = socketpair()
     web, line = Channel(ours), Channel(theirs)
-    missing = Begin("a" * 32, str(tmp_path / "gone.log"), 100, None, "walk", None, None, [])
-    for order in (missing, End(missing.take), Begin("b" * 32, *vars_of(missing)), Grow({"b" * 32: 200}, 0.0)):
+    missing = FollowTake("a" * 32, str(tmp_path / "gone.log"), 100, None, "walk", None, None, [])
+    for order in (
+        missing,
+        ForgetTake(missing.take),
+        FollowTake("b" * 32, *vars_of(missing)),
+        LogGrown({"b" * 32: 200}, 0.0),
+    ):
         web.send(encode(order))
-    said: list[Broken] = []
+    said: list[EstimateFailed] = []
     with pytest.raises((EOFError, ConnectionError)):
         follow_until_closed(line, web, said)
     assert [(report.take, report.code) for report in said] == [("b" * 32, "live_log_gone")]
     assert not caplog.records
 
 
-def vars_of(begin: Begin) -> tuple[Any, ...]:
+def vars_of(begin: FollowTake) -> tuple[Any, ...]:
     """All but the take."""
     return tuple(getattr(begin, name) for name in begin.__struct_fields__[1:])
 
 
-def follow_until_closed(line: Channel, web: Channel, said: list[Broken]) -> None:
+def follow_until_closed(line: Channel, web: Channel, said: list[EstimateFailed]) -> None:
     """Follow until the first report, then close the web's side."""
 
     def read() -> None:
         report = decode_report(web.receive())
-        assert isinstance(report, Broken)
+        assert isinstance(report, EstimateFailed)
         said.append(report)
         web.close()
 

@@ -15,7 +15,7 @@ import pytest
 
 from core.errors import InputError
 from server.live.committer import Committer
-from server.live.protocol import MAX_UNACKED, MOST_UNACKED, Close, ProtocolError
+from server.live.protocol import MAX_UNACKED, MOST_UNACKED, CloseCode, ProtocolError
 from server.live.recorder import Recorder, open_recorder
 from server.storage import fs
 from tests.faults.failing import FailingSystem
@@ -101,7 +101,7 @@ def test_the_finish_is_told_once_it_is_durable_and_again_when_asked_again(tmp_pa
         async with recording(tmp_path / "t.log") as (again, heard):
             assert again.greet(HELLO).close is None
             assert again.offer(finish_text(frames)).ended == again.end != None  # noqa: E711
-            assert again.offer(frame(4)).close is Close.ENDED
+            assert again.offer(frame(4)).close is CloseCode.ENDED
             assert not heard.ends
 
     asyncio.run(run())
@@ -128,7 +128,7 @@ def test_a_take_without_a_log_needs_a_hello(tmp_path: Path) -> None:
     async def run() -> None:
         with pytest.raises(ProtocolError) as refused:
             await open_recorder(tmp_path / "t.log", None, Committer(), Heard())
-        assert (refused.value.code, refused.value.close) == ("take_empty", Close.ENDED)
+        assert (refused.value.code, refused.value.close) == ("take_empty", CloseCode.ENDED)
 
     asyncio.run(run())
 
@@ -163,7 +163,7 @@ def test_a_stalled_disk_holds_up_nobody_and_bounds_what_is_taken(
             answers = [recorder.offer(one) for one in frames]
             goes_on.set()
             assert all(a.close is None for a in answers[:-1])
-            assert answers[-1].close is Close.TOO_MANY
+            assert answers[-1].close is CloseCode.TOO_MANY
             assert recorder.next_seq == MOST_UNACKED > MAX_UNACKED
             monkeypatch.setattr(fs, "system", fs.System())
             await until(lambda: heard.acks and heard.acks[-1] == MOST_UNACKED)
@@ -210,9 +210,9 @@ def test_a_disk_that_refuses_is_said_and_acknowledges_nothing_that_is_not_there(
                 recorder.offer(frames[i])
                 i += 1
                 await until(lambda: heard.failures or heard.acks[-1] == i)  # noqa: B023
-            assert [(f.code, f.close) for f in heard.failures] == [(code, Close.STORAGE)]
+            assert [(f.code, f.close) for f in heard.failures] == [(code, CloseCode.STORAGE)]
             answer = recorder.offer(frame(recorder.next_seq))
-            assert (answer.close, answer.reason) == (Close.STORAGE, code)
+            assert (answer.close, answer.reason) == (CloseCode.STORAGE, code)
             assert recorder.greet(HELLO).reason == code
             sure = heard.acks[-1]
             monkeypatch.setattr(fs, "system", fs.System())

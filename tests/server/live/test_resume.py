@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from server.live.committer import Committer
-from server.live.intake import Answer, Ended
-from server.live.protocol import MOST_UNACKED, Close, ProtocolError
+from server.live.intake import IntakeAnswer, TakeEnd
+from server.live.protocol import MOST_UNACKED, CloseCode, ProtocolError
 from server.live.recorder import Recorder, restore
 from server.storage import fs
 from tests.live_takes import HELLO, digest, finish_text, frame, stored
@@ -67,7 +67,7 @@ class Tablet:
         self.reached = 0  # batches ever sent
         self.acked = 0  # batches the server has promised to keep
         self.online = False
-        self.end: Ended | None = None
+        self.end: TakeEnd | None = None
 
     def welcomed(self, next_seq: int) -> None:
         assert self.acked <= next_seq <= self.reached, "the server lost what it had acknowledged"
@@ -101,17 +101,17 @@ class Stream(RuleBasedStateMachine):
 
     # what the recorder tells
 
-    def grown(self, size: int) -> None:
+    def note_growth(self, size: int) -> None:
         assert self.path.stat().st_size == size
 
-    def acknowledged(self, below: int) -> None:
+    def note_acknowledged(self, below: int) -> None:
         self.tablet.heard(below)
 
-    def ended(self, end: Ended) -> None:
+    def note_end(self, end: TakeEnd) -> None:
         self.tablet.end = end
 
-    def failed(self, error: ProtocolError) -> None:
-        assert error.close is Close.STORAGE
+    def note_failure(self, error: ProtocolError) -> None:
+        assert error.close is CloseCode.STORAGE
         self.tablet.lost()
 
     # what happens
@@ -136,7 +136,7 @@ class Stream(RuleBasedStateMachine):
         for one in FRAMES[self.tablet.at : self.tablet.at + number]:
             known = self.tablet.at < self.recorder_.next_seq  # sent again after a drop: a duplicate
             answer = self.offer(one)
-            assert answer.close is (Close.ENDED if self.over and not known else None)
+            assert answer.close is (CloseCode.ENDED if self.over and not known else None)
             if answer.close is None:
                 self.tablet.at += 1
                 self.tablet.reached = max(self.tablet.reached, self.tablet.at)
@@ -152,14 +152,14 @@ class Stream(RuleBasedStateMachine):
     @rule(data=st.data())
     def skip(self, data: st.DataObject) -> None:
         answer = self.offer(FRAMES[data.draw(st.integers(self.recorder_.next_seq + 1, LENGTH - 1))])
-        assert answer.close is (Close.ENDED if self.over else Close.GAP)
+        assert answer.close is (CloseCode.ENDED if self.over else CloseCode.GAP)
 
     @precondition(lambda self: self.tablet.online and self.tablet.at < LENGTH)
     @rule(at=st.integers(0, len(FRAMES[0]) - 1), bit=st.integers(0, 7))
     def corrupt(self, at: int, bit: int) -> None:
         whole = bytearray(FRAMES[self.tablet.at])
         whole[at % len(whole)] ^= 1 << bit
-        assert self.offer(bytes(whole)).close is Close.MALFORMED
+        assert self.offer(bytes(whole)).close is CloseCode.MALFORMED
 
     @precondition(lambda self: self.tablet.online)
     @rule()
@@ -227,7 +227,7 @@ class Stream(RuleBasedStateMachine):
         assert self.recorder is not None
         return self.recorder
 
-    def offer(self, message: bytes | str) -> Answer:
+    def offer(self, message: bytes | str) -> IntakeAnswer:
         answer = self.recorder_.offer(message)
         if answer.close is not None:
             assert self.said(answer)["type"] == "error"
@@ -239,7 +239,7 @@ class Stream(RuleBasedStateMachine):
             for one in steps:
                 one()
 
-    def said(self, answer: Answer) -> dict[str, Any]:
+    def said(self, answer: IntakeAnswer) -> dict[str, Any]:
         assert answer.say is not None
         return dict(json.loads(answer.say))
 

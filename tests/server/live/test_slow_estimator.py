@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from server.live.client import Report, stream
-from server.live.playback import Due, paced
+from server.live.client import StreamReport, stream
+from server.live.playback import DueBatch, pace_batches
 from tests.data import ROOT
 from tests.live_clinic import heard, visit
 from tests.live_walk import walk, walk_hello
@@ -26,11 +26,11 @@ GROUP_S = 0.25
 """Longest time to an acknowledgement when nothing else happens (docs/live-protocol.md)."""
 
 
-def some_of_the_walk() -> Sequence[Due]:
+def some_of_the_walk() -> Sequence[DueBatch]:
     return [one for one in walk() if one.at_s < SECONDS]
 
 
-async def streamed(clinic: Clinic, port: int, pictures: list[dict[str, Any]]) -> Report:
+async def streamed(clinic: Clinic, port: int, pictures: list[dict[str, Any]]) -> StreamReport:
     """Stream at real speed while a browser keeps the pictures."""
 
     async def look(feed: Any) -> None:
@@ -39,7 +39,7 @@ async def streamed(clinic: Clinic, port: int, pictures: list[dict[str, Any]]) ->
 
     async with visit(clinic, port) as v, v.feed() as feed:
         looking = asyncio.create_task(look(feed))
-        report = await stream(v.socket, v.token, walk_hello(v.take), paced(some_of_the_walk(), 1.0))
+        report = await stream(v.socket, v.token, walk_hello(v.take), pace_batches(some_of_the_walk(), 1.0))
         looking.cancel()
         await asyncio.gather(looking, return_exceptions=True)
     return report

@@ -11,7 +11,7 @@ import pytest
 from core.formats.live_log import FILE_MARK, hello_json, record
 from server.live.hub import Hub
 from server.live.room import Room
-from server.live.take import LiveTake
+from server.live.take import ActiveTake
 from server.main import main
 from server.services import checks, jobs, live, live_logs, live_recordings, recordings, sessions
 from server.services.errors import Conflict
@@ -181,7 +181,7 @@ async def test_a_damaged_log_keeps_its_original_and_the_session_says_so(
         assert original.name in said
         hub: Hub = clinic.app.state.hub
         row = hub.rows.take(take)
-        again = LiveTake(hub, row, Room(), *hub.rows.prepare(row))
+        again = ActiveTake(hub, row, Room(), *hub.rows.prepare(row))
         assert again._seen["notice"] == 0  # or the estimator's first notice would be taken for told
         async with clinic.client("clinician") as http:
             assert (await http.delete(f"/api/v1/sessions/{session}")).status_code == 204
@@ -199,6 +199,6 @@ async def test_a_log_without_a_readable_sample_is_not_thrown_away(tmp_path: Path
         assert not path.exists()
         assert path.with_name(f"{take}.1.damaged").read_bytes() == hurt
         with clinic.db.read() as c:
-            [text] = live.damages(c, session)
+            [text] = live.list_damages(c, session)
         assert "were damaged" in text
         assert any(".1.damaged" in said for said in findings(clinic.settings))

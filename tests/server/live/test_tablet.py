@@ -15,7 +15,7 @@ from sqlalchemy import select, update
 from websockets.asyncio.client import ClientConnection
 
 from core.formats.live_log import StreamInfo
-from server.live.protocol import Close
+from server.live.protocol import CloseCode
 from server.services import recordings
 from server.services.live_recordings import log_path
 from server.storage.tables import audit, job, live_take, now
@@ -102,7 +102,7 @@ async def test_a_tablet_that_comes_back_goes_on_where_the_disk_is(clinic: Clinic
             assert await heard(ws, "finished") == first
         async with v.tablet() as ws:  # the answer was lost on its way
             assert await heard(ws, "finished") == first
-            assert await closed(ws) == (Close.DONE, "take_ended")
+            assert await closed(ws) == (CloseCode.DONE, "take_ended")
 
 
 async def test_wrong_expired_and_foreign_tokens_are_refused(clinic: Clinic, port: int) -> None:
@@ -110,12 +110,12 @@ async def test_wrong_expired_and_foreign_tokens_are_refused(clinic: Clinic, port
         for token in ("wrong", other.token):
             async with one.tablet(one.hello(token=token)) as ws:
                 assert (await heard(ws, "error"))["code"] == "token_not_valid"
-                assert await closed(ws) == (Close.UNAUTHORISED, "token_not_valid")
+                assert await closed(ws) == (CloseCode.UNAUTHORISED, "token_not_valid")
         with clinic.db.write() as c:
             past = now() - dt.timedelta(seconds=1)
             c.execute(update(live_take).where(live_take.c.id == one.take).values(token_expires_at=past))
         async with one.tablet() as ws:
-            assert (await closed(ws))[0] == Close.UNAUTHORISED
+            assert (await closed(ws))[0] == CloseCode.UNAUTHORISED
     assert not log_path(clinic.settings.live, one.take).exists()
 
 
@@ -133,7 +133,7 @@ async def test_a_first_message_that_is_no_hello_is_refused(
 ) -> None:
     async with visit(clinic, port) as v, websockets.connect(v.socket) as ws:
         await ws.send(first)
-        assert (await closed(ws))[0] == Close.MALFORMED
+        assert (await closed(ws))[0] == CloseCode.MALFORMED
 
 
 async def test_silence_instead_of_a_hello_is_closed(
@@ -141,7 +141,7 @@ async def test_silence_instead_of_a_hello_is_closed(
 ) -> None:
     monkeypatch.setattr("server.live.tablet.HELLO_WITHIN_S", 0.1)
     async with visit(clinic, port) as v, websockets.connect(v.socket) as ws:
-        assert await closed(ws) == (Close.NO_HELLO, "no_hello")
+        assert await closed(ws) == (CloseCode.NO_HELLO, "no_hello")
 
 
 async def test_other_sensors_than_at_first_are_refused_and_the_take_stays(clinic: Clinic, port: int) -> None:
@@ -152,7 +152,7 @@ async def test_other_sensors_than_at_first_are_refused_and_the_take_stays(clinic
             await acknowledged(ws, 1)
         streams: tuple[StreamInfo, ...] = HELLO.streams[:1]
         async with v.tablet(v.hello(replace(HELLO, streams=streams))) as ws:
-            assert await closed(ws) == (Close.MALFORMED, "hello_changed")
+            assert await closed(ws) == (CloseCode.MALFORMED, "hello_changed")
         async with v.tablet() as ws:
             assert (await heard(ws, "welcome"))["next_seq"] == 1
 
@@ -160,9 +160,9 @@ async def test_other_sensors_than_at_first_are_refused_and_the_take_stays(clinic
 async def test_damage_gaps_and_oversize_close_with_their_codes(clinic: Clinic, port: int) -> None:
     async with visit(clinic, port) as v:
         for message, code in (
-            (frame(0)[:-1] + bytes([frame(0)[-1] ^ 1]), Close.MALFORMED),
-            (frame(3), Close.GAP),
-            (b"x" * ((1 << 20) + 1), Close.TOO_BIG),
+            (frame(0)[:-1] + bytes([frame(0)[-1] ^ 1]), CloseCode.MALFORMED),
+            (frame(3), CloseCode.GAP),
+            (b"x" * ((1 << 20) + 1), CloseCode.TOO_BIG),
         ):
             async with v.tablet() as ws:
                 await heard(ws, "welcome")
@@ -180,9 +180,9 @@ async def test_a_second_tablet_with_a_new_code_sends_the_first_away(clinic: Clin
         old, v.token = v.token, paired["token"]
         async with v.tablet() as second:
             assert (await heard(second, "welcome"))["next_seq"] == 1
-            assert (await closed(first))[0] == Close.REPLACED
+            assert (await closed(first))[0] == CloseCode.REPLACED
             async with v.tablet(v.hello(token=old)) as third:
-                assert (await closed(third))[0] == Close.UNAUTHORISED
+                assert (await closed(third))[0] == CloseCode.UNAUTHORISED
 
 
 async def test_a_hash_that_differs_keeps_the_take_and_marks_it(clinic: Clinic, port: int) -> None:
@@ -203,10 +203,10 @@ async def test_a_take_closed_here_tells_the_tablet_and_keeps_what_came(clinic: C
         await acknowledged(ws, 1)
         made = (await v.http.post(f"{v.api}/close")).raise_for_status().json()
         assert (made["state"], made["count"]) == ("closed", 1)
-        assert await closed(ws) == (Close.ENDED, "take_ended")
+        assert await closed(ws) == (CloseCode.ENDED, "take_ended")
         assert (await v.state())["recording"] == made["recording_id"] is not None
         async with v.tablet() as again:
-            assert (await closed(again))[0] == Close.ENDED
+            assert (await closed(again))[0] == CloseCode.ENDED
         assert (await v.http.post(f"{v.api}/close")).status_code == 409
 
 
@@ -239,9 +239,9 @@ async def test_erasing_the_session_ends_its_take(clinic: Clinic, port: int) -> N
         await ws.send(frame(0))
         await acknowledged(ws, 1)
         (await v.http.delete(f"/api/v1/sessions/{v.session}")).raise_for_status()
-        assert await closed(ws) == (Close.ENDED, "take_ended")
+        assert await closed(ws) == (CloseCode.ENDED, "take_ended")
         async with v.tablet() as again:
-            assert (await closed(again))[0] == Close.UNAUTHORISED
+            assert (await closed(again))[0] == CloseCode.UNAUTHORISED
     assert not log_path(clinic.settings.live, v.take).exists()
 
 
@@ -262,7 +262,7 @@ async def test_a_full_disk_is_said_and_heals(
             with monkeypatch.context() as patch:
                 patch.setattr(fs.system, "write", full)
                 await ws.send(frame(1))
-                assert await closed(ws) == (Close.STORAGE, "storage_full")
+                assert await closed(ws) == (CloseCode.STORAGE, "storage_full")
         async with v.tablet() as ws:
             assert (await heard(ws, "welcome"))["next_seq"] == 1
             await ws.send(frame(1))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from core.errors import Notice
-from core.online.frame import CalibrationView, LiveFrame, SegmentCheck, SensorHealth, Trail
+from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SegmentCheck, SensorHealth
 from core.parameters.live_stride import LiveStride
 from server.live import wire
 from server.live.room import QUEUE, SHOWN, Room
@@ -24,7 +24,9 @@ STRIDE = LiveStride(
 )  # fmt: skip
 
 
-def told(frame: LiveFrame, trail: tuple[Trail, ...] = (), battery: dict[str, float] | None = None) -> Any:
+def told(
+    frame: LiveFrame, trail: tuple[AngleTrail, ...] = (), battery: dict[str, float] | None = None
+) -> Any:
     slow = wire.slow_part(frame, battery or {})
     return json.loads(wire.frame(frame, trail, slow, {"left": 40.04, "right": None}) + b"}")
 
@@ -37,7 +39,7 @@ def test_angles_are_degrees_and_what_is_lost_is_null() -> None:
         angles={"knee": np.pi / 6, "hip": float("nan")},
         contact={"left": True, "right": False},
     )
-    trail = Trail(np.array([1.49, 1.5]), ("knee", "hip"), np.array([[0.0, np.nan], [np.pi / 6, 0.1]]))
+    trail = AngleTrail(np.array([1.49, 1.5]), ("knee", "hip"), np.array([[0.0, np.nan], [np.pi / 6, 0.1]]))
     said = told(frame, (trail,))
     assert said["angles_deg"] == {"knee": 30.0, "hip": None}
     assert said["trace"] == {"t": [1.49, 1.5], "knee": [0.0, 30.0], "hip": [None, 5.73]}
@@ -48,8 +50,8 @@ def test_angles_are_degrees_and_what_is_lost_is_null() -> None:
 
 def test_trails_that_were_not_sent_are_joined_and_other_names_are_another_curve() -> None:
     frame = LiveFrame(2.0, 1, "running")
-    old = Trail(np.array([1.0]), ("hip",), np.array([[0.1]]))
-    parts = [Trail(np.array([t]), ("knee",), np.array([[0.0]])) for t in (1.1, 1.2)]
+    old = AngleTrail(np.array([1.0]), ("hip",), np.array([[0.1]]))
+    parts = [AngleTrail(np.array([t]), ("knee",), np.array([[0.0]])) for t in (1.1, 1.2)]
     assert told(frame, (old, *parts))["trace"] == {"t": [1.1, 1.2], "knee": [0.0, 0.0]}
 
 

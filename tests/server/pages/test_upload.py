@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from server.pages.upload import fits_movement, view_inspection
-from server.services.recordings import Recording
+from server.services.recordings import StoredRecording
 
 
 def device(name: str, part: str | None = None, leg: int | None = None, **more: Any) -> dict[str, Any]:
@@ -39,9 +39,9 @@ WALKER = [device("P", "pelvis"), device("A", "foot", 1), device("B", "foot", 2),
 RIGHT_WAY = {"P": "pelvis", "A": "foot_r", "B": "foot_l", "C": "shank_r"}
 
 
-def recording(devices: list[dict[str, Any]], manifest: Mapping[str, Any] | None = None) -> Recording:
+def recording(devices: list[dict[str, Any]], manifest: Mapping[str, Any] | None = None) -> StoredRecording:
     found = {"devices": devices, "duration_s": 25.0, "protocol": "walk", "notices": []}
-    return Recording("r", "s", "p", "ready", (), manifest, found, None)
+    return StoredRecording("r", "s", "p", "ready", (), manifest, found, None)
 
 
 def chosen(view: Mapping[str, Any]) -> dict[str, str | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from core.parameters.catalogue import CATALOGUE
-from server.report.behind import behind
+from server.report.behind import open_row
 from server.report.bundle import read_columns
 from server.report.exports import strides_csv
 from server.report.level import level_column
@@ -24,7 +24,7 @@ def test_a_number_is_the_mean_of_the_strides_it_opens_to(make_bundle: MakeBundle
     bundle = make_bundle()
     rows = {r.name: r for _, group in report_model(bundle).groups for r in group}
     column = tuple(s.end_s - s.start_s for s in bundle.strides.strides)
-    number = behind(rows["stride_time_s"], bundle.strides, column, 12.0)
+    number = open_row(rows["stride_time_s"], bundle.strides, column, 12.0)
     counted = [s.value for s in number.strides if s.counted and s.side == "left" and s.value is not None]
     assert rows["stride_time_s"].left is not None
     assert sum(counted) / len(counted) == pytest.approx(rows["stride_time_s"].left.value)
@@ -42,7 +42,7 @@ def test_a_number_is_the_mean_of_the_strides_it_opens_to(make_bundle: MakeBundle
 def test_a_figure_of_the_take_has_no_strides(make_bundle: MakeBundle) -> None:
     bundle = make_bundle()
     rows = {r.name: r for _, group in report_model(bundle).groups for r in group}
-    number = behind(rows["cadence_spm"], bundle.strides, None, 12.0)
+    number = open_row(rows["cadence_spm"], bundle.strides, None, 12.0)
     assert (number.strides, number.svg) == ((), "")
     assert number.to_json()["definition"] == CATALOGUE["cadence_spm"].definition
 

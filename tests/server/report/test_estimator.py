@@ -10,8 +10,8 @@ from core.estimators import ESTIMATORS, NO_FIGURE, PoseEstimator
 from server.report.estimator import (
     QUANTITIES,
     choice_label,
-    estimated_angles,
     estimator_view,
+    list_estimated_angles,
     method_label,
 )
 from server.report.model import report_model
@@ -100,7 +100,7 @@ def test_every_estimator_and_quantity_of_the_core_has_words() -> None:
 
 def test_angles_of_the_model_are_marked_on_their_curves(make_bundle: MakeBundle) -> None:
     bundle = make_bundle(estimator=section(estimated_angles=["knee_flexion_l", "knee_flexion_r"]))
-    assert estimated_angles(bundle.estimator) == {"knee_flexion_l", "knee_flexion_r"}
+    assert list_estimated_angles(bundle.estimator) == {"knee_flexion_l", "knee_flexion_r"}
     model = report_model(bundle)
     low = {p.variable.name: p.low_confidence for p in model.panels}
     assert low["knee_flexion"]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from core.norms import Norms, norms_for
+from core.norms import Norms, look_up_norms
 from core.parameters import cycle_curves
 from core.parameters.anatomical_zero import anatomical_variables
 from core.parameters.result import CycleCurves
@@ -21,7 +21,7 @@ def curves() -> CycleCurves:
 
 
 def norms(standing: dict[str, float]) -> Norms:
-    return norms_for(40, "female", 1.2, 1.7, anatomical_variables(standing))
+    return look_up_norms(40, "female", 1.2, 1.7, anatomical_variables(standing))
 
 
 def test_levels_are_placed_among_healthy_people() -> None:

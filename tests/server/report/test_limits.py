@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from core.flags import RULES
-from core.norms.lookup import norms_for
+from core.norms.lookup import look_up_norms
 from core.parameters.result import Parameter
 from server.report.limits import NAMES
 from server.report.model import report_model
@@ -50,14 +50,14 @@ def test_without_counted_strides_there_are_none(make_bundle: MakeBundle) -> None
 
 def test_a_number_says_its_interval_its_variation_and_its_place_in_the_norm() -> None:
     p = Parameter("knee_flexion_rom_deg", "left", 12, 50.0, 2.0, "deg", None, 4.0, 48.7, 51.3, "few_strides")
-    (row,) = parameter_rows([p], norms_for(40, "female", 1.25, 1.7))
+    (row,) = parameter_rows([p], look_up_norms(40, "female", 1.25, 1.7))
     assert row.left is not None
     assert row.left.z is not None
     assert row.left.z < -2.0
     for words in ("95 % CI 48.7 to 51.3", "CV 4.0 % of few strides", "percentile"):
         assert words in row.left.title
     assert row.z_words.startswith("z −")
-    (slow,) = parameter_rows([p], norms_for(40, "female", 0.5, 1.7))
+    (slow,) = parameter_rows([p], look_up_norms(40, "female", 0.5, 1.7))
     assert slow.left is not None
     assert slow.left.z is None
     assert slow.z_words == ""

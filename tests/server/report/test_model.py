@@ -13,22 +13,22 @@ import pytest
 
 from core.errors import Notice
 from core.events.result import Strides
-from core.norms.lookup import norms_for
+from core.norms.lookup import look_up_norms
 from core.parameters.result import Parameter
 from server.report.bundle import Bundle
 from server.report.model import report_model
-from server.report.table import Row, parameter_rows
+from server.report.table import ParameterRow, parameter_rows
 from server.report.tables import curves_csv, parameters_csv
 from server.report.wording import VARIABLES, difference_words, parameter_term, place_words
 
 MakeBundle = Callable[..., Bundle]
 
 
-def row(rows: tuple[Row, ...], name: str) -> Row:
+def row(rows: tuple[ParameterRow, ...], name: str) -> ParameterRow:
     return next(r for r in rows if r.name == name)
 
 
-def rows_of(*parameters: Parameter) -> tuple[Row, ...]:
+def rows_of(*parameters: Parameter) -> tuple[ParameterRow, ...]:
     return parameter_rows(parameters)
 
 
@@ -79,7 +79,7 @@ def test_what_the_strides_leave_open_is_no_difference() -> None:
 
 def test_three_strides_stand_with_their_number_and_are_compared_with_nothing() -> None:
     sides = both("step_length_m", 0.51, 0.60)
-    norms = norms_for(40, "female", 1.2, 1.7)
+    norms = look_up_norms(40, "female", 1.2, 1.7)
     (full,) = parameter_rows(sides, norms)
     assert full.z_words
     assert full.left is not None
@@ -116,7 +116,7 @@ def test_box_counts_strides_and_names_the_worst_sensor(bundle: Bundle) -> None:
     items = {i.label: i for i in box.items}
     assert (box.kind, box.word) == ("ok", "Good data")
     strides = items["Strides used"]
-    used = len(bundle.strides.used("left"))
+    used = len(bundle.strides.select_used("left"))
     assert (strides.left, strides.left_of) == (used, used + 1)
     assert (items["Lost samples"].value, items["Lost samples"].extra) == ("0.3 %", "at most, right shank")
     assert items["Calibration"].value == "92"

@@ -10,12 +10,12 @@ import pytest
 from defusedxml import ElementTree
 
 from core.condition import USUAL
-from core.norms import norms_for, temporal_values
+from core.norms import look_up_norms, temporal_values
 from core.parameters.result import Parameter
 from server.report.change_words import change_words
 from server.report.numbers import Numbers
-from server.report.trend_chart import Ahead, trend_svg, value_range
-from server.report.trends import Trend, Visit, VisitKind, names_in, trends
+from server.report.trend_chart import PlannedAssessment, trend_svg, value_range
+from server.report.trends import AnalysedVisit, Trend, VisitKind, follow_figures, names_in
 
 DAY = dt.date(2026, 3, 2)
 
@@ -35,14 +35,16 @@ def visit(
     label: str | None = None,
     kind: VisitKind = "assessment",
     feedback: bool = False,
-) -> Visit:
+) -> AnalysedVisit:
     day = DAY + dt.timedelta(days=days)
     walked = replace(USUAL, feedback=feedback)
-    return Visit(f"s{days}", day, "Walk", label, kind, walked, Numbers(parameters, (), ("ok", "Good data")))
+    return AnalysedVisit(
+        f"s{days}", day, "Walk", label, kind, walked, Numbers(parameters, (), ("ok", "Good data"))
+    )
 
 
-def one(*visits: Visit, name: str = "gait_speed_mps") -> Trend:
-    (found,) = trends(visits, [name])
+def one(*visits: AnalysedVisit, name: str = "gait_speed_mps") -> Trend:
+    (found,) = follow_figures(visits, [name])
     return found
 
 
@@ -119,9 +121,9 @@ def test_sides_are_judged_apart() -> None:
 
 def test_speed_is_compared_with_people_at_their_own_pace_whatever_the_persons() -> None:
     slow = [visit(0, speed(0.5))]
-    norms, usual = norms_for(75, "male", 0.5), temporal_values(75, "male").values
+    norms, usual = look_up_norms(75, "male", 0.5), temporal_values(75, "male").values
     assert norms.reason == "no_speed_matched_norm"
-    (trend,) = trends(slow, ["gait_speed_mps"], norms, usual)
+    (trend,) = follow_figures(slow, ["gait_speed_mps"], norms, usual)
     assert trend.norm is not None
     assert trend.norm.mean > 1.0
 
@@ -148,7 +150,7 @@ def test_the_chart_shows_every_visit_and_every_limit() -> None:
         visit(30, speed(0.90), label="MID"),
     ]
     trend = one(*visits)
-    svg = trend_svg(trend, trend.lines[0], visits, [Ahead("POST1", DAY + dt.timedelta(days=60))])
+    svg = trend_svg(trend, trend.lines[0], visits, [PlannedAssessment("POST1", DAY + dt.timedelta(days=60))])
     root = ElementTree.fromstring(svg)
     classes = [e.get("class") for e in root.iter() if e.get("class")]
     assert classes.count("pl-b") == 2

@@ -53,13 +53,13 @@ class Clinic:
             upload.write(content)
             return upload.keep()
 
-    def recording(self, session_id: str) -> recordings.Recording:
+    def recording(self, session_id: str) -> recordings.StoredRecording:
         with self.db.read() as c:
             found = recordings.current(c, session_id)
         assert found is not None
         return found
 
-    def analyse(self, session_id: str, content: bytes = b"{}") -> analyses.Analysis:
+    def analyse(self, session_id: str, content: bytes = b"{}") -> analyses.AnalysisRecord:
         """What the worker does, without the numbers."""
         with self.db.write() as c:
             view = analyses.submit(c, self.queue, None, session_id)
@@ -75,7 +75,7 @@ class Clinic:
 
     def trail(self) -> list[str]:
         with self.db.read() as c:
-            return [row.action for row in reversed(audit.entries(c))]
+            return [row.action for row in reversed(audit.list_entries(c))]
 
 
 @pytest.fixture
@@ -100,10 +100,10 @@ def test_a_patient_is_made_renamed_and_found(clinic: Clinic) -> None:
         False,
     )
     with clinic.db.read() as c:
-        assert [p.code for p in patients.listing(c)] == ["P-9", "Q_2"]
-        assert [p.code for p in patients.listing(c, search="p-9")] == ["P-9"]
-        assert [p.code for p in patients.listing(c, search="_")] == ["Q_2"]  # no wildcard
-        assert patients.listing(c, search="%") == []
+        assert [p.code for p in patients.list_patients(c)] == ["P-9", "Q_2"]
+        assert [p.code for p in patients.list_patients(c, search="p-9")] == ["P-9"]
+        assert [p.code for p in patients.list_patients(c, search="_")] == ["Q_2"]  # no wildcard
+        assert patients.list_patients(c, search="%") == []
     assert clinic.trail() == ["patient.created"] * 2 + ["session.created"] * 2 + ["patient.changed"]
 
 
@@ -140,7 +140,7 @@ def test_a_session_knows_its_state(clinic: Clinic) -> None:
         analyses.submit(c, clinic.queue, None, session_id)
     assert state() == "running"
     with clinic.db.read() as c:
-        assert patients.listing(c)[0].running
+        assert patients.list_patients(c)[0].running
     claim = clinic.queue.claim("w", (recordings.ANALYSE,))
     assert claim is not None
     clinic.queue.fail(claim, "no_walking", "No walking was found.")
@@ -319,7 +319,7 @@ def test_erasing_a_patient_needs_the_code_and_leaves_only_the_trail(clinic: Clin
     with clinic.db.read() as c:
         for table in (tables.patient, tables.session, tables.recording, tables.recording_file, tables.job):
             assert len(c.execute(select(table)).all()) == 1
-        tombstone = audit.entries(c)[0]
+        tombstone = audit.list_entries(c)[0]
         assert (tombstone.action, tombstone.resource_id) == ("patient.erased", patient_id)
         with pytest.raises(NotFound):
             jobs.get(c, view.id)
@@ -444,10 +444,10 @@ def test_jobs_are_listed_with_whose_they_are_and_cancelled_with_a_trail(clinic: 
     with clinic.db.write() as c:
         view = recordings.inspect(c, clinic.queue, None, session_id)
     with clinic.db.write() as c:
-        listed = jobs.listing(c, active_only=True)
+        listed = jobs.list_jobs(c, active_only=True)
         assert [(x.id, x.session_id, x.patient_code) for x in listed] == [(view.id, session_id, "P-1")]
         assert jobs.cancel(c, clinic.queue, clinic.who, view.id).state == "cancelled"
-        assert jobs.listing(c, active_only=True) == []
+        assert jobs.list_jobs(c, active_only=True) == []
         assert [v.id for v in jobs.of_session(c, session_id)] == [view.id]
         with pytest.raises(NotFound):
             jobs.cancel(c, clinic.queue, clinic.who, "0" * 32)

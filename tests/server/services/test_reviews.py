@@ -43,7 +43,7 @@ def session_of(clinic: Clinic) -> str:
     return session
 
 
-def make(clinic: Clinic, session: str, edit: Edit, seen: int | None = None) -> edit_log.Edits:
+def make(clinic: Clinic, session: str, edit: Edit, seen: int | None = None) -> edit_log.EditHistory:
     return reviews.make(clinic.db, clinic.app.state.reviewed, None, session, edit, seen=seen)[1]
 
 
@@ -103,7 +103,7 @@ async def test_what_is_measured_is_kept_for_the_state_and_undo_finds_it_again(cl
     reviewed: ReviewedAnalyses = clinic.app.state.reviewed
     one = make(clinic, session, MOVE)
     with clinic.db.read() as c:
-        found = analyses.shown(c, session)
+        found = analyses.get_shown(c, session)
     kept = reviewed.measure(found, one)
     make(clinic, session, LEAVE_OUT)
     _, back = reviews.undo(clinic.db, None, session)

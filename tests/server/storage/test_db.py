@@ -96,11 +96,11 @@ def test_values_outside_their_domain_are_refused_by_the_database_itself(db: Data
 
 def test_a_watch_sees_commits_of_others_once(db: Database) -> None:
     with db.watch() as changes:
-        assert changes.changed()
-        assert not changes.changed()
+        assert changes.has_changed()
+        assert not changes.has_changed()
         add_patient(db, "a")
-        assert changes.changed()
-        assert not changes.changed()
+        assert changes.has_changed()
+        assert not changes.has_changed()
 
 
 def test_a_backup_under_way_of_writing_is_whole(db: Database, tmp_path: Path) -> None:

@@ -15,10 +15,10 @@ from server.storage.db import Database
 from server.storage.high_water import (
     HighWater,
     MarkKeeper,
-    gone_back,
-    newest,
+    explain_lost_rows,
     raise_mark,
     read_mark,
+    read_newest,
     set_mark,
 )
 from server.storage.migrate import upgrade
@@ -34,7 +34,7 @@ def write_rows(db: Database, number: int, action: str = "patient.opened") -> Non
 
 def complaint(db: Database, mark: Path) -> str | None:
     with db.read() as c:
-        return gone_back(c, mark)
+        return explain_lost_rows(c, mark)
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def test_the_mark_follows_the_log(db: Database, mark: Path) -> None:
     write_rows(db, 3)
     assert raise_mark(db, mark)
     with db.read() as c:
-        last = newest(c)
+        last = read_newest(c)
     assert read_mark(mark) == last
     assert last is not None
     assert last.seq == 3
@@ -146,7 +146,7 @@ def test_the_keeper_raises_the_mark_and_leaves_the_last_row_in_it(db: Database, 
     write_rows(db, 2)
     keeper.stop()
     with db.read() as c:
-        assert read_mark(mark) == newest(c)
+        assert read_mark(mark) == read_newest(c)
 
 
 def test_a_disk_that_refuses_the_mark_stops_nothing_and_it_follows_later(

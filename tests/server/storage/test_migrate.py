@@ -130,10 +130,10 @@ def test_data_survive_up_and_down_and_a_backup_is_made_before(
     fill(path)
     (scripts / "versions" / "next.py").write_text(HANG.format(head=head, then="pass"))
     backup = migrate.upgrade(path, scripts=scripts)
-    assert migrate.current(path) == "next"
+    assert migrate.read_revision(path) == "next"
     assert counts(path) == (1, 2)
     assert backup is not None
-    assert (counts(backup), migrate.current(backup)) == ((1, 2), head)
+    assert (counts(backup), migrate.read_revision(backup)) == ((1, 2), head)
     command.downgrade(migrate.configuration(path, scripts), head)
     assert counts(path) == (1, 2)
     assert migrate.upgrade(path, scripts=scripts) is not None
@@ -186,10 +186,10 @@ def test_a_failing_migration_leaves_exactly_the_old_revision(
         step.write_text(HANG.format(head=head, then=wrong))
         with pytest.raises(RuntimeError):
             migrate.upgrade(path, scripts=scripts)
-        assert (schema(path), migrate.current(path), counts(path)) == (before, head, (1, 2))
+        assert (schema(path), migrate.read_revision(path), counts(path)) == (before, head, (1, 2))
     step.write_text(HANG.format(head=head, then="pass"))
     migrate.upgrade(path, scripts=scripts)
-    assert migrate.current(path) == "next"
+    assert migrate.read_revision(path) == "next"
 
 
 def test_a_migration_killed_in_the_middle_leaves_exactly_the_old_revision(
@@ -214,10 +214,10 @@ def test_a_migration_killed_in_the_middle_leaves_exactly_the_old_revision(
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    assert (schema(path), migrate.current(path), counts(path)) == (before, head, (1, 2))
+    assert (schema(path), migrate.read_revision(path), counts(path)) == (before, head, (1, 2))
     step.write_text(HANG.format(head=head, then="pass"))
     migrate.upgrade(path, scripts=scripts)
-    assert (migrate.current(path), counts(path)) == ("next", (1, 2))
+    assert (migrate.read_revision(path), counts(path)) == ("next", (1, 2))
 
 
 def test_an_unknown_revision_is_refused(tmp_path: Path) -> None:

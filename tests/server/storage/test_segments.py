@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from core.errors import InputError
-from core.formats.live_log import FILE_MARK, Record, hello_json, record
+from core.formats.live_log import FILE_MARK, LogRecord, hello_json, record
 from server.storage import fs, segments
 from tests.live_takes import HELLO, frame, stored
 
@@ -26,8 +26,8 @@ def ends() -> list[int]:
     return found
 
 
-def recovered(path: Path) -> tuple[segments.TakeLog | None, list[Record]]:
-    seen: list[Record] = []
+def recovered(path: Path) -> tuple[segments.TakeLog | None, list[LogRecord]]:
+    seen: list[LogRecord] = []
     log = segments.recover(path, seen.append)
     if log is not None:
         log.close()
@@ -96,7 +96,7 @@ def test_going_back_cuts_off_what_was_not_synced(tmp_path: Path) -> None:
     log.append(PIECES[0])
     log.sync()
     log.append(PIECES[1])
-    log.back()
+    log.drop_unsynced()
     assert (log.size, path.read_bytes()) == (len(HEAD) + len(PIECES[0]), HEAD + PIECES[0])
     log.append(PIECES[1])
     log.close()
@@ -145,10 +145,10 @@ def test_a_file_that_is_there_is_never_written_over(tmp_path: Path, there: bytes
 def test_reading_can_go_on_where_it_stopped_while_the_log_grows(tmp_path: Path) -> None:
     path = tmp_path / "t.log"
     path.write_bytes(HEAD + PIECES[0] + PIECES[1][:7])
-    first = list(segments.records(path))
+    first = list(segments.read_records(path))
     assert [one.kind for _, one in first] == ["H", "B"]
     path.write_bytes(WHOLE)
-    assert [one.body for _, one in segments.records(path, first[-1][0])] == [*FRAMES[1:], b"{}"]
+    assert [one.body for _, one in segments.read_records(path, first[-1][0])] == [*FRAMES[1:], b"{}"]
 
 
 def test_a_big_log_is_read_in_little_memory(tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_a_big_log_is_read_in_little_memory(tmp_path: Path) -> None:
         file.write(piece[:-1])
     tracemalloc.start()
     try:
-        number = sum(1 for _ in segments.records(path))
+        number = sum(1 for _ in segments.read_records(path))
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -174,7 +174,7 @@ def test_a_log_damaged_early_is_not_read_to_its_end(tmp_path: Path) -> None:
     path.write_bytes(HEAD + b"\xff" * 20_000_000)
     tracemalloc.start()
     try:
-        assert len(list(segments.records(path))) == 1
+        assert len(list(segments.read_records(path))) == 1
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

@@ -29,7 +29,7 @@ async def test_same_tab_shares_and_other_sign_in_does_not(motion: ReplayMotion) 
         loads.append(1)
         return motion
 
-    async with FigureViews().running() as views:
+    async with FigureViews().run() as views:
         mine = await views.open("login-1", "tab", "analysis", load)
         assert await views.open("login-1", "tab", "analysis", load) is mine
         theirs = await views.open("login-2", "tab", "analysis", load)
@@ -41,7 +41,7 @@ async def test_same_tab_shares_and_other_sign_in_does_not(motion: ReplayMotion) 
 
 
 async def test_a_views_socket_is_for_this_user_alone_and_goes_with_it(motion: ReplayMotion) -> None:
-    async with FigureViews(idle_s=0.0).running() as views:
+    async with FigureViews(idle_s=0.0).run() as views:
         view = await views.open("login", "tab", "analysis", lambda: motion)
         assert view.socket.is_socket()
         folder = view.socket.parent.stat()
@@ -64,7 +64,7 @@ async def test_a_figure_that_cannot_be_drawn_leaves_nothing_behind(
         raise InputError("body_bad", "There is no body.")
 
     monkeypatch.setattr(tempfile, "tempdir", str(short_path))
-    async with FigureViews().running() as views:
+    async with FigureViews().run() as views:
         threads = threading.active_count()
         with pytest.raises(InputError):
             await views.open_live(("live",), draw, lambda _view: None)
@@ -78,7 +78,7 @@ async def test_a_folder_that_takes_no_sockets_is_told_and_not_waited_for(
 ) -> None:
     (tmp_path / ("a" * 100)).mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / folder))
-    async with FigureViews().running() as views:
+    async with FigureViews().run() as views:
         with pytest.raises(EstimationError, match=f"{why}.*set TMPDIR") as told:
             await views.open("login", "tab", "analysis", lambda: motion)
     assert told.value.code == "no_place_for_views"
@@ -86,9 +86,9 @@ async def test_a_folder_that_takes_no_sockets_is_told_and_not_waited_for(
 
 
 async def test_unwatched_views_stop_and_watched_ones_stay(motion: ReplayMotion) -> None:
-    async with FigureViews(idle_s=0.0).running() as views:
+    async with FigureViews(idle_s=0.0).run() as views:
         view = await views.open("login", "tab", "analysis", lambda: motion)
-        with view.watched():
+        with view.keep_open():
             await views.sweep()
             assert len(views) == 1
         await views.sweep()
@@ -96,12 +96,12 @@ async def test_unwatched_views_stop_and_watched_ones_stay(motion: ReplayMotion) 
 
 
 async def test_at_the_limit_the_longest_unwatched_view_gives_way(motion: ReplayMotion) -> None:
-    async with FigureViews(limit=2).running() as views:
+    async with FigureViews(limit=2).run() as views:
         first = await views.open("login", "1", "analysis", lambda: motion)
         second = await views.open("login", "2", "analysis", lambda: motion)
         third = await views.open("login", "3", "analysis", lambda: motion)
         assert views.find(first.id, "login", Role.ADMIN) is None
-        with second.watched(), third.watched(), pytest.raises(EstimationError) as refused:
+        with second.keep_open(), third.keep_open(), pytest.raises(EstimationError) as refused:
             await views.open("login", "4", "analysis", lambda: motion)
         assert refused.value.code == "too_many_views"
 
@@ -112,7 +112,7 @@ async def test_views_leave_no_threads_and_no_files_behind(motion: ReplayMotion) 
         await views.open("login", "tab", "analysis", lambda: motion)
         await views.close()
 
-    async with FigureViews().running() as views:
+    async with FigureViews().run() as views:
         await one(views)
         await asyncio.sleep(0.1)
         threads, files = threading.active_count(), open_files()
@@ -125,7 +125,7 @@ async def test_views_leave_no_threads_and_no_files_behind(motion: ReplayMotion) 
 
 
 async def test_no_banner_is_printed(motion: ReplayMotion, capfd: pytest.CaptureFixture[str]) -> None:
-    async with FigureViews().running() as views:
+    async with FigureViews().run() as views:
         await views.open("login", "tab", "analysis", lambda: motion)
     out, err = capfd.readouterr()
     assert (out, err) == ("", "")

@@ -41,7 +41,7 @@ def test_message_types_keep_their_names() -> None:
 
 @pytest.mark.anyio
 async def test_a_view_has_no_handler_for_requests_to_share(motion: ReplayMotion) -> None:
-    async with FigureViews().running() as views:
+    async with FigureViews().run() as views:
         view = await views.open("login", "tab", "analysis", lambda: motion)
         assert _messages.ShareUrlRequest not in view.server._websock_server._incoming_handlers
 

@@ -9,15 +9,15 @@ import pytest
 
 from core.body.erkf.filter import filter_block
 from core.body.erkf.params import ErkfParams
-from core.body.erkf.predict import GAMMA, A, C, D, S, back, move, propagate
+from core.body.erkf.predict import GAMMA, A, C, D, S, move, propagate, propagate_back
 from core.body.erkf.smoother import smooth
 from core.body.erkf.start import start_state
 from core.body.erkf.updates import (
     GYRO_BIAS,
     VELOCITY,
+    error_state_rows,
     heading_rows,
     joint_rows,
-    known_rows,
     take_block,
     tilt_rows,
 )
@@ -100,9 +100,9 @@ def test_every_measurement_row_is_the_derivative_of_its_prediction() -> None:
         if kind in ("centre", "axis"):
             joint_rows(state, R, m, 0, 1, ri, rj, kind == "centre", place, H, y)
         elif kind == "velocity":
-            known_rows(place, m, 1, VELOCITY, state[1, 3:6], np.zeros(3), y)
+            error_state_rows(place, m, 1, VELOCITY, state[1, 3:6], np.zeros(3), y)
         elif kind == "bias":
-            known_rows(place, m, 0, GYRO_BIAS, state[0, 10:13], f, y)
+            error_state_rows(place, m, 0, GYRO_BIAS, state[0, 10:13], f, y)
         elif kind == "tilt":
             tilt_rows(R[1], f, m, 1, place, H, y)
         else:
@@ -149,7 +149,7 @@ def test_propagation_and_correction_equal_the_textbook() -> None:
     assert np.array_equal(here, here.T)
     lam = rng.normal(0.0, 1.0, n * m)
     swept = lam.copy()
-    back(swept, blocks, m, dt)
+    propagate_back(swept, blocks, m, dt)
     np.testing.assert_allclose(swept, full.T @ lam, atol=1e-12)
 
     x = np.stack([random_nominal(rng) for _ in range(n)])

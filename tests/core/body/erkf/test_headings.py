@@ -10,14 +10,14 @@ import pytest
 
 from core import calibration
 from core.body import nominal_body
-from core.body.erkf.headings import agreed, findings, heading_errors, turned
+from core.body.erkf.headings import align_forward_axes, heading_errors, judge_turned_axes, turn_forward_axes
 from core.body.erkf.params import ErkfParams
 from core.body.tree import PRESETS
 from core.calibration.result import CalibratedRecording
 from core.frames import R_NEUTRAL, Segment
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
-from core.rest import samples
+from core.rest import index_window
 from core.rotation import about, angle_between, from_matrix, to_matrix
 from tests.walks import simulated
 
@@ -64,8 +64,10 @@ def test_a_good_calibration_is_left_nearly_as_it_is() -> None:
 
 def test_after_turning_everybody_still_faces_ahead_at_rest() -> None:
     calibrated, orientations, found = take(3, {"thigh_l": 25.0})
-    calibrated, orientations = turned(calibrated, orientations, {s: radians(x) for s, x in found.items()})
-    zero = samples(calibrated.calibration.zero, orientations.rate_hz)
+    calibrated, orientations = turn_forward_axes(
+        calibrated, orientations, {s: radians(x) for s, x in found.items()}
+    )
+    zero = index_window(calibrated.calibration.zero, orientations.rate_hz)
     middle = (zero.start + zero.stop) // 2
     for segment in WHOLE:
         apart = angle_between(orientations.q[segment][middle : middle + 1], from_matrix(R_NEUTRAL)[None])
@@ -85,8 +87,8 @@ def test_passes_are_repeated_until_a_large_error_is_gone() -> None:
     calibrated, orientations, without = take(3, {})
     body, _ = nominal_body(calibrated.recording.subject.height_m)
     wrong, turned_wrong, _ = take(3, {"shank_r": -30.0})
-    right, _, small = agreed(calibrated, orientations, body, WHOLE, ErkfParams.offline())
-    again, _, large = agreed(wrong, turned_wrong, body, WHOLE, ErkfParams.offline())
+    right, _, small = align_forward_axes(calibrated, orientations, body, WHOLE, ErkfParams.offline())
+    again, _, large = align_forward_axes(wrong, turned_wrong, body, WHOLE, ErkfParams.offline())
     assert degrees(small["shank_r"]) == pytest.approx(without["shank_r"], abs=0.5)
     assert degrees(large["shank_r"] - small["shank_r"]) == pytest.approx(30.0, abs=0.5)
     for segment in WHOLE:
@@ -96,7 +98,10 @@ def test_passes_are_repeated_until_a_large_error_is_gone() -> None:
 
 
 def test_what_was_turned_is_told_as_health() -> None:
-    told = {f.of: f for f in findings({"pelvis": 0.0, "thigh_r": radians(-20.0), "foot_l": radians(170.0)})}
+    told = {
+        f.of: f
+        for f in judge_turned_axes({"pelvis": 0.0, "thigh_r": radians(-20.0), "foot_l": radians(170.0)})
+    }
     assert [told[s].verdict for s in ("pelvis", "thigh_r", "foot_l")] == ["good", "warn", "bad"]
     assert told["thigh_r"].value == pytest.approx(20.0)
 
@@ -104,5 +109,5 @@ def test_what_was_turned_is_told_as_health() -> None:
 def test_an_axis_turned_right_round_is_not_told_as_more_than_half_a_turn() -> None:
     wrong, orientations, _ = take(3, {"shank_r": 180.0})
     body, _ = nominal_body(wrong.recording.subject.height_m)
-    _, _, total = agreed(wrong, orientations, body, WHOLE, ErkfParams.offline())
+    _, _, total = align_forward_axes(wrong, orientations, body, WHOLE, ErkfParams.offline())
     assert 170.0 < abs(degrees(total["shank_r"])) <= 180.0

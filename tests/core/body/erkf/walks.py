@@ -17,7 +17,7 @@ from core.body.tree import PRESETS, ImuTree, person_tree
 from core.frames import FOOT, GRAVITY, Floats, Segment
 from core.fusion.orientations import Orientations
 from core.rotation import to_matrix
-from core.simulate import Arc, Pivot, Setup, Simulation, Stand, Straight, Truth, simulate
+from core.simulate import Arc, Pivot, RecordingSetup, Simulation, Stand, Straight, WalkTruth, simulate
 from core.timeline import synchronise
 
 MIXED = (
@@ -33,7 +33,7 @@ class Take:
 
     tree: ImuTree
     inputs: ErkfInputs
-    truth: Truth
+    truth: WalkTruth
     rate_hz: float
 
     @property
@@ -46,7 +46,7 @@ class Take:
 @cache
 def mixed_walk(seed: int = 2) -> Take:
     """About a minute with an arc, a pivot and MEMS noise; mounts, places and gyro bias at rest are known."""
-    return take_of(simulate(MIXED, seed=seed, setup=Setup()))
+    return take_of(simulate(MIXED, seed=seed, setup=RecordingSetup()))
 
 
 def take_of(made: Simulation) -> Take:
@@ -91,7 +91,7 @@ def angles_of(take: Take, track: ErkfTrack, *, zeroed: bool = True) -> dict[str,
 
 def angle_errors_deg(take: Take, track: ErkfTrack) -> dict[str, float]:
     """RMS error of each angle in degrees."""
-    true, found = take.truth.zeroed(), angles_of(take, track)
+    true, found = take.truth.subtract_standing(), angles_of(take, track)
     return {n: float(np.degrees(np.sqrt(np.mean((a - true[n][: len(a)]) ** 2)))) for n, a in found.items()}
 
 

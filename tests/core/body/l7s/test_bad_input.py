@@ -11,7 +11,7 @@ import pytest
 
 from core.body.estimate import PoseEstimate
 from core.body.health import Verdict
-from core.body.l7s.filter import filter_block, start
+from core.body.l7s.filter import filter_block, start_l7s_state
 from core.body.l7s.inputs import free_acceleration, inputs_of
 from core.body.l7s.legs import LegModel
 from core.body.l7s.poses import l7s_poses
@@ -273,7 +273,7 @@ def test_a_number_that_is_none_inside_a_valid_sample_is_refused() -> None:
     acc: Floats = inputs.acc.copy()
     acc[37, 1, 2] = np.nan
     with pytest.raises(EstimationError) as error:
-        filter_block(start(inputs, model), replace(inputs, acc=acc), model, 100.0)
+        filter_block(start_l7s_state(inputs, model), replace(inputs, acc=acc), model, 100.0)
     assert error.value.code == "bad_signal"
     assert "Sample 37" in error.value.message
 

@@ -10,7 +10,7 @@ import pytest
 
 from core.angles.measure import measure_angles
 from core.body.l7s.constraints import constraint_rows
-from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start
+from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
 from core.body.l7s.inputs import free_acceleration, inputs_of
 from core.body.l7s.legs import LegModel
 from core.body.l7s.poses import l7s_poses
@@ -26,7 +26,7 @@ from core.frames import FOOT, SIDES, Bools, Floats, Side
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import about, exp, multiply, to_matrix
-from core.simulate import Truth
+from core.simulate import WalkTruth
 from tests.walks import simulated
 
 BODY = BodyModel.from_height(1.75)
@@ -46,7 +46,7 @@ def still_feet(calibrated: CalibratedRecording) -> dict[Side, Bools]:
 
 
 @cache
-def walk() -> tuple[CalibratedRecording, Orientations, dict[Side, Bools], Truth]:
+def walk() -> tuple[CalibratedRecording, Orientations, dict[Side, Bools], WalkTruth]:
     recording, truth = simulated("comfortable", 2)
     calibrated = calibrate(recording)
     return calibrated, estimate_orientations(calibrated), still_feet(calibrated), truth
@@ -140,7 +140,7 @@ def test_angles_and_strides_of_a_simulated_walk_are_within_the_limits(worn: Worn
     found = poses_of(worn)
     posed = Orientations(found.t_s, found.rate_hz, found.q, dict.fromkeys(found.q, found.valid), found.method)
     angles = measure_angles(posed, calibrated.calibration.zero).angles
-    true, n = truth.zeroed(), len(found.t_s)
+    true, n = truth.subtract_standing(), len(found.t_s)
     moving = (found.t_s > truth.stands[0][1]) & (found.t_s < truth.stands[-1][0])
     for name, rmse, r in zip(FLEXION, *LIMITS[worn], strict=True):
         both = [(angles[f"{name}_{e}"][moving], true[f"{name}_{e}"][:n][moving]) for e in "lr"]
@@ -176,7 +176,7 @@ def test_any_split_into_blocks_gives_the_same_bits() -> None:
     acceleration = free_acceleration(calibrated, orientations)
     for worn in ("3I", "2I"):
         inputs = inputs_of(orientations, acceleration, steps, MODEL, worn).part(slice(500, 1400))
-        first = start(inputs, MODEL)
+        first = start_l7s_state(inputs, MODEL)
         whole, end = filter_block(first, inputs, MODEL, 100.0)
         state, parts = first, []
         for a, b in ((0, 1), (1, 2), (2, 300), (300, 301), (301, 900)):
@@ -194,7 +194,7 @@ def test_the_covariance_and_the_figure_after_ten_minutes_are_those_after_one() -
     acceleration = free_acceleration(calibrated, orientations)
     for worn in ("3I", "2I"):
         inputs = inputs_of(orientations, acceleration, steps, MODEL, worn)
-        state, least, apart = start(inputs, MODEL), [], []
+        state, least, apart = start_l7s_state(inputs, MODEL), [], []
         for _ in range(12):
             track, state = filter_block(state, inputs, MODEL, 100.0)
             least.append(float(np.linalg.eigvalsh(state.P)[0]))
@@ -233,7 +233,7 @@ def test_what_cannot_be_estimated_is_refused_with_its_name() -> None:
     inputs = inputs_of(orientations, acceleration, steps, MODEL, "3I").part(slice(0, 50))
     broken = L7sInputs(inputs.R, np.full_like(inputs.acc, np.nan), inputs.step, "3I")
     with pytest.raises(EstimationError) as bad:
-        filter_block(start(inputs, MODEL), broken, MODEL, 100.0)
+        filter_block(start_l7s_state(inputs, MODEL), broken, MODEL, 100.0)
     assert bad.value.code == "bad_signal"
     with pytest.raises(ParameterError):
         L7sParams(acceleration=0.0)
