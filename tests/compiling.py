@@ -20,7 +20,7 @@ def compile_filters() -> None:
         subprocess.Popen(
             [sys.executable, "-c", f"from core.online.session import {name}; {name}()"], cwd=ROOT
         )
-        for name in ("warm", "warm_rest")
+        for name in ("compile_live_kernels", "compile_small_kernels")
     ]
     for process in running:
         if process.wait():

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from core.body.erkf.headings import report_turned_axes
 from core.body.erkf.params import ErkfParams
-from core.body.estimate import compile_pose_kernels as warm_erkf
+from core.body.estimate import compile_pose_kernels
 from core.body.model import BodyModel
 from core.body.mounting import mount_sensors
 from core.body.pose_params import PoseParams
@@ -15,7 +15,7 @@ from core.calibration import CalibrationParams
 from core.calibration.result import CalibratedRecording
 from core.errors import Notice
 from core.frames import Segment
-from core.fusion.attitude import compile_attitude_kernel as warm_attitude
+from core.fusion.attitude import compile_attitude_kernel
 from core.fusion.mahony import MahonyParams, estimate_orientations
 from core.fusion.orientations import Orientations
 from core.online.frame import SegmentCheck
@@ -130,5 +130,5 @@ def compile_calibration_kernels() -> None:
     import scipy.ndimage
     import scipy.signal  # noqa: F401
 
-    warm_attitude()
-    warm_erkf()
+    compile_attitude_kernel()
+    compile_pose_kernels()

@@ -17,18 +17,18 @@ from core.formats.live_log import Hello, SampleBatch
 from core.frames import GRAVITY, R_NEUTRAL, Protocol, Segment
 from core.fusion.orientations import Orientations
 from core.online.calibrated import LiveCalibration
-from core.online.calibrated import compile_calibration_kernels as warm_calibration
+from core.online.calibrated import compile_calibration_kernels
 from core.online.calibrating import CalibratingParams, LiveCalibrator
 from core.online.chain import ChainOutput, ChainParams, LiveChain
 from core.online.frame import EMPTY_TRAIL, AngleTrail, LiveFrame
 from core.online.health import SensorHealthMonitor
 from core.parameters.spatial import Surface
 from core.quality.live_stuck import StuckSensors
-from core.quality.stuck import compile_stuck_kernel as warm_stuck
+from core.quality.stuck import compile_stuck_kernel
 from core.recording import SensorSignals, Subject, UniformRecording, check_belt
 from core.rotation import from_matrix
 from core.timeline.live import LiveAxis, LiveAxisParams, UniformBlock
-from core.timeline.live import compile_axis_kernels as warm_axis
+from core.timeline.live import compile_axis_kernels
 
 
 @dataclass(frozen=True)
@@ -157,23 +157,23 @@ def _told(
 
 def compile_live_kernels() -> None:
     """Compile or load every kernel of the chain, so that the first take does not wait for it."""
-    warm_calibration()
-    _warm_chain(PRESETS["lower_body7"])
-    warm_rest()
+    compile_calibration_kernels()
+    _compile_chain(PRESETS["lower_body7"])
+    compile_small_kernels()
 
 
-def warm_rest() -> None:
+def compile_small_kernels() -> None:
     """Compile or load what the filter of seven sensors is no part of.
 
     A second process may do that while the first is at that filter, which takes longer than all the rest.
     """
-    warm_axis()
-    warm_stuck()
-    _warm_chain(PRESETS["feet_pelvis3"])
-    _warm_chain(PRESETS["feet2"])
+    compile_axis_kernels()
+    compile_stuck_kernel()
+    _compile_chain(PRESETS["feet_pelvis3"])
+    _compile_chain(PRESETS["feet2"])
 
 
-def _warm_chain(worn: tuple[Segment, ...]) -> None:
+def _compile_chain(worn: tuple[Segment, ...]) -> None:
     chain = LiveChain(_standing(worn), worn)
     acc = np.tile([0.0, GRAVITY, 0.0], (10, len(worn), 1))
     chain.push(acc, np.zeros_like(acc), np.ones(acc.shape[:2], np.bool_))

@@ -134,9 +134,9 @@ def follow(line: Channel) -> None:
 
 def compile_kernels() -> None:
     """Compile the kernels or load them from the cache, before a patient stands there."""
-    from core.online import compile_live_kernels as warm_online
+    from core.online import compile_live_kernels
 
-    warm_online()
+    compile_live_kernels()
 
 
 if __name__ == "__main__":

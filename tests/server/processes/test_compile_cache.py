@@ -45,7 +45,7 @@ def test_two_data_folders_share_what_has_been_compiled(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_second_process_compiles_nothing_again(tmp_path: Path) -> None:
     code = (
-        "from core.fusion import attitude; attitude.warm();"
+        "from core.fusion import attitude; attitude.compile_attitude_kernel();"
         "s = attitude.attitude_kernel.stats; print(len(s.cache_hits), len(s.cache_misses))"
     )
     said = []
