@@ -16,8 +16,7 @@ from core.errors import Notice, SagittalError
 from core.formats.live_log import Hello, SampleBatch
 from core.frames import GRAVITY, R_NEUTRAL, Protocol, Segment
 from core.fusion.orientations import Orientations
-from core.online.calibrated import LiveCalibration
-from core.online.calibrated import compile_calibration_kernels
+from core.online.calibrated import LiveCalibration, compile_calibration_kernels
 from core.online.calibrating import CalibratingParams, LiveCalibrator
 from core.online.chain import ChainOutput, ChainParams, LiveChain
 from core.online.frame import EMPTY_TRAIL, AngleTrail, LiveFrame
@@ -27,8 +26,7 @@ from core.quality.live_stuck import StuckSensors
 from core.quality.stuck import compile_stuck_kernel
 from core.recording import SensorSignals, Subject, UniformRecording, check_belt
 from core.rotation import from_matrix
-from core.timeline.live import LiveAxis, LiveAxisParams, UniformBlock
-from core.timeline.live import compile_axis_kernels
+from core.timeline.live import LiveAxis, LiveAxisParams, UniformBlock, compile_axis_kernels
 
 
 @dataclass(frozen=True)
