@@ -11,6 +11,7 @@ from core.calibration.result import SegmentCalibration
 from core.frames import R_NEUTRAL, Bools, Floats
 from core.fusion.attitude import AttitudeParams, attitude_kernel
 from core.rotation import from_matrix
+from core.rotation.compiled import multiply
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
@@ -29,10 +30,8 @@ def _turn(acc, gyr, valid, which, bias, norm, mount, dt, kp, relearn_s, state, o
         for k in range(T):
             a, b, c, d = q[k]
             # q ⊗ mount*
-            out[k, s, 0] = a * m[0] + b * m[1] + c * m[2] + d * m[3]
-            out[k, s, 1] = -a * m[1] + b * m[0] - c * m[3] + d * m[2]
-            out[k, s, 2] = -a * m[2] + b * m[3] + c * m[0] - d * m[1]
-            out[k, s, 3] = -a * m[3] - b * m[2] + c * m[1] + d * m[0]
+            w0, x, y, z = multiply(a, b, c, d, m[0], -m[1], -m[2], -m[3])
+            out[k, s, 0], out[k, s, 1], out[k, s, 2], out[k, s, 3] = w0, x, y, z
 
 
 class AttitudeTracker:

@@ -52,6 +52,47 @@ def to_matrix(q, R):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def from_matrix(R, q):  # type: ignore[no-untyped-def]
+    """Write the unit quaternion q (4,), w ≥ 0, of a matrix R (3, 3), by its largest component."""
+    a, b, c = R[0, 0], R[1, 1], R[2, 2]
+    squares = (1 + a + b + c, 1 + a - b - c, 1 - a + b - c, 1 - a - b + c)
+    best = 0
+    for i in range(1, 4):
+        if squares[i] > squares[best]:
+            best = i
+    x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    d, e, f = R[1, 0] + R[0, 1], R[0, 2] + R[2, 0], R[2, 1] + R[1, 2]
+    if best == 0:
+        q[0], q[1], q[2], q[3] = squares[0], x, y, z
+    elif best == 1:
+        q[0], q[1], q[2], q[3] = x, squares[1], d, e
+    elif best == 2:
+        q[0], q[1], q[2], q[3] = y, d, squares[2], f
+    else:
+        q[0], q[1], q[2], q[3] = z, e, f, squares[3]
+    length = sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    if q[0] < 0.0:
+        length = -length
+    for i in range(4):
+        q[i] /= length
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def transform(R, v, out):  # type: ignore[no-untyped-def]
+    """Write R v (3,) of a matrix (3, 3) and a vector (3,)."""
+    for i in range(3):
+        out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def cross(a, b, out):  # type: ignore[no-untyped-def]
+    """Write the cross product a × b (3,)."""
+    out[0] = a[1] * b[2] - a[2] * b[1]
+    out[1] = a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def turn(q, a, b, c):  # type: ignore[no-untyped-def]
     """Turn q (4,) in place by the rotation vector (a, b, c), rad: q ← q ⊗ Exp((a, b, c)), normalised."""
     angle = sqrt(a * a + b * b + c * c)

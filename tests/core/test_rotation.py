@@ -115,6 +115,12 @@ def test_compiled_loops_turn_as_arrays_do(p: Floats, q: Floats, phi: Floats) -> 
     matrix, product, back = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     compiled.to_matrix(p, matrix)
     np.testing.assert_allclose(matrix, rotation.to_matrix(p), atol=1e-14)
+    quaternion = np.empty(4)
+    compiled.from_matrix(matrix, quaternion)
+    assert same_rotation(quaternion, p)
+    assert quaternion[0] >= 0.0
+    compiled.transform(matrix, phi, back)
+    np.testing.assert_allclose(back, rotation.rotate(p, phi), atol=1e-13)
     np.testing.assert_allclose(compiled.multiply(*p, *q), rotation.multiply(p, q), atol=1e-15)
     turned = p.copy()
     compiled.turn(turned, *phi)
@@ -131,6 +137,9 @@ def test_compiled_loops_turn_as_arrays_do(p: Floats, q: Floats, phi: Floats) -> 
 def test_compiled_cross_products_are_those_of_numpy(a: Floats, b: Floats) -> None:
     cross, both = np.empty((3, 3)), np.empty((3, 3))
     compiled.skew(a, cross)
+    product = np.empty(3)
+    compiled.cross(a, b, product)
+    np.testing.assert_allclose(product, np.cross(a, b), atol=1e-12)
     np.testing.assert_allclose(cross @ b, np.cross(a, b), atol=1e-12)
     compiled.times_cross(np.eye(3), a, -2.0, both)
     np.testing.assert_allclose(both, -2.0 * cross)

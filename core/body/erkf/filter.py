@@ -301,6 +301,11 @@ def _check(state: ErkfState, inputs: ErkfInputs, tree: ImuTree, params: ErkfPara
         raise SignalError(
             "bad_signal", "ErKF: non-finite samples; hold the last one and mark it not valid (erkf_inputs)."
         )
+    others = [i for i in range(len(tree.imus)) if i not in tree.feet]
+    if np.asarray(inputs.contact)[:, others].any():
+        raise ParameterError(
+            "bad_contact", "ErKF: a contact of an IMU that is no foot; name it among the tree's feet."
+        )
     if not (np.isfinite(inputs.step_s).all() and (inputs.step_s >= 0.0).all()):
         raise ParameterError("bad_step", "ErKF: a time step is negative or not finite.")
     if not (np.isfinite(state.P).all() and np.isfinite(state.nominal).all() and _positive(state.P)):

@@ -18,6 +18,7 @@ from core.body.health import longest_run_s
 from core.body.l7s.filter import L7sInputs, L7sTrack
 from core.body.l7s.legs import LegModel
 from core.frames import Bools, Floats, Segment
+from core.rest import find_runs
 
 OUTWARD: Final = (-0.5, 2.0)
 """Left foot left of the right one, in hip widths; healthy walks stay within 0 to 1.3, scissoring aside."""
@@ -78,9 +79,8 @@ def longest_gaps(valid: Mapping[Segment, Bools], rate_hz: float) -> dict[Segment
 
 def _rests(step: Bools, rate_hz: float) -> np.ndarray:
     """Middle samples of the rests of a foot."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], step, [False]))))
     joined: list[list[int]] = []
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in find_runs(step):
         if joined and start - joined[-1][1] < BREAK_S * rate_hz:
             joined[-1][1] = stop
         else:

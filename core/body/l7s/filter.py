@@ -29,7 +29,7 @@ from core.body.l7s.legs import HIP_SIDE, LEGS, LegModel
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.errors import EstimationError, ParameterError
 from core.frames import FOOT, R_NEUTRAL, Bools, Floats
-from core.rotation import about, to_matrix
+from core.rotation import about, to_matrix, wrap_angle
 
 Worn = Literal["3I", "2I"]
 """3I: pelvis and both feet carry an IMU; 2I: the feet only."""
@@ -203,7 +203,7 @@ def start_l7s_state(inputs: L7sInputs, model: LegModel, params: L7sParams | None
     faces = [facing] if inputs.worn == "3I" else []
     for leg, side in enumerate(LEGS):
         faces.append(float(np.arctan2(R[1 + leg, 1, 2], R[1 + leg, 0, 2])))
-        apart = abs((faces[-1] - faces[0] + np.pi) % (2.0 * np.pi) - np.pi)
+        apart = abs(wrap_angle(faces[-1] - faces[0]))
         if apart > HEADING_LIMIT:
             other = "body" if inputs.worn == "3I" else "left foot"
             raise EstimationError(

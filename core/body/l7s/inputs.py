@@ -16,6 +16,7 @@ from core.calibration.result import CalibratedRecording, SegmentCalibration
 from core.errors import EstimationError
 from core.frames import FOOT, GRAVITY, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
+from core.rotation.compiled import multiply3, to_matrix, transform
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
@@ -27,21 +28,16 @@ def _write_free_acceleration(acc, valid, q, R, excess, out):  # type: ignore[no-
     acc : (T, 3) as measured. valid : (T,). q : (T, 4) segment to W. R : (3, 3) sensor to segment. excess :
     of the norm at rest over G, m/s².
     """
-    force = np.empty(3)
+    force, turned = np.empty(3), np.empty((3, 3))
     for k in range(acc.shape[0]):
-        for c in range(3):
-            out[k, c] = 0.0
-            force[c] = R[c, 0] * acc[k, 0] + R[c, 1] * acc[k, 1] + R[c, 2] * acc[k, 2]
+        out[k] = 0.0
         if not valid[k]:
             continue
+        transform(R, acc[k], force)
         force[1] -= excess
-        w, x, y, z = q[k]
-        out[k, 0] = (1 - 2 * (y * y + z * z)) * force[0] + 2 * (x * y - w * z) * force[1]
-        out[k, 0] += 2 * (x * z + w * y) * force[2]
-        out[k, 1] = 2 * (x * y + w * z) * force[0] + (1 - 2 * (x * x + z * z)) * force[1]
-        out[k, 1] += 2 * (y * z - w * x) * force[2]
-        out[k, 2] = 2 * (x * z - w * y) * force[0] + 2 * (y * z + w * x) * force[1]
-        out[k, 2] += (1 - 2 * (x * x + y * y)) * force[2] - GRAVITY
+        to_matrix(q[k], turned)
+        transform(turned, force, out[k])
+        out[k, 2] -= GRAVITY
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
@@ -49,13 +45,8 @@ def _write_sy_frames(q, back, out):  # type: ignore[no-untyped-def]
     """Write matrices (T, 3, 3) in Sy's frames of segments q (T, 4) in ours; `back` (3, 3) is Mᵀ."""
     R = np.empty((3, 3))
     for k in range(q.shape[0]):
-        w, x, y, z = q[k]
-        R[0, 0], R[0, 1], R[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
-        R[1, 0], R[1, 1], R[1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
-        R[2, 0], R[2, 1], R[2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
-        for i in range(3):
-            for j in range(3):
-                out[k, i, j] = R[i, 0] * back[0, j] + R[i, 1] * back[1, j] + R[i, 2] * back[2, j]
+        to_matrix(q[k], R)
+        multiply3(R, back, out[k])
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

@@ -7,45 +7,7 @@ from math import acos, cos, sin, sqrt
 import numba
 import numpy as np
 
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]
-def _quaternion(R, q):  # type: ignore[no-untyped-def]
-    """Write the unit quaternion (4,), w ≥ 0, of a matrix (3, 3), by the largest component (Shepperd)."""
-    a, b, c = R[0, 0], R[1, 1], R[2, 2]
-    squares = (1 + a + b + c, 1 + a - b - c, 1 - a + b - c, 1 - a - b + c)
-    best = 0
-    for i in range(1, 4):
-        if squares[i] > squares[best]:
-            best = i
-    x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
-    d, e, f = R[1, 0] + R[0, 1], R[0, 2] + R[2, 0], R[2, 1] + R[1, 2]
-    if best == 0:
-        q[0], q[1], q[2], q[3] = squares[0], x, y, z
-    elif best == 1:
-        q[0], q[1], q[2], q[3] = x, squares[1], d, e
-    elif best == 2:
-        q[0], q[1], q[2], q[3] = y, d, squares[2], f
-    else:
-        q[0], q[1], q[2], q[3] = z, e, f, squares[3]
-    length = sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
-    if q[0] < 0.0:
-        length = -length
-    for i in range(4):
-        q[i] /= length
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]
-def _times(a, b, out):  # type: ignore[no-untyped-def]
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]
-def _cross(a, b, out):  # type: ignore[no-untyped-def]
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
+from core.rotation.compiled import cross, from_matrix, multiply3
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]
@@ -67,8 +29,8 @@ def write_legs(  # type: ignore[no-untyped-def]
     M, turned = np.empty((3, 3)), np.empty((3, 3))
     along, bent, x, y, z, across = np.empty((6, 3))
     for k in range(R.shape[0]):
-        _times(R[k, 0], to_leg, turned)
-        _quaternion(turned, q[k, 0])
+        multiply3(R[k, 0], to_leg, turned)
+        from_matrix(turned, q[k, 0])
         for c in range(3):
             at[k, 0, c] = p[k, 0, c]
         for leg in range(2):
@@ -88,7 +50,7 @@ def write_legs(  # type: ignore[no-untyped-def]
             angle = acos(min(1.0, max(-1.0, cosine)))
             for c in range(3):
                 along[c] /= distance
-            _cross(y, along, bent)
+            cross(y, along, bent)
             # knee above the ankle by the law of cosines, thigh from knee to hip
             for c in range(3):
                 z[c] = cos(angle) * along[c] + sin(angle) * bent[c]
@@ -98,12 +60,12 @@ def write_legs(  # type: ignore[no-untyped-def]
                     for c in range(3):
                         z[c] = at[k, first, c] - at[k, first + 1, c]
                     _unit(z)
-                _cross(y, z, x)
+                cross(y, z, x)
                 _unit(x)
-                _cross(z, x, across)
+                cross(z, x, across)
                 for c in range(3):
                     M[c, 0], M[c, 1], M[c, 2] = x[c], across[c], z[c]
-                _times(M, to_leg, turned)
-                _quaternion(turned, q[k, first + 1 - part])
-            _times(R[k, 1 + leg], to_foot, turned)
-            _quaternion(turned, q[k, first + 2])
+                multiply3(M, to_leg, turned)
+                from_matrix(turned, q[k, first + 1 - part])
+            multiply3(R[k, 1 + leg], to_foot, turned)
+            from_matrix(turned, q[k, first + 2])

@@ -231,6 +231,9 @@ def broken(make: str) -> None:
             erkf_inputs(tree, nan, ten.gyr, ten.valid, take.rate_hz)
         case "time that runs back":
             filter_block(first, replace(ten, step_s=-ten.step_s), tree, LIVE)
+        case "a thigh that stands":
+            thigh = tree.imus.index("thigh_l") == np.arange(len(tree.imus))
+            filter_block(first, replace(ten, contact=np.tile(thigh, (10, 1))), tree, LIVE)
         case "joints without uncertainty":
             ErkfParams(joint_centre_sd=0.0)
 
@@ -251,6 +254,7 @@ def broken(make: str) -> None:
         ("samples that are no numbers", SignalError, "bad_signal"),
         ("a sensor that never measured", SignalError, "bad_signal"),
         ("time that runs back", ParameterError, "bad_step"),
+        ("a thigh that stands", ParameterError, "bad_contact"),
         ("joints without uncertainty", ParameterError, "deviation_range"),
     ],
 )
