@@ -91,7 +91,7 @@ def find_rest_windows(
 
 
 def find_windows(quiet: Bools, rate_hz: float, params: RestParams | None = None) -> tuple[Window, ...]:
-    """Turn a mask of quiet window centres into rest windows of at least `shortest_s`."""
+    """Turn a mask (n,) of quiet window centres into rest windows of at least `shortest_s`."""
     params = params or RestParams()
     n = len(quiet)
     reach = round(0.25 * params.window_s * rate_hz)

@@ -154,7 +154,7 @@ class _Take:
         return PoseEstimate(self.orientations, poses, None)
 
     def chain(self, segments: tuple[Segment, ...]) -> PoseEstimate:
-        """ErKF and smoother."""
+        """Run the ErKF and its smoother."""
         if self.mounted.failure is not None:
             raise self.mounted.failure
         run = run_erkf(self.calibrated, self.orientations, self.body, segments, self.params.erkf)

@@ -49,5 +49,5 @@ more from the last rest on."""
 
 
 def longest_run_s(flags: Bools, rate_hz: float) -> float:
-    """Duration of the longest stretch of True in s, 0 without any."""
+    """Duration of the longest stretch of True in flags (n,), s; 0 without any."""
     return max((stop - start for start, stop in find_runs(flags)), default=0) / rate_hz

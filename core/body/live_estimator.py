@@ -70,7 +70,7 @@ class LivePoseEstimator(Protocol):
 
     @property
     def broken(self) -> bool:
-        """A filter gave up."""
+        """Whether a filter gave up."""
 
     def push(self, raw: MeasuredBlock) -> BodyBlock:
         """The next samples; the first block is the whole standing window."""

@@ -48,6 +48,6 @@ def cut_last_part(recording: UniformRecording, seconds: float) -> UniformRecordi
 
 
 def find_upward_axes(recording: UniformRecording) -> dict[Segment, Floats]:
-    """Direction of the vertical in each sensor in the last second."""
+    """Unit vector (3,) of the vertical in the axes of each sensor, over the last second."""
     mean = {s: x.acc[-round(recording.rate_hz) :].mean(axis=0) for s, x in recording.sensors.items()}
     return {s: x / max(float(np.linalg.norm(x)), 1e-9) for s, x in mean.items()}

@@ -99,12 +99,12 @@ def _gaps(recording: UniformRecording, segment: Segment) -> bool:
 def straight_parts(
     moving: Bools, turning: Bools, rate_hz: float, params: WalkingParams
 ) -> list[tuple[int, int]]:
-    """Index ranges of straight walking of at least `shortest_s`."""
+    """Index ranges [start, stop) of straight walking of at least `shortest_s`; moving, turning (n,)."""
     return [r for r in find_runs(moving & ~turning) if r[1] - r[0] >= params.shortest_s * rate_hz]
 
 
 def mean_turn(q: Floats, q_rest: Floats, part: tuple[int, int]) -> float:
-    """Mean angle in rad turned about the vertical over an index range, circular."""
+    """Circular mean of the angle in rad about the vertical from q_rest (4,) to q (n, 4) over a range."""
     return float(np.angle(np.exp(1j * measure_turned_angle(q[part[0] : part[1]], q_rest)).mean()))
 
 

@@ -60,12 +60,12 @@ class Turn:
 
     @property
     def duration_s(self) -> float:
-        """Length, s."""
+        """Length of the turn, s."""
         return self.end_s - self.start_s
 
     @property
     def direction(self) -> Literal["left", "right"]:
-        """Seen by the person."""
+        """Left or right, as the person sees it."""
         return "left" if self.angle_rad > 0.0 else "right"
 
 

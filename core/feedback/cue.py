@@ -176,7 +176,7 @@ class FeedbackState:
     guard: GuardState
 
     def to_json(self) -> dict[str, object]:
-        """Plain values."""
+        """The same as plain values for JSON."""
         data = asdict(self)
         data["guard"]["state"] = self.guard.state
         return data

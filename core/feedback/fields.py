@@ -41,7 +41,7 @@ class RecordFields:
     def number_or_none(
         self, name: str, default: float | None, least: float = -inf, most: float = inf
     ) -> float | None:
-        """The same, or null."""
+        """Read the same, or null."""
         found = self._take(name, default)
         return None if found is None else self._number(name, found, least, most)
 
@@ -50,12 +50,12 @@ class RecordFields:
         return self._whole(name, self._take(name, default), least, most)
 
     def whole_or_none(self, name: str, default: int | None, least: int, most: int) -> int | None:
-        """The same, or null."""
+        """Read the same, or null."""
         found = self._take(name, default)
         return None if found is None else self._whole(name, found, least, most)
 
     def flag(self, name: str, default: bool) -> bool:
-        """True or false."""
+        """Read true or false."""
         found = self._take(name, default)
         if not isinstance(found, bool):
             raise self._wrong(name, found, "true or false")
@@ -87,7 +87,7 @@ class RecordFields:
         raise self._wrong(name, found, "a list of 1 to 20 whole percents from 0 to 100")
 
     def text(self, name: str, default: str | None) -> str | None:
-        """A line of text."""
+        """Read a line of text."""
         found = self._take(name, default)
         if found is None or (isinstance(found, str) and len(found) <= 500):
             return found

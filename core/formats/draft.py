@@ -223,7 +223,7 @@ def digest(d: Draft) -> str:
 
 
 def signal_digest(acc: Floats, gyr: Floats | None, mag: Floats | None) -> str:
-    """See `digest`."""
+    """SHA-256 of what a sensor measured, (n, 3) each, as 32-bit floats, for `digest`."""
     h = hashlib.sha256()
     for name, a in (("acc", acc), ("gyr", gyr), ("mag", mag)):
         if a is not None:

@@ -123,7 +123,7 @@ class JsonNode:
         return [JsonNode(v, f"{self.at(key)}[{i}]") for i, v in enumerate(value or [])]
 
     def text(self, key: str) -> str | None:
-        """Text or None."""
+        """Read text, or None."""
         value = self.value.get(key)
         if value is not None and (not isinstance(value, str) or not value.strip()):
             raise self._wrong(key, "a text")
@@ -137,7 +137,7 @@ class JsonNode:
         return value
 
     def number(self, key: str) -> float | None:
-        """Finite number or None."""
+        """Read a finite number, or None."""
         value = self.value.get(key)
         if value is None:
             return None
@@ -153,7 +153,7 @@ class JsonNode:
         return value
 
     def flag(self, key: str) -> bool | None:
-        """True, false or None."""
+        """Read true or false, or None."""
         value = self.value.get(key)
         if value is not None and not isinstance(value, bool):
             raise self._wrong(key, "true or false")

@@ -95,7 +95,7 @@ def overall_profile(scores: Mapping[Side, Mapping[str, float]], variables: Seque
 
 
 def person_mean(curves: MeanCurves, variable: str) -> Floats | None:
-    """Mean of a person's sides, of the one there is, or None."""
+    """Mean curve (101,) of a person's sides, of the one there is, or None."""
     found = [curves[side][variable] for side in SIDES if variable in curves.get(side, {})]
     return np.mean(found, axis=0) if found else None
 

@@ -47,7 +47,7 @@ def sole_heights(feet: FootTracks, side: Side) -> SoleHeights | None:
 def measure_floor_heights(
     heights: SoleHeights, first: int, last: int, ankle_height: float
 ) -> tuple[Floats, Floats]:
-    """Heights of heel and tip over the floor from the flat at sample `first` to that at `last`, m."""
+    """Heights (last − first + 1,) of heel and tip over the floor between flats at two samples, m."""
     a, b = float(heights.ankle[first]) - ankle_height, float(heights.ankle[last]) - ankle_height
     floor = a + (b - a) / (last - first) * np.arange(last - first + 1.0)
     return heights.heel[first : last + 1] - floor, heights.toe[first : last + 1] - floor
@@ -58,7 +58,7 @@ def toe_clearance(h: Floats) -> float | ClearanceReason:
 
     Parameters
     ----------
-    h : heights of the tip over the floor from foot-off to contact.
+    h : (n,) heights of the tip over the floor from foot-off to contact, m.
 
     Returns
     -------

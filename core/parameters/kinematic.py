@@ -239,7 +239,7 @@ def _at_bound(curves: CycleCurves, name: str, side: Side, values: Floats) -> Boo
 def without_bounds(
     curves: CycleCurves, figures: Mapping[str, Mapping[Side, Floats]]
 ) -> dict[str, dict[Side, Floats]]:
-    """The same figures, NaN in strides in which they are the bound of a leg model."""
+    """The same figures (strides,), NaN in strides in which they are the bound of a leg model."""
     return {
         name: {s: np.where(_at_bound(curves, name, s, x), np.nan, x) for s, x in sides.items()}
         for name, sides in figures.items()

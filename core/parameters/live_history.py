@@ -58,9 +58,9 @@ class SampleHistory:
         self._rows += count
 
     def floats(self, name: str, first: int, past: int) -> Floats:
-        """View of a column, samples first … past − 1."""
+        """View (past − first, …) of a column, samples first … past − 1."""
         return self._floats[name][first - self._first : past - self._first]
 
     def bools(self, name: str, first: int, past: int) -> Bools:
-        """View of a column, samples first … past − 1."""
+        """View (past − first, …) of a column, samples first … past − 1."""
         return self._bools[name][first - self._first : past - self._first]

@@ -56,7 +56,7 @@ def temporal_values(strides: Sequence[Stride]) -> dict[str, Floats]:
 
 
 def possible_values(strides: Sequence[Stride]) -> dict[str, Floats]:
-    """As `temporal_values`; NaN also where no person can have the value."""
+    """As `temporal_values`, (strides,) each; NaN also where no person can have the value."""
     found = temporal_values(strides)
     for name, x in found.items():
         low, high = CATALOGUE[name].plausible

@@ -118,7 +118,7 @@ class TakeAnalysis:
 
     @property
     def poses(self) -> Poses | None:
-        """The figure."""
+        """Poses of the segments, None before they are estimated."""
         return None if self.posed is None else self.posed.poses
 
     @property

@@ -125,7 +125,7 @@ def saturation(x: Floats, floor: float) -> tuple[float, float | None]:
 
 
 def magnetic_share(mag: Floats, still: slice, limit: float) -> float | None:
-    """Share of samples whose |m| differs from its own norm at rest by more than `limit` (fraction).
+    """Share of samples of mag (n, 3) whose |m| differs from its norm at rest by more than `limit` (fraction).
 
     None when the magnetometer has no reading at rest. Source: docs/science/quality.md, "Magnetic field".
     """

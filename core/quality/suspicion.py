@@ -32,7 +32,7 @@ _FIX_GYR = 'declare the unit in the manifest (sources[].gyr_unit: "deg/s" or "ra
 
 
 def list_suspicions(device: str, f: Facts, acc: Floats, quat: Floats | None) -> list[Notice]:
-    """All suspicions about one sensor, the grave ones as errors."""
+    """All suspicions about one sensor, the grave ones as errors; acc (n, 3) m/s², quat (n, 4)."""
     found = [*_acceleration(device, f), *_rate(device, f)]
     if quat is not None:
         found += _sign(device, acc, quat)

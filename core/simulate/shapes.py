@@ -19,7 +19,7 @@ def smoothstep(u: Floats) -> Floats:
 
 
 def bump(u: Floats) -> Floats:
-    """C³ hump on [0, 1] with height 1 at the middle, zero outside."""
+    """C³ hump on [0, 1] with height 1 at the middle, zero outside; u of any shape."""
     u = np.clip(u, 0.0, 1.0)
     return (4.0 * u * (1.0 - u)) ** 4
 

@@ -63,11 +63,11 @@ class Ending:
         self._draining: dict[str, ActiveTake] = {}
 
     def ask(self, take: ActiveTake, actor: audit.Actor | None) -> None:
-        """Somebody (None: the program) ends this take here, not the tablet."""
+        """Note that somebody (None: the program) ends this take here, not the tablet."""
         self._asked[take.id] = actor
 
     def unask(self, take: ActiveTake) -> None:
-        """It did not work."""
+        """Take the wish back, since the take could not be ended."""
         del self._asked[take.id]
 
     def draining(self, take_id: str) -> ActiveTake | None:

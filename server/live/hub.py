@@ -56,7 +56,7 @@ ABANDONED_S: Final = live.TOKEN_LIFE.total_seconds()
 
 
 class Hub:
-    """The registry."""
+    """Registry of all running takes and of who watches them."""
 
     def __init__(self, settings: Settings, db: Database, reviewed: ReviewedAnalyses, queue: JobQueue) -> None:
         self._settings, self._db, self._blobs, self._queue = settings, db, reviewed.blobs, queue
@@ -150,7 +150,7 @@ class Hub:
         self.tell_state(take)
 
     def detach(self, take: ActiveTake, tablet: TabletLink) -> None:
-        """A tablet has gone."""
+        """Forget a tablet that has gone."""
         if take.tablet is tablet:
             take.tablet = None
             self.tell_state(take)
@@ -262,7 +262,7 @@ class Hub:
         self.tell_state(take)
 
     def note_ended(self, take: ActiveTake, end: TakeEnd) -> None:
-        """The end is durable."""
+        """Note that the end is durable."""
         self._spawn(self._ending.complete(take, end, lambda: self._forget(take)))
 
     # the estimators

@@ -146,7 +146,7 @@ def ack(below: int) -> str:
 
 
 def error(code: str, detail: str, **more: object) -> str:
-    """Something was refused."""
+    """Message that something was refused."""
     return _text("error", code=code, detail=detail, **more)
 
 

@@ -150,12 +150,12 @@ class Recorder:
         await asyncio.to_thread(self._lane.close)
 
     def note_written(self, size: int) -> None:
-        """Called by the lane."""
+        """Note that the log has so many bytes; the committer's lane says it."""
         self._size = size
         self._listener.note_growth(size)
 
     def note_synced(self, records: int) -> None:
-        """Called by the lane."""
+        """Note that so many records are on the disk; the committer's lane says it."""
         before, was_over = self._intake.durable, self._intake.ended
         self._intake.note_synced(records)
         if self._intake.durable > before:
@@ -164,7 +164,7 @@ class Recorder:
             self._listener.note_end(self._intake.ended)
 
     def note_failure(self, error: OSError) -> None:
-        """Called by the lane."""
+        """Note that the log cannot be written; the committer's lane says it."""
         self._failure = _refused(error)
         self._listener.note_failure(self._failure)
 

@@ -62,7 +62,7 @@ class Room:
 
     @property
     def is_empty(self) -> bool:
-        """Nobody watches."""
+        """Whether nobody watches."""
         return not self.viewers and not self._watchers
 
     def clear(self) -> None:

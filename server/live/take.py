@@ -74,7 +74,7 @@ class TherapistMark:
     value: str | None
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """The same as plain values for JSON."""
         return {"t_s": self.t_s, "value": self.value}
 
 
@@ -190,7 +190,7 @@ class ActiveTake:
         self._house.note_ended(self, end)
 
     def note_failure(self, error: ProtocolError) -> None:
-        """The disk refuses."""
+        """Note that the disk refuses."""
         if self.tablet is not None:
             self.tablet.shut(error.close, error.code)
 
@@ -257,7 +257,7 @@ class ActiveTake:
             self._house.journal.add(self.id, item.kind, item.t_s, content)
 
     def look(self, now: float) -> None:
-        """Notice silence."""
+        """Notice that the tablet has fallen silent."""
         if self.state == "streaming" and now - self.grown_at > STALE_S:
             self.mind_silence(True)
 

@@ -101,7 +101,7 @@ def stride(told: LiveStride) -> dict[str, Any]:
 
 
 def cue(given: Cue) -> dict[str, Any]:
-    """A cue."""
+    """Message of a cue for the screens."""
     return {"type": "cue", **given.to_json()}
 
 

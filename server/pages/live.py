@@ -87,7 +87,7 @@ def view_live(c: Connection, session: Session, patient: Patient, *, capture: str
 
 
 def view_patient_screen(c: Connection, session: Session) -> dict[str, Any]:
-    """The patient's screen."""
+    """Page of the patient's screen."""
     return {
         "live": {
             "session": session.id,

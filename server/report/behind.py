@@ -58,7 +58,7 @@ class ParameterStrides:
     svg: str
 
     def to_json(self) -> dict[str, object]:
-        """Plain JSON."""
+        """The same as plain values for JSON."""
         content = {
             "parameter": asdict(self.row),
             "definition": self.definition,

@@ -176,7 +176,7 @@ class RecentValues(Generic[_Value]):
         return len(self._values)
 
     def clear(self) -> None:
-        """Forget all."""
+        """Forget all that is kept in memory."""
         with self._lock:
             self._values.clear()
 

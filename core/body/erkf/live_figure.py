@@ -58,7 +58,7 @@ class LinkedBody:
 
     @property
     def broken(self) -> bool:
-        """The filter gave up."""
+        """Whether the filter gave up."""
         return self._filtered.broken
 
     def push(self, raw: MeasuredBlock) -> BodyBlock:
@@ -105,7 +105,7 @@ class UnlinkedSensors:
         return BodyBlock(q, np.full((*q.shape[:2], 3), np.nan), raw.valid, np.zeros(T, np.bool_), paths)
 
     def drain_notices(self) -> list[Notice]:
-        """Nothing."""
+        """None: there is nothing here that could fail."""
         return []
 
 

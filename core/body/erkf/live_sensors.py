@@ -60,7 +60,7 @@ class FilteredSensors:
 
     @property
     def broken(self) -> bool:
-        """The filter gave up."""
+        """Whether the filter gave up."""
         return self._filter is not None and self._filter.broken
 
     def push(self, raw: MeasuredBlock) -> FilteredBlock:
@@ -84,7 +84,7 @@ class FootPaths:
 
     @property
     def broken(self) -> bool:
-        """The filter gave up."""
+        """Whether the filter gave up."""
         return self._filtered.broken
 
     def push(self, raw: MeasuredBlock) -> FootBlock:

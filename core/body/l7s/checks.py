@@ -73,7 +73,7 @@ def walking_checks(inputs: L7sInputs, track: L7sTrack, model: LegModel, rate_hz:
 
 
 def longest_gaps(valid: Mapping[Segment, Bools], rate_hz: float) -> dict[Segment, float]:
-    """Longest loss of each sensor in s."""
+    """Longest loss of each sensor in s; `valid` (T,) of each."""
     return {s: longest_run_s(~ok, rate_hz) for s, ok in valid.items()}
 
 

@@ -47,7 +47,7 @@ class LiveL7s:
 
     @property
     def broken(self) -> bool:
-        """The filter gave up."""
+        """Whether the filter gave up."""
         return self._broken or self._feet.broken
 
     def push(self, raw: MeasuredBlock) -> BodyBlock:
