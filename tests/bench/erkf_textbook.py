@@ -115,7 +115,7 @@ class Textbook:
                     var = (p.joint_centre_sd or 0.0) ** 2 + self.second_order(R, i, j, a, b)
                 found.append((H, y, var))
         for i in range(len(self.x)):
-            f, w = self.inputs.acc[k, i], self.inputs.gyr[k, i]
+            f = self.inputs.acc[k, i]
             if taken[i]:
                 H = np.zeros((3, N))
                 H[:, self.at(i, 3)] = EYE
@@ -124,10 +124,6 @@ class Textbook:
                 H = np.zeros((3, N))
                 H[:, self.at(i, 6)] = skew(R[i].T @ UP)
                 found.append((H, f / np.linalg.norm(f) - R[i].T @ UP, p.tilt_sd**2))
-            if p.zaru_sd is not None and self.m == 15 and self.inputs.still[k, i]:
-                H = np.zeros((3, N))
-                H[:, self.at(i, 9)] = EYE
-                found.append((H, w - self.x[i, 10:13], p.zaru_sd**2))
         return found
 
     def second_order(self, R: Floats, i: int, j: int, a: Floats, b: Floats) -> float:

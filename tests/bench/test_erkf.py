@@ -89,7 +89,6 @@ def test_the_compiled_filter_is_the_textbook(params: ErkfParams) -> None:
     foot = take.tree.feet[0]
     contact[300:330, foot] = True
     inputs = replace(part, contact=contact)
-    params = replace(params, zaru_sd=0.01)
     track, book = filtered(inputs, params), textbook(inputs, params)
     assert track.refused[300:330, foot].any()
     np.testing.assert_allclose(track.nominal[-1], book.x, atol=1e-9)

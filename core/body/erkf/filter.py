@@ -214,11 +214,11 @@ def new_record(tree: ImuTree, params: ErkfParams, samples: int) -> SmootherRecor
     """Room for so many samples of what the smoother needs; with 1 nothing is kept."""
     n, J = len(tree.imus), len(tree.joints)
     N = n * params.states
-    # per sample at most: centre and axis of each joint; zero velocity, tilt, ZARU and heading of each IMU
-    B = 2 * J + 4 * n
+    # per sample at most: centre and axis of each joint; zero velocity, tilt and heading of each IMU
+    B = 2 * J + 3 * n
     used = J * (params.joint_centre_sd is not None) + n * (params.tilt_sd is not None) + len(tree.feet)
     used += sum(j.e_distal is not None for j in tree.joints) * (params.joint_axis_sd is not None)
-    used += n * (params.zaru_sd is not None) + n
+    used += n
     K, B = samples, min(B, used)
     return SmootherRecord(
         F=np.empty((K, n, 5, 3, 3)),
@@ -251,7 +251,6 @@ def noise_of(params: ErkfParams, rate_hz: float) -> Noise:
         tilt=on(params.tilt_sd),
         centre=on(params.joint_centre_sd),
         axis=on(params.joint_axis_sd),
-        zaru=on(params.zaru_sd),
         heading=float(params.heading_sd),
         gap_acc=float(params.gap_acc_sd),
         gap_gyr=float(params.gap_gyr_sd),

@@ -16,15 +16,13 @@ from numpy.typing import NDArray
 
 from core.body.erkf.predict import move, propagate, propagate_back, reset_before
 from core.body.erkf.updates import (
-    GYRO_BIAS,
-    VELOCITY,
     back_correct,
-    error_state_rows,
     heading_rows,
     joint_rows,
     second_order_variance,
     take_block,
     tilt_rows,
+    velocity_rows,
 )
 from core.frames import Bools, Floats
 from core.rotation.compiled import to_matrix, turn
@@ -89,13 +87,12 @@ class ErkfOutput(NamedTuple):
 
 class ErkfScratch(NamedTuple):
     """R (n, 3, 3) of the IMUs · U (4, 3), y (3,), place (4,), H (2, 3, 3) of a block · vectors (10, 3) ·
-    zero (3,) · taken (n,) zero velocities · slack (J,) m of the joint centres."""
+    taken (n,) zero velocities · slack (J,) m of the joint centres."""
 
     R: Floats
     U: Floats
     y: Floats
     vectors: Floats
-    zero: Floats
     taken: Bools
     slack: Floats
     place: NDArray[np.int64]
@@ -117,7 +114,6 @@ class Noise(NamedTuple):
     tilt: float
     centre: float
     axis: float
-    zaru: float
     heading: float
     gap_acc: float
     gap_gyr: float
@@ -238,16 +234,12 @@ def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: i
     for i in range(x.shape[0]):
         rests = samples.flags[k, i] & STILL
         if scratch.taken[i]:
-            error_state_rows(place[B], m, i, VELOCITY, x[i, 3:6], scratch.zero, y)
+            velocity_rows(x[i, 3:6], m, i, place[B], y)
             good &= take_block(P, dx, place[B], H[B], y, noise.zero_velocity, V[B], E[B], U)
             B += 1
         if noise.tilt > 0.0 and (scratch.taken[i] or rests):
             tilt_rows(R[i], samples.acc[k, i], m, i, place[B], H[B], y)
             good &= take_block(P, dx, place[B], H[B], y, noise.tilt, V[B], E[B], U)
-            B += 1
-        if noise.zaru > 0.0 and m == 15 and rests:
-            error_state_rows(place[B], m, i, GYRO_BIAS, x[i, 10:13], samples.gyr[k, i], y)
-            good &= take_block(P, dx, place[B], H[B], y, noise.zaru, V[B], E[B], U)
             B += 1
         # nested: heading_rows writes the block and may only run where a heading was measured
         if samples.heading.shape[0] > 0 and np.isfinite(samples.heading[k, i]):  # noqa: SIM102
@@ -322,7 +314,7 @@ def filter_forward(memory, samples, links, noise, record, output):  # type: igno
     output = ErkfOutput(*output)
     n, J = memory.x.shape[0], links.ends.shape[0]
     scratch = ErkfScratch(
-        np.empty((n, 3, 3)), np.empty((4, 3)), np.empty(3), np.empty((10, 3)), np.zeros(3),
+        np.empty((n, 3, 3)), np.empty((4, 3)), np.empty(3), np.empty((10, 3)),
         np.zeros(n, np.bool_), np.empty(J), np.empty(4, np.int64), np.empty((2, 3, 3)),
     )  # fmt: skip
     keeps = record.V.shape[0] > 1

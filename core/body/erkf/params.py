@@ -40,7 +40,7 @@ class ErkfParams:
     zero_velocity_sd : m/s. gate : largest χ² of a zero velocity. reaccept_s : contact refused for so long is
         accepted after all; then `reaccept_m` is added to the foot's uncertainty
         (docs/science/erkf.md, "Zero velocity").
-    tilt_sd : of the direction of f. joint_centre_sd : m. joint_axis_sd, heading_sd : rad. zaru_sd : rad/s.
+    tilt_sd : of the direction of f. joint_centre_sd : m. joint_axis_sd, heading_sd : rad.
     gap_acc_sd, gap_gyr_sd : in place of acc_sd and gyr_sd while an IMU is lost.
     start_* : of the first sample; `start_heading_sd` about the vertical, must cover the first headings'
         errors.
@@ -62,7 +62,6 @@ class ErkfParams:
     tilt_sd: float | None = 0.1
     joint_centre_sd: float | None = 0.01
     joint_axis_sd: float | None = None
-    zaru_sd: float | None = None
     heading_sd: float = radians(10.0)
     gap_acc_sd: float = 20.0
     gap_gyr_sd: float = 5.0
@@ -86,7 +85,7 @@ class ErkfParams:
         for name, value in (*vars(self).items(), *self.gyr_sd_of.items()):
             if isinstance(value, float) and not (np.isfinite(value) and value >= 0.0):
                 raise ParameterError("deviation_range", f"{name} = {value:g} is not 0 or above.")
-        for name in ("zero_velocity_sd", "tilt_sd", "joint_centre_sd", "joint_axis_sd", "zaru_sd"):
+        for name in ("zero_velocity_sd", "tilt_sd", "joint_centre_sd", "joint_axis_sd"):
             if getattr(self, name) == 0.0:
                 raise ParameterError("deviation_range", f"{name} is 0; the filter needs it above 0.")
 

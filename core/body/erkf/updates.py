@@ -18,7 +18,7 @@ FIRST, SECOND, UNIT, TURNS = range(4)
 """A block's place: first error of its IMUs (SECOND is −1 for one IMU), offset of the ±1 (−1: none), whether
 it has a part on δθ."""
 
-POSITION, VELOCITY, ANGLE, GYRO_BIAS = 0, 3, 6, 9
+POSITION, VELOCITY = 0, 3
 """Offsets in an IMU's errors."""
 
 
@@ -60,11 +60,11 @@ def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def error_state_rows(place, m, i, offset, value, measured, y):  # type: ignore[no-untyped-def]
-    """Zero velocity (measured 0) or the gyroscope at rest showing its bias: an error itself is observed."""
-    place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, offset, 0
+def velocity_rows(v, m, i, place, y):  # type: ignore[no-untyped-def]
+    """Zero velocity: the error of v (3,) itself is observed."""
+    place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, VELOCITY, 0
     for k in range(3):
-        y[k] = measured[k] - value[k]
+        y[k] = -v[k]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
