@@ -16,7 +16,7 @@ from pathlib import Path
 
 import httpx
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, Playwright, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, Playwright, expect, sync_playwright
 
 from server.auth import accounts
 from server.auth.passwords import hash_password
@@ -26,6 +26,8 @@ from server.storage.migrate import upgrade
 from tests.browser import filling
 from tests.data import ROOT
 
+expect.set_options(timeout=30_000)  # beside other tests a page may take long; nobody waits unless it does
+
 NAME, PASSWORD = "anna", "correct horse battery"
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or "/usr/bin/chromium"
 FLAGS = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
@@ -33,6 +35,14 @@ FLAGS = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-backgrou
 FLAT = [*FLAGS, "--disable-gpu"]
 SOLID = [*FLAGS, "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 """Without 3D (fast 2D) and with software WebGL, which slows flat pages down to a few frames a second."""
+PACED = """
+if (window !== window.top) {
+  const draw = window.requestAnimationFrame.bind(window);
+  window.requestAnimationFrame = (then) => setTimeout(() => draw(then), 100);
+  window.cancelAnimationFrame = clearTimeout;
+}
+"""
+"""A figure drawn by software as often as it can takes all processors from the server that is to be tested."""
 
 
 @dataclass(frozen=True)
@@ -181,6 +191,8 @@ def opened(flat: Browser, running: RunningServer, cookies: list[dict[str, str]])
             color_scheme=scheme,  # type: ignore[arg-type]
         )
         contexts.append(context)
+        if browser is not flat:
+            context.add_init_script(PACED)
         if signed_in:
             context.add_cookies(cookies)  # type: ignore[arg-type]
         page = context.new_page()
