@@ -14,10 +14,10 @@ from core.formats.live_log import (
     SensorInfo,
     StreamInfo,
     encode_batch,
-    encode_samples,
     finish_json,
     read_batch_header,
     scan,
+    view_samples,
 )
 from server.live.intake import TakeEnd
 from server.live.protocol import ProtocolError
@@ -48,7 +48,7 @@ def digest(frames: list[bytes]) -> str:
     """Hash over the payloads, as the tablet takes it."""
     whole = hashlib.sha256()
     for one in frames:
-        whole.update(encode_samples(one, read_batch_header(one)))
+        whole.update(view_samples(one, read_batch_header(one)))
     return whole.hexdigest()
 
 

@@ -24,6 +24,7 @@ from core.body.erkf.smoother import smooth
 from core.body.erkf.start import start_state
 from core.body.feet import FootTracks
 from core.body.kinematics import forward_kinematics
+from core.body.l7s.filter import compile_l7s_kernel
 from core.body.l7s.health import l7s_health, l7s_notices
 from core.body.l7s.inputs import free_acceleration
 from core.body.l7s.poses import l7s_poses
@@ -221,3 +222,4 @@ def compile_pose_kernels() -> None:
     acc, gyr = np.tile([0.0, GRAVITY, 0.0], (2, 1, 1)), np.zeros((2, 1, 3))
     inputs = erkf_inputs(tree, acc, gyr, np.ones((2, 1), bool), 100.0)
     smooth(start_state(tree, inputs, ErkfParams()), inputs, tree, ErkfParams())
+    compile_l7s_kernel()

@@ -70,6 +70,7 @@ class ImuTree:
     Raises
     ------
     EstimationError `duplicate_segment`, `no_imu`, `segment_length`, `joint_unknown`, `joint_loop`.
+    ParameterError `bad_shape`, `bad_joint`.
     """
 
     imus: tuple[str, ...]
@@ -99,6 +100,10 @@ class ImuTree:
                 )
         group = list(range(n))
         for joint in self.joints:
+            if (joint.e_proximal is None) != (joint.e_distal is None):
+                raise ParameterError(
+                    "bad_joint", f"ImuTree: {joint.name} has one hinge axis of two; give both or none."
+                )
             if not (
                 0 <= joint.proximal < n and 0 <= joint.distal < n and all(0 <= foot < n for foot in self.feet)
             ):

@@ -15,6 +15,10 @@ from core.errors import ManifestError
 
 MOST_DEPTH: Final = 64
 """Objects and lists inside each other; a manifest has five levels."""
+MOST_DIGITS: Final = 308
+"""Of a whole number: more do not fit into a double."""
+MOST_SHOWN: Final = 40
+"""Characters of a key that a sentence quotes."""
 
 
 def read_json(data: bytes | str, most_bytes: int | None = None) -> object:
@@ -36,10 +40,14 @@ def read_json(data: bytes | str, most_bytes: int | None = None) -> object:
         raise ValueError(f"it has {len(data)} bytes, at most {most_bytes} are read")
     try:
         text = data if isinstance(data, str) else data.decode("utf-8-sig")
-        root: object = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_make_object)
+        root: object = json.loads(
+            text, parse_constant=_refuse_constant, parse_int=_read_whole, object_pairs_hook=_make_object
+        )
+        _check_values(root)
     except RecursionError:
         raise _too_deep() from None
-    _check_values(root)
+    except UnicodeError:
+        raise ValueError("a text is not valid Unicode (UTF-8, no lone surrogates)") from None
     return root
 
 
@@ -47,13 +55,25 @@ def _refuse_constant(name: str) -> object:
     raise ValueError(f"{name} is not a number in JSON; use null")
 
 
+def _read_whole(digits: str) -> int:
+    if len(digits) > MOST_DIGITS:
+        raise ValueError("a number is too large")
+    return int(digits)
+
+
 def _make_object(pairs: list[tuple[str, object]]) -> dict[str, object]:
     made: dict[str, object] = {}
     for key, value in pairs:
         if key in made:
-            raise ValueError(f"the key '{key}' is given twice")
+            raise ValueError(f"the key '{_shorten_key(key)}' is given twice")
         made[key] = value
     return made
+
+
+def _shorten_key(key: str) -> str:
+    """Return a key from outside as a sentence may show it: valid Unicode, MOST_SHOWN characters at most."""
+    shown = key.encode("utf-8", "backslashreplace").decode()
+    return shown if len(shown) <= MOST_SHOWN else f"{shown[:MOST_SHOWN]}…"
 
 
 def _check_values(root: object) -> None:

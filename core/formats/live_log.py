@@ -50,7 +50,6 @@ __all__ = [
     "check_fits",
     "decode_batch",
     "encode_batch",
-    "encode_samples",
     "finish_json",
     "hello_json",
     "hello_of",
@@ -61,6 +60,7 @@ __all__ = [
     "record",
     "scan",
     "scan_records",
+    "view_samples",
 ]
 
 MAGIC: Final = 0x314C4753
@@ -238,7 +238,7 @@ def decode_batch(frame: Buffer, header: Header | None = None) -> SampleBatch:
     return SampleBatch(h.stream, h.seq, h.t0_us, h.sent_us, samples, offsets)
 
 
-def encode_samples(frame: Buffer, header: Header) -> memoryview:
+def view_samples(frame: Buffer, header: Header) -> memoryview:
     """The bytes of the samples, which the finish hash is taken over."""
     return memoryview(frame)[_HEAD.size : _HEAD.size + 4 * header.n_samples * header.n_imu * CHANNELS]
 

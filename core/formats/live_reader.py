@@ -21,11 +21,11 @@ from core.formats.live_log import (
     StreamInfo,
     check_fits,
     decode_batch,
-    encode_samples,
     parse_finish,
     parse_hello,
     read_batch_header,
     scan,
+    view_samples,
 )
 from core.frames import Floats
 from core.recording import ImuStream, Recording
@@ -106,7 +106,7 @@ def _taken(records: Sequence[LogRecord], source: str) -> _Taken:
             check_fits(header, taken.hello)
             if r.kind == "H" or header.seq != len(taken.batches):
                 raise InputError("batch_shape", f"batch {header.seq} follows {len(taken.batches) - 1}")
-            digest.update(encode_samples(r.body, header))
+            digest.update(view_samples(r.body, header))
             taken.batches.append(decode_batch(r.body, header))
     except InputError as e:
         message = f"Record {number} of {source} does not belong there ({e.message}); the rest was left out."

@@ -20,11 +20,11 @@ from core.formats.live_log import (
     SampleBatch,
     check_fits,
     encode_batch,
-    encode_samples,
     finish_json,
     parse_finish,
     parse_hello,
     read_batch_header,
+    view_samples,
 )
 from server.live import protocol
 from server.live.protocol import MOST_UNACKED, CloseCode, ProtocolError
@@ -211,7 +211,7 @@ class Intake:
         return IntakeAnswer(keep=("B", frame))
 
     def _take(self, frame: bytes, header: Header) -> None:
-        self._hash.update(encode_samples(frame, header))
+        self._hash.update(view_samples(frame, header))
         self.next_seq += 1
         if self.hello is not None:
             span = self._spans.setdefault(header.stream, _Span(header.t0_us))

@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed
 
 from core.errors import SagittalError
 from core.formats.json_tree import read_json
-from core.formats.live_log import Finish, encode_samples, finish_json, read_batch_header
+from core.formats.live_log import Finish, finish_json, read_batch_header, view_samples
 
 
 class LiveError(SagittalError):
@@ -120,7 +120,7 @@ class Sender:
 
     async def _produce(self, frames: AsyncIterable[bytes]) -> None:
         async for frame in frames:
-            self._hash.update(encode_samples(frame, read_batch_header(frame)))
+            self._hash.update(view_samples(frame, read_batch_header(frame)))
             if not self._kept:
                 self.progressed_at = time.monotonic()  # nothing could be acknowledged before
             self._kept.append(frame)

@@ -31,10 +31,10 @@ from core.formats.live_log import (
     SampleBatch,
     decode_batch,
     encode_batch,
-    encode_samples,
     finish_json,
     hello_json,
     read_batch_header,
+    view_samples,
 )
 from core.simulate import simulate_scenario
 from server.live.playback import cut, hello_of
@@ -223,7 +223,7 @@ async def drive(base: str, cookie: str, all_of: Sequence[Session], pids: Sequenc
     sent = frames(RUNNING_S + SETTLING_S + SECONDS)
     whole = hashlib.sha256()
     for frame in sent:
-        whole.update(encode_samples(frame, read_batch_header(frame)))
+        whole.update(view_samples(frame, read_batch_header(frame)))
     gates = [asyncio.Event() for _ in all_of]
     browsers = [asyncio.create_task(browser(base, s, cookie)) for s in all_of]
     tablets = [

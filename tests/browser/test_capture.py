@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from core.formats import SourceFile, read_recording
 from core.formats.live_log import decode_batch, parse_finish, read_batch_header, scan
-from core.formats.live_log import encode_samples as payload_of
+from core.formats.live_log import view_samples as payload_of
 from server.auth import accounts
 from server.auth.passwords import hash_password
 from server.auth.roles import Role

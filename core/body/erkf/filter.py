@@ -263,7 +263,7 @@ def links_of(tree: ImuTree, params: ErkfParams) -> Links:
     lever, axis = np.zeros((J, 2, 3)), np.zeros((J, 2, 3))
     for k, j in enumerate(tree.joints):
         lever[k] = j.r_proximal, j.r_distal
-        if j.e_proximal is not None and j.e_distal is not None:
+        if j.e_proximal is not None and j.e_distal is not None:  # both or none, says the tree
             axis[k] = j.e_proximal, j.e_distal
     return Links(
         ends=np.array([(j.proximal, j.distal) for j in tree.joints], np.int64).reshape(J, 2),

@@ -30,9 +30,9 @@ NEVER_LOST: Final = -(2**62)
 """Count of lost samples of a sensor that has not measured yet: no gap of it begins before it has."""
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]
 def _mean_up(ring, seen, out):  # type: ignore[no-untyped-def]
-    """Write the direction of the mean of the last `seen` specific forces in a ring (W, 3)."""
+    """Write the direction of the mean of the last `seen` specific forces in a ring (W, 3); NaN of zeros."""
     W = ring.shape[0]
     first = seen - min(seen, W)
     for c in range(3):

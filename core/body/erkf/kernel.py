@@ -2,8 +2,7 @@
 
 A sample is one `advance`: predict, add noise, judge contacts, correct, inject. It serves live blocks, whole
 recordings and the smoother's second pass, so all give the same bits. What the smoother needs is written to a
-`SmootherRecord`; without one the same slot is overwritten
-every sample.
+`SmootherRecord`; without one the same slot is overwritten every sample.
 """
 
 from __future__ import annotations
@@ -42,8 +41,8 @@ class SmootherRecord(NamedTuple):
     V: Floats
     E: Floats
     H: Floats
-    place: Floats
-    blocks: Floats
+    place: NDArray[np.int64]
+    blocks: NDArray[np.int64]
     P: Floats
     dx: Floats
 

@@ -25,7 +25,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from core.body.l7s.legs import HIP_SIDE, LEGS, LegModel
+from core.body.l7s.legs import HIP_SIDE, LEGS, LegModel, solve_legs
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.errors import EstimationError, ParameterError
 from core.frames import FOOT, R_NEUTRAL, Bools, Floats
@@ -223,10 +223,11 @@ def start_l7s_state(inputs: L7sInputs, model: LegModel, params: L7sParams | None
 
 
 def compile_l7s_kernel() -> None:
-    """Compile or load the kernel, so that the first take does not wait for it."""
+    """Compile or load the kernels of filter and legs, so that the first take does not wait for it."""
     model = LegModel.of(BodyModel.from_height(NOMINAL_HEIGHT_M))
     foot = model.to_isb("foot_l").T
     R = np.tile(np.stack((np.eye(3), R_NEUTRAL @ foot, R_NEUTRAL @ foot)), (2, 1, 1, 1))
     for worn in get_args(Worn):
         inputs = L7sInputs(R, np.zeros((2, 3, 3)), np.ones((2, 2), bool), worn)
-        filter_block(start_l7s_state(inputs, model), inputs, model, 100.0)
+        track, _ = filter_block(start_l7s_state(inputs, model), inputs, model, 100.0)
+        solve_legs(track.R, track.p, model)

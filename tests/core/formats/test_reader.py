@@ -62,6 +62,10 @@ def test_two_manifests_or_a_broken_one_are_refused() -> None:
     with pytest.raises(ManifestError) as e:
         read_recording([mt_file(), source("manifest.json", "{")])
     assert e.value.code == "manifest_bad_json"
+    twice = '{"sensors": {"00B40B91": "pelvis", "00B40B91": "foot_l"}}'
+    with pytest.raises(ManifestError, match="the key '00B40B91' is given twice") as e:
+        read_recording([mt_file(), source("who-wears-what.json", twice)])
+    assert e.value.code == "manifest_bad_json"
 
 
 def test_an_opensense_mapping_maps_and_unknown_bodies_are_set_aside() -> None:

@@ -75,7 +75,17 @@ async def test_bad_fields_are_named_and_nothing_is_stored(clinic: Clinic, body: 
         assert len((await client.get(f"{API}/patients")).json()) == before
 
 
-@pytest.mark.parametrize("body", [b'{"code": "x", "note": "\\ud800"}', b"{", b"\xff", b"[" * 100_000])
+@pytest.mark.parametrize(
+    "body",
+    [
+        b'{"code": "x", "note": "\\ud800"}',
+        b'{"\\ud800": 1, "\\ud800": 2}',
+        b'{"height_m": 1' + 5000 * b"0" + b"}",
+        b"{",
+        b"\xff",
+        b"[" * 100_000,
+    ],
+)
 async def test_what_is_no_json_is_refused(clinic: Clinic, body: bytes) -> None:
     async with clinic.client("clinician") as client:
         answer = await client.post(

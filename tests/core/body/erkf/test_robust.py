@@ -219,6 +219,8 @@ def broken(make: str) -> None:
             replace(tree, joints=(*tree.joints, loop))
         case "a joint to nowhere":
             replace(tree, joints=(replace(tree.joints[0], distal=9),))
+        case "a hinge with one axis":
+            replace(tree, joints=(replace(tree.joints[0], e_proximal=np.ones(3), e_distal=None),))
         case "a covariance that is negative":
             filter_block(replace(first, P=-first.P), ten, tree, LIVE)
         case "a covariance that is infinite":
@@ -248,6 +250,7 @@ def broken(make: str) -> None:
         ("no sensor", EstimationError, "no_imu"),
         ("a joint too many", EstimationError, "joint_loop"),
         ("a joint to nowhere", EstimationError, "joint_unknown"),
+        ("a hinge with one axis", ParameterError, "bad_joint"),
         ("a covariance that is negative", EstimationError, "filter_diverged"),
         ("a covariance that is infinite", EstimationError, "filter_diverged"),
         ("nine states where fifteen are meant", ParameterError, "bad_shape"),
