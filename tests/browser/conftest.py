@@ -191,6 +191,7 @@ def opened(flat: Browser, running: RunningServer, cookies: list[dict[str, str]])
             color_scheme=scheme,  # type: ignore[arg-type]
         )
         contexts.append(context)
+        context.set_default_timeout(60_000)
         if browser is not flat:
             context.add_init_script(PACED)
         if signed_in:
