@@ -112,7 +112,7 @@ def test_the_print_view_is_two_sheets_of_paper(opened: Opener, filled: Filled) -
 def test_screenshots_of_every_page(
     opened: Opener, solid: Browser, running: RunningServer, filled: Filled, tmp_path: Path
 ) -> None:
-    """Written to docs/screens when SAGITTAL_SCREENS=1, else a few, thrown away; the figure must be on them."""
+    """Written to docs/screens when SAGITTAL_SCREENS=1, else a few, thrown away; figures must be on them."""
     folder = _screens(tmp_path)
     pages = PAGES if folder != tmp_path else {name: PAGES[name] for name in SOME}
     for name, address in pages.items():
@@ -133,9 +133,7 @@ def test_screenshots_of_every_page(
             page.screenshot(path=folder / f"{name}-dark.png")
             page.close()
     sizes = [p.stat().st_size for p in folder.glob("*.png") if not p.name.startswith(LIVE)]
-    assert len(sizes) == len(pages) + sum(name in TABLETS for name in pages) + sum(
-        name in DARK for name in pages
-    )
+    assert len(sizes) == sum(1 + (name in TABLETS) + (name in DARK) for name in pages)
     assert sum(sizes) < 6_000_000
 
 
