@@ -8,9 +8,10 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 
 import sagittal
-from server.demo.clinic import VISITS, record
+from server.demo.clinic import VISITS, DemoVisit, record
 from tests.data import ROOT
 
 LIMIT = 1.3
@@ -38,15 +39,15 @@ def run_demo() -> float:
         process.stdout.close()
 
 
-def analyse_all_visits() -> float:
-    """Simulate and analyse the demo's visits one after the other in this process; seconds that took."""
+def analyse(visits: Sequence[DemoVisit]) -> float:
+    """Simulate and analyse visits one after the other in this process; seconds that took."""
     began = time.perf_counter()
-    for visit in VISITS:
+    for visit in visits:
         sagittal.analyse(record(visit).recording)
     return time.perf_counter() - began
 
 
 def test_the_second_start_of_the_demo_shows_all_visits_soon() -> None:
     run_demo()
-    analyse_all_visits()
-    assert run_demo() / analyse_all_visits() < LIMIT
+    analyse(VISITS[:1])
+    assert run_demo() / analyse(VISITS) < LIMIT
