@@ -20,8 +20,12 @@ class SensorMap extends HTMLElement {
     }
     this.measures = [...this.querySelectorAll("[data-measure]")];
     this.ask = this.querySelector("[data-ask]");
-    this.querySelector("[data-swap]").addEventListener("click", () => this.swap());
+    // the page comes with its buttons off: a tap before the script is there would be lost
+    const swap = this.querySelector("[data-swap]");
+    swap.addEventListener("click", () => this.swap());
+    swap.disabled = false;
     for (const b of this.querySelectorAll("[data-sides]")) {
+      b.disabled = false;
       b.addEventListener("click", () => {
         if (b.dataset.sides === "swap") this.swap();
         this.answered();
