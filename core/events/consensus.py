@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from core.errors import Notice, ParameterError
-from core.events.detection import detect
+from core.events.detection import PITCH_RULE, detect
+from core.events.detection import SOURCE as REFINED
 from core.events.foot_pitch import FootPitchParams
 from core.events.gyro_peaks import LIMB, GyroPeakPresets, gyro_peak_events
 from core.events.result import EventKind, GaitEvent, GaitEvents
@@ -68,16 +69,23 @@ class _Vote:
     detector: str
     time_s: float
     detected_s: float
+    uncertainty_s: float | None
 
 
 def all_detectors(
     orientations: Orientations,
     foot_pitch: FootPitchParams | None = None,
     params: ConsensusParams | None = None,
+    refined: GaitEvents | None = None,
 ) -> dict[str, GaitEvents]:
-    """What every detector finds whose sensors are worn, the leading foot-pitch rule first."""
+    """What every detector finds whose sensors are worn, the leading one of the feet first.
+
+    Parameters
+    ----------
+    refined : what `detect_contacts` found, which then leads; None = the foot-pitch rule leads.
+    """
     params = params or ConsensusParams()
-    found = {"foot_pitch": detect(orientations, foot_pitch)}
+    found = {PITCH_RULE: detect(orientations, foot_pitch)} if refined is None else {REFINED: refined}
     presets = params.gyro_peaks.by_name
     for name in params.presets:
         preset = presets[name]
@@ -151,7 +159,8 @@ def agree_on_contacts(found: Mapping[str, GaitEvents], params: ConsensusParams |
                     continue
                 time = own.time_s if own is not None else float(np.median([v.time_s for v in votes]))
                 known = max(v.detected_s for v in votes)
-                events.append(GaitEvent(time, side, kind, SOURCE, max(known, time), share))
+                sd = None if own is None else own.uncertainty_s
+                events.append(GaitEvent(time, side, kind, SOURCE, max(known, time), share, sd))
         if dropped:
             notices.append(_disagree(side, dropped, len(voters)))
     events.sort(key=lambda e: (e.time_s, e.side, e.kind))
@@ -190,7 +199,7 @@ def _clusters(
 
 def _votes(name: str, events: GaitEvents, side: Side, kind: EventKind) -> list[_Vote]:
     own = (e for e in events.events if (e.side, e.kind) == (side, kind))
-    return [_Vote(name, e.time_s, e.detected_s) for e in own]
+    return [_Vote(name, e.time_s, e.detected_s, e.uncertainty_s) for e in own]
 
 
 def _moved(votes: list[_Vote], lead: Sequence[float], params: ConsensusParams) -> list[_Vote]:

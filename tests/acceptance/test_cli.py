@@ -123,7 +123,9 @@ def test_result_files_have_the_documented_columns(analysed: tuple[Path, str]) ->
     for row in content["parameters"]:
         assert {"name", "side", "n", "mean", "sd", "unit", "reason"} <= set(row)
         assert (row["mean"] is None) == (row["reason"] is not None)
-    assert list(rows(out / "events.csv")[0]) == ["time_s", "side", "kind", "source", "confidence"]
+    assert list(rows(out / "events.csv")[0]) == [
+        "time_s", "side", "kind", "source", "confidence", "uncertainty_s",
+    ]  # fmt: skip
     stride = rows(out / "strides.csv")[0]
     assert {"side", "start_s", "tc_s", "end_s", "stride_time_s", "excluded_reason"} <= set(stride)
     assert "stride_time_s" in stdout
