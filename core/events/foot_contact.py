@@ -45,6 +45,9 @@ class FootContactParams:
     swing_rad_s, swing_s, longest_s, step_m : a movement between two rests that is so fast, so long and leads
         so far is a swing. Measured on ipol_walks: swings without pitch exceed 1.5 rad/s and 0.3 s and most
         lead 11 cm and more, shifts of a standing foot lead less far.
+    pause_s : a swing without pitch is told where the foot's last pitched swing is no longer ago, else once
+        the next follows within this: mobgap's longest pause inside a walk. A gait without any pitched swing
+        is not told by halves.
     hump_rad : a rise of the pitch that ends in a slap is a landing though the foot does not rest. Our choice.
     dip_rad, onset_s : a pitch that falls by less shows no push-off; the foot then leaves so long after it
         begins to move, the median of ipol_walks.
@@ -55,7 +58,7 @@ class FootContactParams:
     loose_sd_s : the least of a swing without pitch. All measured on ipol_walks.
     """
 
-    contact_share: float = 0.5
+    contact_share: float = 0.4
     knock_s: float = 0.01
     contact_s: float = 0.15
     leaving_share: float = 0.65
@@ -74,6 +77,7 @@ class FootContactParams:
     hump_rad: float = 0.07
     dip_rad: float = 0.02
     onset_s: float = 0.13
+    pause_s: float = 3.0
     contact_sd_s: float = 0.018
     leaving_sd_s: float = 0.012
     flat_sd_s: float = 0.05
@@ -123,6 +127,7 @@ class ContactRule(NamedTuple):
     swing: int
     longest: int
     onset: int
+    pause: int
 
     @classmethod
     def at_rate(cls, params: FootContactParams, rate_hz: float) -> ContactRule:
@@ -137,6 +142,7 @@ class ContactRule(NamedTuple):
             swing=round(params.swing_s * rate_hz),
             longest=round(params.longest_s * rate_hz),
             onset=round(params.onset_s * rate_hz),
+            pause=round(params.pause_s * rate_hz),
         )
 
 
@@ -164,12 +170,13 @@ class FootContactState:
     ) -> FootContactState:
         """State before the first sample at `rate_hz`."""
         # numba is slow to import and only needed here
-        from core.events.foot_contact_kernel import BOTTOM, COUNTERS, NONE, OPEN_TOP, SUMS
+        from core.events.foot_contact_kernel import BOTTOM, COUNTERS, HELD, NONE, OPEN_TOP, PITCHED, SUMS
 
         refinement = ContactRule.at_rate(params or FootContactParams(), rate_hz)
         size = refinement.longest + refinement.leaving + refinement.quiet + refinement.apart + 2
         counters = np.zeros(COUNTERS, np.int64)
-        counters[OPEN_TOP], counters[BOTTOM] = -1, NONE
+        counters[OPEN_TOP] = -1
+        counters[[BOTTOM, PITCHED, HELD]] = NONE
         return cls(
             rule=FootPitchState.start(rate_hz, pitch or FootPitchParams()),
             rate_hz=rate_hz,

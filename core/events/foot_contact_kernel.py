@@ -27,14 +27,18 @@ OPEN_NUMBER: Final = 8
 NUMBER: Final = 9
 BOTTOM: Final = 10
 TOP: Final = 11
-COUNTERS: Final = 12
+PITCHED: Final = 12
+HELD: Final = 13
+COUNTERS: Final = 14
 
 # places in `sums`
 FASTEST: Final = 0
 SPEED: Final = 1
 WAY: Final = 3
 OFFSET: Final = 5
-SUMS: Final = 6
+HELD_TC: Final = 6
+HELD_IC: Final = 8
+SUMS: Final = 10
 
 
 @njit(cache=True, nogil=True)
@@ -177,6 +181,17 @@ def _tell(found_int, found_float, total, kind, number, known, last, at, sd):  # 
 
 
 @njit(cache=True, nogil=True)
+def _tell_held(found_int, found_float, total, counters, sums, k):  # type: ignore[no-untyped-def]
+    """Report the swing without pitch that is held; returns how many reports there are."""
+    for kind, place in ((TC, HELD_TC), (IC, HELD_IC)):
+        at, sd, number = sums[place], sums[place + 1], counters[NUMBER]
+        total = _tell(found_int, found_float, total, kind, number, k, 1, at, sd)
+        counters[NUMBER] = number + 1
+    counters[HELD] = NONE
+    return total
+
+
+@njit(cache=True, nogil=True)
 def _begin_movement(counters, sums, k, told):  # type: ignore[no-untyped-def]
     """A movement of the foot begins at sample k."""
     counters[START], counters[TOP], counters[TOLD] = k, k, told
@@ -264,9 +279,13 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
         )  # fmt: skip
         if not valid[i]:
             counters[MEASURED], counters[RESTING], counters[MOVING], counters[BOTTOM] = 0, 0, 0, NONE
+            counters[HELD] = NONE
             continue
         for e in range(n):
-            counters[TOLD] = 1
+            counters[TOLD], counters[PITCHED] = 1, k
+            if counters[HELD] >= k - rule.pause:
+                # the foot walks on: its step before was one
+                total = _tell_held(found_int, found_float, total, counters, sums, k)
             number = counters[NUMBER]
             counters[NUMBER] = number + 1
             if kind[e] == TC:
@@ -320,16 +339,20 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
                 # the foot left the floor without a push
                 bottom = min(start + rule.onset, middle)
                 at, sd = float(bottom), 2.0 * rule.loose_sd_s
-            sd = max(sd, rule.loose_sd_s)
-            total = _tell(found_int, found_float, total, TC, counters[NUMBER], k, 1, at, sd)
-            counters[NUMBER] += 1
+            sums[HELD_TC], sums[HELD_TC + 1] = at, max(sd, rule.loose_sd_s)
+            counters[HELD] = k
             first = bottom
         if top < 0:
             top = _highest(pitch, first + (end - first) // 2, end)
         at, sd = _landing(pitch, accs, top, first, k, moves, rate_hz, rule)
         sd = max(sd, rule.loose_sd_s)
-        total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, 1, at, sd)
-        counters[NUMBER] += 1
+        if swinging:
+            total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, 1, at, sd)
+            counters[NUMBER] += 1
+        else:
+            sums[HELD_IC], sums[HELD_IC + 1] = at, sd
+            if counters[PITCHED] >= k - rule.pause:
+                total = _tell_held(found_int, found_float, total, counters, sums, k)
         # the pitch rule need not wait for a maximum any more
         pitch_counters[2], pitch_counters[4], pitch_counters[5] = 0, k, -1
         _begin_movement(counters, sums, k, 0)

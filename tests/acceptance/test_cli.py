@@ -112,7 +112,8 @@ def test_simulated_walk_is_analysed_and_agrees_with_its_truth(
     )
     late = [np.abs(true_contacts - float(e["time_s"])).min() for e in contacts]
     assert len(contacts) >= 0.9 * len(true_contacts)
-    assert np.median(late) < 0.02
+    # the sole has touched when the foot begins to slap (docs/accuracy.md, "Contacts on simulated walks")
+    assert np.median(late) < 0.035
 
 
 def test_result_files_have_the_documented_columns(analysed: tuple[Path, str]) -> None:

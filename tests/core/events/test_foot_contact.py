@@ -54,15 +54,19 @@ def joined(parts: list[ContactReports]) -> list[tuple[int, int, int, bool, float
 
 
 def moved(
-    t: Floats, start: float, seconds: float, metres: float, turn: float
+    t: Floats, start: float, seconds: float, metres: float, turn: float, pitched_at: float | None = None
 ) -> tuple[Floats, Floats, Floats]:
-    """Orientations, speed and specific force of a flat foot that turns about the vertical and goes aside."""
+    """Orientations, speed and specific force of a flat foot that turns about the vertical and goes aside.
+
+    At `pitched_at` an ordinary swing begins.
+    """
+    pitch = np.zeros_like(t) if pitched_at is None else walk_pitch(t - pitched_at + REST_S, 1)
     heading = burst(t, start, seconds, turn)
-    q = orientation(np.zeros_like(t), heading)
+    q = orientation(pitch, heading)
     x = np.clip((t - start) / seconds, 0.0, 1.0)
     away = metres * 2 * np.pi / seconds**2 * np.sin(2 * np.pi * x) * ((x > 0) & (x < 1))
     force = np.stack([away, np.zeros_like(t), np.full_like(t, GRAVITY)], axis=1)
-    return q, np.abs(np.gradient(heading, t)), rotate(conjugate(q), force)
+    return q, np.abs(np.gradient(heading, t)) + np.abs(np.gradient(pitch, t)), rotate(conjugate(q), force)
 
 
 @pytest.mark.parametrize("rate_hz", [60.0, 100.0, 204.8])
@@ -105,24 +109,34 @@ def test_a_stream_gives_the_same_bits_as_the_file_and_the_refined_time_soon(bloc
     assert all(refined[n] - known <= FootContactParams().contact_s * RATE for n, known in first.items())
 
 
-def test_a_foot_that_steps_without_pitching_is_found_by_its_movement() -> None:
-    t = np.arange(400) / RATE
+@pytest.mark.parametrize("pitched_at", [0.8, 3.2])
+def test_a_foot_that_steps_without_pitching_is_found_by_its_movement(pitched_at: float) -> None:
+    """A last step is told after a pitched swing, a first one when the next tells that it was walking."""
+    t = np.arange(500) / RATE
+    q, speed, acc = moved(t, 2.0, 0.6, 0.3, np.radians(60.0), pitched_at)
+    told = advance_foot_contacts(FootContactState.start(RATE), q, np.ones(len(t), np.bool_), speed, acc)
+    own = [i for i, at in enumerate(told.at / RATE) if 1.9 < at < 2.9]
+    tc, ic = own
+    assert told.kind[own].tolist() == [0, 1]
+    assert 2.0 < told.at[tc] / RATE < 2.3
+    assert 2.3 < told.at[ic] / RATE < 2.7
+    assert (told.uncertainty_s[own] >= FootContactParams().loose_sd_s).all()
+    assert (told.known[ic] / RATE < 2.8) == (pitched_at < 2.0)
+    assert len(told.kind) == 5, "and the pitched swing, its contact told twice"
+
+
+def test_a_gait_without_any_pitched_swing_is_not_told_by_halves() -> None:
+    t = np.arange(500) / RATE
     q, speed, acc = moved(t, 2.0, 0.6, 0.3, np.radians(60.0))
-    valid = np.ones(len(t), np.bool_)
-    told = advance_foot_contacts(FootContactState.start(RATE), q, valid, speed, acc)
-    assert told.kind.tolist() == [0, 1]
-    assert 2.0 < told.at[0] / RATE < 2.3
-    assert 2.3 < told.at[1] / RATE < 2.7
-    assert (told.uncertainty_s >= FootContactParams().loose_sd_s).all()
-    assert told.known[1] / RATE < 2.8
+    assert not len(advance_foot_contacts(FootContactState.start(RATE), q, t >= 0.0, speed, acc).kind)
 
 
 @pytest.mark.parametrize(("metres", "turn"), [(0.02, 60.0), (0.3, 10.0)])
 def test_a_shift_on_the_spot_and_a_slow_slide_are_no_steps(metres: float, turn: float) -> None:
     t = np.arange(400) / RATE
-    q, speed, acc = moved(t, 2.0, 0.6, metres, np.radians(turn))
+    q, speed, acc = moved(t, 2.0, 0.6, metres, np.radians(turn), 0.8)
     told = advance_foot_contacts(FootContactState.start(RATE), q, np.ones(len(t), np.bool_), speed, acc)
-    assert not len(told.kind)
+    assert len(told.kind) == 3, "the pitched swing alone"
 
 
 def test_a_sensor_lost_in_the_window_ends_the_wait_for_the_refined_time() -> None:
