@@ -20,7 +20,7 @@ from core.events.foot_contact import (
     FootContactState,
     advance_foot_contacts,
 )
-from core.events.foot_motion import FootMotion
+from core.events.foot_movement import FootMovement
 from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
 from core.events.result import EventKind, GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
@@ -52,7 +52,7 @@ def detect_contacts(
     orientations: Orientations,
     pitch: FootPitchParams | None = None,
     params: FootContactParams | None = None,
-    motions: Mapping[Segment, FootMotion] | None = None,
+    motions: Mapping[Segment, FootMovement] | None = None,
 ) -> GaitEvents:
     """Contacts of each foot that carries a sensor, at the moment of contact, with their uncertainty.
 

@@ -9,8 +9,10 @@ without pitch". One kernel runs over a file and over a stream.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import cache
+from typing import Final, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +87,9 @@ class FootContactParams:
     loose_sd_s: float = 0.05
 
 
+_NOTHING: Final = np.zeros((1, 3))
+
+
 class ContactReports(NamedTuple):
     """What a block made known, in order: (m,) each.
 
@@ -100,50 +105,11 @@ class ContactReports(NamedTuple):
     uncertainty_s: Floats
 
 
-class ContactRule(NamedTuple):
-    """`FootContactParams` as the kernel takes them; whole numbers are samples."""
-
-    contact_share: float
-    leaving_share: float
-    stop_share: float
-    least_rad_s: float
-    push_s: float
-    lead_s: float
-    lag_s: float
-    still_rad_s: float
-    swing_rad_s: float
-    step_m: float
-    hump_rad: float
-    dip_rad: float
-    contact_sd_s: float
-    leaving_sd_s: float
-    flat_sd_s: float
-    late_sd_s: float
-    loose_sd_s: float
-    leaving: int
-    after: int
-    quiet: int
-    apart: int
-    swing: int
-    longest: int
-    onset: int
-    pause: int
-
-    @classmethod
-    def at_rate(cls, params: FootContactParams, rate_hz: float) -> ContactRule:
-        """The parameters at a sample rate."""
-        same = {name: float(getattr(params, name)) for name in cls._fields[:17]}
-        return cls(
-            **same,
-            leaving=round(params.leaving_s * rate_hz),
-            after=round(params.contact_s * rate_hz),
-            quiet=round(params.still_s * rate_hz),
-            apart=max(1, round(params.knock_s * rate_hz)),
-            swing=round(params.swing_s * rate_hz),
-            longest=round(params.longest_s * rate_hz),
-            onset=round(params.onset_s * rate_hz),
-            pause=round(params.pause_s * rate_hz),
-        )
+WINDOWS: Final = {
+    "leaving": "leaving_s", "after": "contact_s", "quiet": "still_s", "apart": "knock_s", "swing": "swing_s",
+    "longest": "longest_s", "onset": "onset_s", "pause": "pause_s",
+}  # fmt: skip
+"""Name in the kernel → parameter that it takes in samples, at least one."""
 
 
 @dataclass(eq=False)
@@ -152,13 +118,13 @@ class FootContactState:
 
     Parameters
     ----------
-    rule : of the pitch. pitch : (m,) the last pitches, rad. acc : (m, 3) the last specific forces.
+    rule : of the pitch. refinement : the parameters in the order of the kernel's.
+    pitch : (m,) the last pitches, rad. acc : (m, 3) the last specific forces.
     counters, sums : places named in foot_contact_kernel.py.
     """
 
     rule: FootPitchState
-    rate_hz: float
-    refinement: ContactRule
+    refinement: Floats
     pitch: Floats
     acc: Floats
     counters: NDArray[np.int64]
@@ -170,17 +136,28 @@ class FootContactState:
     ) -> FootContactState:
         """State before the first sample at `rate_hz`."""
         # numba is slow to import and only needed here
-        from core.events.foot_contact_kernel import BOTTOM, COUNTERS, HELD, NONE, OPEN_TOP, PITCHED, SUMS
+        from core.events.foot_contact_kernel import (
+            BOTTOM,
+            COUNTERS,
+            HELD,
+            NONE,
+            OPEN_TOP,
+            PITCHED,
+            SUMS,
+            ContactRule,
+        )
 
-        refinement = ContactRule.at_rate(params or FootContactParams(), rate_hz)
-        size = refinement.longest + refinement.leaving + refinement.quiet + refinement.apart + 2
+        params = params or FootContactParams()
+        samples = {name: max(1, round(getattr(params, of) * rate_hz)) for name, of in WINDOWS.items()}
+        same = {"rate_hz": rate_hz, **asdict(params), **samples}
+        rule = [same[name] for name in ContactRule._fields]
+        size = 2 + sum(samples[name] for name in ("longest", "leaving", "quiet", "apart"))
         counters = np.zeros(COUNTERS, np.int64)
         counters[OPEN_TOP] = -1
         counters[[BOTTOM, PITCHED, HELD]] = NONE
         return cls(
             rule=FootPitchState.start(rate_hz, pitch or FootPitchParams()),
-            rate_hz=rate_hz,
-            refinement=refinement,
+            refinement=np.array(rule, np.float64),
             pitch=np.zeros(size),
             acc=np.zeros((size, 3)),
             counters=counters,
@@ -199,23 +176,36 @@ def advance_foot_contacts(
     speed : (n,) norm of the angular rate, rad/s, without bias. acc : (n, 3) specific force, foot axes, m/s².
         Without them contacts are found and refined by pitch alone.
     """
-    from core.events.foot_contact_kernel import foot_contact_kernel
-
     room = 4 * (len(q) // (state.rule.window + 1) + 2)
     found_int, found_float = np.empty((room, 4), np.int64), np.empty((room, 2))
     moves = speed is not None and acc is not None
     rule = state.rule
     # copies: the kernel is compiled once, for writable contiguous arrays of these types
-    m = foot_contact_kernel(
+    m = _load_kernel()(
         np.array(q, np.float64),
-        np.array(speed, np.float64) if moves else np.zeros(1),
-        np.array(acc, np.float64) if moves else np.zeros((1, 3)),
-        np.array(valid, np.bool_), moves, state.rate_hz,
+        np.array(speed, np.float64) if moves else _NOTHING[0],
+        np.array(acc, np.float64) if moves else _NOTHING,
+        np.array(valid, np.bool_), moves,
         rule.ring, rule.counters, rule.held, rule.window, rule.need, rule.threshold, rule.fall,
         state.pitch, state.acc, state.counters, state.sums, state.refinement, found_int, found_float,
     )  # fmt: skip
+    if m == 0:
+        return _NO_REPORTS
     whole, parts = found_int[:m], found_float[:m]
     return ContactReports(whole[:, 0], whole[:, 1], whole[:, 2], whole[:, 3] == 1, parts[:, 0], parts[:, 1])
+
+
+_NO_REPORTS: Final = ContactReports(
+    *(np.empty(0, np.int64) for _ in range(3)), np.empty(0, np.bool_), np.empty(0), np.empty(0)
+)
+
+
+@cache
+def _load_kernel() -> Callable[..., int]:
+    """The compiled rule: numba is slow to import and only needed to run it."""
+    from core.events.foot_contact_kernel import foot_contact_kernel
+
+    return cast("Callable[..., int]", foot_contact_kernel)
 
 
 def compile_foot_contact_kernel() -> None:

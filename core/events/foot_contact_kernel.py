@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import asin, sqrt
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -39,6 +39,47 @@ OFFSET: Final = 5
 HELD_TC: Final = 6
 HELD_IC: Final = 8
 SUMS: Final = 10
+
+
+class ContactRule(NamedTuple):
+    """`FootContactParams` at a sample rate; whole numbers are samples."""
+
+    rate_hz: float
+    contact_share: float
+    leaving_share: float
+    stop_share: float
+    least_rad_s: float
+    push_s: float
+    lead_s: float
+    lag_s: float
+    still_rad_s: float
+    swing_rad_s: float
+    step_m: float
+    hump_rad: float
+    dip_rad: float
+    contact_sd_s: float
+    leaving_sd_s: float
+    flat_sd_s: float
+    late_sd_s: float
+    loose_sd_s: float
+    leaving: int
+    after: int
+    quiet: int
+    apart: int
+    swing: int
+    longest: int
+    onset: int
+    pause: int
+
+
+@njit(cache=True, nogil=True)
+def _read_rule(x):  # type: ignore[no-untyped-def]
+    """The rule in an array (26,): a tuple would take longer to hand over than the block to go through."""
+    return ContactRule(
+        x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12], x[13], x[14], x[15],
+        x[16], x[17], int(x[18]), int(x[19]), int(x[20]), int(x[21]), int(x[22]), int(x[23]), int(x[24]),
+        int(x[25]),
+    )  # fmt: skip
 
 
 @njit(cache=True, nogil=True)
@@ -233,20 +274,21 @@ def _lands_between(pitch, counters, k, rate_hz, rule):  # type: ignore[no-untype
 
 @njit(cache=True, nogil=True)
 def foot_contact_kernel(  # type: ignore[no-untyped-def]
-    q, speed, acc, valid, moves, rate_hz, pitch_ring, pitch_counters, pitch_held, window, need, threshold,
-    fall, pitch, accs, counters, sums, rule, found_int, found_float,
+    q, speed, acc, valid, moves, pitch_ring, pitch_counters, pitch_held, window, need, threshold,
+    fall, pitch, accs, counters, sums, rules, found_int, found_float,
 ):  # fmt: skip
     """Run over a block of one foot; returns how many reports were made.
 
     Parameters
     ----------
     q, speed, acc, valid : (n, 4), (n,), (n, 3), (n,), see `advance_foot_contacts`; moves False: without speed
-        and acc. pitch_ring to fall : of the pitch rule. pitch to rule : see `FootContactState`; pitch, accs,
+        and acc. pitch_ring to fall : of the pitch rule. pitch to rules : see `FootContactState`; pitch, accs,
         counters and sums are advanced in place.
     found_int : (room, 4) kind, number of the event, sample at which it is known, 1 = its last report.
     found_float : (room, 2) sample of the event, uncertainty in s.
     """
-    size = pitch.shape[0]
+    rule, size = _read_rule(rules), pitch.shape[0]
+    rate_hz = rule.rate_hz
     kind, index, known = np.empty(2, np.int64), np.empty(2, np.int64), np.empty(2, np.int64)
     offset, s = np.empty(2), np.empty(1)
     total = 0

@@ -17,7 +17,7 @@ from core.events.foot_contact import (
     FootContactState,
     advance_foot_contacts,
 )
-from core.events.foot_motion import FootMotion
+from core.events.foot_movement import FootMovement
 from core.events.foot_pitch import FootPitchParams
 from core.events.result import GaitEvent
 from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
@@ -60,7 +60,9 @@ class ContactDetector:
         self._open: list[dict[int, GaitEvent]] = [{} for _ in self.sides]
         self._rate_hz = rate_hz
 
-    def push(self, q: Floats, valid: Bools, motions: Sequence[FootMotion], first: int) -> list[KnownContact]:
+    def push(
+        self, q: Floats, valid: Bools, motions: Sequence[FootMovement], first: int
+    ) -> list[KnownContact]:
         """Contacts that these samples make known, in the order in which they become known.
 
         Parameters

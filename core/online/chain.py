@@ -26,7 +26,7 @@ from core.errors import Notice
 from core.estimators import ERKF, L7S_2I, L7S_3I
 from core.events.flags import StrideParams
 from core.events.foot_contact import FootContactParams
-from core.events.foot_motion import FootMotion
+from core.events.foot_movement import FootMovement
 from core.events.foot_pitch import FootPitchParams
 from core.events.live_contacts import ContactDetector
 from core.events.result import GaitEvent
@@ -215,7 +215,7 @@ class LiveChain:
         placed = self.estimator.push(MeasuredBlock(acc, gyr, valid, turned))
         angles = self._measure(placed, turned, valid)
         motions = [
-            FootMotion.of_signals(acc[:, k], gyr[:, k], mount)
+            FootMovement.of_signals(acc[:, k], gyr[:, k], mount)
             for k, mount in zip(self._feet, self._foot_mounts, strict=True)
         ]
         known = self._contacts.push(q[:, : len(self._feet)], valid[:, self._feet], motions, self.first)

@@ -21,7 +21,7 @@ from core.body.walking_frame import in_walking_frame
 from core.calibration.result import CalibratedRecording
 from core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
 from core.events.detection import detect_contacts as detect_foot_contacts
-from core.events.foot_motion import measure_foot_motions
+from core.events.foot_movement import measure_foot_movements
 from core.events.lumbar import detect_steps, split_about_vertical, trunk_sensor
 from core.events.result import GaitEvents
 from core.events.turns import body_yaw_rate, find_turns
@@ -201,7 +201,7 @@ def _contacts(
     """
     refined = None
     if config.detector != "foot_pitch":
-        motions = measure_foot_motions(calibrated)
+        motions = measure_foot_movements(calibrated)
         refined = detect_foot_contacts(orientations, config.events, config.contacts, motions)
     found = all_detectors(orientations, config.events, config.consensus, refined)
     feet = any(s in orientations.q for s in FOOT.values())

@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 
-from core.events.foot_motion import FootMotion
+from core.events.foot_movement import FootMovement
 from core.frames import R_NEUTRAL, Floats
 from core.fusion.orientations import Orientations
 from core.rotation import about, from_matrix, multiply
@@ -24,7 +24,7 @@ JOIN = 10
 
 
 @cache
-def take() -> tuple[Orientations, FootMotion, Floats, Floats]:
+def take() -> tuple[Orientations, FootMovement, Floats, Floats]:
     """The steps in a row as the right foot's orientation and motion; contacts and foot-offs by force, s."""
     path = data_folder("force_plate_steps", "steps_s1.csv")
     table = np.genfromtxt(path, delimiter=",", names=True)
@@ -59,7 +59,7 @@ def take() -> tuple[Orientations, FootMotion, Floats, Floats]:
     )
     return (
         orientations,
-        FootMotion(np.concatenate(speed), np.concatenate(acc)),
+        FootMovement(np.concatenate(speed), np.concatenate(acc)),
         np.array(contact),
         np.array(off),
     )

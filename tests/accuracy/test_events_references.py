@@ -17,7 +17,7 @@ import pytest
 
 from core import calibration, timeline
 from core.events.detection import detect, detect_contacts
-from core.events.foot_motion import measure_foot_motions
+from core.events.foot_movement import measure_foot_movements
 from core.events.result import EventKind, GaitEvents, Stride
 from core.events.strides import stride_list
 from core.frames import SIDES, Floats, Side
@@ -67,7 +67,7 @@ class Errors:
 def run(recording: Recording) -> FoundEvents:
     calibrated = calibration.calibrate(timeline.synchronise(recording))
     orientations = estimate_orientations(calibrated)
-    motions = measure_foot_motions(calibrated)
+    motions = measure_foot_movements(calibrated)
     refined = detect_contacts(orientations, motions=motions)
     found = {"foot_contact": refined, "foot_pitch": detect(orientations)}
     turning = calibrated.calibration.turning

@@ -12,7 +12,7 @@ from core.events.foot_contact import (
     FootContactState,
     advance_foot_contacts,
 )
-from core.events.foot_motion import FootMotion, measure_foot_motions
+from core.events.foot_movement import FootMovement, measure_foot_movements
 from core.frames import FOOT, GRAVITY, SIDES, Floats
 from core.rotation import conjugate, rotate
 from tests.core.events.foot_signal import foot_pitch, orientation, orientations
@@ -170,10 +170,10 @@ def test_motion_of_the_feet_is_without_bias_and_in_their_axes() -> None:
     from tests.walks import simulated
 
     calibrated = calibration.calibrate(simulated()[0])
-    motions = measure_foot_motions(calibrated)
+    motions = measure_foot_movements(calibrated)
     start, end = (round(x * RATE) for x in calibrated.calibration.zero)
     for side in SIDES:
         motion = motions[FOOT[side]]
-        assert isinstance(motion, FootMotion)
+        assert isinstance(motion, FootMovement)
         assert motion.speed[start:end].mean() < 0.05
         np.testing.assert_allclose(motion.acc[start:end].mean(axis=0), [0.0, GRAVITY, 0.0], atol=0.15)

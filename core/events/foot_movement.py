@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from core.calibration.result import CalibratedRecording, SegmentCalibration
 from core.frames import FOOT, Floats, Segment
+
+if TYPE_CHECKING:
+    # the package brings numba, which readers of results do without
+    from core.calibration.result import CalibratedRecording, SegmentCalibration
 
 
 @dataclass(frozen=True, eq=False)
-class FootMotion:
+class FootMovement:
     """Motion of one foot.
 
     Parameters
@@ -24,17 +28,17 @@ class FootMotion:
     acc: Floats
 
     @classmethod
-    def of_signals(cls, acc: Floats, gyr: Floats, mounted: SegmentCalibration) -> FootMotion:
+    def of_signals(cls, acc: Floats, gyr: Floats, mounted: SegmentCalibration) -> FootMovement:
         """From signals (n, 3) of a sensor and how it sits."""
         speed = np.sqrt(((gyr - mounted.gyro_bias) ** 2).sum(axis=1))
         return cls(speed, acc @ mounted.R_segment_sensor.T)
 
 
-def measure_foot_motions(calibrated: CalibratedRecording) -> Mapping[Segment, FootMotion]:
+def measure_foot_movements(calibrated: CalibratedRecording) -> Mapping[Segment, FootMovement]:
     """Motion of every foot that is calibrated."""
     mounted, sensors = calibrated.calibration.segments, calibrated.recording.sensors
     return {
-        foot: FootMotion.of_signals(sensors[foot].acc, sensors[foot].gyr, mounted[foot])
+        foot: FootMovement.of_signals(sensors[foot].acc, sensors[foot].gyr, mounted[foot])
         for foot in FOOT.values()
         if foot in mounted and foot in sensors
     }
