@@ -7,7 +7,7 @@ Source: docs/science/events.md, "Foot-pitch rule", "Refinement" and "Refusals".
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -76,38 +76,38 @@ def detect_contacts(
         motion = (motions or {}).get(FOOT[side])
         q, valid = orientations.q[FOOT[side]], orientations.valid[FOOT[side]]
         told = advance_foot_contacts(state, q, valid, *(() if motion is None else (motion.speed, motion.acc)))
-        return list(read_reports(told, side, float(orientations.t_s[0]), orientations.rate_hz).values())
+        waiting: dict[int, GaitEvent] = {}
+        reports = read_reports(told, side, float(orientations.t_s[0]), orientations.rate_hz, waiting)
+        final = [event for _, last, event in reports if last]
+        return [*final, *waiting.values()]
 
     return _each_foot(orientations, rule, find)
 
 
 def read_reports(
-    told: ContactReports,
-    side: Side,
-    start_s: float,
-    rate_hz: float,
-    before: Mapping[int, GaitEvent] | None = None,
-) -> dict[int, GaitEvent]:
-    """Number of an event → the event as it is known last, of those that are told here.
+    told: ContactReports, side: Side, start_s: float, rate_hz: float, waiting: dict[int, GaitEvent]
+) -> Iterator[tuple[int, bool, GaitEvent]]:
+    """Sample at which it is told, whether nothing more follows about it, and the event.
 
     Parameters
     ----------
-    start_s : time of sample 0. before : events whose refined time was still to come.
+    start_s : time of sample 0. waiting : events of earlier blocks whose refined time is to come; kept up to
+        date.
     """
-    found: dict[int, GaitEvent] = {}
-    for kind, number, known, _, at, uncertainty in zip(*told, strict=True):
-        time_s, known_s = start_s + float(at) / rate_hz, start_s + int(known) / rate_hz
-        first = found.get(int(number)) or (before or {}).get(int(number))
-        found[int(number)] = GaitEvent(
-            time_s=time_s,
+    for kind, number, known, last, at, uncertainty in zip(*told, strict=True):
+        first = waiting.pop(int(number), None)
+        event = GaitEvent(
+            time_s=start_s + float(at) / rate_hz,
             side=side,
             kind=KINDS[kind],
             source=SOURCE,
-            detected_s=known_s if first is None else first.detected_s,
+            detected_s=start_s + int(known) / rate_hz if first is None else first.detected_s,
             uncertainty_s=float(uncertainty),
             first_s=None if first is None else first.time_s,
         )
-    return found
+        if not last:
+            waiting[int(number)] = event
+        yield int(known), bool(last), event
 
 
 def detect(orientations: Orientations, params: FootPitchParams | None = None) -> GaitEvents:

@@ -195,9 +195,8 @@ def advance_foot_contacts(
     return ContactReports(whole[:, 0], whole[:, 1], whole[:, 2], whole[:, 3] == 1, parts[:, 0], parts[:, 1])
 
 
-_NO_REPORTS: Final = ContactReports(
-    *(np.empty(0, np.int64) for _ in range(3)), np.empty(0, np.bool_), np.empty(0), np.empty(0)
-)
+_NONE: Final = np.empty(0, np.int64)
+_NO_REPORTS: Final = ContactReports(_NONE, _NONE, _NONE, np.empty(0, np.bool_), np.empty(0), np.empty(0))
 
 
 @cache

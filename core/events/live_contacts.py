@@ -11,12 +11,7 @@ from typing import NamedTuple
 
 from core.errors import SignalError
 from core.events.detection import read_reports
-from core.events.foot_contact import (
-    ContactReports,
-    FootContactParams,
-    FootContactState,
-    advance_foot_contacts,
-)
+from core.events.foot_contact import FootContactParams, FootContactState, advance_foot_contacts
 from core.events.foot_movement import FootMovement
 from core.events.foot_pitch import FootPitchParams
 from core.events.result import GaitEvent
@@ -57,7 +52,7 @@ class ContactDetector:
             )
         self.sides: tuple[Side, ...] = tuple(s for f in feet for s in SIDES if FOOT[s] == f)
         self._feet = [FootContactState.start(rate_hz, pitch, params) for _ in self.sides]
-        self._open: list[dict[int, GaitEvent]] = [{} for _ in self.sides]
+        self._waiting: list[dict[int, GaitEvent]] = [{} for _ in self.sides]
         self._rate_hz = rate_hz
 
     def push(
@@ -73,13 +68,7 @@ class ContactDetector:
         found = []
         for i, (side, foot) in enumerate(zip(self.sides, self._feet, strict=True)):
             told = advance_foot_contacts(foot, q[:, i], valid[:, i], motions[i].speed, motions[i].acc)
-            for j in range(len(told.kind)):
-                one = ContactReports(*(x[j : j + 1] for x in told))
-                events = read_reports(one, side, first / self._rate_hz, self._rate_hz, self._open[i])
-                for number, event in events.items():
-                    if told.last[j]:
-                        self._open[i].pop(number, None)
-                    else:
-                        self._open[i][number] = event
-                    found.append(KnownContact(int(told.known[j]), event, bool(told.last[j])))
+            start_s = first / self._rate_hz
+            for known, final, event in read_reports(told, side, start_s, self._rate_hz, self._waiting[i]):
+                found.append(KnownContact(known, event, final))
         return sorted(found, key=lambda x: (x.at, x.event.side))

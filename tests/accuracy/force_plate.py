@@ -28,7 +28,11 @@ def take() -> tuple[Orientations, FootMovement, Floats, Floats]:
     """The steps in a row as the right foot's orientation and motion; contacts and foot-offs by force, s."""
     path = data_folder("force_plate_steps", "steps_s1.csv")
     table = np.genfromtxt(path, delimiter=",", names=True)
-    pitch, speed, acc, contact, off = [], [], [], [], []
+    pitch: list[Floats] = []
+    speed: list[Floats] = []
+    acc: list[Floats] = []
+    contact: list[float] = []
+    off: list[float] = []
     first = 0
     for step in np.unique(table["step"]):
         part = table[table["step"] == step]

@@ -40,8 +40,7 @@ FLEXION_DEG, FRONTAL_DEG, ROTATION_DEG = 2.0, 5.0, 4.0
 
 STRIDE_BIAS_MM, STRIDE_SD_MM = 15.0, 10.0
 CONTACT_MS = 30.0
-"""The refined contact is 18 to 24 ms after the simulator's first touch (docs/science/events.md, "Simulated feet")."""
-"""Of the median: where a foot does not pitch up until it lands, the rule is early by that landing."""
+"""Of the median: 18 to 24 ms after the simulator's first touch (docs/science/events.md, "Simulated feet")."""
 
 DRIFT_DEG = 3.0
 """Of a foot's mean heading against the pelvis', last minute of five against the first, three sensors."""
