@@ -18,7 +18,7 @@ ENTRIES: Final = (
         needs=("foot_off",),
         trainable=True,
         everyday="foot on the floor",
-        norm=NormKey("walkway", "stance_pct", differs="foot_off"),
+        norm=NormKey("walkway", "stance_pct"),
         change="share",
     ),
     ParameterEntry(
@@ -32,7 +32,7 @@ ENTRIES: Final = (
         needs=("foot_off",),
         trainable=True,
         everyday="foot in the air",
-        norm=NormKey("walkway", "swing_pct", differs="foot_off"),
+        norm=NormKey("walkway", "swing_pct"),
         change="share",
     ),
     ParameterEntry(
@@ -45,7 +45,7 @@ ENTRIES: Final = (
         definition="Both feet on the floor, as a share of the stride.",
         needs=("other_foot", "foot_off"),
         trainable=True,
-        norm=NormKey("walkway", "double_support_pct", differs="foot_off"),
+        norm=NormKey("walkway", "double_support_pct"),
         change="share",
     ),
     ParameterEntry(
@@ -83,7 +83,7 @@ ENTRIES: Final = (
         needs=("other_foot", "foot_off"),
         trainable=True,
         everyday="standing on one foot",
-        norm=NormKey("walkway", "single_support_pct", differs="foot_off"),
+        norm=NormKey("walkway", "single_support_pct"),
         change="share",
     ),
     ParameterEntry(
