@@ -106,7 +106,7 @@ def judge_flags(
     """
     found = _values(curves, parameters, standing_deg or {})
     speed = next((p.mean for p in parameters if p.name == "gait_speed_mps"), None)
-    slow = speed is not None and not walking_speed(speed, height_m).has_norm
+    slow = speed is not None and walking_speed(speed, height_m).is_slow
     child = wbds_group(age) is None
     result: list[Flag] = []
     for rule in RULES:

@@ -138,6 +138,12 @@ def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -
     return NormValues(values, None if values else "no_norm_for_age")
 
 
+def explain_difference(name: str) -> str:
+    """Why a walkway's reference of a parameter says nothing about ours; empty where it compares."""
+    norm = CATALOGUE[name].norm
+    return "" if norm is None else _DIFFERS[norm.differs]
+
+
 def comfortable_speed(age: float | None, sex: Sex | None) -> NormValue | None:
     """Speed at which healthy people of this age like to walk: what a person's speed itself is held against.
 
