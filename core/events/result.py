@@ -45,6 +45,7 @@ class GaitEvent:
     detected_s : when a real-time detector would have known it.
     source : name of the detector ("foot_pitch"), "consensus" or "manual".
     confidence : 0 to 1, share of the detectors that found it (core/events/consensus.py); None = one detector.
+    uncertainty_s : standard, of its time; None = that of its detector (core/parameters/uncertainty.py).
     """
 
     time_s: float
@@ -53,6 +54,7 @@ class GaitEvent:
     source: str
     detected_s: float
     confidence: float | None = None
+    uncertainty_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

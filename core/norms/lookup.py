@@ -57,10 +57,10 @@ class Norms:
     reason: str | None = None
     timing_reason: str | None = None
 
-    def place(self, name: str, value: float | None) -> NormPlacement:
-        """Where a value of a parameter stands."""
+    def place(self, name: str, value: float | None, uncertainty: float | None = None) -> NormPlacement:
+        """Where a value of a parameter, known ± `uncertainty`, stands."""
         reason = self.reason if is_angle(name) else self.timing_reason
-        return place_value(value, self.values.get(name), reason or "no_norm")
+        return place_value(value, self.values.get(name), reason or "no_norm", uncertainty)
 
     def place_difference(self, name: str, left: float | None, right: float | None) -> NormPlacement:
         """Where left minus right stands among healthy differences."""

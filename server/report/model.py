@@ -339,7 +339,17 @@ def _key_number(row: ParameterRow) -> KeyNumber:
         text="" if row.both is None else row.both.text,
         left="–" if row.left is None else row.left.text,
         right="–" if row.right is None else row.right.text,
-        words=", ".join(w for w in (few, row.difference, norm) if w),
+        words=", ".join(w for w in (_plus_minus(row), few, row.difference, norm) if w),
+    )
+
+
+def _plus_minus(row: ParameterRow) -> str:
+    """What the numbers are known to: "± 0.02", of two sides "± 4 | 5" where they differ."""
+    found = [c.plus_minus for c in (row.both, row.left, row.right) if c is not None and c.plus_minus]
+    return (
+        found[0]
+        if len(set(found)) == 1
+        else " | ".join((*found[:1], *(x.removeprefix("± ") for x in found[1:])))
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import hypot, sqrt
 from typing import Final
 
 from core.frames import Side
@@ -13,7 +14,7 @@ from core.norms.values import NormValue
 from core.parameters.catalogue import CATALOGUE, name_counted
 from core.parameters.result import Parameter
 from core.parameters.symmetry import Symmetry, compare_sides
-from core.parameters.variability import has_enough_values
+from core.parameters.variability import NORMAL_95, has_enough_values
 from server.report.change_words import ChangeWords
 from server.report.curves import range_svg
 from server.report.wording import (
@@ -41,6 +42,8 @@ class TableCell:
     ci : 95 % confidence interval of the mean over the strides. cv_pct : None below 10 strides.
     z, percentile : among the norm's people, None without a comparable norm or with too few strides.
     few : "3 strides" where they are too few to be compared with anything, else "".
+    uncertainty : value ± this holds the truth with 95 %, by strides and measurement; None where not known.
+    plus_minus : "± 0.03", "" without. known_by : both parts in words, for the page of the parameter.
     """
 
     value: float
@@ -53,6 +56,9 @@ class TableCell:
     z: float | None = None
     percentile: float | None = None
     few: str = ""
+    uncertainty: float | None = None
+    plus_minus: str = ""
+    known_by: str = ""
 
 
 @dataclass(frozen=True)
@@ -256,7 +262,7 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
             f"CV {format_number(p.cv_pct, 1)} %{' of few strides' if p.note == 'few_strides' else ''}"
         )
     enough = has_enough_values(p)
-    place = norms.place(p.name, p.mean if enough else None)
+    place = norms.place(p.name, p.mean if enough else None, p.uncertainty)
     if place.z is not None and place.percentile is not None:
         told.append(
             f"z {format_number(place.z, 1)}, percentile {format_number(place.percentile)} of the norm"
@@ -272,6 +278,23 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
         place.z,
         place.percentile,
         "" if enough else f"{p.n} {what if p.n != 1 else what.removesuffix('s')}",
+        p.uncertainty,
+        "" if p.uncertainty is None else f"± {format_number(p.uncertainty, term.digits)}",
+        _known_by(p, term),
+    )
+
+
+def _known_by(p: Parameter, term: Term) -> str:
+    """What the uncertainty is made of, in words; empty where it is not known."""
+    entry = CATALOGUE.get(p.name)
+    if p.uncertainty is None or entry is None or entry.errors is None:
+        return ""
+    measured = NORMAL_95 * hypot(p.u_own or 0.0, p.u_common or 0.0)
+    strides = sqrt(max(p.uncertainty**2 - measured**2, 0.0))
+    digits = max(term.digits, 1)
+    return (
+        f"± {format_number(p.uncertainty, digits)}\u202f{term.unit} (95 %): strides "
+        f"± {format_number(strides, digits)}, {entry.errors.source} ± {format_number(measured, digits)}"
     )
 
 

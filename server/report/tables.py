@@ -29,6 +29,7 @@ def parameters_csv(report: ReportModel) -> bytes:
         "n",
         "mean",
         "sd",
+        "uncertainty",
         "unit",
         "difference",
         *SYMMETRY.values(),
@@ -47,7 +48,7 @@ def parameters_csv(report: ReportModel) -> bytes:
             for r in group:
                 cells = (("", r.both),) if r.both is not None else (("left", r.left), ("right", r.right))
                 for side, c in cells:
-                    numbers = (0, None, None) if c is None else (c.n, c.value, c.sd)
+                    numbers = (0, None, None, None) if c is None else (c.n, c.value, c.sd, c.uncertainty)
                     norm = (r.norm_mean, r.norm_sd, r.norm_source, r.norm_group)
                     usual = (r.comfortable_mean, r.comfortable_sd)
                     yield (
