@@ -65,7 +65,7 @@ class CurveModel:
         above = int(np.clip(np.searchsorted(self.speeds, v), 1, len(self.speeds) - 1))
         low, high = self.speeds[above - 1 : above + 1]
         share = float(np.clip((v - low) / (high - low), 0.0, 1.0))
-        return (1.0 - share) * self.spread[above - 1] + share * self.spread[above]
+        return np.asarray((1.0 - share) * self.spread[above - 1] + share * self.spread[above])
 
 
 @cache

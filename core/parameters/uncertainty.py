@@ -94,7 +94,7 @@ def _stated(
         return p
     errors = entry.errors
     variable = None if entry.curve is None else entry.curve.variable
-    if variable in estimated:
+    if variable is not None and variable in estimated:
         joint = variable.partition("_")[0]
         errors = replace(errors, own=max(errors.own, ESTIMATED_DEG.get(joint, errors.own)))
     common, own, random = errors.common, errors.own, errors.random

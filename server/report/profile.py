@@ -39,8 +39,8 @@ class ProfileRow:
     Parameters
     ----------
     left, right, healthy, svg : against people at the person's speed where `ProfileView.at_speed`.
-    comfortable : "6.1 | 4.0" of left and right against people at their comfortable speed, "" where the above
-        are against these already.
+    comfortable_left, comfortable_right : against people at their comfortable speed, "" where the above are
+        against these already.
     """
 
     title: str
@@ -50,7 +50,8 @@ class ProfileRow:
     svg: str
     low_confidence: bool
     total: bool
-    comfortable: str = ""
+    comfortable_left: str = ""
+    comfortable_right: str = ""
 
 
 @dataclass(frozen=True)
@@ -100,10 +101,8 @@ def _beside(
     """The row with the scores against people at their comfortable speed, where others are shown."""
     if comfortable is shown:
         return row
-    return replace(
-        row,
-        comfortable=" | ".join(_text(comfortable.find(name, mode, side, variable)) for side in SIDES),
-    )
+    left, right = (_text(comfortable.find(name, mode, side, variable)) for side in SIDES)
+    return replace(row, comfortable_left=left, comfortable_right=right)
 
 
 def _row(title: str, found: dict[Side, Score], *, low: bool, total: bool) -> ProfileRow:

@@ -139,7 +139,7 @@ def test_value_and_uncertainty_hold_the_truth() -> None:
         "Uncertainty: what is told holds the truth",
         ["walk", "values within ±", "error over ±, median", "largest"],
         rows,
-        "± at 95 % (docs/science/uncertainty.md). Simulated people have no error of skin, shoe or Vicon: their "
-        "± is too wide, as it should be. The errors of angles and distances come from the two real walks "
-        f"themselves. Limit: {100 * SHARE:.0f} % of the values of every walk.",
+        "± at 95 % (docs/science/uncertainty.md). Simulated people have no error of skin, shoe or Vicon: "
+        "their ± is too wide, as it should be. The errors of angles and distances come from the two real "
+        f"walks themselves. Limit: {100 * SHARE:.0f} % of the values of every walk.",
     )

@@ -200,11 +200,11 @@ def test_a_slow_walker_is_held_against_people_at_this_speed_and_the_comfortable_
     assert row.norm_mean == pytest.approx(0.472, abs=0.002)
     assert model.profile is not None
     assert model.profile.at_speed
-    assert all(" | " in bar.comfortable for bar in model.profile.rows)
+    assert all(bar.comfortable_left and bar.comfortable_right for bar in model.profile.rows)
     usual = report_model(bundle, age=40, sex="female", speed_mps=1.3)
     assert not usual.at_speed
     assert usual.profile is not None
-    assert not any(bar.comfortable for bar in usual.profile.rows)
+    assert not any(bar.comfortable_left for bar in usual.profile.rows)
 
 
 def test_offsets_that_were_subtracted_are_printed(bundle: Bundle) -> None:
