@@ -26,6 +26,7 @@ from core.parameters.rows import Column
 from core.parameters.smoothness import stride_smoothness
 from core.parameters.spatial import in_place
 from core.parameters.trunk import trunk_regularity
+from core.parameters.uncertainty import state_uncertainty
 from core.parameters.walking import bout_parameters, step_parameters, step_strides, turn_parameters
 from core.rest import Window
 
@@ -117,6 +118,8 @@ def measure_gait(tracks: Tracks, edits: Sequence[Edit] = ()) -> MeasuredGait:
     steps = None if events.events else tracks.steps
     bouts = find_bouts(events, tracks.rests, tracks.bout_params) if steps is None else steps.bouts
     first = figures.parameters if steps is None else _of_steps(tracks, steps, figures.parameters)
+    estimated = () if tracks.angles is None else tracks.angles.estimated
+    first = state_uncertainty(first, events, estimated)
     parameters = first + bout_parameters(bouts) + turn_parameters(tracks.turns)
     return MeasuredGait(events, strides, parameters, figures.columns, bouts, tracks.turns, steps)
 

@@ -86,7 +86,7 @@ class Scores:
     scores : by mode: GVS of nine variables of each side, then profiles and indices. The movement analysis
         profile (MAP) is the set of GVS with the GPS: `profile`.
     reference_n, group, source, zero : of the reference people, printed beside the scores.
-    speed_matched : False: the reference people walked at their comfortable speed, whatever the person's.
+    speed_matched : the reference people walked at the person's speed; False: at their comfortable one.
     """
 
     scores: tuple[Score, ...]
@@ -120,7 +120,9 @@ def score_curves(
     Parameters
     ----------
     curves : from standing. standing_deg : goniometer angles in standing (`core.parameters.anatomical_zero`).
-    reference : None = 42 healthy adults. estimated : variables no two sensors measure; they are not scored.
+    reference : None = 42 healthy adults at their comfortable speed; at the person's own:
+        `core.norms.adult_reference_at_speed`.
+    estimated : variables no two sensors measure; they are not scored.
     age : years; below 18 there is no score against adults (`no_norm_for_age`). None = an adult.
     """
     child = reference is None and wbds_group(age) is None
@@ -141,7 +143,14 @@ def score_curves(
                 found += _profile(profile, side, mode, single, reference)
     if child:
         found = [replace(s, value=None, n=0, healthy=None, percentile=None, reason=_CHILD) for s in found]
-    return Scores(tuple(found), reference.n, reference.group, reference.source, reference.zero)
+    return Scores(
+        tuple(found),
+        reference.n,
+        reference.group,
+        reference.source,
+        reference.zero,
+        reference.speed_matched,
+    )
 
 
 _CHILD: Final = "no_norm_for_age"

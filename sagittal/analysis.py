@@ -14,7 +14,7 @@ from core.errors import Notice
 from core.frames import Floats, Side
 from core.parameters.result import Parameter
 
-NUMBERS = ("mean", "sd", "cv_pct", "ci_low", "ci_high")
+NUMBERS = ("mean", "sd", "cv_pct", "ci_low", "ci_high", "uncertainty", "u_own", "u_common")
 """Columns of the parameter table that hold a number or null."""
 
 

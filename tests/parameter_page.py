@@ -36,7 +36,7 @@ def render_page(text: str) -> str:
 
 def _table(group: str) -> str:
     rows = [_row(entry) for entry in CATALOGUE.values() if entry.group == group]
-    head = ("name", "label", "unit", "definition", "needs", "norm", "change")
+    head = ("name", "label", "unit", "definition", "needs", "norm", "change", "± from")
     lines = [" | ".join(cells) for cells in (head, ("---",) * len(head), *rows)]
     return "".join(f"| {line} |\n" for line in lines).replace("| --- ", "|---").replace("|--- |", "|---|")
 
@@ -50,7 +50,8 @@ def _row(entry: ParameterEntry) -> tuple[str, ...]:
         norm += f", not comparable ({entry.norm.differs.replace('_', '-')})"
     needs = ", ".join(NEEDS[need] for need in entry.needs)
     change = (entry.change or "").replace("_", " ")
-    return f"`{entry.name}`", entry.label, entry.printed_unit, definition, needs, norm, change
+    known = "" if entry.errors is None else entry.errors.source
+    return f"`{entry.name}`", entry.label, entry.printed_unit, definition, needs, norm, change, known
 
 
 def _window(curve: CurveFigure) -> str:

@@ -60,3 +60,10 @@ class JointAngles:
     headings: Mapping[str, Floats] = field(default_factory=dict)
     withheld: Mapping[str, str] = field(default_factory=dict)
     bounds: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def estimated(self) -> frozenset[str]:
+        """Variables, without the side, that no two sensors measure on some side."""
+        told = self.diagnostics.get("estimated", ())
+        names = [str(name) for name in told] if isinstance(told, (tuple, list)) else []
+        return frozenset(name.removesuffix("_l").removesuffix("_r") for name in names)

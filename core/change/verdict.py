@@ -25,12 +25,13 @@ from core.norms.values import NormValue
 from core.parameters.kinematic import is_level
 from core.parameters.result import Parameter
 from core.parameters.symmetry import Symmetry
+from core.parameters.uncertainty import difference_half_width
 from core.parameters.variability import TOO_FEW, has_enough_values
 from core.scores import Score
 
 Verdict = Literal["within_measurement_error", "real_change", "clinically_relevant"]
 
-STRIDES: Final = "strides of the two sessions, 95 %"
+STRIDES: Final = "strides and measurement of the two sessions, 95 %"
 """Source of a limit that comes from the spread of the strides alone."""
 
 UNLIKE: Final = "conditions_differ"
@@ -158,7 +159,7 @@ def _parameter(
     mdc = find_detectable_change(new.name, old.mean, limb) if own is None else own.limit
     open_by_strides = _strides(old, new)
     if mdc is not None and open_by_strides > mdc.value:
-        mdc = ChangeLimit(open_by_strides, "these strides", STRIDES)
+        mdc = ChangeLimit(open_by_strides, "these sessions", STRIDES)
     if norm is not None and norm.comparable and old.mean != new.mean:
         change = replace(change, towards_norm=abs(new.mean - norm.mean) < abs(old.mean - norm.mean))
     if is_level(new.name):
@@ -167,11 +168,15 @@ def _parameter(
 
 
 def _strides(old: Parameter, new: Parameter) -> float:
-    """Half width of the interval of the difference of two means, 0 where a session has no interval."""
+    """Half width of the interval of a difference of two means: of strides, and of what takes measure anew.
+
+    What both takes share, as the definition of a contact, is in both values and not in their difference.
+    """
     halves = [
         0.5 * (p.ci_high - p.ci_low) for p in (old, new) if p.ci_low is not None and p.ci_high is not None
     ]
-    return hypot(*halves) if len(halves) == 2 else 0.0
+    of_strides = hypot(*halves) if len(halves) == 2 else 0.0
+    return difference_half_width(of_strides, old.u_own, new.u_own)
 
 
 def _plain(name: str, side: Side | None, unit: str, before: float | None, after: float | None) -> Change:

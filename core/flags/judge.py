@@ -69,6 +69,7 @@ class _Value:
     n: int = 0
     reason: str | None = None
     sd: float | None = None
+    own: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ def judge_flags(
     """
     found = _values(curves, parameters, standing_deg or {})
     speed = next((p.mean for p in parameters if p.name == "gait_speed_mps"), None)
-    slow = speed is not None and not walking_speed(speed, height_m).has_norm
+    slow = speed is not None and walking_speed(speed, height_m).is_slow
     child = wbds_group(age) is None
     result: list[Flag] = []
     for rule in RULES:
@@ -126,7 +127,11 @@ def judge_flags(
 def _values(
     curves: CycleCurves | None, parameters: Sequence[Parameter], standing_deg: Mapping[str, float]
 ) -> _Values:
-    plain = {(p.name, p.side): _Value(p.mean, p.n, p.reason, p.sd) for p in parameters if p.side is not None}
+    plain = {
+        (p.name, p.side): _Value(p.mean, p.n, p.reason, p.sd, p.u_own or 0.0)
+        for p in parameters
+        if p.side is not None
+    }
     for side in SIDES:
         swing, stance = plain.get(("swing_time_s", side)), plain.get(("stance_time_s", side))
         if swing is not None and stance is not None and swing.mean is not None and stance.mean:
@@ -210,7 +215,7 @@ def _clear(flag: Flag, a: _Value, b: _Value) -> Flag:
     """Sides whose strides overlap so far that either may be the larger are not beyond anything."""
     if not flag.exceeded or a.mean is None or b.mean is None:
         return flag
-    if differ(Spread(a.mean, a.sd, a.n), Spread(b.mean, b.sd, b.n)):
+    if differ(Spread(a.mean, a.sd, a.n, a.own), Spread(b.mean, b.sd, b.n, b.own)):
         return flag
     return replace(flag, exceeded=None, marked=False, reason="sides_alike")
 

@@ -1,6 +1,6 @@
 """Reference tables (package data) and their lookup."""
 
-from core.norms.adults import adult_reference
+from core.norms.adults import adult_reference, adult_reference_at_speed
 from core.norms.kinematics import NormBand, NormBands, adult_kinematics
 from core.norms.lookup import Norms, look_up_norms
 from core.norms.place import NormPlacement
@@ -15,6 +15,7 @@ __all__ = [
     "Norms",
     "adult_kinematics",
     "adult_reference",
+    "adult_reference_at_speed",
     "angle_values",
     "look_up_norms",
     "predict_at_speed",

@@ -5,9 +5,11 @@ from __future__ import annotations
 from functools import cache
 from typing import Final
 
+from core.norms.at_speed import is_matched, reference_at_speed
 from core.norms.kinematics import adult_kinematics
 from core.norms.profile import MODES, CurveReference, Mode, ScoreSpread
-from core.norms.tables import WBDS, WBDS_N, read_rows
+from core.norms.speed import WalkingSpeed
+from core.norms.tables import WBDS, WBDS_N, read_rows, wbds_group
 
 _KEYS: Final = {
     "GPS_side_9var": "gps_side",
@@ -33,6 +35,13 @@ def adult_reference() -> CurveReference:
         group="adult_21_84",
         source=WBDS,
     )
+
+
+def adult_reference_at_speed(age: float | None, speed: WalkingSpeed | None) -> CurveReference | None:
+    """Reference of healthy adults asked to walk at this speed; None where nobody was, or none below 18."""
+    if speed is None or not is_matched(speed.norm_speed) or wbds_group(age) is None:
+        return None
+    return reference_at_speed(age, speed.norm_speed, adult_reference())
 
 
 def _spreads(mode: Mode) -> dict[str, ScoreSpread]:

@@ -15,7 +15,6 @@ from typing import Final, Literal
 import numpy as np
 
 from core.frames import Floats
-from core.norms.speed import SLOW_MPS
 from core.norms.tables import LEVEL, WBDS, WBDS_N, read_rows, wbds_group
 
 Zero = Literal["anatomical", "standing", "stride_mean"]
@@ -63,27 +62,23 @@ class NormBand:
 
 @dataclass(frozen=True, eq=False)
 class NormBands:
-    """Bands by variable, or none and the reason: "no_norm_for_age", "no_speed_matched_norm"."""
+    """Bands by variable, or none and the reason: "no_norm_for_age"."""
 
     bands: Mapping[str, NormBand] = field(default_factory=dict)
     reason: str | None = None
 
 
-def adult_kinematics(age: float | None, speed_mps: float | None = None) -> NormBands:
+def adult_kinematics(age: float | None) -> NormBands:
     """Reference bands for a person of this age, walking overground at comfortable speed (1.25 ± 0.16 m/s).
+
+    Those at a person's own speed: `core.norms.at_speed`.
 
     Parameters
     ----------
     age : years; None = all adults.
-    speed_mps : walking speed if known, on legs of 0.9 m (`WalkingSpeed.equivalent_mps`); below 0.8 m/s no
-        reference applies.
     """
     group = wbds_group(age)
-    if group is None:
-        return NormBands(reason="no_norm_for_age")
-    if speed_mps is not None and speed_mps < SLOW_MPS:
-        return NormBands(reason="no_speed_matched_norm")
-    return NormBands(_bands(group))
+    return NormBands(reason="no_norm_for_age") if group is None else NormBands(_bands(group))
 
 
 @cache

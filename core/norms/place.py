@@ -22,7 +22,8 @@ class NormPlacement:
     Parameters
     ----------
     z : standard deviations above their mean. percentile : share in % of such people below the value, taken
-        as normally distributed. grade : 0 within 1.5 sd, 1 within 4.5, 2 beyond.
+        as normally distributed.
+    grade : 0 within 1.5 sd, 1 within 4.5, 2 beyond; the least that value ± uncertainty leaves possible.
     norm : the reference, also where it is not comparable.
     reason : "no_value", "no_norm", "not_comparable" (`norm.note` says why), "no_spread", or the reason of a
         lookup that found nobody.
@@ -35,15 +36,17 @@ class NormPlacement:
     reason: str | None = None
 
 
-def place_value(value: float | None, norm: NormValue | None, reason: str = "no_norm") -> NormPlacement:
-    """Place one value; `reason` says why there is no norm where the lookup knows it."""
+def place_value(
+    value: float | None, norm: NormValue | None, reason: str = "no_norm", uncertainty: float | None = None
+) -> NormPlacement:
+    """Place one value, known ± `uncertainty`; `reason` says why there is no norm, where that is known."""
     if norm is None:
         return NormPlacement(None, None, None, None, reason)
     if not norm.comparable:
         return NormPlacement(None, None, None, norm, "not_comparable")
     if value is None:
         return NormPlacement(None, None, None, norm, "no_value")
-    return _placed(value - norm.mean, norm.sd, norm)
+    return _placed(value - norm.mean, norm.sd, norm, uncertainty or 0.0)
 
 
 def place_difference(left: float | None, right: float | None, norm: NormValue | None) -> NormPlacement:
@@ -74,10 +77,11 @@ def percentile_of_sample(z: float, n: int) -> float:
     return float(100.0 * stdtr(n - 1, z / sqrt(1.0 + 1.0 / n)))
 
 
-def _placed(distance: float, sd: float, norm: NormValue) -> NormPlacement:
+def _placed(distance: float, sd: float, norm: NormValue, uncertainty: float = 0.0) -> NormPlacement:
     if sd <= 0.0:
         return NormPlacement(None, None, None, norm, "no_spread")
     z = distance / sd
     below = percentile_of_z(z) if norm.n is None else percentile_of_sample(z, norm.n)
-    grade: Grade = 0 if abs(z) <= GRADES_SD[0] else 1 if abs(z) <= GRADES_SD[1] else 2
+    sure = max(abs(z) - uncertainty / sd, 0.0)
+    grade: Grade = 0 if sure <= GRADES_SD[0] else 1 if sure <= GRADES_SD[1] else 2
     return NormPlacement(z, below, grade, norm)

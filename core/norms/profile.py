@@ -60,6 +60,7 @@ class CurveReference:
     spreads : mode → variable, or profile and "_side" or "_overall" → the people themselves, leave one out.
     zero : what the angles are measured from; raw scores need curves with the same zero.
     n, group, source : people, who, from where; printed beside every score.
+    speed_matched : they walked at the person's speed, else at their own.
     """
 
     mean_deg: Mapping[str, Floats]
@@ -68,6 +69,7 @@ class CurveReference:
     n: int
     group: str
     source: str
+    speed_matched: bool = False
 
 
 def gvs(curve: Floats, reference: Floats, mode: Mode) -> Floats:

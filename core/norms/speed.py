@@ -1,8 +1,9 @@
 """Walking speed as norms are chosen by it: free of the length of the legs.
 
 docs/science/norms-and-scores.md, "Speed". Dimensionless speed v / √(g L) (Hof 1996, Gait & Posture 4:222)
-makes short and tall people alike. Norms are given for adults with legs of about 0.9 m, so a person's speed is
-also told as the speed of such legs; where the height is not known it is the speed itself.
+makes short and tall people alike. The walkway norms are of adults with legs of about 0.9 m, so a person's
+speed is also told as the speed of such legs; where the height is not known it is the speed itself. The norms
+by speed measure the leg shorter: their dimensionless speed is one of its own.
 """
 
 from __future__ import annotations
@@ -18,7 +19,22 @@ LEG_M: Final = 0.9
 """Leg of the reference adults, hip to floor."""
 
 SLOW_MPS: Final = 0.8
-"""No adult reference exists for walking slower than this on such legs."""
+"""Nobody in the tables of comfortable walking is slower than this on such legs."""
+
+NORM_LEG_FRACTION: Final = 0.472
+"""Leg over height of the adults of the norms by speed (Schreiber & Moissenet 2019)."""
+
+NORM_LEG_SHARE: Final = 0.89
+"""Their leg over a leg from the front of the pelvis to the ankle: 0.472 / 0.53."""
+
+NORM_LEG_M: Final = 0.828
+"""Their leg where nobody's height is known: that of the tables in m/s."""
+
+SLOWEST: Final = 0.085
+"""v* below which they did not walk (0.24 m/s on a leg of 0.828 m): a norm would be extrapolated."""
+
+COMFORTABLE: Final = 1.25 / sqrt(GRAVITY * NORM_LEG_M)
+"""v* at which the norms by speed meet those of comfortable walking, 0.439; above it the latter hold."""
 
 WBDS_MPS: Final = (1.25, 0.16)
 """Mean and sd of the speed at which the adults of the angle norms walked."""
@@ -33,22 +49,42 @@ class WalkingSpeed:
     speed_mps : as measured. leg_m : hip to floor, None = height not known.
     dimensionless : v / √(g L), None without the height.
     equivalent_mps : the same dimensionless speed on legs of 0.9 m; without the height the speed itself.
+    norm_leg_m : leg as the norms by speed measure it.
     """
 
     speed_mps: float
     leg_m: float | None
     dimensionless: float | None
     equivalent_mps: float
+    norm_leg_m: float = NORM_LEG_M
 
     @property
-    def has_norm(self) -> bool:
-        """Reference people walked as slowly as this."""
-        return self.equivalent_mps >= SLOW_MPS
+    def is_slow(self) -> bool:
+        """Slower than anybody in the tables of comfortable walking."""
+        return self.equivalent_mps < SLOW_MPS
+
+    @property
+    def norm_speed(self) -> float:
+        """Dimensionless speed v* as the norms by speed count it."""
+        return self.speed_mps / sqrt(GRAVITY * self.norm_leg_m)
 
 
-def walking_speed(speed_mps: float, height_m: float | None = None) -> WalkingSpeed:
-    """Relate a speed to the legs that made it; leg length by Winter's fractions of the height."""
-    if height_m is None:
+def walking_speed(
+    speed_mps: float, height_m: float | None = None, leg_m: float | None = None
+) -> WalkingSpeed:
+    """Relate a speed to the legs that made it.
+
+    Parameters
+    ----------
+    leg_m : measured from the front of the pelvis to the ankle; None = by Winter's fractions of the height.
+    """
+    if leg_m is None and height_m is None:
         return WalkingSpeed(speed_mps, None, None, speed_mps)
-    leg = (THIGH_FRACTION + SHANK_FRACTION + ANKLE_FRACTION) * height_m
-    return WalkingSpeed(speed_mps, leg, speed_mps / sqrt(GRAVITY * leg), speed_mps * sqrt(LEG_M / leg))
+    if leg_m is not None:
+        leg, norm_leg = leg_m, NORM_LEG_SHARE * leg_m
+    else:
+        leg = (THIGH_FRACTION + SHANK_FRACTION + ANKLE_FRACTION) * (height_m or 0.0)
+        norm_leg = NORM_LEG_FRACTION * (height_m or 0.0)
+    return WalkingSpeed(
+        speed_mps, leg, speed_mps / sqrt(GRAVITY * leg), speed_mps * sqrt(LEG_M / leg), norm_leg
+    )

@@ -22,7 +22,10 @@ COARSE_S: Final = 0.05
 """Contacts less certain than this (s, in the median) put a share of the stride off by two points and more, a
 reference sd. Our choice."""
 
-_SHARES: Final = frozenset(("stance_pct", "swing_pct", "double_support_pct", "single_support_pct"))
+_SHARES: Final = frozenset(
+    ("stance_pct", "swing_pct", "double_support_pct", "single_support_pct",
+     "initial_double_support_pct", "terminal_double_support_pct")
+)  # fmt: skip
 
 _WIDTH = "Not comparable: a walkway measures between the heels, we between the ankles, which is wider."
 """Heels lie 5 to 6 cm behind the ankles: with toes out by 7 to 10° that is 1 to 2 cm, half a reference sd."""
@@ -151,6 +154,12 @@ def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -
             note=note,
         )
     return NormValues(values, None if values else "no_norm_for_age")
+
+
+def explain_difference(name: str) -> str:
+    """Why a walkway's reference of a parameter says nothing about ours; empty where it compares."""
+    norm = CATALOGUE[name].norm
+    return "" if norm is None else _DIFFERS[norm.differs]
 
 
 def comfortable_speed(age: float | None, sex: Sex | None) -> NormValue | None:

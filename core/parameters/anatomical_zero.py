@@ -12,6 +12,7 @@ from core.frames import SIDES, SUFFIX, Floats, Side
 from core.parameters.catalogue import list_curve_figures
 from core.parameters.kinematic import is_level, summarise_angles
 from core.parameters.result import CycleCurves, Parameter
+from core.parameters.uncertainty import state_uncertainty
 from core.standing_angles import JOINTS, PELVIS, check_standing
 
 
@@ -58,13 +59,14 @@ def anatomical_parameters(curves: CycleCurves, standing_deg: Mapping[str, float]
     Names are those of the parameters from standing; ranges, which have no zero, are not repeated.
     """
     level, figures = anatomical_curves(curves, standing_deg), list_curve_figures()
-    return tuple(
+    found = tuple(
         p
         for p in summarise_angles(level)
         if p.side is not None
         and is_level(p.name)
         and p.side in level.curves.get(figures[p.name].variable, {})
     )
+    return state_uncertainty(found, goniometer=True)
 
 
 def anatomical_variables(standing_deg: Mapping[str, float]) -> tuple[str, ...]:

@@ -21,6 +21,10 @@ class Parameter:
     cv_pct : coefficient of variation; None below 10 strides, for angles and where a value is not positive.
     ci_low, ci_high : 95 % confidence interval of the mean over the strides, None when n < 2.
     note : what to know about the number: "few_strides" below 30; None.
+    uncertainty : the value ± this holds the truth with 95 %, from its strides and its measurement
+        (core/parameters/uncertainty.py); None where the measurement's part is not known.
+    u_own, u_common : standard uncertainties of the measurement that strides do not average out: of this side
+        in this take, and shared by both sides and every take.
     """
 
     name: str
@@ -34,6 +38,9 @@ class Parameter:
     ci_low: float | None = None
     ci_high: float | None = None
     note: str | None = None
+    uncertainty: float | None = None
+    u_own: float | None = None
+    u_common: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

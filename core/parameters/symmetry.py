@@ -43,8 +43,8 @@ class Symmetry:
     ----------
     first : the side that stands first: the affected one, else left. reference : "affected/unaffected" or
         "left/right".
-    difference : first − other, in `unit`. low, high : its 95 % interval, None where the spread of a side is
-        not known. ratio : first / other.
+    difference : first − other, in `unit`. low, high : its 95 % interval, of strides and measurement, None
+        where the spread of a side is not known. ratio : first / other.
     index_pct : 100 (first − other) / mean of both (Robinson 1987), positive when the first is larger.
     angle_pct : (45° − atan(first / other)) / 90° · 100 (Zifchock 2008), as published: NEGATIVE when the
         first is larger.
@@ -85,7 +85,13 @@ def compare_sides(parameters: Sequence[Parameter], affected: Side | None = None)
         (found.get((p.name, first)), found.get((p.name, OTHER[first]))) for p in parameters if p.side == first
     )
     return tuple(
-        _symmetry(a, Spread(a.mean, a.sd, a.n), Spread(b.mean, b.sd, b.n), first, reference)
+        _symmetry(
+            a,
+            Spread(a.mean, a.sd, a.n, a.u_own or 0.0),
+            Spread(b.mean, b.sd, b.n, b.u_own or 0.0),
+            first,
+            reference,
+        )
         for a, b in pairs
         if a is not None and a.mean is not None and has_enough_values(a)
         if b is not None and b.mean is not None and has_enough_values(b)

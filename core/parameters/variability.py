@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import sqrt
+from math import hypot, sqrt
 from typing import Final
 
 import numpy as np
@@ -27,6 +27,9 @@ STEADY_STRIDES: Final = 30
 
 CONFIDENCE: Final = 0.95
 """Of the interval of the mean."""
+
+NORMAL_95: Final = 1.96
+"""Two-sided quantile of `CONFIDENCE` of the normal distribution."""
 
 TOO_FEW: Final = "too_few_strides"
 """Reason of a comparison that is not made for want of strides."""
@@ -75,23 +78,33 @@ def cv_pct(values: Sequence[float] | np.ndarray, unit: str) -> float | None:
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean, standard deviation (n − 1; None below two) and number of the values of one side."""
+    """Mean, standard deviation (n − 1; None below two) and number of the values of one side.
+
+    Parameters
+    ----------
+    own : standard uncertainty of the measurement of this side that strides do not average out.
+    """
 
     mean: float
     sd: float | None
     n: int
+    own: float = 0.0
 
 
 def difference_interval(a: Spread, b: Spread) -> tuple[float, float] | None:
-    """95 % interval of a − b, None without spreads (Welch 1947, Biometrika 34:28; freedom rounded down)."""
+    """95 % interval of a − b, None without spreads (Welch 1947, Biometrika 34:28; freedom rounded down).
+
+    What the measurement of each side leaves open is added as a root of squares: strides do not lessen it.
+    """
     if a.sd is None or b.sd is None:
         return None
     own, other = a.sd**2 / a.n, b.sd**2 / b.n
     between = own + other
-    if between == 0.0:
-        return a.mean - b.mean, a.mean - b.mean
-    freedom = between**2 / (own**2 / (a.n - 1) + other**2 / (b.n - 1))
-    half = t_quantile(max(int(freedom), 1)) * sqrt(between)
+    half = 0.0
+    if between > 0.0:
+        freedom = between**2 / (own**2 / (a.n - 1) + other**2 / (b.n - 1))
+        half = t_quantile(max(int(freedom), 1)) * sqrt(between)
+    half = hypot(half, NORMAL_95 * hypot(a.own, b.own))
     return a.mean - b.mean - half, a.mean - b.mean + half
 
 

@@ -98,6 +98,7 @@ def view_comparison(reviewed: ReviewedAnalyses, found: SessionPair) -> dict[str,
         "figure": all("poses.parquet" in a.found.files for a in (found.before, found.after)),
         "used": {"before": old.used, "after": new.used},
         "norm_source": next((p.norm.source for p in drawn if p.norm is not None), None),
+        "at_speed": any(p.comfortable is not None for p in drawn),
         "norm_note": new.norm_note,
         "quality": {"before": old.quality, "after": new.quality},
     }

@@ -54,6 +54,7 @@ SHOWN: Final = (
     "duration_s",
     "norm_note",
     "norm_source",
+    "at_speed",
     "curve_notes",
     "used",
     "replay",

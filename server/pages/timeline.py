@@ -86,6 +86,7 @@ def view_numbers(
         "key_curve": draw_chart(model.key_curve, KEY_HEIGHT, x_unit=True),
         "used": model.used,
         "norm_source": model.norm_source,
+        "at_speed": model.at_speed,
         "stride_words": f"{sum(model.used.values())} of {len(model.strides)} used",
         "replay": {**model.replay, "curves": {}},
         "empty_reason": explain_emptiness(model),

@@ -16,10 +16,9 @@ from server.auth.roles import Action
 from server.context import HEX_ID, Db, Id, Reviewed
 from server.pages.shell import record_opening, render_page
 from server.report.change_words import change_words, find_term
-from server.report.notes import GROUPS
 from server.report.trend_chart import PlannedAssessment, trend_svg
 from server.report.trends import PRIMARY, AnalysedVisit, Trend, TrendSeries, follow_figures, names_in
-from server.report.wording import format_number
+from server.report.wording import GROUPS, format_number
 from server.services import histories, patients
 from server.services.histories import PatientHistory
 from web.words import day

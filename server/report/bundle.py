@@ -134,6 +134,7 @@ def read_angles(data: bytes) -> JointAngles:
         found,
         zero,
         meta["angle_zero"],
+        diagnostics={"estimated": tuple(meta.get("estimated", ()))},
         standing_deg=standing,
         withheld=dict(meta.get("withheld", {})),
         bounds={name: math.radians(bound) for name, bound in meta.get("bounds_deg", {}).items()},

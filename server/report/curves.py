@@ -55,6 +55,8 @@ def cycle_svg(
     plot = _CyclePlot(v.y_range, height - _TOP - (_BOTTOM_WITH_UNIT if x_unit else _BOTTOM))
     if panel.norm is not None:
         plot.norm(panel.norm.mean_deg, panel.norm.sd_deg)
+    if panel.comfortable is not None:
+        plot.curve(panel.comfortable.mean_deg, "cm")
     plot.grid(v.ticks)
     for side, curve in panel.sides.items():
         plot.foot_off_spread(side, curve)

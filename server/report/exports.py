@@ -131,6 +131,9 @@ def parameter_row(p: Parameter) -> dict[str, object]:
         "ci_low": reduce_to_plain(p.ci_low),
         "ci_high": reduce_to_plain(p.ci_high),
         "note": p.note,
+        "uncertainty": reduce_to_plain(p.uncertainty),
+        "u_own": reduce_to_plain(p.u_own),
+        "u_common": reduce_to_plain(p.u_common),
     }
 
 
@@ -144,6 +147,8 @@ def angles_parquet(angles: JointAngles) -> bytes:
         meta["withheld"] = dict(angles.withheld)
     if angles.bounds:
         meta["bounds_deg"] = {name: math.degrees(bound) for name, bound in angles.bounds.items()}
+    if angles.diagnostics.get("estimated"):
+        meta["estimated"] = reduce_to_plain(angles.diagnostics["estimated"])
     if angles.standing_deg:
         meta["standing_angles_deg"] = dict(angles.standing_deg)
     return parquet_file(angles.t_s, columns, meta)

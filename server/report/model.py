@@ -16,9 +16,12 @@ from core.errors import Notice
 from core.events.result import MANUAL
 from core.flags import judge_flags
 from core.frames import SIDES, Floats, Side
+from core.norms.adults import adult_reference_at_speed
 from core.norms.controls import ControlGroup
+from core.norms.kinematics import NormBand
 from core.norms.lookup import Norms, look_up_norms
 from core.norms.values import withdraw_shares
+from core.norms.profile import CurveReference
 from core.parameters import cycle_curves
 from core.parameters.anatomical_zero import anatomical_variables
 from core.parameters.result import CycleCurves
@@ -144,6 +147,11 @@ class ReportModel:
         return next(p for p in self.panels if p.variable.name == KEY_CURVE)
 
     @property
+    def at_speed(self) -> bool:
+        """A band is of people at the person's speed, the line beside it of people at their own."""
+        return any(p.comfortable is not None for p in self.panels)
+
+    @property
     def used(self) -> dict[Side, int]:
         """Strides that count, by side."""
         return {side: sum(s.used for s in self.strides if s.side == side) for side in SIDES}
@@ -198,19 +206,20 @@ def report_model(
     height_m: float | None = None,
     affected: Side | None = None,
     controls: ControlGroup | None = None,
+    treadmill: bool = False,
 ) -> ReportModel:
     """Build the report of a finished analysis.
 
     Parameters
     ----------
     age : years at the visit; without it curves are compared with all adults, timing with nobody.
-    speed_mps : walking speed, None = the take's own; below 0.8 m/s no reference applies.
+    speed_mps : walking speed, None = the take's own. treadmill : it was walked on a belt.
     height_m : makes the speed dimensionless, so that legs of any length find their reference.
     affected : side, None = none or both. controls : the clinic's own, where no published norm compares.
     """
     if speed_mps is None:
         speed_mps = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
-    norms = look_up_norms(age, sex, speed_mps, height_m)
+    norms = look_up_norms(age, sex, speed_mps, height_m, treadmill=treadmill)
     found = [e.uncertainty_s for e in bundle.events.events if e.source != MANUAL]
     norms = replace(norms, values=withdraw_shares(norms.values, found))
     own = None if controls is None else controls.norms(speed_mps, height_m)
@@ -260,13 +269,23 @@ def report_model(
         provenance=bundle.provenance,
         estimator=estimator_view(bundle.estimator),
         limits=_limits(bundle, curves, height_m, age, own),
-        profile=None if curves is None else profile_view(_scores(bundle, curves, age)),
+        profile=None
+        if curves is None
+        else profile_view(
+            _scores(bundle, curves, age),
+            None
+            if (matched := adult_reference_at_speed(age, norms.speed)) is None
+            else _scores(bundle, curves, age, matched),
+        ),
     )
 
 
-def _scores(bundle: Bundle, curves: CycleCurves, age: float | None) -> Scores:
+def _scores(
+    bundle: Bundle, curves: CycleCurves, age: float | None, reference: CurveReference | None = None
+) -> Scores:
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
-    return score_curves(curves, standing, estimated=list_estimated_variables(bundle.estimator), age=age)
+    unsure = list_estimated_variables(bundle.estimator)
+    return score_curves(curves, standing, reference, estimated=unsure, age=age)
 
 
 def _limits(
@@ -324,26 +343,27 @@ def _key_number(row: ParameterRow) -> KeyNumber:
         text="" if row.both is None else row.both.text,
         left="–" if row.left is None else row.left.text,
         right="–" if row.right is None else row.right.text,
-        words=", ".join(w for w in (few, row.difference, norm) if w),
+        words=", ".join(w for w in (_plus_minus(row), few, row.difference, norm) if w),
+    )
+
+
+def _plus_minus(row: ParameterRow) -> str:
+    """What the numbers are known to: "± 0.02", of two sides "± 4 | 5" where they differ."""
+    found = [c.plus_minus for c in (row.both, row.left, row.right) if c is not None and c.plus_minus]
+    return (
+        found[0]
+        if len(set(found)) == 1
+        else " | ".join((*found[:1], *(x.removeprefix("± ") for x in found[1:])))
     )
 
 
 def _profile_json(profile: ProfileView) -> dict[str, object]:
     rows = [{k: v for k, v in asdict(row).items() if k != "svg"} for row in profile.rows]
-    return {"rows": rows, "index": profile.index, "note": profile.note}
+    return {"rows": rows, "index": profile.index, "note": profile.note, "at_speed": profile.at_speed}
 
 
 def _panel_json(p: CurvePanel) -> dict[str, object]:
     v = p.variable
-    norm = None
-    if p.norm is not None:
-        norm = {
-            "mean_deg": round_curve(p.norm.mean_deg),
-            "sd_deg": round_curve(p.norm.sd_deg),
-            "n": p.norm.n,
-            "group": p.norm.group,
-            "source": p.norm.source,
-        }
     return {
         "variable": v.name,
         "title": p.title,
@@ -354,9 +374,22 @@ def _panel_json(p: CurvePanel) -> dict[str, object]:
         "y_range_deg": v.y_range,
         "up": v.up,
         "down": v.down,
-        "norm": norm,
+        "norm": _band_json(p.norm),
+        "comfortable": _band_json(p.comfortable),
         "norm_note": p.norm_note,
         "sides": {side: _side_json(c) for side, c in p.sides.items()},
+    }
+
+
+def _band_json(band: NormBand | None) -> dict[str, object] | None:
+    if band is None:
+        return None
+    return {
+        "mean_deg": round_curve(band.mean_deg),
+        "sd_deg": round_curve(band.sd_deg),
+        "n": band.n,
+        "group": band.group,
+        "source": band.source,
     }
 
 

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from core.norms.at_speed import ASKED, SOURCE
 from core.norms.controls import ControlGroup
 from core.norms.lookup import Norms
 from core.norms.values import is_angle
@@ -14,16 +15,9 @@ from server.report.bundle import Bundle
 from server.report.estimator import estimator_view
 from server.report.panels import DRAWN_STRIDES, CurvePanel
 from server.report.table import ParameterRow
-from server.report.wording import NO_NORM, VARIABLES, format_number
+from server.report.wording import GROUPS, NO_NORM, VARIABLES, format_number
 
 SPEED: Final = "gait_speed_mps"
-
-GROUPS: Final = {
-    "adult_21_84": "adults 21–84 years",
-    "adult_21_54": "adults 21–54 years",
-    "adult_55_84": "adults 55–84 years",
-}
-"""Group of a reference → its people in words."""
 
 
 def norm_note(
@@ -37,17 +31,28 @@ def norm_note(
     if norms.reason is not None:
         sentences.append(NO_NORM.get(norms.reason, norms.reason))
     used = any(p.norm is not None and p.norm.zero == "anatomical" for p in panels)
-    band = next(iter(norms.bands.values()), None)
-    if band is not None and (used or any(r.norm is not None and is_angle(r.name) for r in rows)):
+    angles = used or any(r.norm is not None and is_angle(r.name) for r in rows)
+    matched = bool(norms.comfortable_bands)
+    if matched and any(r.norm_group == ASKED for r in rows):
+        sentences.append(_matched_note(norms))
+    bands = norms.comfortable_bands if matched else norms.bands
+    band = next(iter(bands.values()), None)
+    if band is not None and angles:
         who = GROUPS.get(band.group, band.group)
         sentences.append(
-            f"Norm: {band.n} {who}, overground at their comfortable 1.25 ± 0.16 m/s, mean ± 1 SD "
-            f"({band.source})."
+            f"{'Comfortable' if matched else 'Norm'}: {band.n} {who}, overground at their comfortable "
+            f"1.25 ± 0.16 m/s, mean ± 1 SD ({band.source})."
         )
     if norms.timing_reason is not None and norms.timing_reason != norms.reason:
         sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
     elif shown := [
-        r for r in rows if r.norm is not None and r.name != SPEED and not is_angle(r.name) and r.unit != "°"
+        r
+        for r in rows
+        if r.norm is not None
+        and r.norm_group != ASKED
+        and r.name != SPEED
+        and not is_angle(r.name)
+        and r.unit != "°"
     ]:
         sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
     if any(r.name == SPEED and r.norm is not None for r in rows):
@@ -56,6 +61,15 @@ def norm_note(
     if controls is not None:
         sentences.append(_own_note(controls))
     return " ".join(sentences)
+
+
+def _matched_note(norms: Norms) -> str:
+    """Who was asked to walk at this speed, and what they are not."""
+    at = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
+    return (
+        f"Norm: {ASKED}{at}, overground, mean ± 1 SD ({SOURCE}). They are not people who are slow from habit "
+        "or age."
+    )
 
 
 def _own_note(controls: ControlGroup) -> str:

@@ -64,6 +64,7 @@ class CurvePanel:
     reason : why there is no curve, None if there is one.
     norm : band to draw, of the same zero; None where there is none. norm_note : what must be said about it,
         or why there is none though a norm exists.
+    comfortable : the same people's band at their comfortable speed, where `norm` is at the person's own.
     """
 
     variable: Variable
@@ -75,6 +76,7 @@ class CurvePanel:
     norm: NormBand | None
     norm_note: str
     sides: Mapping[Side, SideCurve]
+    comfortable: NormBand | None = None
 
 
 def curve_panels(
@@ -98,7 +100,10 @@ def curve_panels(
     for v in VARIABLES:
         bands = [b for by_name in (norms.bands, *known) if (b := by_name.get(v.name)) is not None]
         added = {s: standing_offset_deg(v.name, s, standing) for s in SIDES} if v.name in level else {}
-        found.append(_panel(v, curves, added, bands, sure=v.name not in estimated))
+        panel = _panel(v, curves, added, bands, sure=v.name not in estimated)
+        if panel.norm is not None and panel.norm is norms.bands.get(v.name):
+            panel = replace(panel, comfortable=norms.comfortable_bands.get(v.name))
+        found.append(panel)
     return tuple(found)
 
 
@@ -121,6 +126,7 @@ def _from_standing(panel: CurvePanel) -> CurvePanel:
         norm=None,
         norm_note="",
         sides=sides,
+        comfortable=None,
     )
 
 

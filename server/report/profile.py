@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from core.frames import SIDES, Side
@@ -34,7 +34,14 @@ TOTALS: Final[tuple[tuple[str, Mode, str], ...]] = (
 
 @dataclass(frozen=True)
 class ProfileRow:
-    """A bar of the profile: GVS of one variable, or a profile over several, in degrees as text."""
+    """A bar of the profile: GVS of one variable, or a profile over several, in degrees as text.
+
+    Parameters
+    ----------
+    left, right, healthy, svg : against people at the person's speed where `ProfileView.at_speed`.
+    comfortable_left, comfortable_right : against people at their comfortable speed, "" where the above are
+        against these already.
+    """
 
     title: str
     left: str
@@ -43,32 +50,59 @@ class ProfileRow:
     svg: str
     low_confidence: bool
     total: bool
+    comfortable_left: str = ""
+    comfortable_right: str = ""
 
 
 @dataclass(frozen=True)
 class ProfileView:
-    """Rows of the profile, GDI* in words, what it leaves out, and who the reference people are."""
+    """Rows of the profile, GDI* in words, what it leaves out, and who the reference people are.
+
+    Parameters
+    ----------
+    at_speed : the reference people were asked to walk at the person's speed.
+    """
 
     rows: tuple[ProfileRow, ...]
     index: str
     note: str
+    at_speed: bool = False
 
 
-def profile_view(scores: Scores) -> ProfileView | None:
-    """None when no curve could be scored."""
+def profile_view(comfortable: Scores, matched: Scores | None = None) -> ProfileView | None:
+    """None when no curve could be scored.
+
+    Parameters
+    ----------
+    comfortable, matched : scores of the same curves, against people at their comfortable speed and at the
+        person's own; None where nobody walked so.
+    """
+    scores = comfortable if matched is None else matched
     rows = []
     for variable in dict.fromkeys(s.variable for s in scores.scores if s.variable is not None):
         found = {side: scores.find("gvs_deg", MODE, side, variable) for side in SIDES}
         if any(s.value is not None for s in found.values()):
             label, plane = LABELS.get(variable, variable), PLANES.get(variable)
-            rows.append(_row(label, found, low=plane != "sagittal", total=False))
+            row = _row(label, found, low=plane != "sagittal", total=False)
+            rows.append(_beside(row, comfortable, scores, "gvs_deg", MODE, variable))
     if not rows:
         return None
     for name, mode, title in TOTALS:
         both = {side: scores.find(name, mode, side) for side in SIDES}
         if any(s.value is not None for s in both.values()):
-            rows.append(_row(title, both, low=name == "gps_deg", total=True))
-    return ProfileView(tuple(rows), _index(scores), _note(scores))
+            row = _row(title, both, low=name == "gps_deg", total=True)
+            rows.append(_beside(row, comfortable, scores, name, mode))
+    return ProfileView(tuple(rows), _index(scores), _note(scores), scores.speed_matched)
+
+
+def _beside(
+    row: ProfileRow, comfortable: Scores, shown: Scores, name: str, mode: Mode, variable: str | None = None
+) -> ProfileRow:
+    """The row with the scores against people at their comfortable speed, where others are shown."""
+    if comfortable is shown:
+        return row
+    left, right = (_text(comfortable.find(name, mode, side, variable)) for side in SIDES)
+    return replace(row, comfortable_left=left, comfortable_right=right)
 
 
 def _row(title: str, found: dict[Side, Score], *, low: bool, total: bool) -> ProfileRow:
@@ -119,9 +153,13 @@ def _note(scores: Scores) -> str:
         if gps.value is None and missing
         else ""
     )
+    people = (
+        "healthy adults asked to walk at this speed"
+        if scores.speed_matched
+        else f"{scores.reference_n} healthy adults at their own comfortable speed"
+    )
     return (
-        f"Root mean square distance of each mean curve from that of {scores.reference_n} healthy adults, the "
-        "level of each curve removed, because angles start from the person's standing. Dark to the 75th, "
-        "light to the 95th percentile of these adults, their median as a line; they walked at their own "
-        f"comfortable speed.{without} {scores.source}."
+        f"Root mean square distance of each mean curve from that of {people}. The level of each curve is "
+        "removed, because angles start from the person's standing. Dark to the 75th, light to the 95th "
+        f"percentile of these adults, their median as a line.{without} {scores.source}."
     )

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import hypot, sqrt
 from typing import Final
 
 from core.frames import Side
 from core.norms.kinematics import Zero
 from core.norms.lookup import Norms
+from core.norms.values import NormValue
 from core.parameters.catalogue import CATALOGUE, name_counted
 from core.parameters.result import Parameter
 from core.parameters.symmetry import Symmetry, compare_sides
-from core.parameters.variability import has_enough_values
+from core.parameters.variability import NORMAL_95, has_enough_values
 from server.report.change_words import ChangeWords
 from server.report.curves import range_svg
 from server.report.wording import (
+    GROUPS,
     NO_DIFFERENCE,
     Term,
     difference_words,
@@ -39,6 +42,8 @@ class TableCell:
     ci : 95 % confidence interval of the mean over the strides. cv_pct : None below 10 strides.
     z, percentile : among the norm's people, None without a comparable norm or with too few strides.
     few : "3 strides" where they are too few to be compared with anything, else "".
+    uncertainty : value ± this holds the truth with 95 %, by strides and measurement; None where not known.
+    plus_minus : "± 0.03", "" without. known_by : both parts in words, for the page of the parameter.
     """
 
     value: float
@@ -51,6 +56,9 @@ class TableCell:
     z: float | None = None
     percentile: float | None = None
     few: str = ""
+    uncertainty: float | None = None
+    plus_minus: str = ""
+    known_by: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,6 +70,9 @@ class ParameterRow:
     both : value of the whole take; else `left` and `right`, None where not measured.
     difference : left against right in words. norm : "62.6 ± 2.0". norm_mean, norm_sd, norm_n, norm_source :
         behind it; None where no comparable norm exists, `norm_note` then says why if there is a reason.
+        norm_group : its people in words.
+    comfortable : norm of people at their comfortable speed, with its figures, where `norm` is of people at
+        the person's own; else None.
     reason : words in place of all numbers, None if there is any.
     low_confidence : of an angle that the estimator's model gives; it has no norm.
     symmetry : left against right in numbers, None unless both sides have one of enough strides.
@@ -83,7 +94,13 @@ class ParameterRow:
     norm_sd: float | None = None
     norm_n: int | None = None
     norm_source: str | None = None
+    norm_group: str | None = None
     norm_note: str = ""
+    comfortable: str | None = None
+    comfortable_mean: float | None = None
+    comfortable_sd: float | None = None
+    comfortable_source: str | None = None
+    comfortable_group: str | None = None
     low_confidence: bool = False
     symmetry: Symmetry | None = None
 
@@ -151,6 +168,8 @@ def _row(
     missing = both is None and left is None and right is None
     symmetry = next(iter(compare_sides(tuple(sides.values()), affected)), None)
     shown = norm if norm is not None and norm.comparable else None
+    usual = None if shown is None else norms.comfortable.get(name)
+    usual = usual if usual is not None and usual.comparable else None
     return ParameterRow(
         name=name,
         title=title_of(name, term.label, zero),
@@ -162,16 +181,26 @@ def _row(
         difference=_difference(left, right, sides, term, symmetry) if both is None and not missing else None,
         reason=reason_words(next(iter(sides.values())).reason) if missing else None,
         scale=term.scale,
-        norm=None
-        if shown is None
-        else f"{format_number(shown.mean, term.digits)} ± {format_number(shown.sd, _sd_digits(term))}",
+        norm=_norm_text(shown, term),
         norm_mean=None if shown is None else shown.mean,
         norm_sd=None if shown is None else shown.sd,
         norm_n=None if shown is None else shown.n,
         norm_source=None if shown is None else shown.source,
+        norm_group=None if shown is None else GROUPS.get(shown.group, shown.group),
         norm_note="" if norm is None else norm.note,
+        comfortable=_norm_text(usual, term),
+        comfortable_mean=None if usual is None else usual.mean,
+        comfortable_sd=None if usual is None else usual.sd,
+        comfortable_source=None if usual is None else usual.source,
+        comfortable_group=None if usual is None else GROUPS.get(usual.group, usual.group),
         symmetry=symmetry,
     )
+
+
+def _norm_text(norm: NormValue | None, term: Term) -> str | None:
+    if norm is None:
+        return None
+    return f"{format_number(norm.mean, term.digits)} ± {format_number(norm.sd, _sd_digits(term))}"
 
 
 def _unsure(row: ParameterRow) -> ParameterRow:
@@ -190,6 +219,12 @@ def _unsure(row: ParameterRow) -> ParameterRow:
         norm_sd=None,
         norm_n=None,
         norm_source=None,
+        norm_group=None,
+        comfortable=None,
+        comfortable_mean=None,
+        comfortable_sd=None,
+        comfortable_source=None,
+        comfortable_group=None,
         low_confidence=True,
     )
 
@@ -227,7 +262,7 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
             f"CV {format_number(p.cv_pct, 1)} %{' of few strides' if p.note == 'few_strides' else ''}"
         )
     enough = has_enough_values(p)
-    place = norms.place(p.name, p.mean if enough else None)
+    place = norms.place(p.name, p.mean if enough else None, p.uncertainty)
     if place.z is not None and place.percentile is not None:
         told.append(
             f"z {format_number(place.z, 1)}, percentile {format_number(place.percentile)} of the norm"
@@ -243,6 +278,23 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
         place.z,
         place.percentile,
         "" if enough else f"{p.n} {what if p.n != 1 else what.removesuffix('s')}",
+        p.uncertainty,
+        "" if p.uncertainty is None else f"± {format_number(p.uncertainty, term.digits)}",
+        _known_by(p, term),
+    )
+
+
+def _known_by(p: Parameter, term: Term) -> str:
+    """What the uncertainty is made of, in words; empty where it is not known."""
+    entry = CATALOGUE.get(p.name)
+    if p.uncertainty is None or entry is None or entry.errors is None:
+        return ""
+    measured = NORMAL_95 * hypot(p.u_own or 0.0, p.u_common or 0.0)
+    strides = sqrt(max(p.uncertainty**2 - measured**2, 0.0))
+    digits = max(term.digits, 1)
+    return (
+        f"± {format_number(p.uncertainty, digits)}\u202f{term.unit} (95 %): strides "
+        f"± {format_number(strides, digits)}, {entry.errors.source} ± {format_number(measured, digits)}"
     )
 
 

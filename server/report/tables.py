@@ -29,12 +29,16 @@ def parameters_csv(report: ReportModel) -> bytes:
         "n",
         "mean",
         "sd",
+        "uncertainty",
         "unit",
         "difference",
         *SYMMETRY.values(),
         "norm_mean",
         "norm_sd",
         "norm_source",
+        "norm_group",
+        "comfortable_mean",
+        "comfortable_sd",
         "reason",
         "condition",
     )
@@ -44,8 +48,9 @@ def parameters_csv(report: ReportModel) -> bytes:
             for r in group:
                 cells = (("", r.both),) if r.both is not None else (("left", r.left), ("right", r.right))
                 for side, c in cells:
-                    numbers = (0, None, None) if c is None else (c.n, c.value, c.sd)
-                    norm = (r.norm_mean, r.norm_sd, r.norm_source)
+                    numbers = (0, None, None, None) if c is None else (c.n, c.value, c.sd, c.uncertainty)
+                    norm = (r.norm_mean, r.norm_sd, r.norm_source, r.norm_group)
+                    usual = (r.comfortable_mean, r.comfortable_sd)
                     yield (
                         r.name,
                         side,
@@ -54,6 +59,7 @@ def parameters_csv(report: ReportModel) -> bytes:
                         r.difference,
                         *(None if r.symmetry is None else getattr(r.symmetry, what) for what in SYMMETRY),
                         *norm,
+                        *usual,
                         r.reason if c is None else None,
                         report.condition,
                     )
@@ -100,6 +106,9 @@ def curves_csv(report: ReportModel) -> bytes:
         "sd_deg",
         "norm_mean_deg",
         "norm_sd_deg",
+        "norm_group",
+        "comfortable_mean_deg",
+        "comfortable_sd_deg",
         "zero",
     )
 
@@ -118,6 +127,9 @@ def curves_csv(report: ReportModel) -> bytes:
                         None if c.sd_deg is None else float(c.sd_deg[i]),
                         None if p.norm is None else float(p.norm.mean_deg[i]),
                         None if p.norm is None else float(p.norm.sd_deg[i]),
+                        None if p.norm is None else p.norm.group,
+                        None if p.comfortable is None else float(p.comfortable.mean_deg[i]),
+                        None if p.comfortable is None else float(p.comfortable.sd_deg[i]),
                         p.zero,
                     )
 

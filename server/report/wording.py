@@ -160,9 +160,16 @@ EXCLUDED: Final[Mapping[str, str]] = {
 }
 """Code of a stride left out → words."""
 
+GROUPS: Final[Mapping[str, str]] = {
+    "adult_21_84": "adults 21–84 years",
+    "adult_21_54": "adults 21–54 years",
+    "adult_55_84": "adults 55–84 years",
+}
+"""Group of a reference → its people in words."""
+
 NO_NORM: Final[Mapping[str, str]] = {
     "no_norm_for_age": "No norm for this age: the reference people are adults.",
-    "no_speed_matched_norm": "No speed-matched norm: no adult reference exists below 0.8 m/s.",
+    "no_speed_matched_norm": "No norm at this speed: nobody in the reference walked as slowly.",
     "age_unknown": "No norm for timing: enter the year of birth.",
     "sex_unknown": "No norm for timing: enter the sex.",
 }

@@ -43,7 +43,8 @@ class PatientHistory:
             return None
         numbers = next((v for v in reversed(self.visits) if not v.feedback), self.visits[-1]).numbers
         speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
-        return look_up_norms(self._age, self.patient.sex, speed, self.patient.height_m)
+        belt = self.condition is not None and self.condition.protocol == "treadmill"
+        return look_up_norms(self._age, self.patient.sex, speed, self.patient.height_m, treadmill=belt)
 
     @property
     def usual(self) -> dict[str, NormValue]:

@@ -47,6 +47,7 @@ def read(
         height_m=height,
         affected=patient.affected_side,
         controls=controls.make_group(reviewed, control_visits, speed),
+        treadmill=session.protocol == "treadmill",
     )
     model = replace(model, condition=AnalysedSession(session, found, edits).condition.words)
     if before is None:

@@ -16,9 +16,8 @@ from core.frames import SIDES, Side
 from core.norms import Norms, NormValue
 from core.norms.values import is_angle
 from core.parameters.result import Parameter
-from server.report.notes import GROUPS
 from server.report.numbers import Numbers
-from server.report.wording import NO_NORM
+from server.report.wording import GROUPS, NO_NORM
 from server.services import comparisons, controls, histories
 from server.services.histories import AnalysedSession
 from server.services.patients import Patient

@@ -9,6 +9,7 @@ ask for it anew is all a page has to do after its line was cut.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
 from contextlib import ExitStack
 from typing import Annotated, cast
 
@@ -20,7 +21,7 @@ from fastapi.responses import JSONResponse
 from core.body.kinematics import nominal_body
 from core.body.model import BodyModel
 from core.frames import Floats, Side
-from core.norms import adult_kinematics
+from core.norms import look_up_norms
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -29,7 +30,7 @@ from server.live.hub import Hub
 from server.services import patients, sessions
 from server.storage.db import Database
 from server.viewer.live_figure import LiveFigure
-from server.viewer.live_reference import LiveReference
+from server.viewer.live_reference import LiveReference, NormAt
 from server.viewer.live_watch import LiveWatch
 from server.viewer.views import FigureView, FigureViews
 
@@ -61,15 +62,19 @@ async def figure(
     return JSONResponse({"src": f"/views/{view.id}/"}, headers={"Cache-Control": "no-store"})
 
 
-def _person(db: Database, sid: str) -> tuple[BodyModel, dict[str, Floats]]:
-    """Body and norm curves in rad of who walks; raises NotFound."""
+def _person(db: Database, sid: str) -> tuple[BodyModel, NormAt]:
+    """Body of who walks, and the norm curves of a speed; raises NotFound."""
     with db.read() as c:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
     height = session.height_m if session.height_m is not None else patient.height_m
     age = session.performed_on.year - patient.birth_year if patient.birth_year else None
-    norm = adult_kinematics(age)
-    return nominal_body(height)[0], {name: np.radians(b.mean_deg) for name, b in norm.bands.items()}
+
+    def norm_at(speed_mps: float | None) -> Mapping[str, Floats]:
+        bands = look_up_norms(age, None, speed_mps, height).bands
+        return {name: np.radians(band.mean_deg) for name, band in bands.items()}
+
+    return nominal_body(height)[0], norm_at
 
 
 def _attend(view: FigureView[LiveFigure], hub: Hub, sid: str, reference: LiveReference) -> None:

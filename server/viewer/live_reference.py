@@ -11,7 +11,6 @@ import numpy as np
 from core.angles import SIGNS, cardan_zxy, list_leg_joints, pelvis_angles
 from core.body.model import BodyModel
 from core.frames import SIDES, SUFFIX, Floats, Side
-from core.norms.speed import SLOW_MPS
 from core.rotation import conjugate, multiply
 from server.viewer.moment import FigureMoment
 from server.viewer.reference import SAGITTAL, ReferenceWalk, add_standing_angles, find_better_side
@@ -19,7 +18,12 @@ from server.viewer.reference import SAGITTAL, ReferenceWalk, add_standing_angles
 MEAN_OF: Final = 5
 """Strides of a side whose mean is shown: enough to be the person's walk, few enough to be the present one."""
 SPEED_OF, SPEED_FROM = 10, 3
-"""Strides over which walking is judged too slow for a norm, and how many it takes: as on the page."""
+"""Strides whose mean speed chooses the norm, and how many it takes: as on the page."""
+SPEED_STEP_MPS: Final = 0.05
+"""The norm changes in such steps, so that the figure does not waver with every stride."""
+
+NormAt = Callable[[float | None], Mapping[str, Floats]]
+"""Walking speed in m/s, None = not known yet → norm curves in rad; empty where none fits."""
 
 
 class FeedStride(msgspec.Struct, frozen=True):
@@ -40,15 +44,12 @@ class LiveReference:
 
     Parameters
     ----------
-    norm : variable → (n,) rad over the cycle, empty where no norm fits the person.
+    norm : speed → variable → (n,) rad over the cycle, empty where no norm fits the person.
     trained : the side that is prescribed for, if one is; then the other one is the better.
     """
 
-    def __init__(
-        self, body: BodyModel, norm: Mapping[str, Floats], trained: Callable[[], Side | None]
-    ) -> None:
-        self._body, self._trained = body, trained
-        self._norm = norm if all(name in norm for name in SAGITTAL) else {}
+    def __init__(self, body: BodyModel, norm: NormAt, trained: Callable[[], Side | None]) -> None:
+        self._body, self._trained, self._norm_at = body, trained, norm
         self._walks: dict[str, ReferenceWalk | None] = {}
         self._strides: dict[int, FeedStride] = {}
         self._last: bytes = b""
@@ -74,22 +75,25 @@ class LiveReference:
         return self._walks[key]
 
     def _walk(self, choice: str, zero: Callable[[], Mapping[str, float]]) -> ReferenceWalk | None:
+        norm = self._norm()
         if choice == "norm":
-            return ReferenceWalk(self._norm, self._body) if self._norm and not self._slow() else None
+            return ReferenceWalk(norm, self._body) if norm else None
         if choice not in ("better", "own"):
             return None
         means = {side: average_curves(s for s in self._strides.values() if s.side == side) for side in SIDES}
         trained = self._trained()
-        side = _other(trained) if trained is not None else find_better_side(means, self._norm)
+        side = _other(trained) if trained is not None else find_better_side(means, norm)
         if side is None or not all(name in means[side] for name in SAGITTAL):
             return None
         return ReferenceWalk(add_standing_angles(means[side], zero(), side), self._body, lead=side)
 
-    def _slow(self) -> bool:
-        """No adult norm is of people so slow."""
+    def _norm(self) -> Mapping[str, Floats]:
+        """Curves of healthy adults at the speed of the last strides."""
         told = list(self._strides.values())[-SPEED_OF:]
         speeds = [v for s in told if (v := s.values.get("gait_speed_mps")) is not None]
-        return len(speeds) >= SPEED_FROM and float(np.mean(speeds)) < SLOW_MPS
+        speed = float(np.mean(speeds)) if len(speeds) >= SPEED_FROM else None
+        norm = self._norm_at(None if speed is None else SPEED_STEP_MPS * round(speed / SPEED_STEP_MPS))
+        return norm if all(name in norm for name in SAGITTAL) else {}
 
 
 def average_curves(strides: Iterable[FeedStride]) -> dict[str, Floats]:

@@ -94,7 +94,7 @@ def live(server: viser.ViserServer) -> Callable[[int], object]:
     norm = {name: np.radians(band.mean_deg) for name, band in adult_kinematics(None).bands.items()}
     watch = LiveWatch(
         LiveFigure(server, walk.BODY),
-        LiveReference(walk.BODY, norm, lambda: None),
+        LiveReference(walk.BODY, lambda _: norm, lambda: None),
         ghost=lambda: "norm",
         strides=lambda: (),
         watched=lambda: True,

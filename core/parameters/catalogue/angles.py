@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from core.parameters.catalogue import errors
 from core.parameters.catalogue.entry import (
     ANKLE_AND_FOOT,
     DORSIFLEXION,
@@ -32,6 +33,7 @@ ENTRIES: Final = (
         trainable=True,
         norm=NormKey("angles", "hip_flexion_IC"),
         change="angle",
+        errors=errors.HIP,
     ),
     ParameterEntry(
         "hip_flexion_min_deg",
@@ -46,6 +48,7 @@ ENTRIES: Final = (
         trainable=True,
         norm=NormKey("angles", "hip_extension_peak"),
         change="hip_extension",
+        errors=errors.HIP,
     ),
     ParameterEntry(
         "hip_flexion_rom_deg",
@@ -60,6 +63,7 @@ ENTRIES: Final = (
         trainable=True,
         norm=NormKey("angles", "hip_sagittal_ROM"),
         change="hip_range",
+        errors=errors.HIP_RANGE,
     ),
     ParameterEntry(
         "knee_flexion_ic_deg",
@@ -74,6 +78,7 @@ ENTRIES: Final = (
         trainable=True,
         norm=NormKey("angles", "knee_flexion_IC"),
         change="angle",
+        errors=errors.KNEE,
     ),
     ParameterEntry(
         "knee_flexion_max_loading_deg",
@@ -88,6 +93,7 @@ ENTRIES: Final = (
         trainable=True,
         norm=NormKey("angles", "knee_flexion_loading_peak(0-30%)"),
         change="angle",
+        errors=errors.KNEE,
     ),
     ParameterEntry(
         "knee_flexion_min_stance_deg",
@@ -102,6 +108,7 @@ ENTRIES: Final = (
         trainable=True,
         norm=NormKey("angles", "knee_min_stance(20-60%)"),
         change="angle",
+        errors=errors.KNEE,
     ),
     ParameterEntry(
         "knee_flexion_max_swing_deg",
@@ -117,6 +124,7 @@ ENTRIES: Final = (
         everyday="knee bend",
         norm=NormKey("angles", "knee_flexion_swing_peak"),
         change="angle",
+        errors=errors.KNEE,
     ),
     ParameterEntry(
         "knee_flexion_rom_deg",
@@ -132,6 +140,7 @@ ENTRIES: Final = (
         everyday="knee bend",
         norm=NormKey("angles", "knee_sagittal_ROM"),
         change="knee_range",
+        errors=errors.KNEE_RANGE,
     ),
     ParameterEntry(
         "ankle_dorsiflexion_ic_deg",
@@ -146,6 +155,7 @@ ENTRIES: Final = (
         trainable=True,
         norm=NormKey("angles", "ankle_IC"),
         change="angle",
+        errors=errors.ANKLE,
     ),
     ParameterEntry(
         "ankle_dorsiflexion_max_stance_deg",
@@ -160,6 +170,7 @@ ENTRIES: Final = (
         trainable=True,
         norm=NormKey("angles", "ankle_DF_stance_peak"),
         change="angle",
+        errors=errors.ANKLE,
     ),
     ParameterEntry(
         "ankle_dorsiflexion_min_deg",
@@ -174,6 +185,7 @@ ENTRIES: Final = (
         trainable=True,
         norm=NormKey("angles", "ankle_PF_peak"),
         change="angle",
+        errors=errors.ANKLE,
     ),
     ParameterEntry(
         "ankle_dorsiflexion_max_swing_deg",
@@ -188,6 +200,7 @@ ENTRIES: Final = (
         trainable=True,
         norm=NormKey("angles", "ankle_DF_swing_peak(75-100%)"),
         change="angle",
+        errors=errors.ANKLE,
     ),
     ParameterEntry(
         "ankle_dorsiflexion_rom_deg",
@@ -201,6 +214,7 @@ ENTRIES: Final = (
         curve=CurveFigure("ankle_dorsiflexion", "range"),
         trainable=True,
         norm=NormKey("angles", "ankle_ROM"),
+        errors=errors.ANKLE_RANGE,
     ),
     ParameterEntry(
         "foot_pitch_ic_deg",
@@ -213,6 +227,7 @@ ENTRIES: Final = (
         needs=("foot_sensor",),
         trainable=True,
         everyday="heel first",
+        errors=errors.FOOT_PITCH_IC,
     ),
     ParameterEntry(
         "foot_pitch_tc_deg",
@@ -225,6 +240,7 @@ ENTRIES: Final = (
         needs=("foot_sensor", "foot_off"),
         trainable=True,
         everyday="push-off",
+        errors=errors.FOOT_PITCH_TC,
     ),
     ParameterEntry(
         "toe_out_deg",
@@ -236,6 +252,7 @@ ENTRIES: Final = (
         definition="Foot against the direction of progression while flat, outward positive, from standing.",
         needs=("foot_path",),
         trainable=True,
+        errors=errors.TOE_OUT,
     ),
     ParameterEntry(
         "turning_angle_deg",
@@ -246,5 +263,6 @@ ENTRIES: Final = (
         comparison=TURN,
         definition="Change of the foot's heading over the stride, left positive.",
         needs=("foot_sensor",),
+        errors=errors.FOOT_TURN,
     ),
 )

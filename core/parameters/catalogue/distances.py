@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from core.parameters.catalogue import errors
 from core.parameters.catalogue.entry import DISTANCES, DURATION, HEIGHT, SIZE, WIDTH, NormKey, ParameterEntry
 
 ENTRIES: Final = (
@@ -20,6 +21,7 @@ ENTRIES: Final = (
         everyday="pace",
         norm=NormKey("walkway", "speed_m_s"),
         change="speed",
+        errors=errors.SPEED,
     ),
     ParameterEntry(
         "stride_length_m",
@@ -34,6 +36,7 @@ ENTRIES: Final = (
         everyday="stride",
         is_length=True,
         norm=NormKey("walkway", "stride_length_m"),
+        errors=errors.STRIDE_LENGTH,
     ),
     ParameterEntry(
         "step_length_m",
@@ -52,6 +55,7 @@ ENTRIES: Final = (
         is_length=True,
         norm=NormKey("walkway", "step_length_m"),
         change="step_length",
+        errors=errors.STEP_LENGTH,
     ),
     ParameterEntry(
         "step_width_m",
@@ -68,6 +72,7 @@ ENTRIES: Final = (
         trainable=True,
         everyday="space between the feet",
         norm=NormKey("walkway", "stride_width_m", differs="ankles"),
+        errors=errors.STEP_WIDTH,
     ),
     ParameterEntry(
         "circumduction_m",
@@ -79,6 +84,7 @@ ENTRIES: Final = (
         definition="Largest distance of the foot outward from the straight line between its two flats.",
         needs=("foot_path",),
         trainable=True,
+        errors=errors.CIRCUMDUCTION,
     ),
     ParameterEntry(
         "max_heel_clearance_m",
@@ -91,6 +97,7 @@ ENTRIES: Final = (
         needs=("foot_path", "shoe"),
         trainable=True,
         everyday="heel height",
+        errors=errors.HEEL_CLEARANCE,
     ),
     ParameterEntry(
         "min_toe_clearance_m",
@@ -103,6 +110,7 @@ ENTRIES: Final = (
         needs=("foot_path", "shoe", "foot_off"),
         trainable=True,
         everyday="toe height",
+        errors=errors.TOE_CLEARANCE,
     ),
     ParameterEntry(
         "total_distance_m",

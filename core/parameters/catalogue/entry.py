@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import Final, Literal
 
+from core.parameters.catalogue.errors import MeasurementErrors
+
 Need = Literal[
     "foot_sensor", "foot_path", "foot_off", "other_foot", "linked_feet", "standing_width", "shoe",
     "hip", "knee", "ankle", "pelvis_sensor", "forward",
@@ -110,6 +112,7 @@ class ParameterEntry:
     plausible : least and greatest value that a person can have; beyond, it is an error of detection.
     norm : its reference, None without one. change : its limits of change (core/change/limits.py), None
         where no source has one.
+    errors : what its measurement is known to; None = not known, then no uncertainty is stated.
     """
 
     name: str
@@ -129,6 +132,7 @@ class ParameterEntry:
     plausible: tuple[float, float] = (-inf, inf)
     norm: NormKey | None = None
     change: str | None = None
+    errors: MeasurementErrors | None = None
 
     @property
     def unit(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from core.parameters.catalogue import errors
 from core.parameters.catalogue.entry import DURATION, PARTS, PHASES, NormKey, ParameterEntry
 
 ENTRIES: Final = (
@@ -20,6 +21,7 @@ ENTRIES: Final = (
         everyday="foot on the floor",
         norm=NormKey("walkway", "stance_pct"),
         change="share",
+        errors=errors.STANCE,
     ),
     ParameterEntry(
         "swing_pct",
@@ -34,6 +36,7 @@ ENTRIES: Final = (
         everyday="foot in the air",
         norm=NormKey("walkway", "swing_pct"),
         change="share",
+        errors=errors.SWING,
     ),
     ParameterEntry(
         "double_support_pct",
@@ -47,6 +50,7 @@ ENTRIES: Final = (
         trainable=True,
         norm=NormKey("walkway", "double_support_pct"),
         change="share",
+        errors=errors.DOUBLE,
     ),
     ParameterEntry(
         "initial_double_support_pct",
@@ -59,6 +63,7 @@ ENTRIES: Final = (
         needs=("other_foot", "foot_off"),
         trainable=True,
         change="share",
+        errors=errors.INITIAL,
     ),
     ParameterEntry(
         "terminal_double_support_pct",
@@ -71,6 +76,7 @@ ENTRIES: Final = (
         needs=("other_foot", "foot_off"),
         trainable=True,
         change="share",
+        errors=errors.TERMINAL,
     ),
     ParameterEntry(
         "single_support_pct",
@@ -85,6 +91,7 @@ ENTRIES: Final = (
         everyday="standing on one foot",
         norm=NormKey("walkway", "single_support_pct"),
         change="share",
+        errors=errors.SINGLE,
     ),
     ParameterEntry(
         "loading_pct",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from core.parameters.catalogue import errors
 from core.parameters.catalogue.entry import DURATION, SUPPORT, ParameterEntry
 
 ENTRIES: Final = (
@@ -17,6 +18,7 @@ ENTRIES: Final = (
         definition="Time with both feet on the floor in a stride.",
         needs=("other_foot", "foot_off"),
         trainable=True,
+        errors=errors.DOUBLE,
     ),
     ParameterEntry(
         "initial_double_support_s",
@@ -28,6 +30,7 @@ ENTRIES: Final = (
         definition="From contact to the other foot's foot-off.",
         needs=("other_foot", "foot_off"),
         trainable=True,
+        errors=errors.INITIAL,
     ),
     ParameterEntry(
         "terminal_double_support_s",
@@ -39,6 +42,7 @@ ENTRIES: Final = (
         definition="From the other foot's contact to foot-off.",
         needs=("other_foot", "foot_off"),
         trainable=True,
+        errors=errors.TERMINAL,
     ),
     ParameterEntry(
         "single_support_s",
@@ -50,5 +54,6 @@ ENTRIES: Final = (
         definition="From the other foot's foot-off to its contact.",
         needs=("other_foot", "foot_off"),
         trainable=True,
+        errors=errors.SINGLE,
     ),
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import Final
 
+from core.parameters.catalogue import errors
 from core.parameters.catalogue.entry import DURATION, SIZE, TIMING, NormKey, ParameterEntry
 
 ENTRIES: Final = (
@@ -21,6 +22,7 @@ ENTRIES: Final = (
         counted="steps",
         plausible=(0, 240),
         norm=NormKey("walkway", "cadence_steps_min"),
+        errors=errors.CADENCE,
     ),
     ParameterEntry(
         "pci_pct",
@@ -47,6 +49,7 @@ ENTRIES: Final = (
         trainable=True,
         everyday="rhythm",
         norm=NormKey("walkway", "stride_time_s"),
+        errors=errors.STRIDE,
     ),
     ParameterEntry(
         "step_time_s",
@@ -61,6 +64,7 @@ ENTRIES: Final = (
         everyday="step rhythm",
         plausible=(0.2, inf),
         norm=NormKey("walkway", "step_time_s"),
+        errors=errors.STEP,
     ),
     ParameterEntry(
         "stance_time_s",
@@ -73,6 +77,7 @@ ENTRIES: Final = (
         needs=("foot_off",),
         trainable=True,
         everyday="foot on the floor",
+        errors=errors.STANCE,
     ),
     ParameterEntry(
         "swing_time_s",
@@ -85,5 +90,6 @@ ENTRIES: Final = (
         needs=("foot_off",),
         trainable=True,
         everyday="foot in the air",
+        errors=errors.SWING,
     ),
 )

@@ -72,9 +72,10 @@ def test_dimensionless_speed_makes_short_and_tall_people_alike() -> None:
     assert (unknown.dimensionless, unknown.equivalent_mps) == (None, 1.0)
 
 
-def test_slow_walking_has_no_norm_at_all() -> None:
-    slow = look_up_norms(60, "female", speed_mps=0.7)
+def test_slower_than_anybody_has_no_norm_at_all() -> None:
+    slow = look_up_norms(60, "female", speed_mps=0.2)
     assert (set(slow.values), dict(slow.bands)) == ({"gait_speed_mps"}, {})
+    assert (slow.comfortable, slow.comfortable_bands) == ({}, {})
     assert (slow.reason, slow.timing_reason) == ("no_speed_matched_norm", "no_speed_matched_norm")
     assert slow.place("knee_flexion_rom_deg", 40.0).reason == "no_speed_matched_norm"
     assert slow.place("cadence_spm", 90.0).reason == "no_speed_matched_norm"
@@ -92,18 +93,22 @@ def test_gait_speed_itself_is_held_against_the_speed_people_like() -> None:
 
 
 def test_the_limit_of_slowness_follows_the_legs() -> None:
-    assert look_up_norms(60, "female", 0.78, height_m=1.45).reason is None
-    assert look_up_norms(60, "female", 0.82, height_m=1.95).reason == "no_speed_matched_norm"
+    assert look_up_norms(60, "female", 0.235, height_m=1.45).reason is None
+    assert look_up_norms(60, "female", 0.250, height_m=1.95).reason == "no_speed_matched_norm"
+    assert not walking_speed(0.78, 1.45).is_slow
+    assert walking_speed(0.82, 1.95).is_slow
 
 
 @pytest.mark.parametrize(
     ("age", "speed", "pace"),
-    [(25, 1.0, "slow"), (25, 1.2, "normal"), (25, 1.7, "fast"), (25, 3.0, None), (25, 0.82, None),
-     (75, 0.9, "normal"), (25, None, "normal")],
+    [(25, 1.27, "normal"), (25, 1.7, "fast"), (25, 3.0, None), (75, 1.3, "normal"), (25, None, "normal")],
 )  # fmt: skip
 def test_the_walkway_norm_is_that_of_the_pace_walked(
     age: float, speed: float | None, pace: str | None
 ) -> None:
+    """Below comfortable speed adults are held against people at their speed instead."""
+    assert pace_of(25, "male", 1.0) == "slow"
+    assert pace_of(25, "male", 0.82) is None
     assert pace_of(age, "male", speed) == pace
     found = look_up_norms(age, "male", speed)
     assert found.pace == pace
@@ -116,16 +121,16 @@ def test_the_walkway_norm_is_that_of_the_pace_walked(
 
 
 def test_without_age_or_sex_angles_are_compared_and_times_are_not() -> None:
-    found = look_up_norms(None, None, 1.2)
+    found = look_up_norms(None, None, 1.3)
     assert found.place("knee_flexion_rom_deg", 64.69).z == pytest.approx(0.0)
     assert found.place("cadence_spm", 100.0).reason == "age_unknown"
-    assert look_up_norms(30, None, 1.2).place("cadence_spm", 100.0).reason == "sex_unknown"
+    assert look_up_norms(30, None, 1.3).place("cadence_spm", 100.0).reason == "sex_unknown"
 
 
 def test_levels_compare_only_where_the_anatomical_level_is_known() -> None:
-    standing = look_up_norms(30, "male", 1.2)
+    standing = look_up_norms(30, "male", 1.3)
     assert standing.place("knee_flexion_max_swing_deg", 61.0).reason == "not_comparable"
-    known = look_up_norms(30, "male", 1.2, anatomical=("knee_flexion", "pelvis_tilt"))
+    known = look_up_norms(30, "male", 1.3, anatomical=("knee_flexion", "pelvis_tilt"))
     assert known.place("knee_flexion_max_swing_deg", 61.08).z == pytest.approx(0.0)
     assert known.place("hip_flexion_min_deg", -8.0).reason == "not_comparable"
     assert "depends on the protocol" in known.bands["knee_flexion"].note

@@ -141,7 +141,7 @@ async def test_a_prescribed_norm_has_its_numbers_and_its_people(clinic: Clinic) 
         assert answer.status_code == 201, answer.text
     target = answer.json()["content"]["target"]
     assert target["mean"] == pytest.approx(60.0, abs=5.0)
-    assert "adults 55–84 years, n = 17" in target["words"]
+    assert "healthy adults asked to walk at this speed, n = 52" in target["words"]
 
 
 async def test_a_take_gets_target_baseline_and_the_limit_of_the_other_side(clinic: Clinic) -> None:

@@ -56,7 +56,7 @@ def test_analysis_json_is_strict_json_of_schema_1(files: Mapping[str, bytes]) ->
     assert row["mean"] == pytest.approx(walk.STRIDE_S)
     assert set(row) == {
         *("name", "side", "n", "mean", "sd", "unit", "reason"),
-        *("cv_pct", "ci_low", "ci_high", "note"),
+        *("cv_pct", "ci_low", "ci_high", "note", "uncertainty", "u_own", "u_common"),
     }
 
 

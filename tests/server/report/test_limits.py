@@ -57,7 +57,12 @@ def test_a_number_says_its_interval_its_variation_and_its_place_in_the_norm() ->
     for words in ("95 % CI 48.7 to 51.3", "CV 4.0 % of few strides", "percentile"):
         assert words in row.left.title
     assert row.z_words.startswith("z −")
+    assert row.comfortable is None
     (slow,) = parameter_rows([p], look_up_norms(40, "female", 0.5, 1.7))
     assert slow.left is not None
-    assert slow.left.z is None
-    assert slow.z_words == ""
+    assert slow.left.z is not None
+    assert -1.5 < slow.left.z < -1.2, "much of it is slowness"
+    assert (slow.norm_group, slow.comfortable) == ("healthy adults asked to walk at this speed", row.norm)
+    (none,) = parameter_rows([p], look_up_norms(40, "female", 0.2, 1.7))
+    assert none.left is not None
+    assert (none.left.z, none.z_words, none.norm) == (None, "", None)

@@ -174,19 +174,37 @@ def test_source_and_number_of_the_norm_are_printed_or_why_there_is_none(bundle: 
     assert all(p.norm is None for p in child.panels)
     assert "Timing: female, 10 years, normal pace (Lythgo2011)." in child.norm_note
     assert all(r.norm is None for _, rows in child.groups for r in rows if r.unit == "°")
-    assert report_model(bundle, age=40, speed_mps=0.5).norm_note.startswith("No speed-matched norm")
+    assert report_model(bundle, age=40, speed_mps=0.2).norm_note.startswith("No norm at this speed")
 
 
 def test_slow_walking_keeps_the_norm_of_speed_itself(bundle: Bundle) -> None:
-    speed = Parameter("gait_speed_mps", None, 20, 0.5, 0.05, "m/s")
+    speed = Parameter("gait_speed_mps", None, 20, 0.2, 0.05, "m/s")
     others = tuple(p for p in bundle.parameters if p.name != speed.name)
     model = report_model(replace(bundle, parameters=(speed, *others)), age=40, sex="female")
-    assert model.norm_note.startswith("No speed-matched norm")
+    assert model.norm_note.startswith("No norm at this speed")
     assert "Gait speed: adults 21–84 years (Fukuchi" in model.norm_note
     rows = {r.name: r for _, group in model.groups for r in group}
     assert rows["gait_speed_mps"].both is not None
-    assert rows["gait_speed_mps"].both.z == pytest.approx(-4.7, abs=0.05)
+    assert rows["gait_speed_mps"].both.z == pytest.approx(-6.6, abs=0.05)
     assert {r.name for r in rows.values() if r.norm is not None} == {"gait_speed_mps"}
+
+
+def test_a_slow_walker_is_held_against_people_at_this_speed_and_the_comfortable_ones_stand_beside(
+    bundle: Bundle,
+) -> None:
+    model = report_model(bundle, age=40, sex="female", speed_mps=0.5)
+    assert "healthy adults asked to walk at this speed (0.50" in model.norm_note
+    rows = {r.name: r for _, group in model.groups for r in group}
+    row = rows["step_length_m"]
+    assert row.norm_group == "healthy adults asked to walk at this speed"
+    assert row.norm_mean == pytest.approx(0.472, abs=0.002)
+    assert model.profile is not None
+    assert model.profile.at_speed
+    assert all(bar.comfortable_left and bar.comfortable_right for bar in model.profile.rows)
+    usual = report_model(bundle, age=40, sex="female", speed_mps=1.3)
+    assert not usual.at_speed
+    assert usual.profile is not None
+    assert not any(bar.comfortable_left for bar in usual.profile.rows)
 
 
 def test_offsets_that_were_subtracted_are_printed(bundle: Bundle) -> None:

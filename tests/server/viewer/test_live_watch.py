@@ -14,7 +14,7 @@ from core.angles import cardan_zxy
 from core.angles.measure import measure_angles
 from core.frames import SHANK, SIDES, THIGH, Side
 from core.fusion.orientations import Orientations
-from core.norms import adult_kinematics
+from core.norms import adult_kinematics, look_up_norms
 from core.rotation import conjugate, multiply
 from server.live.messages import STALE_S, Picture
 from server.live.room import Room
@@ -44,7 +44,7 @@ class Bedside:
         self.trained: Side | None = None
         self.watch = LiveWatch(
             self.figure,
-            LiveReference(walk.BODY, NORM, lambda: self.trained),
+            LiveReference(walk.BODY, lambda _: NORM, lambda: self.trained),
             ghost=lambda: self.ghost,
             strides=lambda: self.strides,
             watched=lambda: self.looks,
@@ -147,7 +147,7 @@ def test_the_ghost_follows_the_choice_of_the_therapist(bedside: Bedside) -> None
 
 
 def reference(trained: Side | None = None, norm: dict[str, np.ndarray] = NORM) -> LiveReference:
-    return LiveReference(walk.BODY, norm, lambda: trained)
+    return LiveReference(walk.BODY, lambda _: norm, lambda: trained)
 
 
 def knee(found: ReferenceWalk | None, phase: float) -> float:
@@ -195,10 +195,22 @@ def test_a_new_stride_changes_the_mean() -> None:
     assert knee(second, 0.73) > knee(first, 0.73) + np.radians(5)
 
 
-def test_whoever_walks_too_slowly_for_a_norm_sees_none() -> None:
-    slow = tuple(stride(n, Leg("left"), speed_mps=0.6) for n in range(3))
-    assert reference().find("norm", slow[:2], dict) is not None
-    assert reference().find("norm", slow, dict) is None
+def test_the_norm_walks_at_the_speed_of_the_last_strides() -> None:
+    asked: list[float | None] = []
+
+    def norm_at(speed_mps: float | None) -> dict[str, np.ndarray]:
+        asked.append(speed_mps)
+        bands = look_up_norms(40, None, speed_mps, 1.7).bands
+        return {name: np.radians(band.mean_deg) for name, band in bands.items()}
+
+    shown = LiveReference(walk.BODY, norm_at, lambda: None)
+    slow = tuple(stride(n, Leg("left"), speed_mps=0.41) for n in range(3))
+    first = shown.find("norm", slow[:2], dict)
+    second = shown.find("norm", slow, dict)
+    assert asked == [None, pytest.approx(0.4)], "in steps, so that it does not waver"
+    assert knee(first, 0.72) - knee(second, 0.72) > np.radians(12.0)
+    crawling = tuple(stride(n, Leg("left"), speed_mps=0.2) for n in range(3))
+    assert shown.find("norm", crawling, dict) is None, "nobody in the reference walked as slowly"
     assert reference(norm={}).find("norm", (), dict) is None
 
 

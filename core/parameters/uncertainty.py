@@ -1,0 +1,152 @@
+"""Value ± uncertainty: what strides leave open, and what the measurement does.
+
+docs/science/uncertainty.md. The error of a single stride gets less over many, that of a foot, a calibration
+or a definition does not. It is kept in three parts, because they do not count everywhere alike: what both
+sides and every take share falls out of a difference of sides or visits, and stands in a value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import hypot, sqrt
+from typing import Final
+
+import numpy as np
+
+from core.events.result import EventKind, GaitEvents
+from core.frames import SIDES, Side
+from core.parameters.catalogue import CATALOGUE
+from core.parameters.catalogue.errors import ContactWeights
+from core.parameters.flats import OTHER
+from core.parameters.result import Parameter
+from core.parameters.variability import NORMAL_95, t_quantile
+
+GONIOMETER_DEG: Final = 3.0
+"""Standing angle read with a goniometer, standard. Our estimate: readings of two people differ by 3 to 5°."""
+
+ESTIMATED_DEG: Final[Mapping[str, float]] = {"hip": 7.0, "knee": 10.5, "ankle": 8.1}
+"""Joint → RMS error of an angle that two or three sensors do not measure (neura_walk, three sensors)."""
+
+
+@dataclass(frozen=True)
+class ContactErrors:
+    """What the moments of contact are known to, standard uncertainties in s.
+
+    Parameters
+    ----------
+    contact, foot_off : shared by both feet and every take: how the rule departs from the definition, and the
+        references among themselves. foot : of one foot in one take. random : of a single event.
+    """
+
+    contact: float
+    foot_off: float
+    foot: float
+    random: float
+
+
+PITCH_RULE: Final = ContactErrors(contact=0.031, foot_off=0.031, foot=0.010, random=0.015)
+"""Turning points of the foot's pitch: RMS of their mean errors by person on ipol_walks (4), gaitmap_foot (2
+feet) and force_plate_steps: contact −54 to +5 ms, foot-off +17 to +44 ms."""
+
+REFINED: Final = ContactErrors(contact=0.014, foot_off=0.008, foot=0.006, random=0.014)
+"""Events that state their own uncertainty, where that is `TYPICAL_S`: SD of the mean errors by person on the
+same sets (contact −19 to +22 ms, foot-off −14 to +9 ms), and what is left of 20 ms within a walk."""
+
+TYPICAL_S: Final = 0.020
+"""Stated uncertainty of an event that `REFINED` describes; another one scales it."""
+
+
+def state_uncertainty(
+    parameters: Sequence[Parameter],
+    events: GaitEvents | None = None,
+    estimated: Collection[str] = (),
+    *,
+    goniometer: bool = False,
+) -> tuple[Parameter, ...]:
+    """The parameters with what they are known to; those without a value or a declared error as they are.
+
+    Parameters
+    ----------
+    parameters : of one take. events : that they were measured on, for what its contacts are known to.
+    estimated : variables that no two sensors measure. goniometer : a standing angle was added to the levels.
+    """
+    contacts = {side: _contact_errors(events, side) for side in SIDES}
+    strides = {p.side: p.mean for p in parameters if p.name == "stride_time_s"}
+    return tuple(_stated(p, contacts, strides, estimated, goniometer=goniometer) for p in parameters)
+
+
+def difference_half_width(strides: float, *own: float | None) -> float:
+    """95 % half width of a difference of two values, from that of their strides and their own errors."""
+    return hypot(strides, NORMAL_95 * hypot(*(u or 0.0 for u in own)))
+
+
+def _stated(
+    p: Parameter,
+    contacts: Mapping[Side, ContactErrors],
+    strides: Mapping[Side | None, float | None],
+    estimated: Collection[str],
+    *,
+    goniometer: bool,
+) -> Parameter:
+    entry = CATALOGUE.get(p.name)
+    if p.mean is None or p.n < 1 or entry is None or entry.errors is None:
+        return p
+    errors = entry.errors
+    variable = None if entry.curve is None else entry.curve.variable
+    if variable is not None and variable in estimated:
+        joint = variable.partition("_")[0]
+        errors = replace(errors, own=max(errors.own, ESTIMATED_DEG.get(joint, errors.own)))
+    common, own, random = errors.common, errors.own, errors.random
+    if errors.contacts is not None:
+        in_s = _of_contacts(errors.contacts, contacts, p.side)
+        scale = _per_second(p, strides)
+        if scale is None:
+            return p
+        common, own, random = (hypot(a, scale * b) for a, b in zip((common, own, random), in_s, strict=True))
+    if goniometer and variable is not None and not p.name.endswith("_rom_deg"):
+        own = hypot(own, GONIOMETER_DEG)
+    sampled = 0.0 if p.sd is None else t_quantile(p.n - 1) * p.sd / sqrt(p.n)
+    open_by_strides = max(sampled, NORMAL_95 * random / sqrt(p.n))
+    whole = hypot(open_by_strides, NORMAL_95 * hypot(own, common))
+    return replace(p, uncertainty=whole, u_own=own, u_common=common)
+
+
+def _per_second(p: Parameter, strides: Mapping[Side | None, float | None]) -> float | None:
+    """What a second is in the parameter's unit; None for a share of a stride of unknown length."""
+    if p.unit != "%":
+        return 1.0
+    stride = strides.get(p.side)
+    return None if not stride else 100.0 / stride
+
+
+def _of_contacts(
+    w: ContactWeights, contacts: Mapping[Side, ContactErrors], side: Side | None
+) -> tuple[float, float, float]:
+    """Common, own and random error of a time in s, from those of the contacts that it lies between."""
+    one: Side = side or "left"
+    a, b = contacts[one], contacts[OTHER[one]]
+    # the same rule finds a kind of event on both feet: their shared errors add with their signs
+    contact = (w.start + w.end) * a.contact + w.other * b.contact
+    foot_off = w.off * a.foot_off + w.other_off * b.foot_off
+    # contacts of one foot share an error of that foot; so do its foot-offs
+    own = ((w.start + w.end) * a.foot, w.off * a.foot, w.other * b.foot, w.other_off * b.foot)
+    random = hypot(
+        w.start * a.random, w.off * a.random, w.end * a.random, w.other * b.random, w.other_off * b.random
+    )
+    return hypot(contact, foot_off), hypot(*own), random
+
+
+def _contact_errors(events: GaitEvents | None, side: Side) -> ContactErrors:
+    """Of the events of a foot: by what they state themselves, else of the pitch rule."""
+    found: dict[EventKind, list[float]] = {"ic": [], "tc": []}
+    for e in () if events is None else events.events:
+        if e.side == side and e.uncertainty_s is not None:
+            found[e.kind].append(e.uncertainty_s)
+    if not all(found.values()):
+        return PITCH_RULE
+    ic, tc = (float(np.sqrt(np.mean(np.square(found[kind])))) / TYPICAL_S for kind in ("ic", "tc"))
+    both = hypot(ic, tc) / sqrt(2.0)
+    return ContactErrors(
+        REFINED.contact * ic, REFINED.foot_off * tc, REFINED.foot * both, REFINED.random * both
+    )
