@@ -58,6 +58,7 @@ def tracks_parquet(tracks: Tracks) -> bytes:
         "bout_params": dataclasses.asdict(tracks.bout_params),
         "surface": dataclasses.asdict(tracks.surface),
         "rests": tracks.rests,
+        "standing": tracks.standing,
         "turns": [dataclasses.asdict(t) for t in tracks.turns],
         "steps": None if tracks.steps is None else _steps_meta(tracks.steps),
         "feet": None
@@ -93,6 +94,7 @@ def read_tracks(data: bytes, events: GaitEvents, angles: JointAngles | None) -> 
         params=_made(StrideParams, meta["params"]),
         bout_params=_made(BoutParams, meta.get("bout_params", {})),
         rests=None if meta.get("rests") is None else tuple((a, b) for a, b in meta["rests"]),
+        standing=tuple((a, b) for a, b in meta.get("standing", ())),
         turns=tuple(_made(Turn, t) for t in meta.get("turns", ())),
         steps=None if meta.get("steps") is None else _steps(meta["steps"]),
     )
@@ -108,7 +110,8 @@ def _steps_meta(steps: Steps) -> dict[str, object]:
 
 
 def _steps(meta: Mapping[str, Any]) -> Steps:
-    bouts = [{**b, "stops": tuple((x, y) for x, y in b["stops"])} for b in meta["bouts"]]
+    ranges = ("breaks", "stops")
+    bouts = [b | {k: tuple((x, y) for x, y in b.get(k, ())) for k in ranges} for b in meta["bouts"]]
     return Steps(
         steps=tuple(Step(t, side) for t, side in meta["steps"]),
         bouts=tuple(_made(Bout, b) for b in bouts),
