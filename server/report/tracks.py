@@ -1,7 +1,7 @@
 """tracks.parquet: what strides and parameters are measured on, kept so that an edit can be measured again.
 
 Feet: `<foot>_q_w…z`, `<foot>_valid`; their paths `<foot>_path_x…z` (m), `<foot>_path_q_w…z` where it differs,
-`<foot>_path_valid`, `<foot>_still`; `<pelvis|chest>_acc_x…z` in the walking frame (m/s²); `turning`.
+`<foot>_path_valid`, `<foot>_still`, `<foot>_patched`; `<pelvis|chest>_acc_x…z` in the walking frame (m/s²); `turning`.
 Angles and events lie in their own files.
 """
 
@@ -49,6 +49,8 @@ def tracks_parquet(tracks: Tracks) -> bytes:
             columns |= _spread(f"{foot}_path_q", feet.q[side], "wxyz")
         columns[f"{foot}_path_valid"] = feet.valid[side]
         columns[f"{foot}_still"] = feet.still[side]
+        if side in feet.patched:
+            columns[f"{foot}_patched"] = feet.patched[side]
     for segment, a in tracks.trunk.items():
         columns |= _spread(f"{segment}_acc", a, "xyz")
     meta = {
@@ -140,6 +142,11 @@ def _feet(
         source=str(meta["source"]),
         body=_made(BodyModel, meta["body"]),
         withheld=meta.get("withheld", {}),
+        patched={
+            side: bools_of(table, name)
+            for side in present
+            if (name := f"{FOOT[side]}_patched") in table.column_names
+        },
     )
 
 

@@ -18,8 +18,10 @@ from core.body.erkf.params import ErkfParams
 from core.body.erkf.poses import run_erkf
 from core.body.still import QUIETEST, contact_samples
 from core.frames import FOOT, SIDES, Bools, Floats, Side
+from core.parameters import spatial_rows
 from core.pipeline import analyse
 from core.pipeline.analysis import TakeAnalysis
+from tests.accuracy.gaitmap import COPIES, recording_of, resampled, true_strides
 from tests.accuracy.gaitmap import RATE as GAITMAP_RATE
 from tests.accuracy.ipol import RATE, WALKS, checked_events, first_s, ipol_recording
 from tests.accuracy.report import record
@@ -33,6 +35,9 @@ BEFORE_S, AFTER_S = 0.3, 0.8
 
 LOST = ("12-3", "12-4")
 """Walks in which up to a fifth of a foot's packets is lost."""
+
+HOLE = 6
+"""Packets taken out of one swing in three of gaitmap_foot at 100 Hz."""
 
 
 @cache
@@ -70,6 +75,51 @@ def never_still(side: Side) -> Floats:
         patch.setattr(erkf_filter, "contact_samples", quietest)
         made = run_erkf(*take(), BODY, (FOOT[side],), ErkfParams.offline())
     return errors(made.track.p[:, 0], side, GAITMAP_RATE).straight
+
+
+@cache
+def thinned() -> tuple[TakeAnalysis, dict[Side, set[int]]]:
+    """gaitmap_foot at 100 Hz without some packets of some swings, and which strides these were."""
+    whole = recording_of(resampled(COPIES[0], RATE), RATE)
+    rng, streams, hit = np.random.default_rng(1), {}, {}
+    for device, segment in whole.segments.items():
+        side: Side = "left" if segment == "foot_l" else "right"
+        stream, strides = whole.streams[device], true_strides(side)
+        hit[side] = set(range(1, len(strides), 3))
+        kept = np.ones(len(stream.t_s), np.bool_)
+        for j in hit[side]:
+            s, into = strides[j], rng.uniform(0.7, 0.9)
+            first = round((s.first_ic_s + into * (s.last_ic_s - s.first_ic_s)) * RATE)
+            kept[first : first + HOLE] = False
+        assert stream.gyr is not None
+        streams[device] = replace(
+            stream, t_s=stream.t_s[kept], acc=stream.acc[kept], gyr=stream.gyr[kept], digest=device
+        )
+    return analyse(replace(whole, streams=streams)), hit
+
+
+def test_a_stride_with_lost_packets_in_its_swing_has_no_distance_and_the_others_are_right() -> None:
+    analysis, hit = thinned()
+    assert analysis.strides is not None
+    assert analysis.feet is not None
+    rows = spatial_rows(analysis.strides, analysis.feet)
+    withheld = 0
+    for stride, row in zip(analysis.strides.strides, rows, strict=True):
+        for j, true in enumerate(true_strides(stride.side)):
+            same = abs(stride.start_s - true.first_ic_s) < 0.1 and abs(stride.end_s - true.last_ic_s) < 0.1
+            if same and j in hit[stride.side]:
+                assert row["stride_length_m"] == "packets_lost"
+                withheld += 1
+    assert withheld >= 12
+    for side in SIDES:
+        found = []
+        p = analysis.feet.p[side]
+        for j, true in enumerate(true_strides(side)):
+            if j not in hit[side] and not true.turning:
+                a, b = (min(round(t * RATE), len(p) - 1) for t in (true.start_s, true.end_s))
+                found.append(1000 * (float(np.linalg.norm((p[b] - p[a])[:2])) - true.length_m))
+        assert abs(np.mean(found)) <= 12.0
+        assert np.std(found) <= 30.0
 
 
 @pytest.mark.parametrize("side", SIDES)

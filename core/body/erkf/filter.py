@@ -22,6 +22,7 @@ from core.body.erkf.gaps import bridge_gaps
 from core.body.erkf.kernel import (
     CONTACT,
     INVALID,
+    PATCHED,
     STILL,
     ErkfMemory,
     ErkfOutput,
@@ -48,7 +49,7 @@ class ErkfInputs:
     acc, gyr : (T, n, 3) m/s², rad/s, at rest |acc| = g. valid : (T, n) measured; elsewhere see `erkf_inputs`.
     contact : (T, n) the sensor's foot rests on the floor. still : (T, n) the sensor has been at rest for
         0.3 s. rolling : (T, n) rad/s with which a foot turns that is in contact and not still, 0 elsewhere;
-        None for none.
+        None for none. patched : (T, n) filled over a hole too long for a straight line; None for none.
     heading : (T, n) measured heading of the segment's forward axis in W, rad, NaN where none; None for none.
     """
 
@@ -60,6 +61,7 @@ class ErkfInputs:
     still: Bools
     heading: Floats | None = None
     rolling: Floats | None = None
+    patched: Bools | None = None
 
     def part(self, start: int, stop: int) -> ErkfInputs:
         """Samples start … stop − 1."""
@@ -68,6 +70,7 @@ class ErkfInputs:
             self.step_s[k], self.acc[k], self.gyr[k], self.valid[k], self.contact[k], self.still[k],
             None if self.heading is None else self.heading[k],
             None if self.rolling is None else self.rolling[k],
+            None if self.patched is None else self.patched[k],
         )  # fmt: skip
 
 
@@ -175,6 +178,8 @@ def run_block(
     rate = 1.0 / np.median(inputs.step_s[inputs.step_s > 0.0]) if np.any(inputs.step_s > 0.0) else 1.0
     memory = memory_of(state)
     flags = (INVALID * ~inputs.valid + CONTACT * inputs.contact + STILL * inputs.still).astype(np.int64)
+    if inputs.patched is not None:
+        flags += PATCHED * inputs.patched
     heading = np.empty((0, n)) if inputs.heading is None else np.ascontiguousarray(inputs.heading)
     rolling = np.empty((0, n)) if inputs.rolling is None else params.roll_m * inputs.rolling
     samples = ErkfSamples(
@@ -260,6 +265,8 @@ def noise_of(params: ErkfParams, rate_hz: float) -> Noise:
         heading=float(params.heading_sd),
         gap_acc=float(params.gap_acc_sd),
         gap_gyr=float(params.gap_gyr_sd),
+        patch_acc=float(params.patch_acc_sd),
+        patch_gyr=float(params.patch_gyr_sd),
     )
 
 

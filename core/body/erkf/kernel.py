@@ -26,7 +26,7 @@ from core.body.erkf.updates import (
 from core.frames import Bools, Floats
 from core.rotation.compiled import to_matrix, turn
 
-INVALID, CONTACT, STILL = 1, 2, 4
+INVALID, CONTACT, STILL, PATCHED = 1, 2, 4, 8
 """Bits of a sample's flags."""
 
 
@@ -119,6 +119,8 @@ class Noise(NamedTuple):
     heading: float
     gap_acc: float
     gap_gyr: float
+    patch_acc: float
+    patch_gyr: float
 
 
 class Links(NamedTuple):
@@ -172,6 +174,8 @@ def add_noise(memory, samples, k, links, noise):  # type: ignore[no-untyped-def]
         vw = sd[i, 1] ** 2
         if flags[k, i] & INVALID:
             va, vw = noise.gap_acc**2, noise.gap_gyr**2
+        elif flags[k, i] & PATCHED:
+            va, vw = va + noise.patch_acc**2, vw + noise.patch_gyr**2
         for c in range(3):
             P[b + 3 + c, b + 3 + c] += va * dt * dt
             P[b + 6 + c, b + 6 + c] += vw * dt * dt

@@ -45,6 +45,8 @@ class ErkfParams:
         (docs/science/erkf.md, "Zero velocity").
     tilt_sd : of the direction of f. joint_centre_sd : m. joint_axis_sd, heading_sd : rad.
     gap_acc_sd, gap_gyr_sd : in place of acc_sd and gyr_sd while an IMU is lost.
+    patch_s : more than this between two samples, filled by a straight line, is a patch. patch_acc_sd,
+        patch_gyr_sd : beside acc_sd and gyr_sd in it (docs/science/erkf.md, "Lost packets").
     start_* : of the first sample; `start_heading_sd` about the vertical, must cover the first headings'
         errors.
     moving_* : the same where a recording starts mid-walk; the bias where it has no rest at all.
@@ -69,6 +71,9 @@ class ErkfParams:
     heading_sd: float = radians(10.0)
     gap_acc_sd: float = 20.0
     gap_gyr_sd: float = 5.0
+    patch_s: float = 0.025
+    patch_acc_sd: float = 10.0
+    patch_gyr_sd: float = 1.0
     start_position_sd: float = 0.02
     start_velocity_sd: float = 0.01
     start_tilt_sd: float = radians(1.0)
