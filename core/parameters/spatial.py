@@ -37,8 +37,9 @@ STEP_M: Final = 0.05
 """Two rests of a foot closer than this are one place (our choice: below the error of a stride)."""
 
 Reason = Literal[
-    "treadmill", "no_foot_track", "no_foot_flat", "gap", "packets_lost", "feet_not_linked", "opposite_foot_missing",
-    "no_shoe_geometry", "no_swing_minimum", "no_terminal_contact", "standing_width_unknown", "in_place",
+    "treadmill", "no_foot_track", "no_foot_flat", "gap", "packets_lost", "feet_not_linked",
+    "opposite_foot_missing", "no_shoe_geometry", "no_swing_minimum", "no_terminal_contact",
+    "standing_width_unknown", "in_place",
 ]  # fmt: skip
 
 

@@ -1,8 +1,8 @@
 """tracks.parquet: what strides and parameters are measured on, kept so that an edit can be measured again.
 
 Feet: `<foot>_q_w…z`, `<foot>_valid`; their paths `<foot>_path_x…z` (m), `<foot>_path_q_w…z` where it differs,
-`<foot>_path_valid`, `<foot>_still`, `<foot>_patched`; `<pelvis|chest>_acc_x…z` in the walking frame (m/s²); `turning`.
-Angles and events lie in their own files.
+`<foot>_path_valid`, `<foot>_still`, `<foot>_patched`; `<pelvis|chest>_acc_x…z` in the walking frame (m/s²);
+`turning`. Angles and events lie in their own files.
 """
 
 from __future__ import annotations
