@@ -48,6 +48,8 @@ class QuietestRule:
         walker, more than from the middle of a slow swing to the still part of a stance.
     loudest : of a stance. ipol_walks' stances reach 2.1, the quietest moments of their swings begin at 4.
     swing_rad_s, swing_s : within so long before and after it the foot must swing.
+    share : |ω| in it, of the greatest within swing_s. Feet of ipol_walks have 0.02 to 0.05, few up to 0.1; a
+        shank, taken for a foot, 0.10 to 0.15 (neura_walk, simulated people), a thigh 0.2 and more.
     """
 
     still: StillRule = FOOT_STILL
@@ -55,13 +57,10 @@ class QuietestRule:
     loudest: float = 3.0
     swing_rad_s: float = 2.5
     swing_s: float = 1.0
+    share: float = 0.075
 
 
 QUIETEST = QuietestRule()
-
-CALM_RAD_S = 0.75
-"""A quietest moment that turns no faster is a rest. The briskest feet of ipol_walks have such a one in nearly
-every stance; a shank taken for a foot turns at 0.9 to 1.1 in them (simulated, brisk)."""
 
 
 def contact_samples(
@@ -88,8 +87,11 @@ def contact_samples(
     quietest = np.zeros(len(still), np.bool_)
     for start, stop in find_runs((loud == least) & (loud <= rule.loudest) & ~still):
         k = (start + stop - 1) // 2
-        if swings[k] > swings[max(0, k - swing)] and swings[min(len(still), k + swing)] > swings[k]:
-            quietest[max(0, k - reach) : k + reach + 1] = True
+        before, after = max(0, k - swing), min(len(still), k + swing)
+        window = slice(max(0, k - reach), k + reach + 1)
+        slow = turning[window].max() <= rule.share * turning[before:after].max()
+        if slow and swings[k] > swings[before] and swings[after] > swings[k]:
+            quietest[window] = True
     return np.asarray(still | quietest), np.where(quietest & ~still, turning, 0.0)
 
 

@@ -136,6 +136,10 @@ def test_brisk_walkers_have_distances_and_no_foot_is_said_never_to_rest() -> Non
         assert counted(walk) >= (8 if walk in LOST else 12)
 
 
+def test_nobody_is_told_to_wear_the_feet_exchanged() -> None:
+    assert not any("feet_exchanged" in {n.code for n in analysed(w).notices} for w in WALKS)
+
+
 def test_the_way_back_is_as_long_as_the_way_there() -> None:
     found = np.array([ways(w, side) for w in WALKS if w not in LOST for side in SIDES])
     assert abs(np.mean(found[:, 1] - found[:, 0])) <= 0.2

@@ -10,7 +10,6 @@ import numpy as np
 from core.body.erkf.poses import ErkfRun
 from core.body.erkf.start import find_parts
 from core.body.health import LONGEST_MOVING_S, HealthFinding, longest_run_s
-from core.body.still import CALM_RAD_S
 from core.errors import Notice, Severity
 from core.frames import Floats
 from core.rotation import conjugate, multiply, wrap_angle, yaw
@@ -55,8 +54,9 @@ def erkf_health(run: ErkfRun) -> tuple[HealthFinding, ...]:
         refused = 100.0 * run.track.refused[contact, i].mean() if contact.any() else 0.0
         found.append(HealthFinding("zero_velocity_refused_pct", name, float(refused), *REFUSED_PCT))
         found.append(HealthFinding("contact_pct", name, 100.0 * float(contact.mean())))
-        rests = contact if run.inputs.rolling is None else contact & (run.inputs.rolling[:, i] <= CALM_RAD_S)
-        found.append(HealthFinding("longest_moving_s", name, longest_run_s(~rests, rate), *LONGEST_MOVING_S))
+        found.append(
+            HealthFinding("longest_moving_s", name, longest_run_s(~contact, rate), *LONGEST_MOVING_S)
+        )
         if contact.any():
             found.append(HealthFinding("climb_pct", name, _climb_pct(run, i), warn=CLIMB_PCT))
     for i, name in enumerate(run.tree.imus):
