@@ -25,7 +25,7 @@ from core.events.foot_movement import measure_foot_movements
 from core.events.lumbar import detect_steps, split_about_vertical, trunk_sensor
 from core.events.result import GaitEvents
 from core.events.turns import body_yaw_rate, find_turns
-from core.frames import FOOT, SIDES, Floats, Segment
+from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.measure import Tracks, measure_gait
@@ -33,6 +33,7 @@ from core.parameters.spatial import surface_of
 from core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
 from core.pipeline.config import PipelineConfig
 from core.quality.stuck import drop_stuck_sensors, mark_stuck
+from core.rest import STANDING, Window, find_rest_windows
 from core.withheld import withhold, withhold_distances
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
@@ -159,6 +160,7 @@ def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
         params=config.strides,
         bout_params=config.bouts,
         rests=calibrated.rest,
+        standing=_standing(analysis),
         turns=contacts.turns,
         steps=contacts.steps,
     )
@@ -207,6 +209,16 @@ def _contacts(
     feet = any(s in orientations.q for s in FOOT.values())
     agree = rate_confidence if feet and config.detector != "consensus" else agree_on_contacts
     return agree(found, config.consensus)
+
+
+def _standing(analysis: TakeAnalysis) -> tuple[Window, ...]:
+    """When no foot moved; shanks where no foot is worn, else thighs."""
+    working = drop_stuck_sensors(analysis.recording)
+    for level in (FOOT, SHANK, THIGH):
+        worn = [s for s in level.values() if s in working.sensors]
+        if worn:
+            return find_rest_windows(working, STANDING, worn)
+    return ()
 
 
 def _trunk_acceleration(analysis: TakeAnalysis) -> dict[Segment, Floats]:

@@ -20,8 +20,8 @@ from core.norms.adults import adult_reference_at_speed
 from core.norms.controls import ControlGroup
 from core.norms.kinematics import NormBand
 from core.norms.lookup import Norms, look_up_norms
-from core.norms.values import withdraw_shares
 from core.norms.profile import CurveReference
+from core.norms.values import withdraw_shares
 from core.parameters import cycle_curves
 from core.parameters.anatomical_zero import anatomical_variables
 from core.parameters.result import CycleCurves

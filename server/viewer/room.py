@@ -52,8 +52,8 @@ class SceneRoom:
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
         scene.configure_default_lights(True, cast_shadow=True)
-        # light from all around is one lamp: a picture of a surrounding, which is the default, must be filtered by
-        # the browser first, three quarters of the work of a first picture where there is no graphics processor
+        # light from all around is one lamp: the default, a picture of a surrounding, must be filtered by the
+        # browser first, three quarters of the work of a first picture without a graphics processor
         scene.configure_environment_map(None)
         scene.add_light_hemisphere(
             SKY, sky_color=(255, 255, 255), ground_color=(200, 200, 205), intensity=2.4
