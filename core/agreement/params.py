@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import radians
 
 from core.fusion.attitude import AttitudeParams
 
@@ -71,8 +72,74 @@ class LagParams:
 
 
 @dataclass(frozen=True)
+class ExchangeParams:
+    """When sensors are said to be exchanged (docs/science/agreement.md, "Exchanged sensors").
+
+    Parameters
+    ----------
+    repair : False leaves them on the segments that were declared; what is found is told all the same.
+    over_s : so much of the walk is compared.
+    ratio : another labelling fits so much better than the stated one: right ones have at most 0.9
+        (neura_walk, qmt_fullbody) and 0.7 (simulated people), wrong ones at least 1.17.
+    cosine : between the line of the hips and the right-hand side of walking, below which the legs are
+        exchanged; as stated it is +0.97 and more, exchanged −0.97 and less.
+    least_way_m : a swing that leads less far says nothing about the direction of walking.
+    """
+
+    repair: bool = True
+    over_s: float = 60.0
+    ratio: float = 1.1
+    cosine: float = -0.5
+    least_way_m: float = 0.15
+
+
+@dataclass(frozen=True)
+class SlipParams:
+    """When a slip is told, and when it is repaired (docs/science/agreement.md, "Slipped sensors").
+
+    Parameters
+    ----------
+    repair : False leaves the signals as they are; what is found is told all the same.
+    least_rad : smallest turn told, unwitnessed_rad more where too few strides confirm it.
+    z : turn over the scatter of the windows, which is never taken less than floor_rad.
+    near_s : windows so far from a moment speak about it. lasting : share of the turn that must be left over
+        the whole take: else it came back.
+    alone : largest turn of another sensor at the same time, over this one.
+    agree : share of the turn that the strides must show, where there are `strides` on both sides; each side
+        is the median of up to `near` of them.
+    sure_rad : a larger turn at twice that z is told whatever the strides say.
+    worst_residual : windows whose joint fits worse say nothing. least_swing : nor do those in which a leg
+        sensor turns less, rad/s RMS. least_windows : on either side.
+    misfit : places that also shrink or grow by more than this share did not turn but something else.
+    within_s : strides so near to the change are left out, at least.
+    straight_rad : strides that turn by more are no witnesses.
+    """
+
+    repair: bool = True
+    least_rad: float = radians(7.0)
+    unwitnessed_rad: float = radians(2.0)
+    z: float = 3.5
+    floor_rad: float = radians(1.3)
+    alone: float = 0.6
+    near_s: float = 20.0
+    lasting: float = 0.5
+    agree: float = 0.5
+    strides: int = 3
+    sure_rad: float = radians(12.0)
+    near: int = 4
+    worst_residual: float = 0.75
+    least_swing: float = 0.4
+    least_windows: int = 2
+    misfit: float = 0.35
+    within_s: float = 2.0
+    straight_rad: float = radians(45.0)
+
+
+@dataclass(frozen=True)
 class AgreementParams:
     """Everything about what the sensors say of each other."""
 
     joints: JointParams = field(default_factory=JointParams)
+    exchange: ExchangeParams = field(default_factory=ExchangeParams)
     lags: LagParams = field(default_factory=LagParams)
+    slips: SlipParams = field(default_factory=SlipParams)

@@ -1,13 +1,16 @@
-"""Signals of a late sensor laid on the axis by the times they were measured at."""
+"""Signals of a late sensor laid where they belong, and of a slipped one turned back."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
+from core.agreement.slips import SensorSlip
 from core.frames import Floats
 from core.recording import SensorSignals
+from core.rotation import exp, rotate
 from core.timeline.grid import lay_signal
 from core.timeline.params import TimelineParams
 
@@ -39,3 +42,27 @@ def take_lag_out(
         valid=valid,
         interpolated=(filled | signals.interpolated[nearest]) & valid,
     )
+
+
+SLIPPING_S: Final = 0.3
+"""A slip takes about so long; its turn is spread over this time."""
+
+
+def turn_back(signals: SensorSignals, t_s: Floats, slip: SensorSlip) -> SensorSignals:
+    """Turn back what a sensor showed after it slipped, and take the slip itself out of its rate.
+
+    The gyroscope measured that turn; left in, the orientation integrated from it would be wrong by the slip.
+    """
+    turn = slip.turn_rad * np.array(slip.axis)
+    after = t_s >= slip.at_s
+    slipping = after & (t_s < slip.at_s + SLIPPING_S)
+    back = exp(-turn)
+
+    def turned(x: Floats) -> Floats:
+        return np.where(after[:, None], rotate(back, x), x)
+
+    # a turn of the sensor by r shows −r in its rate
+    lasting_s = np.count_nonzero(slipping) * float(t_s[1] - t_s[0])
+    gyr = turned(signals.gyr) + slipping[:, None] * turn / max(lasting_s, 1e-9)
+    mag = None if signals.mag is None else turned(signals.mag)
+    return replace(signals, acc=turned(signals.acc), gyr=gyr, mag=mag)

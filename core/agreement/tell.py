@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+import numpy as np
+
+from core.agreement.exchange import SensorExchange
 from core.agreement.lags import SensorDrift, SensorLag
-from core.agreement.params import LagParams
+from core.agreement.params import ExchangeParams, LagParams, SlipParams
+from core.agreement.slips import SensorSlip
 from core.errors import Notice
 
 UNDO: Final = "Set agreement.lags.repair to false to analyse them as they are."
@@ -57,6 +61,38 @@ def tell_drift(drift: SensorDrift, params: LagParams) -> Notice:
         f"The clock of {drift.sensor} runs {which}, by {ms:.0f} ± {sd:.0f} ms over the walk; {done}"
         "Synchronise the sensors before the next take. " + UNDO,
         drift.sensor,
+    )
+
+
+def tell_exchange(exchange: SensorExchange, params: ExchangeParams) -> Notice:
+    """Say which sensors were put on each other's segments."""
+    whose = " and ".join(f"{a} with {b}" for a, b in exchange.swap)
+    done = (
+        "The take was analysed so. Correct who wears what; agreement.exchange.repair = false undoes this."
+        if params.repair
+        else "Nothing was changed, as this analysis was told to. Correct who wears what."
+    )
+    return Notice(
+        "sensors_exchanged",
+        f"The joints show that sensors are exchanged: {whose}. " + done,
+        exchange.swap[0][0],
+    )
+
+
+def tell_slip(slip: SensorSlip, params: SlipParams) -> Notice:
+    """Say which sensor slipped, when, how far, and what follows from it."""
+    angle, sd = np.degrees(abs(slip.turn_rad)), np.degrees(slip.sd_rad)
+    done = (
+        "What came after was turned back. Set agreement.slips.repair to false to undo that."
+        if slip.is_repaired and params.repair
+        else "Angles beside it are withheld from there on. Fasten the sensor and record again."
+    )
+    return Notice(
+        "sensor_slipped",
+        f"The sensor on {slip.segment} slipped by {angle:.0f} ± {sd:.0f}° about {slip.at_s:.0f} s. "
+        f"Strides within {slip.within_s:.0f} s of that are left out. " + done,
+        slip.segment,
+        slip.at_s,
     )
 
 

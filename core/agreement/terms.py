@@ -32,11 +32,16 @@ class SensorTerms:
     ----------
     M : (m, 3, 4) [R K | R f] in m/s² per m and m/s², x and y horizontal, z up. usable : (m,) no lost
         sample is near. rate_hz : of these samples.
+    q : (n, 4) sensor to its level frame, at every sample of the take. level : (3, n) specific force there.
+    rate : (n, 3) rad/s with the bias of the quietest moment taken off.
     """
 
     M: Floats
     usable: Bools
     rate_hz: float
+    q: Floats
+    level: Floats
+    rate: Floats
 
 
 NORMS: Final = (9.0, 10.6)
@@ -65,7 +70,23 @@ def find_terms(signals: SensorSignals, rate_hz: float, params: JointParams) -> S
     slow = slow - low_pass(slow, high, rate_hz / thin)
     near = round(NEAR_GAP_S * rate_hz)
     lost = np.convolve(~signals.valid, np.ones(2 * near + 1), "same") > 0.5
-    return SensorTerms(np.ascontiguousarray(slow.T).reshape(-1, 3, TERMS), ~lost[::thin], rate_hz / thin)
+    M = np.ascontiguousarray(slow.T).reshape(-1, 3, TERMS)
+    return SensorTerms(M, ~lost[::thin], rate_hz / thin, q, rows[TERMS - 1 :: TERMS].copy(), gyr)
+
+
+def cut_terms(terms: SensorTerms, start_s: float, end_s: float) -> SensorTerms:
+    """The same of a part of the take; times begin anew."""
+    thin = round((len(terms.q) - 1) / max(1, len(terms.M) - 1))
+    first, last = (max(0, round(x * terms.rate_hz)) for x in (start_s, end_s))
+    part, whole = slice(first, last), slice(first * thin, last * thin)
+    return SensorTerms(
+        terms.M[part],
+        terms.usable[part],
+        terms.rate_hz,
+        terms.q[whole],
+        terms.level[:, whole],
+        terms.rate[whole],
+    )
 
 
 def find_bias(signals: SensorSignals, rate_hz: float) -> Floats:

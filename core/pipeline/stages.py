@@ -31,7 +31,7 @@ from core.parameters.spatial import surface_of
 from core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
 from core.pipeline.config import PipelineConfig
 from core.quality.stuck import drop_stuck_sensors, mark_stuck
-from core.withheld import withhold, withhold_distances
+from core.withheld import withhold, withhold_at_slips, withhold_distances
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 """Segments whose acceleration tells how regular the gait is."""
@@ -136,7 +136,9 @@ def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
     standing = analysis.recording.subject.standing_angles_deg
     zero = mounted.calibrated.calibration.zero
     joint = measure_angles(posed.orientations, zero, posed.poses, standing)
-    return replace(analysis, angles=withhold(joint, posed.poses, posed.orientations))
+    shown = withhold(joint, posed.poses, posed.orientations)
+    doubtful = {} if analysis.agreed is None else analysis.agreed.doubtful
+    return replace(analysis, angles=withhold_at_slips(shown, doubtful) if doubtful else shown)
 
 
 def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:

@@ -12,21 +12,13 @@ from core.agreement import Agreement, AgreementParams, check_agreement
 from core.agreement.agree import compare_sensors
 from core.agreement.lags import find_drifts, find_sensor_lags
 from core.agreement.params import JointParams, LagParams
-from core.agreement.repair import take_lag_out
 from core.agreement.windows import JointWindows, compare_at_joint
-from core.frames import Floats, Segment
+from core.frames import Segment
 from core.recording import UniformRecording
-from core.timeline import TimelineParams
+from tests.perturbations import delay_sensor
 from tests.walks import only, simulated
 
 LEG: tuple[Segment, ...] = ("pelvis", "thigh_l", "thigh_r", "shank_r", "foot_r")
-
-
-def delayed(recording: UniformRecording, segment: Segment, late_s: float | Floats) -> UniformRecording:
-    """The take with one sensor late: its samples show what happened that much earlier."""
-    lag = np.broadcast_to(-np.asarray(late_s, float), recording.t_s.shape)
-    moved = take_lag_out(recording.sensors[segment], recording.t_s, lag, recording.rate_hz, TimelineParams())
-    return replace(recording, sensors={**recording.sensors, segment: moved})
 
 
 @cache
@@ -51,7 +43,7 @@ def test_a_clean_walk_is_the_same_recording() -> None:
 
 @pytest.mark.parametrize(("segment", "late_s"), [("shank_r", 0.04), ("foot_r", -0.1), ("pelvis", 0.033)])
 def test_a_late_sensor_is_told_and_laid_where_it_belongs(segment: Segment, late_s: float) -> None:
-    found = check_agreement(delayed(walk(), segment, late_s))
+    found = check_agreement(delay_sensor(walk(), segment, late_s))
     assert [x.sensors for x in found.lags] == [(segment,)]
     assert found.lags[0].lag_s == pytest.approx(late_s, abs=0.004)
     assert codes(found) == ["sensor_late"]
@@ -59,29 +51,29 @@ def test_a_late_sensor_is_told_and_laid_where_it_belongs(segment: Segment, late_
     assert f"{1000 * abs(found.lags[0].lag_s):.0f} ±" in found.recording.notices[-1].message
     inside = slice(100, -100)
     truth, repaired = (r.sensors[segment].gyr[inside] for r in (walk(), found.recording))
-    late = delayed(walk(), segment, late_s).sensors[segment].gyr[inside]
+    late = delay_sensor(walk(), segment, late_s).sensors[segment].gyr[inside]
     assert np.abs(repaired - truth).mean() < 0.25 * np.abs(late - truth).mean()
 
 
 def test_a_small_lag_is_repaired_and_only_noted() -> None:
-    found = check_agreement(delayed(walk(), "shank_r", 0.02))
+    found = check_agreement(delay_sensor(walk(), "shank_r", 0.02))
     assert codes(found) == ["sensor_late"]
     assert found.recording.notices[-1].severity == "info"
 
 
 def test_a_lag_below_the_limit_is_not_told() -> None:
-    assert codes(check_agreement(delayed(walk(), "shank_r", 0.008))) == []
+    assert codes(check_agreement(delay_sensor(walk(), "shank_r", 0.008))) == []
 
 
 def test_the_repair_can_be_undone() -> None:
-    late = delayed(walk(), "shank_r", 0.04)
+    late = delay_sensor(walk(), "shank_r", 0.04)
     found = check_agreement(late, AgreementParams(lags=LagParams(repair=False)))
     assert codes(found) == ["sensor_late"]
     assert found.recording.sensors["shank_r"] is late.sensors["shank_r"]
 
 
 def test_a_thigh_that_a_hip_alone_accuses_is_told_from_thirty_ms_and_left() -> None:
-    small, large = (delayed(walk(), "thigh_l", x) for x in (0.022, 0.045))
+    small, large = (delay_sensor(walk(), "thigh_l", x) for x in (0.022, 0.045))
     assert codes(check_agreement(small)) == []
     found = check_agreement(large)
     assert codes(found) == ["clocks_disagree"]
@@ -90,15 +82,15 @@ def test_a_thigh_that_a_hip_alone_accuses_is_told_from_thirty_ms_and_left() -> N
 
 def test_of_two_sensors_nobody_knows_which_is_late() -> None:
     pair = only(walk(), "shank_r", "foot_r")
-    assert codes(check_agreement(delayed(pair, "foot_r", 0.02))) == []
-    found = check_agreement(delayed(pair, "foot_r", 0.05))
+    assert codes(check_agreement(delay_sensor(pair, "foot_r", 0.02))) == []
+    found = check_agreement(delay_sensor(pair, "foot_r", 0.05))
     assert codes(found) == ["clocks_disagree"]
     assert not found.lags[0].sure
 
 
 def test_a_clock_that_runs_slow_is_stretched() -> None:
     growing = np.linspace(0.0, 0.06, len(walk().t_s))
-    late = delayed(walk(), "shank_r", growing)
+    late = delay_sensor(walk(), "shank_r", growing)
     found = check_agreement(late)
     assert [d.sensor for d in found.drifts] == ["shank_r"]
     assert "clock_drifts" in codes(found)
