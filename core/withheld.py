@@ -7,7 +7,7 @@ the distances of a foot whose path does not fit its own rests, or whose chain do
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -19,8 +19,8 @@ from core.body.health import HealthFinding
 from core.body.poses import Poses
 from core.errors import Notice
 from core.estimators import BY_METHOD
-from core.frames import FOOT, SIDES, SUFFIX, Oriented, Side
-from core.rest import find_runs
+from core.frames import FOOT, SIDES, SUFFIX, Oriented, Segment, Side
+from core.rest import Window, find_runs
 from core.rotation import wrap_angle
 
 BAD: Final = "estimator_bad"
@@ -89,6 +89,25 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
     return replace(
         angles, angles=kept, withheld=dict.fromkeys(sorted(out), BAD), bounds=bounds, notices=notices
     )
+
+
+def withhold_at_slips(angles: JointAngles, doubtful: Mapping[Segment, Window]) -> JointAngles:
+    """Take out the angles beside a sensor while nobody knows how it sits.
+
+    Parameters
+    ----------
+    doubtful : sensor → stretch, s from recording start (core/agreement).
+    """
+    kept = dict(angles.angles)
+    for side in SIDES:
+        for joint, *ends in list_leg_joints(side):
+            out = np.zeros(len(angles.t_s), np.bool_)
+            for start, end in (doubtful[s] for s in ends if s in doubtful):
+                out |= (angles.t_s >= start) & (angles.t_s <= end)
+            for base, _, _ in SIGNS[joint]:
+                if (name := f"{base}_{SUFFIX[side]}") in kept:
+                    kept[name] = np.where(out, np.nan, kept[name])
+    return replace(angles, angles=kept)
 
 
 def withhold_distances(posed: PoseEstimate) -> PoseEstimate:

@@ -173,8 +173,8 @@ def test_a_filter_in_a_recipe_is_what_later_stages_take() -> None:
     source = simulate_scenario("comfortable", 1, worn=("foot_l", "foot_r")).recording
     held = PipelineStage("orientation", 0.1, _hold_first, ("fused",), ("fusion",))
     recipe = tuple(held if stage is ORIENTATION else stage for stage in WALK)
-    usual = run_stages(TakeAnalysis(source, PipelineConfig(), ""), WALK[:5], say_nothing)
-    still = run_stages(TakeAnalysis(source, PipelineConfig(), ""), recipe[:5], say_nothing)
+    usual = run_stages(TakeAnalysis(source, PipelineConfig(), ""), WALK[:6], say_nothing)
+    still = run_stages(TakeAnalysis(source, PipelineConfig(), ""), recipe[:6], say_nothing)
     assert usual.contacts is not None
     assert still.contacts is not None
     assert len(usual.contacts.events.events) > 20
@@ -194,7 +194,7 @@ def test_a_protocol_is_a_tuple_of_stages_that_the_loop_runs(monkeypatch: pytest.
     told: list[str] = []
     source = simulate_scenario("comfortable", 1, worn=("foot_l", "foot_r")).recording
     found = analyse(source, progress=lambda stage, share: told.append(stage))
-    assert told[:3] == ["timeline", "quality", "rests"]
+    assert told[:4] == ["timeline", "agreement", "quality", "rests"]
     assert found.problem is not None
     assert found.problem.code == "stood"
 

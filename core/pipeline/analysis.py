@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
+from core.agreement import Agreement
 from core.angles import JointAngles
 from core.body.estimate import PoseEstimate
 from core.body.feet import FootTracks
@@ -66,6 +67,7 @@ class TakeAnalysis:
     ----------
     source : as read from the files.
     uniform : stage timeline; samples of sensors that do not measure are not valid.
+    agreed : stage agreement; holds the recording with what could be repaired.
     report : stage quality.
     calibrated : stage calibration, with the mountings that each sensor shows on its own.
     fused : stage orientation, with those mountings.
@@ -83,6 +85,7 @@ class TakeAnalysis:
     config: PipelineConfig = field(default_factory=PipelineConfig)
     version: str = ""
     uniform: UniformRecording | None = None
+    agreed: Agreement | None = None
     report: QualityReport | None = None
     calibrated: CalibratedRecording | None = None
     fused: Orientations | None = None
@@ -97,8 +100,8 @@ class TakeAnalysis:
 
     @property
     def recording(self) -> UniformRecording:
-        """The take on its common time axis; every analysis that `analyse` returns has it."""
-        return require_stage(self.uniform, "timeline")
+        """The take on its axis, late sensors shifted; every analysis that `analyse` returns has it."""
+        return require_stage(self.uniform, "timeline") if self.agreed is None else self.agreed.recording
 
     @property
     def quality(self) -> QualityReport:
@@ -146,8 +149,8 @@ class TakeAnalysis:
         """All notices of all stages, each once."""
         detected = None if self.contacts is None else self.contacts.events
         speaking = (
-            self.source, self.uniform, self.report, self.calibration, self.orientations, detected,
-            self.measured, self.poses, self.angles,
+            self.source, None if self.uniform is None else self.recording, self.report, self.calibration,
+            self.orientations, detected, self.measured, self.poses, self.angles,
         )  # fmt: skip
         found = [notice for part in speaking if part is not None for notice in part.notices]
         found += () if self.mounted is None else self.mounted.assumed

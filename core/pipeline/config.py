@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar, get_args
 
+from core.agreement import AgreementParams
 from core.body.pose_params import PoseParams
 from core.calibration import CalibrationParams
 from core.errors import ParameterError
@@ -50,6 +51,7 @@ class PipelineConfig:
 
     timeline: TimelineParams = field(default_factory=TimelineParams)
     stuck: StuckParams = field(default_factory=StuckParams)
+    agreement: AgreementParams = field(default_factory=AgreementParams)
     quality: QualityParams = field(default_factory=QualityParams)
     calibration: CalibrationParams = field(default_factory=CalibrationParams)
     fusion: MahonyParams = field(default_factory=MahonyParams)

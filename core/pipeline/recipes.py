@@ -14,6 +14,7 @@ from core.errors import Notice, ParameterError, SagittalError
 from core.pipeline.analysis import TakeAnalysis
 from core.pipeline.config import PipelineConfig
 from core.pipeline.stages import (
+    AGREEMENT,
     ANGLES,
     CALIBRATION,
     EVENTS,
@@ -34,7 +35,7 @@ from core.recording import Recording
 Progress = Callable[[str, float], None]
 """Called with the stage that starts and the share of the work done before it, 0 to 1."""
 
-SIGNALS: Final = (TIMELINE, QUALITY)
+SIGNALS: Final = (TIMELINE, AGREEMENT, QUALITY)
 """What every recipe begins with: afterwards it is known which sensors work."""
 
 WALK: Final = (*SIGNALS, CALIBRATION, ORIENTATION, EVENTS, MOUNTING, POSES, ANGLES, PARAMETERS)

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from core import body, calibration, quality, timeline
+from core.agreement import check_agreement
 from core.angles.measure import measure_angles
 from core.body.estimate import estimate_poses
 from core.body.l7s.inputs import free_acceleration
@@ -34,7 +35,7 @@ from core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
 from core.pipeline.config import PipelineConfig
 from core.quality.stuck import drop_stuck_sensors, mark_stuck
 from core.rest import STANDING, Window, find_rest_windows
-from core.withheld import withhold, withhold_distances
+from core.withheld import withhold, withhold_at_slips, withhold_distances
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 """Segments whose acceleration tells how regular the gait is."""
@@ -64,6 +65,12 @@ def lay_on_one_axis(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
     """All sensors on one time axis; samples of a sensor that does not measure are not valid."""
     uniform = timeline.synchronise(analysis.source, config.timeline)
     return replace(analysis, uniform=mark_stuck(uniform, config.stuck))
+
+
+def compare_clocks(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
+    """What the sensors say about each other; late ones are laid where they belong."""
+    uniform = require_stage(analysis.uniform, "timeline")
+    return replace(analysis, agreed=check_agreement(uniform, config.agreement, config.timeline))
 
 
 def judge_signals(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -134,7 +141,9 @@ def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
     standing = analysis.recording.subject.standing_angles_deg
     zero = mounted.calibrated.calibration.zero
     joint = measure_angles(posed.orientations, zero, posed.poses, standing)
-    return replace(analysis, angles=withhold(joint, posed.poses, posed.orientations))
+    shown = withhold(joint, posed.poses, posed.orientations)
+    doubtful = {} if analysis.agreed is None else analysis.agreed.doubtful
+    return replace(analysis, angles=withhold_at_slips(shown, doubtful) if doubtful else shown)
 
 
 def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -240,6 +249,7 @@ def _trunk_acceleration(analysis: TakeAnalysis) -> dict[Segment, Floats]:
 
 
 TIMELINE: Final = PipelineStage("timeline", 0.0, lay_on_one_axis, ("uniform",), ("timeline", "stuck"))
+AGREEMENT: Final = PipelineStage("agreement", 0.02, compare_clocks, ("agreed",), ("agreement", "timeline"))
 QUALITY: Final = PipelineStage("quality", 0.03, judge_signals, ("report",), ("quality",))
 CALIBRATION: Final = PipelineStage("calibration", 0.05, calibrate_sensors, ("calibrated",), ("calibration",))
 ORIENTATION: Final = PipelineStage("orientation", 0.1, orient_segments, ("fused",), ("fusion",))

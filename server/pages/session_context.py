@@ -13,6 +13,7 @@ from server.services import controls, live, patients, sessions
 STAGE_NAMES: Final[Mapping[str, str]] = {
     "reading": "Read the files",
     "timeline": "Lay all sensors on one time axis",
+    "agreement": "Compare the clocks and places of the sensors",
     "quality": "Check the data",
     "calibration": "Calibrate: how each sensor sits on its segment",
     "orientation": "Find the orientation of each segment",

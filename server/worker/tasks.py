@@ -46,11 +46,13 @@ def _publish_analysis(
 def _warm() -> None:
     """Import readers and pipeline, compile the kernels or load them from the cache."""
     import server.report.exports  # noqa: F401
+    from core.agreement.windows import compile_agreement_kernels
     from core.body import estimate
     from core.events import foot_contact
     from core.fusion import attitude
 
     attitude.compile_attitude_kernel()
+    compile_agreement_kernels()
     foot_contact.compile_foot_contact_kernel()
     estimate.compile_pose_kernels()
 

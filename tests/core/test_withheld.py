@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from core.agreement.params import AgreementParams, ExchangeParams
 from core.angles import JointAngles
 from core.body.erkf.health import REFUSED_PCT
 from core.body.estimate import PoseEstimate
@@ -21,7 +22,7 @@ from core.parameters.kinematic import cycle_curves, summarise_angles
 from core.parameters.live_figures import StrideSpan, early_figures
 from core.parameters.spatial import GROUND, NAMES
 from core.parameters.temporal import per_stride, summarise_times
-from core.pipeline import TakeAnalysis, analyse
+from core.pipeline import PipelineConfig, TakeAnalysis, analyse
 from core.quality import find_shown_level
 from core.recording import Recording
 from core.simulate import simulate_scenario
@@ -45,8 +46,10 @@ def worn(recording: Recording, segments: dict[Segment, Segment] | None = None, *
 @cache
 def exchanged() -> TakeAnalysis:
     """A simulated walk, the sensors of both thighs taken for each other."""
+    left_so = PipelineConfig(agreement=AgreementParams(exchange=ExchangeParams(repair=False)))
     return analyse(
-        worn(simulate_scenario("comfortable", 0).recording, {"thigh_l": "thigh_r", "thigh_r": "thigh_l"})
+        worn(simulate_scenario("comfortable", 0).recording, {"thigh_l": "thigh_r", "thigh_r": "thigh_l"}),
+        left_so,
     )
 
 
@@ -67,10 +70,10 @@ def test_the_level_people_see_is_the_worst_of_signals_and_estimator() -> None:
     assert find_shown_level("poor", "good") == "poor"
     found = exchanged()
     assert found.poses is not None
-    assert (found.quality.level, find_worst_verdict(found.poses.health)) == ("good", "bad")
+    assert (found.quality.level, find_worst_verdict(found.poses.health)) == ("usable", "bad")
     files = analysis_files(found)
     quality = json.loads(files["analysis.json"])["quality"]
-    assert (quality["level"], quality["signals_level"]) == ("poor", "good")
+    assert (quality["level"], quality["signals_level"]) == ("poor", "usable")
     assert "sensors contradict" in quality["reasons"][-1]
     box = quality_box(load_bundle(files))
     assert box.kind == "bad"

@@ -87,7 +87,9 @@ def test_parameters_of_an_earlier_stage_cannot_be_changed_on_the_way() -> None:
 
 
 def test_a_stage_that_does_not_exist_is_named() -> None:
-    with pytest.raises(ParameterError, match="No stage 'squat'; expected one of timeline, quality") as caught:
+    with pytest.raises(
+        ParameterError, match="No stage 'squat'; expected one of timeline, agreement, quality"
+    ) as caught:
         resume(whole("pelvis"), "squat")
     assert caught.value.code == "unknown_stage"
 

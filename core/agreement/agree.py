@@ -1,0 +1,137 @@
+"""What the sensors say about each other, and the recording with what could be repaired."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from core.agreement.exchange import SensorExchange, find_exchange, undo_exchange
+from core.agreement.joints import list_worn_joints
+from core.agreement.lags import SensorDrift, SensorLag, find_drifts, find_sensor_lags
+from core.agreement.params import AgreementParams, JointParams
+from core.agreement.repair import take_lag_out, turn_back
+from core.agreement.slips import SensorSlip, find_slips
+from core.agreement.tell import tell_drift, tell_exchange, tell_lag, tell_left_over, tell_slip
+from core.agreement.terms import SensorTerms, find_terms
+from core.agreement.windows import JointWindows, compare_at_joint
+from core.errors import Notice
+from core.frames import Floats, Segment
+from core.quality.stuck import drop_stuck_sensors
+from core.recording import UniformRecording
+from core.rest import Window
+from core.timeline import TimelineParams
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """What was found on a take, and what was made of it.
+
+    Parameters
+    ----------
+    recording : what all that follows works on; its notices say what was found. The recording that was given
+        when there was nothing to say.
+    exchange : None where too few sensors are worn. lags, drifts : as found, also where they are too small to
+        be told. slips : all of them are told.
+    shifted_s : sensor → lag that was taken out, at the middle of the take, s.
+    doubtful : sensor → stretch in which the angles beside it are not to be shown, s: around a slip that was
+        turned back, else from there on.
+    """
+
+    recording: UniformRecording
+    exchange: SensorExchange | None = None
+    lags: tuple[SensorLag, ...] = ()
+    drifts: tuple[SensorDrift, ...] = ()
+    slips: tuple[SensorSlip, ...] = ()
+    shifted_s: Mapping[Segment, float] = field(default_factory=dict)
+    doubtful: Mapping[Segment, Window] = field(default_factory=dict)
+
+
+Terms = Mapping[Segment, SensorTerms]
+
+
+def compare_sensors(
+    recording: UniformRecording, params: JointParams, known: Terms | None = None
+) -> tuple[tuple[JointWindows, ...], Terms]:
+    """Windows of every joint whose sensors are worn, and the terms they were made from.
+
+    Parameters
+    ----------
+    known : terms of sensors that have not changed.
+    """
+    worn = drop_stuck_sensors(recording)
+    joints = list_worn_joints(worn.sensors)
+    terms = dict(known or {})
+    for segment in sorted({s for joint in joints for s in joint} - set(terms)):
+        terms[segment] = find_terms(worn.sensors[segment], worn.rate_hz, params)
+    return tuple(compare_at_joint((a, b), terms[a], terms[b], params) for a, b in joints), terms
+
+
+def check_agreement(
+    recording: UniformRecording,
+    params: AgreementParams | None = None,
+    timeline: TimelineParams | None = None,
+) -> Agreement:
+    """Find exchanged, late and slipped sensors, in this order, and put right what can be.
+
+    Parameters
+    ----------
+    recording : on its axis. timeline : how samples between points of the axis are laid.
+    """
+    params, timeline = params or AgreementParams(), timeline or TimelineParams()
+    joints, terms = compare_sensors(recording, params.joints)
+    if not joints:
+        return Agreement(recording)
+    said: list[Notice] = []
+    exchange = find_exchange(terms, joints, recording.rate_hz, params.joints, params.exchange)
+    current = recording
+    if exchange.swap:
+        said.append(tell_exchange(exchange, params.exchange))
+        if params.exchange.repair:
+            current = replace(current, sensors=undo_exchange(exchange.swap, current.sensors))
+            joints, terms = compare_sensors(current, params.joints, undo_exchange(exchange.swap, terms))
+    lags, drifts = find_sensor_lags(joints, params.lags), find_drifts(joints, params.lags)
+    said += [tell_lag(x, params.lags) for x in lags if x.told]
+    said += [tell_drift(x, params.lags) for x in drifts]
+    late = _lags_over_time(current.t_s, lags, drifts) if params.lags.repair else {}
+    if late:
+        shifted = {
+            s: take_lag_out(current.sensors[s], current.t_s, x, current.rate_hz, timeline)
+            for s, x in late.items()
+        }
+        current = replace(current, sensors={**current.sensors, **shifted})
+        unchanged = {s: x for s, x in terms.items() if s not in late}
+        joints, terms = compare_sensors(current, params.joints, unchanged)
+        said += [tell_left_over(x) for x in find_sensor_lags(joints, params.lags) if x.told]
+    slips = find_slips(current, terms, joints, params.slips)
+    said += [tell_slip(x, params.slips) for x in slips]
+    back = {x.segment: x for x in slips if x.is_repaired and params.slips.repair}
+    turned = {s: turn_back(current.sensors[s], current.t_s, x) for s, x in back.items()}
+    if said:
+        notices = tuple(dict.fromkeys((*current.notices, *said)))
+        current = replace(current, sensors={**current.sensors, **turned}, notices=notices)
+    return Agreement(
+        current,
+        exchange,
+        lags,
+        drifts,
+        slips,
+        {s: float(x[len(x) // 2]) for s, x in late.items()},
+        {x.segment: _find_doubt(x, x.segment in back) for x in slips},
+    )
+
+
+def _find_doubt(slip: SensorSlip, repaired: bool) -> Window:
+    return slip.at_s - slip.within_s, slip.at_s + slip.within_s if repaired else np.inf
+
+
+def _lags_over_time(
+    t_s: Floats, lags: Iterable[SensorLag], drifts: Iterable[SensorDrift]
+) -> dict[Segment, Floats]:
+    """Sensor → its lag (n,) s at every sample, of those that are repaired."""
+    late = {x.sensors[0]: np.full(len(t_s), x.lag_s) for x in lags if x.told and x.sure}
+    for drift in drifts:
+        middle, span = 0.5 * (drift.from_s + drift.until_s), max(drift.until_s - drift.from_s, 1e-9)
+        late[drift.sensor] = late.get(drift.sensor, 0.0) + drift.change_s * (t_s - middle) / span
+    return late

@@ -1,0 +1,68 @@
+"""Signals of a late sensor laid where they belong, and of a slipped one turned back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from core.agreement.slips import SensorSlip
+from core.frames import Floats
+from core.recording import SensorSignals
+from core.rotation import exp, rotate
+from core.timeline.grid import lay_signal
+from core.timeline.params import TimelineParams
+
+
+def take_lag_out(
+    signals: SensorSignals, t_s: Floats, lag_s: Floats, rate_hz: float, params: TimelineParams
+) -> SensorSignals:
+    """Lay a sensor that is late by lag_s (n,) at its own samples where they belong.
+
+    Samples are interpolated as those of any sensor whose times do not fall on the axis
+    (docs/science/timeline.md, "Rule"); where the shift leaves none, the sensor is not valid.
+    """
+    ok, n = signals.valid, len(t_s)
+    own = np.asarray(t_s - lag_s)[ok]
+    if not len(own):
+        return signals
+    with_mag = signals.mag is not None
+    x = np.concatenate(
+        (signals.acc, signals.gyr) + ((signals.mag,) if signals.mag is not None else ()), axis=1
+    )[ok]
+    laid, valid, filled = lay_signal(own, x, float(t_s[0]), n, rate_hz, rate_hz, params)
+    valid &= (t_s >= own[0]) & (t_s <= own[-1])
+    nearest = np.clip(np.round((t_s + lag_s - t_s[0]) * rate_hz).astype(int), 0, n - 1)
+    return replace(
+        signals,
+        acc=laid[0],
+        gyr=laid[1],
+        mag=laid[2] if with_mag else None,
+        valid=valid,
+        interpolated=(filled | signals.interpolated[nearest]) & valid,
+    )
+
+
+SLIPPING_S: Final = 0.3
+"""A slip takes about so long; its turn is spread over this time."""
+
+
+def turn_back(signals: SensorSignals, t_s: Floats, slip: SensorSlip) -> SensorSignals:
+    """Turn back what a sensor showed after it slipped, and take the slip itself out of its rate.
+
+    The gyroscope measured that turn; left in, the orientation integrated from it would be wrong by the slip.
+    """
+    turn = slip.turn_rad * np.array(slip.axis)
+    after = t_s >= slip.at_s
+    slipping = after & (t_s < slip.at_s + SLIPPING_S)
+    back = exp(-turn)
+
+    def turned(x: Floats) -> Floats:
+        return np.where(after[:, None], rotate(back, x), x)
+
+    # a turn of the sensor by r shows −r in its rate
+    lasting_s = np.count_nonzero(slipping) * float(t_s[1] - t_s[0])
+    gyr = turned(signals.gyr) + slipping[:, None] * turn / max(lasting_s, 1e-9)
+    mag = None if signals.mag is None else turned(signals.mag)
+    return replace(signals, acc=turned(signals.acc), gyr=gyr, mag=mag)

@@ -1,0 +1,115 @@
+"""Words for what the sensors say about each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from core.agreement.exchange import SensorExchange
+from core.agreement.lags import SensorDrift, SensorLag
+from core.agreement.params import ExchangeParams, LagParams, SlipParams
+from core.agreement.slips import SensorSlip
+from core.errors import Notice
+
+UNDO: Final = "Set agreement.lags.repair to false to analyse them as they are."
+
+
+def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
+    """Say whose clock is late, and what was done about it."""
+    ms, sd = 1e3 * abs(lag.lag_s), 1e3 * lag.sd_s
+    which = "late" if lag.lag_s > 0 else "early"
+    whose = list_sensors(lag.sensors)
+    if not lag.sure:
+        return Notice(
+            "clocks_disagree",
+            f"The clock of {whose} seems {ms:.0f} ± {sd:.0f} ms {which}. One joint alone shows it, so "
+            "nothing was shifted. Synchronise the sensors and record again.",
+            lag.sensors[0],
+        )
+    if not params.repair:
+        return Notice(
+            "sensor_late",
+            f"The clock of {whose} is {ms:.0f} ± {sd:.0f} ms {which}. It was left so, as this analysis was "
+            "told to. Angles beside it are wrong.",
+            lag.sensors[0],
+        )
+    if abs(lag.lag_s) <= params.warn_s:
+        return Notice(
+            "sensor_late",
+            f"The clock of {whose} is {ms:.0f} ± {sd:.0f} ms {which}; its samples were shifted by that. "
+            + UNDO,
+            lag.sensors[0],
+            severity="info",
+        )
+    return Notice(
+        "sensor_late",
+        f"The clock of {whose} is {ms:.0f} ± {sd:.0f} ms {which}; its samples were shifted by that. "
+        "Synchronise the sensors before the next take. " + UNDO,
+        lag.sensors[0],
+    )
+
+
+def tell_drift(drift: SensorDrift, params: LagParams) -> Notice:
+    """Say whose clock runs slow or fast."""
+    ms, sd = 1e3 * abs(drift.change_s), 1e3 * drift.sd_s
+    which = "slow" if drift.change_s > 0 else "fast"
+    done = "its samples were laid where they belong. " if params.repair else "it was left so. "
+    return Notice(
+        "clock_drifts",
+        f"The clock of {drift.sensor} runs {which}, by {ms:.0f} ± {sd:.0f} ms over the walk; {done}"
+        "Synchronise the sensors before the next take. " + UNDO,
+        drift.sensor,
+    )
+
+
+def tell_exchange(exchange: SensorExchange, params: ExchangeParams) -> Notice:
+    """Say which sensors were put on each other's segments."""
+    whose = " and ".join(f"{a} with {b}" for a, b in exchange.swap)
+    done = (
+        "The take was analysed so. Correct who wears what; agreement.exchange.repair = false undoes this."
+        if params.repair
+        else "Nothing was changed, as this analysis was told to. Correct who wears what."
+    )
+    return Notice(
+        "sensors_exchanged",
+        f"The joints show that sensors are exchanged: {whose}. " + done,
+        exchange.swap[0][0],
+    )
+
+
+def tell_slip(slip: SensorSlip, params: SlipParams) -> Notice:
+    """Say which sensor slipped, when, how far, and what follows from it."""
+    angle, sd = np.degrees(abs(slip.turn_rad)), np.degrees(slip.sd_rad)
+    done = (
+        "What came after was turned back. Set agreement.slips.repair to false to undo that."
+        if slip.is_repaired and params.repair
+        else "Angles beside it are withheld from there on. Fasten the sensor and record again."
+    )
+    return Notice(
+        "sensor_slipped",
+        f"The sensor on {slip.segment} slipped by {angle:.0f} ± {sd:.0f}° about {slip.at_s:.0f} s. "
+        f"Strides within {slip.within_s:.0f} s of that are left out. " + done,
+        slip.segment,
+        slip.at_s,
+    )
+
+
+def tell_left_over(lag: SensorLag) -> Notice:
+    """Say that a lag is left after the repair."""
+    return Notice(
+        "clocks_disagree",
+        f"After the repair {list_sensors(lag.sensors)} still seems {1e3 * abs(lag.lag_s):.0f} ms off the "
+        "others. Angles beside it are doubtful; synchronise the sensors and record again.",
+        lag.sensors[0],
+    )
+
+
+def list_sensors(sensors: Sequence[str]) -> str:
+    """Name sensors in a sentence.
+
+    >>> list_sensors(["thigh_l", "shank_l", "foot_l"])
+    'thigh_l, shank_l and foot_l'
+    """
+    return " and ".join(filter(None, (", ".join(sensors[:-1]), sensors[-1])))

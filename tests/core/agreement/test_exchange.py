@@ -1,0 +1,82 @@
+"""Labels by the joints: what is exchanged is named and put back; a right walk stays as it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from core.agreement import Agreement, AgreementParams, check_agreement
+from core.agreement.exchange import LEGS, SWAPS, Swap, undo_exchange
+from core.agreement.params import ExchangeParams
+from core.recording import UniformRecording
+from tests.walks import only, simulated
+
+
+@cache
+def walk() -> UniformRecording:
+    made = simulated("comfortable", 1)[0]
+    return only(made, *(s for s in made.sensors if s != "chest"))
+
+
+def wrong(swap: Swap) -> UniformRecording:
+    return replace(walk(), sensors=undo_exchange(swap, walk().sensors))
+
+
+def pairs(found: Agreement) -> set[frozenset[str]]:
+    assert found.exchange is not None
+    return {frozenset(pair) for pair in found.exchange.swap}
+
+
+def test_a_right_walk_fits_best_as_it_is() -> None:
+    found = check_agreement(walk())
+    assert found.recording is walk()
+    assert found.exchange is not None
+    assert found.exchange.swap == ()
+    assert found.exchange.ratio < 0.9
+    assert found.exchange.cosine is not None
+    assert found.exchange.cosine > 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("swap", [*SWAPS, LEGS, LEGS[1:]], ids=str)
+def test_exchanged_sensors_are_named_and_put_back(swap: Swap) -> None:
+    found = check_agreement(wrong(swap))
+    assert pairs(found) == {frozenset(pair) for pair in swap}
+    assert [n.code for n in found.recording.notices] == ["sensors_exchanged"]
+    for segment, signals in found.recording.sensors.items():
+        assert signals is walk().sensors[segment]
+
+
+def test_exchanged_feet_are_told_and_left_where_so_configured() -> None:
+    params = AgreementParams(exchange=ExchangeParams(repair=False))
+    found = check_agreement(wrong((("foot_l", "foot_r"),)), params)
+    assert pairs(found) == {frozenset(("foot_l", "foot_r"))}
+    assert found.recording.notices[0].code == "sensors_exchanged"
+    assert found.recording.sensors["foot_l"] is walk().sensors["foot_r"]
+
+
+def test_exchanging_twice_changes_nothing() -> None:
+    things = {"thigh_l": 1, "thigh_r": 2, "foot_l": 3, "foot_r": 4, "shank_l": 5, "shank_r": 6}
+    assert undo_exchange(LEGS, undo_exchange(LEGS, things)) == things  # type: ignore[arg-type]
+
+
+def test_without_a_pelvis_nobody_can_tell_legs_apart() -> None:
+    legs = replace(walk(), sensors={s: x for s, x in wrong(LEGS).sensors.items() if s != "pelvis"})
+    found = check_agreement(legs)
+    assert found.exchange is not None
+    assert found.exchange.cosine is None
+    assert found.exchange.swap == ()
+
+
+def test_people_who_stand_have_no_exchange() -> None:
+    stand = {
+        s: replace(x, acc=np.tile(x.acc[:1], (len(x.acc), 1)), gyr=np.zeros_like(x.gyr))
+        for s, x in walk().sensors.items()
+    }
+    found = check_agreement(replace(walk(), sensors=stand))
+    assert found.recording.notices == ()
+    assert found.exchange is not None
+    assert found.exchange.swap == ()
