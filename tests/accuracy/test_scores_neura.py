@@ -1,9 +1,9 @@
 """Scores on neura_walk, from the sensor files alone, against the same scores of Vicon's curves.
 
 Strides and definitions are the product's on both sides; only the curves differ. A goniometer is played by
-Vicon: its mean angles while standing are entered as a therapist would enter them, whole degrees. Seven strides
-of one person, where the walk starts and stops among them, each taken twice because so few have no score:
-a check of magnitude, no statistic.
+Vicon: its mean angles while standing are entered as a therapist would enter them, whole degrees. Seven
+strides of one person, where the walk starts and stops among them, each taken twice because so few have no
+score: a check of magnitude, no statistic.
 """
 
 from __future__ import annotations
