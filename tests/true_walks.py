@@ -27,13 +27,12 @@ TIP_UP_M = _ANATOMY.rocker_radius - np.sqrt(_ANATOMY.rocker_radius**2 - (TIP_M -
 
 
 def true_tracks(truth: WalkTruth) -> Tracks:
-    """Tracks without any error; a foot is off the floor when its sole is 5 mm up, where it ever is."""
+    """Tracks without any error; a foot is on the floor from the first to the last touch of its sole."""
     n = len(truth.t_s)
     events = []
     for side, contacts in truth.contacts.items():
-        off = np.where(np.isnan(contacts.lift5), contacts.release, contacts.lift5)
         events += [GaitEvent(t, side, "ic", "truth", t) for t in contacts.contact.tolist()]
-        events += [GaitEvent(t, side, "tc", "truth", t) for t in off.tolist()]
+        events += [GaitEvent(t, side, "tc", "truth", t) for t in contacts.release.tolist()]
     feet = FootTracks(
         t_s=truth.t_s,
         rate_hz=truth.rate_hz,

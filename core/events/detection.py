@@ -204,13 +204,8 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list
             Notice(
                 "no_toe_off",
                 f"The {side} foot never pitched below {_degrees(params.threshold)} (lowest was"
-                f" {_degrees(figures.s_min)}), so "
-                + (
-                    "its contacts are those of its movement alone and less exact."
-                    if figures.n_ic
-                    else "no contacts were found on it."
-                )
-                + " A shuffling gait, no walking, or a sensor on another segment looks like this.",
+                f" {_degrees(figures.s_min)}), so no contacts were found on it. A shuffling gait, no walking,"
+                " or a sensor on another segment looks like this.",
                 foot,
             )
         )

@@ -81,7 +81,7 @@ class Room:
 
     def keep_stride(self, k: int, body: bytes) -> None:
         """Keep the `k`th telling of a stride for those who come later."""
-        _keep(self._strides, k, body, 2 * SHOWN)  # told twice each
+        _keep(self._strides, k, body, 3 * SHOWN)  # told three times each
 
     def keep_cue(self, k: int, body: bytes) -> None:
         """Keep the `k`th cue for those who come later."""

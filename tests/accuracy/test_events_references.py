@@ -199,6 +199,18 @@ def test_force_and_motion_capture_lie_on_both_sides(kind: EventKind) -> None:
     assert len(clear) >= 0.95 * len(optical.ms)
 
 
+@pytest.mark.parametrize("copy", COPIES)
+@pytest.mark.parametrize("rate_hz", [60.0, 100.0, 128.0])
+def test_neither_the_sample_rate_nor_the_mounting_moves_a_contact(copy: str, rate_hz: float) -> None:
+    found = run(recording_of(resampled(copy, rate_hz), rate_hz)).events["foot_contact"]
+    for side, kind in product(SIDES, KINDS):
+        here = against(found, side, kind, mocap(side, kind))
+        clear = here.ms[here.stated_ms < 40.0]
+        assert abs(clear.mean()) <= 26
+        assert clear.std(ddof=1) <= 11
+        assert abs(clear.mean() - errors(f"gaitmap_foot {side}", "foot_contact", kind).mean) <= 8
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_stated_uncertainty_is_that_of_the_errors(kind: EventKind) -> None:
     """Over all references together: neither half as large nor twice as large as what was found."""

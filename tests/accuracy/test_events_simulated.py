@@ -61,7 +61,7 @@ def test_no_contact_is_missed_or_invented_on_any_script() -> None:
 
 
 def test_refined_contacts_leave_stance_right_on_simulated_people() -> None:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name in PEOPLE:
         take, truth = simulated(name)
         calibrated = calibration.calibrate(take)

@@ -1,9 +1,9 @@
 """Scores on neura_walk, from the sensor files alone, against the same scores of Vicon's curves.
 
 Strides and definitions are the product's on both sides; only the curves differ. A goniometer is played by
-Vicon: its mean angles while standing are entered as a therapist would enter them, whole degrees. Six strides
-of one person, where the walk starts and stops among them, each taken twice because so few have no score:
-a check of magnitude, no statistic.
+Vicon: its mean angles while standing are entered as a therapist would enter them, whole degrees. Seven
+strides of one person, where the walk starts and stops among them, each taken twice because so few have no
+score: a check of magnitude, no statistic.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from tests.walks import neura_analysis
 
 WALK, STANDING = slice(1110, 2080), slice(300, 1000)
 LAGS = range(-2, 7)
-LIMIT_DEG = {"gps_sagittal raw": 1.0, "gps_sagittal shape": 1.0, "gps shape": 1.0}
-"""Of each profile of a side; ours, reached (0.6 at most) + half."""
+LIMIT_DEG = {"gps_sagittal raw": 1.5, "gps_sagittal shape": 1.5, "gps shape": 1.5}
+"""Of each profile of a side; ours, reached (1.1 at most) + half."""
 
 COURSE_DEG = {"pelvis_rotation": 1.5, "foot_progression": 3.0}
 """RMS of the mean curve; ours, reached (0.9, 2.0) + half."""

@@ -19,6 +19,8 @@ import pytest
 
 from core.body.erkf.live_erkf import LiveErkf
 from core.body.tree import PRESETS
+from core.events.foot_movement import FootMovement
+from core.events.live_contacts import ContactDetector
 from core.formats.live_log import SampleBatch
 from core.frames import Segment
 from core.online import LiveStride, OnlineSession, compile_live_kernels
@@ -34,6 +36,9 @@ SHARE_PCT: Final = 1.5
 
 PUSH_MS: Final = {5: 0.75, 10: 1.5}
 """The same in ms per push of so many samples, all included."""
+
+CONTACTS_MS: Final = 0.05
+"""Contacts of both feet, their refinement included, per push of five samples."""
 
 STRIDE_MS: Final = 2.0
 CALIBRATION_S: Final = 1.5
@@ -169,3 +174,20 @@ def test_memory_is_flat_over_five_minutes() -> None:
         tracemalloc.stop()
     print(f"\nHeld after 50, 100, … 300 s: {', '.join(f'{x:.0f}' for x in held)} kB")
     assert held[-1] - held[1] < GROWTH_KB
+
+
+def test_contacts_of_a_push_cost_little() -> None:
+    size, pushes, noise = 5, 2000, np.random.default_rng(1)
+    q = np.tile([0.5**0.5, 0.5**0.5, 0.0, 0.0], (size, 2, 1)) + 0.01 * noise.normal(size=(size, 2, 4))
+    valid = np.ones((size, 2), np.bool_)
+    moved = [FootMovement(noise.uniform(0.0, 3.0, size), noise.normal(size=(size, 3))) for _ in range(2)]
+    costs = []
+    for _ in range(3):
+        detector = ContactDetector(("foot_l", "foot_r"), 100.0)
+        detector.push(q, valid, moved, 0)
+        start = time.perf_counter()
+        for _ in range(pushes):
+            detector.push(q, valid, moved, 0)
+        costs.append(1e3 * (time.perf_counter() - start) / pushes)
+    print(f"contacts of two feet: {min(costs):.3f} ms per push of {size}")
+    assert min(costs) <= BUSY * CONTACTS_MS
