@@ -44,7 +44,8 @@ class Tracks:
     feet : paths of the feet, None where no distance can be measured. angles : None when not reached.
     trunk : pelvis, chest → (n, 3) acceleration free of gravity, forward, left, up (m/s²): core/walking_frame.
     params : of the stride list. bout_params : of the walking bouts of the feet's contacts.
-    rests : windows of standing still, None if not known. turns : of the body. steps : of a trunk sensor,
+    rests : windows of standing still, None if not known. standing : those of the feet alone, short ones too
+        (core/rest.py, STANDING). turns : of the body. steps : of a trunk sensor,
         where no foot carries one; they are not edited.
     """
 
@@ -61,6 +62,7 @@ class Tracks:
     params: StrideParams = field(default_factory=StrideParams)
     bout_params: BoutParams = field(default_factory=BoutParams)
     rests: tuple[Window, ...] | None = None
+    standing: tuple[Window, ...] = ()
     turns: tuple[Turn, ...] = ()
     steps: Steps | None = None
 
@@ -116,7 +118,10 @@ def measure_gait(tracks: Tracks, edits: Sequence[Edit] = ()) -> MeasuredGait:
     figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk)
     # contacts, found or set by a person, say more than the trunk
     steps = None if events.events else tracks.steps
-    bouts = find_bouts(events, tracks.rests, tracks.bout_params) if steps is None else steps.bouts
+    if steps is None:
+        bouts = find_bouts(events, tracks.rests, tracks.bout_params, tracks.standing)
+    else:
+        bouts = steps.bouts
     first = figures.parameters if steps is None else _of_steps(tracks, steps, figures.parameters)
     estimated = () if tracks.angles is None else tracks.angles.estimated
     first = state_uncertainty(first, events, estimated)

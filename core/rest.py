@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import radians
-from typing import TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -32,6 +32,11 @@ class RestParams:
     gyro_limit: float = radians(6.0)
     acc_std_limit: float = 0.25
     shortest_s: float = 1.0
+
+
+STANDING: Final = RestParams(window_s=0.5, shortest_s=0.5)
+"""A short standing within a walk, which says nothing of the gyroscope (our choice: the shortest stop,
+core/events/bouts.py)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,13 +79,15 @@ class Run:
 
     @property
     def events(self) -> list[GaitEvent]:
-        """In order of time."""
-        found = [e for f in self.frames for e in f.events]
-        return sorted(found, key=lambda e: (e.time_s, e.side, e.kind))
+        """As they were told last, in order of time."""
+        found: dict[tuple[Side, str, float], GaitEvent] = {}
+        for e in (e for f in self.frames for e in f.events):
+            found[e.side, e.kind, e.time_s if e.first_s is None else e.first_s] = e
+        return sorted(found.values(), key=lambda e: (e.time_s, e.side, e.kind))
 
     @property
     def strides(self) -> list[LiveStride]:
-        """As told, most of them twice."""
+        """As told, most of them three times."""
         return [s for f in self.frames for s in f.strides]
 
     @property

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from core.shoe import Shoe
 from core.simulate import WalkTruth, simulate_scenario
 from core.simulate.sensors import PLACES
 from core.simulate.walker import Anatomy
+from tests.kept import keep
 
 _ANATOMY = Anatomy()
 HEEL_M, TIP_M = _ANATOMY.heel, _ANATOMY.toe
@@ -65,7 +65,7 @@ def standing_width(truth: WalkTruth) -> float:
     return round(float(np.hypot(*apart)), 2)
 
 
-@cache
+@keep
 def measured_walk(name: str, seed: int = 5) -> tuple[WalkTruth, MeasuredGait, MeasuredGait]:
     """A named script: its truth, what is measured on the truth, and what the analysis measures."""
     take = simulate_scenario(name, seed)

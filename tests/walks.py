@@ -1,4 +1,4 @@
-"""Walks that tests share: simulated ones with their truth, and neura_walk, each made once per process."""
+"""Walks that tests share: simulated ones with their truth, and neura_walk, each made and analysed once."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from core.formats import SourceFile, parse_manifest, read_recording
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment
+from core.pipeline import TakeAnalysis, analyse
 from core.recording import Recording, SensorSignals, UniformRecording
 from core.rotation import rotate
 from core.simulate import SCRIPTS, WalkTruth, simulate, simulate_scenario
@@ -17,6 +18,7 @@ from core.simulate.script import Script
 from core.simulate.walker import SIGN, Walker
 from core.timeline import synchronise
 from tests.data import data_folder
+from tests.kept import keep
 
 NEURA = {
     "00B40B91": "pelvis", "00B40C45": "thigh_l", "00B40C3C": "thigh_r", "00B40BA5": "shank_l",
@@ -25,14 +27,14 @@ NEURA = {
 }  # fmt: skip
 
 
-@cache
+@keep
 def simulated(name: str = "comfortable", seed: int = 0) -> tuple[UniformRecording, WalkTruth]:
     """A named script on the uniform axis, and its truth."""
     take = simulate_scenario(name, seed)
     return synchronise(take.recording), take.truth
 
 
-@cache
+@keep
 def scripted(script: Script, seed: int = 0) -> tuple[UniformRecording, WalkTruth]:
     """A script of one's own for the reference person, with the sensors of the comfortable walk."""
     take = simulate(script, Walker(), seed, SCRIPTS["comfortable"].setup)
@@ -50,10 +52,22 @@ def neura_recording() -> Recording:
     return read_recording(files, manifest)
 
 
-@cache
+@keep
 def neura_walk() -> UniformRecording:
     """The same on the uniform axis."""
     return synchronise(neura_recording())
+
+
+@keep
+def neura_analysis() -> TakeAnalysis:
+    """What the product makes of it."""
+    return analyse(neura_recording())
+
+
+@keep
+def analysed(name: str, seed: int = 0) -> TakeAnalysis:
+    """What the product makes of a named script."""
+    return analyse(simulate_scenario(name, seed).recording)
 
 
 def only(recording: UniformRecording, *segments: Segment) -> UniformRecording:

@@ -32,7 +32,7 @@ from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.mounting import MountedSensors
 from core.body.pose_params import PoseParams
 from core.body.poses import Poses
-from core.body.still import FOOT_STILL, still_samples
+from core.body.still import contact_samples
 from core.body.tree import person_tree
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError, Notice
@@ -181,7 +181,7 @@ class _Take:
         for side in SIDES:
             acc, gyr, valid = correct_signals(self.calibrated, (FOOT[side],))
             rate = self.calibrated.recording.rate_hz
-            found[side] = still_samples(acc[:, 0], gyr[:, 0], valid[:, 0], rate, FOOT_STILL)
+            found[side], _ = contact_samples(acc[:, 0], gyr[:, 0], valid[:, 0], rate)
         return found
 
     def with_feet(self, made: PoseEstimate, segments: tuple[Segment, ...]) -> PoseEstimate:

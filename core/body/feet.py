@@ -21,6 +21,7 @@ class FootTracks:
     linked : both feet hang on one chain of sensors, so that their places relative to each other are known;
         False: each foot has its own origin and heading.
     source : `core.estimators.LINKED_PATHS` or `SINGLE_PATHS`; live their live twins.
+    patched : side → (n,) packets were lost while the foot moved, and a straight line says too little of it.
     withheld : side → reason why no distance of this foot is told (core/withheld.py).
     """
 
@@ -34,3 +35,4 @@ class FootTracks:
     source: str
     body: BodyModel
     withheld: Mapping[Side, str] = field(default_factory=dict)
+    patched: Mapping[Side, Bools] = field(default_factory=dict)

@@ -4,7 +4,8 @@ Both are rules on the magnitude of angular rate and of specific force, so they n
 rule is the wide one: .7 rad/s and 1.2 m/s² find 14 of 14 stances of the real walk with none too many
 (docs/science/real-recordings.md, "Contacts at rest"); what it lets through wrongly is the χ² gate's matter.
 Events (core/events) say where contact begins and ends; the foot is flat and still only in a part of that
-time.
+time. A brisk walker's foot never is: it rolls from the heel to the ball without a halt. Where the rule finds
+nothing between two swings, the quietest moment between them is taken, believed as far as it is quiet.
 """
 
 from __future__ import annotations
@@ -32,6 +33,66 @@ FOOT_STILL = StillRule(0.7, 1.2, 0.06, 0.06)
 
 AT_REST = StillRule(0.08, 0.25, 0.3, 0.3)
 """A sensor at rest: its specific force is gravity (docs/science/erkf.md, "Zero velocity")."""
+
+
+@dataclass(frozen=True)
+class QuietestRule:
+    """Where a foot on the floor never stops: the quietest moment of its stance.
+
+    Loudness is the greater of |ω| and ||f| − g|, each by its limit in `still`, the greatest over its window:
+    below 1 the foot is still. All values are our choice (docs/science/erkf.md, "Zero velocity").
+
+    Parameters
+    ----------
+    apart_s : a moment is the quietest within so long before and after it: less than the stride of a brisk
+        walker, more than from the middle of a slow swing to the still part of a stance.
+    loudest : of a stance. ipol_walks' stances reach 2.1, the quietest moments of their swings begin at 4.
+    swing_rad_s, swing_s : within so long before and after it the foot must swing.
+    share : |ω| in it, of the greatest within swing_s. Feet of ipol_walks have 0.02 to 0.05, few up to 0.1; a
+        shank, taken for a foot, 0.10 to 0.15 (neura_walk, simulated people), a thigh 0.2 and more.
+    """
+
+    still: StillRule = FOOT_STILL
+    apart_s: float = 0.5
+    loudest: float = 3.0
+    swing_rad_s: float = 2.5
+    swing_s: float = 1.0
+    share: float = 0.075
+
+
+QUIETEST = QuietestRule()
+
+
+def contact_samples(
+    acc: Floats, gyr: Floats, valid: Bools, rate_hz: float, rule: QuietestRule = QUIETEST
+) -> tuple[Bools, Floats]:
+    """Samples (T,) at which a foot rests on the floor, and |ω| (T,) where it is not still there, else 0.
+
+    Parameters
+    ----------
+    acc, gyr : (T, 3) m/s², rad/s. valid : (T,).
+    """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    still = still_samples(acc, gyr, valid, rate_hz, rule.still)
+    turning = np.linalg.norm(gyr, axis=1)
+    force = np.abs(np.linalg.norm(acc, axis=1) - GRAVITY)
+    loud = np.maximum(turning / rule.still.gyr_limit, force / rule.still.acc_limit)
+    reach = round(rule.still.window_s * rate_hz) // 2
+    loud = maximum_filter1d(np.where(valid, loud, np.inf), 2 * reach + 1, mode="nearest")
+    apart, swing = round(rule.apart_s * rate_hz), round(rule.swing_s * rate_hz)
+    # of a stance that the sensor did not see whole nobody knows the quietest moment
+    least = minimum_filter1d(np.where(still | ~valid, 0.0, loud), 2 * apart + 1, mode="nearest")
+    swings = np.concatenate(([0], np.cumsum(turning > rule.swing_rad_s)))
+    quietest = np.zeros(len(still), np.bool_)
+    for start, stop in find_runs((loud == least) & (loud <= rule.loudest) & ~still):
+        k = (start + stop - 1) // 2
+        before, after = max(0, k - swing), min(len(still), k + swing)
+        window = slice(max(0, k - reach), k + reach + 1)
+        slow = turning[window].max() <= rule.share * turning[before:after].max()
+        if slow and swings[k] > swings[before] and swings[after] > swings[k]:
+            quietest[window] = True
+    return np.asarray(still | quietest), np.where(quietest & ~still, turning, 0.0)
 
 
 def still_samples(acc: Floats, gyr: Floats, valid: Bools, rate_hz: float, rule: StillRule) -> Bools:

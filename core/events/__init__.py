@@ -1,8 +1,18 @@
 """Orientations → gait events and the stride list."""
 
-from core.events.detection import detect
+from core.events.detection import detect, detect_contacts
 from core.events.flags import StrideParams
+from core.events.foot_contact import FootContactParams, compile_foot_contact_kernel
 from core.events.foot_pitch import FootPitchParams, compile_foot_pitch_kernel
 from core.events.strides import stride_list
 
-__all__ = ["FootPitchParams", "StrideParams", "compile_foot_pitch_kernel", "detect", "stride_list"]
+__all__ = [
+    "FootContactParams",
+    "FootPitchParams",
+    "StrideParams",
+    "compile_foot_contact_kernel",
+    "compile_foot_pitch_kernel",
+    "detect",
+    "detect_contacts",
+    "stride_list",
+]

@@ -2,7 +2,8 @@
 
 A bout is walking without a long break; a gait that only shuffles the feet once is none. Terms and the two
 limits: docs/science/strides.md, "Walking bouts" (mobgap's rules as executed: at least 4 strides in total,
-breaks of at most 3 s).
+breaks of at most 3 s). A step that takes too long is a break in the row of contacts: one was missed, or the
+person stopped. It is called a stop only where the sensors saw the person stand.
 """
 
 from __future__ import annotations
@@ -26,18 +27,21 @@ class BoutParams:
     ----------
     break_s : longest time between two contacts of a bout. min_strides : least strides of a bout, those of
         both feet counted (mobgap).
-    stop_share : a step that takes so many times the median step of its bout holds a stop. Our choice: a step
-        cannot take that long without one foot standing still; the steps of the virtual patients stay below
-        1.7, a start or end of gait included.
-    stop_s : shortest such step, so that quick walking has no stops. Our choice.
+    long_share : a step that takes so many times the median step of its bout is a break. Our choice: the steps
+        of the virtual patients stay below 1.7, a start or end of gait included.
+    long_s : shortest such step, so that quick walking has none. Our choice.
+    stand_s : time of standing in a break from which it is a stop; with one foot known a stride more, as it
+        stands in each. Our choice: both feet are never at rest together for so long in walking (ipol_walks,
+        gaitmap_foot, neura_walk, all virtual patients).
     near_s : a rest so close to a bout's end is where the walk began or ended. Our choice: the longest rest
         that the quiet window of 1 s cannot see (core/rest.py) and a step.
     """
 
     break_s: float = 3.0
     min_strides: int = 4
-    stop_share: float = 2.0
-    stop_s: float = 1.0
+    long_share: float = 2.0
+    long_s: float = 1.0
+    stand_s: float = 0.5
     near_s: float = 2.0
 
 
@@ -50,7 +54,8 @@ class Bout:
     start_s : the foot that steps first leaves the floor, or its contact where the leaving is not known.
     first_s, end_s : first and last contact. contacts : number of contacts, of both feet.
     step_s : median time between contacts; with one foot known, of its strides.
-    stops : half-open ranges between two contacts that hold a stop.
+    breaks : half-open ranges between two contacts that are too far apart for one step. stops : those in which
+        the person stood.
     from_rest, to_rest : standing still before and after; None where rest is not known.
     """
 
@@ -59,6 +64,7 @@ class Bout:
     end_s: float
     contacts: int
     step_s: float
+    breaks: tuple[Window, ...] = ()
     stops: tuple[Window, ...] = ()
     from_rest: bool | None = None
     to_rest: bool | None = None
@@ -80,6 +86,7 @@ def walking_bouts(
     rests: Sequence[Window] | None = None,
     feet: int = 2,
     params: BoutParams | None = None,
+    standing: Sequence[Window] = (),
 ) -> tuple[Bout, ...]:
     """Walking bouts of contacts in order of time.
 
@@ -87,6 +94,7 @@ def walking_bouts(
     ----------
     contacts, leavings : initial and terminal contacts of all feet that are known, s, increasing.
     rests : windows of rest, None if not known. feet : how many feet the contacts are of.
+    standing : windows in which nothing that steps moved; a stop is told only in these.
     """
     params = params or BoutParams()
     found = []
@@ -96,7 +104,10 @@ def walking_bouts(
             continue
         steps = np.diff(run)
         typical = float(np.median(steps))
-        limit = max(params.stop_s, params.stop_share * typical)
+        limit = max(params.long_s, params.long_share * typical)
+        breaks = tuple((a, b) for a, b in pairwise(run) if b - a > limit)
+        # one foot stands still in every stride
+        least = params.stand_s + (0.0 if feet == 2 else typical)
         start = next((t for t in leavings if max(ended, run[0] - params.break_s) < t < run[0]), run[0])
         ended = run[-1]
         found.append(
@@ -106,7 +117,8 @@ def walking_bouts(
                 end_s=run[-1],
                 contacts=len(run),
                 step_s=typical,
-                stops=tuple((a, b) for a, b in pairwise(run) if b - a > limit),
+                breaks=breaks,
+                stops=tuple(x for x in breaks if any(_overlap(x, w) >= least for w in standing)),
                 from_rest=_touches(rests, start, params.near_s, before=True),
                 to_rest=_touches(rests, run[-1], params.near_s, before=False),
             )
@@ -115,13 +127,16 @@ def walking_bouts(
 
 
 def find_bouts(
-    events: GaitEvents, rests: Sequence[Window] | None = None, params: BoutParams | None = None
+    events: GaitEvents,
+    rests: Sequence[Window] | None = None,
+    params: BoutParams | None = None,
+    standing: Sequence[Window] = (),
 ) -> tuple[Bout, ...]:
-    """Walking bouts of the contacts of the feet."""
+    """Walking bouts of the contacts of the feet; arguments as of `walking_bouts`."""
     contacts = sorted(e.time_s for e in events.events if e.kind == "ic")
     leavings = sorted(e.time_s for e in events.events if e.kind == "tc")
     feet = len({e.side for e in events.events if e.kind == "ic"})
-    return walking_bouts(contacts, leavings, rests, max(1, feet), params)
+    return walking_bouts(contacts, leavings, rests, max(1, feet), params, standing)
 
 
 def _runs(contacts: Sequence[float], break_s: float) -> list[list[float]]:
@@ -133,6 +148,11 @@ def _runs(contacts: Sequence[float], break_s: float) -> list[list[float]]:
         else:
             runs.append([t])
     return runs
+
+
+def _overlap(one: Window, other: Window) -> float:
+    """Time that two ranges have in common, s."""
+    return min(one[1], other[1]) - max(one[0], other[0])
 
 
 def _touches(rests: Sequence[Window] | None, t: float, near_s: float, *, before: bool) -> bool | None:

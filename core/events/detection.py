@@ -1,26 +1,39 @@
-"""Orientations → GaitEvents: the foot-pitch rule on each foot, and what must be said about its result.
+"""Orientations → GaitEvents: the contacts of each foot, and what must be said about them.
 
-Source: docs/science/events.md, "Foot-pitch rule" and "Refusals".
+`detect_contacts` is the product's: found by pitch and movement, refined to the moment of contact. `detect` is
+the foot-pitch rule of the thesis as it is published, which that is compared with.
+Source: docs/science/events.md, "Foot-pitch rule", "Refinement" and "Refusals".
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from core.errors import Notice, SignalError
+from core.events.foot_contact import (
+    ContactReports,
+    FootContactParams,
+    FootContactState,
+    advance_foot_contacts,
+)
+from core.events.foot_movement import FootMovement
 from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
 from core.events.result import EventKind, GaitEvent, GaitEvents
-from core.frames import FOOT, SIDES, Bools, Floats, Side
+from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
 from core.rotation import angle_between
 
 if TYPE_CHECKING:
     # the package brings numba, which readers of results do without
     from core.fusion.orientations import Orientations
 
-SOURCE: Final = "foot_pitch"
+SOURCE: Final = "foot_contact"
+"""The detector of the product."""
+PITCH_RULE: Final = "foot_pitch"
+"""The published rule."""
 KINDS: Final[tuple[EventKind, EventKind]] = ("tc", "ic")
 
 
@@ -35,12 +48,18 @@ class PitchFigures:
     n_tc: int
 
 
-def detect(orientations: Orientations, params: FootPitchParams | None = None) -> GaitEvents:
-    """Contacts of each foot that carries a sensor.
+def detect_contacts(
+    orientations: Orientations,
+    pitch: FootPitchParams | None = None,
+    params: FootContactParams | None = None,
+    motions: Mapping[Segment, FootMovement] | None = None,
+) -> GaitEvents:
+    """Contacts of each foot that carries a sensor, at the moment of contact, with their uncertainty.
 
     Parameters
     ----------
     orientations : with "foot_l", "foot_r" or both; a missing foot gives the notice `foot_missing`.
+    motions : how each foot moved; without it swings are found, and contacts refined, by pitch alone.
 
     Returns
     -------
@@ -50,7 +69,62 @@ def detect(orientations: Orientations, params: FootPitchParams | None = None) ->
     ------
     SignalError : `sample_rate_too_low`.
     """
-    params = params or FootPitchParams()
+    rule = pitch or FootPitchParams()
+
+    def find(side: Side) -> list[GaitEvent]:
+        state = FootContactState.start(orientations.rate_hz, rule, params)
+        motion = (motions or {}).get(FOOT[side])
+        q, valid = orientations.q[FOOT[side]], orientations.valid[FOOT[side]]
+        told = advance_foot_contacts(state, q, valid, *(() if motion is None else (motion.speed, motion.acc)))
+        waiting: dict[int, GaitEvent] = {}
+        reports = read_reports(told, side, float(orientations.t_s[0]), orientations.rate_hz, waiting)
+        final = [event for _, last, event in reports if last]
+        return [*final, *waiting.values()]
+
+    return _each_foot(orientations, rule, find)
+
+
+def read_reports(
+    told: ContactReports, side: Side, start_s: float, rate_hz: float, waiting: dict[int, GaitEvent]
+) -> Iterator[tuple[int, bool, GaitEvent]]:
+    """Sample at which it is told, whether nothing more follows about it, and the event.
+
+    Parameters
+    ----------
+    start_s : time of sample 0. waiting : events of earlier blocks whose refined time is to come; kept up to
+        date.
+    """
+    for kind, number, known, last, at, uncertainty in zip(*told, strict=True):
+        first = waiting.pop(int(number), None)
+        event = GaitEvent(
+            time_s=start_s + float(at) / rate_hz,
+            side=side,
+            kind=KINDS[kind],
+            source=SOURCE,
+            detected_s=start_s + int(known) / rate_hz if first is None else first.detected_s,
+            uncertainty_s=float(uncertainty),
+            first_s=None if first is None else first.time_s,
+        )
+        if not last:
+            waiting[int(number)] = event
+        yield int(known), bool(last), event
+
+
+def detect(orientations: Orientations, params: FootPitchParams | None = None) -> GaitEvents:
+    """Contacts of each foot by the published foot-pitch rule; as `detect_contacts` otherwise."""
+    rule = params or FootPitchParams()
+
+    def find(side: Side) -> list[GaitEvent]:
+        s, valid = pitch_signal(orientations.q[FOOT[side]]), orientations.valid[FOOT[side]]
+        return _pitch_events(side, s, valid, orientations, rule)
+
+    return _each_foot(orientations, rule, find)
+
+
+def _each_foot(
+    orientations: Orientations, params: FootPitchParams, find: Callable[[Side], list[GaitEvent]]
+) -> GaitEvents:
+    """What `find` gives for every foot that can be judged, and what must be said."""
     if orientations.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
@@ -72,7 +146,7 @@ def detect(orientations: Orientations, params: FootPitchParams | None = None) ->
             notices.extend(n for n in no_rest if n not in notices)
             continue
         s, valid = pitch_signal(orientations.q[foot]), orientations.valid[foot]
-        found = _events(side, s, valid, orientations, params)
+        found = find(side)
         events.extend(found)
         figures[foot] = PitchFigures(
             s_min=float(s[valid].min(initial=1.0)),
@@ -88,7 +162,7 @@ def detect(orientations: Orientations, params: FootPitchParams | None = None) ->
     return GaitEvents(tuple(events), tuple(notices), figures)
 
 
-def _events(
+def _pitch_events(
     side: Side, s: Floats, valid: Bools, orientations: Orientations, params: FootPitchParams
 ) -> list[GaitEvent]:
     """Run the rule over the whole take of one foot."""
@@ -101,7 +175,7 @@ def _events(
             time_s=float(orientations.t_s[j] + o * step),
             side=side,
             kind=KINDS[k],
-            source=SOURCE,
+            source=PITCH_RULE,
             detected_s=float(orientations.t_s[at]),
         )
         for k, j, at, o in zip(kind, index, known, offset, strict=True)
@@ -130,8 +204,13 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list
             Notice(
                 "no_toe_off",
                 f"The {side} foot never pitched below {_degrees(params.threshold)} (lowest was"
-                f" {_degrees(figures.s_min)}), so no contacts were found on it. A shuffling gait, no walking,"
-                " or a sensor on another segment looks like this.",
+                f" {_degrees(figures.s_min)}), so "
+                + (
+                    "its contacts are those of its movement alone and less exact."
+                    if figures.n_ic
+                    else "no contacts were found on it."
+                )
+                + " A shuffling gait, no walking, or a sensor on another segment looks like this.",
                 foot,
             )
         )

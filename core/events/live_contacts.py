@@ -1,6 +1,7 @@
 """Contacts of the feet as samples come, told in the push in which they are known.
 
-The rule of core/events/foot_pitch.py; the foot's pitch needs neither heading nor the other sensors.
+The rules of core/events/foot_contact.py; they need neither heading nor the other sensors. A contact is told
+at once, and again when its refined time is known.
 """
 
 from __future__ import annotations
@@ -9,17 +10,23 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from core.errors import SignalError
-from core.events.detection import KINDS, SOURCE
-from core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
+from core.events.detection import read_reports
+from core.events.foot_contact import FootContactParams, FootContactState, advance_foot_contacts
+from core.events.foot_movement import FootMovement
+from core.events.foot_pitch import FootPitchParams
 from core.events.result import GaitEvent
 from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
 
 
 class KnownContact(NamedTuple):
-    """A contact and the sample, counted from the start of the chain, at which it is known."""
+    """A contact and the sample, counted from the start of the chain, at which it is told.
+
+    Not `final`: its refined time is still to come. Then it is told again, its `first_s` the time it had.
+    """
 
     at: int
     event: GaitEvent
+    final: bool
 
 
 class ContactDetector:
@@ -31,35 +38,37 @@ class ContactDetector:
     """
 
     def __init__(
-        self, feet: Sequence[Segment], rate_hz: float, params: FootPitchParams | None = None
+        self,
+        feet: Sequence[Segment],
+        rate_hz: float,
+        pitch: FootPitchParams | None = None,
+        params: FootContactParams | None = None,
     ) -> None:
-        params = params or FootPitchParams()
-        if rate_hz < params.min_rate_hz:
+        pitch = pitch or FootPitchParams()
+        if rate_hz < pitch.min_rate_hz:
             raise SignalError(
                 "sample_rate_too_low",
-                f"Gait events need at least {params.min_rate_hz:g} Hz, the sensors send {rate_hz:g} Hz.",
+                f"Gait events need at least {pitch.min_rate_hz:g} Hz, the sensors send {rate_hz:g} Hz.",
             )
         self.sides: tuple[Side, ...] = tuple(s for f in feet for s in SIDES if FOOT[s] == f)
-        self._rules = [FootPitchState.start(rate_hz, params) for _ in self.sides]
+        self._feet = [FootContactState.start(rate_hz, pitch, params) for _ in self.sides]
+        self._waiting: list[dict[int, GaitEvent]] = [{} for _ in self.sides]
         self._rate_hz = rate_hz
 
-    def push(self, q: Floats, valid: Bools, first: int) -> list[KnownContact]:
+    def push(
+        self, q: Floats, valid: Bools, motions: Sequence[FootMovement], first: int
+    ) -> list[KnownContact]:
         """Contacts that these samples make known, in the order in which they become known.
 
         Parameters
         ----------
-        q : (T, feet, 4) foot to W. valid : (T, feet). first : the chain's first sample on the axis.
+        q : (T, feet, 4) foot to W. valid : (T, feet). motions : of each foot over the same samples.
+        first : the chain's first sample on the axis.
         """
         found = []
-        for i, (side, rule) in enumerate(zip(self.sides, self._rules, strict=True)):
-            told = advance_foot_pitch(rule, pitch_signal(q[:, i]), valid[:, i])
-            for kind, index, known, offset in zip(*told, strict=True):
-                event = GaitEvent(
-                    time_s=(first + int(index) + float(offset)) / self._rate_hz,
-                    side=side,
-                    kind=KINDS[kind],
-                    source=SOURCE,
-                    detected_s=(first + int(known)) / self._rate_hz,
-                )
-                found.append(KnownContact(int(known), event))
+        for i, (side, foot) in enumerate(zip(self.sides, self._feet, strict=True)):
+            told = advance_foot_contacts(foot, q[:, i], valid[:, i], motions[i].speed, motions[i].acc)
+            start_s = first / self._rate_hz
+            for known, final, event in read_reports(told, side, start_s, self._rate_hz, self._waiting[i]):
+                found.append(KnownContact(known, event, final))
         return sorted(found, key=lambda x: (x.at, x.event.side))

@@ -24,7 +24,7 @@ from core.events.periodicity import Periodicity, PeriodicityParams, step_times
 from core.events.steps import Step, Steps
 from core.frames import Bools, Floats, Segment, Side
 from core.recording import SensorSignals, UniformRecording
-from core.rest import find_rest_windows, find_runs
+from core.rest import STANDING, find_rest_windows, find_runs
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 
@@ -119,8 +119,11 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
         )
     times = _steps(vertical, moving, rhythm, rate, params)
     rests = find_rest_windows(recording, segments=(segment,))
+    standing = find_rest_windows(recording, STANDING, (segment,))
     bouts = tuple(
-        b for b in walking_bouts(times, rests=rests, params=params.bouts) if _repeats(b, rhythm, params)
+        b
+        for b in walking_bouts(times, rests=rests, params=params.bouts, standing=standing)
+        if _repeats(b, rhythm, params)
     )
     if not bouts:
         return _nothing(
@@ -200,7 +203,7 @@ def _steps(
         peaks, _ = find_peaks(smooth, prominence=params.prominence, distance=params.apart * step * rate_hz)
         inside = [int(p) for p in peaks + low if first <= p < end and moving[p]]
         row = [float(p + _offset(smooth, p - low)) / rate_hz for p in inside]
-        times += _together(row, params.bouts.stop_share * step, params.row_steps)
+        times += _together(row, params.bouts.long_share * step, params.row_steps)
     return times
 
 
@@ -241,8 +244,8 @@ def _together(times: list[float], longest: float, least: int) -> list[float]:
 
 
 def _unbroken(times: list[float], bout: Bout) -> list[list[float]]:
-    """Steps of a bout between its stops."""
-    ends = {a for a, _ in bout.stops}
+    """Steps of a bout between its breaks."""
+    ends = {a for a, _ in bout.breaks}
     rows: list[list[float]] = [[]]
     for t in times:
         rows[-1].append(t)

@@ -42,10 +42,12 @@ class GaitEvent:
     Parameters
     ----------
     time_s : when it happened, seconds from recording start.
-    detected_s : when a real-time detector would have known it.
-    source : name of the detector ("foot_pitch"), "consensus" or "manual".
+    detected_s : when a real-time detector tells it first.
+    source : name of the detector ("foot_contact"), "consensus" or "manual".
     confidence : 0 to 1, share of the detectors that found it (core/events/consensus.py); None = one detector.
-    uncertainty_s : standard, of its time; None = that of its detector (core/parameters/uncertainty.py).
+    uncertainty_s : standard uncertainty of `time_s` against the moment a force plate means, s; None where a
+        person placed it or the detector has none. Most of it is the same for all events of a foot.
+    first_s : the time under which a stream told it first, where `time_s` is a later, refined one; else None.
     """
 
     time_s: float
@@ -55,6 +57,7 @@ class GaitEvent:
     detected_s: float
     confidence: float | None = None
     uncertainty_s: float | None = None
+    first_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

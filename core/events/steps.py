@@ -37,7 +37,7 @@ class Steps:
 
     @property
     def step_times_s(self) -> tuple[float, ...]:
-        """Times from contact to contact inside the bouts, without stops.
+        """Times from contact to contact inside the bouts, without breaks.
 
         The steps of the first and last stride of a bout, where gait starts and stops, are left out as in the
         stride list.
@@ -48,9 +48,9 @@ class Steps:
         )
 
     def _times(self, bout: Bout) -> list[float | None]:
-        """Step times of a bout in order, None for one that holds a stop."""
+        """Step times of a bout in order, None for a break."""
         contacts = [s.time_s for s in self.steps if bout.first_s <= s.time_s <= bout.end_s]
-        return [None if (a, b) in bout.stops else b - a for a, b in pairwise(contacts)]
+        return [None if (a, b) in bout.breaks else b - a for a, b in pairwise(contacts)]
 
     @property
     def cadence_spm(self) -> float | None:

@@ -45,9 +45,7 @@ class Flag:
     zero : what an angle is measured from, None where its zero does not matter.
     source : of the limit. verified : False = to be shown as "unverified cut-off".
     note : "no_speed_matched_norm": the people of the limit walk faster than this person;
-        "sides_stand_differently": the difference of two angles from standing contains that of the posture;
-        "late_foot_off": our foot-off is 0.07 s later than a walkway's on both sides, which makes a ratio of
-        swing times larger and one of stance times smaller by a few hundredths.
+        "sides_stand_differently": the difference of two angles from standing contains that of the posture.
     """
 
     name: str
@@ -221,8 +219,7 @@ def _ratio(rule: Rule, found: _Values) -> Flag:
     if small <= SMALLEST:
         return _flag(rule, None, _Value(None, 0, "near_zero"), None)
     side: Side = "left" if left.mean >= right.mean else "right"
-    flag = _clear(_flag(rule, side, _Value(large / small, min(left.n, right.n)), None), left, right)
-    return flag if rule.measure == "step_length_m" else replace(flag, note="late_foot_off")
+    return _clear(_flag(rule, side, _Value(large / small, min(left.n, right.n)), None), left, right)
 
 
 def _clear(flag: Flag, a: _Value, b: _Value) -> Flag:

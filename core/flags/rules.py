@@ -1,8 +1,7 @@
 """Limits that values are held against, each with its source (docs/science/flags.md, "Rules").
 
-A limit nobody of us has read in its source is kept and marked unverified. Not here: the range
-from foot-off to the swing peak of the knee (our foot-off is 0.07 s late, worth 20° of it), and hip abduction
-as a sign of circumduction (it stays normal when the pelvis is hiked; the path of the foot shows it).
+A limit nobody of us has read in its source is kept and marked unverified. Not here:
+hip abduction as a sign of circumduction (it stays normal when the pelvis is hiked; the foot's path shows it).
 """
 
 from __future__ import annotations

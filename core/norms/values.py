@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import hypot, sqrt
 from typing import Final, Literal, cast
 
@@ -17,15 +17,20 @@ Pace = Literal["slow", "normal", "fast"]
 
 _NOT_LEVEL = "Not comparable: measured from the person's own standing, the reference is anatomical."
 _BAND = "The range defines the pace class, it is not mean ± SD."
-_FOOT_OFF = (
-    "Not comparable: our foot-off is the foot's lowest pitch, about 0.07 s after a walkway's last contact."
-)
-"""Simulated truth: 72 ± 5 ms after the last touch; gaitmap's healthy walker has a stance of 68.6 % by it."""
+_COARSE = "Not comparable: the contacts of this take are too uncertain; wear a sensor on each foot."
+COARSE_S: Final = 0.05
+"""Contacts less certain than this (s, in the median) put a share of the stride off by two points and more, a
+reference sd. Our choice."""
+
+_SHARES: Final = frozenset(
+    ("stance_pct", "swing_pct", "double_support_pct", "single_support_pct",
+     "initial_double_support_pct", "terminal_double_support_pct")
+)  # fmt: skip
 
 _WIDTH = "Not comparable: a walkway measures between the heels, we between the ankles, which is wider."
 """Heels lie 5 to 6 cm behind the ankles: with toes out by 7 to 10° that is 1 to 2 cm, half a reference sd."""
 
-_DIFFERS: Final[Mapping[str | None, str]] = {None: "", "ankles": _WIDTH, "foot_off": _FOOT_OFF}
+_DIFFERS: Final[Mapping[str | None, str]] = {None: "", "ankles": _WIDTH}
 """What is measured differently (`NormKey.differs`) → why the reference says nothing about ours."""
 
 
@@ -58,6 +63,19 @@ class NormValues:
 
     values: Mapping[str, NormValue] = field(default_factory=dict)
     reason: str | None = None
+
+
+def withdraw_shares(
+    values: Mapping[str, NormValue], uncertainties_s: Sequence[float | None]
+) -> dict[str, NormValue]:
+    """References where shares of the stride compare only if the contacts (their uncertainties) are exact."""
+    known = sorted(u for u in uncertainties_s if u is not None)
+    if known and known[len(known) // 2] <= COARSE_S:
+        return dict(values)
+    return {
+        name: replace(v, comparable=False, note=_COARSE) if name in _SHARES and v.comparable else v
+        for name, v in values.items()
+    }
 
 
 def list_norm_keys(table: Literal["angles", "walkway"]) -> dict[str, NormKey]:

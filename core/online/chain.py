@@ -25,6 +25,8 @@ from core.body.still import FOOT_STILL
 from core.errors import Notice
 from core.estimators import ERKF, L7S_2I, L7S_3I
 from core.events.flags import StrideParams
+from core.events.foot_contact import FootContactParams
+from core.events.foot_movement import FootMovement
 from core.events.foot_pitch import FootPitchParams
 from core.events.live_contacts import ContactDetector
 from core.events.result import GaitEvent
@@ -59,6 +61,7 @@ class ChainParams:
     l7s: L7sParams = field(default_factory=L7sParams)
     attitude: AttitudeParams = field(default_factory=AttitudeParams)
     events: FootPitchParams = field(default_factory=FootPitchParams)
+    contacts: FootContactParams = field(default_factory=FootContactParams)
     strides: StrideParams = field(default_factory=StrideParams)
 
 
@@ -113,8 +116,9 @@ class LiveChain:
         self._index = np.array(index, np.int64)
         self._hold = HeadingHold(turned, rate, FOOT_STILL.gyr_limit)
         self._attitudes = AttitudeTracker(index, [mounted[s] for s in turned], rate, self.params.attitude)
-        self._contacts = ContactDetector(feet, rate, self.params.events)
+        self._contacts = ContactDetector(feet, rate, self.params.events, self.params.contacts)
         self._feet = np.array([self.segments.index(f) for f in feet], np.int64)
+        self._foot_mounts = [mounted[f] for f in feet]
         self._courses = tuple(s for s in COURSES if s in self.segments)
         # a pelvis that carries a sensor tilts as that says, not as a model of the legs wants it
         self._tilting = tuple(s for s in self.estimator.attitudes if s == "pelvis")
@@ -210,11 +214,16 @@ class LiveChain:
         turned = {s: q[:, i] for i, s in enumerate(self._turned)}
         placed = self.estimator.push(MeasuredBlock(acc, gyr, valid, turned))
         angles = self._measure(placed, turned, valid)
-        known = self._contacts.push(q[:, : len(self._feet)], valid[:, self._feet], self.first)
+        motions = [
+            FootMovement.of_signals(acc[:, k], gyr[:, k], mount)
+            for k, mount in zip(self._feet, self._foot_mounts, strict=True)
+        ]
+        known = self._contacts.push(q[:, : len(self._feet)], valid[:, self._feet], motions, self.first)
         self._remember(placed, turned, valid, angles)
         self._count += len(acc)
         for x in known:
-            self.contact[x.event.side] = x.event.kind == "ic"
+            if x.event.first_s is None:
+                self.contact[x.event.side] = x.event.kind == "ic"
         self._notices += self.estimator.drain_notices()
         if self.estimator.broken and not self._told_broken:
             self._told_broken = True

@@ -99,7 +99,7 @@ class LiveFrame:
     q : segment → (4,) segment to W. p : segment → (3,) m, as `Poses`. valid : all segments of the figure are
         measured. contact : side → on the floor, as far as events are known.
     angles : name → rad, NaN where lost, at the last sample. trail : the same since the frame before.
-    events, strides, notices : new since the frame before.
+    events, strides, notices : new since the frame before; an event whose `first_s` is set was told before.
     """
 
     t_s: float

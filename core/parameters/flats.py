@@ -1,6 +1,7 @@
 """Where a foot rests after each of its contacts: the places between which distances are measured.
 
-A foot's flat is the middle of its longest stillness between contact and foot-off.
+A foot's flat is the middle of its longest stillness between contact and foot-off, or the quietest moment of a
+stance without any (core/body/still.py).
 """
 
 from __future__ import annotations

@@ -17,9 +17,10 @@ NOT_YET: Final = "not_yet"
 class LiveStride:
     """One cycle of a foot, told as soon as its second contact is known.
 
-    Distances need the rest of the foot after that contact: where a reason is `not_yet`, the same stride (same
-    `n`) is told once more when they are known, at the latest with the foot's next contact, and is then
-    `complete`. Values that were there do not change.
+    The same stride (same `n`) is told again when the time of that contact is refined, within 0.2 s: its times
+    and shares change by a few hundredths of a second. Distances need the rest of the foot after the contact:
+    where a reason is `not_yet`, it is told once more when they are known, at the latest with the foot's next
+    contact, and is then `complete`. Then no value changes any more.
 
     Parameters
     ----------

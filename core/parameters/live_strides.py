@@ -1,4 +1,5 @@
-"""Contacts → live strides: each told when its second contact is known, and again when its distances are.
+"""Contacts → live strides: each told when its second contact is known, and again when that contact is refined
+and when its distances are known.
 
 The stride list of a whole take asks the neighbours of a stride whether it counts; here only those before it
 can be asked: not yet whether it is the last. It is told as counted, and told again as not counted when nobody
@@ -78,24 +79,43 @@ class LiveStrides:
         self._events: deque[GaitEvent] = deque()
         self._recent: dict[Side, deque[Stride]] = {s: deque(maxlen=REMEMBERED) for s in OTHER}
         self._pending: list[_Pending] = []
+        self._last: dict[Side, int] = {}
         self._count = 0
 
     def push(self, known: Iterable[KnownContact], history: SampleHistory) -> list[LiveStride]:
         """Strides that the contacts known since the last call, or the mere time since then, complete."""
         told: list[LiveStride] = []
-        for at, event in known:
+        for at, event, final in known:
             told += self._given_up(at, history)
+            if event.first_s is not None:
+                told += self._refined(at, event, history)
+                continue
             self._events.append(event)
             # as far back as the samples go
             while event.detected_s - self._events[0].time_s > KEPT_S + self._params.max_s:
                 self._events.popleft()
             told += self._completed(at, history)
             if event.kind == "ic":
-                told += self._landed(at, event, history)
+                told += self._landed(at, event, history, final)
         return told + self._given_up(history.length - 1, history)
 
-    def _landed(self, at: int, event: GaitEvent, history: SampleHistory) -> list[LiveStride]:
-        """The stride that this contact ends, if it began within reach."""
+    def _refined(self, at: int, event: GaitEvent, history: SampleHistory) -> list[LiveStride]:
+        """The stride that this contact ended, with its refined end."""
+        for i, e in enumerate(self._events):
+            if (e.side, e.kind, e.time_s) == (event.side, event.kind, event.first_s):
+                self._events[i] = event
+        recent = self._recent[event.side]
+        if not recent or recent[-1].end_s != event.first_s:
+            return []
+        recent.pop()
+        number = self._last.pop(event.side)
+        self._pending = [p for p in self._pending if p.told.n != number]
+        return self._landed(at, event, history, True, number)
+
+    def _landed(
+        self, at: int, event: GaitEvent, history: SampleHistory, refined: bool, number: int | None = None
+    ) -> list[LiveStride]:
+        """The stride that this contact ends, if it began within reach; `number`: of one told before."""
         own = [e.time_s for e in self._events if e.side == event.side and e.kind == "ic"]
         if len(own) < 2:
             return []
@@ -114,21 +134,22 @@ class LiveStrides:
         values, reasons = _split(found)
         final = self._setup.surface.protocol == "treadmill" or event.side not in self._setup.feet
         told = LiveStride(
-            n=self._count,
+            n=self._count if number is None else number,
             side=event.side,
             start_s=stride.start_s,
             foot_off_s=stride.tc_s,
             end_s=stride.end_s,
-            detected_s=event.detected_s,
+            detected_s=(self._setup.first + at) / self._setup.rate_hz,
             values=values,
             reasons=reasons,
             curves=curves,
             turn_rad=stride.turn_rad,
             flags=flags,
             counted=not flags,
-            complete=final,
+            complete=final and refined,
         )
-        self._count += 1
+        self._last[event.side] = told.n
+        self._count += number is None
         if not final:
             wait = round(self._params.max_s * self._setup.rate_hz)
             self._pending.append(_Pending(told, stride, self._sample(stride.end_s) + wait))

@@ -37,8 +37,9 @@ STEP_M: Final = 0.05
 """Two rests of a foot closer than this are one place (our choice: below the error of a stride)."""
 
 Reason = Literal[
-    "treadmill", "no_foot_track", "no_foot_flat", "gap", "feet_not_linked", "opposite_foot_missing",
-    "no_shoe_geometry", "no_swing_minimum", "no_terminal_contact", "standing_width_unknown", "in_place",
+    "treadmill", "no_foot_track", "no_foot_flat", "gap", "packets_lost", "feet_not_linked",
+    "opposite_foot_missing", "no_shoe_geometry", "no_swing_minimum", "no_terminal_contact",
+    "standing_width_unknown", "in_place",
 ]  # fmt: skip
 
 
@@ -166,11 +167,12 @@ def _on_belt(s: Stride, belt_mps: float | None) -> Row:
 @dataclass(frozen=True, eq=False)
 class _Paths:
     """What is looked up for every stride: flats and the foot's heading there, heights, and how often the
-    foot was lost before a sample."""
+    foot was lost, or packets of its swing, before a sample."""
 
     places: Places
     heights: Mapping[Side, SoleHeights | None]
     lost: Mapping[Side, NDArray[np.int64]]
+    patched: Mapping[Side, NDArray[np.int64]]
     heading: Mapping[tuple[Side, int], float]
     known: bool
     """How far apart the feet stood, without which width is not known."""
@@ -186,6 +188,10 @@ def _paths(strides: Strides, feet: FootTracks) -> _Paths:
         places=found,
         heights={side: sole_heights(feet, side) for side in feet.p},
         lost={side: np.concatenate(([0], np.cumsum(~feet.valid[side]))) for side in feet.p},
+        patched={
+            side: np.concatenate(([0], np.cumsum(feet.patched.get(side, np.zeros(len(feet.t_s), np.bool_)))))
+            for side in feet.p
+        },
         heading=heading,
         known=feet.body.standing_width is not None,
     )
@@ -201,6 +207,8 @@ def _row(s: Stride, feet: FootTracks | None, paths: _Paths | None) -> Row:
         return dict.fromkeys(NAMES, "no_foot_flat")
     if paths.lost[s.side][last + 1] > paths.lost[s.side][first]:
         return dict.fromkeys(NAMES, "gap")
+    if paths.patched[s.side][last + 1] > paths.patched[s.side][first]:
+        return dict.fromkeys(NAMES, "packets_lost")
     p = feet.p[s.side]
     x, y = (p[last, :2] - p[first, :2]).tolist()
     length = hypot(x, y)

@@ -48,14 +48,14 @@ def turn_parameters(turns: Sequence[Turn]) -> tuple[Parameter, ...]:
 
 
 def step_strides(steps: Steps) -> tuple[Window, ...]:
-    """Strides of one foot between a trunk sensor's steps: two steady steps each, none with a stop inside."""
+    """Strides of one foot between a trunk sensor's steps: two steady steps each, none with a break inside."""
     strides: list[Window] = []
     for bout in steps.bouts:
         contacts = [s.time_s for s in steps.steps if bout.first_s <= s.time_s <= bout.end_s]
         steady = contacts[EDGE_STEPS : len(contacts) - EDGE_STEPS]
-        stops = [first for first, _ in bout.stops]
+        breaks = [first for first, _ in bout.breaks]
         pairs = zip(steady[:-2:2], steady[2::2], strict=True)
-        strides += [(a, b) for a, b in pairs if not any(a <= stop < b for stop in stops)]
+        strides += [(a, b) for a, b in pairs if not any(a <= at < b for at in breaks)]
     return tuple(strides)
 
 

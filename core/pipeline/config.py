@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeVar, get_args
 from core.body.pose_params import PoseParams
 from core.calibration import CalibrationParams
 from core.errors import ParameterError
-from core.events import FootPitchParams, StrideParams
+from core.events import FootContactParams, FootPitchParams, StrideParams
 from core.events.bouts import BoutParams
 from core.events.consensus import ConsensusParams
 from core.events.lumbar import LumbarParams
@@ -24,8 +24,9 @@ from core.timeline import TimelineParams
 
 Settings = TypeVar("Settings")
 
-Detector = Literal["foot_pitch", "consensus"]
-"""Whose contacts count: the foot-pitch rule's own, or what most detectors agree on."""
+Detector = Literal["foot_contact", "foot_pitch", "consensus"]
+"""Whose contacts count: the refined ones of the feet, the published foot-pitch rule's, or what most detectors
+agree on."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,10 @@ class PipelineConfig:
 
     Parameters
     ----------
-    detector : the foot-pitch rule has the smallest error and refuses feet that hardly pitch; the consensus
-        finds those by the shanks (tests/accuracy/test_events_consensus.py).
+    events : of the foot-pitch rule, by which contacts are found. contacts : of their refinement.
+    detector : "foot_contact" has the smallest error (tests/accuracy/test_events_references.py);
+        "foot_pitch" is the published rule, to compare with; the consensus asks the shanks too and is led by
+        "foot_contact".
     bouts : of the feet's contacts; those of a trunk sensor's steps are `lumbar.bouts`.
 
     Raises
@@ -51,7 +54,8 @@ class PipelineConfig:
     calibration: CalibrationParams = field(default_factory=CalibrationParams)
     fusion: MahonyParams = field(default_factory=MahonyParams)
     events: FootPitchParams = field(default_factory=FootPitchParams)
-    detector: Detector = "foot_pitch"
+    contacts: FootContactParams = field(default_factory=FootContactParams)
+    detector: Detector = "foot_contact"
     consensus: ConsensusParams = field(default_factory=ConsensusParams)
     lumbar: LumbarParams = field(default_factory=LumbarParams)
     turns: TurnParams = field(default_factory=TurnParams)

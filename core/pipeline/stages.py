@@ -18,11 +18,14 @@ from core.body.estimate import estimate_poses
 from core.body.l7s.inputs import free_acceleration
 from core.body.mounting import mount_sensors
 from core.body.walking_frame import in_walking_frame
+from core.calibration.result import CalibratedRecording
 from core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
+from core.events.detection import detect_contacts as detect_foot_contacts
+from core.events.foot_movement import measure_foot_movements
 from core.events.lumbar import detect_steps, split_about_vertical, trunk_sensor
 from core.events.result import GaitEvents
 from core.events.turns import body_yaw_rate, find_turns
-from core.frames import FOOT, SIDES, Floats, Segment
+from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.measure import Tracks, measure_gait
@@ -30,6 +33,7 @@ from core.parameters.spatial import surface_of
 from core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
 from core.pipeline.config import PipelineConfig
 from core.quality.stuck import drop_stuck_sensors, mark_stuck
+from core.rest import STANDING, Window, find_rest_windows
 from core.withheld import withhold, withhold_distances
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
@@ -86,7 +90,8 @@ def orient_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
 def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Contacts of the feet, turns of the body, and steps of the trunk where no contact was found."""
     fused, uniform = require_stage(analysis.fused, "orientation"), drop_stuck_sensors(analysis.recording)
-    events = _contacts(fused, config)
+    calibrated = require_stage(analysis.calibrated, "calibration")
+    events = _contacts(fused, calibrated, config)
     alone = not events.events and trunk_sensor(uniform) is not None
     contacts = DetectedContacts(
         events,
@@ -155,6 +160,7 @@ def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
         params=config.strides,
         bout_params=config.bouts,
         rests=calibrated.rest,
+        standing=_standing(analysis),
         turns=contacts.turns,
         steps=contacts.steps,
     )
@@ -188,15 +194,31 @@ def measure_trunk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
     return replace(analysis, tracks=tracks, measured=measure_gait(tracks))
 
 
-def _contacts(orientations: Orientations, config: PipelineConfig) -> GaitEvents:
+def _contacts(
+    orientations: Orientations, calibrated: CalibratedRecording, config: PipelineConfig
+) -> GaitEvents:
     """Contacts of the chosen detector, each with the share of all detectors that saw it.
 
     Without a foot sensor there is no foot-pitch rule: the shanks' detectors agree among themselves.
     """
-    found = all_detectors(orientations, config.events, config.consensus)
+    refined = None
+    if config.detector != "foot_pitch":
+        motions = measure_foot_movements(calibrated)
+        refined = detect_foot_contacts(orientations, config.events, config.contacts, motions)
+    found = all_detectors(orientations, config.events, config.consensus, refined)
     feet = any(s in orientations.q for s in FOOT.values())
-    agree = rate_confidence if feet and config.detector == "foot_pitch" else agree_on_contacts
+    agree = rate_confidence if feet and config.detector != "consensus" else agree_on_contacts
     return agree(found, config.consensus)
+
+
+def _standing(analysis: TakeAnalysis) -> tuple[Window, ...]:
+    """When no foot moved; shanks where no foot is worn, else thighs."""
+    working = drop_stuck_sensors(analysis.recording)
+    for level in (FOOT, SHANK, THIGH):
+        worn = [s for s in level.values() if s in working.sensors]
+        if worn:
+            return find_rest_windows(working, STANDING, worn)
+    return ()
 
 
 def _trunk_acceleration(analysis: TakeAnalysis) -> dict[Segment, Floats]:
@@ -222,7 +244,11 @@ QUALITY: Final = PipelineStage("quality", 0.03, judge_signals, ("report",), ("qu
 CALIBRATION: Final = PipelineStage("calibration", 0.05, calibrate_sensors, ("calibrated",), ("calibration",))
 ORIENTATION: Final = PipelineStage("orientation", 0.1, orient_segments, ("fused",), ("fusion",))
 EVENTS: Final = PipelineStage(
-    "events", 0.14, detect_contacts, ("contacts",), ("events", "detector", "consensus", "lumbar", "turns")
+    "events",
+    0.14,
+    detect_contacts,
+    ("contacts",),
+    ("events", "contacts", "detector", "consensus", "lumbar", "turns"),
 )
 TRUNK_EVENTS: Final = PipelineStage("events", 0.14, detect_trunk_steps, ("contacts",), ("lumbar", "turns"))
 MOUNTING: Final = PipelineStage("mounting", 0.15, mount_on_segments, ("mounted",), ("poses",))

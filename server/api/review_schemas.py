@@ -43,7 +43,8 @@ class EditAnswer:
 class Event:
     """A contact (ic) or foot-off (tc); its source is a detector, "consensus", or "manual".
 
-    `confidence` is the share of the detectors that found it, null when there was one.
+    `confidence` is the share of the detectors that found it, null when there was one; `uncertainty_s` the
+    standard uncertainty of its time, null where a person placed it.
     """
 
     side: str
@@ -51,6 +52,7 @@ class Event:
     time_s: float
     source: str
     confidence: float | None
+    uncertainty_s: float | None
 
 
 @dataclass(frozen=True)

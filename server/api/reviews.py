@@ -143,6 +143,7 @@ def _review(
                 "time_s": round(e.time_s, 6),
                 "source": e.source,
                 "confidence": e.confidence,
+                "uncertainty_s": e.uncertainty_s,
             }
             for e in bundle.events.events
         ],

@@ -80,7 +80,7 @@ def pose(shown: LiveFrame) -> FigurePose | None:
 
 
 def stride(told: LiveStride) -> dict[str, Any]:
-    """A stride; it comes again under the same `n` when values that were `not_yet` are known."""
+    """A stride; it comes again with the same `n` when its end is refined or its distances are known."""
     duration = told.end_s - told.start_s
     off = None if told.foot_off_s is None else 100.0 * (told.foot_off_s - told.start_s) / duration
     return {

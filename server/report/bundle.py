@@ -173,6 +173,7 @@ def read_events(data: bytes) -> GaitEvents:
                 source=row["source"],
                 detected_s=t,
                 confidence=_number(row.get("confidence") or ""),
+                uncertainty_s=_number(row.get("uncertainty_s") or ""),
             )
             for row in _rows(data)
         )

@@ -43,7 +43,7 @@ QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
     "feet_out_of_place_pct": ("Feet not under the hips", 0, "%"),
     "phase_off_pct": ("Feet out of step by", 0, "% of a stride"),
     "toward_foot_mps2": ("Pelvis falls toward the standing foot", 2, "m/s²"),
-    "inner_foot_m": ("Inner foot ahead in turns", 2, "m/rad"),
+    "inner_foot_m": ("Inner foot ahead in turns; up to the limit, sides are undecided", 2, "m/rad"),
     "pelvis_rise_cm": ("Pelvis rises and sinks by", 0, "cm"),
     "pelvis_tilt_sd_deg": ("Pelvis tilt, standard deviation", 1, "°"),
 }
@@ -174,6 +174,8 @@ def _row(f: Mapping[str, Any]) -> HealthRow:
         text="not measured"
         if f["value"] is None
         else f"{format_number(float(f['value']), digits)}{gap}{unit}",
-        limit="" if limit is None else f"≤ {format_number(float(limit), 0)}{gap}{unit}",
+        limit=""
+        if limit is None
+        else f"≤ {format_number(float(limit), 0 if float(limit).is_integer() else digits)}{gap}{unit}",
         kind=KINDS[str(f["verdict"])],
     )

@@ -5,7 +5,8 @@ angles.parquet  joint angles in degrees on the uniform axis
 poses.parquet   segment poses for the replay
 tracks.parquet  what strides and parameters are measured on (server/report/tracks.py)
 signals.parquet what the sensors measured, on the common time axis (server/report/signals.py)
-events.csv      contacts: time_s, side, kind (ic | tc), source, confidence (share of detectors)
+events.csv      contacts: time_s, side, kind (ic | tc), source, confidence (share of detectors),
+                uncertainty_s (standard)
 steps.csv       steps of a trunk sensor, where no foot carries one: time_s, side
 strides.csv     one row per stride with its temporal parameters and why it was left out
 
@@ -170,8 +171,8 @@ def poses_parquet(poses: Poses) -> bytes:
 def events_csv(events: GaitEvents) -> bytes:
     """All contacts in order of time."""
     return write_csv(
-        ("time_s", "side", "kind", "source", "confidence"),
-        ((e.time_s, e.side, e.kind, e.source, e.confidence) for e in events.events),
+        ("time_s", "side", "kind", "source", "confidence", "uncertainty_s"),
+        ((e.time_s, e.side, e.kind, e.source, e.confidence, e.uncertainty_s) for e in events.events),
     )
 
 

@@ -32,7 +32,6 @@ NAMES: Final[Mapping[str, str]] = {
 NOTES: Final[Mapping[str, str]] = {
     "no_speed_matched_norm": "the people of the limit walk faster",
     "sides_stand_differently": "a difference in standing is part of it",
-    "late_foot_off": "our foot-off is 0.07 s late, worth a few hundredths",
 }
 
 REASONS: Final[Mapping[str, str]] = {

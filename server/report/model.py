@@ -13,6 +13,7 @@ from typing import Final, Literal
 import numpy as np
 
 from core.errors import Notice
+from core.events.result import MANUAL
 from core.flags import judge_flags
 from core.frames import SIDES, Floats, Side
 from core.norms.adults import adult_reference_at_speed
@@ -20,6 +21,7 @@ from core.norms.controls import ControlGroup
 from core.norms.kinematics import NormBand
 from core.norms.lookup import Norms, look_up_norms
 from core.norms.profile import CurveReference
+from core.norms.values import withdraw_shares
 from core.parameters import cycle_curves
 from core.parameters.anatomical_zero import anatomical_variables
 from core.parameters.result import CycleCurves
@@ -218,6 +220,8 @@ def report_model(
     if speed_mps is None:
         speed_mps = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
     norms = look_up_norms(age, sex, speed_mps, height_m, treadmill=treadmill)
+    found = [e.uncertainty_s for e in bundle.events.events if e.source != MANUAL]
+    norms = replace(norms, values=withdraw_shares(norms.values, found))
     own = None if controls is None else controls.norms(speed_mps, height_m)
     if own is not None:
         compared = {name: v for name, v in norms.values.items() if v.comparable or name not in own.values}

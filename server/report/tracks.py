@@ -1,8 +1,8 @@
 """tracks.parquet: what strides and parameters are measured on, kept so that an edit can be measured again.
 
 Feet: `<foot>_q_w…z`, `<foot>_valid`; their paths `<foot>_path_x…z` (m), `<foot>_path_q_w…z` where it differs,
-`<foot>_path_valid`, `<foot>_still`; `<pelvis|chest>_acc_x…z` in the walking frame (m/s²); `turning`.
-Angles and events lie in their own files.
+`<foot>_path_valid`, `<foot>_still`, `<foot>_patched`; `<pelvis|chest>_acc_x…z` in the walking frame (m/s²);
+`turning`. Angles and events lie in their own files.
 """
 
 from __future__ import annotations
@@ -49,6 +49,8 @@ def tracks_parquet(tracks: Tracks) -> bytes:
             columns |= _spread(f"{foot}_path_q", feet.q[side], "wxyz")
         columns[f"{foot}_path_valid"] = feet.valid[side]
         columns[f"{foot}_still"] = feet.still[side]
+        if side in feet.patched:
+            columns[f"{foot}_patched"] = feet.patched[side]
     for segment, a in tracks.trunk.items():
         columns |= _spread(f"{segment}_acc", a, "xyz")
     meta = {
@@ -58,6 +60,7 @@ def tracks_parquet(tracks: Tracks) -> bytes:
         "bout_params": dataclasses.asdict(tracks.bout_params),
         "surface": dataclasses.asdict(tracks.surface),
         "rests": tracks.rests,
+        "standing": tracks.standing,
         "turns": [dataclasses.asdict(t) for t in tracks.turns],
         "steps": None if tracks.steps is None else _steps_meta(tracks.steps),
         "feet": None
@@ -93,6 +96,7 @@ def read_tracks(data: bytes, events: GaitEvents, angles: JointAngles | None) -> 
         params=_made(StrideParams, meta["params"]),
         bout_params=_made(BoutParams, meta.get("bout_params", {})),
         rests=None if meta.get("rests") is None else tuple((a, b) for a, b in meta["rests"]),
+        standing=tuple((a, b) for a, b in meta.get("standing", ())),
         turns=tuple(_made(Turn, t) for t in meta.get("turns", ())),
         steps=None if meta.get("steps") is None else _steps(meta["steps"]),
     )
@@ -108,7 +112,8 @@ def _steps_meta(steps: Steps) -> dict[str, object]:
 
 
 def _steps(meta: Mapping[str, Any]) -> Steps:
-    bouts = [{**b, "stops": tuple((x, y) for x, y in b["stops"])} for b in meta["bouts"]]
+    ranges = ("breaks", "stops")
+    bouts = [b | {k: tuple((x, y) for x, y in b.get(k, ())) for k in ranges} for b in meta["bouts"]]
     return Steps(
         steps=tuple(Step(t, side) for t, side in meta["steps"]),
         bouts=tuple(_made(Bout, b) for b in bouts),
@@ -137,6 +142,11 @@ def _feet(
         source=str(meta["source"]),
         body=_made(BodyModel, meta["body"]),
         withheld=meta.get("withheld", {}),
+        patched={
+            side: bools_of(table, name)
+            for side in present
+            if (name := f"{FOOT[side]}_patched") in table.column_names
+        },
     )
 
 

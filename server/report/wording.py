@@ -122,6 +122,7 @@ REASONS: Final[Mapping[str, str]] = {
     "at_bound": "withheld: the leg model's knee rests on its limit",
     "impossible": "withheld: nobody can walk like this",
     "gap": "not measured: the sensor was lost in every stride",
+    "packets_lost": "not measured: packets were lost in the swing of every stride",
     "treadmill": "not measured: on a treadmill the belt's speed is needed, and gives speed and stride length",
     "no_foot_track": "not measured: no sensor on this foot",
     "no_foot_flat": "not measured: the foot never rested on the floor",

@@ -17,6 +17,8 @@ from server.viewer.colours import BACKGROUND, FLOOR
 
 ROOM: Final = "/room"
 """Name of the node that everything hangs on."""
+SKY: Final = "/sky"
+"""Name of the light that comes from everywhere."""
 
 FOV_RAD: Final = float(np.deg2rad(31.0))
 FLOOR_M: Final = 60.0
@@ -50,6 +52,12 @@ class SceneRoom:
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
         scene.configure_default_lights(True, cast_shadow=True)
+        # light from all around is one lamp: the default, a picture of a surrounding, must be filtered by the
+        # browser first, three quarters of the work of a first picture without a graphics processor
+        scene.configure_environment_map(None)
+        scene.add_light_hemisphere(
+            SKY, sky_color=(255, 255, 255), ground_color=(200, 200, 205), intensity=2.4
+        )
         self._node = scene.add_frame(ROOM, show_axes=False)
         self._grid = scene.add_grid(
             f"{ROOM}/floor", floor_m, floor_m, shadow_opacity=0.2, position=(*middle, 0.0)

@@ -47,11 +47,11 @@ def _warm() -> None:
     """Import readers and pipeline, compile the kernels or load them from the cache."""
     import server.report.exports  # noqa: F401
     from core.body import estimate
-    from core.events import foot_pitch
+    from core.events import foot_contact
     from core.fusion import attitude
 
     attitude.compile_attitude_kernel()
-    foot_pitch.compile_foot_pitch_kernel()
+    foot_contact.compile_foot_contact_kernel()
     estimate.compile_pose_kernels()
 
 

@@ -112,7 +112,8 @@ def test_simulated_walk_is_analysed_and_agrees_with_its_truth(
     )
     late = [np.abs(true_contacts - float(e["time_s"])).min() for e in contacts]
     assert len(contacts) >= 0.9 * len(true_contacts)
-    assert np.median(late) < 0.02
+    # the sole has touched when the foot begins to slap (docs/accuracy.md, "Contacts on simulated walks")
+    assert np.median(late) < 0.035
 
 
 def test_result_files_have_the_documented_columns(analysed: tuple[Path, str]) -> None:
@@ -123,7 +124,9 @@ def test_result_files_have_the_documented_columns(analysed: tuple[Path, str]) ->
     for row in content["parameters"]:
         assert {"name", "side", "n", "mean", "sd", "unit", "reason"} <= set(row)
         assert (row["mean"] is None) == (row["reason"] is not None)
-    assert list(rows(out / "events.csv")[0]) == ["time_s", "side", "kind", "source", "confidence"]
+    assert list(rows(out / "events.csv")[0]) == [
+        "time_s", "side", "kind", "source", "confidence", "uncertainty_s",
+    ]  # fmt: skip
     stride = rows(out / "strides.csv")[0]
     assert {"side", "start_s", "tc_s", "end_s", "stride_time_s", "excluded_reason"} <= set(stride)
     assert "stride_time_s" in stdout

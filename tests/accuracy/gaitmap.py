@@ -13,8 +13,10 @@ from scipy.signal import butter, sosfiltfilt
 
 from core.formats import SourceFile, parse_manifest, read_recording
 from core.frames import SIDES, Floats, Side
+from core.pipeline import TakeAnalysis, analyse
 from core.recording import Recording
 from tests.data import data_folder
+from tests.kept import keep
 
 RATE = 204.8
 COPIES = ("imu_sample.csv", "imu_sample_not_rotated.csv")
@@ -73,6 +75,12 @@ def recording_of(x: Floats, rate_hz: float) -> Recording:
     }  # fmt: skip
     manifest = parse_manifest(json.dumps({"protocol": "walk", "sources": [source]}).encode())
     return read_recording([SourceFile(name, len(data), lambda: data)], manifest)
+
+
+@keep
+def analysed() -> TakeAnalysis:
+    """What the product makes of the first copy."""
+    return analyse(recording_of(signals(COPIES[0]), RATE))
 
 
 @cache

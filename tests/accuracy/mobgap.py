@@ -17,6 +17,7 @@ from core.frames import GRAVITY, Floats
 from core.recording import ImuStream, Recording, UniformRecording
 from core.timeline import synchronise
 from tests.data import data_folder
+from tests.kept import keep
 
 TRIALS = (("Test5", "Trial1"), ("Test5", "Trial2"), ("Test11", "Trial1"))
 """Two straight walks of 5 m, and daily life for two minutes: one healthy older adult."""
@@ -62,7 +63,7 @@ def recording(trial: tuple[str, str]) -> Recording:
     return Recording({"LowerBack": stream}, {"LowerBack": "pelvis"})
 
 
-@cache
+@keep
 def uniform(trial: tuple[str, str]) -> UniformRecording:
     """The same on the uniform axis."""
     return synchronise(recording(trial))

@@ -27,6 +27,7 @@ from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import from_matrix, multiply, rotate
 from tests.data import data_folder
+from tests.kept import keep
 from tests.walks import neura_walk
 
 HEIGHT_M = 1.70
@@ -78,7 +79,7 @@ class Chain:
         return np.asarray(1000 * np.sqrt(np.mean(self.run.track.joint_residual[WALK] ** 2, axis=0)))
 
 
-@cache
+@keep
 def take() -> tuple[CalibratedRecording, Orientations]:
     """The walk calibrated, and its orientations from six axes."""
     calibrated = calibrate(neura_walk())
@@ -102,7 +103,7 @@ def chain(
     return Chain(run, calibrated, replace_orientations(run, orientations), turned)
 
 
-@cache
+@keep
 def healthy() -> Chain:
     return chain(*take())
 

@@ -18,11 +18,10 @@ from core.body.l7s.poses import l7s_poses
 from core.body.still import FOOT_STILL, still_samples
 from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
-from core.pipeline import analyse
 from tests.accuracy.neura import BODY, HEIGHT_M, SHIPPED, angles_deg, healthy, stride_errors_m, take
 from tests.accuracy.report import record, record_in_short
 from tests.accuracy.test_neura_walk import scores
-from tests.walks import neura_recording
+from tests.walks import neura_analysis
 
 FLEXION = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 
@@ -110,7 +109,7 @@ def test_strides_of_a_foot_alone_are_within_the_limits() -> None:
 
 
 def test_the_pipeline_gives_these_angles_and_feet() -> None:
-    made, analysis = healthy(), analyse(neura_recording())
+    made, analysis = healthy(), neura_analysis()
     assert analysis.problem is None
     assert analysis.poses is not None
     assert analysis.orientations is not None

@@ -1,4 +1,6 @@
-"""Contacts on gaitmap_foot, whole chain from the file, against motion capture (docs/science/events.md).
+"""Contacts of the published pitch rule on gaitmap_foot against motion capture (docs/science/events.md).
+
+The product's refined contacts: test_events_references.py.
 
 Reference events cover straight strides only: extras are counted inside reference strides. One reference
 stride of the left foot (samples 3359 to 3826) spans the turn and holds two real strides: the contact in its
@@ -134,21 +136,12 @@ def test_write_down_the_figures() -> None:
                     n = len(reference(side, kind))
                     row = (name, f"{rate_hz:g}", side, kind.upper(), f"{len(r.errors)}/{n}", str(extra))
                     rows.append((*row, f"{r.mean_ms:+.1f}", f"{r.sd_ms:.1f}"))
-    contacts, _ = found(COPIES[0], RATE)
-    names: dict[EventKind, str] = {"ic": "Contact (IC) ms", "tc": "Foot-off (TC) ms"}
-    for kind, name in names.items():
-        errors = 1e3 * np.concatenate([score(contacts, side, kind)[0].errors for side in SIDES])
-        record_in_short(
-            name,
-            "–",
-            f"{errors.mean():+.1f} ± {errors.std(ddof=1):.1f} (n={len(errors)})",
-            "gaitmap_foot, 1 person, against motion capture",
-        )
     record(
         "Contacts on gaitmap_foot",
         ("copy", "rate Hz", "foot", "event", "found", "extra", "mean ms", "sd ms"),
         rows,
-        "Error is found − motion capture. Limits (docs/science/events.md): |mean| ≤ 25 ms, sd ≤ 15 ms, at"
+        "Contacts of the published pitch rule."
+        " Error is found − motion capture. Limits (docs/science/events.md): |mean| ≤ 25 ms, sd ≤ 15 ms, at"
         " most one missed and one extra inside reference strides. Rates other than 204.8 Hz are resampled."
         " The contact before the right foot's first foot-off is not reported by design. One left reference"
         " stride spans the turn and holds two strides: its inner contact counts as extra, its end as missed.",

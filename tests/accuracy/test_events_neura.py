@@ -104,11 +104,12 @@ def test_contacts_agree_with_the_heel_marker() -> None:
         "Contacts on neura_walk",
         ("foot", "heel slower than m/s", "flags with one IC", "mean ms", "sd ms"),
         rows,
-        "Error is found − the moment the Vicon heel marker slows down before the reviewed still flag; the lag"
-        " between IMU and Vicon (0 to 3 samples) is not removed. Limit at 0.5 m/s: |mean| ≤ 50 ms; the other"
-        " rows show what the choice of that speed does. At least 11 of 14 flags have exactly one IC in the"
-        " 0.45 s before, no IC stands elsewhere. Missed by the rule: the first step of the left foot (before"
-        " its first foot-off), the right step in the turn and the right closing step, which hardly pitch.",
+        "Contacts of the published pitch rule. Error is found − the moment the Vicon heel marker slows down"
+        " before the reviewed still flag; the lag between IMU and Vicon (0 to 3 samples) is not removed."
+        " Limit at 0.5 m/s: |mean| ≤ 50 ms; the other rows show what the choice of that speed does. At least"
+        " 11 of 14 flags have exactly one IC in the 0.45 s before, no IC stands elsewhere. Missed by the"
+        " rule: the first step of the left foot (before its first foot-off), the right step in the turn and"
+        " the right closing step, which hardly pitch.",
     )
 
 

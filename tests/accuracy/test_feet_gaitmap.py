@@ -18,15 +18,14 @@ from core.events.result import Stride
 from core.frames import FOOT, SIDES, Floats, Side
 from core.measure import MeasuredGait, Tracks, measure_gait
 from core.parameters.stance import FLAT_RAD, NAMES, find_stances
-from core.pipeline import analyse
 from core.shoe import Shoe
-from tests.accuracy.gaitmap import COPIES, MARKERS, MOCAP_RATE, RATE, recording_of, signals, table
+from tests.accuracy.gaitmap import MARKERS, MOCAP_RATE, analysed, table
 from tests.accuracy.report import record, record_in_short
 
 
 @cache
-def analysed() -> tuple[Tracks, MeasuredGait]:
-    done = analyse(recording_of(signals(COPIES[0]), RATE))
+def gait() -> tuple[Tracks, MeasuredGait]:
+    done = analysed()
     assert done.tracks is not None
     assert done.measured is not None
     return done.tracks, done.measured
@@ -48,7 +47,7 @@ def marker_pitch(side: Side) -> tuple[Floats, Floats]:
     line = foot["TOE"] - foot["FCC"]
     t = np.arange(len(line)) / MOCAP_RATE
     pitch = np.arctan2(line[:, 2], np.hypot(line[:, 0], line[:, 1]))
-    own = analysed()[1].strides.select_used(side)
+    own = gait()[1].strides.select_used(side)
     quiet = np.concatenate(
         [pitch[(t > s.start_s + 0.3 * stance(s)) & (t < s.start_s + 0.5 * stance(s))] for s in own]
     )
@@ -61,7 +60,7 @@ def stance(s: Stride) -> float:
 
 
 def counted(side: Side, name: str) -> Floats:
-    _, measured = analysed()
+    _, measured = gait()
     column = measured.columns[name]
     return np.array([
         column[i]
@@ -75,13 +74,13 @@ def spread(errors: Floats, form: str) -> str:
 
 
 def strides(side: Side) -> list[Stride]:
-    return list(analysed()[1].strides.select_used(side))
+    return list(gait()[1].strides.select_used(side))
 
 
 def test_parts_of_stance_are_those_of_the_markers() -> None:
     """Ours against the same rule on the pitch of the markers, and against heel and tip 1 cm off the floor."""
     rows = []
-    _, measured = analysed()
+    _, measured = gait()
     for side in SIDES:
         t, pitch = marker_pitch(side)
         own = find_stances(measured.strides, t, {FOOT[side]: pitch})
@@ -164,7 +163,7 @@ SHOE = Shoe(0.05, 0.20, 0.0)
 
 
 def test_heel_and_toe_pass_the_floor_as_their_markers_do() -> None:
-    tracks, measured = analysed()
+    tracks, measured = gait()
     assert tracks.feet is not None
     body, _ = nominal_body(None, None, SHOE)
     again = measure_gait(replace(tracks, feet=replace(tracks.feet, body=body)))

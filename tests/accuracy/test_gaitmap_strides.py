@@ -30,10 +30,9 @@ from core.frames import FOOT, GRAVITY, SIDES, Floats, Side
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.parameters import spatial_rows
-from core.pipeline import TakeAnalysis, analyse
 from core.rotation import rotate
 from core.timeline import synchronise
-from tests.accuracy.gaitmap import COPIES, RATE, block_mean, recording_of, signals, true_strides
+from tests.accuracy.gaitmap import COPIES, RATE, analysed, block_mean, recording_of, signals, true_strides
 from tests.accuracy.report import record, record_in_short
 
 BODY = BodyModel.from_height(1.70)
@@ -120,11 +119,6 @@ def naive(side: Side, dedrift: bool) -> Floats:
     return np.asarray(np.cumsum(v, axis=0) / RATE)
 
 
-@cache
-def product() -> TakeAnalysis:
-    return analyse(recording_of(signals(COPIES[0]), RATE))
-
-
 @pytest.mark.parametrize("side", SIDES)
 def test_straight_strides_agree_with_motion_capture(side: Side) -> None:
     made = run(side)
@@ -167,7 +161,7 @@ def test_how_the_sensor_is_turned_on_the_shoe_does_not_matter(side: Side) -> Non
 @pytest.mark.parametrize("side", SIDES)
 def test_the_product_measures_the_same_feet(side: Side) -> None:
     """Two feet through the whole chain; the ankle's way instead of the sensor's."""
-    feet = product().feet
+    feet = analysed().feet
     assert feet is not None
     assert feet.source == "erkf_feet"
     assert not feet.linked
@@ -179,7 +173,7 @@ def test_the_product_measures_the_same_feet(side: Side) -> None:
 
 def reported(side: Side) -> tuple[Floats, Floats]:
     """Errors of the strides that the report counts: lengths in mm, speeds in mm/s."""
-    analysis = product()
+    analysis = analysed()
     assert analysis.strides is not None
     rows = spatial_rows(analysis.strides, analysis.feet)
     found = []
@@ -216,7 +210,7 @@ def test_write_down_the_figures() -> None:
     rows, turns, speed, short, plain = [], [], [], [], []
     for side in SIDES:
         made, half, constant = run(side), run(side, half_rate=True), run(side, impact=0.0)
-        feet = product().feet
+        feet = analysed().feet
         assert feet is not None
         unknown = replace(OFFLINE, start_gyr_bias_sd=OFFLINE.moving_gyr_bias_sd)
         biased = run_erkf(*take(), BODY, (FOOT[side],), unknown)

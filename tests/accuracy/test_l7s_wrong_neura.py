@@ -171,6 +171,6 @@ def test_write_down_the_figures() -> None:
         rows,
         "Offset removed, whole walk against Vicon; one person, one walk out and back. A mistake counts as "
         "told when a notice names it; every one here is. What is not told: clocks apart by less than an "
-        "eighth of a stride, and, with feet alone in a take without a turn, that they were exchanged (notice "
-        "sides_not_checked).",
+        "eighth of a stride, and, with feet alone in a take whose turns are not decisive, that they were "
+        "exchanged.",
     )

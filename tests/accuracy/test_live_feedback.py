@@ -14,11 +14,9 @@ import pytest
 from core.feedback import AnalysedStride, Cue, FeedbackEngine, FeedbackSplit, Prescription, split
 from core.measure import MeasuredGait
 from core.online import LiveFrame
-from core.pipeline import analyse
-from core.simulate import simulate_scenario
 from tests.accuracy.report import record, record_in_short
 from tests.live_walks import live
-from tests.walks import simulated
+from tests.walks import analysed, simulated
 
 WHO, SEED = "hemiparetic", 3
 
@@ -40,7 +38,7 @@ def frames(*sizes: int) -> Sequence[LiveFrame]:
 
 @cache
 def offline() -> MeasuredGait:
-    measured = analyse(simulate_scenario(WHO, SEED).recording).measured
+    measured = analysed(WHO, SEED).measured
     assert measured is not None
     return measured
 

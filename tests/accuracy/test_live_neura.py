@@ -19,7 +19,8 @@ from core.body.erkf.live_erkf import live_params
 from core.body.erkf.start import start_state
 from core.body.live_still import StillnessDetector
 from core.body.tree import person_tree
-from core.events import detect
+from core.events import detect_contacts
+from core.events.foot_movement import measure_foot_movements
 from core.events.result import GaitEvent
 from core.frames import FOOT, SIDES, Floats, Side
 from tests.accuracy.gaitmap import RATE
@@ -61,7 +62,8 @@ def scored() -> dict[str, Score]:
 
 def nearest(events: list[GaitEvent]) -> tuple[list[float], int]:
     """Time of each live contact minus that of the nearest offline one, ms; offline ones without any."""
-    offline = list(detect(take()[1]).events)
+    calibrated, orientations = take()
+    offline = list(detect_contacts(orientations, motions=measure_foot_movements(calibrated)).events)
     apart = []
     for e in events:
         same = [x for x in offline if (x.side, x.kind) == (e.side, e.kind)]

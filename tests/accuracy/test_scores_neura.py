@@ -19,12 +19,11 @@ from core.frames import SIDES
 from core.norms.profile import NINE, SAGITTAL
 from core.parameters import cycle_curves
 from core.parameters.result import CycleCurves
-from core.pipeline import TakeAnalysis, analyse
 from core.scores import Scores, score_curves
 from tests.accuracy.neura import STRAIGHT
 from tests.accuracy.report import record, record_in_short
 from tests.data import data_folder
-from tests.walks import neura_recording
+from tests.walks import neura_analysis
 
 WALK, STANDING = slice(1110, 2080), slice(300, 1000)
 LAGS = range(-2, 7)
@@ -39,16 +38,11 @@ MARKERS = {"pelvis": ("LPSI", "RPSI"), "foot_l": ("LHEE", "LTOE"), "foot_r": ("R
 
 
 @cache
-def analysis() -> TakeAnalysis:
-    return analyse(neura_recording())
-
-
-@cache
 def vicon() -> JointAngles:
     """Vicon's angles, zero at anatomical, on our time axis; its markers' courses about the vertical."""
     from scipy.io import loadmat
 
-    ours = analysis().angles
+    ours = neura_analysis().angles
     assert ours is not None
     n = len(ours.t_s)
     table = np.genfromtxt(data_folder("neura_walk") / "reference_angles.csv", delimiter=",", names=True)
@@ -74,7 +68,7 @@ def vicon() -> JointAngles:
 @cache
 def curves() -> tuple[CycleCurves, CycleCurves]:
     """Ours from standing, Vicon's anatomical; Vicon has no pelvic tilt and obliquity: ours twice."""
-    run = analysis()
+    run = neura_analysis()
     assert run.angles is not None
     assert run.strides is not None
     kept = tuple(replace(s, excluded_reason=None) for s in run.strides.strides if set(s.flags) <= STRAIGHT)

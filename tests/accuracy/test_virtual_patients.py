@@ -15,6 +15,7 @@ from core.frames import SIDES, SUFFIX, Side
 from core.pipeline import TakeAnalysis, analyse
 from core.simulate import PATIENTS, WalkTruth, simulate_scenario
 from tests.accuracy.report import record
+from tests.walks import analysed
 
 WALKING = tuple(name for name in PATIENTS if name != "severe_shuffle")
 SEED = 7
@@ -102,7 +103,7 @@ def test_what_is_told_of_each_person_is_what_the_person_did() -> None:
 
 @pytest.mark.parametrize("seed", [7, 8])
 def test_a_severe_shuffle_is_refused_and_not_guessed(seed: int) -> None:
-    found = analyse(simulate_scenario("severe_shuffle", seed).recording)
+    found = analysed("severe_shuffle", seed)
     assert "no_toe_off" in {n.code for n in found.notices}
     figures = [p for p in found.parameters if p.name in ("stride_time_s", "stance_pct")]
     assert [(p.mean, p.reason) for p in figures] == [(None, "no_strides")] * len(figures)

@@ -24,7 +24,7 @@ from server.viewer.replay_figure import ReplayFigure
 from tests.server import walk
 from tests.server.viewer.pictures import POSES, RATE_HZ, picture
 
-LASTS_S, WINDOWS = 2.0, 6
+LASTS_S, WINDOWS = 1.0, 6
 """Windows of walking; the first is for settling."""
 NO_DEARER: Final = 1.6
 """Live / replay. The aim is a twentieth of a core for a figure that somebody looks at (issue 5): measured 4.0

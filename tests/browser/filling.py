@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from functools import cache
 from typing import Any
 from urllib.parse import quote
 
 import httpx
 
 from core.simulate import mt_files, simulate_scenario
+from tests.kept import keep
 
 
-@cache
+@keep
 def simulated_files() -> tuple[Mapping[str, bytes], Mapping[str, str | None]]:
     """A simulated walk as MT Manager text by file name, and which sensor is on which segment."""
     made = simulate_scenario("comfortable", 1)

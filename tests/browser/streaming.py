@@ -6,7 +6,6 @@ import asyncio
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from functools import cache
 from typing import Any
 from uuid import uuid4
 
@@ -17,6 +16,7 @@ from server.demo import live as demo_live
 from server.demo.clinic import STROKE
 from tests.browser import filling
 from tests.browser.conftest import RunningServer
+from tests.kept import keep
 
 LONGER: Mapping[str, Any] = {
     "parameter": "step_length_m",
@@ -29,7 +29,7 @@ LONGER: Mapping[str, Any] = {
 """Longer steps on the left, told after every stride but for short probe blocks."""
 
 
-@cache
+@keep
 def _training() -> Simulation:
     return demo_live.plan_training(4)
 

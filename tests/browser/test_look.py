@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page
@@ -56,10 +55,14 @@ OUT = {"sign-in", "set-up", "capture"}
 FIGURE = {"session", "kinematics"}
 TABLETS = {"session", "found", "timeline", "kinematics"}
 DARK = {"session", "timeline", "kinematics", "patients"}
-SOME = ("patients", "session", "timeline")
-"""Which pictures are also taken of a tablet and in the dark, and which are taken in every run."""
+"""Which pictures are also taken of a tablet and in the dark."""
 LIVE = "live"
 """How the pictures of live pages begin."""
+SCREENS = ROOT / "docs" / "screens"
+pictures = pytest.mark.skipif(
+    os.environ.get("SAGITTAL_SCREENS") != "1",
+    reason="takes the pictures of docs/screens, which software draws for minutes: set SAGITTAL_SCREENS=1",
+)
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -109,71 +112,62 @@ def test_the_print_view_is_two_sheets_of_paper(opened: Opener, filled: Filled) -
     assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ") == 2
 
 
-def test_screenshots_of_every_page(
-    opened: Opener, solid: Browser, running: RunningServer, filled: Filled, tmp_path: Path
-) -> None:
-    """Written to docs/screens when SAGITTAL_SCREENS=1, else a few, thrown away; figures must be on them."""
-    folder = _screens(tmp_path)
-    pages = PAGES if folder != tmp_path else {name: PAGES[name] for name in SOME}
-    for name, address in pages.items():
+@pictures
+def test_screenshots_of_every_page(opened: Opener, solid: Browser, filled: Filled) -> None:
+    """Figures must be on them."""
+    for name, address in PAGES.items():
         browser = {"browser": solid} if name in FIGURE else {}
         page = opened(address(filled), signed_in=name not in OUT, **browser)
         if name in FIGURE:
             _wait_for_figure(page)
-        page.screenshot(path=folder / f"{name}.png")
+        page.screenshot(path=SCREENS / f"{name}.png")
         if name in TABLETS:
             page.set_viewport_size({"width": TABLET[0], "height": TABLET[1]})
             page.wait_for_timeout(300)
-            page.screenshot(path=folder / f"{name}-tablet.png")
+            page.screenshot(path=SCREENS / f"{name}-tablet.png")
         page.close()
         if name in DARK:
             page = opened(address(filled), scheme="dark", **browser)
             if name in FIGURE:
                 _wait_for_figure(page)
-            page.screenshot(path=folder / f"{name}-dark.png")
+            page.screenshot(path=SCREENS / f"{name}-dark.png")
             page.close()
-    sizes = [p.stat().st_size for p in folder.glob("*.png") if not p.name.startswith(LIVE)]
-    assert len(sizes) == sum(1 + (name in TABLETS) + (name in DARK) for name in pages)
+    sizes = [p.stat().st_size for p in SCREENS.glob("*.png") if not p.name.startswith(LIVE)]
+    assert len(sizes) == sum(1 + (name in TABLETS) + (name in DARK) for name in PAGES)
     assert sum(sizes) < 6_000_000
 
 
-def test_screenshots_of_a_live_take(
-    opened: Opener, solid: Browser, running: RunningServer, tmp_path: Path
-) -> None:
+@pictures
+def test_screenshots_of_a_live_take(opened: Opener, solid: Browser, running: RunningServer) -> None:
     """The therapist's page from calibration on, with the figure, and the patient's; both also dark."""
-    folder = _screens(tmp_path)
     with walking(running) as session:
         page = opened(f"/sessions/{session}/live", browser=solid)
         page.locator("live-page[data-view=calibrate] .checks tbody tr").first.wait_for(timeout=60_000)
         page.wait_for_timeout(1000)
-        page.screenshot(path=folder / "live-calibration.png")
+        page.screenshot(path=SCREENS / "live-calibration.png")
         until_strides(page, 4)
         page.get_by_role("button", name="Norm").dispatch_event("click")
         _wait_for_live_figure(page)
-        page.screenshot(path=folder / "live.png")
+        page.screenshot(path=SCREENS / "live.png")
         page.set_viewport_size({"width": TABLET[0], "height": TABLET[1]})
         page.wait_for_timeout(1500)
-        page.screenshot(path=folder / "live-tablet.png")
+        page.screenshot(path=SCREENS / "live-tablet.png")
         page.close()
         for scheme, name in (("light", "live-patient"), ("dark", "live-patient-dark")):
             page = opened(f"/sessions/{session}/live/patient", scheme=scheme)
             page.get_by_role("button", name="Without sound").click()
             page.locator("[data-last] svg").first.wait_for(timeout=60_000)
-            page.screenshot(path=folder / f"{name}.png")
+            page.screenshot(path=SCREENS / f"{name}.png")
             page.close()
         page = opened(f"/sessions/{session}/live", browser=solid, scheme="dark")
         page.frame_locator("live-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
         until_strides(page, 4)
         _wait_for_live_figure(page)
-        page.screenshot(path=folder / "live-dark.png")
+        page.screenshot(path=SCREENS / "live-dark.png")
         page.close()
-    sizes = [p.stat().st_size for p in folder.glob(f"{LIVE}*.png")]
+    sizes = [p.stat().st_size for p in SCREENS.glob(f"{LIVE}*.png")]
     assert len(sizes) >= 6
     assert sum(sizes) < 1_500_000
-
-
-def _screens(otherwise: Path) -> Path:
-    return ROOT / "docs" / "screens" if os.environ.get("SAGITTAL_SCREENS") == "1" else otherwise
 
 
 def _wait_for_live_figure(page: Page) -> None:

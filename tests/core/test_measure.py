@@ -12,18 +12,18 @@ from core.events.edits import Edit
 from core.frames import R_NEUTRAL
 from core.measure import MeasuredGait, measure_gait
 from core.parameters.result import Parameter
-from core.pipeline import TakeAnalysis, analyse
+from core.pipeline import TakeAnalysis
 from core.rotation import about, from_matrix, multiply, rotate
-from core.simulate import simulate_scenario
 from server.report.bundle import load_bundle
 from server.report.exports import analysis_files
 from server.report.tracks import NAME, read_tracks
 from tests.server import walk
+from tests.walks import analysed
 
 
 @pytest.fixture(scope="module")
 def analysis() -> TakeAnalysis:
-    return analyse(simulate_scenario("comfortable", 1).recording)
+    return analysed("comfortable", 1)
 
 
 def figure(measured: MeasuredGait, name: str, side: str | None = "left") -> Parameter:

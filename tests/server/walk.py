@@ -13,7 +13,7 @@ from core.angles import JointAngles
 from core.body.feet import FootTracks
 from core.body.model import BodyModel
 from core.body.poses import Poses
-from core.events.result import GaitEvent, GaitEvents, Stride, Strides
+from core.events.result import EventKind, GaitEvent, GaitEvents, Stride, Strides
 from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, SUFFIX, THIGH, Bools, Floats, Segment, Side
 from core.measure import Tracks
 
@@ -96,7 +96,8 @@ def events(duration_s: float = 12.0) -> GaitEvents:
             start = (k - PHASE[side]) * STRIDE_S
             for kind, t in (("ic", start), ("tc", start + FOOT_OFF * STRIDE_S)):
                 if 0 <= t < duration_s:
-                    found.append(GaitEvent(t, side, "ic" if kind == "ic" else "tc", "foot_pitch", t))
+                    name: EventKind = "ic" if kind == "ic" else "tc"
+                    found.append(GaitEvent(t, side, name, "foot_contact", t, uncertainty_s=0.02))
     return GaitEvents(tuple(sorted(found, key=lambda e: e.time_s)))
 
 

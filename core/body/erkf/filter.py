@@ -22,6 +22,7 @@ from core.body.erkf.gaps import bridge_gaps
 from core.body.erkf.kernel import (
     CONTACT,
     INVALID,
+    PATCHED,
     STILL,
     ErkfMemory,
     ErkfOutput,
@@ -32,7 +33,7 @@ from core.body.erkf.kernel import (
     filter_forward,
 )
 from core.body.erkf.params import ErkfParams
-from core.body.still import AT_REST, FOOT_STILL, still_samples
+from core.body.still import AT_REST, contact_samples, still_samples
 from core.body.tree import ImuTree
 from core.errors import EstimationError, ParameterError, SignalError
 from core.frames import Bools, Floats
@@ -47,7 +48,8 @@ class ErkfInputs:
     step_s : (T,) time since the sample before; 0 for the very first.
     acc, gyr : (T, n, 3) m/s², rad/s, at rest |acc| = g. valid : (T, n) measured; elsewhere see `erkf_inputs`.
     contact : (T, n) the sensor's foot rests on the floor. still : (T, n) the sensor has been at rest for
-        0.3 s.
+        0.3 s. rolling : (T, n) rad/s with which a foot turns that is in contact and not still, 0 elsewhere;
+        None for none. patched : (T, n) filled over a hole too long for a straight line; None for none.
     heading : (T, n) measured heading of the segment's forward axis in W, rad, NaN where none; None for none.
     """
 
@@ -58,6 +60,8 @@ class ErkfInputs:
     contact: Bools
     still: Bools
     heading: Floats | None = None
+    rolling: Floats | None = None
+    patched: Bools | None = None
 
     def part(self, start: int, stop: int) -> ErkfInputs:
         """Samples start … stop − 1."""
@@ -65,6 +69,8 @@ class ErkfInputs:
         return ErkfInputs(
             self.step_s[k], self.acc[k], self.gyr[k], self.valid[k], self.contact[k], self.still[k],
             None if self.heading is None else self.heading[k],
+            None if self.rolling is None else self.rolling[k],
+            None if self.patched is None else self.patched[k],
         )  # fmt: skip
 
 
@@ -137,6 +143,7 @@ def erkf_inputs(
     acc, gyr = np.asarray(acc, np.float64), np.asarray(gyr, np.float64)
     valid = np.asarray(valid & np.isfinite(acc).all(axis=2) & np.isfinite(gyr).all(axis=2))
     contact, still = np.zeros(valid.shape, bool), np.zeros(valid.shape, bool)
+    rolling = np.zeros(valid.shape)
     for i, name in enumerate(tree.imus):
         if not valid[:, i].any():
             raise SignalError("bad_signal", f"{name}: no valid sample; leave this sensor out.", sensor=name)
@@ -144,10 +151,10 @@ def erkf_inputs(
     for i in range(len(tree.imus)):
         still[:, i] = still_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz, AT_REST)
         if i in tree.feet:
-            contact[:, i] = still_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz, FOOT_STILL)
+            contact[:, i], rolling[:, i] = contact_samples(acc[:, i], gyr[:, i], valid[:, i], rate_hz)
     step = np.full(len(acc), 1.0 / rate_hz)
     step[:1] = 0.0
-    return ErkfInputs(step, acc, gyr, valid, contact, still, heading)
+    return ErkfInputs(step, acc, gyr, valid, contact, still, heading, rolling)
 
 
 def filter_block(
@@ -171,13 +178,17 @@ def run_block(
     rate = 1.0 / np.median(inputs.step_s[inputs.step_s > 0.0]) if np.any(inputs.step_s > 0.0) else 1.0
     memory = memory_of(state)
     flags = (INVALID * ~inputs.valid + CONTACT * inputs.contact + STILL * inputs.still).astype(np.int64)
+    if inputs.patched is not None:
+        flags += PATCHED * inputs.patched
     heading = np.empty((0, n)) if inputs.heading is None else np.ascontiguousarray(inputs.heading)
+    rolling = np.empty((0, n)) if inputs.rolling is None else params.roll_m * inputs.rolling
     samples = ErkfSamples(
         np.ascontiguousarray(inputs.step_s),
         np.ascontiguousarray(inputs.acc),
         np.ascontiguousarray(inputs.gyr),
         flags,
         heading,
+        rolling,
     )
     output = new_output(tree, T)
     links, noise = links_of(tree, params), noise_of(params, rate)
@@ -254,6 +265,8 @@ def noise_of(params: ErkfParams, rate_hz: float) -> Noise:
         heading=float(params.heading_sd),
         gap_acc=float(params.gap_acc_sd),
         gap_gyr=float(params.gap_gyr_sd),
+        patch_acc=float(params.patch_acc_sd),
+        patch_gyr=float(params.patch_gyr_sd),
     )
 
 

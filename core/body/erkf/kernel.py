@@ -26,7 +26,7 @@ from core.body.erkf.updates import (
 from core.frames import Bools, Floats
 from core.rotation.compiled import to_matrix, turn
 
-INVALID, CONTACT, STILL = 1, 2, 4
+INVALID, CONTACT, STILL, PATCHED = 1, 2, 4, 8
 """Bits of a sample's flags."""
 
 
@@ -61,13 +61,15 @@ class ErkfMemory(NamedTuple):
 
 
 class ErkfSamples(NamedTuple):
-    """A block: step (T,) s · acc, gyr (T, n, 3) · flags (T, n) · heading (T, n), or (0, n) for none."""
+    """A block: step (T,) s · acc, gyr (T, n, 3) · flags (T, n) · heading (T, n), or (0, n) for none ·
+    rolling (T, n) speed in m/s that a foot in contact may have beyond σ_v, or (0, n) for none."""
 
     step: Floats
     acc: Floats
     gyr: Floats
     flags: NDArray[np.int64]
     heading: Floats
+    rolling: Floats
 
 
 class ErkfOutput(NamedTuple):
@@ -86,13 +88,14 @@ class ErkfOutput(NamedTuple):
 
 class ErkfScratch(NamedTuple):
     """R (n, 3, 3) of the IMUs · U (4, 3), y (3,), place (4,), H (2, 3, 3) of a block · vectors (10, 3) ·
-    taken (n,) zero velocities · slack (J,) m of the joint centres."""
+    taken (n,) zero velocities, their σ (n,) · slack (J,) m of the joint centres."""
 
     R: Floats
     U: Floats
     y: Floats
     vectors: Floats
     taken: Bools
+    zero_velocity: Floats
     slack: Floats
     place: NDArray[np.int64]
     H: Floats
@@ -116,6 +119,8 @@ class Noise(NamedTuple):
     heading: float
     gap_acc: float
     gap_gyr: float
+    patch_acc: float
+    patch_gyr: float
 
 
 class Links(NamedTuple):
@@ -169,6 +174,8 @@ def add_noise(memory, samples, k, links, noise):  # type: ignore[no-untyped-def]
         vw = sd[i, 1] ** 2
         if flags[k, i] & INVALID:
             va, vw = noise.gap_acc**2, noise.gap_gyr**2
+        elif flags[k, i] & PATCHED:
+            va, vw = va + noise.patch_acc**2, vw + noise.patch_gyr**2
         for c in range(3):
             P[b + 3 + c, b + 3 + c] += va * dt * dt
             P[b + 6 + c, b + 6 + c] += vw * dt * dt
@@ -180,12 +187,13 @@ def add_noise(memory, samples, k, links, noise):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
-def judge_contacts(memory, flags, noise, taken, refused):  # type: ignore[no-untyped-def]
-    """Write for a sample's flags (n,) which zero velocities are taken (n,) and which the gate refuses (n,).
+def judge_contacts(memory, samples, k, noise, scratch, refused):  # type: ignore[no-untyped-def]
+    """Write for sample k how far each zero velocity is believed, which are taken and which the gate refuses.
 
     All are judged from the predicted state, before any block, so that the order does not matter.
     """
     P, x, count = memory.P, memory.x, memory.refused
+    flags, taken, sd = samples.flags[k], scratch.taken, scratch.zero_velocity
     for i in range(flags.shape[0]):
         taken[i] = False
         refused[i] = False
@@ -193,7 +201,10 @@ def judge_contacts(memory, flags, noise, taken, refused):  # type: ignore[no-unt
             count[i] = 0
             continue
         b, v = i * noise.m, x[i, 3:6]
-        taken[i] = noise.gate < 0.0 or is_within_gate(P, b, v, noise.zero_velocity, noise.gate)
+        sd[i] = noise.zero_velocity
+        if samples.rolling.shape[0] > 0:
+            sd[i] = np.sqrt(sd[i] ** 2 + samples.rolling[k, i] ** 2)
+        taken[i] = noise.gate < 0.0 or is_within_gate(P, b, v, sd[i], noise.gate)
         refused[i] = not taken[i]
         count[i] = 0 if taken[i] else count[i] + 1
         if count[i] >= noise.reaccept:
@@ -234,7 +245,7 @@ def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: i
         rests = samples.flags[k, i] & STILL
         if scratch.taken[i]:
             velocity_rows(x[i, 3:6], m, i, place[B], y)
-            good &= take_block(P, dx, place[B], H[B], y, noise.zero_velocity, V[B], E[B], U)
+            good &= take_block(P, dx, place[B], H[B], y, scratch.zero_velocity[i], V[B], E[B], U)
             B += 1
         if noise.tilt > 0.0 and (scratch.taken[i] or rests):
             tilt_rows(R[i], samples.acc[k, i], m, i, place[B], H[B], y)
@@ -289,7 +300,7 @@ def advance(memory, samples, k, links, noise, scratch, record, slot, output):  #
     """Filter sample k of a block: the one rule of a file and a stream; False if the covariance broke."""
     predict(memory, samples, k, noise, scratch, record.F[slot])
     add_noise(memory, samples, k, links, noise)
-    judge_contacts(memory, samples.flags[k], noise, scratch.taken, output.refused[k])
+    judge_contacts(memory, samples, k, noise, scratch, output.refused[k])
     good = correct(memory, samples, k, links, noise, scratch, record, slot)
     inject(memory, noise, scratch, output.nominal[k], output.heading_sd[k])
     for r in range(memory.dx.shape[0]):
@@ -314,7 +325,7 @@ def filter_forward(memory, samples, links, noise, record, output):  # type: igno
     n, J = memory.x.shape[0], links.ends.shape[0]
     scratch = ErkfScratch(
         np.empty((n, 3, 3)), np.empty((4, 3)), np.empty(3), np.empty((10, 3)),
-        np.zeros(n, np.bool_), np.empty(J), np.empty(4, np.int64), np.empty((2, 3, 3)),
+        np.zeros(n, np.bool_), np.empty(n), np.empty(J), np.empty(4, np.int64), np.empty((2, 3, 3)),
     )  # fmt: skip
     keeps = record.V.shape[0] > 1
     for k in range(samples.step.shape[0]):

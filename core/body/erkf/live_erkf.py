@@ -104,7 +104,7 @@ class LiveErkf:
             tree, ErkfInputs(step, standing.acc, standing.gyr, standing.valid, none, none), params, (0, T), q
         )
         self._memory = memory_of(state)
-        self._heading = np.empty((0, n))
+        self._heading, self._rolling = np.empty((0, n)), np.empty((0, n))
         self._gone, self._adrift = np.zeros(n, np.int64), np.zeros(n, np.bool_)
         linked = {i for j in tree.joints for i in (j.proximal, j.distal)}
         self._alone = frozenset(tree.feet) - linked
@@ -133,7 +133,9 @@ class LiveErkf:
             for _, i in (x for x in begins if x[0] == first):
                 self._settle(i, signals.acc[first, i], signals.gyr[first, i])
             k = slice(first, past)
-            samples = ErkfSamples(step[k], signals.acc[k], signals.gyr[k], flags[k], self._heading)
+            samples = ErkfSamples(
+                step[k], signals.acc[k], signals.gyr[k], flags[k], self._heading, self._rolling
+            )
             part = output.part(first, past)
             broke = filter_forward(
                 *map(tuple, (self._memory, samples, self._links, self._noise, self._record, part))

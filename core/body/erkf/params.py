@@ -37,11 +37,16 @@ class ErkfParams:
         from sample to sample that is added as uncertainty, σ_a² + (c |f_k − f_k−1|)²
         (docs/science/erkf.md, "Impacts").
     gyr_walk, acc_walk : random walk of the biases, rad/s/√s and m/s²/√s (15 states).
-    zero_velocity_sd : m/s. gate : largest χ² of a zero velocity. reaccept_s : contact refused for so long is
+    zero_velocity_sd : m/s, of a foot that is still. roll_m : m, times |ω| the speed that the quietest moment
+        of a rolling foot has beside it: half of the 0.1 m that a sensor on the instep is off the ball, as
+        velocity over |ω| next to the still part of a stance is on gaitmap_foot (0.03 to 0.05 m forward, up to
+        0.1 m upward). gate : largest χ² of a zero velocity. reaccept_s : contact refused for so long is
         accepted after all; then `reaccept_m` is added to the foot's uncertainty
         (docs/science/erkf.md, "Zero velocity").
     tilt_sd : of the direction of f. joint_centre_sd : m. joint_axis_sd, heading_sd : rad.
     gap_acc_sd, gap_gyr_sd : in place of acc_sd and gyr_sd while an IMU is lost.
+    patch_s : more than this between two samples, filled by a straight line, is a patch. patch_acc_sd,
+        patch_gyr_sd : beside acc_sd and gyr_sd in it (docs/science/erkf.md, "Lost packets").
     start_* : of the first sample; `start_heading_sd` about the vertical, must cover the first headings'
         errors.
     moving_* : the same where a recording starts mid-walk; the bias where it has no rest at all.
@@ -56,6 +61,7 @@ class ErkfParams:
     gyr_walk: float = 5e-5
     acc_walk: float = 2e-4
     zero_velocity_sd: float = 0.01
+    roll_m: float = 0.05
     gate: float | None = GATE
     reaccept_s: float = 0.08
     reaccept_m: float = 0.1
@@ -65,6 +71,9 @@ class ErkfParams:
     heading_sd: float = radians(10.0)
     gap_acc_sd: float = 20.0
     gap_gyr_sd: float = 5.0
+    patch_s: float = 0.025
+    patch_acc_sd: float = 10.0
+    patch_gyr_sd: float = 1.0
     start_position_sd: float = 0.02
     start_velocity_sd: float = 0.01
     start_tilt_sd: float = radians(1.0)

@@ -22,6 +22,8 @@ from core.calibration.result import CalibratedRecording
 from core.estimators import ERKF, LINKED_PATHS, SINGLE_PATHS
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
+from core.recording import UniformRecording
+from core.rest import find_runs
 from core.rotation import from_matrix, multiply
 
 NEAR_START_S = 1.0
@@ -63,6 +65,7 @@ def run_erkf(
     acc, gyr, valid = correct_signals(calibrated, segments)
     rate = calibrated.recording.rate_hz
     inputs = erkf_inputs(tree, acc, gyr, valid, rate)
+    inputs = replace(inputs, patched=find_patches(calibrated.recording, segments, params.patch_s))
     first = np.stack([multiply(orientations.q[s][0], from_matrix(mounts[s])) for s in segments])
     rest = next(
         (
@@ -76,6 +79,15 @@ def run_erkf(
     start = start_state(tree, inputs, params, rest, q=first, bias_age_s=calibrated.calibration.zero[0])
     track, final = smooth(start, inputs, tree, params)
     return ErkfRun(tree, inputs, start, rest, track, final)
+
+
+def find_patches(recording: UniformRecording, segments: Sequence[Segment], longest_s: float) -> Bools:
+    """Samples (T, n) filled over holes with more than `longest_s` between the samples beside them."""
+    patched = np.zeros((len(recording.t_s), len(segments)), np.bool_)
+    for i, segment in enumerate(segments):
+        for start, stop in find_runs(recording.sensors[segment].interpolated):
+            patched[start:stop, i] = (stop - start + 1) / recording.rate_hz > longest_s
+    return patched
 
 
 def replace_orientations(run: ErkfRun, orientations: Orientations) -> Orientations:
@@ -126,6 +138,7 @@ def foot_tracks(run: ErkfRun, orientations: Orientations, body: BodyModel) -> Fo
     """
     origin = run.tree.segment_origin(run.track.p, run.track.q)
     at: dict[Side, int] = {s: run.segments.index(FOOT[s]) for s in SIDES if FOOT[s] in run.segments}
+    patched = run.inputs.patched
     linked = len(at) == 2 and not ({FOOT[s] for s in at} & {run.segments[i] for i in run.tree.roots()})
     return FootTracks(
         t_s=orientations.t_s,
@@ -134,6 +147,9 @@ def foot_tracks(run: ErkfRun, orientations: Orientations, body: BodyModel) -> Fo
         q={s: orientations.q[FOOT[s]] for s in at},
         still={s: run.inputs.contact[:, i] for s, i in at.items()},
         valid={s: orientations.valid[FOOT[s]] for s in at},
+        patched={}
+        if patched is None
+        else {s: patched[:, i] & ~run.inputs.contact[:, i] for s, i in at.items()},
         linked=linked,
         source=LINKED_PATHS if linked else SINGLE_PATHS,
         body=body,

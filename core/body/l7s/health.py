@@ -28,8 +28,9 @@ feet 50."""
 TOWARD_MPS2: Final = (-0.05, 0.1)
 """Right walks have −1.0 to −0.28, with the feet exchanged the same with the other sign."""
 
-INNER_M: Final = (-0.03, 0.05)
-"""Right walks with turns have −0.17 to −0.07, with the feet exchanged 0 to 0.35."""
+INNER_M: Final = (0.15, 0.15)
+"""Feet alone: right walks have −0.32 to 0.08 (ipol_walks, gaitmap_foot, neura_walk, simulation), those with
+exchanged feet −0.55 to 0.35. Above this they are exchanged; up to it nothing is known and nothing told."""
 
 TILT_DEG: Final = (7.0, 12.0)
 """Right walks have 0.2 to 3.4, a thigh 12 and more."""
@@ -78,6 +79,8 @@ def l7s_health(poses: Poses) -> tuple[HealthFinding, ...]:
     for key, name, scale, limits in JUDGED:
         if key in d:
             found.append(HealthFinding(name, None, scale * d[key], *limits))
+    if not {"toward_foot_mps2", "inner_foot_m"} & {f.name for f in found}:
+        found.append(HealthFinding("inner_foot_m", None, float("nan")))
     found.append(HealthFinding("min_eigenvalue", None, float(d["min_eigenvalue"])))
     return tuple(found)
 
@@ -119,8 +122,8 @@ TOLD: Final[Mapping[str, tuple[str, str]]] = {
     "inner_foot_m": (
         "feet_exchanged",
         (
-            "In turns the inner foot goes as far as the outer one or further ({value:+.2f} m per radian, "
-            "below {warn:g} is expected): left and right foot look exchanged."
+            "In turns the inner foot goes further than the outer one ({value:+.2f} m per radian, right walks "
+            "stay below {warn:g}): left and right foot look exchanged."
         ),
     ),
     "pelvis_tilt_sd_deg": (
@@ -155,24 +158,16 @@ TOLD: Final[Mapping[str, tuple[str, str]]] = {
 }
 """Finding → code and words of the notice when it is not good."""
 
-SIDES_UNCHECKED: Final = (
-    "Nothing in this take shows whether left and right foot were exchanged: feet alone show it in turns, a "
-    "pelvis sensor in every step. Walk there and back, or wear the pelvis sensor."
-)
-
 
 def list_health_notices(findings: Sequence[HealthFinding]) -> tuple[Notice, ...]:
     """What of it a person must be told; the worst of each kind."""
     notices = {}
-    for f in sorted(findings, key=lambda f: f.value):
-        if f.verdict != "good" and f.name in TOLD:
+    for f in sorted((f for f in findings if f.verdict != "good"), key=lambda f: f.value):
+        if f.name in TOLD:
             code, words = TOLD[f.name]
             sensor = f.of if f.name == "gap_s" else None
             message = words.format(of=f.of, value=f.value, warn=f.warn)
             notices[code] = Notice(code, message, sensor=sensor)
-    checked = {"toward_foot_mps2", "inner_foot_m"} & {f.name for f in findings}
-    if not checked:
-        notices["sides_not_checked"] = Notice("sides_not_checked", SIDES_UNCHECKED, severity="info")
     return tuple(notices.values())
 
 

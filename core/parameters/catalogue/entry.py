@@ -86,12 +86,12 @@ class NormKey:
     Parameters
     ----------
     table : "angles" of the adults of the cycle curves, "walkway" by age and sex. row : its name there.
-    differs : what is measured differently, so that values cannot be compared: "foot_off" or "ankles".
+    differs : what is measured differently, so that values cannot be compared: "ankles".
     """
 
     table: Literal["angles", "walkway"]
     row: str
-    differs: Literal["foot_off", "ankles"] | None = None
+    differs: Literal["ankles"] | None = None
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from functools import cache
 import pytest
 
 from core import calibration
-from core.events import detect
-from core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
+from core.events import detect, detect_contacts
+from core.events.consensus import ConsensusParams, agree_on_contacts, all_detectors, rate_confidence
+from core.events.foot_movement import measure_foot_movements
 from core.events.result import GaitEvent, GaitEvents
 from core.frames import FOOT, SIDES
 from core.fusion.mahony import estimate_orientations
@@ -109,3 +110,24 @@ def test_where_the_foot_pitch_rule_abstains_the_others_are_pointed_to() -> None:
     told = rate_confidence(detectors("severe_shuffle"))
     assert told.events == ()
     assert [n.code for n in told.notices] == ["no_toe_off"] * 2 + ["others_found_contacts"] * 2
+
+
+def test_contacts_led_by_a_shank_are_corrected_and_say_how_uncertain_they_are() -> None:
+    params = ConsensusParams()
+    early = contacts(1, 2, 3, 4, 5)
+    led = agree_on_contacts({"foot_contact": contacts(), "gouwanda": early, "catalfamo": early})
+    assert led.times("left", "ic") == tuple(t + params.shank_early_s for t in (1, 2, 3, 4, 5))
+    assert {e.uncertainty_s for e in led.events} == {params.shank_sd_s}
+    foot = agree_on_contacts({"foot_contact": early, "gouwanda": early})
+    assert foot.times("left", "ic") == (1, 2, 3, 4, 5), "where the foot leads its times stay"
+
+
+def test_refined_contacts_lead_and_keep_time_and_uncertainty_in_a_consensus() -> None:
+    calibrated = calibration.calibrate(simulated("comfortable")[0])
+    take = estimate_orientations(calibrated)
+    lead = detect_contacts(take, motions=measure_foot_movements(calibrated))
+    agreed = agree_on_contacts(all_detectors(take, refined=lead))
+    known = {(e.side, e.kind, e.time_s): e.uncertainty_s for e in lead.events}
+    kept = [e for e in agreed.events if (e.side, e.kind, e.time_s) in known]
+    assert len(kept) >= 0.95 * len(agreed.events)
+    assert all(e.uncertainty_s == known[e.side, e.kind, e.time_s] for e in kept)

@@ -46,6 +46,16 @@ def test_a_turn_has_its_angle_direction_and_peak(angle: float) -> None:
     assert turn.end_s == pytest.approx(8.0, abs=0.6)
 
 
+@pytest.mark.parametrize("seconds", [1.5, 2.0, 3.0, 5.0])
+def test_the_edges_of_a_steady_turn_stay_where_they_are(seconds: float) -> None:
+    t = np.arange(2000) / RATE
+    turning = (t > 5.0) & (t < 5.0 + seconds)
+    with_every_stride = radians(40.0) * np.sin(2 * pi * 0.95 * t)
+    (turn,) = find_turns(pi / seconds * turning + with_every_stride, always(t), RATE)
+    assert turn.start_s == pytest.approx(5.0, abs=0.15)
+    assert turn.end_s == pytest.approx(5.0 + seconds, abs=0.15)
+
+
 def test_a_turn_there_and_one_back_are_two() -> None:
     there, back = find_turns(bump(pi, 3.0, 3.0) + bump(-pi, 9.0, 3.0), always(np.zeros(2000)), RATE)
     assert (there.direction, back.direction) == ("left", "right")

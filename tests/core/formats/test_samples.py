@@ -12,6 +12,7 @@ from core.errors import FormatError, InputError
 from core.formats import SourceFile, parse_manifest, read_recording, write_recording
 from core.recording import Recording
 from tests.data import data_folder
+from tests.ipol import ipol_recording
 
 MT = "opensense_xsens_apdm/xsens_formats/"
 WALK = "opensense_xsens_apdm/walk_8imu_noGyr/MT_012005D6_009-001_"
@@ -193,27 +194,10 @@ def test_both_gaitmap_copies_hold_the_same_norms() -> None:
         )
 
 
-def ipol_manifest() -> bytes:
-    """Manifest of three tab-separated tables with one packet counter: two shoes and the low back."""
-    names = {kind: [f"{kind}_{axis}" for axis in "XYZ"] for kind in ("Acc", "Gyr", "Mag")}
-    columns = {"acc": names["Acc"], "gyr": names["Gyr"], "mag": names["Mag"]}
-    entry = {
-        "skip_rows": 1,
-        "separator": "\t",
-        "counter": {"column": "PacketCounter", "rate_hz": 100},
-        "acc_unit": "m/s2",
-        "gyr_unit": "rad/s",
-    }
-    places = {"*_lf.txt": "foot_l", "*_rf.txt": "foot_r", "*_lb.txt": "pelvis"}
-    sources = [{"file": file, "columns": {place: columns}, **entry} for file, place in places.items()]
-    return json.dumps({"sources": sources}).encode()
-
-
 @pytest.mark.parametrize("trial", ["11-1", "12-3", "13-2", "14-1"])
 def test_tables_with_lost_packets_keep_their_time(trial: str) -> None:
     folder = data_folder("ipol_walks")
-    files = [SourceFile.of_path(path) for path in sorted(folder.glob(f"{trial}_*.txt"))]
-    recording = read_recording(files, parse_manifest(ipol_manifest()))
+    recording = ipol_recording(trial)
     assert dict(recording.segments) == {"pelvis": "pelvis", "foot_l": "foot_l", "foot_r": "foot_r"}
     counters = {}
     for file, place in (("lf", "foot_l"), ("rf", "foot_r"), ("lb", "pelvis")):

@@ -124,11 +124,11 @@ def test_what_is_missing_has_its_own_reason() -> None:
 
 def test_two_steady_steps_of_a_trunk_sensor_are_a_stride() -> None:
     times = [1.0, 1.5, 2.1, 2.6, 3.2, 3.7, 4.3, 4.8, 8.0, 8.5]
-    bout = Bout(1.0, 1.0, 8.5, len(times), 0.55, stops=((4.8, 8.0),))
+    bout = Bout(1.0, 1.0, 8.5, len(times), 0.55, breaks=((4.8, 8.0),))
     steps = Steps(tuple(Step(t, None) for t in times), (bout,), "pelvis")
     # the steps of the first and last stride start and stop the walk
     assert step_strides(steps) == ((2.1, 3.2), (3.2, 4.3))
-    stopped = Steps(steps.steps, (replace(bout, stops=((3.2, 3.7),)),), "pelvis")
+    stopped = Steps(steps.steps, (replace(bout, breaks=((3.2, 3.7),)),), "pelvis")
     assert step_strides(stopped) == ((2.1, 3.2),)
     assert step_strides(Steps(steps.steps[:3], (replace(bout, end_s=2.1, stops=()),), "pelvis")) == ()
 

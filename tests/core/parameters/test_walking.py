@@ -58,9 +58,9 @@ def test_a_walk_of_starting_and_stopping_steps_has_no_cadence() -> None:
     assert found["step_count"].mean == 5
 
 
-def test_a_stop_is_no_step_time() -> None:
+def test_a_break_is_no_step_time() -> None:
     walked = steps(*[0.5 * i for i in range(8)], *[6.0 + 0.5 * i for i in range(8)])
-    assert walked.bouts[0].stops == ((3.5, 6.0),)
+    assert walked.bouts[0].breaks == ((3.5, 6.0),)
     assert max(walked.step_times_s) == pytest.approx(0.5)
     assert walked.cadence_spm == pytest.approx(120.0)
 

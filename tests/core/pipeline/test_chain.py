@@ -17,6 +17,7 @@ from core.parameters.trunk import NAMES as TRUNK_NAMES
 from core.pipeline import TakeAnalysis, analyse
 from core.recording import UniformRecording
 from core.simulate import simulate_scenario
+from tests.walks import analysed
 
 OFF_DEG = 20.0
 
@@ -27,7 +28,7 @@ OF_TRUNK = (*TRUNK_NAMES, SPARC)
 @pytest.fixture(scope="module")
 def right() -> TakeAnalysis:
     """A simulated walk as the product analyses it."""
-    return analyse(simulate_scenario("comfortable", 0).recording)
+    return analysed("comfortable", 0)
 
 
 @pytest.fixture(scope="module")

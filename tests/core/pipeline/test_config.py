@@ -93,5 +93,5 @@ def shifted(value: typing.Any, path: tuple[str, ...]) -> typing.Any:
 def test_a_detector_that_does_not_exist_is_named() -> None:
     with pytest.raises(ParameterError, match="no detector 'marianni'; expected one of gouwanda"):
         ConsensusParams(presets=("marianni",))
-    with pytest.raises(ParameterError, match="not one of foot_pitch, consensus"):
+    with pytest.raises(ParameterError, match="not one of foot_contact, foot_pitch, consensus"):
         PipelineConfig(detector="best")  # type: ignore[arg-type]

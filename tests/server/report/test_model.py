@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 from core.errors import Notice
-from core.events.result import Strides
+from core.events.result import GaitEvents, Strides
 from core.norms.lookup import look_up_norms
 from core.parameters.result import Parameter
 from server.report.bundle import Bundle
@@ -288,3 +288,18 @@ def test_ten_minutes_are_reported_in_little_more_than_a_piece_of_plain_python(
 def test_reading_a_result_does_not_load_the_compiler() -> None:
     code = "import sys, server.report.model, server.report.tables; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_shares_of_the_stride_have_their_place_where_the_contacts_are_exact(make_bundle: MakeBundle) -> None:
+    exact = make_bundle()
+    coarse = make_bundle(
+        events=GaitEvents(tuple(replace(e, uncertainty_s=0.06) for e in exact.events.events))
+    )
+    for bundle, placed in ((exact, True), (coarse, False)):
+        rows = tuple(r for _, rows in report_model(bundle, age=72, sex="female").groups for r in rows)
+        for name in ("stance_pct", "swing_pct", "double_support_pct"):
+            found = row(rows, name)
+            assert (found.norm is not None) == placed
+            assert bool(found.z_words) == placed
+            assert placed or "too uncertain" in found.norm_note
+        assert row(rows, "stride_time_s").norm is not None

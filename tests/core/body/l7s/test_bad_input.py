@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from core.body.estimate import PoseEstimate
-from core.body.health import Verdict
+from core.body.health import HealthFinding, Verdict
 from core.body.l7s.filter import filter_block, start_l7s_state
+from core.body.l7s.health import INNER_M, list_health_notices
 from core.body.l7s.inputs import free_acceleration, inputs_of
 from core.body.l7s.legs import LegModel
 from core.body.l7s.poses import l7s_poses
@@ -96,20 +97,23 @@ def test_exchanged_feet_show_in_where_the_pelvis_falls(name: str) -> None:
     assert as_worn[0] < 0.0 < wrong[0]
 
 
-def test_exchanged_feet_show_in_turns_without_a_pelvis() -> None:
+def test_without_a_pelvis_exchanged_feet_shift_what_turns_show_and_nothing_is_said_below_the_limit() -> None:
     recording = take("l7s_2i")
     s = recording.sensors
     made = run(wearing(recording, foot_l=s["foot_r"], foot_r=s["foot_l"]), "l7s_2i")
-    assert "feet_exchanged" in codes(made)
+    assert "feet_exchanged" not in codes(made)
     assert finding(made, "inner_foot_m")[0] > 0.0
+    (told,) = list_health_notices([HealthFinding("inner_foot_m", None, 0.2, *INNER_M)])
+    assert told.code == "feet_exchanged"
     # minus the distance of the feet across the way
     assert -0.2 < finding(right("l7s_2i"), "inner_foot_m")[0] < -0.05
 
 
-def test_without_turn_and_pelvis_it_is_told_that_sides_cannot_be_checked() -> None:
-    assert "sides_not_checked" in codes(right("l7s_2i", "comfortable"))
-    assert "sides_not_checked" not in codes(right("l7s_2i"))
-    assert "sides_not_checked" not in codes(right("l7s_3i", "comfortable"))
+def test_without_turn_and_pelvis_sides_are_not_measured() -> None:
+    value, verdict = finding(right("l7s_2i", "comfortable"), "inner_foot_m")
+    assert np.isnan(value)
+    assert verdict == "good"
+    assert "inner_foot_m" not in {f.name for f in right("l7s_3i", "comfortable").poses.health}
 
 
 @pytest.mark.parametrize("estimator", BOTH)

@@ -1,0 +1,401 @@
+"""The compiled part of the contacts (docs/science/events.md, "Refinement"); foot_contact.py explains it."""
+
+from __future__ import annotations
+
+from math import asin, sqrt
+from typing import Final, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from core.events.foot_pitch_kernel import foot_pitch_kernel
+
+TC: Final = 0
+IC: Final = 1
+NONE: Final = -(1 << 40)
+
+# places in `counters`
+SEEN: Final = 0
+MEASURED: Final = 1
+RESTING: Final = 2
+MOVING: Final = 3
+START: Final = 4
+TOLD: Final = 5
+OPEN_TOP: Final = 6
+OPEN_KNOWN: Final = 7
+OPEN_NUMBER: Final = 8
+NUMBER: Final = 9
+BOTTOM: Final = 10
+TOP: Final = 11
+PITCHED: Final = 12
+HELD: Final = 13
+COUNTERS: Final = 14
+
+# places in `sums`
+FASTEST: Final = 0
+SPEED: Final = 1
+WAY: Final = 3
+OFFSET: Final = 5
+HELD_TC: Final = 6
+HELD_IC: Final = 8
+SUMS: Final = 10
+
+
+class ContactRule(NamedTuple):
+    """`FootContactParams` at a sample rate; whole numbers are samples."""
+
+    rate_hz: float
+    contact_share: float
+    leaving_share: float
+    stop_share: float
+    least_rad_s: float
+    push_s: float
+    lead_s: float
+    lag_s: float
+    still_rad_s: float
+    swing_rad_s: float
+    step_m: float
+    hump_rad: float
+    dip_rad: float
+    contact_sd_s: float
+    leaving_sd_s: float
+    flat_sd_s: float
+    late_sd_s: float
+    loose_sd_s: float
+    leaving: int
+    after: int
+    quiet: int
+    apart: int
+    swing: int
+    longest: int
+    onset: int
+    pause: int
+
+
+@njit(cache=True, nogil=True)
+def _read_rule(x):  # type: ignore[no-untyped-def]
+    """The rule in an array (26,): a tuple would take longer to hand over than the block to go through."""
+    return ContactRule(
+        x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12], x[13], x[14], x[15],
+        x[16], x[17], int(x[18]), int(x[19]), int(x[20]), int(x[21]), int(x[22]), int(x[23]), int(x[24]),
+        int(x[25]),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def _rate(pitch, j, rate_hz):  # type: ignore[no-untyped-def]
+    """Pitch rate between samples j and j + 1, rad/s."""
+    size = pitch.shape[0]
+    return (pitch[(j + 1) % size] - pitch[j % size]) * rate_hz
+
+
+@njit(cache=True, nogil=True)
+def _knock(acc, j, apart):  # type: ignore[no-untyped-def]
+    """Change of the acceleration over the `apart` samples before j, m/s²."""
+    size = acc.shape[0]
+    a, b = acc[(j - apart) % size], acc[j % size]
+    return sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+
+
+@njit(cache=True, nogil=True)
+def _deepest(pitch, rate_hz, first, last):  # type: ignore[no-untyped-def]
+    """Place j and value of the least pitch rate between samples first and last + 1."""
+    place, least = first, _rate(pitch, first, rate_hz)
+    for j in range(first + 1, last + 1):
+        r = _rate(pitch, j, rate_hz)
+        if r < least:
+            place, least = j, r
+    return place, least
+
+
+@njit(cache=True, nogil=True)
+def _highest(pitch, first, last):  # type: ignore[no-untyped-def]
+    """Sample of the highest pitch among first … last."""
+    size = pitch.shape[0]
+    place = first
+    for j in range(first, last + 1):
+        if pitch[j % size] > pitch[place % size]:
+            place = j
+    return place
+
+
+@njit(cache=True, nogil=True)
+def _lowest(pitch, first, last):  # type: ignore[no-untyped-def]
+    """Sample of the lowest pitch among first … last."""
+    size = pitch.shape[0]
+    place = first
+    for j in range(first, last + 1):
+        if pitch[j % size] < pitch[place % size]:
+            place = j
+    return place
+
+
+@njit(cache=True, nogil=True)
+def _landing(pitch, acc, top, first, last, moves, rate_hz, rule):  # type: ignore[no-untyped-def]
+    """Sample and uncertainty (s) of a contact whose highest pitch is at `top`, from samples first … last.
+
+    NaN where neither pitch nor acceleration shows it.
+    """
+    if last - top >= 2:
+        place, slap = _deepest(pitch, rate_hz, top, last - 1)
+        if slap <= -rule.least_rad_s:
+            level, start = rule.contact_share * slap, max(first, top - 2)
+            j = place
+            while j >= start and _rate(pitch, j, rate_hz) < level:
+                j -= 1
+            if j >= start:
+                here, after = _rate(pitch, j, rate_hz), _rate(pitch, j + 1, rate_hz)
+                at = j + 0.5 + (level - here) / (after - here)
+                start += rule.apart
+                if not moves or start > place:
+                    return at, rule.contact_sd_s
+                hardest = 0.0
+                for j in range(start, place + 2):
+                    hardest = max(hardest, _knock(acc, j, rule.apart))
+                j = start
+                while _knock(acc, j, rule.apart) < rule.contact_share * hardest:
+                    j += 1
+                half = 0.5 * (j - 0.5 * rule.apart - at)
+                return at + half, sqrt(rule.contact_sd_s**2 + (half / rate_hz) ** 2)
+    # no slap: the foot came down flat or on its tip
+    peak, place = 0.0, first
+    for j in range(first, min(top, last - 1) + 1):
+        r = _rate(pitch, j, rate_hz)
+        if r > peak:
+            peak, place = r, j
+    size = pitch.shape[0]
+    if moves:
+        half = 0.5 * (pitch[_lowest(pitch, first, top) % size] + pitch[top % size])
+        place = max(place, first + rule.apart)
+        while place < top and pitch[place % size] < half:
+            place += 1
+        hardest = place
+        for j in range(place, last + 1):
+            if _knock(acc, j, rule.apart) > _knock(acc, hardest, rule.apart):
+                hardest = j
+        return hardest - 0.5 * rule.apart, rule.flat_sd_s
+    if peak < rule.least_rad_s:
+        return np.nan, rule.late_sd_s
+    level = rule.stop_share * peak
+    j = min(top, last - 1)
+    while j > first and _rate(pitch, j, rate_hz) < level:
+        j -= 1
+    if j >= last - 1:
+        return np.nan, rule.late_sd_s
+    here, after = _rate(pitch, j, rate_hz), _rate(pitch, j + 1, rate_hz)
+    return j + 0.5 + (level - here) / min(after - here, -1e-9), rule.flat_sd_s
+
+
+@njit(cache=True, nogil=True)
+def _leaving(pitch, bottom, first, rate_hz, rule):  # type: ignore[no-untyped-def]
+    """Sample and uncertainty (s) of a foot-off whose lowest pitch is at `bottom`, from samples first …
+
+    NaN where the pitch rate shows no push-off, or one that is long over.
+    """
+    first = max(first, bottom - rule.leaving)
+    if bottom - first < 2:
+        return np.nan, rule.late_sd_s
+    place, push = _deepest(pitch, rate_hz, first, bottom - 1)
+    if push > -rule.least_rad_s:
+        return np.nan, rule.late_sd_s
+    level = rule.leaving_share * push
+    j = place
+    while j < bottom and _rate(pitch, j, rate_hz) < level:
+        j += 1
+    before, here = _rate(pitch, j - 1, rate_hz), _rate(pitch, j, rate_hz)
+    if here <= before:
+        return np.nan, rule.late_sd_s
+    at = j - 0.5 + (level - before) / (here - before)
+    width = (bottom - at) / rate_hz
+    if width > rule.push_s:
+        return np.nan, rule.late_sd_s
+    return at, sqrt(rule.leaving_sd_s**2 + 0.25 * width * width)
+
+
+@njit(cache=True, nogil=True)
+def _tell(found_int, found_float, total, kind, number, known, last, at, sd):  # type: ignore[no-untyped-def]
+    """Write one report; returns how many there are."""
+    found_int[total, 0], found_int[total, 1] = kind, number
+    found_int[total, 2], found_int[total, 3] = known, last
+    found_float[total, 0], found_float[total, 1] = at, sd
+    return total + 1
+
+
+@njit(cache=True, nogil=True)
+def _tell_held(found_int, found_float, total, counters, sums, k):  # type: ignore[no-untyped-def]
+    """Report the swing without pitch that is held; returns how many reports there are."""
+    for kind, place in ((TC, HELD_TC), (IC, HELD_IC)):
+        at, sd, number = sums[place], sums[place + 1], counters[NUMBER]
+        total = _tell(found_int, found_float, total, kind, number, k, 1, at, sd)
+        counters[NUMBER] = number + 1
+    counters[HELD] = NONE
+    return total
+
+
+@njit(cache=True, nogil=True)
+def _begin_movement(counters, sums, k, told):  # type: ignore[no-untyped-def]
+    """A movement of the foot begins at sample k."""
+    counters[START], counters[TOP], counters[TOLD] = k, k, told
+    sums[:OFFSET] = 0.0
+
+
+@njit(cache=True, nogil=True)
+def _add_way(sums, q, acc, rate_hz):  # type: ignore[no-untyped-def]
+    """Add one sample to the horizontal velocity and way of a movement; gravity has no part in them."""
+    w, x, y, z = q
+    ax, ay, az = acc
+    a = (1.0 - 2.0 * (y * y + z * z)) * ax + 2.0 * (x * y - w * z) * ay + 2.0 * (x * z + w * y) * az
+    b = 2.0 * (x * y + w * z) * ax + (1.0 - 2.0 * (x * x + z * z)) * ay + 2.0 * (y * z - w * x) * az
+    sums[SPEED] += a / rate_hz
+    sums[SPEED + 1] += b / rate_hz
+    sums[WAY] += sums[SPEED] / rate_hz
+    sums[WAY + 1] += sums[SPEED + 1] / rate_hz
+
+
+@njit(cache=True, nogil=True)
+def _leads_far(sums, samples, end, start, rate_hz, rule):  # type: ignore[no-untyped-def]
+    """Whether a movement from rest to rest over `samples` is a swing: fast, long, and away from its place."""
+    half = 0.5 * samples / rate_hz
+    a, b = sums[WAY] - half * sums[SPEED], sums[WAY + 1] - half * sums[SPEED + 1]
+    long = rule.swing <= end - start <= rule.longest
+    return long and sums[FASTEST] >= rule.swing_rad_s and sqrt(a * a + b * b) >= rule.step_m
+
+
+@njit(cache=True, nogil=True)
+def _lands_between(pitch, counters, k, rate_hz, rule):  # type: ignore[no-untyped-def]
+    """Whether the highest pitch of the movement, a slap's length ago, was a landing."""
+    start, top, size = counters[START], counters[TOP], pitch.shape[0]
+    if k != top + rule.after or top - start < 2:
+        return False
+    rise = pitch[top % size] - pitch[_lowest(pitch, start, top) % size]
+    _, slap = _deepest(pitch, rate_hz, top, k - 1)
+    return rise >= rule.hump_rad and slap <= -2.0 * rule.least_rad_s
+
+
+@njit(cache=True, nogil=True)
+def foot_contact_kernel(  # type: ignore[no-untyped-def]
+    q, speed, acc, valid, moves, pitch_ring, pitch_counters, pitch_held, window, need, threshold,
+    fall, pitch, accs, counters, sums, rules, found_int, found_float,
+):  # fmt: skip
+    """Run over a block of one foot; returns how many reports were made.
+
+    Parameters
+    ----------
+    q, speed, acc, valid : (n, 4), (n,), (n, 3), (n,), see `advance_foot_contacts`; moves False: without speed
+        and acc. pitch_ring to fall : of the pitch rule. pitch to rules : see `FootContactState`; pitch, accs,
+        counters and sums are advanced in place.
+    found_int : (room, 4) kind, number of the event, sample at which it is known, 1 = its last report.
+    found_float : (room, 2) sample of the event, uncertainty in s.
+    """
+    rule, size = _read_rule(rules), pitch.shape[0]
+    rate_hz = rule.rate_hz
+    kind, index, known = np.empty(2, np.int64), np.empty(2, np.int64), np.empty(2, np.int64)
+    offset, s = np.empty(2), np.empty(1)
+    total = 0
+    for i in range(q.shape[0]):
+        k = counters[SEEN]
+        counters[SEEN] = k + 1
+        w, x, y, z = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
+        s[0] = 2.0 * (x * z - w * y)
+        if valid[i]:
+            pitch[k % size] = asin(min(1.0, max(-1.0, s[0])))
+            if moves:
+                accs[k % size] = acc[i]
+            counters[MEASURED] += 1
+        measured = k if valid[i] else k - 1
+        reach = max(measured - counters[MEASURED] + 1, measured - size + 1 + rule.apart)
+        if counters[OPEN_TOP] >= 0 and (not valid[i] or k >= counters[OPEN_KNOWN] + rule.after):
+            # the window of a contact has ended: here, or with the last sample that was measured
+            top, first = counters[OPEN_TOP], max(reach, counters[BOTTOM])
+            at, sd = _landing(pitch, accs, top, first, measured, moves, rate_hz, rule)
+            if at != at:
+                at = top + sums[OFFSET] + rule.lead_s * rate_hz
+            number = counters[OPEN_NUMBER]
+            total = _tell(found_int, found_float, total, IC, number, k, 1, at, sd)
+            counters[OPEN_TOP] = -1
+            # the foot is on the floor: what moves from here on is another movement
+            _begin_movement(counters, sums, k, 0)
+        n = foot_pitch_kernel(
+            s, valid[i : i + 1], pitch_ring, pitch_counters, pitch_held,
+            window, need, threshold, fall, kind, index, known, offset,
+        )  # fmt: skip
+        if not valid[i]:
+            counters[MEASURED], counters[RESTING], counters[MOVING], counters[BOTTOM] = 0, 0, 0, NONE
+            counters[HELD] = NONE
+            continue
+        for e in range(n):
+            counters[TOLD], counters[PITCHED] = 1, k
+            if counters[HELD] >= k - rule.pause:
+                # the foot walks on: its step before was one
+                total = _tell_held(found_int, found_float, total, counters, sums, k)
+            number = counters[NUMBER]
+            counters[NUMBER] = number + 1
+            if kind[e] == TC:
+                at, sd = _leaving(pitch, index[e], reach, rate_hz, rule)
+                if at != at:
+                    at = index[e] + offset[e] - rule.lag_s * rate_hz
+                counters[BOTTOM] = index[e]
+                total = _tell(found_int, found_float, total, TC, number, k, 1, at, sd)
+            else:
+                at = index[e] + offset[e] + rule.lead_s * rate_hz
+                counters[OPEN_TOP], counters[OPEN_KNOWN], counters[OPEN_NUMBER] = index[e], k, number
+                sums[OFFSET] = offset[e]
+                total = _tell(found_int, found_float, total, IC, number, k, 0, at, rule.late_sd_s)
+        if not moves:
+            continue
+        if speed[i] < rule.still_rad_s:
+            counters[RESTING] += 1
+        else:
+            counters[RESTING] = 0
+            if counters[MOVING] == 0:
+                counters[MOVING] = 1
+                # where the take begins in a movement, it is not known where that began
+                _begin_movement(counters, sums, k, 1 if n > 0 or counters[MEASURED] < rule.quiet else 0)
+        if counters[MOVING] == 0:
+            continue
+        _add_way(sums, q[i], acc[i], rate_hz)
+        sums[FASTEST] = max(sums[FASTEST], speed[i])
+        if pitch[k % size] >= pitch[counters[TOP] % size]:
+            counters[TOP] = k
+        swinging, stopped = pitch_counters[2] == 1, counters[RESTING] >= rule.quiet
+        start, end, top = counters[START], k - rule.quiet + 1, -1
+        alone = not swinging and counters[TOLD] == 0 and counters[OPEN_TOP] < 0 and start >= reach
+        if stopped:
+            counters[MOVING] = 0
+        elif alone and _lands_between(pitch, counters, k, rate_hz, rule):
+            end, top = k, counters[TOP]
+        else:
+            continue
+        first = start
+        if swinging:
+            first = max(reach, counters[BOTTOM])
+        elif not alone or not _leads_far(sums, k - start + 1, end, start, rate_hz, rule):
+            continue
+        else:
+            middle = top if top >= 0 else start + (end - start) // 2
+            bottom = _lowest(pitch, start, middle)
+            at, sd = np.nan, 0.0
+            if bottom < middle - 1 and pitch[start % size] - pitch[bottom % size] >= rule.dip_rad:
+                at, sd = _leaving(pitch, bottom, reach, rate_hz, rule)
+            if at != at:
+                # the foot left the floor without a push
+                bottom = min(start + rule.onset, middle)
+                at, sd = float(bottom), 2.0 * rule.loose_sd_s
+            sums[HELD_TC], sums[HELD_TC + 1] = at, max(sd, rule.loose_sd_s)
+            counters[HELD] = k
+            first = bottom
+        if top < 0:
+            top = _highest(pitch, first + (end - first) // 2, end)
+        at, sd = _landing(pitch, accs, top, first, k, moves, rate_hz, rule)
+        sd = max(sd, rule.loose_sd_s)
+        if swinging:
+            total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, 1, at, sd)
+            counters[NUMBER] += 1
+        else:
+            sums[HELD_IC], sums[HELD_IC + 1] = at, sd
+            if counters[PITCHED] >= k - rule.pause:
+                total = _tell_held(found_int, found_float, total, counters, sums, k)
+        # the pitch rule need not wait for a maximum any more
+        pitch_counters[2], pitch_counters[4], pitch_counters[5] = 0, k, -1
+        _begin_movement(counters, sums, k, 0)
+    return total

@@ -1,0 +1,94 @@
+"""What takes long to make, made once: by one process for all, not again while the sources are the same."""
+
+from __future__ import annotations
+
+import contextlib
+import copyreg
+import fcntl
+import functools
+import hashlib
+import os
+import pickle
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final, ParamSpec, TypeVar
+
+from tests.data import ROOT
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+SOURCES: Final = ("core", "sagittal", "tests")
+"""Folders of which every module counts, and the tables beside them."""
+FOLDER: Final = Path(tempfile.gettempdir()) / f"sagittal-tests-{os.getuid()}"
+FORGOTTEN_S: Final = 24 * 3600.0
+"""What other sources gave is removed after this time."""
+
+
+def view(content: dict[object, object]) -> MappingProxyType[object, object]:
+    """A mapping that nobody can change, as its pickle makes it again."""
+    return MappingProxyType(content)
+
+
+copyreg.pickle(MappingProxyType, lambda seen: (view, (dict(seen),)))
+
+
+def keep(make: Callable[P, R]) -> Callable[P, R]:
+    """Keep what a function gives for its arguments, in this process and on disk.
+
+    Parameters
+    ----------
+    make : gives the same for the same arguments; what it gives is never changed, and can be pickled.
+    """
+
+    @functools.cache
+    def kept(*args: P.args, **kwargs: P.kwargs) -> R:
+        said = f"{make.__module__}.{make.__qualname__}{args}{sorted(kwargs.items())}"
+        path = folder() / hashlib.sha256(said.encode()).hexdigest()[:32]
+        with _locked(path.with_suffix(".lock")):
+            if not path.exists():
+                made = make(*args, **kwargs)
+                part = path.with_suffix(".part")
+                part.write_bytes(pickle.dumps(made, pickle.HIGHEST_PROTOCOL))
+                part.rename(path)
+                return made
+        found: R = pickle.loads(path.read_bytes())  # noqa: S301  written by this user's tests
+        return found
+
+    return functools.wraps(make)(kept)  # type: ignore[return-value]
+
+
+@functools.cache
+def folder() -> Path:
+    """Where the tests of these sources keep; made, and what is forgotten beside it removed."""
+    FOLDER.mkdir(mode=0o700, exist_ok=True)
+    if FOLDER.stat().st_uid != os.getuid():
+        raise PermissionError(f"{FOLDER} belongs to somebody else; set TMPDIR to a folder of your own")
+    for other in FOLDER.iterdir():
+        if time.time() - other.stat().st_mtime > FORGOTTEN_S:
+            shutil.rmtree(other, ignore_errors=True)
+    mine = FOLDER / hash_sources()
+    mine.mkdir(exist_ok=True)
+    return mine
+
+
+@functools.cache
+def hash_sources() -> str:
+    """16 hexadecimal digits that change with every source and with the folder of the recordings."""
+    digest = hashlib.sha256(os.environ.get("SAGITTAL_DATA", "").encode())
+    for name in SOURCES:
+        for path in sorted((ROOT / name).rglob("*")):
+            if path.suffix in (".py", ".csv", ".json"):
+                digest.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    with path.open("w") as f:
+        fcntl.flock(f, fcntl.LOCK_EX)
+        yield
