@@ -204,5 +204,5 @@ def test_the_truth_lies_within_as_often_as_said(n: int) -> None:
     for name, found in inside.items():
         assert np.mean(found) >= 0.93, (name, np.mean(found))
     # and it is not said by saying little
-    assert np.mean(widths["stance_time_s"]) < 0.048
-    assert np.mean(widths["stance_pct"]) < 4.5
+    assert np.mean(widths["stance_time_s"]) < 0.053
+    assert np.mean(widths["stance_pct"]) < 5.0
