@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import sqrt
 from typing import Final, Literal
 
 import numpy as np
@@ -15,6 +16,8 @@ from core.norms.lookup import Norms
 from core.norms.speed import walking_speed
 from core.norms.tables import WBDS, wbds_group
 from core.parameters.anatomical_zero import anatomical_curves
+from core.parameters.catalogue import CurveFigure
+from core.parameters.catalogue.errors import LEVELS
 from core.parameters.flats import OTHER
 from core.parameters.kinematic import stride_figures
 from core.parameters.result import CycleCurves, Parameter
@@ -153,10 +156,18 @@ def _figures(curves: CycleCurves) -> dict[tuple[str, Side], _Value]:
             whole = counted[np.isfinite(counted)]
             if len(whole):
                 sd = float(whole.std(ddof=1)) if len(whole) > 1 else None
-                found[name, side] = _Value(float(whole.mean()), len(whole), sd=sd)
+                found[name, side] = _Value(float(whole.mean()), len(whole), sd=sd, own=_own(CURVES[name]))
             else:
                 found[name, side] = _Value(None, 0, "gap" if len(counted) else "no_strides")
     return found
+
+
+def _own(figure: CurveFigure) -> float:
+    """What one side of a figure is known to in a take, degrees; 0 where nobody has measured it."""
+    known = LEVELS.get(figure.variable)
+    if known is None:
+        return 0.0
+    return known.own * (sqrt(2.0) if figure.statistic == "range" else 1.0)
 
 
 def _with_limit(rule: Rule, controls: Norms | None) -> Rule:

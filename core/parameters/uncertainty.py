@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from core.events.result import EventKind, GaitEvents
+from core.events.result import MANUAL, EventKind, GaitEvents
 from core.frames import SIDES, Side
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.catalogue.errors import ContactWeights
@@ -49,9 +49,10 @@ PITCH_RULE: Final = ContactErrors(contact=0.031, foot_off=0.031, foot=0.010, ran
 """Turning points of the foot's pitch: RMS of their mean errors by person on ipol_walks (4), gaitmap_foot (2
 feet) and force_plate_steps: contact −54 to +5 ms, foot-off +17 to +44 ms."""
 
-REFINED: Final = ContactErrors(contact=0.014, foot_off=0.008, foot=0.006, random=0.014)
+REFINED: Final = ContactErrors(contact=0.014, foot_off=0.012, foot=0.006, random=0.014)
 """Events that state their own uncertainty, where that is `TYPICAL_S`: SD of the mean errors by person on the
-same sets (contact −19 to +22 ms, foot-off −14 to +9 ms), and what is left of 20 ms within a walk."""
+same sets (contact −19 to +22 ms), by laboratory for foot-off (+5, +6, −14 ms, rounded up: its persons are of
+one), and what is left of 20 ms within a walk."""
 
 TYPICAL_S: Final = 0.020
 """Stated uncertainty of an event that `REFINED` describes; another one scales it."""
@@ -138,11 +139,15 @@ def _of_contacts(
 
 
 def _contact_errors(events: GaitEvents | None, side: Side) -> ContactErrors:
-    """Of the events of a foot: by what they state themselves, else of the pitch rule."""
+    """Of the events of a foot: by what they state themselves, else of the pitch rule.
+
+    An event set by a person counts as `TYPICAL_S`: people who mark the same signal differ by as much.
+    """
     found: dict[EventKind, list[float]] = {"ic": [], "tc": []}
     for e in () if events is None else events.events:
-        if e.side == side and e.uncertainty_s is not None:
-            found[e.kind].append(e.uncertainty_s)
+        known = TYPICAL_S if e.source == MANUAL else e.uncertainty_s
+        if e.side == side and known is not None:
+            found[e.kind].append(known)
     if not all(found.values()):
         return PITCH_RULE
     ic, tc = (float(np.sqrt(np.mean(np.square(found[kind])))) / TYPICAL_S for kind in ("ic", "tc"))

@@ -41,7 +41,7 @@ REASONS: Final[Mapping[str, str]] = {
     "near_zero": "a side is near zero",
     "no_norm_for_age": "the people of the limit are adults",
     "too_few_strides": "too few strides to judge",
-    "sides_alike": "the strides do not say that the sides differ",
+    "sides_alike": "strides and measurement do not say that the sides differ",
 }
 """Why a value cannot be held against its limit; other codes as in the table."""
 

@@ -73,10 +73,16 @@ def walk(name: str, seed: int = 5) -> tuple[Judged, Judged]:
 def test_the_chain_raises_the_flags_of_the_truth(name: str) -> None:
     (true, _), (found, _) = walk(name)
     for key, flag in true.items():
-        if flag.exceeded is None or flag.value is None or flag.limit is None:
-            assert found[key].exceeded is None, key
-            continue
         mine = found[key]
+        if "sides_alike" in (flag.reason, mine.reason):
+            # beyond the limit, and about as far apart as two sides are known to: said or left unsaid
+            assert flag.value is not None
+            assert mine.value is not None
+            assert abs(mine.value - flag.value) <= NEAR[flag.unit], key
+            continue
+        if flag.exceeded is None or flag.value is None or flag.limit is None:
+            assert mine.exceeded is None, key
+            continue
         assert mine.value is not None, key
         if abs(flag.value - flag.limit) > NEAR[flag.unit]:
             assert mine.exceeded is flag.exceeded, (key, flag.value, mine.value, flag.limit)
@@ -114,5 +120,6 @@ def test_scores_are_near_those_of_the_truth() -> None:
         ],
         rows,
         "gps_sagittal, chain / truth. Flags that only the chain or only the truth raises lie within 3° or "
-        f"0.08 of their limit. Limit of the scores: {SCORE_DEG}°.",
+        "0.08 of their limit, or the difference of their sides within its uncertainty. "
+        f"Limit of the scores: {SCORE_DEG}°.",
     )

@@ -103,6 +103,8 @@ ANKLE: Final = _angle("calibration of shank and foot", 2.3, 1.5)
 HIP_RANGE: Final = _range(HIP)
 KNEE_RANGE: Final = _range(KNEE)
 ANKLE_RANGE: Final = _range(ANKLE)
+LEVELS: Final = {"hip_flexion": HIP, "knee_flexion": KNEE, "ankle_dorsiflexion": ANKLE}
+"""Variable of the cycle curves → what its levels are known to."""
 FOOT_PITCH_IC: Final = _angle("zero of the foot, moment of contact", 1.5, 1.5)
 """gaitmap_foot +1.2 and +0.1°; a contact 14 ms off is 2° where the foot comes down."""
 FOOT_PITCH_TC: Final = _angle("zero of the foot, moment of foot-off", 2.0, 2.0)
