@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from core.body.model import BodyModel
-from core.frames import Bools, Floats, Side
+from core.frames import Bools, Floats, Posture, Side
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +21,7 @@ class FootTracks:
     linked : both feet hang on one chain of sensors, so that their places relative to each other are known;
         False: each foot has its own origin and heading.
     source : `core.estimators.LINKED_PATHS` or `SINGLE_PATHS`; live their live twins.
+    posture : what the feet's neutral posture and direction are of; toe-out is told from standing alone.
     withheld : side → reason why no distance of this foot is told (core/withheld.py).
     """
 
@@ -34,3 +35,4 @@ class FootTracks:
     source: str
     body: BodyModel
     withheld: Mapping[Side, str] = field(default_factory=dict)
+    posture: Posture = "standing"

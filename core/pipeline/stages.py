@@ -30,6 +30,7 @@ from core.parameters.spatial import surface_of
 from core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
 from core.pipeline.config import PipelineConfig
 from core.quality.stuck import drop_stuck_sensors, mark_stuck
+from core.recording import UniformRecording
 from core.withheld import withhold, withhold_distances
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
@@ -84,8 +85,14 @@ def orient_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
 
 
 def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Contacts of the feet, turns of the body, and steps of the trunk where no contact was found."""
-    fused, uniform = require_stage(analysis.fused, "orientation"), drop_stuck_sensors(analysis.recording)
+    """Contacts of the feet, turns of the body, and steps of the trunk where no contact was found.
+
+    Where no sensor could be calibrated, the trunk's steps are left: they need no calibration.
+    """
+    fused, uniform = analysis.fused, drop_stuck_sensors(analysis.recording)
+    if fused is None:
+        uncalibrated = analysis.stopped_at == CALIBRATION.name and trunk_sensor(uniform) is not None
+        return detect_trunk_steps(analysis, config) if uncalibrated else analysis
     events = _contacts(fused, config)
     alone = not events.events and trunk_sensor(uniform) is not None
     contacts = DetectedContacts(
@@ -127,8 +134,8 @@ def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
     """Joint angles; those that the estimator cannot stand behind are withheld."""
     posed, mounted = require_stage(analysis.posed, "poses"), require_stage(analysis.mounted, "mounting")
     standing = analysis.recording.subject.standing_angles_deg
-    zero = mounted.calibrated.calibration.zero
-    joint = measure_angles(posed.orientations, zero, posed.poses, standing)
+    calibration = mounted.calibrated.calibration
+    joint = measure_angles(posed.orientations, calibration.zero, posed.poses, standing, calibration.posture)
     return replace(analysis, angles=withhold(joint, posed.poses, posed.orientations))
 
 
@@ -136,7 +143,7 @@ def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
     """Strides and parameters of what was reached; nothing before the contacts are known."""
     fused, contacts, calibrated = analysis.fused, analysis.contacts, analysis.calibration
     if fused is None or contacts is None or calibrated is None:
-        return analysis
+        return measure_trunk(analysis, config)
     uniform, complete = analysis.recording, analysis.angles is not None
     feet = [s for s in FOOT.values() if s in fused.q]
     # a foot whose sensor failed keeps what it had
@@ -150,7 +157,7 @@ def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
         turning=calibrated.turning,
         feet=analysis.feet if complete else None,
         angles=analysis.angles,
-        trunk=_trunk_acceleration(analysis) if complete else {},
+        trunk=_trunk_acceleration(analysis, config) if complete else {},
         surface=surface_of(uniform),
         params=config.strides,
         bout_params=config.bouts,
@@ -167,11 +174,6 @@ def measure_trunk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
     if contacts is None or contacts.steps is None:
         return analysis
     source = contacts.steps.source
-    signals = uniform.sensors[source]
-    vertical, _ = split_about_vertical(signals, uniform.rate_hz, config.lumbar)
-    # which way is forward nobody knows without a calibration
-    upwards = np.full((len(vertical), 3), np.nan)
-    upwards[:, 2] = np.where(signals.valid, vertical, np.nan)
     tracks = Tracks(
         t_s=uniform.t_s,
         rate_hz=uniform.rate_hz,
@@ -181,7 +183,7 @@ def measure_trunk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
         surface=surface_of(uniform),
         params=config.strides,
         bout_params=config.bouts,
-        trunk={source: upwards},
+        trunk={source: _vertical_acceleration(uniform, source, config)},
         turns=contacts.turns,
         steps=contacts.steps,
     )
@@ -199,21 +201,33 @@ def _contacts(orientations: Orientations, config: PipelineConfig) -> GaitEvents:
     return agree(found, config.consensus)
 
 
-def _trunk_acceleration(analysis: TakeAnalysis) -> dict[Segment, Floats]:
+def _vertical_acceleration(uniform: UniformRecording, segment: Segment, config: PipelineConfig) -> Floats:
+    """Acceleration (n, 3), upwards alone, of a trunk sensor whose forward nobody knows; NaN = not known."""
+    signals = uniform.sensors[segment]
+    vertical, _ = split_about_vertical(signals, uniform.rate_hz, config.lumbar)
+    upwards = np.full((len(vertical), 3), np.nan)
+    upwards[:, 2] = np.where(signals.valid, vertical, np.nan)
+    return upwards
+
+
+def _trunk_acceleration(analysis: TakeAnalysis, config: PipelineConfig) -> dict[Segment, Floats]:
     """Segment → (n, 3) acceleration free of gravity, forward, left, up, m/s²; NaN = not measured."""
     mounted, posed = analysis.mounted, analysis.posed
     if mounted is None or posed is None:
         return {}
     orientations = posed.orientations
     acceleration = free_acceleration(mounted.calibrated, orientations)
+    uniform = drop_stuck_sensors(analysis.recording)
     return {
         s: np.where(
             orientations.valid[s][:, None],
             in_walking_frame(acceleration[s], orientations.q[s], analysis.recording.rate_hz),
             np.nan,
         )
-        for s in TRUNK
         if s in orientations.q
+        else _vertical_acceleration(uniform, s, config)
+        for s in TRUNK
+        if s in orientations.q or s in uniform.sensors
     }
 
 
@@ -222,7 +236,12 @@ QUALITY: Final = PipelineStage("quality", 0.03, judge_signals, ("report",), ("qu
 CALIBRATION: Final = PipelineStage("calibration", 0.05, calibrate_sensors, ("calibrated",), ("calibration",))
 ORIENTATION: Final = PipelineStage("orientation", 0.1, orient_segments, ("fused",), ("fusion",))
 EVENTS: Final = PipelineStage(
-    "events", 0.14, detect_contacts, ("contacts",), ("events", "detector", "consensus", "lumbar", "turns")
+    "events",
+    0.14,
+    detect_contacts,
+    ("contacts",),
+    ("events", "detector", "consensus", "lumbar", "turns"),
+    runs_after_problem=True,
 )
 TRUNK_EVENTS: Final = PipelineStage("events", 0.14, detect_trunk_steps, ("contacts",), ("lumbar", "turns"))
 MOUNTING: Final = PipelineStage("mounting", 0.15, mount_on_segments, ("mounted",), ("poses",))

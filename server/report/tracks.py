@@ -67,6 +67,7 @@ def tracks_parquet(tracks: Tracks) -> bytes:
             "source": feet.source,
             "body": dataclasses.asdict(feet.body),
             "withheld": dict(feet.withheld),
+            "posture": feet.posture,
         },
     }
     return parquet_file(tracks.t_s, columns, meta)
@@ -137,6 +138,7 @@ def _feet(
         source=str(meta["source"]),
         body=_made(BodyModel, meta["body"]),
         withheld=meta.get("withheld", {}),
+        posture=meta.get("posture", "standing"),
     )
 
 
