@@ -48,7 +48,7 @@ class HeadingParams:
     coherence : least agreement of the parts' velocities, 0 to 1.
     reach_s : parts that start further from the rest are left out: heading drifts.
     pendulum : agreement from which a pelvis' sign is believed (`pendulum_agreement`). On 24 real takes of six
-        people it is .58 to .85; virtual people, whose pelvis has no dynamics, have up to .44 of either sign.
+        people it is .60 to .86; virtual people, whose pelvis has no dynamics, have up to .44 of either sign.
     """
 
     cutoff_hz: float = 4.0

@@ -230,8 +230,10 @@ def _heading_drift(stretches: Sequence[_Stretch], straight: Bools, rate_hz: floa
     """Turn about the vertical (k,) in rad between first and last third of each straight part, and time."""
     turned, time = [], []
     for x in stretches:
-        level = multiply(_level(_direction(x)), x.q)
-        heading = np.exp(2j * np.arctan2(level[:, 3], level[:, 0]))
+        # the turn since the first sample as the room sees it: its twist is the same for any mounting
+        level = _level(_direction(x))
+        turn = multiply(multiply(level, x.q), conjugate(level))
+        heading = np.exp(2j * np.arctan2(turn[:, 3], turn[:, 0]))
         for a, b in find_runs(straight[x.first : x.first + len(x.q)]):
             edge = (b - a) // 3
             if edge < 0.5 * rate_hz:

@@ -18,6 +18,7 @@ from core.body.estimate import estimate_poses
 from core.body.l7s.inputs import free_acceleration
 from core.body.mounting import mount_sensors
 from core.body.walking_frame import in_walking_frame
+from core.errors import Notice
 from core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
 from core.events.lumbar import detect_steps, split_about_vertical, trunk_sensor
 from core.events.result import GaitEvents
@@ -35,6 +36,11 @@ from core.withheld import withhold, withhold_distances
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 """Segments whose acceleration tells how regular the gait is."""
+
+TRUNK_ALONE: Final = (
+    "No sensor could be calibrated. Cadence, step times and turns come from the trunk sensor alone, which "
+    "needs no calibration."
+)
 
 
 @dataclass(frozen=True)
@@ -91,8 +97,9 @@ def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
     """
     fused, uniform = analysis.fused, drop_stuck_sensors(analysis.recording)
     if fused is None:
-        uncalibrated = analysis.stopped_at == CALIBRATION.name and trunk_sensor(uniform) is not None
-        return detect_trunk_steps(analysis, config) if uncalibrated else analysis
+        if analysis.stopped_at != CALIBRATION.name or trunk_sensor(uniform) is None:
+            return analysis
+        return _fall_back_on_trunk(detect_trunk_steps(analysis, config))
     events = _contacts(fused, config)
     alone = not events.events and trunk_sensor(uniform) is not None
     contacts = DetectedContacts(
@@ -101,6 +108,14 @@ def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
         detect_steps(uniform, config.lumbar) if alone else None,
     )
     return replace(analysis, contacts=contacts)
+
+
+def _fall_back_on_trunk(analysis: TakeAnalysis) -> TakeAnalysis:
+    """The analysis with the steps of its trunk sensor, which say what stopped the calibration."""
+    contacts, problem = require_stage(analysis.contacts, "events"), analysis.problem
+    told = () if problem is None else (replace(problem, severity="warning"),)
+    events = replace(contacts.events, notices=(*told, Notice("trunk_alone", TRUNK_ALONE)))
+    return replace(analysis, contacts=replace(contacts, events=events))
 
 
 def detect_trunk_steps(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -143,7 +158,9 @@ def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
     """Strides and parameters of what was reached; nothing before the contacts are known."""
     fused, contacts, calibrated = analysis.fused, analysis.contacts, analysis.calibration
     if fused is None or contacts is None or calibrated is None:
-        return measure_trunk(analysis, config)
+        steps = measure_trunk(analysis, config)
+        # what stopped the calibration did not stop the analysis
+        return steps if steps.measured is None else replace(steps, problem=None, stopped_at=None)
     uniform, complete = analysis.recording, analysis.angles is not None
     feet = [s for s in FOOT.values() if s in fused.q]
     # a foot whose sensor failed keeps what it had
