@@ -11,13 +11,14 @@ from core.calibration import CalibrationParams, calibrate
 from core.calibration.heading import HeadingParams, pendulum_agreement
 from core.calibration.sensor_in_walk import WalkRungParams, find_flat_moments
 from core.errors import CalibrationError
+from core.frames import Floats, Segment
 from core.fusion.mahony import estimate_orientations
 from core.recording import UniformRecording
 from core.rotation import angle_between, exp, rotate, wrap_angle, yaw
 from tests.walks import cut, only, simulated, turned
 
 START_S, END_S = 8.0, 20.0
-LEGS = ("shank_l", "shank_r", "foot_l", "foot_r", "thigh_l", "thigh_r")
+LEGS: tuple[Segment, ...] = ("shank_l", "shank_r", "foot_l", "foot_r", "thigh_l", "thigh_r")
 
 
 def mid_walk(name: str = "comfortable") -> UniformRecording:
@@ -64,18 +65,19 @@ def test_segments_are_where_they_are_but_for_a_fixed_turn(name: str) -> None:
 
 def test_the_foot_is_flat_where_it_is_flat_in_standing(legs: UniformRecording) -> None:
     found, whole = calibrate(legs).calibration, calibrate(simulated()[0]).calibration
-    for s in ("foot_l", "foot_r"):
-        a, b = (c.segments[s].R_segment_sensor[1] for c in (found, whole))  # type: ignore[index]
+    feet: tuple[Segment, ...] = ("foot_l", "foot_r")
+    for s in feet:
+        a, b = (c.segments[s].R_segment_sensor[1] for c in (found, whole))
         assert np.degrees(np.arccos(a @ b)) < 3.0
 
 
 def test_any_mounting_gives_the_same_posture(legs: UniformRecording) -> None:
     rng = np.random.default_rng(3)
-    by = {s: exp(rng.normal(0.0, 1.5, 3)) for s in LEGS}
-    q, other = (estimate_orientations(calibrate(r)).q for r in (legs, turned(legs, by)))  # type: ignore[arg-type]
+    by: dict[Segment, Floats] = {s: exp(rng.normal(0.0, 1.5, 3)) for s in LEGS}
+    q, other = (estimate_orientations(calibrate(r)).q for r in (legs, turned(legs, by)))
     for s in LEGS:
         # headings are means of a twist, which another mounting sees a little otherwise
-        assert np.degrees(np.median(angle_between(q[s], other[s]))) < 4.0  # type: ignore[index]
+        assert np.degrees(np.median(angle_between(q[s], other[s]))) < 4.0
 
 
 def test_all_segments_walk_ahead(legs: UniformRecording) -> None:
@@ -83,7 +85,7 @@ def test_all_segments_walk_ahead(legs: UniformRecording) -> None:
     q = estimate_orientations(made).q
     a, b = (round(t * legs.rate_hz) for t in made.calibration.zero)
     for s in LEGS:
-        heading = np.angle(np.mean(np.exp(1j * yaw(q[s][a:b]))))  # type: ignore[index]
+        heading = np.angle(np.mean(np.exp(1j * yaw(q[s][a:b]))))
         assert abs(np.degrees(wrap_angle(float(heading)))) < 5.0, s
 
 
