@@ -22,6 +22,8 @@ Bools = NDArray[np.bool_]
 Segment = Literal["pelvis", "thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r", "chest"]
 Side = Literal["left", "right"]
 Protocol = Literal["walk", "treadmill", "squat", "tug", "activity"]
+Posture = Literal["standing", "walking"]
+"""What is neutral, and the zero of joint angles: standing, or flat feet and the mean of straight walking."""
 
 SEGMENTS: Final[tuple[Segment, ...]] = get_args(Segment)
 SIDES: Final[tuple[Side, ...]] = get_args(Side)

@@ -26,12 +26,23 @@ Window = tuple[float, float]
 
 @dataclass(frozen=True)
 class RestParams:
-    """What counts as rest (docs/science/calibration.md, "Rest")."""
+    """What counts as rest (docs/science/calibration.md, "Rest", "False rests").
+
+    Parameters
+    ----------
+    drift, drift_rate : a rest over which the vertical turns further in a sensor, and faster, rad and rad/s,
+        is a slow movement. bias : a mean rate further from that of a longer rest, rad/s, is no bias of the
+        gyroscope, and that of the longer rest is taken. 6 °/s of mean rate let both pass: a lower back that
+        swayed for 2 s at the start of a real take had 2.9 °/s, and its heading was lost.
+    """
 
     window_s: float = 1.0
     gyro_limit: float = radians(6.0)
     acc_std_limit: float = 0.25
     shortest_s: float = 1.0
+    drift: float = radians(1.0)
+    drift_rate: float = radians(1.0)
+    bias: float = radians(1.0)
 
 
 STANDING: Final = RestParams(window_s=0.5, shortest_s=0.5)
@@ -93,6 +104,28 @@ def find_rest_windows(
     for segment in chosen:
         quiet &= measure_quietness(recording.sensors[segment], recording.rate_hz, params).quiet
     return find_windows(quiet, recording.rate_hz, params)
+
+
+def drop_false_rests(
+    recording: UniformRecording, rests: tuple[Window, ...], params: RestParams | None = None
+) -> tuple[Window, ...]:
+    """The rests in which no sensor's vertical turns: the others are slow movements."""
+    params = params or RestParams()
+    return tuple(r for r in rests if not _drifts(recording, r, params))
+
+
+def _drifts(recording: UniformRecording, window: Window, params: RestParams) -> bool:
+    """Does the vertical turn in a sensor between the ends of a window, a quarter of a second to one each?"""
+    part, rate = index_window(window, recording.rate_hz), recording.rate_hz
+    edge = max(1, min((part.stop - part.start) // 4, round(rate)))
+    seconds = (part.stop - part.start - edge) / rate
+    for x in recording.sensors.values():
+        ends = (x.acc[part.start : part.start + edge], x.acc[part.stop - edge : part.stop])
+        a, b = (f.mean(axis=0) for f in ends)
+        turned = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+        if turned > params.drift and turned > params.drift_rate * seconds:
+            return True
+    return False
 
 
 def find_windows(quiet: Bools, rate_hz: float, params: RestParams | None = None) -> tuple[Window, ...]:

@@ -34,7 +34,7 @@ from core.norms.profile import (
 )
 from core.norms.tables import wbds_group
 from core.parameters.anatomical_zero import anatomical_curves
-from core.parameters.kinematic import MEAN_ZERO, MeanCurve, mean_curve
+from core.parameters.kinematic import MEAN_ZERO, NO_STANDING, MeanCurve, mean_curve
 from core.parameters.result import CycleCurves
 from core.parameters.variability import TOO_FEW
 
@@ -57,11 +57,11 @@ class Score:
     value : in `unit`. n : strides behind it, the fewest of its curves.
     healthy : spread of the score (of the GPS behind a GDI*) among the reference people, degrees.
     percentile : of the reference people who score lower, by their log-normal spread; None for a GVS.
-    missing : variables it lacks. reason : "angle_zero_standing", "no_level" (rotation and progression are
-        measured from their own mean, never against the walking direction), "joint_missing", "no_strides",
-        "too_few_strides", "estimated" (no two sensors measure it), "variables_missing" (several reasons, see
-        the GVS),
-        "no_reference", "no_norm_for_age", "score_zero" (the very curves of the reference: no GDI*).
+    missing : variables it lacks. reason : "angle_zero_standing", "no_standing" (nobody stood still),
+        "no_level" (rotation and progression are measured from their own mean, never against the walking
+        direction), "joint_missing", "no_strides", "too_few_strides", "estimated" (no two sensors measure it),
+        "variables_missing" (several reasons, see the GVS), "no_reference", "no_norm_for_age", "score_zero"
+        (the very curves of the reference: no GDI*).
     """
 
     name: str
@@ -183,6 +183,8 @@ def _gvs(
         reason = why or ("no_strides" if there else "joint_missing")
     elif estimated:
         reason = "estimated"
+    elif curves.zero == "walking" and mode == "raw" and variable not in MEAN_ZERO:
+        reason, own = NO_STANDING, None
     elif own is None:
         reason = "no_level" if variable in MEAN_ZERO else "angle_zero_standing"
     elif own.n < COMPARED:

@@ -12,7 +12,7 @@ from core.angles.cardan import compute_headings
 from core.angles.kernel import AngleKernel, mean_angles, subtract_zero
 from core.angles.result import SIGNS, JointAngles, list_leg_joints
 from core.errors import Notice
-from core.frames import SIDES, SUFFIX, Bools, Floats
+from core.frames import SIDES, SUFFIX, Bools, Floats, Posture
 from core.rest import Window, index_window
 
 if TYPE_CHECKING:
@@ -28,8 +28,9 @@ def measure_angles(
     zero: Window,
     poses: Poses | None = None,
     standing_deg: Mapping[str, float] | None = None,
+    posture: Posture = "standing",
 ) -> JointAngles:
-    """Angles of every joint whose two segments are there, zeroed on the mean over the standing window.
+    """Angles of every joint whose two segments are there, zeroed on the mean over a window.
 
     Parameters
     ----------
@@ -38,6 +39,8 @@ def measure_angles(
     poses : of an estimator that knows more segments than have a sensor. A joint that has not both its sensors
         takes its angles from there; `diagnostics["estimated"]` names them.
     standing_deg : goniometer angles of that standing; kept beside the angles, not added.
+    posture : what was done in that window. From the mean of walking no goniometer leads to the anatomical
+        zero.
 
     Returns
     -------
@@ -65,7 +68,8 @@ def measure_angles(
         {kernel.names[i]: float(offset[i]) for i in kept},
         notices=tuple(notices),
         diagnostics={"estimated": tuple(kernel.names[i] for i in kept if kernel.estimated[i])},
-        standing_deg=dict(standing_deg or {}),
+        zero=posture,
+        standing_deg=dict(standing_deg or {}) if posture == "standing" else {},
         headings=compute_headings(orientations),
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from core.errors import Notice
-from core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
+from core.frames import FOOT, SHANK, THIGH, Floats, Posture, Segment, Side
 
 SIGNS: Final[dict[str, tuple[tuple[str, float, float], ...]]] = {
     "hip": (("hip_flexion", 1, 1), ("hip_adduction", 1, -1), ("hip_rotation", 1, -1)),
@@ -39,9 +39,10 @@ class JointAngles:
         "hip_flexion_l", "hip_adduction_l", "hip_rotation_l", "knee_flexion_l", "knee_adduction_l",
         "knee_rotation_l", "ankle_dorsiflexion_l", "ankle_inversion_l", "ankle_rotation_l", right alike.
         Pelvis tilt: anterior positive. Pelvis obliquity: right side up is positive.
-        Zero is the mean over the calibration's standing window.
+        Zero is the mean over the calibration's zero window.
     zero_offset : name → rad that was subtracted (the raw standing angle).
-    zero : "standing" (the only zero so far).
+    zero : "standing", or "walking": nobody stood still and the angles start from their mean over straight
+        walking, so that they have a shape and a range and no level.
     standing_deg : angles of that standing by goniometer, where somebody entered them; see
         `core.standing_angles`, and `core.parameters.anatomical_zero`, which adds them back.
     headings : "pelvis", "foot_l", "foot_r" → (n,) rad about the vertical, left positive, unwrapped, from a
@@ -53,7 +54,7 @@ class JointAngles:
     t_s: Floats
     angles: Mapping[str, Floats]
     zero_offset: Mapping[str, float]
-    zero: str = "standing"
+    zero: Posture = "standing"
     notices: tuple[Notice, ...] = ()
     diagnostics: Mapping[str, object] = field(default_factory=dict)
     standing_deg: Mapping[str, float] = field(default_factory=dict)

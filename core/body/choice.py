@@ -17,6 +17,9 @@ from core.fusion.orientations import Orientations
 
 WHOLE: Final = PRESETS["lower_body7"]
 
+NO_STANDING: Final = "no_standing"
+"""`Poses.reduced` of a take in which nobody stands still."""
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -63,14 +66,47 @@ def choose(
     EstimationError `estimator_impossible` when the requested one needs sensors that are not there.
     """
     worn = {s: calibrated.recording.sensors[s] for s in WHOLE if s in calibrated.recording.sensors}
-    share = {s: float(np.mean(x.valid)) if s in orientations.q else 0.0 for s, x in worn.items()}
-    working = tuple(s for s in WHOLE if share.get(s, 0.0) >= max(least_valid, 1e-9))
-    failed = tuple(s for s in worn if s not in working)
+    share = {s: float(np.mean(x.valid)) for s, x in worn.items()}
+    lasting = tuple(s for s in WHOLE if share.get(s, 0.0) >= max(least_valid, 1e-9))
+    failed = tuple(s for s in worn if s not in lasting)
+    working = tuple(s for s in lasting if s in orientations.q)
+    if calibrated.calibration.posture == "walking":
+        return _without_standing(requested, working, _report_failed(failed, share, least_valid), failed)
     found = list_possible_estimators(working)
     if requested != AUTO and requested not in found:
         raise EstimationError("estimator_impossible", _impossible(requested, working))
     hoped = list_possible_estimators(worn)[:1]
-    reduced = "sensor_failed" if requested == AUTO and hoped != found[:1] else None
+    reduced = None
+    if requested == AUTO and hoped != found[:1]:
+        reduced = "sensor_failed" if failed else "not_calibrated"
+    order = found if requested == AUTO else (requested,)
+    return Choice(working, failed, found, order, reduced, _report_failed(failed, share, least_valid))
+
+
+def _without_standing(
+    requested: Requested,
+    working: tuple[Segment, ...],
+    notices: tuple[Notice, ...],
+    failed: tuple[Segment, ...],
+) -> Choice:
+    """No estimator: each begins with how a person stands, and a mean posture is 10° off that.
+
+    Raises
+    ------
+    EstimationError `estimator_impossible` when one was asked for.
+    """
+    if requested != AUTO:
+        raise EstimationError(
+            "estimator_impossible",
+            f"The estimator {requested} begins with standing, and nobody stands still in this take. Let it "
+            "be chosen, or record 3 s of standing.",
+        )
+    return Choice(working, failed, (), (), NO_STANDING, notices)
+
+
+def _report_failed(
+    failed: tuple[Segment, ...], share: dict[Segment, float], least_valid: float
+) -> tuple[Notice, ...]:
     notices = []
     for s in failed:
         message = (
@@ -79,8 +115,7 @@ def choose(
             "record again."
         )
         notices.append(Notice("sensor_failed", message, sensor=s))
-    order = found if requested == AUTO else (requested,)
-    return Choice(working, failed, found, order, reduced, tuple(notices))
+    return tuple(notices)
 
 
 def _impossible(requested: Requested, working: tuple[Segment, ...]) -> str:

@@ -99,7 +99,7 @@ def estimate_poses(
     if made is None:
         # no figure; the notices of what is missing are still wanted
         made = take.anchored()
-        made = replace(made, poses=replace(made.poses, method=NO_FIGURE))
+        made = replace(made, poses=replace(made.poses, q={}, p={}, method=NO_FIGURE))
     if made.feet is None:
         try:
             made = take.with_feet(made, used)
@@ -202,9 +202,8 @@ class _Take:
             health=(*made.poses.health, *(f for f in health if (f.name, f.of) not in known)),
             notices=(*made.poses.notices, *erkf_notices(run, health)),
         )
-        return replace(
-            made, poses=poses, feet=foot_tracks(run, replace_orientations(run, self.orientations), self.body)
-        )
+        paths = foot_tracks(run, replace_orientations(run, self.orientations), self.body)
+        return replace(made, poses=poses, feet=replace(paths, posture=self.calibrated.calibration.posture))
 
 
 def _without(orientations: Orientations, failed: Collection[Segment]) -> Orientations:

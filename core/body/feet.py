@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from core.body.model import BodyModel
-from core.frames import Bools, Floats, Side
+from core.frames import Bools, Floats, Posture, Side
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +22,7 @@ class FootTracks:
         False: each foot has its own origin and heading.
     source : `core.estimators.LINKED_PATHS` or `SINGLE_PATHS`; live their live twins.
     patched : side → (n,) packets were lost while the foot moved, and a straight line says too little of it.
+    posture : what the feet's neutral posture and direction are of; toe-out is told from standing alone.
     withheld : side → reason why no distance of this foot is told (core/withheld.py).
     """
 
@@ -36,3 +37,4 @@ class FootTracks:
     body: BodyModel
     withheld: Mapping[Side, str] = field(default_factory=dict)
     patched: Mapping[Side, Bools] = field(default_factory=dict)
+    posture: Posture = "standing"

@@ -60,7 +60,10 @@ def mount_sensors(
     `headings` when the ErKF was asked for by name.
     """
     subject = calibrated.recording.subject
-    body, assumed = nominal_body(subject.height_m, subject.standing_width_m, subject.shoe)
+    # how far apart the feet stood leans legs that stand
+    stood = calibrated.calibration.posture == "standing"
+    width_m = subject.standing_width_m if stood else None
+    body, assumed = nominal_body(subject.height_m, width_m, subject.shoe)
     calibrated, orientations = lean_legs_apart(calibrated, orientations, body)
     choice = choose(calibrated, orientations, params.estimator, params.least_valid)
     mounted = MountedSensors(calibrated, orientations, body, assumed, choice)

@@ -23,8 +23,8 @@ class Poses:
     valid : (n,) all segments of the figure measured.
     contact : segment (feet) → (n,) True while the foot is taken to be on the floor.
     method : of an estimator of `core.estimators`, or its NO_FIGURE.
-    reduced : a stable code when a better estimator was not possible or not asked for, e.g. "sensor_failed";
-        None for the best one of the worn sensors.
+    reduced : a stable code when a better estimator was not possible or not asked for: "sensor_failed",
+        "not_calibrated", "no_standing", "estimator_failed"; None for the best one of the worn sensors.
     health : the estimator's own findings.
     """
 

@@ -18,12 +18,14 @@ from core.calibration.gyro_pca import (
     sagittal_angle,
 )
 from core.calibration.heading import (
+    Complexes,
     HeadingParams,
     Part,
     WalkingDirection,
     acceleration_axis,
     horizontal_acceleration,
     nearest_sign,
+    pendulum_agreement,
     rest_to_rest_velocity,
     start_direction,
     subtract_angles,
@@ -178,6 +180,11 @@ def _by_walking(
             a, walk.rest, walk.parts[0], walk.bearing[0], walk.leads, walk.rate_hz, gap_s, params
         )
         if start is None:
+            agrees = _vaulting(segment, signals, q, a, axis.angle, walk)
+            if written is None and abs(agrees) >= params.pendulum:
+                facts |= {"source": "acceleration", "sign": "pendulum", "pendulum": agrees}
+                angle = nearest_sign(axis.angle, axis.angle + (0.0 if agrees > 0.0 else np.pi))
+                return AnteriorAxis(angle, "walking_direction", axis.score, (), facts)
             angle, notices = _signed(segment, axis.angle, written, R_vertical, q, walk)
             facts |= {"source": "acceleration", "sign": "declared" if written is not None else "gait"}
             return AnteriorAxis(angle, "walking_direction", axis.score, notices, facts)
@@ -188,6 +195,13 @@ def _by_walking(
         if abs(off) > allowed and axis.score <= STRONG_AXIS:
             facts["source"] = "velocity"
             chosen = WalkingDirection(start.angle, 0.5)
+    agrees = _vaulting(segment, signals, q, a, chosen.angle, walk)
+    if abs(agrees) >= params.pendulum:
+        facts["pendulum"] = agrees
+    if agrees <= -params.pendulum:
+        # a velocity gained since a standing that swayed can point backwards, a walking trunk cannot
+        facts |= {"source": "acceleration", "sign": "pendulum"}
+        chosen = WalkingDirection(nearest_sign(axis.angle, chosen.angle + np.pi), axis.score)
     notices = _sign_notices(segment, chosen.angle, R_vertical, q, walk)
     if abs(off) > allowed:
         message = (
@@ -197,6 +211,16 @@ def _by_walking(
         )
         notices += (Notice("heading_disagreement", message, sensor=segment),)
     return AnteriorAxis(chosen.angle, "walking_direction", chosen.score, notices, facts)
+
+
+def _vaulting(
+    segment: Segment, signals: SensorSignals, q: Floats, a: Complexes, angle: float, walk: CalibrationWalk
+) -> float:
+    """`pendulum_agreement` of a pelvis with a direction; 0 for the others."""
+    if segment != "pelvis" or walk.steps_s is None:
+        return 0.0
+    up = rotate(q, signals.acc)[:, 2]
+    return pendulum_agreement(a, up, angle, walk.parts, walk.bearing, walk.rate_hz, walk.steps_s)
 
 
 def _by_gyro(

@@ -9,9 +9,11 @@ from math import degrees, radians
 import numpy as np
 
 from core.calibration.anterior import AnteriorAxis, CalibrationWalk, Method, find_anterior_axis
-from core.calibration.gyro_pca import about_vertical, sagittal_angle
+from core.calibration.from_walking import calibrate_from_walking
+from core.calibration.gyro_pca import about_vertical, count_steps, sagittal_angle
 from core.calibration.heading import HeadingParams, Part, step_time
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
+from core.calibration.sensor_in_walk import WalkRungParams
 from core.calibration.standing import SensorAtRest, choose_rest, find_rests, stand_all, vertical_frame
 from core.calibration.walking import (
     TRUNK,
@@ -22,8 +24,8 @@ from core.calibration.walking import (
     turn_sensors,
     turning_mask,
 )
-from core.errors import CalibrationError, Notice
-from core.frames import R_NEUTRAL, Bools, Floats, Segment
+from core.errors import CalibrationError, Notice, SignalError
+from core.frames import R_NEUTRAL, Floats, Segment
 from core.fusion.attitude import AttitudeParams, estimate_orientation
 from core.recording import UniformRecording
 from core.rest import RestParams, Window
@@ -45,6 +47,7 @@ class CalibrationParams:
     method : how the anterior axis of leg segments is found; the trunk is always by walking direction or
         declared mounting, because walking gives it no sagittal axis
         (docs/science/calibration.md, "Flexion axis by gyro PCA").
+    from_walking : where nobody stands still.
     """
 
     method: Method = "walking_direction"
@@ -52,24 +55,28 @@ class CalibrationParams:
     walking: WalkingParams = field(default_factory=WalkingParams)
     heading: HeadingParams = field(default_factory=HeadingParams)
     attitude: AttitudeParams = field(default_factory=AttitudeParams)
+    from_walking: WalkRungParams = field(default_factory=WalkRungParams)
 
 
 def calibrate(recording: UniformRecording, params: CalibrationParams | None = None) -> CalibratedRecording:
     """Find how each sensor sits on its segment, from standing and walking, without a magnetometer.
 
+    Where nobody stands still the walk alone has to do (core/calibration/from_walking.py).
+
     Parameters
     ----------
-    recording : any subset of segments; rest before or after the walk.
+    recording : any subset of segments; rest before or after the walk, or none.
 
     Returns
     -------
-    CalibratedRecording. A trunk sensor whose direction cannot be found is left out with
-    `pelvis_heading_unknown`, so that hip angles are withheld and the legs still work.
+    CalibratedRecording. A sensor whose direction cannot be found is left out with a notice, as
+    `pelvis_heading_unknown`, so that its angles are withheld and the others still work.
 
     Raises
     ------
-    SignalError `no_rest`, `rest_too_short`, `not_still`, `unit_suspect`.
-    CalibrationError `no_walking`, `not_single_axis`, `calibration_sign_conflict`, `no_segment`.
+    SignalError `unit_suspect`; `no_rest`, `rest_too_short`, `not_still` where there is no walk either.
+    CalibrationError `no_segment`; where no sensor can be calibrated that of the first: `no_walking`,
+    `not_single_axis`, `calibration_sign_conflict`, `pelvis_heading_unknown`.
 
     References
     ----------
@@ -79,10 +86,21 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
     if not recording.sensors:
         raise CalibrationError("no_segment", "No sensor is mapped to a segment; map at least one foot.")
     rate = recording.rate_hz
-    rests = find_rests(recording, params.rest)
+    try:
+        rests = find_rests(recording, params.rest)
+    except SignalError as why:
+        return calibrate_from_walking(
+            recording,
+            params.walking,
+            params.heading,
+            params.attitude,
+            params.from_walking,
+            params.method,
+            why,
+        )
     moving = moving_mask(recording, params.walking)
     zero = choose_rest(rests, moving, rate)
-    standing = stand_all(recording, zero)
+    standing = stand_all(recording, zero, rests, params.rest)
     q = {s: _rest_world(recording, s, standing[s], zero, params.attitude) for s in recording.sensors}
     biases = {s: x.gyro_bias for s, x in standing.items()}
     turning = turning_mask(recording, biases, q, params.walking) & moving
@@ -90,6 +108,7 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
     walk, facing = _walk(recording, rests, zero, parts, q, params.heading)
     found: dict[Segment, AnteriorAxis] = {}
     notices: list[Notice] = []
+    failed: CalibrationError | None = None
     for s, signals in recording.sensors.items():
         declared = recording.mounting.get(s, "")
         try:
@@ -97,9 +116,10 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
                 s, signals, standing[s], q[s], walk, declared, params.method, params.heading
             )
         except CalibrationError as error:
-            if error.code != "pelvis_heading_unknown" or len(recording.sensors) == 1:
-                raise
+            failed = failed or error
             notices.append(Notice(error.code, error.message, sensor=s))
+    if not found and failed is not None:
+        raise failed
     for f in found.values():
         notices += f.notices
     steps = _straight_steps(found, standing, q, walk)
@@ -211,13 +231,4 @@ def _straight_steps(
         return None
     up = rotate(conjugate(q[leg]), np.array([0.0, 0.0, 1.0]))
     R = about_vertical(-found[leg].angle) @ vertical_frame(standing[leg].up)
-    return 2 * _swings(sagittal_angle(up, R), walk.mask)
-
-
-def _swings(angle: Floats, walking: Bools) -> int:
-    """Number of times an oscillating angle rises from its lower into its upper third."""
-    x = angle[walking]
-    low, high = np.percentile(x, [2.0, 98.0])
-    state = np.where(x > high - (high - low) / 3, 1, np.where(x < low + (high - low) / 3, -1, 0))
-    state = state[state != 0]
-    return int(np.count_nonzero(np.diff(state) > 0))
+    return count_steps(sagittal_angle(up, R), walk.mask)

@@ -88,3 +88,14 @@ def gait_margin(angle: Floats, walking: Bools, segment: Segment) -> float:
     low, high = np.percentile(angle[walking], [2.0, 98.0])
     margin = abs(high) - abs(low) if segment.startswith("thigh") else abs(low) - abs(high)
     return float(margin)
+
+
+def count_steps(angle: Floats, walking: Bools) -> int:
+    """Steps in a walk (n,) by the sagittal angle (n,) of a leg sensor: two for each time that it rises from
+    its lower into its upper third.
+    """
+    x = angle[walking]
+    low, high = np.percentile(x, [2.0, 98.0])
+    state = np.where(x > high - (high - low) / 3, 1, np.where(x < low + (high - low) / 3, -1, 0))
+    state = state[state != 0]
+    return 2 * int(np.count_nonzero(np.diff(state) > 0))

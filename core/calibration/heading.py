@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,9 @@ from core.rotation import rotate, wrap_angle
 
 Complexes = NDArray[np.complex128]
 Part = tuple[int, int]
+
+STEP_BAND_HZ: Final = (0.8, 4.0)
+"""Band in which a trunk's forward and vertical accelerations are compared: steps of 0.3 to 1.2 s."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,8 @@ class HeadingParams:
     speed : plausible walking speed, m/s.
     coherence : least agreement of the parts' velocities, 0 to 1.
     reach_s : parts that start further from the rest are left out: heading drifts.
+    pendulum : agreement from which a pelvis' sign is believed (`pendulum_agreement`). On 24 real takes of six
+        people it is .60 to .86; virtual people, whose pelvis has no dynamics, have up to .44 of either sign.
     """
 
     cutoff_hz: float = 4.0
@@ -53,6 +59,7 @@ class HeadingParams:
     speed: tuple[float, float] = (0.15, 3.0)
     coherence: float = 0.8
     reach_s: float = 60.0
+    pendulum: float = 0.5
 
 
 @dataclass(frozen=True)
@@ -194,6 +201,46 @@ def step_time(up: Floats, rate_hz: float) -> float:
         return 0.0
     best = max(r[k] for k in peaks)
     return next(k for k in peaks if r[k] >= 0.7 * best) / rate_hz
+
+
+def pendulum_agreement(
+    a: Complexes,
+    up: Floats,
+    angle: float,
+    parts: list[Part],
+    bearing: list[float],
+    rate_hz: float,
+    steps_s: list[float],
+) -> float:
+    """How well a direction is the forward one of a trunk that vaults over its legs, −1 to 1; 0 = cannot say.
+
+    A walking trunk is slowest where it is highest (Cavagna et al. 1977), so its forward acceleration follows
+    the rate at which its vertical acceleration rises: their correlation at step frequency, both averaged with
+    themselves a step later.
+
+    Parameters
+    ----------
+    a, up : (n,) horizontal acceleration in the sensor's world and vertical specific force, m/s².
+    steps_s : step time in each part, 0 = none.
+    """
+    both, own, rise = 0.0, 0.0, 0.0
+    for (start, end), turn, step_s in zip(parts, bearing, steps_s, strict=True):
+        shift = round(step_s * rate_hz)
+        if not 0 < shift < (end - start) // 2:
+            continue
+        ahead = (a[start:end] * np.exp(-1j * (angle + turn))).real
+        x, y = (_around_steps(v, rate_hz) for v in (ahead, up[start:end]))
+        y = np.gradient(y)
+        x, y = x[:-shift] + x[shift:], y[:-shift] + y[shift:]
+        x, y = x - x.mean(), y - y.mean()
+        both, own, rise = both + float(x @ y), own + float(x @ x), rise + float(y @ y)
+    return both / float(np.sqrt(own * rise)) if own * rise > 0.0 else 0.0
+
+
+def _around_steps(x: Floats, rate_hz: float) -> Floats:
+    """The part (n,) of a signal at step frequency and its neighbourhood."""
+    low, high = STEP_BAND_HZ
+    return np.asarray(low_pass(x, high, rate_hz) - low_pass(x, low, rate_hz))
 
 
 def nearest_sign(axis: float, towards: float) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from core.errors import Notice
-from core.frames import Bools, Floats, Segment
+from core.frames import Bools, Floats, Posture, Segment
 from core.recording import UniformRecording
 from core.rest import Window as Window  # the calibration's windows are windows of rest and walking
 
@@ -19,9 +19,10 @@ class SegmentCalibration:
     ----------
     R_segment_sensor : (3, 3) maps sensor coordinates to ISB segment coordinates.
     gyro_bias : (3,) rad/s, sensor frame, mean over rest.
-    rest_norm : |acc| at rest, m/s².
+    rest_norm : |acc| at rest, m/s²; without rest the mean specific force of the walk.
     method : how the heading was found: "walking_direction", "gyro_pca", "declared", "neighbour".
     score : 0 (guess) to 1 (certain); the method's own quality measure, documented there.
+    start_q : (4,) sensor to W in the middle of `Calibration.zero`; None = neutral, as who stands is.
     """
 
     R_segment_sensor: Floats
@@ -29,6 +30,7 @@ class SegmentCalibration:
     rest_norm: float
     method: str
     score: float
+    start_q: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +39,12 @@ class Calibration:
 
     Parameters
     ----------
-    rest, walking : windows that were used; `walking` may be several straight parts.
-    zero : window whose mean joint angles are subtracted (`angle_zero: standing`).
+    rest, walking : windows that were used; `walking` may be several straight parts. `rest` is empty where
+        nobody stood still.
+    zero : window whose mean joint angles are subtracted: standing, or a straight part of the walk.
     turning : (n,) mask on the uniform axis, True while turning.
     straight_steps : in `walking`, about; None without a leg sensor or a walk.
+    posture : what is neutral.
     """
 
     segments: Mapping[Segment, SegmentCalibration]
@@ -52,6 +56,7 @@ class Calibration:
     notices: tuple[Notice, ...] = ()
     diagnostics: Mapping[str, object] = field(default_factory=dict)
     straight_steps: int | None = None
+    posture: Posture = "standing"
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from core.errors import SignalError
 from core.frames import Bools, Floats, Segment
 from core.recording import SensorSignals, UniformRecording
-from core.rest import RestParams, Window, find_rest_windows, find_runs, index_window, measure_quietness
+from core.rest import (
+    RestParams,
+    Window,
+    drop_false_rests,
+    find_rest_windows,
+    find_runs,
+    index_window,
+    measure_quietness,
+)
 
 LONGEST_S = 8.0
 """Rest that is used, s; 1, 2, 3, 5 and 8 s gave the same angles within 0.1°
@@ -89,15 +97,23 @@ def vertical_frame(up: Floats) -> Floats:
 
 
 def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window, ...]:
-    """All windows in which every sensor is at rest.
+    """All windows in which every sensor is at rest, without those in which one of them moves slowly.
 
     Raises
     ------
     SignalError `rest_too_short`, `not_still` or `no_rest`, with the quietest moment that was found.
     """
     found = find_rest_windows(recording, params)
+    if rests := drop_false_rests(recording, found, params):
+        return rests
     if found:
-        return found
+        raise SignalError(
+            "not_still",
+            "No standing found: in the quietest seconds a sensor still turns by more than "
+            f"{np.degrees(params.drift):.0f}°. Let the person stand still for 3 to 5 s before or after "
+            "walking.",
+            t_s=found[0][0],
+        )
     quietest: list[tuple[float, Segment, float]] = []
     for segment, signals in recording.sensors.items():
         q = measure_quietness(signals, recording.rate_hz, params)
@@ -152,6 +168,23 @@ def choose_rest(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> Win
     return first, min(last, first + LONGEST_S)
 
 
-def stand_all(recording: UniformRecording, window: Window) -> Mapping[Segment, SensorAtRest]:
-    """Standing of every sensor over one window."""
-    return {s: measure_standing(x, recording.rate_hz, window, s) for s, x in recording.sensors.items()}
+def stand_all(
+    recording: UniformRecording, window: Window, rests: tuple[Window, ...], params: RestParams
+) -> Mapping[Segment, SensorAtRest]:
+    """Standing of every sensor over one window, its gyroscope's bias held against the longest rest.
+
+    A sensor that turned slowly while the person stood has a mean rate that is no bias.
+    """
+    rate = recording.rate_hz
+    longest = max(rests, key=lambda r: r[1] - r[0])
+    longer = longest[1] - longest[0] > window[1] - window[0]
+    found = {}
+    for s, x in recording.sensors.items():
+        own = measure_standing(x, rate, window, s)
+        if longer:
+            part = index_window(longest, rate)
+            bias = x.gyr[part][x.valid[part]].mean(axis=0)
+            if float(np.linalg.norm(bias - own.gyro_bias)) > params.bias:
+                own = replace(own, gyro_bias=bias)
+        found[s] = own
+    return found

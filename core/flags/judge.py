@@ -19,7 +19,7 @@ from core.parameters.anatomical_zero import anatomical_curves
 from core.parameters.catalogue import CurveFigure
 from core.parameters.catalogue.errors import LEVELS
 from core.parameters.flats import OTHER
-from core.parameters.kinematic import stride_figures
+from core.parameters.kinematic import NO_STANDING, stride_figures
 from core.parameters.result import CycleCurves, Parameter
 from core.parameters.variability import TOO_FEW, Spread, differ
 
@@ -151,7 +151,11 @@ def _figures(curves: CycleCurves) -> dict[tuple[str, Side], _Value]:
     """Mean over the counted strides of what `CURVES` reads."""
     found: dict[tuple[str, Side], _Value] = {}
     for name, sides in stride_figures(curves, CURVES).items():
+        level = CURVES[name].statistic != "range"
         for side, values in sides.items():
+            if level and curves.zero == "walking":
+                found[name, side] = _Value(None, 0, NO_STANDING)
+                continue
             counted = values[curves.used[side]]
             whole = counted[np.isfinite(counted)]
             if len(whole):

@@ -73,8 +73,10 @@ def estimate_orientations(
 def segment_orientation(
     signals: SensorSignals, mounted: SegmentCalibration, zero: Window, rate_hz: float, params: AttitudeParams
 ) -> Floats:
-    """Orientation (n, 4) of one segment in W, from standing to both ends of the take."""
-    start = from_matrix(R_NEUTRAL @ mounted.R_segment_sensor)
+    """Orientation (n, 4) of one segment in W, from `zero` to both ends of the take."""
+    start = mounted.start_q
+    if start is None:
+        start = from_matrix(R_NEUTRAL @ mounted.R_segment_sensor)
     at = min(round(0.5 * (zero[0] + zero[1]) * rate_hz), len(signals.acc) - 1)
     gyr = signals.gyr - mounted.gyro_bias
     sensor = estimate_orientation(

@@ -17,8 +17,9 @@ import numpy as np
 from core.frames import Floats
 from core.norms.tables import LEVEL, WBDS, WBDS_N, read_rows, wbds_group
 
-Zero = Literal["anatomical", "standing", "stride_mean"]
-"""What a curve is measured from: anatomy, the person's own standing, its own mean over each stride."""
+Zero = Literal["anatomical", "standing", "walking", "stride_mean"]
+"""What a curve is measured from: anatomy, the person's own standing, its mean over straight walking where
+nobody stood, its own mean over each stride."""
 
 _PLANE = "Low confidence outside the sagittal plane."
 _HEADING = "Low confidence: the transverse plane depends on the sensors' headings."

@@ -20,7 +20,7 @@ from core.calibration.live_attempt import CalibrationSamples, WornSensors
 from core.calibration.live_standing import StandingNow, cut_last_part, find_upward_axes, judge_standing
 from core.calibration.result import Calibration
 from core.calibration.walking import moving_mask
-from core.errors import Notice, SagittalError
+from core.errors import Notice, SagittalError, SignalError
 from core.frames import Bools, Floats, Segment
 from core.online.calibrated import LiveCalibration, MountingParams, finish_calibration
 from core.online.frame import CalibrationView, SegmentCheck, Stage
@@ -212,6 +212,12 @@ class LiveCalibrator:
             found = calibrated.calibration
             steps = found.straight_steps or 0
             self.view = replace(self.view, steps=steps)
+            if found.posture != "standing":
+                raise SignalError(
+                    "not_still",
+                    "A sensor moved slowly while all stood. Stand still again for 3 s, then walk straight "
+                    "ahead.",
+                )
             least = p.least_steps if late else p.steps
             if found.straight_steps is None and late:
                 least = 0  # a trunk sensor shows none
@@ -237,9 +243,9 @@ class LiveCalibrator:
 
 def _why(found: Calibration, steps: int, params: CalibratingParams) -> Notice:
     """Why a calibration from so much walking is not taken."""
-    unknown = next((n for n in found.notices if n.code == "pelvis_heading_unknown"), None)
-    if unknown is not None:
-        return unknown
+    unknown = (n for n in found.notices if n.sensor is not None and n.sensor not in found.segments)
+    if (told := next(unknown, None)) is not None:
+        return told
     message = (
         f"{params.walk_s:.0f} s of movement held about {steps} straight steps, {params.least_steps} are "
         "needed. Stand still again, then walk straight ahead."

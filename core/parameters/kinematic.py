@@ -36,6 +36,9 @@ def is_level(name: str) -> bool:
     return entry is not None and entry.curve is not None and entry.curve.statistic != "range"
 
 
+NO_STANDING: Final = "no_standing"
+"""Reason of a level where nobody stood still: the angle has a range and no zero."""
+
 AT_BOUND: Final = "at_bound"
 """Reason of a figure that is the end of what an estimator allows in most strides."""
 
@@ -98,7 +101,8 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
         rows = resample(np.stack([angles.angles[name] for name in names]), angles.t_s, bounds, POINTS)
         for (name, base), row in zip(names.items(), rows, strict=True):
             sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
-            if base == "knee_flexion":
+            # from the mean of walking nobody knows where straight is
+            if base == "knee_flexion" and angles.zero == "standing":
                 least = LEAST_KNEE - np.radians(angles.standing_deg.get(name, 0.0))
                 torn = (row < least).any(axis=1)
                 row = np.where(torn[:, None], np.nan, row)
@@ -119,6 +123,7 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
         },
         why=why,
         bounds=ends,
+        zero=angles.zero,
     )
 
 
@@ -200,7 +205,7 @@ def summarise_angles(
     Returns
     -------
     without a value a reason: "joint_missing" (a segment carries no sensor), "no_strides", "gap", "at_bound"
-    (in most strides), "estimator_bad", "impossible".
+    (in most strides), "no_standing" (levels of a take in which nobody stood), "estimator_bad", "impossible".
     """
     read = list_curve_figures()
     figures: dict[str, Mapping[Side, Floats]] = {name: {} for name in read}
@@ -215,6 +220,8 @@ def summarise_angles(
             if side not in sides:
                 reason = why or "joint_missing"
                 values: list[float] = []
+            elif curves.zero == "walking" and is_level(name):
+                reason, values = NO_STANDING, []
             else:
                 reason = (why or "gap") if used.any() else "no_strides"
                 counted = sides[side][used]
@@ -239,9 +246,14 @@ def _at_bound(curves: CycleCurves, name: str, side: Side, values: Floats) -> Boo
 def without_bounds(
     curves: CycleCurves, figures: Mapping[str, Mapping[Side, Floats]]
 ) -> dict[str, dict[Side, Floats]]:
-    """The same figures (strides,), NaN in strides in which they are the bound of a leg model."""
+    """The same figures (strides,), NaN in strides in which they are the bound of a leg model or a level of
+    angles that have none.
+    """
+    level = [name for name in figures if curves.zero == "walking" and is_level(name)]
     return {
-        name: {s: np.where(_at_bound(curves, name, s, x), np.nan, x) for s, x in sides.items()}
+        name: {
+            s: np.where((name in level) | _at_bound(curves, name, s, x), np.nan, x) for s, x in sides.items()
+        }
         for name, sides in figures.items()
     }
 

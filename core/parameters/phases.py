@@ -50,10 +50,10 @@ def phase_rows(
 
     Returns
     -------
-    reasons: "opposite_foot_missing", "no_terminal_contact", "no_foot_flat", "feet_not_linked",
-    "joint_missing", "gap"; "no_mid_stance" and "no_terminal_stance" where the heel rises outside single
-    support; "feet_not_adjacent", "tibia_not_vertical" where the swing has no such moment, or not in this
-    order.
+    reasons: "no_standing" (where the tibia is vertical is known from standing), "opposite_foot_missing",
+    "no_terminal_contact", "no_foot_flat", "feet_not_linked", "joint_missing", "gap"; "no_mid_stance" and
+    "no_terminal_stance" where the heel rises outside single support; "feet_not_adjacent",
+    "tibia_not_vertical" where the swing has no such moment, or not in this order.
     """
     adjacent, vertical = _adjacent(strides, feet), _vertical(strides, angles, pitch)
     linked = feet is not None and feet.linked
@@ -63,7 +63,9 @@ def phase_rows(
     for i, s in enumerate(strides.strides):
         ankle = f"ankle_dorsiflexion_{SUFFIX[s.side]}"
         upright = "joint_missing"
-        if angles is not None:
+        if angles is not None and angles.zero == "walking":
+            upright = "no_standing"
+        elif angles is not None:
             known = ankle in angles.angles
             upright = "tibia_not_vertical" if known else angles.withheld.get(ankle, upright)
         row = _stance(s, float(stances.heel_off_s[i]), stances.rows[i]["push_pct"])
@@ -136,7 +138,7 @@ def _vertical(strides: Strides, angles: JointAngles | None, pitch: dict[Segment,
     for side in SIDES:
         ankle = None if angles is None else angles.angles.get(f"ankle_dorsiflexion_{SUFFIX[side]}")
         own = [i for i, s in enumerate(strides.strides) if s.side == side]
-        if angles is None or ankle is None or FOOT[side] not in pitch or not own:
+        if angles is None or angles.zero == "walking" or ankle is None or FOOT[side] not in pitch or not own:
             continue
         bounds = _swings(strides, own)
         lean = resample((pitch[FOOT[side]] - ankle)[None], angles.t_s, bounds, SWING_POINTS)[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from core.frames import Bools, Floats, Side
+from core.frames import Bools, Floats, Posture, Side
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class CycleCurves:
     used : side → (strides,) True where the stride counts.
     foot_off_pct : side → (strides,) terminal contact in % of cycle, NaN if not found.
     why : variable → side → reason of an angle that was withheld, or impossible in some stride.
-    bounds : variable → side → rad, as `JointAngles.bounds`.
+    bounds : variable → side → rad, as `JointAngles.bounds`. zero : as `JointAngles.zero`.
     """
 
     curves: Mapping[str, Mapping[Side, Floats]]
@@ -63,3 +63,4 @@ class CycleCurves:
     foot_off_pct: Mapping[Side, Floats]
     why: Mapping[str, Mapping[Side, str]] = field(default_factory=dict)
     bounds: Mapping[str, Mapping[Side, float]] = field(default_factory=dict)
+    zero: Posture = "standing"

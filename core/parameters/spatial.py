@@ -38,7 +38,7 @@ STEP_M: Final = 0.05
 
 Reason = Literal[
     "treadmill", "no_foot_track", "no_foot_flat", "gap", "packets_lost", "feet_not_linked",
-    "opposite_foot_missing", "no_shoe_geometry", "no_swing_minimum", "no_terminal_contact",
+    "opposite_foot_missing", "no_shoe_geometry", "no_standing", "no_swing_minimum", "no_terminal_contact",
     "standing_width_unknown", "in_place",
 ]  # fmt: skip
 
@@ -222,7 +222,7 @@ def _row(s: Stride, feet: FootTracks | None, paths: _Paths | None) -> Row:
         "gait_speed_mps": length / float(feet.t_s[last] - feet.t_s[first]),
         "stride_length_m": length,
         "circumduction_m": float(((p[first : last + 1, :2] - p[first, :2]) @ outward).max()),
-        "toe_out_deg": degrees(out),
+        "toe_out_deg": degrees(out) if feet.posture == "standing" else "no_standing",
     }
     row |= _clearance(s, feet, paths.heights[s.side], first, last)
     row |= _step(s, feet, paths, p[last, :2], along, outward)

@@ -97,7 +97,7 @@ def run_stages(analysis: TakeAnalysis, stages: Sequence[PipelineStage], progress
                 raise
             problem = Notice(error.code, error.message, error.sensor, error.t_s, severity="error")
             analysis = replace(analysis, problem=problem)
-        if analysis.problem is not before:
+        if analysis.problem is not before and analysis.problem is not None:
             analysis = replace(analysis, stopped_at=stage.name)
     return analysis
 

@@ -20,6 +20,7 @@ from core.body.l7s.inputs import free_acceleration
 from core.body.mounting import mount_sensors
 from core.body.walking_frame import in_walking_frame
 from core.calibration.result import CalibratedRecording
+from core.errors import Notice
 from core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
 from core.events.detection import detect_contacts as detect_foot_contacts
 from core.events.foot_movement import measure_foot_movements
@@ -34,11 +35,17 @@ from core.parameters.spatial import surface_of
 from core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
 from core.pipeline.config import PipelineConfig
 from core.quality.stuck import drop_stuck_sensors, mark_stuck
+from core.recording import UniformRecording
 from core.rest import STANDING, Window, find_rest_windows
 from core.withheld import withhold, withhold_at_slips, withhold_distances
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 """Segments whose acceleration tells how regular the gait is."""
+
+TRUNK_ALONE: Final = (
+    "No sensor could be calibrated. Cadence, step times and turns come from the trunk sensor alone, which "
+    "needs no calibration."
+)
 
 
 @dataclass(frozen=True)
@@ -95,8 +102,15 @@ def orient_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
 
 
 def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Contacts of the feet, turns of the body, and steps of the trunk where no contact was found."""
-    fused, uniform = require_stage(analysis.fused, "orientation"), drop_stuck_sensors(analysis.recording)
+    """Contacts of the feet, turns of the body, and steps of the trunk where no contact was found.
+
+    Where no sensor could be calibrated, the trunk's steps are left: they need no calibration.
+    """
+    fused, uniform = analysis.fused, drop_stuck_sensors(analysis.recording)
+    if fused is None:
+        if analysis.stopped_at != CALIBRATION.name or trunk_sensor(uniform) is None:
+            return analysis
+        return _fall_back_on_trunk(detect_trunk_steps(analysis, config))
     calibrated = require_stage(analysis.calibrated, "calibration")
     events = _contacts(fused, calibrated, config)
     alone = not events.events and trunk_sensor(uniform) is not None
@@ -106,6 +120,14 @@ def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
         detect_steps(uniform, config.lumbar) if alone else None,
     )
     return replace(analysis, contacts=contacts)
+
+
+def _fall_back_on_trunk(analysis: TakeAnalysis) -> TakeAnalysis:
+    """The analysis with the steps of its trunk sensor, which say what stopped the calibration."""
+    contacts, problem = require_stage(analysis.contacts, "events"), analysis.problem
+    told = () if problem is None else (replace(problem, severity="warning"),)
+    events = replace(contacts.events, notices=(*told, Notice("trunk_alone", TRUNK_ALONE)))
+    return replace(analysis, contacts=replace(contacts, events=events))
 
 
 def detect_trunk_steps(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -139,8 +161,8 @@ def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
     """Joint angles; those that the estimator cannot stand behind are withheld."""
     posed, mounted = require_stage(analysis.posed, "poses"), require_stage(analysis.mounted, "mounting")
     standing = analysis.recording.subject.standing_angles_deg
-    zero = mounted.calibrated.calibration.zero
-    joint = measure_angles(posed.orientations, zero, posed.poses, standing)
+    calibration = mounted.calibrated.calibration
+    joint = measure_angles(posed.orientations, calibration.zero, posed.poses, standing, calibration.posture)
     shown = withhold(joint, posed.poses, posed.orientations)
     doubtful = {} if analysis.agreed is None else analysis.agreed.doubtful
     return replace(analysis, angles=withhold_at_slips(shown, doubtful) if doubtful else shown)
@@ -150,7 +172,9 @@ def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
     """Strides and parameters of what was reached; nothing before the contacts are known."""
     fused, contacts, calibrated = analysis.fused, analysis.contacts, analysis.calibration
     if fused is None or contacts is None or calibrated is None:
-        return analysis
+        steps = measure_trunk(analysis, config)
+        # what stopped the calibration did not stop the analysis
+        return steps if steps.measured is None else replace(steps, problem=None, stopped_at=None)
     uniform, complete = analysis.recording, analysis.angles is not None
     feet = [s for s in FOOT.values() if s in fused.q]
     # a foot whose sensor failed keeps what it had
@@ -164,7 +188,7 @@ def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
         turning=calibrated.turning,
         feet=analysis.feet if complete else None,
         angles=analysis.angles,
-        trunk=_trunk_acceleration(analysis) if complete else {},
+        trunk=_trunk_acceleration(analysis, config) if complete else {},
         surface=surface_of(uniform),
         params=config.strides,
         bout_params=config.bouts,
@@ -182,11 +206,6 @@ def measure_trunk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
     if contacts is None or contacts.steps is None:
         return analysis
     source = contacts.steps.source
-    signals = uniform.sensors[source]
-    vertical, _ = split_about_vertical(signals, uniform.rate_hz, config.lumbar)
-    # which way is forward nobody knows without a calibration
-    upwards = np.full((len(vertical), 3), np.nan)
-    upwards[:, 2] = np.where(signals.valid, vertical, np.nan)
     tracks = Tracks(
         t_s=uniform.t_s,
         rate_hz=uniform.rate_hz,
@@ -196,7 +215,7 @@ def measure_trunk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
         surface=surface_of(uniform),
         params=config.strides,
         bout_params=config.bouts,
-        trunk={source: upwards},
+        trunk={source: _vertical_acceleration(uniform, source, config)},
         turns=contacts.turns,
         steps=contacts.steps,
     )
@@ -230,21 +249,33 @@ def _standing(analysis: TakeAnalysis) -> tuple[Window, ...]:
     return ()
 
 
-def _trunk_acceleration(analysis: TakeAnalysis) -> dict[Segment, Floats]:
+def _vertical_acceleration(uniform: UniformRecording, segment: Segment, config: PipelineConfig) -> Floats:
+    """Acceleration (n, 3), upwards alone, of a trunk sensor whose forward nobody knows; NaN = not known."""
+    signals = uniform.sensors[segment]
+    vertical, _ = split_about_vertical(signals, uniform.rate_hz, config.lumbar)
+    upwards = np.full((len(vertical), 3), np.nan)
+    upwards[:, 2] = np.where(signals.valid, vertical, np.nan)
+    return upwards
+
+
+def _trunk_acceleration(analysis: TakeAnalysis, config: PipelineConfig) -> dict[Segment, Floats]:
     """Segment → (n, 3) acceleration free of gravity, forward, left, up, m/s²; NaN = not measured."""
     mounted, posed = analysis.mounted, analysis.posed
     if mounted is None or posed is None:
         return {}
     orientations = posed.orientations
     acceleration = free_acceleration(mounted.calibrated, orientations)
+    uniform = drop_stuck_sensors(analysis.recording)
     return {
         s: np.where(
             orientations.valid[s][:, None],
             in_walking_frame(acceleration[s], orientations.q[s], analysis.recording.rate_hz),
             np.nan,
         )
-        for s in TRUNK
         if s in orientations.q
+        else _vertical_acceleration(uniform, s, config)
+        for s in TRUNK
+        if s in orientations.q or s in uniform.sensors
     }
 
 
@@ -259,6 +290,7 @@ EVENTS: Final = PipelineStage(
     detect_contacts,
     ("contacts",),
     ("events", "contacts", "detector", "consensus", "lumbar", "turns"),
+    runs_after_problem=True,
 )
 TRUNK_EVENTS: Final = PipelineStage("events", 0.14, detect_trunk_steps, ("contacts",), ("lumbar", "turns"))
 MOUNTING: Final = PipelineStage("mounting", 0.15, mount_on_segments, ("mounted",), ("poses",))

@@ -157,9 +157,9 @@ def assess(
         notices.append(
             Notice(
                 "no_rest",
-                "The sensors are never at rest together for 1 s; gyroscope bias and standing posture need "
-                "it. "
-                "Ask the person to stand still for 3 to 5 s at the start.",
+                "The sensors are never at rest together for 1 s, so there is no standing posture to measure "
+                "from. Ask the person to stand still for 3 to 5 s at the start.",
+                severity="info",
             )
         )
     for segment, signals in uniform.sensors.items():
@@ -307,8 +307,8 @@ def _level(
     sensors: Mapping[Segment, SensorQuality], notices: list[Notice], params: QualityParams
 ) -> tuple[Level, tuple[str, ...]]:
     """Poor: wrong or missing signals; usable: something to keep in mind; good: nothing."""
-    poor = [n.message for n in notices if n.severity == "error" or n.code == "no_rest"]
-    usable = [n.message for n in notices if n.severity == "warning" and n.code != "no_rest"]
+    poor = [n.message for n in notices if n.severity == "error"]
+    usable = [n.message for n in notices if n.severity == "warning"]
     for s in sensors.values():
         if s.invalid_pct > 100 * params.invalid_poor:
             poor.append(f"{s.segment} has no data in {s.invalid_pct:.0f} % of the take.")

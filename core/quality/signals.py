@@ -14,6 +14,10 @@ from core.rest import find_runs
 STILL: Final = 0.03
 """A second is still when acc varies less than this share of its mean (0.25 m/s²:
 docs/science/quality.md, "Stillness of one sensor")."""
+TURNING: Final = 0.0625
+"""Variance of the rate of a turning body, of its mean square: a quarter of the rate [our choice]."""
+SMOOTH: Final = 0.3
+"""Largest roughness of a movement (1 = noise); walking trunks have .1 and less [our choice]."""
 PLATEAU: Final = 3
 """Neighbouring samples at the largest value that make a plateau: noise does not repeat it [our choice]."""
 RANGES: Final = (
@@ -71,6 +75,8 @@ def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
     still_norm = float(norm[at].mean())
     speed = None if gyr is None else np.linalg.norm(gyr, axis=1)
     calm = np.union1d([k], np.flatnonzero(spread < STILL * np.linalg.norm(mean, axis=1)))
+    if gyr is not None:
+        calm = _without_turns(gyr[good], calm, width)
     known = None if speed is None else speed[np.isfinite(speed)]
     return Facts(
         still=bool(spread[k] < STILL * np.linalg.norm(mean[k])),
@@ -81,6 +87,24 @@ def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
         acc_std=float(norm.std()),
         gyro_top=None if known is None or not len(known) else float(np.percentile(known, 99.9)),
     )
+
+
+def _without_turns(gyr: Floats, starts: NDArray[np.int64], width: int) -> NDArray[np.int64]:
+    """Those of the windows in which a sensor does not turn: a trunk that turns slowly has a calm force.
+
+    A bias is constant and noise jumps from sample to sample (mean square of differences, von Neumann 1941, by
+    twice the variance: 1); a body's turning rate changes smoothly (0.1 and less).
+    """
+    total = np.concatenate((np.zeros((1, 3)), np.cumsum(gyr, axis=0)))
+    square = np.concatenate(([0.0], np.cumsum((gyr**2).sum(axis=1))))
+    jump = np.concatenate(([0.0, 0.0], np.cumsum((np.diff(gyr, axis=0) ** 2).sum(axis=1))))
+    ends = starts + width
+    mean = (total[ends] - total[starts]) / width
+    level = (mean**2).sum(axis=1)
+    variance = (square[ends] - square[starts]) / width - level
+    rough = (jump[ends] - jump[starts + 1]) / max(1, width - 1)
+    smooth = (variance > TURNING * level) & (rough < SMOOTH * 2.0 * variance)
+    return starts[~smooth] if np.isfinite(square[-1]) else starts
 
 
 def _least(speed: Floats, starts: NDArray[np.int64], width: int) -> float | None:

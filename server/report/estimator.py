@@ -22,6 +22,8 @@ VERDICTS: Final[Mapping[str, str]] = {"good": "consistent", "warn": "doubtful in
 
 REDUCED: Final[Mapping[str, str]] = {
     "sensor_failed": "reduced: a sensor failed in this take",
+    "not_calibrated": "reduced: which way a sensor faces is not known",
+    "no_standing": "none: nobody stood still in this take",
     "estimator_failed": "reduced: the better estimator could not finish",
 }
 

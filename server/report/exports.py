@@ -236,6 +236,7 @@ def _calibration(calibration: Calibration | None, angles: JointAngles | None) ->
             "rest_s": calibration.rest,
             "walking_s": calibration.walking,
             "zero_s": calibration.zero,
+            "posture": calibration.posture,
             "angle_zero": None if angles is None else angles.zero,
             "zero_offset_deg": offsets,
             "diagnostics": calibration.diagnostics,

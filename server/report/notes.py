@@ -98,6 +98,11 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
             "Curves named from standing have the posture of the standing part at 0°. "
             f"Subtracted: {', '.join(offsets)}. A person who stands bent gets curves shifted by that much."
         )
+    if any(p.zero == "walking" and p.reason is None for p in panels):
+        about_zero.append(
+            "Nobody stood still in this take: these curves start from their own mean in straight walking. "
+            "Read their shape and range; they have no level."
+        )
     if any(p.zero == "anatomical" and p.reason is None for p in panels):
         about_zero.append(
             "Curves named anatomical start from what the goniometer read in standing, as the norm does."

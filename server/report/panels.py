@@ -23,6 +23,7 @@ from server.report.wording import VARIABLES, ZERO_WORDS, Variable, reason_words
 NO_BAND: Final[Mapping[Zero, str]] = {
     "standing": "No norm band: these curves start from this person's standing, the norm from the anatomical "
     "zero. Enter goniometer angles of standing to compare.",
+    "walking": "No norm band: nobody stood still, so these curves start from their own mean in walking.",
     "stride_mean": "No norm band: measured from its own mean over the stride, the norm is not.",
     "anatomical": "No norm band: the norm is measured from standing.",
 }
@@ -108,9 +109,13 @@ def curve_panels(
 
 
 def same_zero(before: CurvePanel, after: CurvePanel) -> tuple[CurvePanel, CurvePanel]:
-    """Two panels of a variable to be drawn in one: both from standing unless both are anatomical."""
+    """Two panels of a variable to be drawn in one: both from standing unless both are anatomical; the earlier
+    one without curves where only one of them comes from a take in which somebody stood."""
     if before.zero == after.zero or None in (before.zero, after.zero):
         return before, after
+    if "walking" in (before.zero, after.zero):
+        # a curve without a level is not drawn over one that has one
+        return replace(before, sides={}, reason=reason_words("no_standing")), after
     return _from_standing(before), _from_standing(after)
 
 
@@ -144,7 +149,7 @@ def _panel(
     reason = None if sides else _why_missing(variable, curves)
     zero: Zero | None = None
     if curves is not None:
-        zero = "stride_mean" if variable.name in MEAN_ZERO else "anatomical" if added else "standing"
+        zero = "stride_mean" if variable.name in MEAN_ZERO else "anatomical" if added else curves.zero
     fitting = next((b for b in bands if b.zero == zero), None) if sure and reason is None else None
     note = "" if fitting is None else fitting.note
     if fitting is None and bands and sure and zero is not None:

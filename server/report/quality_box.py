@@ -147,8 +147,12 @@ def _calibration(calibration: Mapping[str, Any] | None, *, needed: bool) -> list
         return [] if not needed else [QualityItem("Calibration", "not reached", kind="bad")]
     scores = [float(s["score"]) for s in calibration["segments"].values() if s.get("score") is not None]
     method = _METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
+    if calibration.get("posture") == "walking" and calibration["method"] == "walking_direction":
+        method = "from walking alone"
     value = f"{format_number(100 * min(scores))}" if scores else method
     items = [QualityItem("Calibration", value, f"/ 100, {method}" if scores else "")]
+    if calibration.get("posture", "standing") == "walking":
+        items.append(QualityItem("Posture", "from walking", "nobody stood still", kind="warn"))
     if calibration.get("angle_zero") is not None:
         items.append(QualityItem("Angle zero", str(calibration["angle_zero"])))
     return items

@@ -70,6 +70,7 @@ def tracks_parquet(tracks: Tracks) -> bytes:
             "source": feet.source,
             "body": dataclasses.asdict(feet.body),
             "withheld": dict(feet.withheld),
+            "posture": feet.posture,
         },
     }
     return parquet_file(tracks.t_s, columns, meta)
@@ -147,6 +148,7 @@ def _feet(
             for side in present
             if (name := f"{FOOT[side]}_patched") in table.column_names
         },
+        posture=meta.get("posture", "standing"),
     )
 
 

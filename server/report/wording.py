@@ -95,6 +95,7 @@ def parameter_term(name: str) -> Term:
 ZERO_WORDS: Final[Mapping[str, str]] = {
     "anatomical": "anatomical",
     "standing": "from standing",
+    "walking": "from the mean in walking",
     "stride_mean": "from its mean over the stride",
 }
 """Zero of an angle → what is added to its title."""
@@ -126,6 +127,7 @@ REASONS: Final[Mapping[str, str]] = {
     "treadmill": "not measured: on a treadmill the belt's speed is needed, and gives speed and stride length",
     "no_foot_track": "not measured: no sensor on this foot",
     "no_foot_flat": "not measured: the foot never rested on the floor",
+    "no_standing": "not measured: nobody stood still in this take",
     "angle_zero_standing": "not measured: angles start from standing; enter goniometer angles",
     "no_level": "not measured: has a shape over the stride, no level against the walking direction",
     "variables_missing": "not measured: some of its variables are missing",

@@ -79,7 +79,10 @@ def make_group(
 def _session(reviewed: ReviewedAnalyses, visit: ControlVisit) -> ControlSession:
     def read() -> ControlSession:
         bundle = reviewed.read_bundle(visit.found, visit.edits)
-        curves = {} if bundle.angles is None else mean_curves(cycle_curves(bundle.angles, bundle.strides))
+        # of somebody who never stood still the curves have no level
+        stood = bundle.angles is not None and bundle.angles.zero == "standing"
+        angles = bundle.angles if stood else None
+        curves = {} if angles is None else mean_curves(cycle_curves(angles, bundle.strides))
         age = None if visit.birth_year is None else float(visit.performed_on.year - visit.birth_year)
         return ControlSession(visit.person, age, visit.sex, bundle.parameters, curves)  # type: ignore[arg-type]
 

@@ -94,7 +94,8 @@ def view(reviewed: ReviewedAnalyses, gathered: FeedbackRecords) -> FeedbackView 
         return None
     content = this.training.content
     bundle, strides = _strides(reviewed, this)
-    curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
+    stood = bundle.angles is not None and bundle.angles.zero == "standing"
+    curves = cycle_curves(bundle.angles, bundle.strides) if stood and bundle.angles else None
     earlier = None
     if before is not None:
         there = before.at.session

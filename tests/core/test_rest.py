@@ -9,7 +9,14 @@ import pytest
 
 from core.frames import Floats
 from core.recording import SensorSignals, Subject, UniformRecording
-from core.rest import RestParams, find_rest_windows, find_runs, index_window, measure_quietness
+from core.rest import (
+    RestParams,
+    drop_false_rests,
+    find_rest_windows,
+    find_runs,
+    index_window,
+    measure_quietness,
+)
 from tests.data import data_folder
 from tests.walks import lost, neura_walk
 
@@ -79,6 +86,19 @@ def test_shortest_rest_is_respected() -> None:
     recording = take(foot_l=with_walk(still(1000), 2.0, 10.0))
     assert len(find_rest_windows(recording)) == 1
     assert find_rest_windows(recording, RestParams(shortest_s=3.0)) == ()
+
+
+@pytest.mark.parametrize(("degrees", "seconds", "kept"), [(0.5, 2.0, 1), (4.0, 2.0, 0), (4.0, 8.0, 1)])
+def test_a_rest_in_which_the_vertical_turns_fast_is_a_slow_movement(
+    degrees: float, seconds: float, kept: int
+) -> None:
+    """Four degrees in two seconds are 2 °/s that a mean would take for a bias; in eight they are little."""
+    n = round(seconds * RATE)
+    lean = np.radians(degrees) * np.linspace(0.0, 1.0, n)
+    quiet = still(n)
+    acc = 9.81 * np.stack((np.sin(lean), np.cos(lean), np.zeros(n)), axis=1)
+    recording = take(foot_l=replace(quiet, acc=acc))
+    assert len(drop_false_rests(recording, ((0.0, seconds),))) == kept
 
 
 def test_runs_and_samples_are_half_open() -> None:

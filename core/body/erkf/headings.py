@@ -150,7 +150,8 @@ def turn_forward_axes(
     for segment, error in errors.items():
         was = mounted[segment]
         mount = to_matrix(about(1, error)) @ was.R_segment_sensor
-        mounted[segment] = replace(was, R_segment_sensor=mount)
+        start = None if was.start_q is None else multiply(about(2, error), was.start_q)
+        mounted[segment] = replace(was, R_segment_sensor=mount, start_q=start)
         q[segment] = multiply(multiply(about(2, error), q[segment]), about(1, -error))
     calibration = replace(calibrated.calibration, segments=mounted)
     return replace(calibrated, calibration=calibration), replace(orientations, q=q)

@@ -76,7 +76,8 @@ def run_erkf(
         None,
     )
     # without a standing start the biases still come from the calibration's rest, wherever that is
-    start = start_state(tree, inputs, params, rest, q=first, bias_age_s=calibrated.calibration.zero[0])
+    age_s = calibrated.calibration.zero[0] if calibrated.calibration.posture == "standing" else None
+    start = start_state(tree, inputs, params, rest, q=first, bias_age_s=age_s)
     track, final = smooth(start, inputs, tree, params)
     return ErkfRun(tree, inputs, start, rest, track, final)
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.calibration.standing import choose_rest, find_rests, measure_standing, vertical_frame
+from core.calibration.standing import choose_rest, find_rests, measure_standing, stand_all, vertical_frame
 from core.errors import SignalError
 from core.frames import Floats
 from core.recording import SensorSignals, Subject, UniformRecording
@@ -78,6 +78,22 @@ def test_missing_rest_says_how_still_it_was() -> None:
         find_rests(take(sensor(wobble(34.0))), RestParams())
     assert fast.value.code == "no_rest"
     assert "34 °/s" in fast.value.message
+
+
+def test_a_standing_that_sways_is_not_still_and_one_that_turned_takes_the_longer_bias() -> None:
+    lean = np.radians(6.0) * np.linspace(0.0, 1.0, 300)
+    force = 9.81 * np.stack((np.sin(lean), np.cos(lean), np.zeros(300)), axis=1)
+    with pytest.raises(SignalError) as caught:
+        find_rests(take(sensor(np.zeros((300, 3)), force)), RestParams())
+    assert caught.value.code == "not_still"
+    gyr = np.zeros((1000, 3))
+    gyr[800:, 1] = np.radians(2.5)
+    rests = ((0.0, 6.0), (8.0, 10.0))
+    recording = take(sensor(gyr))
+    (turned,) = stand_all(recording, rests[1], rests, RestParams()).values()
+    assert np.allclose(turned.gyro_bias, 0.0)
+    (alone,) = stand_all(recording, rests[1], rests[1:], RestParams()).values()
+    assert alone.gyro_bias[1] == pytest.approx(np.radians(2.5))
 
 
 def test_rests_that_never_meet_are_no_rest() -> None:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import pytest
 
+from core.calibration import CalibrationParams
+from core.calibration.sensor_in_walk import WalkRungParams
 from core.frames import Segment
 from core.measure import measure_gait
 from core.parameters.result import Parameter
 from core.pipeline import TakeAnalysis, analyse
+from core.pipeline.config import PipelineConfig
 from core.simulate import simulate_scenario
 from server.report.bundle import load_bundle
 from server.report.exports import analysis_files
@@ -92,9 +96,30 @@ def test_with_a_foot_sensor_the_foot_decides() -> None:
     assert all(b.initiation_s is not None and 0.2 < b.initiation_s < 1.5 for b in a.measured.bouts)
 
 
-def test_sitting_with_a_trunk_sensor_says_that_nobody_walked() -> None:
-    from dataclasses import replace
+def test_what_cannot_be_calibrated_leaves_the_steps_of_the_trunk_and_says_why() -> None:
+    take = simulate_scenario("fast_with_turns", 1, worn=("pelvis", "foot_l", "foot_r")).recording
+    streams = {
+        d: replace(s, t_s=s.t_s[k] - 8.0, acc=s.acc[k], gyr=None if s.gyr is None else s.gyr[k], mag=None)
+        for d, s in take.streams.items()
+        for k in [(s.t_s >= 8.0) & (s.t_s < 28.0)]
+    }
+    never = PipelineConfig(calibration=CalibrationParams(from_walking=WalkRungParams(least_s=100.0)))
+    a = analyse(replace(take, streams=streams), never)
+    assert a.problem is None
+    assert a.stopped_at is None
+    assert figures(a)["cadence_spm"].mean == pytest.approx(124.0, rel=0.02)
+    told = {n.code: n.severity for n in a.notices}
+    assert told["trunk_alone"] == "warning"
+    assert {"no_rest", "not_still"} & set(told)
+    assert "error" not in told.values()
+    walked = analyse(replace(take, streams=streams))
+    assert walked.calibration is not None
+    assert walked.calibration.posture == "walking"
+    whole = analysis("pelvis", "foot_l", "foot_r")
+    assert figures(walked)["cadence_spm"].mean == pytest.approx(figures(whole)["cadence_spm"].mean, rel=0.02)
 
+
+def test_sitting_with_a_trunk_sensor_says_that_nobody_walked() -> None:
     take = simulate_scenario("comfortable", 1, worn=("pelvis",)).recording
     (stream,) = take.streams.values()
     still = stream.t_s < 5.5

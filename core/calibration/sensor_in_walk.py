@@ -1,0 +1,260 @@
+"""One sensor of somebody who never stands still: gyroscope bias, attitude and mean posture from the walk.
+
+Two things hold in every walk. Between two moments at which a foot is flat its velocity begins and ends at
+zero, so its mean specific force in a fixed frame is gravity; of any other segment that is true on average
+over some strides straight ahead. And who walks straight faces the same way at both ends. A gyroscope with a
+bias turns both away: the bias is what keeps them (docs/science/calibration.md, "Without standing").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.frames import FOOT, Bools, Floats, Segment
+from core.fusion.attitude import AttitudeParams, AttitudeState, advance, estimate_orientation
+from core.recording import SensorSignals
+from core.rest import find_runs
+from core.rotation import conjugate, multiply, rotate, wrap_angle
+
+Indices = NDArray[np.int64]
+Span = tuple[int, int]
+
+UP = np.array([0.0, 0.0, 1.0])
+
+PROBE = 1e-4
+"""Change of the bias in rad/s over which the derivative is taken; the map is all but linear."""
+
+
+@dataclass(frozen=True)
+class WalkRungParams:
+    """How sensors are calibrated from walking alone (docs/science/calibration.md, "Without standing").
+
+    Parameters
+    ----------
+    least_s : shortest walking it is tried on: some three strides (our choice).
+    flat_apart_s : least time between two flat moments of a foot. flat_mean_s : time over which its rate is
+        averaged to find them.
+    flat_times, flat_rate : a quiet moment counts when its rate is below the lower quartile times the one plus
+        the other (rad/s): flats of ipol_walks have 4 to 30 °/s, the quietest moment of a swing 60 and more.
+    window_s : length of the Hann window over which specific force is averaged where no foot rests: a stride
+        of 1.5 s and all of its harmonics are damped by 30 dB or more.
+    foot_sd, body_sd : what a mean specific force is off gravity between two flats and in such a window, m/s²
+        (measured on ipol_walks, neura_walk and qmt_fullbody: .03 to .6 and .4 to .9).
+    bias_sd : of a gyroscope that nobody saw at rest, rad/s (the sensors of those sets have 0.1 to 2 °/s).
+    heading_sd : of the heading of one straight part's ends, rad (our choice: a step's).
+    """
+
+    least_s: float = 4.0
+    flat_apart_s: float = 0.6
+    flat_mean_s: float = 0.1
+    flat_times: float = 2.0
+    flat_rate: float = radians(5.0)
+    window_s: float = 3.0
+    foot_sd: float = 0.2
+    body_sd: float = 0.6
+    bias_sd: float = radians(1.0)
+    heading_sd: float = radians(4.0)
+
+
+@dataclass(frozen=True, eq=False)
+class SensorInWalk:
+    """One sensor while somebody walks.
+
+    Parameters
+    ----------
+    q : (n, 4) sensor to a z-up world of its own. gyro_bias : (3,) rad/s. norm : mean |f|, m/s².
+    flats : (m,) samples at which a foot is flat; empty for other segments.
+    """
+
+    q: Floats
+    gyro_bias: Floats
+    norm: float
+    flats: Indices
+
+
+def find_flat_moments(gyr: Floats, walked: Bools, rate_hz: float, params: WalkRungParams) -> Indices:
+    """Samples (m,) at which a foot that walks is at its quietest, one or more in every stance.
+
+    Parameters
+    ----------
+    gyr : (n, 3) rad/s. walked : (n,) somebody walks and the sensor is there.
+    """
+    from scipy.ndimage import uniform_filter1d
+    from scipy.signal import find_peaks
+
+    width = max(2, round(params.flat_mean_s * rate_hz))
+    rate = np.sqrt(uniform_filter1d((gyr**2).sum(axis=1), width, mode="nearest"))
+    lows, _ = find_peaks(-np.where(walked, rate, rate.max()), distance=params.flat_apart_s * rate_hz)
+    lows = lows[walked[lows]]
+    if not len(lows):
+        return lows
+    limit = params.flat_times * np.quantile(rate[lows], 0.25) + params.flat_rate
+    return np.asarray(lows[rate[lows] < limit])
+
+
+def follow_sensor(
+    segment: Segment,
+    signals: SensorSignals,
+    walks: Sequence[Span],
+    straight: Bools,
+    rate_hz: float,
+    attitude: AttitudeParams,
+    params: WalkRungParams,
+) -> SensorInWalk | None:
+    """Bias and attitude of a sensor from the walk alone.
+
+    Parameters
+    ----------
+    walks : index ranges in which somebody walks. straight : (n,) and does not turn, as far as is known.
+
+    Returns
+    -------
+    None where the sensor is there for no walk of `least_s`.
+    """
+    walked = np.zeros(len(signals.acc), np.bool_)
+    for a, b in walks:
+        walked[a:b] = True
+    walked &= signals.valid
+    runs = [r for r in find_runs(walked) if r[1] - r[0] >= params.least_s * rate_hz]
+    if not runs:
+        return None
+    foot = segment in FOOT.values()
+    flats = find_flat_moments(signals.gyr, walked, rate_hz, params) if foot else np.zeros(0, np.int64)
+    bias = np.zeros(3)
+    # the second pass has the turn of the sensor about the vertical right, the third changes nothing
+    for _ in range(2):
+        stretches = [_Stretch.integrate(signals, bias, r, flats, straight, rate_hz, params) for r in runs]
+        bias = bias + _bias_step(stretches, signals, bias, straight, flats, rate_hz, params)
+    stretches = [_Stretch.integrate(signals, bias, r, flats, straight, rate_hz, params) for r in runs]
+    longest = max(stretches, key=lambda x: len(x.q))
+    at = longest.first + len(longest.q) // 2
+    force = longest.forces.mean(axis=0)
+    q_at = multiply(_level(force), longest.q[at - longest.first])
+    norm = float(np.linalg.norm(force))
+    q = estimate_orientation(
+        q_at, at, signals.gyr - bias, signals.acc, signals.valid, rate_hz, norm, attitude
+    )
+    return SensorInWalk(q, bias, norm, flats)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """One unbroken walk of a sensor, integrated from its rates alone.
+
+    Parameters
+    ----------
+    first : its first sample. q : (m, 4) sensor to the frame of its first sample. forces : (k, 3) mean
+    specific force in that frame over spans that should show gravity alone. inverse_sd : 1 / (m/s²) of each.
+    """
+
+    first: int
+    q: Floats
+    forces: Floats
+    inverse_sd: float
+
+    @classmethod
+    def integrate(
+        cls,
+        signals: SensorSignals,
+        bias: Floats,
+        run: Span,
+        flats: Indices,
+        straight: Bools,
+        rate_hz: float,
+        params: WalkRungParams,
+    ) -> _Stretch:
+        a, b = run
+        gyr = signals.gyr[a:b] - bias
+        start = AttitudeState(np.array([1.0, 0.0, 0.0, 0.0]), gyr[0])
+        free = AttitudeParams(kp=0.0)
+        q, _ = advance(start, gyr, signals.acc[a:b], np.ones(b - a, np.bool_), rate_hz, 1.0, free)
+        force = rotate(q, signals.acc[a:b])
+        own = flats[(flats >= a) & (flats < b)] - a
+        if len(own) >= 3:
+            total = np.concatenate((np.zeros((1, 3)), np.cumsum(force, axis=0)))
+            means = np.diff(total[own], axis=0) / np.diff(own)[:, None]
+            return cls(a, q, means, 1.0 / params.foot_sd)
+        width = min(round(params.window_s * rate_hz), b - a)
+        taper = np.hanning(width + 2)[1:-1]
+        taper /= taper.sum()
+        starts = np.arange(0, b - a - width + 1, max(1, width // 2))
+        clear = [i for i in starts if straight[a + i : a + i + width].all()]
+        means = np.array([taper @ force[i : i + width] for i in (clear or starts)])
+        return cls(a, q, means, 1.0 / params.body_sd)
+
+
+def _bias_step(
+    stretches: Sequence[_Stretch],
+    signals: SensorSignals,
+    bias: Floats,
+    straight: Bools,
+    flats: Indices,
+    rate_hz: float,
+    params: WalkRungParams,
+) -> Floats:
+    """Change (3,) of the bias that lays the mean forces of each stretch upon each other, and its heading.
+
+    Least squares with the prior `bias_sd`, so that a short walk, which shows little, changes little. About
+    the vertical gravity says nothing: there the bias is the mean turning rate straight ahead.
+    """
+    up = np.mean([rotate(conjugate(x.q), _direction(x)).mean(axis=0) for x in stretches], axis=0)
+    up /= np.linalg.norm(up)
+    across = np.linalg.svd(up[None])[2][1:]
+    rows, wanted = [np.eye(2) / params.bias_sd], [-(across @ bias) / params.bias_sd]
+    for x in stretches:
+        run = (x.first, x.first + len(x.q))
+        change = []
+        for axis in across:
+            moved = _Stretch.integrate(signals, bias + PROBE * axis, run, flats, straight, rate_hz, params)
+            change.append((moved.forces - x.forces) / PROBE)
+        J = np.stack(change, axis=-1)
+        rows.append((J - J.mean(axis=0)) * x.inverse_sd)
+        wanted.append(-(x.forces - x.forces.mean(axis=0)).reshape(-1) * x.inverse_sd)
+    A = np.concatenate([r.reshape(-1, 2) for r in rows])
+    step = np.linalg.lstsq(A, np.concatenate(wanted), rcond=None)[0] @ across
+    turned, time = _heading_drift(stretches, straight, rate_hz)
+    weight = time**2 / params.heading_sd**2
+    drift = float((weight * turned / np.maximum(time, 1e-9)).sum() / (weight.sum() + params.bias_sd**-2))
+    # who walks round and round turns as a gyroscope with a bias would: no such bias is believed
+    if abs(drift) > 2.0 * params.bias_sd:
+        drift = 0.0
+    return np.asarray(step + drift * up)
+
+
+def _heading_drift(stretches: Sequence[_Stretch], straight: Bools, rate_hz: float) -> tuple[Floats, Floats]:
+    """Turn about the vertical (k,) in rad between first and last third of each straight part, and time."""
+    turned, time = [], []
+    for x in stretches:
+        # the turn since the first sample as the room sees it: its twist is the same for any mounting
+        level = _level(_direction(x))
+        turn = multiply(multiply(level, x.q), conjugate(level))
+        heading = np.exp(2j * np.arctan2(turn[:, 3], turn[:, 0]))
+        for a, b in find_runs(straight[x.first : x.first + len(x.q)]):
+            edge = (b - a) // 3
+            if edge < 0.5 * rate_hz:
+                continue
+            first, last = heading[a : a + edge].mean(), heading[b - edge : b].mean()
+            turned.append(wrap_angle(float(np.angle(last * np.conj(first)))))
+            time.append((b - a - edge) / rate_hz)
+    return np.array(turned, np.float64), np.array(time, np.float64)
+
+
+def _direction(stretch: _Stretch) -> Floats:
+    force = stretch.forces.mean(axis=0)
+    return np.asarray(force / np.linalg.norm(force))
+
+
+def _level(force: Floats) -> Floats:
+    """The shortest turn (4,) that lays a force (3,) upon the vertical."""
+    z = force / np.linalg.norm(force)
+    axis = np.cross(z, UP)
+    w = 1.0 + float(z @ UP)
+    if w < 1e-9:
+        return np.array([0.0, 1.0, 0.0, 0.0])
+    q = np.array([w, *axis])
+    return np.asarray(q / np.linalg.norm(q))
