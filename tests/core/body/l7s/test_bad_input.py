@@ -19,7 +19,7 @@ from core.body.l7s.poses import l7s_poses
 from core.body.model import BodyModel
 from core.body.pose_params import PoseParams
 from core.calibration import calibrate
-from core.errors import EstimationError, SagittalError, SignalError
+from core.errors import EstimationError, SagittalError
 from core.estimators import Estimator
 from core.frames import FOOT, SIDES, Floats, Segment
 from core.fusion.mahony import estimate_orientations
@@ -324,8 +324,8 @@ def test_without_standing_there_is_an_error_or_a_notice(estimator: Estimator) ->
     assert "started_moving" in told
     with pytest.raises(SagittalError) as error:
         run(cut(walking, 8.0, 24.0), estimator)
-    assert isinstance(error.value, SignalError)
-    assert error.value.code == "no_rest"
+    assert isinstance(error.value, EstimationError)
+    assert error.value.code == "estimator_impossible"
 
 
 @pytest.mark.parametrize("estimator", BOTH)
