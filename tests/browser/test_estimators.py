@@ -66,7 +66,7 @@ def test_the_ankles_distance_gives_step_width(opened: Opener, walk: str, running
     page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")
     expect(page.locator("job-progress")).to_have_count(0, timeout=60_000)
     page.reload()
-    expect(width.locator("td.n .num").first).to_have_text(re.compile(r"^\s*0\.\d\d\s*$"))
+    expect(width.locator("td.n .num").first).to_have_text(re.compile(r"^\s*0\.\d\d(\s*± [\d.]+)?\s*$"))
     page.goto(f"/sessions/{walk}/upload")
     expect(ankles).to_have_value("0.2")
 
@@ -105,7 +105,7 @@ def test_goniometer_and_shoe_go_into_the_manifest_and_leave_it(
     expect(page.locator("job-progress")).to_have_count(0, timeout=60_000)
     page.reload()
     clearance = page.locator(".params tr", has_text="Toe clearance")
-    expect(clearance.locator("td.n .num").first).to_have_text(re.compile(r"^\s*−?0\.\d+\s*$"))
+    expect(clearance.locator("td.n .num").first).to_have_text(re.compile(r"^\s*−?0\.\d+(\s*± [\d.]+)?\s*$"))
     with running.client() as client:
         said = client.get(f"/api/v1/sessions/{walk}/recording").json()["manifest"]["subject"]
     assert said["standing_angles_deg"] == {"knee_flexion_l": 8, "knee_flexion_r": -2}
