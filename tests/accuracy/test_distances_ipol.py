@@ -23,9 +23,9 @@ from core.pipeline import analyse
 from core.pipeline.analysis import TakeAnalysis
 from tests.accuracy.gaitmap import COPIES, recording_of, resampled, true_strides
 from tests.accuracy.gaitmap import RATE as GAITMAP_RATE
-from tests.accuracy.ipol import RATE, WALKS, checked_events, first_s, ipol_recording
 from tests.accuracy.report import record
 from tests.accuracy.test_gaitmap_strides import errors, take
+from tests.ipol import FEET, RATE, WALKS, checked_events, first_s, ipol_recording
 
 pytestmark = pytest.mark.accuracy
 
@@ -42,7 +42,7 @@ HOLE = 6
 
 @cache
 def analysed(walk: str) -> TakeAnalysis:
-    return analyse(ipol_recording(walk))
+    return analyse(ipol_recording(walk, *FEET))
 
 
 def counted(walk: str) -> int:
@@ -56,7 +56,7 @@ def ways(walk: str, side: Side) -> tuple[float, float, float]:
     """Straight ways of one foot to the turn, back, and from its first place to its last, m."""
     feet, events = analysed(walk).feet, checked_events(walk)
     assert feet is not None
-    off, p = first_s(ipol_recording(walk)), feet.p[side][:, :2]
+    off, p = first_s(ipol_recording(walk, *FEET)), feet.p[side][:, :2]
     times = (events.walk_s[0] - BEFORE_S, float(np.mean(events.turn_s)), events.walk_s[1] + AFTER_S)
     first, turn, last = (p[int(np.clip((t - off) * RATE, 0, len(p) - 1))] for t in times)
     there, back, apart = turn - first, last - turn, last - first

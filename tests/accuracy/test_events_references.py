@@ -29,7 +29,7 @@ from tests.accuracy.gaitmap import COPIES, RATE, recording_of, resampled
 from tests.accuracy.report import record, record_in_short
 from tests.accuracy.test_events_gaitmap import reference as mocap
 from tests.accuracy.test_events_neura import heel_stops
-from tests.ipol import SUBJECTS, ipol_events, ipol_recording, ipol_trials
+from tests.ipol import SUBJECTS, WALKS, checked_events, ipol_recording
 from tests.walks import neura_recording
 
 WINDOW_S = 0.25
@@ -78,6 +78,12 @@ def run(recording: Recording) -> FoundEvents:
 @cache
 def ipol(trial: str) -> FoundEvents:
     return run(ipol_recording(trial))
+
+
+def checked(trial: str, side: Side, kind: EventKind) -> tuple[float, ...]:
+    """Hand-checked events of one foot, s."""
+    events = checked_events(trial)
+    return tuple((events.contacts if kind == "ic" else events.leavings)[side].tolist())
 
 
 @cache
@@ -130,16 +136,16 @@ def errors(name: str, rule: str, kind: EventKind) -> Errors:
         return pooled([against(gaitmap().events[rule], s, kind, mocap(s, kind)) for s in sides])
     if name == "neura_walk":
         return pooled([against(neura().events[rule], s, kind, heel_stops(s)) for s in SIDES])
-    chosen = [t for t in ipol_trials() if name == "ipol_walks" or t.startswith(name)]
+    chosen = [t for t in WALKS if name == "ipol_walks" or t.startswith(name)]
     return pooled(
-        [against(ipol(t).events[rule], s, kind, ipol_events(t, s, kind)) for t, s in product(chosen, SIDES)]
+        [against(ipol(t).events[rule], s, kind, checked(t, s, kind)) for t, s in product(chosen, SIDES)]
     )
 
 
 def shares_off(subject: str, rule: str) -> tuple[float, float, int]:
     """Mean found − reference of swing and double support, points of the stride, and of how many strides."""
     swing, double = [], []
-    for trial in (t for t in ipol_trials() if t.startswith(subject)):
+    for trial in (t for t in WALKS if t.startswith(subject)):
         for s in ipol(trial).strides[rule]:
             other: Side = "right" if s.side == "left" else "left"
             ours = (s.start_s, s.tc_s, s.end_s, s.opposite_tc_s, s.opposite_ic_s)
@@ -151,7 +157,7 @@ def shares_off(subject: str, rule: str) -> tuple[float, float, int]:
             found = np.array(ours, np.float64)
             true = np.array(
                 [
-                    min(ipol_events(trial, *place), key=lambda t, x=x: abs(t - x))  # type: ignore[misc]
+                    min(checked(trial, *place), key=lambda t, x=x: abs(t - x))  # type: ignore[misc]
                     for x, place in zip(found, places, strict=True)
                 ]
             )

@@ -14,8 +14,8 @@ import pytest
 from core.events.lumbar import detect_steps
 from core.timeline import synchronise
 from tests.accuracy.event_scoring import Score, match
-from tests.accuracy.ipol import WALKS, checked_events, first_s, ipol_recording
 from tests.accuracy.report import record
+from tests.ipol import WALKS, checked_events, first_s, ipol_recording
 
 pytestmark = pytest.mark.accuracy
 
@@ -40,7 +40,7 @@ class Found:
 
 @cache
 def found(walk: str) -> Found:
-    recording = ipol_recording(walk, ("pelvis",))
+    recording = ipol_recording(walk, "pelvis")
     off, events = first_s(recording), checked_events(walk)
     true = sorted((float(t) - off, side) for side, times in events.contacts.items() for t in times)
     steps = detect_steps(synchronise(recording)).steps

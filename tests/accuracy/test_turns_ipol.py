@@ -16,8 +16,8 @@ from core.frames import Floats, Segment
 from core.pipeline import analyse
 from core.pipeline.analysis import TakeAnalysis
 from core.simulate import simulate_scenario
-from tests.accuracy.ipol import FEET, WALKS, checked_events, first_s, ipol_recording
 from tests.accuracy.report import record
+from tests.ipol import FEET, WALKS, checked_events, first_s, ipol_recording
 
 pytestmark = pytest.mark.accuracy
 
@@ -27,14 +27,14 @@ EDGE_S = 0.2
 
 @cache
 def analysed(walk: str, worn: str) -> TakeAnalysis:
-    return analyse(ipol_recording(walk, WORN[worn]))
+    return analyse(ipol_recording(walk, *WORN[worn]))
 
 
 def edge_errors(worn: str) -> Floats:
     """(walks, 2) begin and end of the turn minus those of the people, s."""
     errors = []
     for walk in WALKS:
-        measured, off = analysed(walk, worn).measured, first_s(ipol_recording(walk, WORN[worn]))
+        measured, off = analysed(walk, worn).measured, first_s(ipol_recording(walk, *WORN[worn]))
         assert measured is not None
         true = np.array(checked_events(walk).turn_s)
         found = [np.array((t.start_s, t.end_s)) + off for t in measured.turns]

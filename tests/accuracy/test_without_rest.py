@@ -27,10 +27,10 @@ from tests.accuracy import mobgap
 from tests.accuracy.gaitmap import RATE, recording_of, signals
 from tests.accuracy.report import record
 from tests.data import data_folder
+from tests.ipol import WALKS, ipol_recording
 from tests.walks import neura_recording
 
 MARGIN_S = 0.3
-IPOL: Mapping[str, Segment] = {"lf": "foot_l", "rf": "foot_r", "lb": "pelvis"}
 QMT: Mapping[str, Segment] = {
     "foot_left": "foot_l", "foot_right": "foot_r", "lower_leg_left": "shank_l", "lower_leg_right": "shank_r",
     "upper_leg_left": "thigh_l", "upper_leg_right": "thigh_r", "hip": "pelvis",
@@ -39,34 +39,6 @@ QMT: Mapping[str, Segment] = {
 CADENCE_PCT, SWING_PCT, PITCH_DEG = 2.0, 2.0, 3.0
 WORST_PITCH_DEG = 3.2
 """Of one foot of one take: 3° is the aim, a foot of ipol_walks 13-5 has 3.05."""
-
-
-def list_ipol_walks() -> list[str]:
-    return sorted(p.stem for p in data_folder("ipol_walks").glob("*.json"))
-
-
-def _ipol(name: str) -> Recording:
-    """Two feet and the lower back; the packet counter is the clock, a packet that comes twice counts once."""
-    streams = {}
-    for place in IPOL:
-        lines = data_folder("ipol_walks", f"{name}_{place}.txt").read_text().splitlines()
-        head = lines[1].split("\t")
-        x = np.array([[float(v) for v in line.split("\t")] for line in lines[2:] if line.strip()])
-        count = x[:, head.index("PacketCounter")]
-        x = x[np.concatenate(([True], np.diff(count) > 0))]
-        streams[place] = ImuStream(
-            device_id=place,
-            source=f"{name}_{place}.txt",
-            t_s=x[:, head.index("PacketCounter")] / 100.0,
-            acc=x[:, [head.index(f"Acc_{a}") for a in "XYZ"]],
-            gyr=x[:, [head.index(f"Gyr_{a}") for a in "XYZ"]],
-            mag=None,
-            quat=None,
-            rate_hz=100.0,
-            clock="counter",
-            digest=f"{name}_{place}",
-        )
-    return Recording(streams, dict(IPOL))
 
 
 def _qmt() -> Recording:
@@ -88,7 +60,7 @@ def read_take(name: str) -> Recording:
         return recording_of(signals("imu_sample.csv"), RATE)
     if name == "qmt_fullbody":
         return _qmt()
-    return _ipol(name)
+    return ipol_recording(name)
 
 
 def cut_recording(recording: Recording, start_s: float, end_s: float) -> Recording:
@@ -163,7 +135,7 @@ def relative_pct(p: Pair, name: str) -> list[float]:
 
 
 WHOLE = ("neura_walk", "gaitmap_foot", "qmt_fullbody")
-NAMES = (*WHOLE, *list_ipol_walks())
+NAMES = (*WHOLE, *WALKS)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -267,10 +239,9 @@ def test_a_lower_back_alone_has_its_cadence_without_rest(trial: tuple[str, str])
 def test_write_down_the_figures() -> None:
     rows = []
     groups: list[tuple[str, Sequence[str]]] = [(name, (name,)) for name in WHOLE]
-    walks = list_ipol_walks()
     groups += [
-        (f"ipol_walks, subject {s}", [w for w in walks if w.startswith(s)])
-        for s in sorted({w.split("-")[0] for w in walks})
+        (f"ipol_walks, subject {s}", [w for w in WALKS if w.startswith(s)])
+        for s in sorted({w.split("-")[0] for w in WALKS})
     ]
     for title, names in groups:
         pairs = [pair(n) for n in names]
