@@ -14,11 +14,13 @@ import numpy as np
 
 from core import body, calibration, quality, timeline
 from core.agreement import check_agreement
+from core.agreement.joints import LEG_JOINTS
 from core.angles.measure import measure_angles
 from core.body.estimate import estimate_poses
 from core.body.l7s.inputs import free_acceleration
 from core.body.mounting import mount_sensors
 from core.body.walking_frame import in_walking_frame
+from core.events.alternation import tell_foot_lag
 from core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
 from core.events.lumbar import detect_steps, split_about_vertical, trunk_sensor
 from core.events.result import GaitEvents
@@ -32,6 +34,9 @@ from core.pipeline.analysis import DetectedContacts, TakeAnalysis, require_stage
 from core.pipeline.config import PipelineConfig
 from core.quality.stuck import drop_stuck_sensors, mark_stuck
 from core.withheld import withhold, withhold_at_slips, withhold_distances
+
+CHAIN: Final[frozenset[Segment]] = frozenset(s for joint in LEG_JOINTS for s in joint)
+"""With all of these worn the joints compare the clocks of both feet."""
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 """Segments whose acceleration tells how regular the gait is."""
@@ -94,6 +99,9 @@ def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
     """Contacts of the feet, turns of the body, and steps of the trunk where no contact was found."""
     fused, uniform = require_stage(analysis.fused, "orientation"), drop_stuck_sensors(analysis.recording)
     events = _contacts(fused, config)
+    if not set(uniform.sensors) >= CHAIN:
+        told = tell_foot_lag(events, config.alternation)
+        events = replace(events, notices=(*events.notices, *told)) if told else events
     alone = not events.events and trunk_sensor(uniform) is not None
     contacts = DetectedContacts(
         events,
@@ -232,8 +240,12 @@ QUALITY: Final = PipelineStage("quality", 0.03, judge_signals, ("report",), ("qu
 CALIBRATION: Final = PipelineStage("calibration", 0.05, calibrate_sensors, ("calibrated",), ("calibration",))
 ORIENTATION: Final = PipelineStage("orientation", 0.1, orient_segments, ("fused",), ("fusion",))
 EVENTS: Final = PipelineStage(
-    "events", 0.14, detect_contacts, ("contacts",), ("events", "detector", "consensus", "lumbar", "turns")
-)
+    "events",
+    0.14,
+    detect_contacts,
+    ("contacts",),
+    ("events", "detector", "consensus", "alternation", "lumbar", "turns"),
+)  # fmt: skip
 TRUNK_EVENTS: Final = PipelineStage("events", 0.14, detect_trunk_steps, ("contacts",), ("lumbar", "turns"))
 MOUNTING: Final = PipelineStage("mounting", 0.15, mount_on_segments, ("mounted",), ("poses",))
 POSES: Final = PipelineStage("poses", 0.4, build_figure, ("posed",), ("poses",))
