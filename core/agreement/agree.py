@@ -52,20 +52,26 @@ Terms = Mapping[Segment, SensorTerms]
 
 
 def compare_sensors(
-    recording: UniformRecording, params: JointParams, known: Terms | None = None
+    recording: UniformRecording,
+    params: JointParams,
+    known: Terms | None = None,
+    unchanged: Iterable[JointWindows] = (),
 ) -> tuple[tuple[JointWindows, ...], Terms]:
     """Windows of every joint whose sensors are worn, and the terms they were made from.
 
     Parameters
     ----------
-    known : terms of sensors that have not changed.
+    known : terms of sensors that have not changed. unchanged : joints neither of whose sensors has.
     """
     worn = drop_stuck_sensors(recording)
     joints = list_worn_joints(worn.sensors)
-    terms = dict(known or {})
+    terms, done = dict(known or {}), {(w.first, w.second): w for w in unchanged}
     for segment in sorted({s for joint in joints for s in joint} - set(terms)):
         terms[segment] = find_terms(worn.sensors[segment], worn.rate_hz, params)
-    return tuple(compare_at_joint((a, b), terms[a], terms[b], params) for a, b in joints), terms
+    return tuple(
+        done[a, b] if (a, b) in done else compare_at_joint((a, b), terms[a], terms[b], params)
+        for a, b in joints
+    ), terms
 
 
 def check_agreement(
@@ -101,8 +107,9 @@ def check_agreement(
             for s, x in late.items()
         }
         current = replace(current, sensors={**current.sensors, **shifted})
-        unchanged = {s: x for s, x in terms.items() if s not in late}
-        joints, terms = compare_sensors(current, params.joints, unchanged)
+        kept = {s: x for s, x in terms.items() if s not in late}
+        same = [w for w in joints if not {w.first, w.second} & set(late)]
+        joints, terms = compare_sensors(current, params.joints, kept, same)
         said += [tell_left_over(x) for x in find_sensor_lags(joints, params.lags) if x.told]
     slips = find_slips(current, terms, joints, params.slips)
     said += [tell_slip(x, params.slips) for x in slips]

@@ -14,6 +14,7 @@ from core.body.pose_params import PoseParams
 from core.calibration import CalibrationParams
 from core.errors import ParameterError
 from core.events import FootContactParams, FootPitchParams, StrideParams
+from core.events.alternation import AlternationParams
 from core.events.bouts import BoutParams
 from core.events.consensus import ConsensusParams
 from core.events.lumbar import LumbarParams
@@ -59,6 +60,7 @@ class PipelineConfig:
     contacts: FootContactParams = field(default_factory=FootContactParams)
     detector: Detector = "foot_contact"
     consensus: ConsensusParams = field(default_factory=ConsensusParams)
+    alternation: AlternationParams = field(default_factory=AlternationParams)
     lumbar: LumbarParams = field(default_factory=LumbarParams)
     turns: TurnParams = field(default_factory=TurnParams)
     poses: PoseParams = field(default_factory=PoseParams)

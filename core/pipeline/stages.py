@@ -14,6 +14,7 @@ import numpy as np
 
 from core import body, calibration, quality, timeline
 from core.agreement import check_agreement
+from core.agreement.joints import LEG_JOINTS
 from core.angles.measure import measure_angles
 from core.body.estimate import estimate_poses
 from core.body.l7s.inputs import free_acceleration
@@ -21,6 +22,7 @@ from core.body.mounting import mount_sensors
 from core.body.walking_frame import in_walking_frame
 from core.calibration.result import CalibratedRecording
 from core.errors import Notice
+from core.events.alternation import tell_foot_lag
 from core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
 from core.events.detection import detect_contacts as detect_foot_contacts
 from core.events.foot_movement import measure_foot_movements
@@ -38,6 +40,9 @@ from core.quality.stuck import drop_stuck_sensors, mark_stuck
 from core.recording import UniformRecording
 from core.rest import STANDING, Window, find_rest_windows
 from core.withheld import withhold, withhold_at_slips, withhold_distances
+
+CHAIN: Final[frozenset[Segment]] = frozenset(s for joint in LEG_JOINTS for s in joint)
+"""With all of these worn the joints compare the clocks of both feet."""
 
 TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 """Segments whose acceleration tells how regular the gait is."""
@@ -113,6 +118,9 @@ def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
         return _fall_back_on_trunk(detect_trunk_steps(analysis, config))
     calibrated = require_stage(analysis.calibrated, "calibration")
     events = _contacts(fused, calibrated, config)
+    if not set(uniform.sensors) >= CHAIN:
+        told = tell_foot_lag(events, config.alternation)
+        events = replace(events, notices=(*events.notices, *told)) if told else events
     alone = not events.events and trunk_sensor(uniform) is not None
     contacts = DetectedContacts(
         events,
@@ -289,7 +297,7 @@ EVENTS: Final = PipelineStage(
     0.14,
     detect_contacts,
     ("contacts",),
-    ("events", "contacts", "detector", "consensus", "lumbar", "turns"),
+    ("events", "contacts", "detector", "consensus", "alternation", "lumbar", "turns"),
     runs_after_problem=True,
 )
 TRUNK_EVENTS: Final = PipelineStage("events", 0.14, detect_trunk_steps, ("contacts",), ("lumbar", "turns"))
