@@ -1,4 +1,4 @@
-"""The filters compiled before the tests, on two processors at a time."""
+"""The filters compiled before the tests, on all processors at a time."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ def compile_filters() -> None:
         a filter does not compile.
     """
     running = [
-        subprocess.Popen(
-            [sys.executable, "-c", f"from core.online.session import {name}; {name}()"], cwd=ROOT
+        subprocess.Popen([sys.executable, "-c", f"from {room} import {name}; {name}()"], cwd=ROOT)
+        for room, name in (
+            ("core.online.session", "compile_live_kernels"),
+            ("core.online.session", "compile_small_kernels"),
+            ("core.agreement.windows", "compile_agreement_kernels"),
         )
-        for name in ("compile_live_kernels", "compile_small_kernels")
     ]
     for process in running:
         if process.wait():
