@@ -37,7 +37,8 @@ def drain():
     with connect(f"ws://127.0.0.1:{sys.argv[1]}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None,
                  compression=None, proxy=None) as ws:
         ws.recv()
-        print("ready", flush=True)
+        sys.stdout.write("ready\\n")  # at once: what two threads print may mingle
+        sys.stdout.flush()
         for _ in ws: pass
 for _ in range(int(sys.argv[2])): threading.Thread(target=drain).start()
 """
@@ -57,10 +58,10 @@ def watched(server: viser.ViserServer, viewers: int) -> Iterator[None]:
     with subprocess.Popen(
         [sys.executable, "-c", DRAIN, str(server.get_port()), str(viewers)], stdout=subprocess.PIPE
     ) as browsers:
-        assert browsers.stdout is not None
-        for _ in range(viewers):
-            assert browsers.stdout.readline() == b"ready\n"
         try:
+            assert browsers.stdout is not None
+            for _ in range(viewers):
+                assert browsers.stdout.readline() == b"ready\n"
             yield
         finally:
             browsers.kill()
