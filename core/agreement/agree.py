@@ -9,10 +9,11 @@ import numpy as np
 
 from core.agreement.exchange import SensorExchange, find_exchange, undo_exchange
 from core.agreement.joints import list_worn_joints
-from core.agreement.lags import SensorDrift, SensorLag, find_drifts, find_sensor_lags
+from core.agreement.lags import SensorDrift, SensorLag, find_drifts, find_sensor_lags, list_judged
 from core.agreement.params import AgreementParams, JointParams
-from core.agreement.repair import take_lag_out, turn_back
+from core.agreement.repair import leave_out, take_lag_out, turn_back
 from core.agreement.slips import SensorSlip, find_slips
+from core.agreement.standings import compare_standings
 from core.agreement.tell import tell_drift, tell_exchange, tell_lag, tell_left_over, tell_slip
 from core.agreement.terms import SensorTerms, find_terms
 from core.agreement.windows import JointWindows, compare_at_joint
@@ -34,18 +35,28 @@ class Agreement:
         when there was nothing to say.
     exchange : None where too few sensors are worn. lags, drifts : as found, also where they are too small to
         be told. slips : all of them are told.
+    whole : the same with all that a slipped sensor measured, which `recording` leaves out; None where nothing
+        is left out.
     shifted_s : sensor → lag that was taken out, at the middle of the take, s.
     doubtful : sensor → stretch in which the angles beside it are not to be shown, s: around a slip that was
-        turned back, else from there on.
+        turned back, all of the take where the slip was before the walk, else from there on. Unless repair was
+        forbidden, a sensor that is not turned back is not valid there.
+    judged_clocks : sensors of which a lag would have been seen. judged_places : sensor → from when to when a
+        slip would have been, s.
+    misfits : joint → median misfit of its two sides over its windows, after what was repaired.
     """
 
     recording: UniformRecording
+    whole: UniformRecording | None = None
     exchange: SensorExchange | None = None
     lags: tuple[SensorLag, ...] = ()
     drifts: tuple[SensorDrift, ...] = ()
     slips: tuple[SensorSlip, ...] = ()
     shifted_s: Mapping[Segment, float] = field(default_factory=dict)
     doubtful: Mapping[Segment, Window] = field(default_factory=dict)
+    judged_clocks: frozenset[Segment] = frozenset()
+    judged_places: Mapping[Segment, Window] = field(default_factory=dict)
+    misfits: Mapping[tuple[Segment, Segment], float] = field(default_factory=dict)
 
 
 Terms = Mapping[Segment, SensorTerms]
@@ -92,11 +103,15 @@ def check_agreement(
     said: list[Notice] = []
     exchange = find_exchange(terms, joints, recording.rate_hz, params.joints, params.exchange)
     current = recording
+    if exchange.mixed_up or exchange.mirrored:
+        # what else the joints seem to say follows from that
+        return Agreement(recording, exchange=exchange, misfits=measure_misfits(joints))
     if exchange.swap:
         said.append(tell_exchange(exchange, params.exchange))
         if params.exchange.repair:
             current = replace(current, sensors=undo_exchange(exchange.swap, current.sensors))
             joints, terms = compare_sensors(current, params.joints, undo_exchange(exchange.swap, terms))
+    clocks = list_judged(joints, params.lags)
     lags, drifts = find_sensor_lags(joints, params.lags), find_drifts(joints, params.lags)
     said += [tell_lag(x, params.lags) for x in lags if x.told]
     said += [tell_drift(x, params.lags) for x in drifts]
@@ -111,25 +126,50 @@ def check_agreement(
         same = [w for w in joints if not {w.first, w.second} & set(late)]
         joints, terms = compare_sensors(current, params.joints, kept, same)
         said += [tell_left_over(x) for x in find_sensor_lags(joints, params.lags) if x.told]
-    slips = find_slips(current, terms, joints, params.slips)
+    slips, places = find_slips(current, terms, joints, params.slips)
+    before, stayed = compare_standings(current, terms, params.slips)
+    # a joint near the edge of a walk may blame its other sensor, which both standings then clear
+    legs = {x.segment[-1] for x in before}
+    slips = tuple(x for x in slips if x.segment[-1] not in legs or x.segment not in stayed)
+    slips += tuple(x for x in before if x.segment not in {slip.segment for slip in slips})
+    places |= {s: x for s, x in stayed.items() if s not in places or _length(x) > _length(places[s])}
     said += [tell_slip(x, params.slips) for x in slips]
     back = {x.segment: x for x in slips if x.is_repaired and params.slips.repair}
     turned = {s: turn_back(current.sensors[s], current.t_s, x) for s, x in back.items()}
+    doubtful = {x.segment: _find_doubt(x, x.segment in back) for x in slips}
     if said:
         notices = tuple(dict.fromkeys((*current.notices, *said)))
         current = replace(current, sensors={**current.sensors, **turned}, notices=notices)
+    out = {s: x for s, x in doubtful.items() if params.slips.repair and s not in back}
+    left = {s: leave_out(current.sensors[s], current.t_s, x) for s, x in out.items()}
+    whole, current = current, replace(current, sensors={**current.sensors, **left}) if left else current
     return Agreement(
         current,
+        whole if left else None,
         exchange,
         lags,
         drifts,
         slips,
         {s: float(x[len(x) // 2]) for s, x in late.items()},
-        {x.segment: _find_doubt(x, x.segment in back) for x in slips},
+        doubtful,
+        clocks,
+        places,
+        measure_misfits(joints),
     )
 
 
+def measure_misfits(joints: Iterable[JointWindows]) -> dict[tuple[Segment, Segment], float]:
+    """Joint → median misfit of its two sides; joints without a window are left out."""
+    return {(j.first, j.second): float(np.median(j.residual)) for j in joints if len(j.t_s)}
+
+
+def _length(window: Window) -> float:
+    return window[1] - window[0]
+
+
 def _find_doubt(slip: SensorSlip, repaired: bool) -> Window:
+    if slip.at_rest:
+        return -np.inf, np.inf
     return slip.at_s - slip.within_s, slip.at_s + slip.within_s if repaired else np.inf
 
 

@@ -8,16 +8,18 @@ they are; there the places of the hips, left and right of the way the feet go, t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations, pairwise
 from typing import Final, TypeVar
 
 import numpy as np
 
-from core.agreement.joints import LEG_JOINTS
+from core.agreement.joints import LEG_JOINTS, list_worn_joints
+from core.agreement.labels import sort_by_joints
+from core.agreement.mirrored import find_mirrored
 from core.agreement.params import ExchangeParams, JointParams
 from core.agreement.strides import find_swings
-from core.agreement.terms import SensorTerms, cut_terms
+from core.agreement.terms import LevelMotion, SensorTerms, cut_terms
 from core.agreement.windows import JointWindows, compare_at_joint
 from core.frames import FOOT, SHANK, SIDES, THIGH, Floats, Segment
 from core.rotation import rotate
@@ -57,11 +59,16 @@ class SensorExchange:
     swap : to be undone, empty where the stated labels hold. ratio : misfit of the stated labels over that of
         the best others. cosine : between the line of the hips and the right-hand side of walking, of the
         labels that fit; None where it cannot be said.
+    mixed_up : segment → the one that its sensor is stated to be on, where labels are wrong in a way that is
+        no likely exchange; for a person to confirm, nothing is done. mirrored : sensors whose accelerometer
+        has all its signs turned round; neither is done anything about.
     """
 
     swap: Swap
     ratio: float
     cosine: float | None
+    mixed_up: Mapping[Segment, Segment] = field(default_factory=dict)
+    mirrored: frozenset[Segment] = frozenset()
 
 
 def find_exchange(
@@ -86,24 +93,77 @@ def find_exchange(
         frozenset((a, b)): compare_at_joint((a, b), part[a], part[b], joint_params)
         for a, b in combinations(part, 2)
     }
-    misfits = {k: float(np.median(np.minimum(w.residual, WORST))) for k, w in compared.items() if len(w.t_s)}
+    if not all(len(compared[frozenset((w.first, w.second))].t_s) for w in joints):
+        # a leg that swings alone says nothing of the other: labels are compared where all joints move
+        return SensorExchange((), 0.0, None)
+    swap, ratio = choose_labels(compared, params)
+    misfits = _misfits(compared)
+    rates = {s: float(np.sqrt((x.rate**2).sum(axis=1).mean())) for s, x in part.items()}
+    order = sort_by_joints(misfits, rates, params.calmest)
+    mirrored, gain = find_mirrored(part, misfits, list_worn_joints(part), joint_params, params)
+    others = max(len(joints) * float(np.log(max(ratio, 1.0))), 0.0 if order is None else order.gain)
+    if mirrored and gain > others + np.log(params.mirrored):
+        return SensorExchange((), float(np.exp(gain / len(joints))), None, mirrored=mirrored)
+    if order is not None and order.is_clear(_score(misfits, swap), params.ratio, params.distinct):
+        moved = {s: part[x] for s, x in order.stated_for.items()}
+        cosine = _compare_hips_of(moved, rate_hz, joint_params, params)
+        sure = cosine is not None and abs(cosine) > -params.cosine
+        found = order.exchange_legs() if cosine is not None and cosine < 0.0 else order.stated_for
+        return SensorExchange((), order.stated / order.misfit, cosine, found if sure else {})
+    cosine = _compare_hips_of(undo_exchange(swap, part), rate_hz, joint_params, params)
+    return judge_legs(swap, ratio, cosine, params)
+
+
+def _compare_hips_of(
+    terms: Mapping[Segment, SensorTerms], rate_hz: float, joint_params: JointParams, params: ExchangeParams
+) -> float | None:
+    chains = {
+        (a, b): compare_at_joint((a, b), terms[a], terms[b], joint_params) for a, b in list_worn_joints(terms)
+    }
+    return compare_hips(terms, chains, rate_hz, params)
+
+
+def choose_labels(
+    compared: Mapping[frozenset[Segment], JointWindows], params: ExchangeParams
+) -> tuple[Swap, float]:
+    """The labels under which the joints fit best and the misfit of the stated ones over theirs.
+
+    Parameters
+    ----------
+    compared : pairs of sensors, those of every joint of every labelling of `SWAPS`, as stated.
+    """
+    misfits = _misfits(compared)
+    worn = frozenset().union(*compared)
     stated = _score(misfits, ())
-    possible = [x for x in SWAPS if all(s in part for pair in x for s in pair)]
+    possible = [x for x in SWAPS if all(s in worn for pair in x for s in pair)]
     scores = {x: _score(misfits, x) for x in possible}
     best = min(scores, key=lambda x: scores[x], default=())
     ratio = stated / scores[best] if best else 0.0
-    swap: Swap = best if ratio > params.ratio else ()
-    cosine = _compare_hips(part, swap, joint_params, rate_hz, params)
+    return best if ratio > params.ratio else (), ratio
+
+
+def _misfits(compared: Mapping[frozenset[Segment], JointWindows]) -> dict[frozenset[Segment], float]:
+    """Median misfit of every pair that has windows."""
+    return {k: float(np.median(np.minimum(w.residual, WORST))) for k, w in compared.items() if len(w.t_s)}
+
+
+def judge_legs(swap: Swap, ratio: float, cosine: float | None, params: ExchangeParams) -> SensorExchange:
+    """Add exchanged legs to the labels that fit where the hips lie the wrong way round."""
     if cosine is not None and cosine < params.cosine:
         swap = _simplify((*swap, *LEGS))
     return SensorExchange(swap, ratio, cosine)
 
 
 def undo_exchange(swap: Swap, by_segment: Mapping[Segment, Thing]) -> dict[Segment, Thing]:
-    """The same things on the segments they belong to."""
+    """The same things on the segments they belong to; where one of two is not worn, the other moves."""
     out = dict(by_segment)
     for a, b in swap:
-        out[a], out[b] = out[b], out[a]
+        if a in out and b in out:
+            out[a], out[b] = out[b], out[a]
+        elif a in out:
+            out[b] = out.pop(a)
+        elif b in out:
+            out[a] = out.pop(b)
     return out
 
 
@@ -123,49 +183,47 @@ def _simplify(swap: Swap) -> Swap:
     return tuple((a, b) for a, b in where.items() if a < b and where[b] == a)
 
 
-def _compare_hips(
-    stated: Mapping[Segment, SensorTerms],
-    swap: Swap,
-    joint_params: JointParams,
+def compare_hips(
+    motions: Mapping[Segment, LevelMotion],
+    joints: Mapping[tuple[Segment, Segment], JointWindows],
     rate_hz: float,
     params: ExchangeParams,
 ) -> float | None:
     """Cosine between the line from the left to the right hip and the right-hand side of walking.
 
     The way of a foot over a swing is turned into the level frame of the pelvis by the turns of the joints.
+
+    Parameters
+    ----------
+    motions, joints : by the labels that fit; times of the windows are counted from the first sample.
     """
-    terms = undo_exchange(swap, stated)
-    if not all(s in terms for s in ("pelvis", "thigh_l", "thigh_r")):
+    spoken = {joint: w for joint, w in joints.items() if len(w.t_s)}
+    hips = [w for joint, w in spoken.items() if "pelvis" in joint]
+    if any(np.median(w.residual) > params.worst_residual for w in hips):
         return None
-
-    def compare(a: Segment, b: Segment) -> JointWindows:
-        return compare_at_joint((a, b), terms[a], terms[b], joint_params)
-
-    hips = {side: compare("pelvis", THIGH[side]) for side in SIDES}
-    if not all(len(w.t_s) for w in hips.values()):
+    left, right = (spoken.get(("pelvis", THIGH[side])) for side in SIDES)
+    if left is None or right is None:
         return None
-    centre = {side: np.median(w.place_in("pelvis"), axis=0) for side, w in hips.items()}
-    line = centre["right"] - centre["left"]
+    line = np.median(right.place_in("pelvis"), axis=0) - np.median(left.place_in("pelvis"), axis=0)
     said: list[float] = []
     for side in SIDES:
-        shank, foot = SHANK[side], FOOT[side]
-        if shank not in terms or foot not in terms:
-            continue
-        chain = (hips[side], compare(THIGH[side], shank), compare(shank, foot))
-        if all(len(w.t_s) for w in chain):
-            said += _cosines(terms, chain, line, rate_hz, params)
+        thigh, shank, foot = THIGH[side], SHANK[side], FOOT[side]
+        chain = [spoken.get(joint) for joint in (("pelvis", thigh), (thigh, shank), (shank, foot))]
+        whole = [w for w in chain if w is not None]
+        if len(whole) == len(chain):
+            said += _cosines(motions, whole, line, rate_hz, params)
     return float(np.median(said)) if len(said) >= LEAST_SAYING else None
 
 
 def _cosines(
-    terms: Mapping[Segment, SensorTerms],
+    motions: Mapping[Segment, LevelMotion],
     chain: Sequence[JointWindows],
     line: Floats,
     rate_hz: float,
     params: ExchangeParams,
 ) -> list[float]:
     """One cosine per swing of a leg."""
-    foot, shank = terms[chain[-1].second], terms[chain[-1].first]
+    foot, shank = motions[chain[-1].second], motions[chain[-1].first]
     speed = np.linalg.norm(foot.rate, axis=1)
     swings, said = find_swings(shank.rate, rate_hz), []
     for a, b in pairwise(swings):
@@ -181,7 +239,7 @@ def _cosines(
             continue
         c, s = np.cos(turn), np.sin(turn)
         ahead = np.array([c * way[0] - s * way[1], s * way[0] + c * way[1]])
-        across = rotate(terms["pelvis"].q[(a + b) // 2], line)[:2]
+        across = rotate(motions["pelvis"].q[(a + b) // 2], line)[:2]
         size = np.linalg.norm(across) * np.linalg.norm(ahead)
         said.append(float((across[0] * ahead[1] - across[1] * ahead[0]) / max(size, 1e-9)))
     return said

@@ -139,6 +139,11 @@ def find_drifts(joints: Sequence[JointWindows], params: LagParams) -> tuple[Sens
     return tuple(out)
 
 
+def list_judged(joints: Sequence[JointWindows], params: LagParams) -> frozenset[Segment]:
+    """Sensors whose clock a joint compares with that of another."""
+    return frozenset(s for w in _speaking(joints, params) for s in (w.first, w.second))
+
+
 def _speaking(joints: Sequence[JointWindows], params: LagParams) -> list[JointWindows]:
     """Joints with windows that hang together well enough to say something about time."""
     kept = [w.choose(w.certain & (w.residual < params.worst_residual)) for w in joints]
@@ -181,6 +186,8 @@ def _best_addition(
     taken = {s for c in chosen for s in c}
     before = _left_over([_column(use, sd, c) for c in chosen], y)
     best, most = None, params.z**2
+    if before <= most:
+        return None
     for option in (*((s,) for s in worn), *groups):
         column = _column(use, sd, option)
         if taken & set(option) or not column.any():

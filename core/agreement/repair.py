@@ -10,6 +10,7 @@ import numpy as np
 from core.agreement.slips import SensorSlip
 from core.frames import Floats
 from core.recording import SensorSignals
+from core.rest import Window
 from core.rotation import exp, rotate
 from core.timeline.grid import lay_signal
 from core.timeline.params import TimelineParams
@@ -66,3 +67,9 @@ def turn_back(signals: SensorSignals, t_s: Floats, slip: SensorSlip) -> SensorSi
     gyr = turned(signals.gyr) + slipping[:, None] * turn / max(lasting_s, 1e-9)
     mag = None if signals.mag is None else turned(signals.mag)
     return replace(signals, acc=turned(signals.acc), gyr=gyr, mag=mag)
+
+
+def leave_out(signals: SensorSignals, t_s: Floats, doubtful: Window) -> SensorSignals:
+    """The sensor as one that does not measure while nobody knows how it sits."""
+    valid = signals.valid & ~((t_s >= doubtful[0]) & (t_s <= doubtful[1]))
+    return replace(signals, valid=valid, interpolated=signals.interpolated & valid)

@@ -12,15 +12,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+import numba
 import numpy as np
 
 from core.agreement.lags import MAD
-from core.agreement.params import SlipParams
+from core.agreement.params import JointParams, SlipParams
 from core.agreement.strides import choose_leg, find_main_axis, find_stride_turns, find_swings
-from core.agreement.terms import SensorTerms
-from core.agreement.windows import JointWindows
+from core.agreement.terms import LevelMotion, SensorTerms, find_terms
+from core.agreement.windows import JointWindows, compare_at_joint
 from core.frames import Bools, Floats, Segment
-from core.recording import UniformRecording
+from core.recording import SensorSignals, UniformRecording
+from core.rest import Window
 
 INDEPENDENT: Final = 5.0
 """More windows side by side than this do not make a median surer: gait changes between them too."""
@@ -44,6 +46,7 @@ class SensorSlip:
     ----------
     at_s, within_s : when, and half the width of what is left out. turn_rad : about `axis` (3,) in sensor
         axes: what the sensor shows afterwards = that turn of what it would have shown. sd_rad : of it.
+    at_rest : seen by two standings (standings.py), so that the moment is not known well enough to turn back.
     """
 
     segment: Segment
@@ -52,11 +55,12 @@ class SensorSlip:
     turn_rad: float
     sd_rad: float
     axis: tuple[float, float, float]
+    at_rest: bool = False
 
     @property
     def is_repaired(self) -> bool:
         """Whether what follows is turned back."""
-        return self.segment.startswith(REPAIRED)
+        return self.segment.startswith(REPAIRED) and not self.at_rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,15 +70,19 @@ class PlaceTurns:
     Parameters
     ----------
     t_s, turn : (m,) s, rad. places : (m, joints, 3) across the axis, turned back, m.
+    step_s : between windows.
     """
 
     t_s: Floats
     turn: Floats
     places: Floats
+    step_s: float
 
 
 @dataclass(frozen=True)
-class _Step:
+class PlaceStep:
+    """A turn for good: when, by how much, over its scatter, and that, s and rad."""
+
     at_s: float
     size: float
     z: float
@@ -86,116 +94,204 @@ def find_slips(
     terms: Mapping[Segment, SensorTerms],
     joints: Sequence[JointWindows],
     params: SlipParams,
-) -> tuple[SensorSlip, ...]:
-    """The slips that pass all limits, at most one a sensor.
+) -> tuple[tuple[SensorSlip, ...], dict[Segment, Window]]:
+    """The slips that pass all limits, at most one a sensor; sensor → from when to when one would be seen.
 
     Parameters
     ----------
     terms, joints : of a recording whose late sensors were shifted.
     """
     rate_hz = recording.rate_hz
-    moving = [_find_moving(w, terms, rate_hz, params) for w in joints]
     axes: dict[Segment, Floats] = {s: find_main_axis(x.rate) for s, x in terms.items() if s != "pelvis"}
-    turns: dict[Segment, PlaceTurns] = {
-        s: x for s, axis in axes.items() if (x := _find_place_turns(s, joints, moving, axis, params))
-    }
+    power = {s: np.concatenate(([0.0], np.cumsum((terms[s].rate ** 2).sum(axis=1)))) for s in axes}
+    moving = [_find_moving(w, power, rate_hz, params) for w in joints]
+    turns = find_turns([w.choose(ok) for w, ok in zip(joints, moving, strict=True)], axes, params)
     half = 0.5 * max((w.width_s for w in joints), default=0.0)
     slips = []
-    for segment, found in turns.items():
-        step = _find_best_step(found, half, params)
-        if step is None or not _is_alone(segment, step, turns, half, params):
-            continue
-        if _measure_misfit(found, step, half) >= params.misfit:
-            continue
-        slip = _question_strides(segment, step, axes[segment], recording, terms, half, params)
+    for segment, step in judge_turns(turns, half, params).items():
+        valid = recording.sensors[segment].valid
+        slip = question_strides(segment, step, axes[segment], terms, valid, rate_hz, half, params)
         if slip is not None:
             slips.append(slip)
-    return tuple(slips)
+    return tuple(slips), _find_judged(turns, half, params)
+
+
+def _find_judged(
+    turns: Mapping[Segment, PlaceTurns], half: float, params: SlipParams
+) -> dict[Segment, Window]:
+    """Moments with windows enough wholly before and after, of sensors where that is most of the walk."""
+    judged, least = {}, params.least_windows
+    for segment, t_s in ((s, x.t_s) for s, x in turns.items()):
+        start, end = float(t_s[least - 1]) + half, float(t_s[-least]) - half
+        if end - start >= params.judged * float(t_s[-1] - t_s[0]):
+            judged[segment] = start, end
+    return judged
+
+
+def find_turns(
+    joints: Sequence[JointWindows], axes: Mapping[Segment, Floats], params: SlipParams
+) -> dict[Segment, PlaceTurns]:
+    """How the places beside every sensor turn.
+
+    Parameters
+    ----------
+    joints : with the windows that speak (`is_moving`). axes : sensor → axis it turns about most (3,).
+    """
+    found = {s: _find_place_turns(s, joints, axis, params) for s, axis in axes.items()}
+    return {s: x for s, x in found.items() if x is not None}
+
+
+def judge_turns(
+    turns: Mapping[Segment, PlaceTurns], half: float, params: SlipParams, since_s: float = -np.inf
+) -> dict[Segment, PlaceStep]:
+    """Sensor → when its places turned for good, while those of the others did not.
+
+    Parameters
+    ----------
+    half : of a window's width, s. since_s : moments before are not asked for.
+    """
+    steps: dict[Segment, PlaceStep] = {}
+    for segment, found in turns.items():
+        step = _find_best_step(found, half, params, since_s)
+        if step is None or not _is_alone(segment, step, turns, half, params):
+            continue
+        if _measure_misfit(found, step, half) < params.misfit:
+            steps[segment] = step
+    return steps
+
+
+def is_moving(w: JointWindows, swing: Mapping[Segment, Floats], params: SlipParams) -> Bools:
+    """Windows (m,) in which the leg sensors of a joint swing as in walking, and the joint fits.
+
+    Parameters
+    ----------
+    swing : leg sensor → mean square of its rate in each window (m,), rad²/s².
+    """
+    ok = w.residual < params.worst_residual
+    for s in (w.first, w.second):
+        if s in swing:
+            ok &= swing[s] > params.least_swing**2
+    return np.asarray(ok, np.bool_)
 
 
 def _find_moving(
-    w: JointWindows, terms: Mapping[Segment, SensorTerms], rate_hz: float, params: SlipParams
+    w: JointWindows, power: Mapping[Segment, Floats], rate_hz: float, params: SlipParams
 ) -> Bools:
-    """Windows (m,) in which the leg sensors of a joint swing as in walking, and the joint fits."""
-    ok = w.residual < params.worst_residual
-    for s in (w.first, w.second):
-        if s == "pelvis":
-            continue
-        power = np.concatenate(([0.0], np.cumsum((terms[s].rate ** 2).sum(axis=1))))
+    swing = {}
+    for s in {w.first, w.second} & set(power):
         a, b = (
-            np.clip(np.round((w.t_s + x * w.width_s) * rate_hz).astype(int), 0, len(power) - 1)
+            np.clip(np.round((w.t_s + x * w.width_s) * rate_hz).astype(int), 0, len(power[s]) - 1)
             for x in (-0.5, 0.5)
         )
-        ok &= (power[b] - power[a]) > params.least_swing**2 * np.maximum(b - a, 1)
-    return np.asarray(ok, np.bool_)
+        swing[s] = (power[s][b] - power[s][a]) / np.maximum(b - a, 1)
+    return is_moving(w, swing, params)
 
 
 def _find_place_turns(
     segment: Segment,
     joints: Sequence[JointWindows],
-    moving: Sequence[Bools],
     axis: Floats,
     params: SlipParams,
 ) -> PlaceTurns | None:
     """Turns of the places from where they typically lie, of windows in which all its joints speak."""
-    own = [(w.choose(ok)) for w, ok in zip(joints, moving, strict=True) if segment in (w.first, w.second)]
+    own = [w for w in joints if segment in (w.first, w.second)]
     # one joint alone says too little, except at a foot, which has no other
     if not own or (len(own) < 2 and not segment.startswith("foot")):
         return None
     t = own[0].t_s
     for w in own[1:]:
-        t = np.intersect1d(t, w.t_s)
+        t = np.intersect1d(t, w.t_s, assume_unique=True)
     if len(t) < 2 * params.least_windows:
         return None
-    V = np.stack([w.place_in(segment)[np.isin(w.t_s, t)] for w in own], axis=1)
-    V = V - (V @ axis)[:, :, None] * axis
-    turn = np.zeros(len(t))
-    back = V
+    V = np.stack([w.place_in(segment)[np.isin(w.t_s, t, assume_unique=True)] for w in own], axis=1)
+    turn, back = _turn_places(V, axis)
+    return PlaceTurns(t, np.unwrap(turn), back, float(np.median(np.diff(t))))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _turn_places(V, axis):  # type: ignore[no-untyped-def]
+    """Turns (m,) about an axis (3,) of places V (m, joints, 3) from their median, and the places across the
+    axis turned back by them."""
+    m, joints = V.shape[:2]
+    x, y, z = axis
+    across, back = np.empty(V.shape), np.empty(V.shape)
+    for k in range(m):
+        for j in range(joints):
+            along = V[k, j, 0] * x + V[k, j, 1] * y + V[k, j, 2] * z
+            for c in range(3):
+                across[k, j, c] = back[k, j, c] = V[k, j, c] - along * axis[c]
+    turn, typical = np.zeros(m), np.empty((joints, 3))
     for _ in range(2):
-        typical = np.median(back, axis=0)
-        turn = np.arctan2((np.cross(typical, V) @ axis).sum(axis=1), np.einsum("mjc,jc->m", V, typical))
-        c, s = np.cos(turn)[:, None, None], np.sin(turn)[:, None, None]
-        back = c * V - s * np.cross(axis, V)
-    return PlaceTurns(t, np.unwrap(turn), back)
+        for j in range(joints):
+            for c in range(3):
+                typical[j, c] = np.median(back[:, j, c])
+        for k in range(m):
+            sine = cosine = 0.0
+            for j in range(joints):
+                a, b, d = typical[j]
+                p, q, r = across[k, j]
+                sine += x * (b * r - d * q) + y * (d * p - a * r) + z * (a * q - b * p)
+                cosine += a * p + b * q + d * r
+            turn[k] = np.arctan2(sine, cosine)
+            c0, s0 = np.cos(turn[k]), np.sin(turn[k])
+            for j in range(joints):
+                p, q, r = across[k, j]
+                back[k, j, 0] = c0 * p - s0 * (y * r - z * q)
+                back[k, j, 1] = c0 * q - s0 * (z * p - x * r)
+                back[k, j, 2] = c0 * r - s0 * (x * q - y * p)
+    return turn, back
 
 
 def _measure_step(
     found: PlaceTurns, at_s: float, half: float, floor: float, reach: float = np.inf
 ) -> tuple[float, float] | None:
     """Turn between windows wholly before and wholly after a moment, and its standard deviation."""
-    before = (found.t_s <= at_s - half) & (found.t_s >= at_s - reach)
-    after = (found.t_s >= at_s + half) & (found.t_s <= at_s + reach)
-    if not before.any() or not after.any():
-        return None
-    parts = [found.turn[before], found.turn[after]]
-    middles = [float(np.median(x)) for x in parts]
-    spread = max(MAD * float(np.median(np.abs(x - m))) for x, m in zip(parts, middles, strict=True))
-    step = float(np.median(np.diff(found.t_s)))
-    free = [float(np.clip(len(x) * step / (2 * half), 1.0, INDEPENDENT)) for x in parts]
-    return middles[1] - middles[0], float(max(spread, floor) * np.sqrt(sum(1.0 / n for n in free)))
+    size, sd = _compare_sides(found.t_s, found.turn, found.step_s, at_s, half, floor, reach)
+    return None if np.isnan(size) else (size, sd)
 
 
-def _find_best_step(found: PlaceTurns, half: float, params: SlipParams) -> _Step | None:
+def is_lasting(found: PlaceTurns, at_s: float, turn_rad: float, half: float, params: SlipParams) -> bool:
+    """Whether what turned at a moment is still turned; also where no window from before is left."""
+    measured = _measure_step(found, at_s, half, params.floor_rad)
+    return measured is None or measured[0] / turn_rad >= params.lasting
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _compare_sides(t_s, turn, step_s, at_s, half, floor, reach):  # type: ignore[no-untyped-def]
+    """Difference of the medians of both sides and its spread; not a number where a side has no window."""
+    before = turn[(t_s <= at_s - half) & (t_s >= at_s - reach)]
+    after = turn[(t_s >= at_s + half) & (t_s <= at_s + reach)]
+    if len(before) == 0 or len(after) == 0:
+        return np.nan, np.nan
+    spread, inverse = floor, 0.0
+    for x in (before, after):
+        spread = max(spread, MAD * np.median(np.abs(x - np.median(x))))
+        inverse += 1.0 / min(max(len(x) * step_s / (2.0 * half), 1.0), INDEPENDENT)
+    return np.median(after) - np.median(before), spread * np.sqrt(inverse)
+
+
+def _find_best_step(found: PlaceTurns, half: float, params: SlipParams, since_s: float) -> PlaceStep | None:
     """The moment before and after which the places differ most clearly, for good; None below the limits."""
     best, most = None, 0.0
     least = params.least_windows
-    first, last = found.t_s[least - 1] + half, found.t_s[-least] - half
-    moments = np.arange(first, last + 0.01, max(FINEST_S, 0.5 * float(np.median(np.diff(found.t_s)))))
+    first, last = max(found.t_s[least - 1] + half, since_s), found.t_s[-least] - half
+    moments = np.arange(first, last + 0.01, max(FINEST_S, 0.5 * found.step_s))
     for at in moments[_is_likely(found, moments, half, LIKELY * params.least_rad)]:
         measured = _measure_step(found, float(at), half, params.floor_rad, params.near_s)
-        lasting = _measure_step(found, float(at), half, params.floor_rad)
-        if measured is None or lasting is None or lasting[0] / measured[0] < params.lasting:
+        if measured is None or not is_lasting(found, float(at), measured[0], half, params):
             continue
         size, sd = measured
         z = abs(size) / sd
         if z * abs(size) > most:
-            best, most = _Step(float(at), size, z, sd), z * abs(size)
+            best, most = PlaceStep(float(at), size, z, sd), z * abs(size)
     if best is None or abs(best.size) <= params.least_rad or best.z <= params.z:
         return None
     return replace(best, at_s=_find_moment(found, best, half, moments, params))
 
 
-def _find_moment(found: PlaceTurns, step: _Step, half: float, moments: Floats, params: SlipParams) -> float:
+def _find_moment(
+    found: PlaceTurns, step: PlaceStep, half: float, moments: Floats, params: SlipParams
+) -> float:
     """When the turn was: windows that contain it show a share of it, so that it is a ramp of their width."""
     best, least = step.at_s, np.inf
     near = np.abs(found.t_s - step.at_s) <= params.near_s
@@ -223,7 +319,7 @@ def _is_likely(found: PlaceTurns, moments: Floats, half: float, least: float) ->
 
 
 def _is_alone(
-    segment: Segment, step: _Step, turns: Mapping[Segment, PlaceTurns], half: float, params: SlipParams
+    segment: Segment, step: PlaceStep, turns: Mapping[Segment, PlaceTurns], half: float, params: SlipParams
 ) -> bool:
     """Whether the other sensors stay where they are at that moment; a change of gait turns several."""
     others = []
@@ -236,7 +332,7 @@ def _is_alone(
     return len(others) > 1 and max(others) < params.alone * abs(step.size)
 
 
-def _measure_misfit(found: PlaceTurns, step: _Step, half: float) -> float:
+def _measure_misfit(found: PlaceTurns, step: PlaceStep, half: float) -> float:
     """What a turn does not carry from before to after, of the size of the places."""
     before = np.median(found.places[found.t_s <= step.at_s - half], axis=0)
     after = np.median(found.places[found.t_s >= step.at_s + half], axis=0)
@@ -244,22 +340,28 @@ def _measure_misfit(found: PlaceTurns, step: _Step, half: float) -> float:
     return float(np.linalg.norm(before - after) / max(size, 1e-9))
 
 
-def _question_strides(
+def question_strides(
     segment: Segment,
-    step: _Step,
+    step: PlaceStep,
     axis: Floats,
-    recording: UniformRecording,
-    terms: Mapping[Segment, SensorTerms],
+    motions: Mapping[Segment, LevelMotion],
+    valid: Bools,
+    rate_hz: float,
     half: float,
     params: SlipParams,
 ) -> SensorSlip | None:
-    """What single strides say of it: when it was, None where they deny it or it is too small without them."""
-    rate_hz, at, within = recording.rate_hz, step.at_s, half
+    """What single strides say of it: when it was, None where they deny it or it is too small without them.
+
+    Parameters
+    ----------
+    step : its time is counted from the first sample of `motions`. valid : (n,) samples of the sensor.
+    """
+    at, within = step.at_s, half
     share = None
     for leg in choose_leg(segment):
-        borders = find_swings(terms[leg].rate, rate_hz) if leg in terms else np.zeros(0)
+        borders = find_swings(motions[leg].rate, rate_hz) if leg in motions else np.zeros(0)
         if len(borders) > 2 * params.strides:
-            u = find_stride_turns(terms[segment], recording.sensors[segment].valid, borders, rate_hz, params)
+            u = find_stride_turns(motions[segment], valid, borders, rate_hz, params)
             x = u.turn @ axis
             best = np.inf
             for k in range(params.strides, len(x) - params.strides + 1):
@@ -286,3 +388,15 @@ def _question_strides(
         return None
     along = tuple(float(v) for v in axis)
     return SensorSlip(segment, at, max(within, params.within_s), step.size, step.sd, along)  # type: ignore[arg-type]
+
+
+def compile_agreement_kernels() -> None:
+    """Compile the kernels or load them, so that the first recording does not wait for them."""
+    n = 1000
+    wave = np.random.default_rng(0).normal(size=(2, n, 3))
+    still = SensorSignals("", wave[0], wave[1], None, np.ones(n, np.bool_), np.zeros(n, np.bool_))
+    terms = find_terms(still, 100.0, JointParams())
+    compare_at_joint(("pelvis", "thigh_l"), terms, terms, JointParams())
+    turn, places = _turn_places(np.ones((4, 2, 3)), np.array([1.0, 0.0, 0.0]))
+    found = PlaceTurns(np.arange(4.0), turn, places, 1.0)
+    _measure_step(found, 2.0, 1.0, 1.0)

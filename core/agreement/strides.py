@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from core.agreement.params import SlipParams
-from core.agreement.terms import SensorTerms
+from core.agreement.terms import LevelMotion
 from core.filtering import low_pass
 from core.frames import Bools, Floats, Segment
 from core.rotation import conjugate, exp, rotate, to_matrix
@@ -41,7 +41,12 @@ class StrideTurns:
 
 def find_main_axis(rate: Floats) -> Floats:
     """Unit axis (3,) about which a sensor turns most; rate (n, 3) rad/s."""
-    return np.asarray(np.linalg.eigh(rate.T @ rate)[1][:, -1])
+    return find_largest_axis(rate.T @ rate)
+
+
+def find_largest_axis(moments: Floats) -> Floats:
+    """The same from the sum of products (3, 3) of its rate."""
+    return np.ascontiguousarray(np.linalg.eigh(moments)[1][:, -1])
 
 
 def find_swings(rate: Floats, rate_hz: float) -> Floats:
@@ -63,7 +68,7 @@ def choose_leg(segment: Segment) -> tuple[Segment, ...]:
 
 
 def find_stride_turns(
-    terms: SensorTerms, valid: Bools, borders: Floats, rate_hz: float, params: SlipParams
+    motion: LevelMotion, valid: Bools, borders: Floats, rate_hz: float, params: SlipParams
 ) -> StrideTurns:
     """Fit each stride's curve of vertical and rate to the typical one by a rotation.
 
@@ -72,19 +77,19 @@ def find_stride_turns(
     """
     length = np.diff(borders)
     usual = float(np.median(length)) if len(length) else 0.0
-    smooth = low_pass(np.ascontiguousarray(terms.rate.T), 15.0, rate_hz).T
+    smooth = low_pass(np.ascontiguousarray(motion.rate.T), 15.0, rate_hz).T
     curves, spans = [], []
     for a, b in pairwise(borders):
         if not USUAL[0] * usual <= b - a <= USUAL[1] * usual or b - a > LONGEST_S * rate_hz:
             continue
         if not valid[a : b + 1].all():
             continue
-        up = terms.level[:, a:b].mean(axis=1)
+        up = motion.level[:, a:b].mean(axis=1)
         up /= np.linalg.norm(up)
-        if abs(float(np.sum(rotate(terms.q[a:b], terms.rate[a:b]) @ up))) / rate_hz > params.straight_rad:
+        if abs(float(np.sum(rotate(motion.q[a:b], motion.rate[a:b]) @ up))) / rate_hz > params.straight_rad:
             continue
         k = a + (np.arange(POINTS) * (b - a)) // POINTS
-        curves.append(np.concatenate((rotate(conjugate(terms.q[k]), np.tile(up, (POINTS, 1))), smooth[k])))
+        curves.append(np.concatenate((rotate(conjugate(motion.q[k]), np.tile(up, (POINTS, 1))), smooth[k])))
         spans.append((a / rate_hz, b / rate_hz))
     if len(curves) < 2 * params.strides:
         return StrideTurns(np.zeros(0), np.zeros(0), np.zeros((0, 3)))

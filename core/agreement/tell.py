@@ -16,37 +16,39 @@ from core.errors import Notice
 UNDO: Final = "Set agreement.lags.repair to false to analyse them as they are."
 
 
+def say_lag(lag: SensorLag) -> str:
+    """Whose clock is late, by how much."""
+    ms, sd = 1e3 * abs(lag.lag_s), 1e3 * lag.sd_s
+    verb, which = "is" if lag.sure else "seems", "late" if lag.lag_s > 0 else "early"
+    return f"The clock of {list_sensors(lag.sensors)} {verb} {ms:.0f} ± {sd:.0f} ms {which}"
+
+
 def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
     """Say whose clock is late, and what was done about it."""
-    ms, sd = 1e3 * abs(lag.lag_s), 1e3 * lag.sd_s
-    which = "late" if lag.lag_s > 0 else "early"
-    whose = list_sensors(lag.sensors)
+    said = say_lag(lag)
     if not lag.sure:
         return Notice(
             "clocks_disagree",
-            f"The clock of {whose} seems {ms:.0f} ± {sd:.0f} ms {which}. One joint alone shows it, so "
-            "nothing was shifted. Synchronise the sensors and record again.",
+            f"{said}. One joint alone shows it, so nothing was shifted. Synchronise the sensors and record "
+            "again.",
             lag.sensors[0],
         )
     if not params.repair:
         return Notice(
             "sensor_late",
-            f"The clock of {whose} is {ms:.0f} ± {sd:.0f} ms {which}. It was left so, as this analysis was "
-            "told to. Angles beside it are wrong.",
+            f"{said}. It was left so, as this analysis was told to. Angles beside it are wrong.",
             lag.sensors[0],
         )
     if abs(lag.lag_s) <= params.warn_s:
         return Notice(
             "sensor_late",
-            f"The clock of {whose} is {ms:.0f} ± {sd:.0f} ms {which}; its samples were shifted by that. "
-            + UNDO,
+            f"{said}; its samples were shifted by that. " + UNDO,
             lag.sensors[0],
             severity="info",
         )
     return Notice(
         "sensor_late",
-        f"The clock of {whose} is {ms:.0f} ± {sd:.0f} ms {which}; its samples were shifted by that. "
-        "Synchronise the sensors before the next take. " + UNDO,
+        f"{said}; its samples were shifted by that. Synchronise the sensors before the next take. " + UNDO,
         lag.sensors[0],
     )
 
@@ -64,9 +66,14 @@ def tell_drift(drift: SensorDrift, params: LagParams) -> Notice:
     )
 
 
+def say_exchange(exchange: SensorExchange) -> str:
+    """Which sensors were put on each other's segments."""
+    whose = " and ".join(f"{a} with {b}" for a, b in exchange.swap)
+    return f"The joints show that sensors are exchanged: {whose}."
+
+
 def tell_exchange(exchange: SensorExchange, params: ExchangeParams) -> Notice:
     """Say which sensors were put on each other's segments."""
-    whose = " and ".join(f"{a} with {b}" for a, b in exchange.swap)
     done = (
         "The take was analysed so. Correct who wears what; agreement.exchange.repair = false undoes this."
         if params.repair
@@ -74,23 +81,41 @@ def tell_exchange(exchange: SensorExchange, params: ExchangeParams) -> Notice:
     )
     return Notice(
         "sensors_exchanged",
-        f"The joints show that sensors are exchanged: {whose}. " + done,
+        f"{say_exchange(exchange)} {done}",
         exchange.swap[0][0],
     )
 
 
+def say_slip(slip: SensorSlip) -> str:
+    """Which sensor slipped, when and how far."""
+    angle, sd = np.degrees(abs(slip.turn_rad)), np.degrees(slip.sd_rad)
+    if slip.at_rest:
+        return (
+            f"The sensor on {slip.segment} slipped by {angle:.0f} ± {sd:.0f}° before the walk at "
+            f"{slip.at_s + slip.within_s:.0f} s, or its leg stood otherwise before than after it."
+        )
+    return f"The sensor on {slip.segment} slipped by {angle:.0f} ± {sd:.0f}° about {slip.at_s:.0f} s."
+
+
 def tell_slip(slip: SensorSlip, params: SlipParams) -> Notice:
     """Say which sensor slipped, when, how far, and what follows from it."""
-    angle, sd = np.degrees(abs(slip.turn_rad)), np.degrees(slip.sd_rad)
-    done = (
-        "What came after was turned back. Set agreement.slips.repair to false to undo that."
-        if slip.is_repaired and params.repair
-        else "Angles beside it are withheld from there on. Fasten the sensor and record again."
-    )
+    if not params.repair:
+        done = "It was left so, as this analysis was told to. Angles beside it are withheld from there on."
+    elif slip.at_rest:
+        done = "It is left out, as if it were not worn. Fasten it and record again."
+    elif slip.is_repaired:
+        done = (
+            f"Angles beside it are left out within {slip.within_s:.0f} s of that; what came after was turned "
+            "back. Set agreement.slips.repair to false to undo that."
+        )
+    else:
+        done = (
+            f"From {max(slip.at_s - slip.within_s, 0.0):.0f} s on it is left out, as if it were not worn. "
+            "Fasten it and record again."
+        )
     return Notice(
         "sensor_slipped",
-        f"The sensor on {slip.segment} slipped by {angle:.0f} ± {sd:.0f}° about {slip.at_s:.0f} s. "
-        f"Strides within {slip.within_s:.0f} s of that are left out. " + done,
+        f"{say_slip(slip)} {done}",
         slip.segment,
         slip.at_s,
     )

@@ -25,23 +25,33 @@ TERMS: Final = 4
 
 
 @dataclass(frozen=True, eq=False)
-class SensorTerms:
-    """One sensor's side of every joint.
+class LevelMotion:
+    """How one sensor moves, without calibration.
+
+    Parameters
+    ----------
+    q : (n, 4) sensor to its level frame, whose heading is free. level : (3, n) specific force there, m/s².
+    rate : (n, 3) rad/s with the bias at rest taken off.
+    """
+
+    q: Floats
+    level: Floats
+    rate: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class SensorTerms(LevelMotion):
+    """One sensor's side of every joint, and how it moves at every sample of the take.
 
     Parameters
     ----------
     M : (m, 3, 4) [R K | R f] in m/s² per m and m/s², x and y horizontal, z up. usable : (m,) no lost
         sample is near. rate_hz : of these samples.
-    q : (n, 4) sensor to its level frame, at every sample of the take. level : (3, n) specific force there.
-    rate : (n, 3) rad/s with the bias of the quietest moment taken off.
     """
 
     M: Floats
     usable: Bools
     rate_hz: float
-    q: Floats
-    level: Floats
-    rate: Floats
 
 
 NORMS: Final = (9.0, 10.6)
@@ -60,18 +70,47 @@ STEEPEST: Final = 4.0
 def find_terms(signals: SensorSignals, rate_hz: float, params: JointParams) -> SensorTerms:
     """Tilt the sensor level and band-pass its terms."""
     gyr = signals.gyr - find_bias(signals, rate_hz)
-    q = _tilt(signals, gyr, rate_hz, params)
-    low, high = params.band_hz[1], params.band_hz[0]
-    w = low_pass(np.ascontiguousarray(gyr.T), STEEPEST * low, rate_hz)
-    rows = np.empty((3 * TERMS, len(gyr)))
-    _write_terms(q, np.ascontiguousarray(signals.acc), w, np.gradient(w, 1.0 / rate_hz, axis=1), rows)
-    thin = max(1, int(rate_hz / params.working_hz + 0.3))
-    slow = low_pass(rows, low, rate_hz)[:, ::thin]
-    slow = slow - low_pass(slow, high, rate_hz / thin)
+    state, rest_norm = start_tilt(signals.acc, signals.valid, rate_hz)
+    q = advance(state, gyr, signals.acc, signals.valid, rate_hz, rest_norm, params.attitude)[0]
+    slow, level = low_pass_terms(q[None], signals.acc[None], gyr[None], rate_hz, params)
+    thin = find_thinning(rate_hz, params)
+    M = take_mean_out(slow, rate_hz / thin, params)[0]
+    usable = find_usable(signals.valid[:, None], rate_hz)[0]
+    return SensorTerms(q, level[0], gyr, M, usable[::thin], rate_hz / thin)
+
+
+def find_thinning(rate_hz: float, params: JointParams) -> int:
+    """Every how many samples one is taken for the terms."""
+    return max(1, int(rate_hz / params.working_hz + 0.3))
+
+
+def low_pass_terms(
+    q: Floats, acc: Floats, gyr: Floats, rate_hz: float, params: JointParams, pad: int | None = None
+) -> tuple[Floats, Floats]:
+    """Terms (k, 12, m) of k sensors below the band's upper edge, thinned, and their level force (k, 3, n).
+
+    Parameters
+    ----------
+    q : (k, n, 4) sensors to level. acc, gyr : (k, n, 3) m/s², rad/s without bias. pad : as `low_pass`.
+    """
+    edge = params.band_hz[1]
+    w = low_pass(np.ascontiguousarray(gyr.transpose(0, 2, 1)), STEEPEST * edge, rate_hz, pad)
+    rows = np.empty((len(q), 3 * TERMS, q.shape[1]))
+    _write_terms(q, np.ascontiguousarray(acc), w, np.gradient(w, 1.0 / rate_hz, axis=2), rows)
+    slow = low_pass(rows, edge, rate_hz, pad)[:, :, :: find_thinning(rate_hz, params)]
+    return slow, rows[:, TERMS - 1 :: TERMS].copy()
+
+
+def take_mean_out(slow: Floats, rate_hz: float, params: JointParams, pad: int | None = None) -> Floats:
+    """Terms (k, m, 3, 4) within the band, from those below its upper edge (k, 12, m) at their own rate."""
+    slow = slow - low_pass(slow, params.band_hz[0], rate_hz, pad)
+    return np.ascontiguousarray(slow.transpose(0, 2, 1)).reshape(len(slow), -1, 3, TERMS)
+
+
+def find_usable(valid: Bools, rate_hz: float) -> Bools:
+    """Samples (k, n) near which none of valid (n, k) was lost."""
     near = round(NEAR_GAP_S * rate_hz)
-    lost = np.convolve(~signals.valid, np.ones(2 * near + 1), "same") > 0.5
-    M = np.ascontiguousarray(slow.T).reshape(-1, 3, TERMS)
-    return SensorTerms(M, ~lost[::thin], rate_hz / thin, q, rows[TERMS - 1 :: TERMS].copy(), gyr)
+    return np.array([np.convolve(~x, np.ones(2 * near + 1), "same") <= 0.5 for x in valid.T], np.bool_)
 
 
 def cut_terms(terms: SensorTerms, start_s: float, end_s: float) -> SensorTerms:
@@ -80,12 +119,12 @@ def cut_terms(terms: SensorTerms, start_s: float, end_s: float) -> SensorTerms:
     first, last = (max(0, round(x * terms.rate_hz)) for x in (start_s, end_s))
     part, whole = slice(first, last), slice(first * thin, last * thin)
     return SensorTerms(
-        terms.M[part],
-        terms.usable[part],
-        terms.rate_hz,
         terms.q[whole],
         terms.level[:, whole],
         terms.rate[whole],
+        terms.M[part],
+        terms.usable[part],
+        terms.rate_hz,
     )
 
 
@@ -99,32 +138,31 @@ def find_bias(signals: SensorSignals, rate_hz: float) -> Floats:
     return np.asarray(signals.gyr[max(0, calmest - half) : calmest + half].mean(axis=0))
 
 
-def _tilt(signals: SensorSignals, gyr: Floats, rate_hz: float, params: JointParams) -> Floats:
-    """Orientation (n, 4) from the sensor to a level frame of free heading."""
-    valid = signals.valid
-    norm = float(np.median(np.linalg.norm(signals.acc[valid], axis=1))) if valid.any() else GRAVITY
+def start_tilt(acc: Floats, valid: Bools, rate_hz: float) -> tuple[AttitudeState, float]:
+    """Level a sensor by its first `START_S`, heading free: the filter's start, and the norm at rest."""
+    norm = float(np.median(np.linalg.norm(acc[valid], axis=1))) if valid.any() else GRAVITY
     first = np.flatnonzero(valid)[: max(1, round(START_S * rate_hz))]
-    up = signals.acc[first].mean(axis=0) if len(first) else np.array([0.0, 0.0, 1.0])
+    up = acc[first].mean(axis=0) if len(first) else np.array([0.0, 0.0, 1.0])
     up = up / max(float(np.linalg.norm(up)), 1e-9)
     across = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
     across /= max(float(np.linalg.norm(across)), 1e-9)
     start = AttitudeState(from_matrix(np.stack((across, np.cross(up, across), up))), np.zeros(3), 0.0)
-    rest_norm = norm if NORMS[0] < norm < NORMS[1] else GRAVITY
-    return advance(start, gyr, signals.acc, valid, rate_hz, rest_norm, params.attitude)[0]
+    return start, norm if NORMS[0] < norm < NORMS[1] else GRAVITY
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _write_terms(q, f, w, dw, out):  # type: ignore[no-untyped-def]
-    """Write [R K | R f] of q (n, 4), f (n, 3), w and dw (3, n) into out (12, n)."""
+    """Write [R K | R f] of q (k, n, 4), f (k, n, 3), w and dw (k, 3, n) into out (k, 12, n)."""
     R = np.empty((3, 3))
-    for n in range(q.shape[0]):
-        compiled.to_matrix(q[n], R)
-        x, y, z = w[0, n], w[1, n], w[2, n]
-        a, b, c = dw[0, n], dw[1, n], dw[2, n]
-        for i in range(3):
-            r0, r1, r2 = R[i, 0], R[i, 1], R[i, 2]
-            k = TERMS * i
-            out[k, n] = r0 * -(y * y + z * z) + r1 * (x * y + c) + r2 * (x * z - b)
-            out[k + 1, n] = r0 * (x * y - c) - r1 * (x * x + z * z) + r2 * (y * z + a)
-            out[k + 2, n] = r0 * (x * z + b) + r1 * (y * z - a) - r2 * (x * x + y * y)
-            out[k + 3, n] = r0 * f[n, 0] + r1 * f[n, 1] + r2 * f[n, 2]
+    for s in range(q.shape[0]):
+        for n in range(q.shape[1]):
+            compiled.to_matrix(q[s, n], R)
+            x, y, z = w[s, 0, n], w[s, 1, n], w[s, 2, n]
+            a, b, c = dw[s, 0, n], dw[s, 1, n], dw[s, 2, n]
+            for i in range(3):
+                r0, r1, r2 = R[i, 0], R[i, 1], R[i, 2]
+                k = TERMS * i
+                out[s, k, n] = r0 * -(y * y + z * z) + r1 * (x * y + c) + r2 * (x * z - b)
+                out[s, k + 1, n] = r0 * (x * y - c) - r1 * (x * x + z * z) + r2 * (y * z + a)
+                out[s, k + 2, n] = r0 * (x * z + b) + r1 * (y * z - a) - r2 * (x * x + y * y)
+                out[s, k + 3, n] = r0 * f[s, n, 0] + r1 * f[s, n, 1] + r2 * f[s, n, 2]

@@ -7,15 +7,15 @@ terms.py. Only sums of products over the window enter: they are made once per se
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from core.agreement.params import JointParams
-from core.agreement.terms import TERMS, SensorTerms, find_terms
+from core.agreement.terms import TERMS, SensorTerms
 from core.frames import Bools, Floats, Segment
-from core.recording import SensorSignals
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +53,13 @@ class JointWindows:
             self.residual[kept], self.places[kept], self.turn[kept], self.width_s, self.step_s,
         )  # fmt: skip
 
+    def turn_round(self) -> JointWindows:
+        """The same joint seen from the other sensor."""
+        places = np.concatenate((self.places[:, 3:], self.places[:, :3]), axis=1)
+        return replace(
+            self, first=self.second, second=self.first, lag_s=-self.lag_s, places=places, turn=-self.turn
+        )
+
 
 def compare_at_joint(
     names: tuple[Segment, Segment], first: SensorTerms, second: SensorTerms, params: JointParams
@@ -62,45 +69,96 @@ def compare_at_joint(
     chunk, widest = round(params.chunk_s * rate), round(params.widest_s * rate)
     n = min(len(first.M), len(second.M))
     chunks = max(0, (n - 2 * widest) // chunk)
-    ok = np.zeros(chunks, np.bool_)
-    AA, BB = np.zeros((chunks, TERMS, TERMS)), np.zeros((chunks, 2 * widest + 1, TERMS, TERMS))
-    AB = np.zeros((chunks, 2 * widest + 1, 3, TERMS, TERMS))
-    _sum_products(
-        first.M[:n], second.M[:n], first.usable[:n], second.usable[:n], chunk, widest, ok, AA, BB, AB
-    )
+    sums = JointSums.empty(chunks, widest)
+    sums.add(slice(None), first.M[:n], second.M[:n], first.usable[:n], second.usable[:n], chunk)
     width = params.window_chunks
     step = int(np.clip(np.ceil(chunks / params.windows), 1, max(1, width // 2)))
-    starts = np.arange(0, max(0, chunks - width + 1), step)
-    found = np.zeros((len(starts), 11))
-    ridge = (params.noise_mps2 / params.place_sd_m) ** 2 / (chunk * width)
-    used = _solve_windows(
-        AA, BB, AB, ok, starts, width, params.least_chunks, chunk, params.least_power, ridge, found
+    found = sums.solve(np.arange(0, max(0, chunks - width + 1), step), chunk, params)
+    return read_windows(
+        names, found, (found[:, 0] * chunk + widest) / rate, rate, chunk, params, step_s=step * chunk / rate
     )
-    found, middle = found[:used], found[:used, 0]
+
+
+def read_windows(
+    names: tuple[Segment, Segment],
+    found: Floats,
+    t_s: Floats,
+    rate_hz: float,
+    chunk: int,
+    params: JointParams,
+    step_s: float,
+) -> JointWindows:
+    """Solved windows (m, 11), as `JointSums.solve` gives them, in seconds; t_s (m,) their middles."""
     return JointWindows(
         first=names[0],
         second=names[1],
-        t_s=(middle * chunk + widest) / rate,
-        lag_s=found[:, 1] / rate,
+        t_s=t_s,
+        lag_s=found[:, 1] / rate_hz,
         certain=found[:, 2] > 0.5,
         residual=found[:, 3],
         places=found[:, 4:10],
         turn=found[:, 10],
-        width_s=width * chunk / rate,
-        step_s=step * chunk / rate,
+        width_s=params.window_chunks * chunk / rate_hz,
+        step_s=step_s,
     )
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _sum_products(A, B, ok_a, ok_b, chunk, widest, ok, AA, BB, AB):  # type: ignore[no-untyped-def]
-    """Sums by chunk and lag of the products of A and B (n, 3, 4).
+@dataclass(frozen=True, eq=False)
+class JointSums:
+    """Products of two sensors' terms, summed by chunk and lag.
 
     Parameters
     ----------
     ok : (chunks,) no sample of the chunk was lost, at any lag. AA : (chunks, 4, 4).
     BB : (chunks, lags, 4, 4). AB : (chunks, lags, 3, 4, 4) horizontal along, horizontal across, vertical. The
-    first lag is −widest.
+        first lag is the most negative one.
     """
+
+    ok: Bools
+    AA: Floats
+    BB: Floats
+    AB: Floats
+
+    @classmethod
+    def empty(cls, chunks: int, widest: int) -> JointSums:
+        """No products yet; widest : largest lag in samples."""
+        lags = 2 * widest + 1
+        return cls(
+            np.zeros(chunks, np.bool_),
+            np.zeros((chunks, TERMS, TERMS)),
+            np.zeros((chunks, lags, TERMS, TERMS)),
+            np.zeros((chunks, lags, 3, TERMS, TERMS)),
+        )
+
+    def add(self, part: slice, A: Floats, B: Floats, ok_a: Bools, ok_b: Bools, chunk: int) -> None:
+        """Add the products of A and B (n, 3, 4) to a part of the chunks, which holds zeros."""
+        widest = self.BB.shape[1] // 2
+        _sum_products(
+            A, B, ok_a, ok_b, chunk, widest, self.ok[part], self.AA[part], self.BB[part], self.AB[part]
+        )
+
+    def forget_first(self) -> None:
+        """Leave the first chunk out; the last one is empty then."""
+        for x in (self.ok, self.AA, self.BB, self.AB):
+            x[:-1] = x[1:]
+            x[-1] = 0
+
+    def solve(self, starts: NDArray[np.int64], chunk: int, params: JointParams) -> Floats:
+        """Windows (m, 11) from these chunks on: middle in chunks, lag in samples, certain, misfit, places,
+        turn; m of those that can be used."""
+        width = params.window_chunks
+        found = np.zeros((len(starts), 11))
+        ridge = (params.noise_mps2 / params.place_sd_m) ** 2 / (chunk * width)
+        used = _solve_windows(
+            self.AA, self.BB, self.AB, self.ok, starts, width, params.least_chunks, chunk, params.least_power,
+            ridge, found,
+        )  # fmt: skip
+        return found[:used]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _sum_products(A, B, ok_a, ok_b, chunk, widest, ok, AA, BB, AB):  # type: ignore[no-untyped-def]
+    """Add the products of A and B (n, 3, 4) to the sums of `JointSums`; the first lag is −widest."""
     lags = 2 * widest + 1
     running = np.zeros((A.shape[0] + 1, TERMS, TERMS))
     for t in range(A.shape[0]):
@@ -250,12 +308,3 @@ def _solve_windows(AA, BB, AB, ok, starts, width, least, chunk, least_power, rid
         found[used, 10] = start
         used += 1
     return used
-
-
-def compile_agreement_kernels() -> None:
-    """Compile the kernels or load them, so that the first recording does not wait for them."""
-    n = 1000
-    wave = np.random.default_rng(0).normal(size=(2, n, 3))
-    still = SensorSignals("", wave[0], wave[1], None, np.ones(n, np.bool_), np.zeros(n, np.bool_))
-    terms = find_terms(still, 100.0, JointParams())
-    compare_at_joint(("pelvis", "thigh_l"), terms, terms, JointParams())

@@ -63,6 +63,14 @@ def test_exchanging_twice_changes_nothing() -> None:
     assert undo_exchange(LEGS, undo_exchange(LEGS, things)) == things  # type: ignore[arg-type]
 
 
+def test_a_leg_whose_other_side_is_not_worn_moves_over() -> None:
+    worn = only(wrong(LEGS), "pelvis", "thigh_l", "thigh_r", "shank_r", "foot_r")
+    found = check_agreement(worn)
+    assert [n.code for n in found.recording.notices] == ["sensors_exchanged"]
+    assert set(found.recording.sensors) == {"pelvis", "thigh_l", "thigh_r", "shank_l", "foot_l"}
+    assert found.recording.sensors["foot_l"] is walk().sensors["foot_l"]
+
+
 def test_without_a_pelvis_nobody_can_tell_legs_apart() -> None:
     legs = replace(walk(), sensors={s: x for s, x in wrong(LEGS).sensors.items() if s != "pelvis"})
     found = check_agreement(legs)

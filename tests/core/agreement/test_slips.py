@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,11 +13,12 @@ from core.agreement.repair import turn_back
 from core.agreement.slips import SensorSlip
 from core.agreement.strides import find_main_axis
 from core.frames import Floats, Segment
+from core.pipeline import resume
 from core.recording import SensorSignals, UniformRecording
 from core.rotation import exp, rotate
 from core.withheld import withhold_at_slips
-from tests.perturbations import slip_sensor
-from tests.walks import only, simulated
+from tests.perturbations import find_middle, slip_sensor
+from tests.walks import analysed, only, simulated
 
 AT_S = 17.0
 
@@ -27,7 +30,8 @@ def walk() -> UniformRecording:
 
 @pytest.mark.parametrize("segment", ["shank_r", "foot_l"])
 def test_a_slip_is_named_with_its_moment_and_angle(segment: Segment) -> None:
-    found = check_agreement(slip_sensor(walk(), segment, np.radians(15.0), AT_S))
+    slipped = slip_sensor(walk(), segment, np.radians(15.0), AT_S)
+    found = check_agreement(slipped)
     assert [x.segment for x in found.slips] == [segment]
     slip = found.slips[0]
     assert abs(slip.turn_rad) == pytest.approx(np.radians(15.0), abs=np.radians(2.0))
@@ -36,6 +40,9 @@ def test_a_slip_is_named_with_its_moment_and_angle(segment: Segment) -> None:
     start, end = found.doubtful[segment]
     assert start < AT_S < end
     assert (end == np.inf) == (segment == "foot_l")
+    lost = ~found.recording.sensors[segment].valid
+    assert np.array_equal(lost, (slipped.t_s >= start) & (segment == "foot_l"))
+    assert (found.whole is None) == (segment == "shank_r")
 
 
 def test_a_shank_is_turned_back_and_a_foot_is_left() -> None:
@@ -47,6 +54,9 @@ def test_a_shank_is_turned_back_and_a_foot_is_left() -> None:
     left = check_agreement(slipped, AgreementParams(slips=SlipParams(repair=False)))
     assert left.recording.sensors["shank_r"] is slipped.sensors["shank_r"]
     assert left.doubtful["shank_r"][1] == np.inf
+    foot = slip_sensor(walk(), "foot_l", np.radians(15.0), AT_S)
+    left = check_agreement(foot, AgreementParams(slips=SlipParams(repair=False)))
+    assert left.recording.sensors["foot_l"] is foot.sensors["foot_l"]
 
 
 def test_what_the_gyroscope_saw_of_a_slip_leaves_its_rate() -> None:
@@ -63,6 +73,26 @@ def test_what_the_gyroscope_saw_of_a_slip_leaves_its_rate() -> None:
     back = turn_back(x, t_s, slip)
     assert np.abs(back.gyr.sum(axis=0)).max() < 1e-9
     assert np.abs(back.acc[230:] - [9.81, 0.0, 0.0]).max() < 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("segment", "by_deg"), [("thigh_l", 15.0), ("foot_l", 15.0), ("foot_l", -15.0)])
+def test_no_figure_rests_on_what_a_slipped_sensor_measured(segment: Segment, by_deg: float) -> None:
+    """Whatever is still told is what the same walk gives without the slip, within what is stated."""
+    right = analysed("healthy", 5)
+    slipped = slip_sensor(right.recording, segment, np.radians(by_deg), find_middle(right.recording))
+    found = resume(replace(right, uniform=slipped), "agreement")
+    assert [n.code for n in found.notices if n.code in ("sensor_slipped", "gap")] == ["sensor_slipped"]
+    truth = {(p.name, p.side): p.mean for p in right.parameters}
+    wrong = [
+        (p.name, p.side, truth[p.name, p.side], p.mean)
+        for p in found.parameters
+        if p.mean is not None
+        and p.uncertainty is not None
+        and (mean := truth[p.name, p.side]) is not None
+        and abs(p.mean - mean) > p.uncertainty
+    ]
+    assert wrong == []
 
 
 def test_a_turn_that_comes_back_is_no_slip() -> None:

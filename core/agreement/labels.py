@@ -1,0 +1,90 @@
+"""Who wears what, from the joints alone: the order of sensors in which neighbours share one.
+
+From foot to foot over the pelvis seven sensors make one path. All paths are scored whose middle sensor, the
+pelvis, turns least; which end is the left foot the hips tell (core/agreement/exchange.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise, permutations
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.frames import Segment
+
+PATH: Final[tuple[Segment, ...]] = ("foot_l", "shank_l", "thigh_l", "pelvis", "thigh_r", "shank_r", "foot_r")
+MIDDLE: Final = 3
+
+
+@dataclass(frozen=True)
+class SortedLabels:
+    """The labels under which the joints fit best.
+
+    Parameters
+    ----------
+    stated_for : best label → the sensor that was stated to be worn elsewhere or there, by its stated label.
+        Left and right may be exchanged.
+    misfit : geometric mean of the joints' misfits; stated : of the labels as stated. next : of the best path
+        of another order.
+    """
+
+    stated_for: Mapping[Segment, Segment]
+    misfit: float
+    stated: float
+    next: float
+
+    @property
+    def gain(self) -> float:
+        """Sum over the joints of ln(misfit as stated / as sorted)."""
+        return (len(PATH) - 1) * float(np.log(self.stated / self.misfit))
+
+    def is_clear(self, exchanged: float, ratio: float, distinct: float) -> bool:
+        """Whether it fits better than what is stated or exchanged, by a ratio, and than any other order."""
+        return exchanged > ratio * self.misfit and self.next > distinct * self.misfit
+
+    def exchange_legs(self) -> dict[Segment, Segment]:
+        """The same order with the left foot at its other end."""
+        return dict(zip(PATH, reversed([self.stated_for[s] for s in PATH]), strict=True))
+
+
+@cache
+def _list_paths() -> NDArray[np.int64]:
+    """Every order of seven sensors (2520, 7), of two that are the same backwards one."""
+    return np.array([p for p in permutations(range(len(PATH))) if p[0] < p[-1]], np.int64)
+
+
+def sort_by_joints(
+    misfits: Mapping[frozenset[Segment], float], rates: Mapping[Segment, float], calmest: float
+) -> SortedLabels | None:
+    """Score every order of seven sensors; None with others than these seven.
+
+    Parameters
+    ----------
+    misfits : of every pair, by stated labels. rates : RMS of the rate of each sensor while walking, rad/s.
+    calmest : the pelvis turns at most so much more than the sensor that turns least.
+    """
+    if set(rates) != set(PATH) or any(frozenset(x) not in misfits for x in permutations(PATH, 2)):
+        return None
+    least = min(rates.values())
+    middles = [s for s in PATH if rates[s] <= calmest * least]
+    cost = np.array([[0.0 if a == b else np.log(misfits[frozenset((a, b))]) for b in PATH] for a in PATH])
+    paths = _list_paths()
+    paths = paths[np.isin(paths[:, MIDDLE], [PATH.index(s) for s in middles])]
+    scores = cost[paths[:, :-1], paths[:, 1:]].mean(axis=1)
+    order = np.argsort(scores)
+    best = [PATH[k] for k in paths[order[0]]]
+    # the end that was stated as more of the left leg stays the left one: the hips judge that
+    if sum(s.endswith("_l") for s in best[:MIDDLE]) < sum(s.endswith("_r") for s in best[:MIDDLE]):
+        best.reverse()
+    stated = np.mean([cost[PATH.index(a), PATH.index(b)] for a, b in pairwise(PATH)])
+    return SortedLabels(
+        dict(zip(PATH, best, strict=True)),
+        float(np.exp(scores[order[0]])),
+        float(np.exp(stated)),
+        float(np.exp(scores[order[1]])) if len(order) > 1 else np.inf,
+    )

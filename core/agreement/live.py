@@ -1,0 +1,199 @@
+"""What the sensors of a live take say about each other: told while somebody walks, repaired by the analysis.
+
+Listening begins where all stood for calibration; everything is a function of the samples, whatever blocks
+they came in. Samples are only collected as they come: comparing them waits until whoever coaches has been
+served.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from core.agreement.exchange import undo_exchange
+from core.agreement.joints import list_worn_joints
+from core.agreement.live_comparison import SensorComparison, Verdict
+from core.agreement.live_terms import RawSecond
+from core.agreement.params import LiveAgreementParams
+from core.agreement.slips import SensorSlip, compile_agreement_kernels
+from core.agreement.tell_live import take_back, tell_exchange_now, tell_lag_now, tell_slip_now
+from core.agreement.terms import find_thinning
+from core.errors import Notice
+from core.frames import Segment
+from core.timeline.live import UniformBlock
+
+STANDING: Final = 2
+"""Seconds of the standing from which biases and tilts are learnt."""
+
+Key = tuple[str, tuple[Segment, ...]]
+"""Code and sensors, by the labels that fit."""
+
+
+@dataclass(frozen=True)
+class _Said:
+    """Something that holds: the notice, the sensors as they are worn, verdicts that missed it since."""
+
+    notice: Notice
+    worn: tuple[Segment, ...]
+    slip: SensorSlip | None = None
+    missed: int = 0
+
+
+class LiveAgreement:
+    """Collects samples as they come and compares the sensors when asked to.
+
+    Parameters
+    ----------
+    segments : of the blocks' columns.
+    """
+
+    def __init__(
+        self, segments: Sequence[Segment], rate_hz: float, params: LiveAgreementParams | None = None
+    ) -> None:
+        self._params = params or LiveAgreementParams()
+        joints = list_worn_joints(segments)
+        self._worn = tuple(s for s in segments if any(s in joint for joint in joints))
+        self._columns = np.array([segments.index(s) for s in self._worn], np.int64)
+        self._rate_hz = rate_hz
+        self._thin = find_thinning(rate_hz, self._params.agreement.joints)
+        chunk_s = self._params.agreement.joints.chunk_s
+        self._second = self._thin * round(chunk_s * rate_hz / self._thin)
+        self._last: deque[RawSecond] = deque()  # never less than the standing
+        self._held = 0
+        self._second_at: int | None = None  # first sample of the second that is collected; None: nobody stood
+        self._due: deque[SensorComparison | RawSecond] = deque()
+        self._comparison: SensorComparison | None = None
+        self._said: dict[Key, _Said] = {}
+        self._runs: dict[Key, int] = {}
+
+    @property
+    def doubts(self) -> Mapping[Segment, str]:
+        """Worn segment → code of what is said of its sensor and still holds."""
+        return {s: x.notice.code for x in self._said.values() for s in x.worn}
+
+    def push(self, block: UniformBlock, stood: Sequence[int] = ()) -> None:
+        """Collect the next samples.
+
+        Parameters
+        ----------
+        stood : samples of the axis up to which all stood, in the block or at its end, in order.
+        """
+        if not len(self._worn):
+            return
+        start = 0
+        for at in stood:
+            self._collect(block, start, at - block.first)
+            start = at - block.first
+            self._second_at = at
+            standing = self._read_last(STANDING * self._second)
+            self._due.append(
+                SensorComparison(self._worn, standing, at, self._rate_hz, self._thin, self._params)
+            )
+        self._collect(block, start, len(block))
+
+    def forget(self) -> None:
+        """Begin anew with the next standing: the therapist puts something right."""
+        self._second_at = self._comparison = None
+        self._due.clear()
+        self._said, self._runs = {}, {}
+
+    def compare(self) -> list[Notice]:
+        """Look at the seconds that are complete; what is new."""
+        fresh: list[Notice] = []
+        while self._due:
+            one = self._due.popleft()
+            if isinstance(one, SensorComparison):
+                self._comparison, self._runs = one, {}
+                self._said = {k: x for k, x in self._said.items() if x.slip is None}
+            elif self._comparison is not None:
+                slips = [x.slip for x in self._said.values() if x.slip is not None]
+                verdict = self._comparison.push(one, slips)
+                if verdict is not None:
+                    fresh += self._tell(verdict)
+        return fresh
+
+    def _collect(self, block: UniformBlock, start: int, stop: int) -> None:
+        """Add rows of a block; a whole second is due once somebody stood."""
+        while start < stop:
+            end = stop
+            if self._second_at is not None:
+                end = min(stop, self._second_at + self._second - block.first)
+            k, part = self._columns, slice(start, end)
+            self._last.append(
+                RawSecond(
+                    block.acc[part].take(k, axis=1), block.gyr[part].take(k, axis=1),
+                    block.valid[part].take(k, axis=1),
+                )
+            )  # fmt: skip
+            self._held += end - start
+            while self._held - len(self._last[0].acc) >= STANDING * self._second:
+                self._held -= len(self._last.popleft().acc)
+            if self._second_at is not None and block.first + end == self._second_at + self._second:
+                self._due.append(self._read_last(self._second))
+                self._second_at += self._second
+            start = end
+
+    def _read_last(self, n: int) -> RawSecond:
+        """The last samples, at most n."""
+        return RawSecond(
+            np.concatenate([x.acc for x in self._last])[-n:],
+            np.concatenate([x.gyr for x in self._last])[-n:],
+            np.concatenate([x.valid for x in self._last])[-n:],
+        )
+
+    def _tell(self, verdict: Verdict) -> list[Notice]:
+        """What is new of a verdict, and what no longer holds."""
+        p = self._params
+        swap = verdict.exchange.swap
+        holds: dict[Key, _Said] = {}
+        if swap:
+            moved = tuple(dict.fromkeys(s for pair in swap for s in pair))
+            notice = tell_exchange_now(verdict.exchange, verdict.t_s)
+            holds[notice.code, moved] = _Said(notice, moved)
+        names = undo_exchange(swap, {s: s for s in self._worn})
+        for lag in verdict.lags:
+            notice = tell_lag_now(lag, p.agreement.lags, verdict.t_s)
+            holds[notice.code, lag.sensors] = _Said(notice, tuple(names[s] for s in lag.sensors))
+        for slip in verdict.slips:
+            notice = tell_slip_now(slip)
+            holds[notice.code, (slip.segment,)] = _Said(notice, (names[slip.segment],), slip)
+        self._runs = {k: self._runs.get(k, 0) + 1 for k in holds}
+        fresh = []
+        for key, one in holds.items():
+            ready = self._runs[key] >= p.confirmed or key[0] == "sensors_exchanged"
+            if key in self._said:
+                self._said[key] = replace(self._said[key], missed=0)
+            elif ready:
+                self._said[key] = one
+                fresh.append(one.notice)
+        return fresh + self._take_back(holds, verdict)
+
+    def _take_back(self, holds: Mapping[Key, _Said], verdict: Verdict) -> list[Notice]:
+        """What was said and is missed for some time."""
+        fresh = []
+        for key, one in list(self._said.items()):
+            if key in holds or (one.slip is not None and one.slip.segment not in verdict.back):
+                continue
+            self._said[key] = replace(one, missed=one.missed + 1)
+            if self._said[key].missed >= self._params.cleared:
+                del self._said[key]
+                fresh.append(take_back(one.notice, key[1], verdict.t_s))
+        return fresh
+
+
+def compile_live_agreement() -> None:
+    """Compile the kernels as a stream calls them, so that the first take does not wait for them."""
+    compile_agreement_kernels()
+    n = 200
+    wave = np.random.default_rng(0).normal(size=(2, 10 * n, 7, 3))
+    worn: tuple[Segment, ...] = (
+        "pelvis", "thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r",
+    )  # fmt: skip
+    watch = LiveAgreement(worn, 100.0)
+    valid = np.ones((10 * n, 7), np.bool_)
+    watch.push(UniformBlock(0, np.arange(10 * n) / 100.0, wave[0], wave[1], valid, ~valid), (n,))
+    watch.compare()

@@ -1,0 +1,70 @@
+"""Accelerometers whose signs are all turned round: the mirror image of a movement fits no joint.
+
+With f → −f what seems up is down: seen level, heights and one horizontal direction of every place swap their
+sign, and the specific force is seen in a mirror. No rotation does that, so neighbours disagree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from core.agreement.params import ExchangeParams, JointParams
+from core.agreement.terms import SensorTerms
+from core.agreement.windows import compare_at_joint
+from core.frames import Floats, Segment
+
+MOST: Final = 3
+"""So many sensors of seven are looked for: more would be the majority."""
+
+LEVEL_AGAIN: Final[Floats] = np.array([1.0, -1.0, -1.0])
+
+
+def turn_round(terms: SensorTerms) -> SensorTerms:
+    """The terms of the same sensor with −f, levelled anew by half a turn about a horizontal line."""
+    M = terms.M * LEVEL_AGAIN[:, None]
+    M[:, :, 3] *= -1.0
+    return replace(terms, M=np.ascontiguousarray(M))
+
+
+def find_mirrored(
+    terms: Mapping[Segment, SensorTerms],
+    misfits: Mapping[frozenset[Segment], float],
+    joints: Sequence[tuple[Segment, Segment]],
+    joint_params: JointParams,
+    params: ExchangeParams,
+) -> tuple[frozenset[Segment], float]:
+    """Sensors that fit their neighbours only with −f, and the sum of ln(misfit as stated / so) they gain.
+
+    Parameters
+    ----------
+    misfits : of the joints as stated.
+    """
+    gains: dict[frozenset[Segment], float] = {}
+    bad: set[frozenset[Segment]] = set()
+    for a, b in joints:
+        other = compare_at_joint((a, b), terms[a], turn_round(terms[b]), joint_params)
+        as_stated = misfits.get(frozenset((a, b)))
+        if as_stated is not None and len(other.t_s):
+            misfit = float(np.median(other.residual))
+            gains[frozenset((a, b))] = float(np.log(as_stated / misfit))
+            bad |= {frozenset((a, b))} if misfit > params.worst_residual else set()
+    worn = sorted({s for joint in gains for s in joint})
+    most = min(MOST, (len(worn) - 1) // 2)
+    found = {
+        frozenset(chosen): sum(gain for joint, gain in gains.items() if len(joint & set(chosen)) == 1)
+        for k in range(1, most + 1)
+        for chosen in combinations(worn, k)
+    }
+    order = sorted(found, key=lambda s: found[s], reverse=True)
+    if not order or found[order[0]] < np.log(params.mirrored):
+        return frozenset(), 0.0
+    if any(len(joint & order[0]) == 1 for joint in bad):
+        return frozenset(), 0.0
+    if len(order) > 1 and found[order[0]] - found[order[1]] < np.log(params.distinct):
+        return frozenset(), 0.0
+    return order[0], found[order[0]]

@@ -1,0 +1,60 @@
+"""Words for the same while samples come: nothing is repaired yet, the analysis of the take does that."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from core.agreement.exchange import SensorExchange
+from core.agreement.lags import SensorLag
+from core.agreement.params import LagParams
+from core.agreement.slips import SensorSlip
+from core.agreement.tell import list_sensors, say_exchange, say_lag, say_slip
+from core.errors import Notice
+
+AGAIN: Final = "sensors_agree_again"
+
+
+def tell_lag_now(lag: SensorLag, params: LagParams, t_s: float) -> Notice:
+    """Say whose clock is late."""
+    if not lag.sure:
+        todo = "One joint alone shows it. Synchronise the sensors and record again."
+        return Notice("clocks_disagree", f"{say_lag(lag)}. {todo}", lag.sensors[0], t_s)
+    todo = "Angles beside it are wrong while they are shown live; the analysis of the take puts them right."
+    if abs(lag.lag_s) <= params.warn_s:
+        return Notice("sensor_late", f"{say_lag(lag)}. {todo}", lag.sensors[0], t_s, "info")
+    return Notice(
+        "sensor_late",
+        f"{say_lag(lag)}. {todo} Synchronise the sensors before the next take.",
+        lag.sensors[0],
+        t_s,
+    )
+
+
+def tell_exchange_now(exchange: SensorExchange, t_s: float) -> Notice:
+    """Say which sensors were put on each other's segments."""
+    return Notice(
+        "sensors_exchanged",
+        f"{say_exchange(exchange)} The live figure is wrong; the analysis of the take puts it right. Correct "
+        "who wears what and calibrate again.",
+        exchange.swap[0][0],
+        t_s,
+    )
+
+
+def tell_slip_now(slip: SensorSlip) -> Notice:
+    """Say which sensor slipped, when and how far."""
+    return Notice(
+        "sensor_slipped",
+        f"{say_slip(slip)} Angles beside it are wrong from there on. Fasten the sensor and calibrate again.",
+        slip.segment,
+        slip.at_s,
+    )
+
+
+def take_back(told: Notice, sensors: tuple[str, ...], t_s: float) -> Notice:
+    """Say that what was told holds no more."""
+    what = {
+        "sensors_exchanged": "The sensors of {} fit where they are worn now.",
+        "sensor_slipped": "The sensor on {} sits as it did before it slipped.",
+    }.get(told.code, "The clock of {} agrees with the others now.")
+    return Notice(AGAIN, what.format(list_sensors(sensors)), told.sensor, t_s, "info")
