@@ -19,6 +19,7 @@ from core.rotation.arrays import (
     normalise,
     rotate,
     slerp,
+    split_heading,
     to_matrix,
     wrap_angle,
     yaw,
@@ -26,5 +27,5 @@ from core.rotation.arrays import (
 
 __all__ = [
     "about", "angle_between", "conjugate", "exp", "from_matrix", "log", "mean", "multiply", "normalise",
-    "rotate", "slerp", "to_matrix", "wrap_angle", "yaw",
+    "rotate", "slerp", "split_heading", "to_matrix", "wrap_angle", "yaw",
 ]  # fmt: skip

@@ -139,6 +139,18 @@ def yaw(q: Floats) -> Floats:
     return np.asarray(np.arctan2(x[..., 1], x[..., 0]))
 
 
+def split_heading(q: Floats) -> tuple[Floats, Floats]:
+    """Take rotations (..., 4) apart: first a turn about the vertical, then a tilt about a horizontal axis.
+
+    Returns
+    -------
+    The tilt (..., 2), a rotation vector in the floor plane, and the turn (...), rad in [−π, π].
+    """
+    q = np.where(q[..., :1] < 0.0, -q, q)
+    turn = 2.0 * np.arctan2(q[..., 3], q[..., 0])
+    return log(multiply(q, about(2, -turn)))[..., :2], np.asarray(turn)
+
+
 def wrap_angle(angle: Angle) -> Angle:
     """The same angle (...) in rad in [−π, π)."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi

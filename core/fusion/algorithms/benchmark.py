@@ -1,0 +1,175 @@
+"""Scores of filters on recordings with a reference orientation, as the BROAD benchmark defines them.
+
+Laidig, Caruso, Cereatti and Seel 2021: the error q_ref ⊗ q* in the world is split into a turn about the
+vertical (heading) and the rest (inclination); the score is the RMS over the moving phase.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import zipfile
+import zlib
+from dataclasses import dataclass
+from io import BytesIO
+from typing import Final
+
+import numpy as np
+
+from core.errors import FormatError, SignalError
+from core.frames import Bools, Floats
+from core.fusion.algorithms.filter import FusionFilter, RestMeans
+from core.fusion.algorithms.parameters import AlgorithmGains
+from core.fusion.self_calibrating import SelfCalibratingFilter
+from core.rotation import conjugate, multiply, split_heading
+
+REST_S: Final = 1.0
+"""Shortest rest before the movement that a filter is started from."""
+
+_RATES: Final = (1.0, 1e5)
+"""Hz of a trial; beyond it something else was written there."""
+_UNREADABLE: Final = (
+    # an array alone is no archive (TypeError); encrypted, or packed in a way that is not known (RuntimeError)
+    KeyError, ValueError, TypeError, OSError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+
+_NORM: Final = (0.9, 1.1)
+"""Length of a unit quaternion; others are taken for lost."""
+
+_SHAPES: Final = {"imu_gyr": 3, "imu_acc": 3, "imu_mag": 3, "opt_quat": 4}
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceTrial:
+    """One sensor with an optical reference.
+
+    Parameters
+    ----------
+    gyr, acc, mag : (n, 3) rad/s, m/s² and any unit, mag NaN where there is none. reference : (n, 4) sensor
+    to world, NaN where it was lost. moving : (n,) the phase that is scored.
+    """
+
+    name: str
+    rate_hz: float
+    gyr: Floats
+    acc: Floats
+    mag: Floats
+    reference: Floats
+    moving: Bools
+
+    @property
+    def scored(self) -> Bools:
+        """Samples (n,) of the moving phase that have a reference."""
+        return np.asarray(self.moving & np.isfinite(self.reference).all(axis=1))
+
+    @property
+    def has_magnetometer(self) -> bool:
+        """Whether any sample of it is a number."""
+        return bool(np.isfinite(self.mag).any())
+
+    @property
+    def sha256(self) -> str:
+        """Digest of the rate and all samples, whatever file they came in."""
+        found = hashlib.sha256(repr(self.rate_hz).encode())
+        for array in (self.gyr, self.acc, self.mag, self.reference, self.moving):
+            found.update(array.tobytes())
+        return found.hexdigest()
+
+
+@dataclass(frozen=True)
+class OrientationScore:
+    """RMS errors in rad."""
+
+    total: float
+    heading: float
+    inclination: float
+
+
+def read_trial(name: str, content: bytes) -> ReferenceTrial:
+    """Read a trial of BROAD from the bytes of an .npz file.
+
+    Raises
+    ------
+    FormatError `not_a_trial` where arrays are missing, or are not the numbers that they should be.
+    """
+    try:
+        with np.load(BytesIO(content), allow_pickle=False) as file:
+            found = {key: np.asarray(file[key]) for key in (*_SHAPES, "movement", "sampling_rate")}
+    except _UNREADABLE as error:
+        raise FormatError(
+            "not_a_trial",
+            f"{name} does not hold imu_gyr, imu_acc, imu_mag, opt_quat, movement, sampling_rate.",
+        ) from error
+    if wrong := [key for key, array in found.items() if array.dtype.kind not in "fiub"]:
+        raise FormatError("not_a_trial", f"{name}: {', '.join(wrong)} are no numbers.")
+    n = found["movement"].size
+    if not n or found["movement"].shape != (n,) or any(found[k].shape != (n, d) for k, d in _SHAPES.items()):
+        raise FormatError("not_a_trial", f"{name}: arrays of different lengths, or without samples.")
+    rate = found["sampling_rate"]
+    if rate.size != 1 or not _RATES[0] <= rate.item() <= _RATES[1]:
+        raise FormatError(
+            "not_a_trial", f"{name}: sampling_rate is one number of {_RATES[0]:g} to {_RATES[1]:g} Hz."
+        )
+    gyr, acc, mag, reference = (np.array(found[key], np.float64, order="C") for key in _SHAPES)
+    norm = np.linalg.norm(reference, axis=1)
+    reference[(norm < _NORM[0]) | (norm > _NORM[1])] = np.nan
+    return ReferenceTrial(name, float(rate.item()), gyr, acc, mag, reference, found["movement"].astype(bool))
+
+
+def find_rest(trial: ReferenceTrial, *, with_bias: bool = False) -> RestMeans:
+    """Means over the rest before the movement; `with_bias` leaves the gyroscope's in.
+
+    Raises
+    ------
+    SignalError `no_rest` where it is shorter than a second.
+    """
+    first = int(np.argmax(trial.moving)) if trial.moving.any() else len(trial.moving)
+    if first < REST_S * trial.rate_hz:
+        raise SignalError("no_rest", f"{trial.name} has less than {REST_S:g} s of rest before the movement.")
+    acc, gyr, mag = (x[:first, None] for x in (trial.acc, trial.gyr, trial.mag))
+    rest = RestMeans.over(acc, gyr, mag if trial.has_magnetometer else None)
+    return RestMeans(rest.acc, np.zeros((1, 3)), rest.mag) if with_bias else rest
+
+
+def run_trial(
+    name: str,
+    trial: ReferenceTrial,
+    params: AlgorithmGains | None = None,
+    *,
+    with_bias: bool = False,
+    magnetometer: bool | None = None,
+) -> Floats:
+    """Orientations (n, 4) of a trial by one algorithm, started from the rest before the movement.
+
+    Parameters
+    ----------
+    with_bias, magnetometer : as in `find_rest` and `FusionFilter`.
+    """
+    rest = find_rest(trial, with_bias=with_bias)
+    run = FusionFilter(name, trial.rate_hz, rest, params, magnetometer=magnetometer)
+    return run.advance(trial.gyr[:, None], trial.acc[:, None], trial.mag[:, None])[:, 0]
+
+
+def run_own(trial: ReferenceTrial, *, both_ways: bool) -> Floats:
+    """Orientations (n, 4) by the self-calibrating filter, which finds its start and the bias itself."""
+    signals = trial.gyr[:, None], trial.acc[:, None], trial.mag[:, None]
+    run = SelfCalibratingFilter(trial.rate_hz, magnetometer=True)
+    return np.asarray((run.smooth if both_ways else run.advance)(*signals)[:, 0])
+
+
+def score_orientation(q: Floats, trial: ReferenceTrial) -> OrientationScore:
+    """RMS errors of orientations (n, 4) over the moving phase where there is a reference."""
+    part = trial.scored
+    return score_error(multiply(trial.reference[part], conjugate(q[part])))
+
+
+def score_error(error: Floats) -> OrientationScore:
+    """RMS of errors (..., 4) in the world: reference ⊗ estimate*."""
+    tilt, turn = split_heading(error)
+    inclination = np.linalg.norm(tilt, axis=-1)
+    # of half angles the cosines multiply
+    total = 2.0 * np.arccos(np.clip(np.cos(0.5 * turn) * np.cos(0.5 * inclination), -1.0, 1.0))
+
+    def rms(angle: Floats) -> float:
+        return float(np.sqrt(np.mean(angle**2)))
+
+    return OrientationScore(rms(total), rms(turn), rms(inclination))

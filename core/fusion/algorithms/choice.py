@@ -1,0 +1,60 @@
+"""Every filter that can be asked for by name: the published ones and the project's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from core.errors import ParameterError
+from core.fusion.algorithms.listed import ALGORITHMS, BY_NAME
+
+
+@dataclass(frozen=True)
+class OwnFilter:
+    """The project's own self-calibrating filter beside the published ones; `both_ways`: after the take."""
+
+    name: str
+    label: str
+    both_ways: bool
+
+
+OWN: Final = (
+    OwnFilter("sagittal_live", "Sagittal, live", both_ways=False),
+    OwnFilter("sagittal_both_ways", "Sagittal, both ways", both_ways=True),
+)
+
+LABELS: Final[dict[str, str]] = {a.name: a.shown for a in ALGORITHMS} | {o.name: o.label for o in OWN}
+"""Every filter that can be asked for, as it is shown to people."""
+
+
+def require_filters(names: Sequence[str]) -> None:
+    """Refuse a choice of filters that names none, or one that is not listed.
+
+    Raises
+    ------
+    ParameterError `no_filter`, `no_such_algorithm`.
+    """
+    if not names:
+        raise ParameterError("no_filter", "No filter was chosen; choose at least one.")
+    unknown = next((name for name in names if name not in LABELS), None)
+    if unknown is not None:
+        raise ParameterError("no_such_algorithm", f"There is no filter '{unknown}'; see the list.")
+
+
+def require_tunable(name: str) -> None:
+    """Refuse a filter that is not listed, or has no gains to fit: the project's own estimates its own.
+
+    Raises
+    ------
+    ParameterError `no_such_algorithm`, `nothing_to_tune`.
+    """
+    if any(name == own.name for own in OWN):
+        raise ParameterError(
+            "nothing_to_tune",
+            f"'{name}' calibrates itself, it has no gains to fit; choose a published one.",
+        )
+    if name not in BY_NAME:
+        raise ParameterError(
+            "no_such_algorithm", f"There is no filter '{name}' to tune; GET /api/v1/filters lists them."
+        )

@@ -1,0 +1,264 @@
+"""From an algorithm's gains to the compiled loop of its engine and the state it runs on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import Final
+
+import numpy as np
+
+from core.errors import ParameterError
+from core.frames import Floats
+from core.fusion.algorithms import (
+    complementary,
+    direction,
+    error_state,
+    extended_kalman,
+    quaternion_kalman,
+    sigma_point,
+)
+from core.fusion.algorithms.gains import (
+    LEVELS,
+    LONGEST_WINDOW,
+    OUTPUT,
+    WIDTH,
+    FixedGain,
+    Gain,
+    InnovationRules,
+)
+from core.fusion.algorithms.parameters import AlgorithmGains
+from core.rotation import conjugate, rotate
+
+GAINS_RATE_HZ: Final = 100.0
+"""Rate for which gains per sample are given."""
+
+Run = Callable[[Floats, Floats, Floats, Floats, Floats], None]
+"""(gyr, acc, mag, state, out): advance the state in place and write q (n, S, 4)."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a filter starts from.
+
+    Parameters
+    ----------
+    q : (S, 4) sensor to world. m_ref : (S, 3) unit field of the world. has_mag : whether one is measured.
+    """
+
+    params: AlgorithmGains
+    rate_hz: float
+    q: Floats
+    m_ref: Floats
+    has_mag: bool
+
+    def rows(self, names: Sequence[str], convert: Callable[[str, Floats], Floats]) -> Floats:
+        """Gains (g, 42) in the order of names; one that the algorithm does not have is zero."""
+        found = []
+        for name in names:
+            gain: Gain = getattr(self.params, name, FixedGain(0.0))
+            row = gain.row()
+            for part in (LEVELS, OUTPUT):
+                row[part] = convert(name, row[part])
+            found.append(row)
+        return np.array(found).reshape(-1, WIDTH)
+
+    def constants(self, names: Sequence[str]) -> dict[str, float]:
+        """Numbers by name; one that the algorithm does not have is zero."""
+        return {name: float(getattr(self.params, name, 0.0)) for name in names}
+
+    def noise_rows(self, names: Sequence[str]) -> Floats:
+        """Gains that are noises of samples: a white noise of the same density at every rate."""
+        return self.rows(names, lambda _, values: values * sqrt(self.rate_hz / GAINS_RATE_HZ))
+
+    def decay(self, share: float) -> float:
+        """Share left after a sample of this rate, of one at 100 Hz."""
+        return float(share ** (GAINS_RATE_HZ / self.rate_hz))
+
+    def drive(self, variance: float, share: float) -> float:
+        """Variance gained in a sample of this rate, so that the spread in the long run stays."""
+        if share >= 1.0:
+            return variance * GAINS_RATE_HZ / self.rate_hz
+        return variance * (1.0 - self.decay(share) ** 2) / (1.0 - share**2)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A filter ready to run: state (S, size), loop, and where the gyroscope bias stands in the state."""
+
+    state: Floats
+    run: Run
+    bias: int | None
+
+
+def prepare_complementary(kind: str, given: Setting) -> Prepared:
+    """E1."""
+    shares = complementary.FRACTIONS.get(kind, ())
+    ratio = GAINS_RATE_HZ / given.rate_hz
+
+    def convert(name: str, values: Floats) -> Floats:
+        if name not in shares:
+            return values
+        if (values > 1.0).any():
+            raise ParameterError("gain_out_of_range", f"Gain {name} is a share of an error: 0 to 1.")
+        return np.asarray(1.0 - (1.0 - values) ** ratio)
+
+    rows = given.rows(complementary.GAINS[kind], convert)
+    values = given.constants(complementary.CONSTANTS[kind])
+    for name in values:
+        values[name] = float(convert(name, np.array([values[name]]))[0])
+    if not given.has_mag:
+        values |= dict.fromkeys(complementary.LEARNS_BIAS.get(kind, ()), 0.0)
+    constants = np.array([*values.values(), 0.0])
+    state = np.zeros((len(given.q), complementary.SIZE))
+    state[:, :4] = given.q
+    number, dt = complementary.KINDS.index(kind), 1.0 / given.rate_hz
+
+    def run(gyr: Floats, acc: Floats, mag: Floats, state: Floats, out: Floats) -> None:
+        complementary.run_complementary(number, gyr, acc, mag, dt, given.m_ref, rows, constants, state, out)
+
+    return Prepared(state, run, complementary.BIAS)
+
+
+def prepare_quaternion_kalman(kind: str, given: Setting) -> Prepared:
+    """E2."""
+    rows = given.noise_rows(quaternion_kalman.GAINS)
+    values = given.constants(quaternion_kalman.CONSTANTS)
+    values |= {name: given.decay(values[name]) for name in ("c_a", "c_d")}
+    constants = np.array([*values.values()])
+    adaptation: InnovationRules | None = getattr(given.params, "adaptation", None)
+    window, rules = 0, np.zeros(WIDTH)
+    if adaptation is not None:
+        ratio = given.rate_hz / GAINS_RATE_HZ
+        window, rules = min(max(round(adaptation.window * ratio), 1), LONGEST_WINDOW), adaptation.row()
+        rules[OUTPUT] *= ratio
+    start = values["p0"], rows[0, 0] ** 2
+    state = np.array([quaternion_kalman.start_state(kind, q, *start) for q in given.q])
+    number, dt = quaternion_kalman.KINDS.index(kind), 1.0 / given.rate_hz
+
+    def run(gyr: Floats, acc: Floats, mag: Floats, state: Floats, out: Floats) -> None:
+        quaternion_kalman.run_quaternion_kalman(
+            number, window, rules, gyr, acc, mag, dt, given.m_ref, rows, constants, state, out
+        )
+
+    return Prepared(state, run, None)
+
+
+def prepare_extended_kalman(kind: str, given: Setting) -> Prepared:
+    """E3."""
+    blocks = extended_kalman.find_blocks(kind, given.has_mag)
+    rows = given.noise_rows(extended_kalman.GAINS)
+    values = given.constants(extended_kalman.CONSTANTS)
+    values |= {name: given.decay(values[name]) for name in ("c_a", "c_d")}
+    if values["gamma"] == 0.0:
+        values["gamma"] = np.inf
+    constants = np.array([*values.values()])
+    state = np.array([extended_kalman.start_state(blocks, q, values["p0"]) for q in given.q])
+    places, dt, quasi_static = (
+        extended_kalman.place_blocks(blocks),
+        1.0 / given.rate_hz,
+        kind == "quasi_static",
+    )
+
+    def run(gyr: Floats, acc: Floats, mag: Floats, state: Floats, out: Floats) -> None:
+        extended_kalman.run_extended_kalman(
+            quasi_static, places, gyr, acc, mag, dt, given.m_ref, rows, constants, state, out
+        )
+
+    return Prepared(state, run, int(places[1]) if "b" in blocks else None)
+
+
+def prepare_sigma_point(kind: str, given: Setting) -> Prepared:
+    """E4."""
+    n = sigma_point.count_states(given.has_mag)
+    options = {
+        name: getattr(given.params, name)
+        for name in ("alpha", "beta", "kappa", "weight")
+        if hasattr(given.params, name)
+    }
+    points, mean, spread = sigma_point.make_points(kind, n, **options)
+    rows = given.noise_rows(sigma_point.GAINS)
+    values = given.constants(sigma_point.CONSTANTS)
+    values["c_a"] = given.decay(values["c_a"])
+    constants = np.array([*values.values()])
+    state = np.array([sigma_point.start_state(n, q, values["p0"]) for q in given.q])
+    dt = 1.0 / given.rate_hz
+
+    def run(gyr: Floats, acc: Floats, mag: Floats, state: Floats, out: Floats) -> None:
+        sigma_point.run_sigma_point(
+            points, mean, spread, gyr, acc, mag, dt, given.m_ref, rows, constants, state, out
+        )
+
+    return Prepared(state, run, 7 if given.has_mag else None)
+
+
+def prepare_error_state(kind: str, given: Setting) -> Prepared:
+    """E5."""
+    rows = given.noise_rows(error_state.GAINS)
+    values = given.constants(error_state.CONSTANTS)
+    ratio = given.rate_hz / GAINS_RATE_HZ
+    if kind == "disturbed":
+        decay = float(getattr(given.params, "sigma", 0.0))
+        values["s_b"] = float(getattr(given.params, "zeta", 0.0))
+        values["xi"] = given.drive(values["xi"], error_state.ACCELERATION_DECAY)
+        values["gamma_d"] = given.drive(values["gamma"], decay)
+        values["sigma_d"] = given.decay(decay)
+    if kind == "external":
+        values["m1"] = min(max(round(values["m1"] * ratio), 1), error_state.LONGEST)
+        values["m2"] = round(values["m2"] * ratio)
+    if kind == "windowed":
+        values |= {name: max(values[name] * ratio, 1.0) for name in ("n_s", "n_l", "n_m")}
+        values |= {name: values[name] * sqrt(ratio) for name in ("xi_a", "xi_xy")}
+        values |= {name: values[name] * ratio for name in ("c_a", "c_m")}
+    # only Suh 2010 has variances of its own for the biases
+    p_b, p_b_a = (values[n] if kind == "external" else values["p0"] for n in ("p_b", "p_b_a"))
+    if not given.has_mag:
+        values["s_b"] = 0.0
+    constants = np.array([*values.values()])
+    state = np.array(
+        [error_state.start_state(kind, q, values["p0"], p_b, p_b_a, given.has_mag) for q in given.q]
+    )
+    number, dt = error_state.KINDS.index(kind), 1.0 / given.rate_hz
+    n, decay_a = error_state.STATES[number], given.decay(error_state.ACCELERATION_DECAY)
+
+    def run(gyr: Floats, acc: Floats, mag: Floats, state: Floats, out: Floats) -> None:
+        error_state.run_error_state(
+            number, n, decay_a, gyr, acc, mag, dt, given.m_ref, rows, constants, state, out
+        )
+
+    return Prepared(state, run, 4 if n > 3 else None)
+
+
+def prepare_direction(kind: str, given: Setting) -> Prepared:
+    """E6."""
+    rows = given.noise_rows(direction.GAINS)
+    values = given.constants(direction.CONSTANTS)
+    for decay, drive in (("c_a", "s_a"), ("c_m", "s_m")):
+        values[drive] = sqrt(given.drive(values[drive] ** 2, values[decay]))
+        values[decay] = given.decay(values[decay])
+    if kind == "vertical":
+        ratio = sqrt(given.rate_hz / GAINS_RATE_HZ)
+        values["sigma_f"] *= ratio
+    constants = np.array([*values.values()])
+    up = rotate(conjugate(given.q), np.array([0.0, 0.0, 1.0]))
+    field = rotate(conjugate(given.q), given.m_ref)
+    state = np.array(
+        [direction.start_state(kind, *start, constants) for start in zip(given.q, up, field, strict=True)]
+    )
+    number, dt = direction.KINDS.index(kind), 1.0 / given.rate_hz
+
+    def run(gyr: Floats, acc: Floats, mag: Floats, state: Floats, out: Floats) -> None:
+        direction.run_direction(number, gyr, acc, mag, dt, given.m_ref, rows, constants, state, out)
+
+    return Prepared(state, run, direction.BIAS if kind == "vertical" else None)
+
+
+PREPARE: Final[dict[str, Callable[[str, Setting], Prepared]]] = {
+    "E1": prepare_complementary,
+    "E2": prepare_quaternion_kalman,
+    "E3": prepare_extended_kalman,
+    "E4": prepare_sigma_point,
+    "E5": prepare_error_state,
+    "E6": prepare_direction,
+}

@@ -1,0 +1,219 @@
+"""Gains of an algorithm as a point in a unit box, over the logarithm of each number that may be tuned.
+
+Which numbers those are, and where they may lie, stands in the types of `core.fusion.algorithms.parameters`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from math import isinf, log
+from typing import Any, Final, get_type_hints
+
+import numpy as np
+
+from core.errors import ParameterError
+from core.frames import Floats
+from core.fusion.algorithms.gains import FixedGain, FuzzyGain, Gain, ThreeLevelGain, TwoLevelGain
+from core.fusion.algorithms.parameters import (
+    DEVIATION,
+    MAGNETIC,
+    TURNING,
+    AlgorithmGains,
+    TuningRange,
+)
+from core.fusion.algorithms.schemes import Scheme
+
+DIGITS: Final = 4
+"""Significant digits of a tuned gain: more would be noise of the data."""
+
+THRESHOLDS: Final = {"acc": DEVIATION, "mag": DEVIATION, "gyr": TURNING}
+
+
+@dataclass(frozen=True)
+class _Variable:
+    """One number: a field of the gains, where in a gain (None = the field itself), place in a tuple."""
+
+    field: str
+    part: str | None
+    index: int | None
+    limits: TuningRange
+
+
+class GainSpace:
+    """The numbers of some gains that may be tuned; all others stay.
+
+    Parameters
+    ----------
+    params : gains to start from; their levels are kept. magnetometer : whether one is used; without one the
+    gains that only it needs stay, and thresholds on it are dropped.
+
+    Raises
+    ------
+    ParameterError `nothing_to_tune`.
+    """
+
+    def __init__(self, params: AlgorithmGains, *, magnetometer: bool) -> None:
+        ranges = _find_ranges(type(params), magnetometer)
+        if not magnetometer:
+            gains = {name: getattr(params, name) for name in ranges}
+            params = _change(params, {n: _without_field(g) for n, g in gains.items() if isinstance(g, Gain)})
+        self.params: AlgorithmGains = params
+        self._variables = tuple(
+            variable
+            for name, limits in ranges.items()
+            for variable in _list_variables(name, getattr(params, name), limits)
+        )
+        if not self._variables:
+            raise ParameterError("nothing_to_tune", f"{type(params).__name__} has no gain that can be tuned.")
+
+    def __len__(self) -> int:
+        return len(self._variables)
+
+    def encode(self, params: AlgorithmGains) -> Floats:
+        """The point (d,) of gains with the levels of this space; what is outside its range is at its end."""
+        return np.array([_to_unit(_read(params, v), v.limits) for v in self._variables])
+
+    def decode(self, point: Floats) -> AlgorithmGains:
+        """The gains at a point (d,), each rounded to four digits."""
+        parts: dict[str, Any] = {}
+        for v, x in zip(self._variables, point, strict=True):
+            value = _from_unit(float(x), v.limits)
+            if v.part is None:
+                parts[v.field] = value
+                continue
+            inner = parts.setdefault(v.field, {})
+            if v.index is None:
+                inner[v.part] = value
+            else:
+                whole = inner.setdefault(v.part, list(getattr(getattr(self.params, v.field), v.part)))
+                whole[v.index] = value
+        return _change(self.params, {name: self._gain(name, part) for name, part in parts.items()})
+
+    def _gain(self, name: str, part: float | dict[str, Any]) -> float | Gain:
+        if isinstance(part, float):
+            return part
+        gain: Any = getattr(self.params, name)
+        # thresholds in their order; corners are put in theirs by the gain itself
+        inner = {
+            k: tuple(sorted(x) if len(x) == 2 else x) if isinstance(x, list) else x for k, x in part.items()
+        }
+        changed: Gain = replace(gain, **inner)
+        return changed
+
+
+def choose_scheme(params: AlgorithmGains, scheme: Scheme, *, magnetometer: bool) -> AlgorithmGains:
+    """The gains with every gain that may follow the motion doing it by a scheme, its levels alike at first.
+
+    A gain of the gyroscope follows the rate, one of accelerometer or magnetometer its deviation, a gain of
+    both follows both (Nazarahari 2021, Table 5).
+    """
+    changed: dict[str, Any] = {}
+    for name in _find_ranges(type(params), magnetometer):
+        gain = getattr(params, name)
+        if isinstance(gain, Gain):
+            changed[name] = _make_gain(_quiet(gain), scheme, _follows(name), magnetometer)
+    return _change(params, changed)
+
+
+def gains_to_json(params: AlgorithmGains) -> dict[str, Any]:
+    """Gains by name: a number, or the levels and thresholds of a gain; what is infinite is left out."""
+    return {f.name: x for f in fields(params) if (x := _to_plain(getattr(params, f.name))) is not None}
+
+
+def _change(params: Any, values: Mapping[str, Any]) -> AlgorithmGains:
+    """The same class of gains with other values; mypy cannot see that the names are those of its fields."""
+    changed: AlgorithmGains = replace(params, **values)
+    return changed
+
+
+def _to_plain(value: Any) -> Any:
+    if isinstance(value, FixedGain):
+        return value.value
+    if isinstance(value, float | int):
+        return None if isinf(value) else value
+    if isinstance(value, tuple):
+        plain = [_to_plain(x) for x in value]
+        return None if None in plain else plain
+    if value is None:
+        return None
+    return {f.name: x for f in fields(value) if (x := _to_plain(getattr(value, f.name))) is not None}
+
+
+def _find_ranges(gains: type[AlgorithmGains], magnetometer: bool) -> dict[str, TuningRange]:
+    """Field → range, of those that are read with or without a magnetometer."""
+    hints = get_type_hints(gains, include_extras=True)
+    found = {}
+    for f in fields(gains):
+        notes = getattr(hints[f.name], "__metadata__", ())
+        if notes and (magnetometer or MAGNETIC not in notes):
+            found[f.name] = notes[0]
+    return found
+
+
+def _list_variables(name: str, value: Any, limits: TuningRange) -> list[_Variable]:
+    if not isinstance(value, Gain):
+        return [_Variable(name, None, None, limits)]
+    found: list[_Variable] = []
+    for f in fields(value):
+        part = getattr(value, f.name)
+        inner = THRESHOLDS.get(f.name, limits)
+        if isinstance(part, tuple):
+            found += [_Variable(name, f.name, i, inner) for i, x in enumerate(part) if not isinf(x)]
+        elif isinstance(part, float) and not isinf(part):
+            found.append(_Variable(name, f.name, None, inner))
+    return found
+
+
+def _read(params: AlgorithmGains, v: _Variable) -> float:
+    value = getattr(params, v.field)
+    if v.part is not None:
+        value = getattr(value, v.part)
+    return float(value if v.index is None else value[v.index])
+
+
+def _to_unit(value: float, limits: TuningRange) -> float:
+    x = min(max(1.0 - value if limits.left else value, limits.low), limits.high)
+    return log(x / limits.low) / log(limits.high / limits.low)
+
+
+def _from_unit(x: float, limits: TuningRange) -> float:
+    value = float(f"{limits.low * (limits.high / limits.low) ** x:.{DIGITS}g}")
+    return round(1.0 - value, 12) if limits.left else value
+
+
+def _quiet(gain: Gain) -> float:
+    """The value of a gain at rest."""
+    if isinstance(gain, FixedGain):
+        return gain.value
+    if isinstance(gain, FuzzyGain):
+        return gain.output[3]
+    return gain.quiet
+
+
+def _follows(name: str) -> tuple[str, ...]:
+    if name == "sigma_g":
+        return ("gyr",)
+    if name.endswith("_a"):
+        return ("acc",)
+    return ("mag",) if name.endswith("_m") else ("acc", "mag")
+
+
+def _make_gain(value: float, scheme: Scheme, follows: tuple[str, ...], magnetometer: bool) -> Gain:
+    watched = [name for name in follows if name != "mag" or magnetometer]
+    if scheme == "fixed" or not watched:
+        return FixedGain(value)
+    if scheme == "two_levels":
+        return TwoLevelGain(value, value, **dict.fromkeys(watched, 0.1))
+    return ThreeLevelGain(value, value, value, **dict.fromkeys(watched, (0.1, 0.2)))
+
+
+def _without_field(gain: Gain) -> Gain:
+    """The same gain with no threshold on the magnetometer; fixed where it followed nothing else."""
+    if isinstance(gain, TwoLevelGain):
+        rest = replace(gain, mag=np.inf)
+        return FixedGain(gain.quiet) if isinf(rest.acc) and isinf(rest.gyr) else rest
+    if isinstance(gain, ThreeLevelGain):
+        rest3 = replace(gain, mag=(np.inf, np.inf))
+        return FixedGain(gain.quiet) if isinf(rest3.acc[0]) and isinf(rest3.gyr[0]) else rest3
+    return gain

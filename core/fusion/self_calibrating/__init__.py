@@ -1,0 +1,21 @@
+"""Orientation of single sensors that find their own calibration while they move.
+
+One error-state Kalman filter for any number of sensors, live in blocks or over a whole recording both ways:
+docs/science/self-calibrating-filter.md.
+"""
+
+from core.fusion.self_calibrating.filter import (
+    SelfCalibratingFilter,
+    SensorEstimates,
+    SmoothedOrientations,
+    smooth_orientations,
+)
+from core.fusion.self_calibrating.params import SelfCalibratingParams
+
+__all__ = [
+    "SelfCalibratingFilter",
+    "SelfCalibratingParams",
+    "SensorEstimates",
+    "SmoothedOrientations",
+    "smooth_orientations",
+]
