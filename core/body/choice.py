@@ -20,6 +20,10 @@ WHOLE: Final = PRESETS["lower_body7"]
 NO_STANDING: Final = "no_standing"
 """`Poses.reduced` of a take in which nobody stands still."""
 
+LEAST_SLIPPED: Final = 0.25
+"""Share of the take for which a sensor that slipped later must be there: what it measured until then counts
+(our choice; before a slip in mid-walk angles stay within 0.2°, estimated instead they err by 4 to 7°)."""
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -59,7 +63,8 @@ def choose(
 
     Parameters
     ----------
-    least_valid : share of the take a sensor must be there for; below it has failed.
+    least_valid : share of the take a sensor must be there for; below it has failed. One that slipped may be
+        there for less.
 
     Raises
     ------
@@ -67,11 +72,13 @@ def choose(
     """
     worn = {s: calibrated.recording.sensors[s] for s in WHOLE if s in calibrated.recording.sensors}
     share = {s: float(np.mean(x.valid)) for s, x in worn.items()}
-    lasting = tuple(s for s in WHOLE if share.get(s, 0.0) >= max(least_valid, 1e-9))
+    slipped = {n.sensor for n in calibrated.recording.notices if n.code == "sensor_slipped"}
+    need = {s: max(min(least_valid, LEAST_SLIPPED) if s in slipped else least_valid, 1e-9) for s in WHOLE}
+    lasting = tuple(s for s in WHOLE if share.get(s, 0.0) >= need[s])
     failed = tuple(s for s in worn if s not in lasting)
     working = tuple(s for s in lasting if s in orientations.q)
     if calibrated.calibration.posture == "walking":
-        return _without_standing(requested, working, _report_failed(failed, share, least_valid), failed)
+        return _without_standing(requested, working, _report_failed(failed, share, need), failed)
     found = list_possible_estimators(working)
     if requested != AUTO and requested not in found:
         raise EstimationError("estimator_impossible", _impossible(requested, working))
@@ -80,7 +87,7 @@ def choose(
     if requested == AUTO and hoped != found[:1]:
         reduced = "sensor_failed" if failed else "not_calibrated"
     order = found if requested == AUTO else (requested,)
-    return Choice(working, failed, found, order, reduced, _report_failed(failed, share, least_valid))
+    return Choice(working, failed, found, order, reduced, _report_failed(failed, share, need))
 
 
 def _without_standing(
@@ -105,14 +112,14 @@ def _without_standing(
 
 
 def _report_failed(
-    failed: tuple[Segment, ...], share: dict[Segment, float], least_valid: float
+    failed: tuple[Segment, ...], share: dict[Segment, float], need: dict[Segment, float]
 ) -> tuple[Notice, ...]:
     notices = []
     for s in failed:
         message = (
-            f"The {s} sensor is there for {share[s]:.0%} of the take, at least {least_valid:.0%} is needed, "
-            "so it is left out: angles of its joints are missing or estimated. Charge or replace it and "
-            "record again."
+            f"The {s} sensor can be used for {share[s]:.0%} of the take, {need[s]:.0%} is needed, "
+            "so it is left out: angles of its joints are missing or estimated. Charge, fasten or replace it "
+            "and record again."
         )
         notices.append(Notice("sensor_failed", message, sensor=s))
     return tuple(notices)

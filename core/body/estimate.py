@@ -24,10 +24,9 @@ from core.body.erkf.smoother import smooth
 from core.body.erkf.start import start_state
 from core.body.feet import FootTracks
 from core.body.kinematics import forward_kinematics
-from core.body.l7s.filter import compile_l7s_kernel
 from core.body.l7s.health import l7s_health, l7s_notices
 from core.body.l7s.inputs import free_acceleration
-from core.body.l7s.poses import l7s_poses
+from core.body.l7s.poses import compile_l7s_kernel, l7s_poses
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.mounting import MountedSensors
 from core.body.pose_params import PoseParams

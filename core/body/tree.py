@@ -34,6 +34,9 @@ PRESETS: Final[Mapping[Preset, tuple[Segment, ...]]] = {
 HINGED: Final = "shank"
 """The knee is the joint with a hinge axis, z of thigh and shank; its distal segment begins so."""
 
+COPIED: Final = 4096
+"""Samples that are laid out for the kernel at a time: whole takes would be copied by the ten megabytes."""
+
 LONGEST_M: Final = 2.0
 """A joint further from its sensor than this is a unit error."""
 
@@ -142,19 +145,22 @@ class ImuTree:
 
         n = len(self.imus)
         turned, origin = np.empty((q.size // (4 * n), n, 4)), np.empty((p.size // (3 * n), n, 3))
-        write_segments(
-            np.ascontiguousarray(p, np.float64).reshape(origin.shape),
-            np.ascontiguousarray(q, np.float64).reshape(turned.shape),
-            self.q_mount,
-            self.place,
-            turned,
-            origin,
-        )
+        p_flat, q_flat = p.reshape(origin.shape), q.reshape(turned.shape)
+        for first in range(0, len(turned), COPIED):
+            part = slice(first, first + COPIED)
+            write_segments(
+                np.ascontiguousarray(p_flat[part], np.float64),
+                np.ascontiguousarray(q_flat[part], np.float64),
+                self.q_mount,
+                self.place,
+                turned[part],
+                origin[part],
+            )
         return turned.reshape(q.shape), origin.reshape(p.shape)
 
     def segment_q(self, q: Floats) -> Floats:
         """Segment orientations (..., n, 4) from sensor orientations (..., n, 4)."""
-        return self.segments(np.zeros((*q.shape[:-1], 3)), q)[0]
+        return self.segments(np.broadcast_to(0.0, (*q.shape[:-1], 3)), q)[0]
 
     def segment_origin(self, p: Floats, q: Floats) -> Floats:
         """Segment origins (..., n, 3) in W from sensor positions (..., n, 3) and orientations (..., n, 4)."""

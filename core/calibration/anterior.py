@@ -28,14 +28,16 @@ from core.calibration.heading import (
     pendulum_agreement,
     rest_to_rest_velocity,
     start_direction,
+    stride_direction,
     subtract_angles,
     velocity_direction,
 )
 from core.calibration.mounting import read_declared_angle
+from core.calibration.sensor_in_walk import WalkRungParams, find_flat_moments
 from core.calibration.standing import SensorAtRest, vertical_frame
 from core.calibration.walking import TRUNK
 from core.errors import CalibrationError, Notice
-from core.frames import Bools, Floats, Segment
+from core.frames import FOOT, Bools, Floats, Segment
 from core.recording import SensorSignals
 from core.rest import Window
 from core.rotation import conjugate, rotate
@@ -129,7 +131,7 @@ def find_anterior_axis(
     if method == "gyro_pca" and segment not in TRUNK:
         found = _by_gyro(segment, signals, standing, R_vertical, q, walk, written)
     else:
-        found = _by_walking(segment, signals, R_vertical, q, walk, written, params)
+        found = _by_walking(segment, signals, standing, R_vertical, q, walk, written, params)
     if written is not None and abs(subtract_angles(found.angle, written)) > CONFLICT:
         raise CalibrationError(
             "calibration_sign_conflict",
@@ -142,9 +144,27 @@ def find_anterior_axis(
     return found
 
 
+def _by_strides(
+    segment: Segment,
+    signals: SensorSignals,
+    standing: SensorAtRest,
+    a: Complexes,
+    walk: CalibrationWalk,
+    params: HeadingParams,
+) -> WalkingDirection | None:
+    """Direction of a foot's strides, each from one flat moment to the next; None for other segments."""
+    if segment not in FOOT.values():
+        return None
+    flats = find_flat_moments(
+        signals.gyr - standing.gyro_bias, walk.mask & signals.valid, walk.rate_hz, WalkRungParams()
+    )
+    return stride_direction(a, flats, walk.parts, walk.bearing, walk.rate_hz, params)
+
+
 def _by_walking(
     segment: Segment,
     signals: SensorSignals,
+    standing: SensorAtRest,
     R_vertical: Floats,
     q: Floats,
     walk: CalibrationWalk,
@@ -165,7 +185,12 @@ def _by_walking(
         velocity = velocity_direction(v, first, [p for p, _ in inside], [b for _, b in inside], params)
     facts: dict[str, object] = {"axis_share": axis.score}
     allowed = DISAGREEMENT
-    if velocity is not None:
+    strides = _by_strides(segment, signals, standing, a, walk, params)
+    if strides is not None:
+        off = subtract_angles(nearest_sign(axis.angle, strides.angle), strides.angle)
+        facts |= {"source": "strides", "disagreement_rad": off}
+        chosen = strides
+    elif velocity is not None:
         off = subtract_angles(nearest_sign(axis.angle, velocity.angle), velocity.angle)
         facts |= {"source": "velocity", "disagreement_rad": off}
         if abs(off) > DISAGREEMENT and axis.score > STRONG_AXIS:

@@ -10,11 +10,27 @@ import numpy as np
 
 from core.calibration.anterior import AnteriorAxis, CalibrationWalk, Method, find_anterior_axis
 from core.calibration.from_walking import calibrate_from_walking
+from core.calibration.functional import (
+    FunctionalMovements,
+    FunctionalParams,
+    find_functional_axes,
+    find_functional_movements,
+)
 from core.calibration.gyro_pca import about_vertical, count_steps, sagittal_angle
 from core.calibration.heading import HeadingParams, Part, step_time
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
+from core.calibration.score import ScoreParams
 from core.calibration.sensor_in_walk import WalkRungParams
-from core.calibration.standing import SensorAtRest, choose_rest, find_rests, stand_all, vertical_frame
+from core.calibration.standing import (
+    LEG_AHEAD,
+    SensorAtRest,
+    choose_rest,
+    drop_pauses,
+    find_rests,
+    measure_leg_ahead,
+    stand_all,
+    vertical_frame,
+)
 from core.calibration.walking import (
     TRUNK,
     WalkingParams,
@@ -25,7 +41,7 @@ from core.calibration.walking import (
     turning_mask,
 )
 from core.errors import CalibrationError, Notice, SignalError
-from core.frames import R_NEUTRAL, Floats, Segment
+from core.frames import R_NEUTRAL, Bools, Floats, Segment
 from core.fusion.attitude import AttitudeParams, estimate_orientation
 from core.recording import UniformRecording
 from core.rest import RestParams, Window
@@ -37,6 +53,11 @@ FACING = radians(20.0)
 FEW_STEPS = 8
 """Steps below which calibration says how few there were (docs/science/calibration.md, "Parameters")."""
 
+NO_STANDING = (
+    "No standing found: the person only paused in mid-stride. Let them stand still for 3 to 5 s with both "
+    "feet side by side, before or after walking."
+)
+
 
 @dataclass(frozen=True)
 class CalibrationParams:
@@ -47,7 +68,8 @@ class CalibrationParams:
     method : how the anterior axis of leg segments is found; the trunk is always by walking direction or
         declared mounting, because walking gives it no sagittal axis
         (docs/science/calibration.md, "Flexion axis by gyro PCA").
-    from_walking : where nobody stands still.
+    from_walking : where nobody stands still. functional : swings and bows done for the calibration.
+    score : limits of the checks.
     """
 
     method: Method = "walking_direction"
@@ -56,12 +78,15 @@ class CalibrationParams:
     heading: HeadingParams = field(default_factory=HeadingParams)
     attitude: AttitudeParams = field(default_factory=AttitudeParams)
     from_walking: WalkRungParams = field(default_factory=WalkRungParams)
+    functional: FunctionalParams = field(default_factory=FunctionalParams)
+    score: ScoreParams = field(default_factory=ScoreParams)
 
 
 def calibrate(recording: UniformRecording, params: CalibrationParams | None = None) -> CalibratedRecording:
     """Find how each sensor sits on its segment, from standing and walking, without a magnetometer.
 
-    Where nobody stands still the walk alone has to do (core/calibration/from_walking.py).
+    Where nobody stands still with both feet side by side the walk alone has to do
+    (core/calibration/from_walking.py): a pause in mid-stride is no zero of angles.
 
     Parameters
     ----------
@@ -74,7 +99,8 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
 
     Raises
     ------
-    SignalError `unit_suspect`; `no_rest`, `rest_too_short`, `not_still` where there is no walk either.
+    SignalError `unit_suspect`; `no_rest`, `rest_too_short`, `not_still`, `no_standing` where there is no walk
+    long enough either.
     CalibrationError `no_segment`; where no sensor can be calibrated that of the first: `no_walking`,
     `not_single_axis`, `calibration_sign_conflict`, `pelvis_heading_unknown`.
 
@@ -85,21 +111,49 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
     params = params or CalibrationParams()
     if not recording.sensors:
         raise CalibrationError("no_segment", "No sensor is mapped to a segment; map at least one foot.")
-    rate = recording.rate_hz
     try:
         rests = find_rests(recording, params.rest)
     except SignalError as why:
-        return calibrate_from_walking(
-            recording,
-            params.walking,
-            params.heading,
-            params.attitude,
-            params.from_walking,
-            params.method,
-            why,
-        )
-    moving = moving_mask(recording, params.walking)
-    zero = choose_rest(rests, moving, rate)
+        return _from_walking(recording, (), params, why)
+    movements = find_functional_movements(recording, params.functional)
+    moving = moving_mask(recording, params.walking) & ~movements.anywhere
+    left = drop_pauses(rests, moving, recording.rate_hz)
+    while left:
+        zero = choose_rest(left, moving, recording.rate_hz)
+        found, ahead = _calibrate_at(recording, rests, zero, moving, params, movements)
+        if ahead < LEG_AHEAD:
+            return found
+        left = tuple(r for r in left if not (r[0] <= zero[0] and zero[1] <= r[1]))
+    paused = SignalError("no_standing", NO_STANDING, t_s=rests[0][0])
+    return _from_walking(recording, rests, params, paused)
+
+
+def _from_walking(
+    recording: UniformRecording, rests: tuple[Window, ...], params: CalibrationParams, why: SignalError
+) -> CalibratedRecording:
+    """Calibrate without a standing; `rests` are pauses, `why` says what was wrong with them."""
+    return calibrate_from_walking(
+        recording,
+        params.walking,
+        params.heading,
+        params.attitude,
+        params.from_walking,
+        params.method,
+        why,
+        rests,
+    )
+
+
+def _calibrate_at(
+    recording: UniformRecording,
+    rests: tuple[Window, ...],
+    zero: Window,
+    moving: Bools,
+    params: CalibrationParams,
+    movements: FunctionalMovements,
+) -> tuple[CalibratedRecording, float]:
+    """Calibrate on one of the rests, and by how much one leg was ahead of the other there, rad."""
+    rate = recording.rate_hz
     standing = stand_all(recording, zero, rests, params.rest)
     q = {s: _rest_world(recording, s, standing[s], zero, params.attitude) for s in recording.sensors}
     biases = {s: x.gyro_bias for s, x in standing.items()}
@@ -107,8 +161,7 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
     parts = straight_parts(moving, turning, rate, params.walking)
     walk, facing = _walk(recording, rests, zero, parts, q, params.heading)
     found: dict[Segment, AnteriorAxis] = {}
-    notices: list[Notice] = []
-    failed: CalibrationError | None = None
+    failed: list[CalibrationError] = []
     for s, signals in recording.sensors.items():
         declared = recording.mounting.get(s, "")
         try:
@@ -116,10 +169,12 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
                 s, signals, standing[s], q[s], walk, declared, params.method, params.heading
             )
         except CalibrationError as error:
-            failed = failed or error
-            notices.append(Notice(error.code, error.message, sensor=s))
-    if not found and failed is not None:
-        raise failed
+            failed.append(error)
+    found |= find_functional_axes(recording, movements, standing, q, params.functional)
+    failed = [error for error in failed if error.sensor not in found]
+    if not found and failed:
+        raise failed[0]
+    notices = [Notice(error.code, error.message, sensor=error.sensor) for error in failed]
     for f in found.values():
         notices += f.notices
     steps = _straight_steps(found, standing, q, walk)
@@ -130,14 +185,7 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
         )
         notices.append(Notice("few_steps", message))
     if facing:
-        notices.append(
-            Notice(
-                "facing_not_walking",
-                f"The person turned by {abs(degrees(facing)):.0f}° between standing and walking; forward is "
-                "where they stood facing. Start straight ahead from standing where possible.",
-                severity="info",
-            )
-        )
+        notices.append(_tell_facing(facing, walk.leads))
     calibration = Calibration(
         segments={s: _mounted(standing[s], f) for s, f in found.items()},
         rest=rests,
@@ -149,7 +197,8 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
         diagnostics={s: {"method": f.method, "score": f.score, **f.facts} for s, f in found.items()},
         straight_steps=steps,
     )
-    return CalibratedRecording(recording, calibration)
+    ahead = measure_leg_ahead(_tilts(found, standing, q, parts, params.from_walking.least_s * rate))
+    return CalibratedRecording(recording, calibration), ahead
 
 
 def _rest_world(
@@ -209,6 +258,20 @@ def _walk(
     return CalibrationWalk(rest, leads, near, bearing, span, mask, steps_s, rate), facing
 
 
+def _tell_facing(turn: float, leads: bool) -> Notice:
+    """They stood facing elsewhere than they walked, rad; `leads`: the standing is before the walk."""
+    between, todo = (
+        ("standing and walking", "Start straight ahead from standing where possible.")
+        if leads
+        else ("walking and standing", "Stand still where the walk ends before turning where possible.")
+    )
+    message = (
+        f"The person turned by {abs(degrees(turn)):.0f}° between {between}; forward is where they stood "
+        f"facing. {todo}"
+    )
+    return Notice("facing_not_walking", message, severity="info")
+
+
 def _mounted(standing: SensorAtRest, found: AnteriorAxis) -> SegmentCalibration:
     return SegmentCalibration(
         R_segment_sensor=about_vertical(-found.angle) @ vertical_frame(standing.up),
@@ -217,6 +280,25 @@ def _mounted(standing: SensorAtRest, found: AnteriorAxis) -> SegmentCalibration:
         method=found.method,
         score=min(1.0, max(0.0, found.score)),
     )
+
+
+def _tilts(
+    found: Mapping[Segment, AnteriorAxis],
+    standing: Mapping[Segment, SensorAtRest],
+    q: Mapping[Segment, Floats],
+    parts: list[Part],
+    least: float,
+) -> dict[Segment, float]:
+    """Mean sagittal inclination of each segment in straight walking, rad; empty below `least` samples."""
+    if sum(b - a for a, b in parts) < least:
+        return {}
+    tilts = {}
+    for s, f in found.items():
+        up = [rotate(conjugate(q[s][a:b]), np.array([0.0, 0.0, 1.0])) for a, b in parts]
+        mean = np.concatenate(up).mean(axis=0)[None]
+        R = about_vertical(-f.angle) @ vertical_frame(standing[s].up)
+        tilts[s] = float(sagittal_angle(mean, R)[0])
+    return tilts
 
 
 def _straight_steps(

@@ -31,6 +31,7 @@ from core.calibration.heading import (
     nearest_sign,
     pendulum_agreement,
     step_time,
+    stride_direction,
 )
 from core.calibration.mounting import read_declared_angle
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
@@ -51,7 +52,7 @@ from core.filtering import low_pass
 from core.frames import FOOT, R_NEUTRAL, SHANK, SIDES, THIGH, Bools, Floats, Segment
 from core.fusion.attitude import AttitudeParams
 from core.recording import UniformRecording
-from core.rest import find_runs
+from core.rest import Window, find_runs
 from core.rotation import about, conjugate, from_matrix, multiply, rotate
 
 SWING_HZ: Final = 1.6
@@ -69,6 +70,11 @@ Seen: .59 to 1.8 on the same sets. Thighs have −.2 to 1.4: they tell nothing b
 FROM_WALKING: Final = (
     "Nobody stood still, so sensors were calibrated from walking: joint angles have ranges, no levels. Stand "
     "still for 3 seconds next time."
+)
+
+FROM_PAUSES: Final = (
+    "The person only paused in mid-stride, so sensors were calibrated from walking: joint angles have "
+    "ranges, no levels. Stand still for 3 seconds with both feet side by side next time."
 )
 
 
@@ -95,12 +101,13 @@ def calibrate_from_walking(
     params: WalkRungParams,
     method: Method,
     why: SignalError,
+    rests: tuple[Window, ...] = (),
 ) -> CalibratedRecording:
-    """Calibrate without a rest.
+    """Calibrate without a standing.
 
     Parameters
     ----------
-    why : what was wrong with standing; raised when walking cannot replace it.
+    why : what was wrong with standing; raised when walking cannot replace it. rests : pauses in mid-stride.
 
     Returns
     -------
@@ -140,12 +147,12 @@ def calibrate_from_walking(
     bearing = _bearings(recording, sensors, near, home)
     neutral = {s: _find_neutral(s, x, near, home) for s, x in sensors.items()}
     found, notices = _find_forward(recording, neutral, near, bearing, heading, method)
-    notices.append(Notice("from_walking", FROM_WALKING))
+    notices.append(Notice("from_walking", FROM_PAUSES if rests else FROM_WALKING))
     zero = (home[0] / rate, home[1] / rate)
     at = round(0.5 * (zero[0] + zero[1]) * rate)
     calibration = Calibration(
         segments={s: _mounted(neutral[s], f, at) for s, f in found.items()},
-        rest=(),
+        rest=rests,
         walking=tuple((a / rate, b / rate) for a, b in parts),
         zero=zero,
         turning=turning,
@@ -214,6 +221,7 @@ def _find_forward(
         vaulting = 0.0
         R = vertical_frame(x.up)
         try:
+            strides = None
             if method == "gyro_pca" and segment not in TRUNK:
                 pca = flexion_axis(signals.gyr[mask] - x.sensor.gyro_bias, R, segment)
                 axis, share = -pca.gamma, pca.rho
@@ -224,14 +232,18 @@ def _find_forward(
                     steps_s = [step_time(upwards[p[0] : p[1]], recording.rate_hz) for p in parts]
                 seen = acceleration_axis(a, parts, bearing, recording.rate_hz, params, steps_s)
                 axis, share = seen.angle, seen.score
+                strides = stride_direction(a, x.sensor.flats, parts, bearing, recording.rate_hz, params)
+                if strides is not None:
+                    axis, share = strides.angle, strides.score
                 if steps_s is not None:
                     vaulting = pendulum_agreement(
                         a, upwards, axis, parts, bearing, recording.rate_hz, steps_s
                     )
             forward = _push(a, axis, parts, bearing, recording.rate_hz)
             angle, how, own = _sign(
-                segment, axis, recording, x, mask, forward, pushed, vaulting, params.pendulum
-            )
+                segment, axis, strides is not None, recording, x, mask, forward, pushed, vaulting,
+                params.pendulum,
+            )  # fmt: skip
         except CalibrationError as error:
             failed = failed or error
             notices.append(Notice(error.code, error.message, sensor=segment))
@@ -256,6 +268,7 @@ def _in_order(worn: Mapping[Segment, object]) -> Iterator[Segment]:
 def _sign(
     segment: Segment,
     axis: float,
+    directed: bool,
     recording: UniformRecording,
     x: _Neutral,
     mask: Bools,
@@ -266,6 +279,10 @@ def _sign(
 ) -> tuple[float, str, tuple[Notice, ...]]:
     """The end of the axis that is forward, what told it, and what to say.
 
+    Parameters
+    ----------
+    directed : the axis is the direction of a foot's strides, which has a sign.
+
     Raises
     ------
     CalibrationError `forward_unknown`, `pelvis_heading_unknown`.
@@ -274,6 +291,8 @@ def _sign(
     written = read_declared_angle(recording.mounting.get(segment, ""), R, segment)
     if written is not None:
         return nearest_sign(axis, written), "declared", ()
+    if directed:
+        return axis, "strides", ()
     if segment in TRUNK:
         if segment == "pelvis" and abs(vaulting) >= least_vaulting:
             return (axis if vaulting > 0 else nearest_sign(axis, axis + np.pi)), "pendulum", ()

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from math import radians
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.errors import CalibrationError
 from core.frames import Bools, Floats, Segment
@@ -37,6 +38,23 @@ class FlexionAxis:
     rho: float
 
 
+@dataclass(frozen=True)
+class MainAxis:
+    """First principal axis (x, z) of horizontal rates, without a sign, and its share of both components."""
+
+    x: float
+    z: float
+    share: float
+
+
+def measure_main_axis(horizontal: Floats) -> MainAxis:
+    """Principal axis of rates (n, 2) about x and z, rad/s."""
+    W = horizontal - horizontal.mean(axis=0)
+    values, vectors = np.linalg.eigh(W.T @ W)
+    px, pz = vectors[:, 1]
+    return MainAxis(float(px), float(pz), float(values[1] / max(values.sum(), 1e-12)))
+
+
 def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionAxis:
     """Find the turn of the vertical frame about its y that lays z along the axis the segment turns about.
 
@@ -48,10 +66,8 @@ def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionA
     ------
     CalibrationError `not_single_axis` when the movement has no main axis (ρ < 0.70).
     """
-    W = (rate @ R_vertical.T)[:, [0, 2]]
-    W = W - W.mean(axis=0)
-    values, vectors = np.linalg.eigh(W.T @ W)
-    rho = float(values[1] / max(values.sum(), 1e-12))
+    found = measure_main_axis((rate @ R_vertical.T)[:, [0, 2]])
+    rho = found.share
     if rho < SINGLE_AXIS:
         raise CalibrationError(
             "not_single_axis",
@@ -60,8 +76,7 @@ def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionA
             "walking direction.",
             sensor=segment,
         )
-    px, pz = vectors[:, 1]
-    return FlexionAxis(float(np.arctan2(-px, pz)), rho)
+    return FlexionAxis(float(np.arctan2(-found.x, found.z)), rho)
 
 
 def about_vertical(gamma: float) -> Floats:
@@ -94,8 +109,17 @@ def count_steps(angle: Floats, walking: Bools) -> int:
     """Steps in a walk (n,) by the sagittal angle (n,) of a leg sensor: two for each time that it rises from
     its lower into its upper third.
     """
-    x = angle[walking]
+    return 2 * int(np.count_nonzero(np.diff(_tell_thirds(angle[walking])) > 0))
+
+
+def count_repetitions(angle: Floats) -> int:
+    """How often an angle (n,) comes into its upper third, the lower third between; from rest anywhere."""
+    state = _tell_thirds(angle)
+    return int(np.count_nonzero(np.diff(state) > 0)) + int(len(state) > 0 and state[0] > 0)
+
+
+def _tell_thirds(x: Floats) -> NDArray[np.int64]:
+    """Where x (n,) is in its upper third (1) or lower third (−1), the samples between left out."""
     low, high = np.percentile(x, [2.0, 98.0])
     state = np.where(x > high - (high - low) / 3, 1, np.where(x < low + (high - low) / 3, -1, 0))
-    state = state[state != 0]
-    return 2 * int(np.count_nonzero(np.diff(state) > 0))
+    return np.asarray(state[state != 0])

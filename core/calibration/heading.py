@@ -4,15 +4,16 @@ Horizontal vectors are complex numbers x + iy. Every sensor has its own z-up wor
 the direction of walking, seen in each of them, is what they have in common
 (docs/science/calibration.md, "Direction of walking").
 
-Two measures, both over the straight parts of a walk, each part turned back by the angle walked since the
-first:
-- rest-to-rest velocity with linear de-drift: ≤ 2° on a short walk out and back;
+Measures, all over the straight parts of a walk, each part turned back by the angle walked since the first:
+- rest-to-rest velocity with linear de-drift: ≤ 2° on a short walk out and back; of a foot every stride is
+  from rest to rest;
 - principal axis of the horizontal acceleration below 4 Hz: legs ≤ 3.4°, any length of walk, without a sign.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import pi
 from typing import Final
 
@@ -29,6 +30,9 @@ Part = tuple[int, int]
 
 STEP_BAND_HZ: Final = (0.8, 4.0)
 """Band in which a trunk's forward and vertical accelerations are compared: steps of 0.3 to 1.2 s."""
+
+LONGEST_STRIDE_S: Final = 2.5
+"""Flat moments of a foot further apart are no stride (our choice: the slowest of patients)."""
 
 
 @dataclass(frozen=True)
@@ -114,6 +118,34 @@ def velocity_direction(
     if not params.speed[0] <= np.abs(total) <= params.speed[1] or coherence < params.coherence:
         return None
     return WalkingDirection(float(np.angle(total)), coherence)
+
+
+def stride_direction(
+    a: Complexes,
+    flats: NDArray[np.int64],
+    parts: list[Part],
+    bearing: list[float],
+    rate_hz: float,
+    params: HeadingParams,
+) -> WalkingDirection | None:
+    """Direction of a foot's mean velocity from one flat moment to the next; None if implausible.
+
+    A flat foot stands still for a moment, so every stride lies between two rests of its own.
+
+    Parameters
+    ----------
+    flats : (m,) samples at which the foot is flat.
+    """
+    v = np.zeros(len(a), np.complex128)
+    strides: list[Part] = []
+    turns: list[float] = []
+    for (start, end), turn in zip(parts, bearing, strict=True):
+        for first, last in pairwise(flats[(flats >= start) & (flats < end)].tolist()):
+            if last - first <= LONGEST_STRIDE_S * rate_hz:
+                v[first:last] = rest_to_rest_velocity(a[first:last], True, rate_hz)
+                strides.append((first, last))
+                turns.append(turn)
+    return velocity_direction(v, 0, strides, turns, params)
 
 
 def start_direction(

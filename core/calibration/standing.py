@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import radians
 
 import numpy as np
 
 from core.errors import SignalError
-from core.frames import Bools, Floats, Segment
+from core.frames import SHANK, THIGH, Bools, Floats, Segment
 from core.recording import SensorSignals, UniformRecording
 from core.rest import (
     RestParams,
@@ -32,6 +33,15 @@ GOOD_S = 2.0
 
 LONG_WALK_S = 10.0
 """A walk this long, or half as long as the longest, is not the putting on of sensors (our choice)."""
+
+PAUSE_S = 1.0
+"""Movement so close before and after a short rest makes it a pause in a walk, s (our choice)."""
+
+LEG_AHEAD = radians(6.0)
+"""From here on one leg was ahead of the other. Standings of real and virtual people have up to 4°, stops in
+mid-stride 7° and more for steps of 0.3 m, 10 to 20° for longer ones
+(docs/science/calibration.md, "Standing").
+"""
 
 NORM_RANGE = (7.0, 13.0)
 """|f| at rest that can be gravity in m/s²; real sensors are within 6.6 % of 9.81
@@ -138,6 +148,53 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
         sensor=segment if np.isfinite(rate) else None,
         t_s=at_s,
     )
+
+
+def drop_pauses(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> tuple[Window, ...]:
+    """The rests that can be a standing: not those shorter than 2 s with movement right before and after.
+
+    Who pauses in a walk has one foot ahead of the other.
+
+    Parameters
+    ----------
+    rests : rest windows in order. moving : (n,) True while walking.
+    """
+    reach = round(PAUSE_S * rate_hz)
+
+    def is_pause(rest: Window) -> bool:
+        part = index_window(rest, rate_hz)
+        before, after = moving[max(0, part.start - reach) : part.start], moving[part.stop : part.stop + reach]
+        return rest[1] - rest[0] < GOOD_S and bool(before.any() and after.any())
+
+    return tuple(r for r in rests if not is_pause(r))
+
+
+def measure_leg_ahead(tilt: Mapping[Segment, float]) -> float:
+    """By how much one leg was ahead of the other while the person stood, rad; 0 where no legs show it.
+
+    Standing with the feet side by side both legs are as far from their mean posture in walking. In a step
+    position thigh and shank of one leg are both tilted forward against the other's; a knee that does not
+    extend, a turned axis or a slipped sensor tilts one of them, or both in opposite ways.
+
+    Parameters
+    ----------
+    tilt : segment → mean sagittal inclination in straight walking against the standing, rad.
+
+    Returns
+    -------
+    The smaller of the differences of the thighs and of the shanks where they have one sign, else 0. With one
+    of the two pairs half of its difference.
+    """
+    apart = [
+        tilt[pair["left"]] - tilt[pair["right"]]
+        for pair in (THIGH, SHANK)
+        if pair["left"] in tilt and pair["right"] in tilt
+    ]
+    if not apart:
+        return 0.0
+    if len(apart) == 1:
+        return 0.5 * abs(apart[0])
+    return min(map(abs, apart)) if apart[0] * apart[1] > 0.0 else 0.0
 
 
 def choose_rest(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> Window:

@@ -1,6 +1,12 @@
 """Simulated walkers and sensors with exact truth, for tests, demo and CLI (docs/simulation.md)."""
 
 from core.simulate.chest import ChestSimulation, ChestTruth, PostureHold, simulate_day
+from core.simulate.functional import (
+    FunctionalSimulation,
+    FunctionalTruth,
+    SwingsAndBows,
+    simulate_swings_and_bows,
+)
 from core.simulate.magnetics import Dipole
 from core.simulate.mems import SensorNoise
 from core.simulate.movements import MOVEMENTS, Movement, simulate_movement
@@ -13,8 +19,10 @@ from core.simulate.setup import Dropout, Lag, RecordingSetup
 from core.simulate.simulation import Simulation, simulate
 from core.simulate.soft_tissue import SoftTissue
 from core.simulate.squat import Squats, SquatSimulation, SquatTruth, simulate_squats
+from core.simulate.standing import Sway, SwaySimulation, SwayTruth, simulate_sway
 from core.simulate.tables import angle_table, event_table, stride_table
 from core.simulate.truth import WalkTruth
+from core.simulate.tug import ChairSimulation, ChairTruth, simulate_chair_rises, simulate_tug
 from core.simulate.walker import STEADY, SideGait, Variability, Walker
 
 __all__ = [
@@ -23,10 +31,14 @@ __all__ = [
     "SCRIPTS",
     "STEADY",
     "Arc",
+    "ChairSimulation",
+    "ChairTruth",
     "ChestSimulation",
     "ChestTruth",
     "Dipole",
     "Dropout",
+    "FunctionalSimulation",
+    "FunctionalTruth",
     "Lag",
     "Movement",
     "Phase",
@@ -46,6 +58,10 @@ __all__ = [
     "Squats",
     "Stand",
     "Straight",
+    "Sway",
+    "SwaySimulation",
+    "SwayTruth",
+    "SwingsAndBows",
     "Variability",
     "WalkTruth",
     "Walker",
@@ -55,9 +71,13 @@ __all__ = [
     "mt_text",
     "phase_table",
     "simulate",
+    "simulate_chair_rises",
     "simulate_day",
     "simulate_movement",
     "simulate_scenario",
     "simulate_squats",
+    "simulate_sway",
+    "simulate_swings_and_bows",
+    "simulate_tug",
     "stride_table",
 ]

@@ -1,8 +1,9 @@
 """A sensor on the breastbone while a person sits, stands, lies and walks
 (docs/science/simulation.md, "Chest").
 
-For the recognition of postures and of rising from a chair. It moves in one plane: no rolling over in bed, no
-turning, no stairs; it has not been compared with recordings of a chest.
+For the recognition of postures and of rising from a chair. It moves in one plane but for lying on a side; it
+does not turn, and it has not been compared with recordings of a chest. Stairs are level walking with the
+lean and the unrest of the trunk that the published figures ask for (docs/science/activity.md, "Stairs").
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from core.errors import ParameterError
 from core.frames import Floats
 from core.rotation import about, multiply, rotate
+from core.simulate.chair import LEAN, LIFTING
 from core.simulate.phases import Phase
 from core.simulate.recorder import Draws, Recorded, oversampling, record
 from core.simulate.sensors import Mount, SensorPath, draw_mounts
@@ -27,7 +29,7 @@ from core.simulate.spline import sign_continuous
 from core.simulate.stance import Q_NEUTRAL
 from core.simulate.walker import Walker
 
-Posture = Literal["stand", "sit", "lie", "walk"]
+Posture = Literal["stand", "sit", "lie", "walk", "lie_side", "stairs_up", "stairs_down", "bow"]
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,29 @@ POSTURES: Final[Mapping[Posture, HeldPosture]] = MappingProxyType(
         "walk": HeldPosture(1.30, radians(3.0)),
         "sit": HeldPosture(0.90, radians(8.0)),
         "lie": HeldPosture(0.65, radians(-88.0)),
+        "lie_side": HeldPosture(0.65, radians(-88.0)),
+        "stairs_up": HeldPosture(1.30, radians(3.0)),
+        "stairs_down": HeldPosture(1.30, radians(3.0)),
+        "bow": HeldPosture(1.30, radians(3.0)),
     }
 )
+
+STEPPING: Final[Mapping[Posture, tuple[float, float]]] = MappingProxyType(
+    {
+        "walk": (0.0, 0.0),
+        "stairs_up": (radians(12.0), radians(4.5)),
+        "stairs_down": (radians(0.2), radians(3.5)),
+    }
+)
+"""What is walked → how much further the trunk leans forward, and how far it rocks at `ROCKING_HZ`."""
+
+ROCKING_HZ: Final = 0.35
+
+ROLL_S: Final = 2.0
+"""Duration of turning over in bed."""
+
+TRUNK_M: Final = 0.45
+"""From the hip to the breastbone: so far from the hinge it sinks when somebody bows."""
 
 CHANGE_S: Final = 1.5
 """Duration of rising and sitting down; healthy people take 1.5 ± 0.3 s
@@ -53,12 +76,6 @@ CHANGE_S: Final = 1.5
 
 LYING_S: Final = 3.0
 """Duration of lying down and getting up."""
-
-LEAN: Final = radians(35.0)
-"""The trunk leans forward by so much on the way up from a chair, and down to it."""
-
-LIFTING: Final = 0.7
-"""Share of the change in which the height changes: its last part going up, its first going down."""
 
 FORWARD_M: Final = 0.25
 """Breastbone forward over the feet when rising."""
@@ -72,8 +89,25 @@ STARTING_S: Final = 0.8
 
 
 @dataclass(frozen=True)
+class ChestStyle:
+    """How a person moves; the defaults are a healthy adult without breath.
+
+    Parameters
+    ----------
+    lean_rad : forward on the way up from a chair and down to it. change_s : duration of that. lying_s : of
+        lying down and getting up. bow_rad : of a bow. sway_m : to the sides with each stride.
+    """
+
+    lean_rad: float = LEAN
+    change_s: float = CHANGE_S
+    lying_s: float = LYING_S
+    bow_rad: float = radians(55.0)
+    sway_m: float = 0.0
+
+
+@dataclass(frozen=True)
 class PostureHold:
-    """Stay in a posture; `steps_per_min` counts for walking."""
+    """Stay in a posture, walk, or bow for so long; `steps_per_min` counts for walking and stairs."""
 
     posture: Posture
     duration_s: float
@@ -112,25 +146,39 @@ class ChestSimulation(Recorded):
 
 
 def simulate_day(
-    day: Day, height_m: float = 1.75, seed: int = 0, setup: RecordingSetup | None = None
+    day: Day,
+    height_m: float = 1.75,
+    seed: int = 0,
+    setup: RecordingSetup | None = None,
+    style: ChestStyle | None = None,
+    mount: Mount | None = None,
 ) -> ChestSimulation:
     """Let a person of a height go through postures with one sensor on the chest.
+
+    Parameters
+    ----------
+    mount : how the sensor sits, None = drawn.
 
     Raises
     ------
     ParameterError : "day_item", "height_implausible".
     """
     _check(day)
+    style = style or ChestStyle()
     setup, draws, scale = setup or RecordingSetup(), Draws(seed), Walker.of_height(height_m).scale
     every = oversampling(setup.rate_hz)
-    phases = _phases(day)
+    phases = _phases(day, style)
     t = np.arange(round(phases[-1].end_s * every * setup.rate_hz) + 1) / (every * setup.rate_hz)
-    height, pitch, forward, steps = _way(t, day, phases)
+    height, pitch, forward, steps = _way(t, day, phases, style)
     height, forward = scale * height, scale * forward
 
-    mount = draw_mounts({"chest": (0.0, 0.0, 0.0)}, scale, setup.mount_spread_rad, draws.mounts)["chest"]
+    drawn = draw_mounts({"chest": (0.0, 0.0, 0.0)}, scale, setup.mount_spread_rad, draws.mounts)["chest"]
+    mount = mount or drawn
     q = multiply(Q_NEUTRAL, about(2, -pitch))
-    way = np.stack((forward, np.zeros(len(t)), height), axis=-1) + rotate(q, mount.position_m)
+    if any(p.kind == "lie_side" for p in phases):
+        q = multiply(q, about(1, _roll(t, phases)))
+    aside = _sway(t, day, phases, style.sway_m) if style.sway_m else np.zeros(len(t))
+    way = np.stack((forward, aside, height), axis=-1) + rotate(q, mount.position_m)
     path = SensorPath(t, way, sign_continuous(multiply(q, mount.q_segment_sensor)))
     made = record({"chest": path}, setup, draws, height_m, protocol="activity")
     truth = ChestTruth(
@@ -139,39 +187,75 @@ def simulate_day(
     return ChestSimulation(**vars(made), truth=truth)
 
 
-def _phases(day: Day) -> tuple[Phase, ...]:
+def _phases(day: Day, style: ChestStyle) -> tuple[Phase, ...]:
     """Postures and the changes between them; from standing one simply walks off."""
     phases: list[Phase] = []
     now, before = 0.0, day[0].posture
     for hold in day:
-        if {before, hold.posture} not in ({before}, {"stand", "walk"}):
-            takes = LYING_S if "lie" in (before, hold.posture) else CHANGE_S
+        if _upright(before) != _upright(hold.posture):
+            takes = style.lying_s if "lie" in (_upright(before), _upright(hold.posture)) else style.change_s
             phases.append(Phase(f"{_upright(before)}_to_{_upright(hold.posture)}", now, now + takes))
             now += takes
         phases.append(Phase(hold.posture, now, now + hold.duration_s))
-        now, before = now + hold.duration_s, hold.posture
+        # after a bow one is as one was
+        now, before = now + hold.duration_s, before if hold.posture == "bow" else hold.posture
     return tuple(phases)
 
 
-def _upright(posture: Posture) -> str:
-    return "stand" if posture == "walk" else posture
+def _upright(posture: Posture) -> Posture:
+    """The posture that transitions lead to and from."""
+    return "stand" if posture in STEPPING or posture == "bow" else "lie" if posture == "lie_side" else posture
 
 
-def _way(t: Floats, day: Day, phases: tuple[Phase, ...]) -> tuple[Floats, Floats, Floats, Floats]:
+def _roll(t: Floats, phases: tuple[Phase, ...]) -> Floats:
+    """Turn (n,) about the long axis of the trunk, rad, in which the person lies on a side and turns back."""
+    roll = np.zeros(len(t))
+    for phase in phases:
+        if phase.kind == "lie_side":
+            into, left = (t - phase.start_s) / ROLL_S, (phase.end_s - t) / ROLL_S
+            roll += 0.5 * np.pi * smoothstep(into) * smoothstep(left)
+    return roll
+
+
+def _sway(t: Floats, day: Day, phases: tuple[Phase, ...], sway_m: float) -> Floats:
+    """Way to the side (n,) of walking, once to each side in a stride."""
+    aside = np.zeros(len(t))
+    walks = iter([hold for hold in day if hold.posture in STEPPING])
+    for phase in phases:
+        if phase.kind in STEPPING:
+            pace = next(walks).steps_per_min / 60.0
+            into, left = t - phase.start_s, phase.end_s - t
+            going = smoothstep(into / STARTING_S) * smoothstep(left / STARTING_S)
+            aside += sway_m * going * np.sin(np.pi * pace * into)
+    return aside
+
+
+def _way(
+    t: Floats, day: Day, phases: tuple[Phase, ...], style: ChestStyle
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Height and pitch (n,), way forward (n,) of the reference person, and times of the steps."""
-    start = POSTURES[day[0].posture]
+    start = POSTURES[_upright(day[0].posture)]
     height, pitch, forward = (
         np.full(len(t), start.height_m),
         np.full(len(t), start.pitch_rad),
         np.zeros(len(t)),
     )
-    walks = iter([hold for hold in day if hold.posture == "walk"])
+    walks = iter([hold for hold in day if hold.posture in STEPPING])
     steps: list[Floats] = []
     for phase in phases:
         u = (t - phase.start_s) / (phase.end_s - phase.start_s)
-        if phase.kind == "walk":
+        if phase.kind in STEPPING:
             pace = next(walks).steps_per_min / 60.0
+            lean, rocks = STEPPING[phase.kind]  # type: ignore[index]
+            if lean or rocks:
+                into, left = t - phase.start_s, phase.end_s - t
+                going = smoothstep(into / STARTING_S) * smoothstep(left / STARTING_S)
+                pitch += going * (lean + rocks * np.sin(2.0 * np.pi * ROCKING_HZ * into))
             steps.append(_walk(t, phase, pace, height, pitch, forward))
+        elif phase.kind == "bow":
+            bent = style.bow_rad * bump(u)
+            pitch += bent
+            height -= TRUNK_M * (1.0 - np.cos(bent))
         elif "_to_" in phase.kind:
             a, b = (POSTURES[name] for name in phase.kind.split("_to_"))  # type: ignore[index]
             rises = b.height_m > a.height_m
@@ -179,7 +263,7 @@ def _way(t: Floats, day: Day, phases: tuple[Phase, ...]) -> tuple[Floats, Floats
             height += (b.height_m - a.height_m) * lifted
             pitch += (b.pitch_rad - a.pitch_rad) * smoothstep(u)
             if "lie" not in phase.kind:
-                pitch += LEAN * bump(u)
+                pitch += style.lean_rad * bump(u)
                 forward += (FORWARD_M if rises else -FORWARD_M) * smoothstep(u)
     return height, pitch, forward, np.concatenate(steps) if steps else np.empty(0)
 
@@ -206,7 +290,9 @@ def _check(day: Day) -> None:
             raise ParameterError(
                 "day_item", f"Item {i}: posture '{hold.posture}'; expected one of {', '.join(POSTURES)}."
             )
-        shortest = 2.0 * STARTING_S if hold.posture == "walk" else 0.0
+        shortest = 2.0 * STARTING_S if hold.posture in STEPPING else 0.0
+        if hold.posture == "lie_side":
+            shortest = 2.0 * ROLL_S
         if not (np.isfinite(hold.duration_s) and hold.duration_s > shortest):
             raise ParameterError(
                 "day_item",

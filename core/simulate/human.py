@@ -15,6 +15,7 @@ from core.errors import ParameterError
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from core.rotation import about, from_matrix, multiply, rotate
 from core.simulate import pelvis
+from core.simulate.chair import ChairChange, sit_and_rise
 from core.simulate.script import Plan
 from core.simulate.stance import Sole, StanceFoot, foot_orientation
 from core.simulate.swing import FootMotion, foot_motion
@@ -35,6 +36,7 @@ class Motion:
     timings : side → events of each swing. sole_height : side → (n,) lowest sole point, m.
     guard_m : largest lowering of the pelvis because a leg would have been too short.
     lifts_m : side → lift of each swing added for clearance; it costs knee flexion.
+    heading_rad : (n,) of the path, unwrapped, without the pelvis' own rotation.
     """
 
     t_s: Floats
@@ -47,10 +49,15 @@ class Motion:
     sole_height: Mapping[Side, Floats]
     guard_m: float
     lifts_m: Mapping[Side, tuple[float, ...]]
+    heading_rad: Floats
 
 
-def move(plan: Plan, walker: Walker, rate_hz: float) -> Motion:
+def move(plan: Plan, walker: Walker, rate_hz: float, chair: tuple[ChairChange, ...] = ()) -> Motion:
     """Work out the poses of a plan on a grid of `rate_hz` (400 Hz or more is meant).
+
+    Parameters
+    ----------
+    chair : rises and ways down while the plan stands.
 
     Raises
     ------
@@ -82,6 +89,11 @@ def move(plan: Plan, walker: Walker, rate_hz: float) -> Motion:
         if dip == 0.0:
             break
     mid_hip = np.column_stack((xy, z))
+    if chair:
+        seat, thigh = sit_and_rise(t, chair), walker.anatomy.thigh
+        behind = np.stack((-np.cos(heading), -np.sin(heading), np.zeros(len(t))), axis=-1)
+        mid_hip = mid_hip + thigh * (seat.back[:, None] * behind - seat.drop[:, None] * [0.0, 0.0, 1.0])
+        q_pelvis = multiply(q_pelvis, about(2, -seat.pelvis_rad))
 
     q: dict[Segment, Floats] = {"pelvis": q_pelvis}
     p: dict[Segment, Floats] = {"pelvis": mid_hip}
@@ -90,7 +102,7 @@ def move(plan: Plan, walker: Walker, rate_hz: float) -> Motion:
         _leg(walker, s, feet[s], mid_hip, q_pelvis, q, p)
         sole_height[s] = Sole.of(walker).lowest(p[FOOT[s]], q[FOOT[s]], feet[s].pitch)
     lifts = {s: feet[s].lifts for s in SIDES}
-    return Motion(t, rate_hz, plan, walker, q, p, timings, sole_height, lowered, lifts)
+    return Motion(t, rate_hz, plan, walker, q, p, timings, sole_height, lowered, lifts, heading)
 
 
 def _touching(t: Floats, timing: FootTiming, margin_s: float) -> Bools:

@@ -1,4 +1,4 @@
-"""The named movements of the command line that are not walks: squats on one leg, chair and bed."""
+"""The named movements of the command line that are not walks: squats, chair and bed, swings and bows."""
 
 from __future__ import annotations
 
@@ -8,22 +8,50 @@ from types import MappingProxyType
 
 from core.errors import ParameterError
 from core.simulate.chest import ChestSimulation, Day, PostureHold, simulate_day
+from core.simulate.functional import FunctionalSimulation, SwingsAndBows, simulate_swings_and_bows
+from core.simulate.patients import PATIENTS
 from core.simulate.scripts import ON_SKIN
 from core.simulate.squat import Squats, SquatSimulation, simulate_squats
+from core.simulate.squat_chain import measure_leg, place_sensors
+from core.simulate.tug import ChairSimulation, simulate_chair_rises, simulate_tug
+
+
+@dataclass(frozen=True)
+class ChairTest:
+    """A test that begins on a chair: there and back, or five rises; who does it."""
+
+    person: str
+    rises: bool = False
 
 
 @dataclass(frozen=True)
 class Movement:
-    """What is done: squats, or postures with a sensor on the chest."""
+    """What is done: squats, swings and bows, postures of a chest, or a test that begins on a chair.
+
+    Parameters
+    ----------
+    agreed : sensors sit as the fixed offset has them (docs/science/squat.md, "Fixed offset"), else anyhow.
+    """
 
     title: str
-    does: Squats | Day
+    does: Squats | SwingsAndBows | Day | ChairTest
+    agreed: bool = False
 
 
 MOVEMENTS: Mapping[str, Movement] = MappingProxyType(
     {
         "squats": Movement("Five squats on the right leg", Squats()),
         "squats_left": Movement("Five squats on the left leg", Squats(side="left")),
+        "squats_agreed": Movement(
+            "Six squats on the right leg, sensors put on as agreed", Squats(hinged=True, repetitions=6), True
+        ),
+        "swings_and_bows": Movement("Twelve swings of each leg and six bows", SwingsAndBows()),
+        "tug": Movement("Timed up and go", ChairTest("healthy")),
+        **{
+            f"tug_{name}": Movement(f"Timed up and go: {p.title}", ChairTest(name))
+            for name, p in PATIENTS.items()
+        },
+        "five_sit_to_stand": Movement("Five times sit to stand", ChairTest("healthy", rises=True)),
         "chair_rises": Movement(
             "Five rises from a chair",
             (
@@ -53,7 +81,7 @@ MOVEMENTS: Mapping[str, Movement] = MappingProxyType(
 
 def simulate_movement(
     name: str, seed: int = 0, height_m: float = 1.75, rate_hz: float = 100.0
-) -> SquatSimulation | ChestSimulation:
+) -> SquatSimulation | FunctionalSimulation | ChestSimulation | ChairSimulation:
     """Simulate a named movement for a person of a height.
 
     Raises
@@ -66,5 +94,11 @@ def simulate_movement(
         )
     does, setup = MOVEMENTS[name].does, replace(ON_SKIN, rate_hz=rate_hz)
     if isinstance(does, Squats):
-        return simulate_squats(does, height_m, seed, setup)
+        mounts = place_sensors(measure_leg(height_m, does.side), height_m) if MOVEMENTS[name].agreed else None
+        return simulate_squats(does, height_m, seed, setup, mounts)
+    if isinstance(does, SwingsAndBows):
+        return simulate_swings_and_bows(does, height_m, seed, setup)
+    if isinstance(does, ChairTest):
+        run = simulate_chair_rises if does.rises else simulate_tug
+        return run(does.person, seed, height_m, setup)
     return simulate_day(does, height_m, seed, setup)

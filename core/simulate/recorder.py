@@ -40,12 +40,14 @@ class Recorded:
     Parameters
     ----------
     ideal : segment → signals at every sample of the common axis, without errors, lags or losses.
+    sensor_q : segment → (n, 4) sensor to world at the same samples, moved by skin and shocks as it was.
     errors : segment → constant errors it was given. clipped : segment → (n,) samples beyond its range.
     first_counter : packet counter at t = 0, for rendering device files.
     """
 
     recording: Recording
     ideal: Mapping[Segment, SimulatedSignals]
+    sensor_q: Mapping[Segment, Floats]
     errors: Mapping[Segment, DrawnErrors]
     clipped: Mapping[Segment, Bools]
     first_counter: int
@@ -99,7 +101,8 @@ def record(
     recording = Recording(
         streams=streams, segments=segments, subject=Subject(height_m=height_m), protocol=protocol
     )
-    return Recorded(recording, ideal, errors, beyond, first_counter)
+    turned = {segment: path.q[::every] for segment, path in paths.items()}
+    return Recorded(recording, ideal, turned, errors, beyond, first_counter)
 
 
 def _arrived(t: Floats, segment: Segment, setup: RecordingSetup, rng: np.random.Generator) -> Bools:

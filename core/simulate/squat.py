@@ -44,6 +44,8 @@ class Squats:
     depth_rad : knee flexion added to standing, varying by `spread` (relative SD, limited to two).
     moving_s : down and up together. hold_s : at the bottom. rest_s : standing after each. lead_s : before.
     valgus_rad : knee falling inward. trunk_rad : forward lean of the pelvis.
+    hinged : the knee is a hinge: it falls inward because the shank turns and leans inward, and the hip
+        follows; else it opens sideways itself.
     """
 
     side: Side = "right"
@@ -59,6 +61,7 @@ class Squats:
     standing_knee_rad: float = radians(5.0)
     standing_ankle_rad: float = radians(2.0)
     standing_tilt_rad: float = radians(8.0)
+    hinged: bool = False
 
     def __post_init__(self) -> None:
         deepest = self.standing_knee_rad + self.depth_rad * (1.0 + 2.0 * self.spread)
@@ -113,9 +116,17 @@ class SquatSimulation(Recorded):
 
 
 def simulate_squats(
-    squats: Squats | None = None, height_m: float = 1.75, seed: int = 0, setup: RecordingSetup | None = None
+    squats: Squats | None = None,
+    height_m: float = 1.75,
+    seed: int = 0,
+    setup: RecordingSetup | None = None,
+    mounts: Mapping[Segment, Mount] | None = None,
 ) -> SquatSimulation:
     """Let a person of a height squat on one leg, with sensors on its foot, shank, thigh and on the pelvis.
+
+    Parameters
+    ----------
+    mounts : how sensors sit; those that are not given are drawn.
 
     Raises
     ------
@@ -133,7 +144,8 @@ def simulate_squats(
     q, p = _poses(_depth(t, squats, starts, deep), squats, person.anatomy)
 
     places = {segment: PLACES[segment] for segment in q}
-    mounts = draw_mounts(places, person.scale, setup.mount_spread_rad, draws.mounts)
+    drawn = draw_mounts(places, person.scale, setup.mount_spread_rad, draws.mounts)
+    mounts = drawn | {segment: mount for segment, mount in (mounts or {}).items() if segment in drawn}
     paths: dict[Segment, SensorPath] = {}
     for segment, mount in mounts.items():
         place, turn = mount.position_m, mount.q_segment_sensor
@@ -178,8 +190,13 @@ def _poses(
     knee = squats.standing_knee_rad + squats.depth_rad * depth
     ankle = squats.standing_ankle_rad + ANKLE_PER_KNEE * squats.depth_rad * depth
     lean = squats.standing_tilt_rad + squats.trunk_rad * depth
-    shank = multiply(multiply(Q_NEUTRAL, about(2, -ankle)), about(0, -0.5 * inward))
-    thigh = multiply(multiply(shank, about(2, knee)), about(0, inward))
+    if squats.hinged:
+        fallen = multiply(about(1, inward), about(0, -0.5 * inward))
+        shank = multiply(multiply(Q_NEUTRAL, fallen), about(2, -ankle))
+        thigh = multiply(shank, about(2, knee))
+    else:
+        shank = multiply(multiply(Q_NEUTRAL, about(2, -ankle)), about(0, -0.5 * inward))
+        thigh = multiply(multiply(shank, about(2, knee)), about(0, inward))
     trunk = multiply(Q_NEUTRAL, about(2, -lean))
     ankle_joint = np.tile([0.0, 0.0, anatomy.ankle_height], (len(depth), 1))
     knee_joint = ankle_joint + rotate(shank, np.array([0.0, anatomy.shank, 0.0]))

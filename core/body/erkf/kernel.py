@@ -34,7 +34,7 @@ class SmootherRecord(NamedTuple):
     """What one segment of the forward pass leaves for the backward pass; K samples or 1.
 
     F (K, n, 5, 3, 3) · V (K, B, 3, N) · E (K, B, 9) · H (K, B, 2, 3, 3) · place (K, B, 4) · blocks (K,) ·
-    P (K, N, N) after the updates · dx (K, N) injected.
+    P (K, N, N) after the updates, on and below the diagonal · dx (K, N) injected.
     """
 
     F: Floats
@@ -277,7 +277,7 @@ def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-unty
         var = 0.0
         for c in range(3):
             for e in range(3):
-                var += R[i, 2, c] * P[b + 6 + c, b + 6 + e] * R[i, 2, e]
+                var += R[i, 2, c] * P[b + 6 + max(c, e), b + 6 + min(c, e)] * R[i, 2, e]
         heading_sd[i] = np.sqrt(max(var, 0.0))
         nominal[i] = x[i]
 
@@ -333,8 +333,12 @@ def filter_forward(memory, samples, links, noise, record, output):  # type: igno
         if not advance(memory, samples, k, links, noise, scratch, record, slot, output):
             return k
         if keeps:
-            record.P[slot] = memory.P
+            for r in range(memory.P.shape[0]):
+                record.P[slot, r, : r + 1] = memory.P[r, : r + 1]
             record.dx[slot] = memory.dx
+    for r in range(memory.P.shape[0]):
+        for c in range(r):
+            memory.P[c, r] = memory.P[r, c]
     return -1
 
 
@@ -345,11 +349,20 @@ def smooth_backward(lam, step, record, m, out):  # type: ignore[no-untyped-def]
     d = np.empty(len(lam))
     for k in range(T - 1, -1, -1):
         P, dx = record.P[k], record.dx[k]
+        d[:] = 0.0
         for r in range(len(lam)):
-            s = 0.0
-            for c in range(len(lam)):
-                s += P[r, c] * lam[c]
-            d[r] = -s
+            # four sums, as one would wait for itself
+            s0, s1, s2, s3, own, past = P[r, r] * lam[r], 0.0, 0.0, 0.0, lam[r], r - r % 4
+            for c in range(0, past, 4):
+                s0 += P[r, c] * lam[c]
+                s1 += P[r, c + 1] * lam[c + 1]
+                s2 += P[r, c + 2] * lam[c + 2]
+                s3 += P[r, c + 3] * lam[c + 3]
+            for c in range(past, r):
+                s0 += P[r, c] * lam[c]
+            for c in range(r):
+                d[c] -= P[r, c] * own
+            d[r] -= s0 + s1 + s2 + s3
         for i in range(n):
             b, x = i * m, out[k, i]
             for c in range(3):

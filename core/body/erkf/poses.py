@@ -62,9 +62,9 @@ def run_erkf(
     """
     mounts = {s: calibrated.calibration.segments[s].R_segment_sensor for s in segments}
     tree = person_tree(body, mounts, segments)
-    acc, gyr, valid = correct_signals(calibrated, segments)
     rate = calibrated.recording.rate_hz
-    inputs = erkf_inputs(tree, acc, gyr, valid, rate)
+    # not kept by a name: the inputs are copies, and ten minutes of them 20 MB
+    inputs = erkf_inputs(tree, *correct_signals(calibrated, segments), rate)
     inputs = replace(inputs, patched=find_patches(calibrated.recording, segments, params.patch_s))
     first = np.stack([multiply(orientations.q[s][0], from_matrix(mounts[s])) for s in segments])
     rest = next(

@@ -1,14 +1,14 @@
 """One step of time of the ErKF: Potter 2021 eq 8–15 with both ends of the step, and P ← F P Fᵀ + Q.
 
 F couples nothing between IMUs, so P is passed through by blocks: rows, then columns, of the lower block
-triangle only, then mirrored. (A full row and column pass is not symmetric in floating point, and the
-asymmetry grows without bound: docs/science/erkf.md, "Prediction".)
+triangle. Only P on and below its diagonal is kept; what is above is whatever was there. (A full row and
+column pass is not symmetric in floating point, and the asymmetry grows without bound: docs/science/erkf.md,
+"Prediction".)
 """
 
 from __future__ import annotations
 
 import numba
-import numpy as np
 
 from core.frames import GRAVITY
 from core.rotation.compiled import (
@@ -77,13 +77,17 @@ def reset_before(F, d):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
-    """P ← F P Fᵀ for the blocks F (n, 5, 3, 3) of n IMUs with m errors each."""
+    """P ← F P Fᵀ, on and below the diagonal, for the blocks F (n, 5, 3, 3) of n IMUs with m errors each."""
     N = P.shape[0]
     half = 0.5 * dt
     biased = m == 15
     for j in range(N // m):
         b, end = j * m, (j + 1) * m
         f = F[j]
+        # the block on the diagonal is passed through whole
+        for r in range(b + 1, end):
+            for c in range(b, r):
+                P[c, r] = P[r, c]
         for i in range(3):
             a0, a1, a2 = f[A, i, 0], f[A, i, 1], f[A, i, 2]
             if biased:
@@ -111,28 +115,23 @@ def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
                 g0, g1, g2 = f[GAMMA, i, 0], f[GAMMA, i, 1], f[GAMMA, i, 2]
                 for c in range(end):
                     P[b + 6 + i, c] += g0 * P[b + 9, c] + g1 * P[b + 10, c] + g2 * P[b + 11, c]
-    change = np.empty(3)
-    for r in range(N):
-        for j in range(r // m + 1):
-            b = j * m
-            f = F[j]
-            row = P[r, b : b + m]
-            t0, t1, t2 = row[6], row[7], row[8]
+    for j in range(N // m):
+        b = j * m
+        f = F[j]
+        for r in range(b, N):
+            t0, t1, t2 = P[r, b + 6], P[r, b + 7], P[r, b + 8]
             for i in range(3):
-                change[i] = f[A, i, 0] * t0 + f[A, i, 1] * t1 + f[A, i, 2] * t2
-                row[6 + i] = f[S, i, 0] * t0 + f[S, i, 1] * t1 + f[S, i, 2] * t2
-            if biased:
-                for i in range(3):
-                    change[i] += f[D, i, 0] * row[9] + f[D, i, 1] * row[10] + f[D, i, 2] * row[11]
-                    change[i] += f[C, i, 0] * row[12] + f[C, i, 1] * row[13] + f[C, i, 2] * row[14]
-                    row[6 + i] += f[GAMMA, i, 0] * row[9] + f[GAMMA, i, 1] * row[10]
-                    row[6 + i] += f[GAMMA, i, 2] * row[11]
-            for i in range(3):
-                row[i] += dt * row[3 + i] + half * change[i]
-                row[3 + i] += change[i]
-    for r in range(N):
-        for c in range(r):
-            P[c, r] = P[r, c]
+                dv = f[A, i, 0] * t0 + f[A, i, 1] * t1 + f[A, i, 2] * t2
+                turned = f[S, i, 0] * t0 + f[S, i, 1] * t1 + f[S, i, 2] * t2
+                if biased:
+                    g0, g1, g2 = P[r, b + 9], P[r, b + 10], P[r, b + 11]
+                    dv += f[D, i, 0] * g0 + f[D, i, 1] * g1 + f[D, i, 2] * g2
+                    dv += f[C, i, 0] * P[r, b + 12] + f[C, i, 1] * P[r, b + 13] + f[C, i, 2] * P[r, b + 14]
+                    turned += f[GAMMA, i, 0] * g0 + f[GAMMA, i, 1] * g1
+                    turned += f[GAMMA, i, 2] * g2
+                P[r, b + 6 + i] = turned
+                P[r, b + i] += dt * P[r, b + 3 + i] + half * dv
+                P[r, b + 3 + i] += dv
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

@@ -9,6 +9,8 @@ hundredth of its memory (docs/science/erkf.md, "Smoother").
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, filter_block, new_record, run_block
@@ -46,16 +48,19 @@ def smooth(
     starts = list(range(0, T, segment))
     checkpoints = []
     final = state
+    # the covariances of all checkpoints are most of the memory: half of each says it all
+    half = np.tril_indices(n * params.states)
     for a in starts:
-        checkpoints.append(final)
+        checkpoints.append(replace(final, P=final.P[half]))
         _, final = filter_block(final, inputs.part(a, a + segment), tree, params)
     nominal, sd = np.empty((T, n, 16)), np.empty((T, n))
     residual, refused = np.empty((T, len(tree.joints))), np.empty((T, n), bool)
     record = new_record(tree, params, segment)
     lam = np.zeros(n * params.states)
     for a in reversed(starts):
-        part = inputs.part(a, a + segment)
-        track, _ = run_block(checkpoints.pop(), part, tree, params, record)
+        part, kept, P = inputs.part(a, a + segment), checkpoints.pop(), np.empty_like(state.P)
+        P[half] = P.T[half] = kept.P
+        track, _ = run_block(replace(kept, P=P), part, tree, params, record)
         smooth_backward(lam, np.ascontiguousarray(part.step_s), record, params.states, track.nominal)
         b = a + len(part.step_s)
         nominal[a:b], sd[a:b], refused[a:b] = track.nominal, track.heading_sd, track.refused

@@ -50,8 +50,9 @@ def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def
     var = 0.0
     for k in range(3):
         for c in range(3):
-            var += R[i, 2, k] * (P[a + k, a + c] * R[i, 2, c] - 2.0 * P[a + k, b + c] * R[j, 2, c])
-            var += R[j, 2, k] * P[b + k, b + c] * R[j, 2, c]
+            own, other = P[a + max(k, c), a + min(k, c)], P[max(a + k, b + c), min(a + k, b + c)]
+            var += R[i, 2, k] * (own * R[i, 2, c] - 2.0 * other * R[j, 2, c])
+            var += R[j, 2, k] * P[b + max(k, c), b + min(k, c)] * R[j, 2, c]
     reach = 0.0
     for k in range(2):
         reach += (R[i, k, 0] * ri[0] + R[i, k, 1] * ri[1] + R[i, k, 2] * ri[2]) ** 2
@@ -96,11 +97,32 @@ def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-un
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def complete_rows(P, first):  # type: ignore[no-untyped-def]
+    """Copy what is below the diagonal of P into its rows first … first + 2, so that they are whole."""
+    for q in range(3):
+        for c in range(q):
+            P[first + c, first + q] = P[first + q, first + c]
+    for c in range(first + 3, P.shape[0]):
+        P[first, c], P[first + 1, c], P[first + 2, c] = P[c, first], P[c, first + 1], P[c, first + 2]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def take_block(P, dx, place, H, y, sd, V, E, U):  # type: ignore[no-untyped-def]
-    """Take one block; V (3, N) and E (9,) = (e, L) are kept for the smoother. False if S is not positive."""
+    """Take one block, P on and below the diagonal; False if S is not positive.
+
+    V (3, N) and E (9,) = (e, L) are kept for the smoother.
+    """
     N = P.shape[0]
     b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
     both, turns = b2 >= 0, place[TURNS] == 1
+    if turns:
+        complete_rows(P, b + 6)
+        if both:
+            complete_rows(P, b2 + 6)
+    if unit >= 0:
+        complete_rows(P, b + unit)
+        if both:
+            complete_rows(P, b2 + unit)
     for r in range(3):
         if turns:
             h0, h1, h2 = H[0, r, 0], H[0, r, 1], H[0, r, 2]
@@ -171,7 +193,7 @@ def take_block(P, dx, place, H, y, sd, V, E, U):  # type: ignore[no-untyped-def]
     E[3], E[4], E[5], E[6], E[7], E[8] = i0, l10, l20, i1, l21, i2
     for r in range(N):
         v0, v1, v2 = V[0, r], V[1, r], V[2, r]
-        for c in range(N):
+        for c in range(r + 1):
             P[r, c] -= v0 * V[0, c] + v1 * V[1, c] + v2 * V[2, c]
     return True
 

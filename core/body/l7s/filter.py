@@ -21,14 +21,13 @@ docs/science/l7s.md, "Departures from the paper"):
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal, get_args
+from typing import Final, Literal
 
 import numpy as np
 
-from core.body.l7s.legs import HIP_SIDE, LEGS, LegModel, solve_legs
-from core.body.model import NOMINAL_HEIGHT_M, BodyModel
+from core.body.l7s.legs import HIP_SIDE, LEGS, LegModel
 from core.errors import EstimationError, ParameterError
-from core.frames import FOOT, R_NEUTRAL, Bools, Floats
+from core.frames import FOOT, Bools, Floats
 from core.rotation import about, to_matrix, wrap_angle
 
 Worn = Literal["3I", "2I"]
@@ -220,14 +219,3 @@ def start_l7s_state(inputs: L7sInputs, model: LegModel, params: L7sParams | None
         p[1 + leg] = hip + 0.5 * model.foot * R[1 + leg, :, 2]
     P = (params or L7sParams()).start * np.eye(SIZE)
     return L7sState(R, p, np.zeros((3, 3)), P, np.zeros(2))
-
-
-def compile_l7s_kernel() -> None:
-    """Compile or load the kernels of filter and legs, so that the first take does not wait for it."""
-    model = LegModel.of(BodyModel.from_height(NOMINAL_HEIGHT_M))
-    foot = model.to_isb("foot_l").T
-    R = np.tile(np.stack((np.eye(3), R_NEUTRAL @ foot, R_NEUTRAL @ foot)), (2, 1, 1, 1))
-    for worn in get_args(Worn):
-        inputs = L7sInputs(R, np.zeros((2, 3, 3)), np.ones((2, 2), bool), worn)
-        track, _ = filter_block(start_l7s_state(inputs, model), inputs, model, 100.0)
-        solve_legs(track.R, track.p, model)

@@ -8,20 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
+from typing import Final, get_args
 
 import numpy as np
 
 from core.body.l7s.checks import longest_gaps, walking_checks
-from core.body.l7s.filter import L7sParams, Worn, filter_block, start_l7s_state
+from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
 from core.body.l7s.health import l7s_health, list_health_notices
 from core.body.l7s.inputs import KnownSamples, bodies_of, inputs_of
 from core.body.l7s.legs import BODIES, LEGS, LegModel, solve_legs
-from core.body.model import BodyModel
+from core.body.l7s.smoother import smooth_track
+from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.poses import Poses
 from core.errors import Notice
 from core.estimators import L7S_2I, L7S_3I
-from core.frames import FOOT, Bools, Floats, Segment, Side
+from core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.rotation import angle_between, from_matrix
 
@@ -38,6 +39,8 @@ def l7s_poses(
     body: BodyModel,
     params: L7sParams | None = None,
     worn: Worn | None = None,
+    *,
+    both_ways: bool = True,
 ) -> Poses:
     """Poses of the seven segments from pelvis and feet, or from the feet alone.
 
@@ -46,7 +49,8 @@ def l7s_poses(
     orientations : of the worn segments; others are not read.
     acceleration : segment → (n, 3) in W without gravity, m/s² (`core.body.l7s.inputs.free_acceleration`).
     steps : side → (n,) foot still on the floor: zero velocity, not contact.
-    worn : None = 3I with a pelvis, else 2I.
+    worn : None = 3I with a pelvis, else 2I. both_ways : places from what comes before and after
+        (core/body/l7s/smoother.py); False gives the filter's, as they are live.
 
     Returns
     -------
@@ -55,7 +59,8 @@ def l7s_poses(
     constrained state and differs from the measured one by some degrees (docs/science/l7s.md, "Constraints").
     Diagnostics by side: `knee_straight_share`, samples with a foot in motion at which the leg is at its full
     length, so that the knee is a bound and no measurement; `hinge_m`, `excess_m`, largest residuals of the
-    constraints; `step_share`; `foot_turned_rad`, mean angle from measured to reported.
+    constraints; `step_share`; `sensor_ahead_m`, how far the foot's sensor was found ahead of the foot's
+    middle (0 both_ways=False); `foot_turned_rad`, mean angle from measured to reported.
     At the end: `position_sd_m` by body, `min_eigenvalue` of P. By sensor: `gap_s`, the longest loss.
     And those of `walking_checks`. Health and notices as of health.py; a notice `foot_never_still` when a
     foot has no step.
@@ -71,14 +76,20 @@ def l7s_poses(
     track, state = filter_block(
         start_l7s_state(inputs, model, params), inputs, model, orientations.rate_hz, params
     )
-    legs = solve_legs(track.R, track.p, model)
+    measured = bodies_of(worn)
+    R, p, passes = track.R, track.p, 0
+    offsets = np.zeros((len(LEGS), 3))
+    if both_ways:
+        valid = np.stack([orientations.valid[s] if s in measured else steps["left"] for s in BODIES], axis=1)
+        whole = smooth_track(track, inputs, valid, model, orientations.rate_hz)
+        R, p, passes, offsets = whole.R, whole.p, whole.passes, whole.offsets
+    legs = solve_legs(R, p, model)
     length = model.thigh + model.shank
     moving = ~inputs.step.all(axis=1) | inputs.step.all()
     turned = angle_between(
-        from_matrix(track.R[:, 1:].reshape(-1, 3, 3)), from_matrix(inputs.R[:, 1:].reshape(-1, 3, 3))
+        from_matrix(R[:, 1:].reshape(-1, 3, 3)), from_matrix(inputs.R[:, 1:].reshape(-1, 3, 3))
     ).reshape(-1, 2)
     variances = np.diag(state.P)[:18].reshape(3, 6)[:, :3]
-    measured = bodies_of(worn)
     poses = Poses(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
@@ -91,6 +102,7 @@ def l7s_poses(
         notices=_never_still(steps),
         diagnostics={
             "adjoint": params.adjoint,
+            "passes": passes,
             "knee_straight_share": {
                 s: float(np.mean(legs.reach[moving, i] > length - STRETCHED_M)) for i, s in enumerate(LEGS)
             },
@@ -99,6 +111,7 @@ def l7s_poses(
                 s: float(np.maximum(legs.reach[:, i] - length, 0.0).max()) for i, s in enumerate(LEGS)
             },
             "step_share": {s: float(np.mean(steps[s])) for s in LEGS},
+            "sensor_ahead_m": {s: float(-offsets[i, 2]) for i, s in enumerate(LEGS)},
             "foot_turned_rad": {s: float(turned[:, i].mean()) for i, s in enumerate(LEGS)},
             "position_sd_m": {s: float(np.sqrt(x.max())) for s, x in zip(BODIES, variances, strict=True)},
             "min_eigenvalue": float(np.linalg.eigvalsh(state.P)[0]),
@@ -121,3 +134,16 @@ def _never_still(steps: Mapping[Side, Bools]) -> tuple[Notice, ...]:
         for side in LEGS
         if not np.any(steps[side])
     )
+
+
+def compile_l7s_kernel() -> None:
+    """Compile or load the kernels of filter, smoother and legs: the first take does not wait for them."""
+    model = LegModel.of(BodyModel.from_height(NOMINAL_HEIGHT_M))
+    foot = model.to_isb("foot_l").T
+    n = 20
+    R = np.tile(np.stack((np.eye(3), R_NEUTRAL @ foot, R_NEUTRAL @ foot)), (n, 1, 1, 1))
+    for worn in get_args(Worn):
+        inputs = L7sInputs(R, np.zeros((n, 3, 3)), np.ones((n, 2), bool), worn)
+        track, _ = filter_block(start_l7s_state(inputs, model), inputs, model, 100.0)
+        smooth_track(track, inputs, np.ones((n, 3), bool), model, 100.0)
+        solve_legs(track.R, track.p, model)

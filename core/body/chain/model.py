@@ -1,0 +1,145 @@
+"""A chain of hinges with sensors on its links, and the leg as one.
+
+Where Kianifar et al. use Denavit-Hartenberg frames a joint here is an axis and the way to it from the joint
+before: the poses are the same (docs/science/squat.md, "Chain").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from core.body.chain.geometry import LegGeometry
+from core.errors import EstimationError, ParameterError
+from core.frames import R_NEUTRAL, SHANK, THIGH, Floats, Segment, Side
+
+FORWARD: Final = (1.0, 0.0, 0.0)
+UP: Final = (0.0, 1.0, 0.0)
+RIGHT: Final = (0.0, 0.0, 1.0)
+
+LEG_AXES: Final = (UP, FORWARD, RIGHT, RIGHT, RIGHT, FORWARD, UP)
+"""Ankle rotation, adduction, flexion; knee flexion; hip flexion, adduction, rotation, from the foot up."""
+
+LEG_SENSORS: Final = (0, 3, 4, 7)
+"""First joint below each sensor, and the number of joints: ankle 3, knee 1, hip 3."""
+
+HIP_ROTATION: Final = 6
+
+ABOUT_UP: Final = 0.02
+"""Standard deviation at the start of the angles about the vertical, rad: standing is their zero."""
+TILTS: Final = 2.0
+"""Of the others before gravity was seen, rad."""
+
+
+@dataclass(frozen=True, eq=False)
+class RevoluteChain:
+    """Hinges one after the other on a base that does not move, and one sensor on the last link of each group.
+
+    Parameters
+    ----------
+    axes : (J, 3) unit, and offsets : (J, 3) m from the joint before, both in the link below the joint.
+    first : (S + 1,) first joint of each sensor's group, ending with J.
+    places : (S, 3) m of the sensors from the last joint of their group. mounts : (S, 3, 3) sensor to link.
+    base : (3, 3) link of the base to world.
+    bounded : (J,) True for angles that a virtual sensor holds about zero.
+    start_sd : (J,) rad, of the angles before anything was measured.
+
+    Raises
+    ------
+    ParameterError `bad_shape`, `bad_joint`.
+    """
+
+    axes: Floats
+    offsets: Floats
+    first: tuple[int, ...]
+    places: Floats
+    mounts: Floats
+    base: Floats
+    bounded: tuple[bool, ...]
+    start_sd: Floats
+
+    def __post_init__(self) -> None:
+        joints, sensors = len(self.axes), len(self.places)
+        for name, array, shape in (
+            ("axes", self.axes, (joints, 3)),
+            ("offsets", self.offsets, (joints, 3)),
+            ("places", self.places, (sensors, 3)),
+            ("mounts", self.mounts, (sensors, 3, 3)),
+            ("base", self.base, (3, 3)),
+            ("start_sd", self.start_sd, (joints,)),
+        ):
+            if array.shape != shape or not np.isfinite(array).all():
+                raise ParameterError(
+                    "bad_shape", f"RevoluteChain: {name} has shape {array.shape}, expected {shape}, finite."
+                )
+        groups = np.diff(self.first)
+        if (
+            len(self.first) != sensors + 1
+            or self.first[0] != 0
+            or self.first[-1] != joints
+            or (groups < 1).any()
+            or len(self.bounded) != joints
+        ):
+            raise ParameterError(
+                "bad_joint", f"RevoluteChain: {joints} joints are not split by {self.first}."
+            )
+        if not np.allclose(np.linalg.norm(self.axes, axis=1), 1.0):
+            raise ParameterError("bad_joint", "RevoluteChain: an axis is not of length 1.")
+
+    def links(self, angles: Floats) -> list[Floats]:
+        """Orientations (n, 3, 3) in the world of the links that carry sensors, from angles (n, J)."""
+        from core.rotation import exp, to_matrix
+
+        found, R = [], np.broadcast_to(self.base, (len(angles), 3, 3))
+        for j, axis in enumerate(self.axes):
+            R = R @ to_matrix(exp(angles[:, j : j + 1] * axis))
+            if j + 1 in self.first:
+                found.append(R)
+        return found
+
+
+def leg_segments(side: Side) -> tuple[Segment, Segment, Segment]:
+    """Segments that carry the three sensors, from the foot up."""
+    return SHANK[side], THIGH[side], "pelvis"
+
+
+def build_leg_chain(geometry: LegGeometry, mounts: Mapping[Segment, Floats]) -> RevoluteChain:
+    """The leg on its foot, which stands neutral: seven hinges, three sensors.
+
+    Parameters
+    ----------
+    mounts : segment → (3, 3) R_segment_sensor of shank, thigh and pelvis.
+
+    Raises
+    ------
+    EstimationError `segments_missing`.
+    """
+    worn = leg_segments(geometry.side)
+    missing = [s for s in worn if s not in mounts]
+    if missing:
+        raise EstimationError(
+            "segments_missing",
+            f"The squat needs sensors on {', '.join(worn)}; missing: {', '.join(missing)}.",
+            sensor=missing[0],
+        )
+    offsets = np.zeros((7, 3))
+    offsets[3], offsets[4] = geometry.knee_from_ankle(), geometry.hip_from_knee()
+    return RevoluteChain(
+        axes=np.array(LEG_AXES),
+        offsets=offsets,
+        first=LEG_SENSORS,
+        places=np.stack(
+            (
+                geometry.tibia_sensor_from_ankle(),
+                geometry.thigh_sensor_from_knee(),
+                geometry.back_sensor_from_hip(),
+            )
+        ),
+        mounts=np.stack([np.asarray(mounts[s], np.float64) for s in worn]),
+        base=R_NEUTRAL.copy(),
+        bounded=tuple(j == HIP_ROTATION for j in range(7)),
+        start_sd=np.array([ABOUT_UP if axis == UP else TILTS for axis in LEG_AXES]),
+    )

@@ -1,0 +1,294 @@
+"""L7S over a whole take: the places of pelvis and feet that fit what comes before and after.
+
+The filter knows of each sample only what came before. Its pelvis is early by a part of a step, and the pull
+to the standing height lifts it in every step until the knee rests at its bound. With the take at hand the
+same measurements are one least-squares problem in the places of the three bodies at nodes 20 ms apart
+(docs/science/l7s.md, "Both ways"). Orientations are the measured ones; accelerations are integrated twice
+between the nodes, so that what is solved for is a slow correction.
+
+Weights are densities: variance times twice the time that the error lasts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numba
+import numpy as np
+from scipy.linalg import solveh_banded
+
+from core.body.l7s.constraints import project
+from core.body.l7s.filter import L7sInputs, L7sTrack
+from core.body.l7s.foot_place import find_sensor_offsets
+from core.body.l7s.legs import LegModel
+from core.body.l7s.updates import N
+from core.errors import EstimationError
+from core.frames import Bools, Floats
+
+NODE_S: Final = 0.02
+"""Time between nodes: a brisk walker's foot rests for some 40 ms. Half of it changes flexion by 0.1°."""
+
+DENSITY: Final = 0.25
+"""Of the error of a worn sensor's acceleration, m²/s³: 2° of tilt, 0.35 m/s², for 1 s. Four times
+more or less changes flexion by up to 2°."""
+
+DENSITY_LOST: Final = 100.0
+"""While a sensor is lost: up to 20 m/s² for 0.1 s."""
+
+DENSITY_UNWORN: Final = 2.0
+"""Of a pelvis without a sensor: 2.5 m/s² RMS of comfortable walking for a sixth of a second."""
+
+MID_PELVIS: Final = 0.1
+"""Mid-pelvis over the feet, m² s. Real pelves leave that place in every step; this pull is slower than
+0.2 Hz, so slower than the slowest steps. Ten times the filter's, which looks one way."""
+
+PELVIS_HEIGHT: Final = 0.01
+"""Standing height of the pelvis, m² s: the filter's 1 m² at 100 Hz."""
+
+FOOT_HEIGHT: Final = (1e-6, 0.1)
+"""Height of a foot at rest and on its way, m² s: the filter's variances at 100 Hz."""
+
+REST_M: Final = 3e-4
+"""A resting foot moves by less from node to node."""
+
+HINGE: Final = 0.02
+"""Distance of the hip from the plane of the foot, m² s: 10 cm, a toe-out of 7° more than the knee's, for 1 s.
+What is left of it, the foot is turned by."""
+
+CARRIED: Final = 0.997
+"""Distance of hip and ankle of the leg that carries the body alone, of thigh and shank: 42 healthy adults
+(core/norms/data/SOURCES.md, WBDS) bend this knee by 5.2 ± 5.2° from 15 to 45 % of the cycle."""
+
+CARRIES: Final = 8e-5
+"""Of that distance, m² s: 1 cm over a stance of 0.4 s."""
+
+LONGER: Final = 1e-5
+"""What a leg is longer than thigh and shank, m² s: 1 cm for 50 ms."""
+
+ANYWHERE: Final = 10.0
+"""Pull to the filter's places for what nothing else holds, m² s."""
+
+PASSES: Final = 20
+SETTLED_M: Final = 1e-4
+"""Gauss–Newton ends when no node moves further, after 11 to 14 passes on right walks."""
+
+BAND: Final = 18
+"""A node (9 places) is tied to the next but one."""
+
+PROJECTIONS: Final = 3
+
+
+@dataclass(frozen=True, eq=False)
+class WholeTrack:
+    """Poses of BODIES that meet the constraints.
+
+    Parameters
+    ----------
+    R : (n, 3, 3, 3) and p : (n, 3, 3) in Sy's frames. passes : of Gauss–Newton. offsets : (2, 3) from each
+    foot's sensor to the foot's middle (`find_sensor_offsets`).
+    """
+
+    R: Floats
+    p: Floats
+    passes: int
+    offsets: Floats
+
+
+def smooth_track(
+    track: L7sTrack, inputs: L7sInputs, valid: Bools, model: LegModel, rate_hz: float
+) -> WholeTrack:
+    """Find the places of pelvis and feet over a whole take.
+
+    Parameters
+    ----------
+    track : of the filter on these inputs. valid : (n, 3) sensor there; of a body without one it is not read.
+
+    Raises
+    ------
+    EstimationError `l7s_diverged` when the places cannot be found or a constraint cannot be met.
+    """
+    R, acc = inputs.R.copy(), inputs.acc.copy()
+    density = np.where(valid, DENSITY, DENSITY_LOST)
+    if inputs.worn == "2I":
+        R[:, 0], acc[:, 0], density[:, 0] = _level_pelvis(R), 0.0, DENSITY_UNWORN
+    n, dt = len(acc), 1.0 / rate_hz
+    hop = max(1, round(NODE_S * rate_hz))
+    at = np.arange(0, n, hop)
+    leg = model.thigh + model.shank
+    lengths = np.array([0.5 * model.hip_width, 0.5 * model.foot, leg, CARRIED * leg])
+    offsets = find_sensor_offsets(inputs, valid, model, rate_hz)
+    p, passes = track.p.copy(), 0
+    if len(at) > 2:
+        free = _integrate_twice(acc, dt)
+        free[:, 1:] += np.einsum("nbij,bj->nbi", R[:, 1:], offsets)
+        x, passes = _solve_nodes(
+            p[at].reshape(-1, 9), free[at].reshape(-1, 9), np.ascontiguousarray(R[at]),
+            np.maximum.reduceat(density, at, axis=0), np.minimum.reduceat(inputs.step, at, axis=0), hop * dt,
+            lengths, np.array([model.hip_height, model.foot_height]),
+        )  # fmt: skip
+        p = free + _interpolate(x.reshape(-1, 3, 3) - free[at], at, n)
+    if not np.isfinite(p).all():
+        raise EstimationError("l7s_diverged", NOT_FOUND)
+    failed = _project_all(R, p, lengths)
+    if failed >= 0:
+        raise EstimationError(
+            "l7s_diverged",
+            f"The leg constraints cannot be met at sample {failed}; check which foot each sensor is on and "
+            "the body height.",
+        )
+    return WholeTrack(R, p, passes, offsets)
+
+
+NOT_FOUND: Final = (
+    "The places of pelvis and feet cannot be found; check which foot each sensor is on and the body height."
+)
+
+
+def _solve_nodes(
+    start: Floats, free: Floats, R: Floats, density: Floats, still: Bools, hop_s: float, lengths: Floats,
+    heights: Floats,
+) -> tuple[Floats, int]:  # fmt: skip
+    """Places (T, 9) of the nodes by Gauss–Newton, and the passes it took; arguments as `write_equations`."""
+    x = start.copy()
+    bent = np.zeros_like(x)
+    bent[1:-1] = free[2:] - 2.0 * free[1:-1] + free[:-2]
+    band, slope = np.empty((BAND + 1, x.size)), np.empty(x.size)
+    passes = 0
+    while passes < PASSES:
+        passes += 1
+        write_equations(x, start, R, bent, density, still, hop_s, lengths, heights, band, slope)
+        try:
+            move = solveh_banded(band, slope, overwrite_ab=True, lower=True, check_finite=False)
+        except np.linalg.LinAlgError:
+            raise EstimationError("l7s_diverged", NOT_FOUND) from None
+        x -= move.reshape(x.shape)
+        if np.abs(move).max() < SETTLED_M:
+            break
+    return x, passes
+
+
+def _level_pelvis(R: Floats) -> Floats:
+    """Level pelvis (n, 3, 3) that faces between the feet."""
+    toward = R[:, 1, :2, 2] + R[:, 2, :2, 2]
+    toward = toward / np.maximum(np.linalg.norm(toward, axis=1), 1e-9)[:, None]
+    level = np.zeros((len(R), 3, 3))
+    level[:, 0, 0], level[:, 1, 0] = toward[:, 0], toward[:, 1]
+    level[:, 0, 1], level[:, 1, 1] = -toward[:, 1], toward[:, 0]
+    level[:, 2, 2] = 1.0
+    return level
+
+
+def _integrate_twice(acc: Floats, dt: float) -> Floats:
+    """Ways (n, 3, 3) from accelerations, each constant up to its sample as in the filter."""
+    v = np.cumsum(dt * acc, axis=0)
+    return np.asarray(np.cumsum(dt * v - 0.5 * dt * dt * acc, axis=0))
+
+
+def _interpolate(slow: Floats, at: np.ndarray, n: int) -> Floats:
+    """Corrections (n, 3, 3) on straight lines between the nodes, past the last on the last line."""
+    hop = int(at[1])
+    k = np.minimum(np.arange(n) // hop, len(at) - 2)
+    share = ((np.arange(n) - at[k]) / hop)[:, None, None]
+    return np.asarray(slow[k] + share * (slow[k + 1] - slow[k]))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _add(band, slope, index, value, count, residual, weight):  # type: ignore[no-untyped-def]
+    """Add one row, `value` at `index`, to the normal equations: lower band and right side."""
+    for a in range(count):
+        w = weight * value[a]
+        slope[index[a]] += w * residual
+        for b in range(count):
+            if index[a] >= index[b]:
+                band[index[a] - index[b], index[b]] += w * value[b]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _reach(R, p, leg, lengths, tau):  # type: ignore[no-untyped-def]
+    """Write the vector (3,) from ankle to hip; return its length. R (3, 3, 3), p (3, 3) of BODIES."""
+    side = 1.0 if leg == 0 else -1.0
+    square = 0.0
+    for i in range(3):
+        hip = p[0, i] + side * lengths[0] * R[0, i, 1]
+        tau[i] = hip - p[1 + leg, i] + lengths[1] * R[1 + leg, i, 2]
+        square += tau[i] * tau[i]
+    return np.sqrt(square)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def write_equations(  # type: ignore[no-untyped-def]
+    x, start, R, bent, density, still, hop, lengths, heights, band, slope
+):
+    """Write band (19, 9 T) and right side (9 T,) of the least-squares problem at places x (T, 9).
+
+    start : the filter's. R : (T, 3, 3, 3). bent : second differences of the integrated accelerations.
+    density : (T, 3) and still : (T, 2) from each node to the next. lengths : half hip width, half foot, leg,
+    leg that carries. heights : pelvis, foot.
+    """
+    T = x.shape[0]
+    band[:] = 0.0
+    slope[:] = 0.0
+    index, value, tau = np.empty(6, np.int64), np.empty(6), np.empty(3)
+    for k in range(T):
+        o = 9 * k
+        for j in range(9):
+            index[0], value[0] = o + j, 1.0
+            _add(band, slope, index, value, 1, x[k, j] - start[k, j], hop / ANYWHERE)
+            if 0 < k < T - 1:
+                index[0], index[1], index[2] = o + j - 9, o + j, o + j + 9
+                value[0], value[1], value[2] = 1.0, -2.0, 1.0
+                residual = x[k - 1, j] - 2.0 * x[k, j] + x[k + 1, j] - bent[k, j]
+                most = max(density[k - 1, j // 3], density[k, j // 3])
+                _add(band, slope, index, value, 3, residual, 1.0 / (most * hop**3))
+        for i in range(2):
+            index[0], index[1], index[2] = o + i, o + 3 + i, o + 6 + i
+            value[0], value[1], value[2] = 1.0, -0.5, -0.5
+            residual = x[k, i] - 0.5 * x[k, 3 + i] - 0.5 * x[k, 6 + i]
+            _add(band, slope, index, value, 3, residual, hop / MID_PELVIS)
+        index[0], value[0] = o + 2, 1.0
+        _add(band, slope, index, value, 1, x[k, 2] - heights[0], hop / PELVIS_HEIGHT)
+        for leg in range(2):
+            f = 3 * (1 + leg)
+            index[0], value[0] = o + f + 2, 1.0
+            spread = FOOT_HEIGHT[0] if still[k, leg] else FOOT_HEIGHT[1]
+            _add(band, slope, index, value, 1, x[k, f + 2] - heights[1], hop / spread)
+            if still[k, leg] and k < T - 1:
+                for i in range(3):
+                    index[0], index[1] = o + f + i, o + f + i + 9
+                    value[0], value[1] = -1.0, 1.0
+                    _add(band, slope, index, value, 2, x[k + 1, f + i] - x[k, f + i], 1.0 / REST_M**2)
+            reach = _reach(R[k], x[k].reshape(3, 3), leg, lengths, tau)
+            across = 0.0
+            for i in range(3):
+                y = R[k, 1 + leg, i, 1]
+                across += y * tau[i]
+                index[i], value[i] = o + i, y
+                index[3 + i], value[3 + i] = o + f + i, -y
+            _add(band, slope, index, value, 6, across, hop / HINGE)
+            for i in range(3):
+                value[i], value[3 + i] = tau[i] / reach, -tau[i] / reach
+            if still[k, leg] and not still[k, 1 - leg]:
+                _add(band, slope, index, value, 6, reach - lengths[3], hop / CARRIES)
+            if reach > lengths[2]:
+                _add(band, slope, index, value, 6, reach - lengths[2], hop / LONGER)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _project_all(R, p, lengths):  # type: ignore[no-untyped-def]
+    """Project every sample onto the constraints in place; return the sample that failed, −1 if none did.
+
+    The filter's projection with what may move here: a foot turns by 0.1 rad as easily as a body shifts by
+    1 cm, the pelvis keeps its orientation.
+    """
+    P = np.zeros((N, N))
+    for b in range(3):
+        for i in range(3):
+            P[6 * b + i, 6 * b + i] = 1e-4
+            P[6 * b + 3 + i, 6 * b + 3 + i] = 1e-2 if b > 0 else 1e-8
+    dx, work, v = np.zeros(N), np.empty((7, 3, 3)), np.zeros((3, 3))
+    for k in range(R.shape[0]):
+        for _ in range(PROJECTIONS):
+            if not project(R[k], p[k], v, P, lengths[0], lengths[1], lengths[2], dx, work):
+                return k
+    return -1

@@ -1,0 +1,35 @@
+"""Fixed offset: sensors put on as agreed, so that how they sit is known without any movement.
+
+Kianifar et al.: x of the device along the bone towards the trunk, y away from the body. On the front of the
+thigh and on the back y lies in the sagittal plane, on the flat side of the shin 45° inward of it.
+"""
+
+from __future__ import annotations
+
+from math import radians
+from typing import Final
+
+import numpy as np
+
+from core.frames import SHANK, THIGH, Floats, Segment, Side
+from core.rotation import about, to_matrix
+
+SHIN_FACE: Final = radians(45.0)
+"""The flat side of the shin looks so far inward of forward (Kianifar, "IMU orientations")."""
+
+FRONT: Final[Floats] = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+"""Sensor to segment of a device on the front: x → up, y → forward, z → left."""
+BACK: Final[Floats] = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""Of one on the back: x → up, y → backward, z → right."""
+FRONT.setflags(write=False)
+BACK.setflags(write=False)
+
+
+def make_fixed_mounts(side: Side) -> dict[Segment, Floats]:
+    """Segment → (3, 3) R_segment_sensor of shank, thigh and pelvis for the squat on the leg of a side."""
+    inward = SHIN_FACE if side == "right" else -SHIN_FACE
+    return {
+        SHANK[side]: to_matrix(about(1, inward)) @ FRONT,
+        THIGH[side]: FRONT.copy(),
+        "pelvis": BACK.copy(),
+    }

@@ -1,0 +1,225 @@
+"""Movements done for the calibration: swings of one leg from the hip, and bows of the trunk.
+
+Both turn a segment about its medio-lateral axis, which the principal axis of its rate shows (Nazarahari 2021,
+thesis, ch. 3). Where they are is found by what stays still meanwhile: the other leg, or both feet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from core.calibration.anterior import AnteriorAxis
+from core.calibration.gyro_pca import (
+    GOOD_AXIS,
+    WEAK_MARGIN,
+    about_vertical,
+    count_repetitions,
+    flexion_axis,
+    sagittal_angle,
+)
+from core.calibration.heading import nearest_sign
+from core.calibration.mounting import read_declared_angle
+from core.calibration.standing import SensorAtRest, vertical_frame
+from core.calibration.walking import TRUNK
+from core.errors import CalibrationError, Notice
+from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from core.recording import UniformRecording
+from core.rest import find_runs
+from core.rotation import conjugate, rotate
+
+FunctionalMethod = Literal["hip_swing", "trunk_bow"]
+FUNCTIONAL: Final[tuple[FunctionalMethod, ...]] = ("hip_swing", "trunk_bow")
+
+FORWARD: Final[Mapping[FunctionalMethod, float]] = {"hip_swing": 1.0, "trunk_bow": -1.0}
+"""Sign of the sagittal angle on the way forward: feet swing forward under the hip, a head forward over it."""
+
+EDGE_S: Final = 0.75
+"""Half the time over which the rates of a swing are averaged."""
+
+UP: Final = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class FunctionalParams:
+    """What counts as swings and bows (docs/science/calibration.md, "Swings and bows").
+
+    Parameters
+    ----------
+    swing_s, bow_s : rates are averaged over so long. swing_rate, bow_rate : of the leg and of the trunk
+        meanwhile, rad/s. still_rate : of the other leg, or of feet and shanks. still_share : of these over
+        the one that moves. pause_s : a shorter break is part of it. shortest_s : of the whole.
+    swings, bows : repetitions that are asked for; with half of them the axis is used, and told.
+    """
+
+    swing_s: float = 1.5
+    bow_s: float = 3.0
+    swing_rate: float = 0.5
+    bow_rate: float = 0.2
+    still_rate: float = 0.3
+    still_share: float = 0.4
+    pause_s: float = 2.0
+    shortest_s: float = 5.0
+    swings: int = 10
+    bows: int = 5
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionalMovements:
+    """Where they are.
+
+    Parameters
+    ----------
+    swings : side → (n,) that leg swings and the other stands. bows : (n,) the trunk bows over still feet.
+    """
+
+    swings: Mapping[Side, Bools]
+    bows: Bools
+
+    @property
+    def anywhere(self) -> Bools:
+        """Samples (n,) of any of them: nobody walks there."""
+        return np.asarray(np.logical_or.reduce([*self.swings.values(), self.bows]))
+
+    def shown_by(self, segment: Segment) -> tuple[FunctionalMethod, Bools]:
+        """The movement that shows the axis of a segment, and when."""
+        if segment in TRUNK:
+            return "trunk_bow", self.bows
+        side = next(s for s in SIDES if segment in (THIGH[s], SHANK[s], FOOT[s]))
+        return "hip_swing", self.swings[side]
+
+
+def find_functional_movements(recording: UniformRecording, params: FunctionalParams) -> FunctionalMovements:
+    """Find swings and bows; a take in which nobody did any has none.
+
+    The other leg needs a sensor, and for bows both shanks or feet: a single sensor does not tell a swing
+    from a step.
+    """
+    worn, rate = recording.sensors, recording.rate_hz
+    legs = {side: [s for s in (THIGH[side], SHANK[side], FOOT[side]) if s in worn] for side in SIDES}
+    none = np.zeros(len(recording.t_s), np.bool_)
+    if not all(legs.values()):
+        return FunctionalMovements(dict.fromkeys(SIDES, none), none)
+    pace = {side: _average(recording, legs[side], params.swing_s) for side in SIDES}
+    swings: dict[Side, Bools] = {}
+    for side, other in ((SIDES[0], SIDES[1]), (SIDES[1], SIDES[0])):
+        mine, theirs = pace[side], pace[other]
+        alone = (theirs < params.still_rate) & (theirs < params.still_share * mine)
+        swings[side] = _join(alone & (mine > params.swing_rate), rate, params)
+    trunk = [s for s in TRUNK if s in worn]
+    low = {side: [s for s in legs[side] if s != THIGH[side]] for side in SIDES}
+    if not trunk or not all(low.values()):
+        return FunctionalMovements(swings, none)
+    bowing = _average(recording, trunk, params.bow_s)
+    feet = np.maximum(*(_average(recording, low[side], params.bow_s) for side in SIDES))
+    thighs = [s for s in THIGH.values() if s in worn]
+    upright = _average(recording, thighs, params.bow_s) if thighs else np.zeros(len(none))
+    bows = (bowing > params.bow_rate) & (np.maximum(feet, upright) < params.still_share * bowing)
+    return FunctionalMovements(swings, _join(bows & (feet < params.still_rate), rate, params))
+
+
+def find_functional_axes(
+    recording: UniformRecording,
+    movements: FunctionalMovements,
+    standing: Mapping[Segment, SensorAtRest],
+    q: Mapping[Segment, Floats],
+    params: FunctionalParams,
+) -> dict[Segment, AnteriorAxis]:
+    """Anterior axis of every sensor whose segment was swung or bowed often enough.
+
+    Parameters
+    ----------
+    q : segment → (n, 4) sensor to its rest world.
+    """
+    found: dict[Segment, AnteriorAxis] = {}
+    for segment, signals in recording.sensors.items():
+        how, seen = movements.shown_by(segment)
+        seen = seen & signals.valid
+        if not seen.any():
+            continue
+        R_vertical = vertical_frame(standing[segment].up)
+        try:
+            axis = flexion_axis(signals.gyr[seen] - standing[segment].gyro_bias, R_vertical, segment)
+        except CalibrationError:
+            continue  # turned about several axes: the walk has to show it
+        up = rotate(conjugate(q[segment]), UP)
+        angle, margin = _give_sign(-axis.gamma, how, up[seen], R_vertical)
+        written = read_declared_angle(recording.mounting.get(segment, ""), R_vertical, segment)
+        if written is not None:
+            angle, margin = nearest_sign(angle, written), np.inf
+        bend = sagittal_angle(up, about_vertical(-angle) @ R_vertical) * FORWARD[how]
+        asked = params.swings if how == "hip_swing" else params.bows
+        done = sum(count_repetitions(bend[a:b]) for a, b in find_runs(_widen(seen, recording.rate_hz)))
+        if 2 * done < asked:
+            continue
+        told = tuple(_tell(segment, how, done, asked, axis.rho, margin))
+        facts = {"source": how, "rho": axis.rho, "repetitions": done, "asked": asked}
+        found[segment] = AnteriorAxis(angle, how, axis.rho, told, facts)
+    return found
+
+
+def _give_sign(axis: float, how: FunctionalMethod, up: Floats, R_vertical: Floats) -> tuple[float, float]:
+    """The end of an axis that is forward, and how clear that is, rad: legs swing forward, trunks bow forward.
+
+    Parameters
+    ----------
+    up : (m, 3) the vertical in the sensor while it moves.
+    """
+    bend = float(sagittal_angle(up, about_vertical(-axis) @ R_vertical).mean())
+    forward = bend * FORWARD[how]
+    return (axis if forward >= 0.0 else nearest_sign(axis, axis + np.pi)), abs(forward)
+
+
+def _tell(
+    segment: Segment, how: FunctionalMethod, done: int, asked: int, rho: float, margin: float
+) -> Sequence[Notice]:
+    what, further = ("swings", "swing") if how == "hip_swing" else ("bows", "bow")
+    told = []
+    if done < asked:
+        message = f"{segment}: calibration saw {done} {what}, {asked} or more are good."
+        told.append(Notice("few_repetitions", message, sensor=segment))
+    if rho < GOOD_AXIS:
+        message = (
+            f"{segment}: in the {what} the first component holds {rho:.0%} of the movement, {GOOD_AXIS:.0%} "
+            "or more is good. Move in one plane."
+        )
+        told.append(Notice("not_single_axis", message, sensor=segment))
+    if margin < WEAK_MARGIN:
+        message = (
+            f"{segment}: forward and backward are hard to tell apart in these {what}; {further} further "
+            "forward than back, or declare the mounting."
+        )
+        told.append(Notice("calibration_sign_weak", message, sensor=segment))
+    return told
+
+
+def _average(recording: UniformRecording, segments: Sequence[Segment], seconds: float) -> Floats:
+    """Mean |ω| (n,) of some sensors over a window around each sample, rad/s."""
+    from scipy.ndimage import uniform_filter1d
+
+    rate = np.mean([np.linalg.norm(recording.sensors[s].gyr, axis=1) for s in segments], axis=0)
+    width = max(1, min(round(seconds * recording.rate_hz), len(rate)))
+    return np.asarray(uniform_filter1d(rate, width, mode="nearest"))
+
+
+def _widen(seen: Bools, rate_hz: float) -> Bools:
+    """The same (n,) with its edges, where a movement begins and ends slowly."""
+    wide, edge = seen.copy(), round(EDGE_S * rate_hz)
+    for a, b in find_runs(seen):
+        wide[max(0, a - edge) : b + edge] = True
+    return wide
+
+
+def _join(seen: Bools, rate_hz: float, params: FunctionalParams) -> Bools:
+    """Runs (n,) with breaks of up to `pause_s` closed, those of `shortest_s` and more."""
+    joined = seen.copy()
+    for a, b in find_runs(~seen):
+        if a > 0 and b < len(seen) and b - a <= params.pause_s * rate_hz:
+            joined[a:b] = True
+    for a, b in find_runs(joined):
+        if b - a < params.shortest_s * rate_hz:
+            joined[a:b] = False
+    return joined

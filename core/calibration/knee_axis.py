@@ -1,0 +1,80 @@
+"""The hinge of the knee in the axes of thigh and shank, from their rates alone.
+
+What two segments turn otherwise than about their common hinge they turn together: |ω₁ × j₁| = |ω₂ × j₂| at
+every sample, j₁ and j₂ the hinge in the axes of each (Seel et al. 2014, doi:10.3390/s140406891).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+from typing import Final
+
+import numpy as np
+
+from core.frames import Floats
+
+MOST_SAMPLES: Final = 2000
+"""More are thinned: a step has some fifty of its own."""
+
+STEEPEST: Final = radians(45.0)
+"""A hinge found further out of the horizontal plane of its segment is no knee, but skin (our choice)."""
+
+ROUNDS: Final = 20
+SETTLED: Final = 1e-4
+RIDGE: Final = 1e-3
+LONGEST_STEP: Final = 0.5
+
+
+@dataclass(frozen=True)
+class KneeAxes:
+    """Where the hinge lies.
+
+    Parameters
+    ----------
+    thigh, shank : its turn about the long axis of the segment from the medio-lateral axis, rad.
+    steepest : the larger angle of the two out of the segment's horizontal plane, rad.
+    """
+
+    thigh: float
+    shank: float
+    steepest: float
+
+    @property
+    def apart(self) -> float:
+        """By how much the forward axes of thigh and shank disagree about it, rad."""
+        return self.thigh - self.shank
+
+
+def find_knee_axes(thigh: Floats, shank: Floats) -> KneeAxes:
+    """Fit the hinge by Gauss-Newton from the medio-lateral axes on.
+
+    Parameters
+    ----------
+    thigh, shank : (n, 3) rates without bias in segment axes, rad/s, at the same samples.
+    """
+    thin = max(1, len(thigh) // MOST_SAMPLES)
+    first, second = thigh[::thin], shank[::thin]
+    x = np.zeros(4)
+    weight = RIDGE * np.sqrt(len(first)) * np.eye(4)
+    for _ in range(ROUNDS):
+        e1, J1 = _measure_across(first, x[:2])
+        e2, J2 = _measure_across(second, x[2:])
+        J = np.concatenate((np.concatenate((J1, -J2), axis=1), weight))
+        step = np.linalg.lstsq(J, np.concatenate((e2 - e1, np.zeros(4))), rcond=None)[0]
+        size = float(np.linalg.norm(step))
+        x += step * min(1.0, LONGEST_STEP / max(size, 1e-12))
+        if size < SETTLED:
+            break
+    return KneeAxes(float(x[0]), float(x[2]), float(max(abs(x[1]), abs(x[3]))))
+
+
+def _measure_across(rate: Floats, turn: Floats) -> tuple[Floats, Floats]:
+    """|ω × j| (n,) and its derivative (n, 2) by the two angles of j."""
+    (ca, sa), (ce, se) = ((np.cos(v), np.sin(v)) for v in turn)
+    j = np.array([ce * sa, se, ce * ca])
+    dj = np.array([[ce * ca, -se * sa], [0.0, ce], [-ce * sa, -se * ca]])
+    across = np.cross(rate, j)
+    size = np.linalg.norm(across, axis=1)
+    slope = np.cross(across, rate) / np.maximum(size, 1e-9)[:, None]
+    return size, slope @ dj

@@ -1,0 +1,416 @@
+"""How good a calibration is: checks of every sensor, each with its limit, what it means and what to do.
+
+The rules stand in one table (`RULES`); limits are `ScoreParams`. Where the limits come from:
+docs/science/calibration.md, "Score".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import degrees
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from core.agreement import Agreement
+from core.calibration.anterior import STRONG_AXIS
+from core.calibration.functional import FUNCTIONAL
+from core.calibration.gyro_pca import GOOD_AXIS, measure_main_axis
+from core.calibration.knee_axis import STEEPEST, find_knee_axes
+from core.calibration.result import CalibratedRecording
+from core.calibration.walking import TRUNK
+from core.frames import FOOT, GRAVITY, SEGMENTS, SHANK, SIDES, THIGH, Bools, Floats, Segment
+from core.rest import index_window, measure_turn
+from core.rotation import wrap_angle
+
+CheckName = Literal[
+    "forward_found", "stillness", "gravity", "axis_share", "repetitions", "mirror", "knee_axis",
+    "joint_misfit", "heading_spread",
+]  # fmt: skip
+CalibrationVerdict = Literal["pass", "redo", "not_judged"]
+
+TURNED_ALL: Final = 1.0
+"""Seconds of straight walking below which no axis is looked for."""
+
+
+@dataclass(frozen=True)
+class ScoreParams:
+    """Limits of the checks (docs/science/calibration.md, "Score").
+
+    Parameters
+    ----------
+    stillness : turn of the vertical while standing, degrees. gravity : |f| at rest off gravity, percent.
+    axis_share : share of the first component of the rate. repetitions : straight steps; of swings and bows
+    those that `FunctionalParams` asks for. mirror, knee_axis, heading_spread : degrees.
+    joint_misfit : of a joint's acceleration from its two sides, over its size.
+    """
+
+    stillness: float = 4.0
+    gravity: float = 10.0
+    axis_share: float = 0.70
+    repetitions: int = 8
+    mirror: float = 25.0
+    knee_axis: float = 10.0
+    joint_misfit: float = 0.9
+    heading_spread: float = 25.0
+
+
+@dataclass(frozen=True)
+class CheckRule:
+    """One check as people read it.
+
+    Parameters
+    ----------
+    least : the value must reach the limit; else it must not exceed it. means : what a value beyond the limit
+    says. todo : what to do then.
+    """
+
+    name: CheckName
+    title: str
+    unit: str
+    least: bool
+    means: str
+    todo: str
+
+
+RULES: Final[tuple[CheckRule, ...]] = (
+    CheckRule(
+        "forward_found",
+        "Forward axis found",
+        "",
+        False,
+        "Which way the sensor faces is not known, so its angles are withheld.",
+        "Stand still for 3 s, then walk at least 8 steps straight ahead, or declare the mounting.",
+    ),
+    CheckRule(
+        "stillness",
+        "Standing still",
+        "°",
+        False,
+        "The segment tilted while the person stood, so its upright is off by up to half of that.",
+        "Let the person stand still for 3 to 5 s, with a hand on a rail if needed, and record again.",
+    ),
+    CheckRule(
+        "gravity",
+        "Gravity at rest",
+        "%",
+        False,
+        "The accelerometer is off by so much at rest; distances and tilts of this sensor are doubtful.",
+        "Calibrate the accelerometer as its maker says, or wear another sensor.",
+    ),
+    CheckRule(
+        "axis_share",
+        "One axis of turning",
+        "",
+        True,
+        "The segment turned about several axes, so its flexion axis is not clear.",
+        "Fasten the sensor, and walk straight ahead at the usual speed, without turning.",
+    ),
+    CheckRule(
+        "repetitions",
+        "Steps or repetitions",
+        "",
+        True,
+        "The direction rests on few repetitions, so chance has a large part in it.",
+        "Walk further straight ahead, at least 8 steps, or repeat the movement at least 10 times.",
+    ),
+    CheckRule(
+        "mirror",
+        "Left mirrors right",
+        "°",
+        False,
+        "Left and right turn about axes that are no mirror images; one forward axis may be off by that.",
+        "Look whether both sensors sit alike and tight, then stand and walk again.",
+    ),
+    CheckRule(
+        "knee_axis",
+        "Knee seen from both sides",
+        "°",
+        False,
+        "Thigh and shank disagree about the axis of their knee, so one forward axis is off by that.",
+        "Fasten both sensors of that knee, away from muscle, then stand and walk again.",
+    ),
+    CheckRule(
+        "joint_misfit",
+        "Joints hold together",
+        "",
+        False,
+        "The sensors beside its joints do not show one acceleration of the joint.",
+        "Check who wears which sensor, its strap and its clock; then record again.",
+    ),
+    CheckRule(
+        "heading_spread",
+        "Measures of forward agree",
+        "°",
+        False,
+        "Walking velocity, acceleration and joints show different ways forward.",
+        "Start straight ahead from standing, walk without turning, and stand still at the end.",
+    ),
+)
+"""All checks in the order in which they are shown."""
+
+RULE_OF: Final[Mapping[CheckName, CheckRule]] = {rule.name: rule for rule in RULES}
+
+
+@dataclass(frozen=True)
+class CalibrationCheck:
+    """One check of one sensor, or of the whole take.
+
+    Parameters
+    ----------
+    segment : None = the whole take. value : in the unit of its rule, None where it could not be measured.
+    limit : None where there is none. why : what the verdict means; empty where it passes.
+    """
+
+    name: CheckName
+    segment: Segment | None
+    value: float | None
+    limit: float | None
+    verdict: CalibrationVerdict
+    why: str = ""
+
+    @property
+    def rule(self) -> CheckRule:
+        """Its words."""
+        return RULE_OF[self.name]
+
+    @property
+    def todo(self) -> str:
+        """What to do; empty unless something is to be done again."""
+        return self.rule.todo if self.verdict == "redo" else ""
+
+    def to_json(self) -> dict[str, object]:
+        """The check with its words, as JSON values."""
+        rule = self.rule
+        return {
+            "name": self.name,
+            "title": rule.title,
+            "segment": self.segment,
+            "value": self.value,
+            "unit": rule.unit,
+            "limit": self.limit,
+            "limit_is": "least" if rule.least else "most",
+            "verdict": self.verdict,
+            "why": self.why,
+            "todo": self.todo,
+        }
+
+
+@dataclass(frozen=True)
+class CalibrationScore:
+    """All checks of a calibration."""
+
+    checks: tuple[CalibrationCheck, ...]
+
+    @property
+    def verdict(self) -> CalibrationVerdict:
+        """Of the whole take."""
+        return judge_together(self.checks)
+
+    def judge_segment(self, segment: Segment) -> CalibrationVerdict:
+        """Verdict of one sensor."""
+        return judge_together(c for c in self.checks if c.segment == segment)
+
+    def to_json(self) -> dict[str, object]:
+        """Verdicts of the take and of its sensors, and every check, as JSON values."""
+        worn = [s for s in SEGMENTS if any(c.segment == s for c in self.checks)]
+        return {
+            "verdict": self.verdict,
+            "segments": {s: self.judge_segment(s) for s in worn},
+            "checks": [c.to_json() for c in self.checks],
+        }
+
+
+def judge_together(checks: Iterable[CalibrationCheck]) -> CalibrationVerdict:
+    """Redo where one check says so, pass where one passes and none says so."""
+    found = {c.verdict for c in checks}
+    return "redo" if "redo" in found else "pass" if "pass" in found else "not_judged"
+
+
+def score_calibration(
+    calibrated: CalibratedRecording,
+    params: ScoreParams | None = None,
+    agreed: Agreement | None = None,
+    turned: Mapping[Segment, float] | None = None,
+) -> CalibrationScore:
+    """Judge a calibration by every check that its take allows.
+
+    Parameters
+    ----------
+    calibrated : with the mountings that are used. agreed : what the sensors say of each other, None where
+    nobody compared them. turned : segment → how far the joints turned its forward axis, rad.
+    """
+    view = _Evidence(calibrated, params or ScoreParams(), agreed, turned or {})
+    moved = {s for s, x in calibrated.calibration.segments.items() if x.method in FUNCTIONAL}
+    walked = set(calibrated.calibration.segments) - moved
+    checks = [view.check_steps()] if walked or not moved else []
+    for segment in (s for s in SEGMENTS if s in calibrated.recording.sensors):
+        if segment not in calibrated.calibration.segments:
+            checks.append(view.tell_missing(segment))
+            continue
+        checks += [
+            CalibrationCheck("forward_found", segment, None, None, "pass"),
+            view.check_stillness(segment),
+            view.check_gravity(segment),
+            view.check_axis_share(segment),
+            *([view.check_repetitions(segment)] if segment in moved else []),
+            view.check_mirror(segment),
+            view.check_knee_axis(segment),
+            view.check_joints(segment),
+            view.check_heading_spread(segment),
+        ]
+    return CalibrationScore(tuple(checks))
+
+
+class _Evidence:
+    """What the checks are made of, worked out once."""
+
+    def __init__(
+        self,
+        calibrated: CalibratedRecording,
+        params: ScoreParams,
+        agreed: Agreement | None,
+        turned: Mapping[Segment, float],
+    ) -> None:
+        self.recording, self.calibration = calibrated.recording, calibrated.calibration
+        self.params, self.agreed, self.turned = params, agreed, turned
+        rate = self.recording.rate_hz
+        self.straight = np.zeros(len(self.recording.t_s), np.bool_)
+        for window in self.calibration.walking:
+            self.straight[index_window(window, rate)] = True
+        self.rates: dict[Segment, Floats] = {
+            s: (self.recording.sensors[s].gyr - x.gyro_bias) @ x.R_segment_sensor.T
+            for s, x in self.calibration.segments.items()
+        }
+        self.axes = {s: self._find_axis(s) for s in self.rates}
+        self.knees = {side: self._find_knee(THIGH[side], SHANK[side]) for side in SIDES}
+
+    def _seen(self, *segments: Segment) -> Bools:
+        """Samples (n,) of straight walking at which all of these sensors were there."""
+        valid = [self.recording.sensors[s].valid for s in segments]
+        return np.asarray(np.logical_and.reduce([self.straight, *valid]))
+
+    def _find_axis(self, segment: Segment) -> tuple[float, float] | None:
+        """Heading of the axis it turns about from the medio-lateral one, rad, and the share of it."""
+        seen = self._seen(segment)
+        if segment in TRUNK or np.count_nonzero(seen) < TURNED_ALL * self.recording.rate_hz:
+            return None
+        found = measure_main_axis(self.rates[segment][seen][:, [0, 2]])
+        heading = float(np.arctan2(found.x, found.z))
+        return 0.5 * float(wrap_angle(2.0 * heading)), found.share
+
+    def _find_knee(self, thigh: Segment, shank: Segment) -> tuple[float, float] | None:
+        if thigh not in self.rates or shank not in self.rates:
+            return None
+        seen = self._seen(thigh, shank)
+        if np.count_nonzero(seen) < TURNED_ALL * self.recording.rate_hz:
+            return None
+        found = find_knee_axes(self.rates[thigh][seen], self.rates[shank][seen])
+        return found.apart, found.steepest
+
+    def _judge(self, name: CheckName, segment: Segment | None, value: float) -> CalibrationCheck:
+        rule, limit = RULE_OF[name], float(getattr(self.params, name))
+        good = value >= limit if rule.least else value <= limit
+        return CalibrationCheck(
+            name, segment, value, limit, "pass" if good else "redo", "" if good else rule.means
+        )
+
+    def _leave(
+        self, name: CheckName, segment: Segment | None, why: str, value: float | None = None
+    ) -> CalibrationCheck:
+        limit = float(getattr(self.params, name))
+        return CalibrationCheck(name, segment, value, limit, "not_judged", why)
+
+    def tell_missing(self, segment: Segment) -> CalibrationCheck:
+        said = [n.message for n in self.calibration.notices if n.sensor == segment]
+        why = said[0] if said else RULE_OF["forward_found"].means
+        return CalibrationCheck("forward_found", segment, None, None, "redo", why)
+
+    def check_repetitions(self, segment: Segment) -> CalibrationCheck:
+        """Swings or bows that were done for this sensor."""
+        facts = self._facts(segment)
+        done, asked = float(facts["repetitions"]), float(facts["asked"])
+        why = "" if done >= asked else RULE_OF["repetitions"].means
+        verdict: CalibrationVerdict = "redo" if why else "pass"
+        return CalibrationCheck("repetitions", segment, done, asked, verdict, why)
+
+    def _facts(self, segment: Segment) -> Mapping[str, Any]:
+        """What its calibration says of how the forward axis was found."""
+        facts = self.calibration.diagnostics.get(segment)
+        return facts if isinstance(facts, Mapping) else {}
+
+    def check_steps(self) -> CalibrationCheck:
+        steps = self.calibration.straight_steps
+        if steps is None:
+            return self._leave("repetitions", None, "No leg sensor shows steps of a straight walk.")
+        return self._judge("repetitions", None, float(steps))
+
+    def check_stillness(self, segment: Segment) -> CalibrationCheck:
+        if self.calibration.posture != "standing":
+            return self._leave("stillness", segment, "Nobody stood still; the walk alone had to do.")
+        part = index_window(self.calibration.zero, self.recording.rate_hz)
+        turned, _ = measure_turn(self.recording.sensors[segment].acc[part], self.recording.rate_hz)
+        return self._judge("stillness", segment, degrees(turned))
+
+    def check_gravity(self, segment: Segment) -> CalibrationCheck:
+        if self.calibration.posture != "standing":
+            return self._leave("gravity", segment, "Nobody stood still; the walk alone had to do.")
+        norm = self.calibration.segments[segment].rest_norm
+        return self._judge("gravity", segment, 100.0 * abs(norm / GRAVITY - 1.0))
+
+    def check_axis_share(self, segment: Segment) -> CalibrationCheck:
+        if self.calibration.segments[segment].method in FUNCTIONAL:
+            return self._judge("axis_share", segment, float(self._facts(segment)["rho"]))
+        if segment in TRUNK:
+            return self._leave("axis_share", segment, "A walking trunk turns about every axis.")
+        found = self.axes[segment]
+        if found is None:
+            return self._leave("axis_share", segment, "No straight walking shows it.")
+        return self._judge("axis_share", segment, found[1])
+
+    def check_mirror(self, segment: Segment) -> CalibrationCheck:
+        pair = next((p for p in (THIGH, SHANK, FOOT) if segment in p.values()), None)
+        if pair is None:
+            return self._leave("mirror", segment, "It has no counterpart on the other side.")
+        found = [self.axes.get(s) for s in pair.values()]
+        known = [x for x in found if x is not None]
+        if len(known) < len(found):
+            return self._leave("mirror", segment, "The other side has no calibrated sensor that walked.")
+        apart = degrees(abs(float(wrap_angle(known[0][0] + known[1][0]))))
+        if min(share for _, share in known) < GOOD_AXIS:
+            return self._leave("mirror", segment, "Its main axis of turning is not clear enough.", apart)
+        return self._judge("mirror", segment, apart)
+
+    def check_knee_axis(self, segment: Segment) -> CalibrationCheck:
+        side = next((s for s in SIDES if segment in (THIGH[s], SHANK[s])), None)
+        if side is None:
+            return self._leave("knee_axis", segment, "It is not beside a knee.")
+        found = self.knees[side]
+        if found is None:
+            return self._leave("knee_axis", segment, "Thigh and shank were not both seen in walking.")
+        apart = degrees(abs(float(wrap_angle(found[0]))))
+        if found[1] > STEEPEST:
+            return self._leave("knee_axis", segment, "Skin moves too much to see the knee's axis.", apart)
+        return self._judge("knee_axis", segment, apart)
+
+    def check_joints(self, segment: Segment) -> CalibrationCheck:
+        """The best of its joints: a sensor whose neighbour alone is wrong fits its other neighbour."""
+        misfits = {} if self.agreed is None else self.agreed.misfits
+        own = [x for joint, x in misfits.items() if segment in joint]
+        if not own:
+            return self._leave("joint_misfit", segment, "No sensor across one of its joints walked with it.")
+        return self._judge("joint_misfit", segment, min(own))
+
+    def check_heading_spread(self, segment: Segment) -> CalibrationCheck:
+        said = self._facts(segment)
+        off, share = said.get("disagreement_rad"), said.get("axis_share", 1.0)
+        back = float(self.turned.get(segment, 0.0))
+        measures = [back] if segment in self.turned else []
+        # where sway is as large as progress, velocity alone shows the way
+        if isinstance(off, float | int) and (said.get("source") != "velocity" or share > STRONG_AXIS):
+            other = -off if said.get("source") == "acceleration" else off
+            measures += [back, float(wrap_angle(float(other) + back))]
+        if not measures:
+            return self._leave("heading_spread", segment, "Only one measure shows its way forward.")
+        return self._judge("heading_spread", segment, degrees(max(map(abs, measures))))

@@ -1,0 +1,290 @@
+"""Table-top calibration: sensors lie on a table as agreed and are carried to the body.
+
+Kianifar et al.: the gyroscope is integrated from the table to the leg. The person stands still and faces
+along the arrow on the table (docs/science/squat.md, "From the table").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import acos, degrees, radians
+
+import numba
+import numpy as np
+
+from core.errors import CalibrationError, Notice
+from core.frames import R_NEUTRAL, Floats, Segment
+from core.recording import SensorSignals, UniformRecording
+from core.rest import RestParams, Window, find_rest_windows, find_runs, index_window
+from core.rotation import conjugate, exp, from_matrix, mean, multiply, rotate, to_matrix
+from core.rotation.compiled import turn
+
+
+@dataclass(frozen=True)
+class TableTopParams:
+    """What the protocol asks for (docs/science/squat.md, "From the table").
+
+    Parameters
+    ----------
+    longest_s : between the two rests. edge_s : a rest may begin so late and end so early in the take.
+    still_s, still : the quietest part of the rest on the table, and the most that its rate may vary, SD in
+        rad/s: what a hand holds varies more.
+    mean_s : of the rest on the body. slope : device against the table it should lie flat on, rad.
+    drift : tilt at the end that gravity takes off and that is told of, rad.
+    facing : of the person from the arrow, left positive, rad.
+    table : (w, x, y, z) device on the table in arrow axes: x along the arrow, z up.
+    stand_s : shortest standing with all sensors on. worn : a sensor whose vertical has turned so far from
+        that on the table is on the body, rad.
+    """
+
+    rest: RestParams = field(default_factory=RestParams)
+    longest_s: float = 60.0
+    edge_s: float = 1.0
+    still_s: float = 1.0
+    still: float = radians(1.0)
+    mean_s: float = 1.0
+    slope: float = radians(15.0)
+    drift: float = radians(3.0)
+    facing: float = 0.0
+    table: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    stand_s: float = 2.0
+    worn: float = radians(45.0)
+
+
+@dataclass(frozen=True, eq=False)
+class TableTopMounts:
+    """How the sensors sit.
+
+    Parameters
+    ----------
+    R_segment_sensor : segment → (3, 3). gyro_bias : segment → (3,) rad/s, on the table.
+    drift_rad : segment → tilt that gravity took off at the end. moved_s : segment → time between the rests.
+    """
+
+    R_segment_sensor: Mapping[Segment, Floats]
+    gyro_bias: Mapping[Segment, Floats]
+    drift_rad: Mapping[Segment, float]
+    moved_s: Mapping[Segment, float]
+    notices: tuple[Notice, ...] = ()
+
+
+def calibrate_table_top(recording: UniformRecording, params: TableTopParams | None = None) -> TableTopMounts:
+    """Find how every sensor of a take sits, from its way from the table to a person who stands neutral.
+
+    Raises
+    ------
+    CalibrationError `no_segment`, `table_not_still`, `body_not_still`, `table_top_too_long`, `table_top_gap`,
+    `table_orientation`.
+
+    References
+    ----------
+    Kianifar et al. 2019, "Calibration protocol", equations 2 to 5, doi:10.1177/2055668318813455. There the
+    increment is written as the matrix itself; tilts are not corrected and no rest is asked for.
+    """
+    params = params or TableTopParams()
+    if not recording.sensors:
+        raise CalibrationError("no_segment", "No sensor is mapped to a segment; map those on the table.")
+    mounts: dict[Segment, Floats] = {}
+    biases: dict[Segment, Floats] = {}
+    drifts: dict[Segment, float] = {}
+    moved: dict[Segment, float] = {}
+    notices = []
+    to_segment = conjugate(multiply(exp(np.array([0.0, 0.0, params.facing])), from_matrix(R_NEUTRAL)))
+    for segment, signals in recording.sensors.items():
+        table, body = _find_ends(recording, segment, params)
+        part = index_window(table, recording.rate_hz)
+        biases[segment] = signals.gyr[part].mean(axis=0)
+        start = _lie_on_table(segment, signals.acc[part].mean(axis=0), params)
+        q, drifts[segment] = _carry(signals, biases[segment], start, part, body, recording.rate_hz, params)
+        mounts[segment], moved[segment] = to_matrix(multiply(to_segment, q)), body[0] - table[1]
+        if drifts[segment] > params.drift:
+            message = (
+                f"{segment}: its tilt drifted by {degrees(drifts[segment]):.1f}° on the way from the table; "
+                "its heading may be off as much. Put it on again, faster."
+            )
+            notices.append(Notice("table_top_drift", message, sensor=segment))
+    return TableTopMounts(mounts, biases, drifts, moved, tuple(notices))
+
+
+def find_worn_standing(recording: UniformRecording, params: TableTopParams | None = None) -> Window:
+    """The first standing in which every sensor has left the table, of a take that goes on after it.
+
+    While one sensor is put on the others lie still, so rest alone does not tell.
+
+    Raises
+    ------
+    CalibrationError `table_not_still`, `body_not_still`.
+    """
+    params = params or TableTopParams()
+    rests = find_rest_windows(recording, params.rest)
+    if not rests or rests[0][0] > params.edge_s:
+        raise CalibrationError(
+            "table_not_still",
+            "The sensors do not lie still together when the take begins; start it before touching them.",
+            t_s=0.0,
+        )
+    for rest in rests[1:]:
+        if rest[1] - rest[0] >= params.stand_s and all(
+            _turned(x, recording.rate_hz, rests[0], rest) > params.worn for x in recording.sensors.values()
+        ):
+            return rest
+    raise CalibrationError(
+        "body_not_still",
+        f"No standing of {params.stand_s:g} s was found with all sensors on the body; stand still before "
+        "squatting.",
+        t_s=rests[0][1],
+    )
+
+
+def crop(recording: UniformRecording, end_s: float) -> UniformRecording:
+    """The take up to a time."""
+    part = slice(0, index_window((0.0, end_s), recording.rate_hz).stop)
+    sensors = {
+        s: SensorSignals(
+            x.device_id,
+            x.acc[part].copy(),
+            x.gyr[part].copy(),
+            None if x.mag is None else x.mag[part].copy(),
+            x.valid[part].copy(),
+            x.interpolated[part].copy(),
+        )
+        for s, x in recording.sensors.items()
+    }
+    return replace(recording, t_s=recording.t_s[part].copy(), sensors=sensors)
+
+
+def _turned(signals: SensorSignals, rate_hz: float, a: Window, b: Window) -> float:
+    """Angle between the verticals of a sensor in two rests, rad."""
+    u, v = (signals.acc[index_window(w, rate_hz)].mean(axis=0) for w in (a, b))
+    return acos(float(np.clip(u @ v / (np.linalg.norm(u) * np.linalg.norm(v)), -1.0, 1.0)))
+
+
+def _find_ends(
+    recording: UniformRecording, segment: Segment, params: TableTopParams
+) -> tuple[Window, Window]:
+    """The rests of a sensor on the table and on the body."""
+    end_s = len(recording.t_s) / recording.rate_hz
+    rests = find_rest_windows(recording, params.rest, (segment,))
+    if not rests or rests[0][0] > params.edge_s:
+        raise CalibrationError(
+            "table_not_still",
+            f"{segment} does not lie still when the take begins; leave it on the table for "
+            f"{params.rest.shortest_s:g} s or more after the start.",
+            sensor=segment,
+            t_s=0.0,
+        )
+    if len(rests) < 2 or rests[-1][1] < end_s - params.edge_s:
+        raise CalibrationError(
+            "body_not_still",
+            f"{segment} is not still on the body when the take ends; stand still for "
+            f"{params.rest.shortest_s:g} s or more before stopping.",
+            sensor=segment,
+            t_s=end_s,
+        )
+    table, body = rests[0], rests[-1]
+    if body[0] - table[1] > params.longest_s:
+        raise CalibrationError(
+            "table_top_too_long",
+            f"{segment} was on its way for {body[0] - table[1]:.0f} s; the gyroscope can be trusted for "
+            f"{params.longest_s:g} s.",
+            sensor=segment,
+            t_s=table[1],
+        )
+    table, rate = _find_stillest(recording, segment, table, params)
+    if rate > params.still:
+        raise CalibrationError(
+            "table_not_still",
+            f"{segment} is not still on the table: its rate varies by {degrees(rate):.1f} °/s, limit "
+            f"{degrees(params.still):.0f} °/s. Leave it alone for {params.still_s:g} s after the start.",
+            sensor=segment,
+            t_s=table[0],
+        )
+    silent = find_runs(~recording.sensors[segment].valid)
+    if silent:
+        raise CalibrationError(
+            "table_top_gap",
+            f"{segment} sent nothing for a while on its way; how it turned meanwhile is not known.",
+            sensor=segment,
+            t_s=silent[0][0] / recording.rate_hz,
+        )
+    return table, body
+
+
+def _find_stillest(
+    recording: UniformRecording, segment: Segment, rest: Window, params: TableTopParams
+) -> tuple[Window, float]:
+    """The part of a rest in which the rate varies least, and its standard deviation, rad/s.
+
+    A rest may end with the onset of a slow movement, which is no bias.
+    """
+    part, width = index_window(rest, recording.rate_hz), round(params.still_s * recording.rate_hz)
+    gyr = recording.sensors[segment].gyr
+    starts = range(part.start, max(part.start, part.stop - width) + 1, max(1, width // 10))
+    spread = [float(np.sqrt(gyr[a : a + width].var(axis=0).sum())) for a in starts]
+    best = int(np.argmin(spread))
+    first = starts[best]
+    return (first / recording.rate_hz, (first + width) / recording.rate_hz), spread[best]
+
+
+def _lie_on_table(segment: Segment, force: Floats, params: TableTopParams) -> Floats:
+    """Orientation (4,) of a device on the table, in arrow axes; gravity says how level it lies."""
+    q = np.array(params.table) / np.linalg.norm(params.table)
+    level = _turn_upright(rotate(q, force))
+    slope = float(2.0 * acos(min(1.0, abs(float(level[0])))))
+    if slope > params.slope:
+        raise CalibrationError(
+            "table_orientation",
+            f"{segment} lies {degrees(slope):.0f}° off the agreed way on the table, limit "
+            f"{degrees(params.slope):.0f}°; lay all sensors the same way up.",
+            sensor=segment,
+            t_s=0.0,
+        )
+    return multiply(level, q)
+
+
+def _carry(
+    signals: SensorSignals,
+    bias: Floats,
+    start: Floats,
+    part: slice,
+    body: Window,
+    rate_hz: float,
+    params: TableTopParams,
+) -> tuple[Floats, float]:
+    """Orientation (4,) on the body in arrow axes, and the tilt that gravity took off, rad."""
+    gyr = np.ascontiguousarray(signals.gyr[part.stop - 1 :] - bias)
+    q = np.empty((len(gyr), 4))
+    integrate_turns(gyr, 1.0 / rate_hz, start, q)
+    rest = index_window((max(body[0], body[1] - params.mean_s), body[1]), rate_hz)
+    found = mean(q[rest.start - part.stop + 1 : rest.stop - part.stop + 1])
+    level = _turn_upright(rotate(found, signals.acc[rest].mean(axis=0)))
+    return multiply(level, found), float(2.0 * acos(min(1.0, abs(float(level[0])))))
+
+
+def _turn_upright(force: Floats) -> Floats:
+    """The shortest turn (4,) that takes a vector (3,) to the vertical."""
+    up = force / np.linalg.norm(force)
+    axis = np.array([up[1], -up[0], 0.0])
+    sine = float(np.linalg.norm(axis))
+    angle = float(np.arctan2(sine, up[2]))
+    if sine < 1e-12:
+        axis, sine = np.array([1.0, 0.0, 0.0]), 1.0
+    return exp(angle * axis / sine)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def integrate_turns(gyr, dt, start, out):  # type: ignore[no-untyped-def]
+    """Write orientations (n, 4) of a sensor with rates (n, 3), start (4,) at the first sample.
+
+    R ← R Exp(ω Δt) of Kianifar equations 4 and 5 (their increment is the matrix of a body-fixed turn, so it
+    stands on the right); the rate of a step is the mean of both its ends.
+    """
+    h = 0.5 * dt
+    out[0] = start
+    for k in range(1, gyr.shape[0]):
+        out[k] = out[k - 1]
+        turn(
+            out[k], h * (gyr[k - 1, 0] + gyr[k, 0]), h * (gyr[k - 1, 1] + gyr[k, 1]),
+            h * (gyr[k - 1, 2] + gyr[k, 2]),
+        )  # fmt: skip

@@ -1,0 +1,72 @@
+"""Sensors of a simulated squat where Kianifar et al. put theirs, and the chain that knows it exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import radians
+from typing import Final
+
+import numpy as np
+
+from core.body.chain.geometry import LegGeometry
+from core.calibration.fixed_offset import make_fixed_mounts
+from core.frames import SHANK, THIGH, Floats, Segment, Side
+from core.rotation import exp, from_matrix, to_matrix
+from core.simulate.sensors import Mount
+from core.simulate.walker import Walker
+
+TURNED: Final = radians(10.0)
+"""Largest turn of a sensor about each axis where a hand put it on."""
+
+
+def measure_leg(height_m: float, side: Side) -> LegGeometry:
+    """The leg of the simulated person of a height, measured; what the person has not is nominal.
+
+    Raises
+    ------
+    ParameterError : "height_implausible".
+    """
+    person, nominal = Walker.of_height(height_m).anatomy, LegGeometry.from_height(height_m, side)
+    return LegGeometry(
+        side=side,
+        tibia=person.shank,
+        thigh=person.thigh,
+        pelvis_width=nominal.pelvis_width,
+        leg_length=nominal.leg_length,
+    )
+
+
+def draw_leg(height_m: float, side: Side, seed: int = 0) -> tuple[LegGeometry, dict[Segment, Floats]]:
+    """The leg, with sensors put on by a hand: up to 1 cm aside and 10° off the agreed way, and both known.
+
+    Returns
+    -------
+    Its geometry, and segment → (3, 3) R_segment_sensor.
+    """
+    rng = np.random.default_rng(seed)
+    aside = rng.uniform(-0.01, 0.01, 2)
+    leg = replace(measure_leg(height_m, side), tibia_aside=float(aside[0]), thigh_aside=float(aside[1]))
+    turns = rng.uniform(-TURNED, TURNED, (3, 3))
+    worn = make_fixed_mounts(side)
+    return leg, {s: to_matrix(exp(turn)) @ worn[s] for s, turn in zip(worn, turns, strict=True)}
+
+
+def place_sensors(
+    leg: LegGeometry, height_m: float, turned: Mapping[Segment, Floats] | None = None
+) -> dict[Segment, Mount]:
+    """Sensors on shin, thigh and back of the person of a height.
+
+    Parameters
+    ----------
+    leg : says where. turned : segment → (3, 3) R_segment_sensor, else as `make_fixed_mounts` says.
+    """
+    hips = Walker.of_height(height_m).anatomy.hip_width
+    hip = np.array([0.0, 0.0, 0.5 * leg.outward * hips])
+    places: dict[Segment, Floats] = {
+        SHANK[leg.side]: leg.tibia_sensor_from_ankle() - leg.knee_from_ankle(),
+        THIGH[leg.side]: leg.thigh_sensor_from_knee() - leg.hip_from_knee(),
+        "pelvis": leg.back_sensor_from_hip() + hip,
+    }
+    mounts = {**make_fixed_mounts(leg.side), **(turned or {})}
+    return {s: Mount(place, from_matrix(mounts[s])) for s, place in places.items()}
