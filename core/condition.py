@@ -58,6 +58,11 @@ PROTOCOL_WORDS: Final[Mapping[Protocol, str]] = {
     "treadmill": "treadmill",
     "squat": "squats",
     "tug": "timed up and go",
+    "five_sit_to_stand": "five times sit to stand",
+    "walk_10m": "ten metres",
+    "walk_6min": "six minutes",
+    "standing_eyes_open": "standing, eyes open",
+    "standing_eyes_closed": "standing, eyes closed",
     "activity": "daily activity",
 }
 

@@ -39,10 +39,15 @@ LIVE_SINGLE_PATHS: Final = "erkf_feet_live"
 
 @dataclass(frozen=True)
 class PaperReference:
-    """Where a method comes from; doi without "https://doi.org/"."""
+    """Where a method comes from; doi without "https://doi.org/", empty where none was found."""
 
     citation: str
     doi: str
+
+    @property
+    def line(self) -> str:
+        """Citation with its DOI, or that none was found."""
+        return f"{self.citation}. doi:{self.doi}" if self.doi else f"{self.citation}. No DOI found."
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,8 @@ class PoseEstimator:
     method : `Poses.method` of its figure. label : of that method. choice : what a form offers.
     needs : in words, after "sensors on". sets : segments whose sensors it needs, any one of these sets.
     sensors : all that it reads when it is asked for by name; None = every sensor there is.
-    leg_model : thighs and shanks carry no sensor, a model of the leg gives them.
+    leg_model : thighs and shanks carry no sensor, a model of the leg gives them. fixed : variables that this
+        model holds where they are, so that they are no result of a take.
     in_room : its positions hold in the room; else the figure is for the eye alone.
     note : what a reader of a report has to know.
     paper : None = our own. science : the page with its equations.
@@ -73,6 +79,7 @@ class PoseEstimator:
     note: str
     paper: PaperReference | None
     science: str
+    fixed: tuple[str, ...] = ()
 
     def runs_on(self, segments: Iterable[Segment]) -> bool:
         """Whether sensors on these segments are enough."""
@@ -84,6 +91,12 @@ ONE_LEG: Final[tuple[frozenset[Segment], ...]] = tuple(
     frozenset[Segment](("pelvis", THIGH[s], SHANK[s], FOOT[s])) for s in SIDES
 )
 """The pelvis and a whole leg, of either side."""
+
+HINGES: Final = ("knee_adduction", "knee_rotation", "ankle_inversion", "ankle_rotation")
+"""Variables of a leg whose knee and ankle are hinges: they turn about one axis."""
+
+LEVEL_PELVIS: Final = ("pelvis_tilt", "pelvis_obliquity")
+"""Variables of a pelvis that is taken to be level."""
 
 SY_2021: Final = PaperReference(
     "Sy LW, Lovell NH, Redmond SJ 2021. Estimating lower body kinematics using a Lie group constrained "
@@ -127,11 +140,12 @@ L7S_3I: Final = PoseEstimator(
     in_room=True,
     note=(
         "Thighs and shanks carry no sensor: they follow from the pelvis, the feet and the leg's length, with "
-        "knees and ankles as hinges (Sy). On a healthy walk estimated flexion was 7 to 11° from optical "
-        "motion capture, so curves show the pattern, not small changes."
+        "knees and ankles as hinges (Sy). On a healthy walk estimated flexion was 4 to 7° from optical "
+        "motion capture, live 7 to 11°, so curves show the pattern, not small changes."
     ),
     paper=SY_2021,
     science="docs/science/l7s.md",
+    fixed=HINGES,
 )
 
 L7S_2I: Final = PoseEstimator(
@@ -146,11 +160,12 @@ L7S_2I: Final = PoseEstimator(
     in_room=True,
     note=(
         "Only the feet carry sensors: pelvis, thighs and shanks are estimated from them and the leg's length "
-        "(Sy). On a healthy walk estimated flexion was 8 to 11° from optical motion capture; the pelvis is "
-        "taken to keep its height and to face between the feet."
+        "(Sy). On a healthy walk estimated flexion was 5 to 9° from optical motion capture, live 8 to 11°; "
+        "the pelvis is taken to be level and to face between the feet."
     ),
     paper=SY_2021,
     science="docs/science/l7s.md",
+    fixed=(*HINGES, *LEVEL_PELVIS),
 )
 
 ORIENTATIONS_ONLY: Final = PoseEstimator(

@@ -21,7 +21,10 @@ Bools = NDArray[np.bool_]
 
 Segment = Literal["pelvis", "thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r", "chest"]
 Side = Literal["left", "right"]
-Protocol = Literal["walk", "treadmill", "squat", "tug", "activity"]
+Protocol = Literal[
+    "walk", "treadmill", "squat", "tug", "five_sit_to_stand", "walk_10m", "walk_6min",
+    "standing_eyes_open", "standing_eyes_closed", "activity",
+]  # fmt: skip
 Posture = Literal["standing", "walking"]
 """What is neutral, and the zero of joint angles: standing, or flat feet and the mean of straight walking."""
 

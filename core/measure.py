@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from core.angles import JointAngles
 from core.body.feet import FootTracks
 from core.errors import Notice
+from core.events.alternation import AlternationParams, measure_foot_lag
 from core.events.bouts import Bout, BoutParams, find_bouts
 from core.events.edits import Edit, apply_event_edits, apply_stride_edits
 from core.events.flags import StrideParams, add_flag
@@ -124,9 +125,16 @@ def measure_gait(tracks: Tracks, edits: Sequence[Edit] = ()) -> MeasuredGait:
         bouts = steps.bouts
     first = figures.parameters if steps is None else _of_steps(tracks, steps, figures.parameters)
     estimated = () if tracks.angles is None else tracks.angles.estimated
-    first = state_uncertainty(first, events, estimated)
+    first = state_uncertainty(first, events, estimated, feet_lag_s=_find_feet_lag(tracks, events))
     parameters = first + bout_parameters(bouts) + turn_parameters(tracks.turns)
     return MeasuredGait(events, strides, parameters, figures.columns, bouts, tracks.turns, steps)
+
+
+def _find_feet_lag(tracks: Tracks, events: GaitEvents) -> float:
+    """What one foot's clock may be late by, s; 0 where a chain of sensors links the feet, or none tells."""
+    if tracks.feet is not None and tracks.feet.linked:
+        return 0.0
+    return abs(measure_foot_lag(events, AlternationParams()) or 0.0)
 
 
 def _walked(tracks: Tracks, events: GaitEvents) -> Strides:

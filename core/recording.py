@@ -6,7 +6,7 @@ one time axis with a validity mask per sensor (made by core/timeline). All later
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import Final
@@ -15,6 +15,7 @@ import numpy as np
 
 from core.errors import Notice, ParameterError, SignalError
 from core.frames import PROTOCOLS, SEGMENTS, Bools, Floats, Protocol, Segment
+from core.sample_blocks import LongStream, SampleBlock
 from core.shoe import Shoe
 from core.standing_angles import check_standing
 
@@ -157,6 +158,52 @@ class ImuStream:
             )
 
 
+@dataclass(frozen=True)
+class GivenLimits:
+    """When a person says that a functional test began and ended, s; None = as it is found.
+
+    Raises
+    ------
+    ParameterError `test_limits` where a time is below 0 or the end is not after the start.
+    """
+
+    start_s: float | None = None
+    end_s: float | None = None
+
+    def __post_init__(self) -> None:
+        times = [t for t in (self.start_s, self.end_s) if t is not None]
+        if any(not 0.0 <= t < float("inf") for t in times) or times != sorted(set(times)):
+            raise ParameterError(
+                "test_limits",
+                f"A test from {self.start_s} s to {self.end_s} s; expected times of 0 or more, the end after "
+                "the start.",
+            )
+
+
+BLOCK_ROWS: Final = 1 << 16
+"""Rows of a block where nothing else says how long it is."""
+
+
+def as_long_stream(stream: ImuStream, rows: int = BLOCK_ROWS) -> LongStream:
+    """A stream that is in memory, read in blocks of so many rows."""
+
+    def open_blocks() -> Iterator[SampleBlock]:
+        for i in range(0, len(stream.t_s), rows):
+            part = slice(i, i + rows)
+            gyr = None if stream.gyr is None else stream.gyr[part]
+            yield SampleBlock(stream.t_s[part] - stream.t_s[0], stream.acc[part], gyr)
+
+    return LongStream(
+        device_id=stream.device_id,
+        source=stream.source,
+        rate_hz=stream.rate_hz,
+        has_gyro=stream.gyr is not None,
+        duration_s=float(stream.t_s[-1] - stream.t_s[0]),
+        open_blocks=open_blocks,
+        notices=stream.notices,
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """One take: streams by device id and which segment each is worn on.
@@ -168,6 +215,8 @@ class Recording:
     mounting : segment → declared mounting, free text ("sacrum, face backwards").
     sha256 : file name → sha256 of the source bytes.
     belt_speed_mps : of a treadmill, None = not entered.
+    test_limits : of a functional test, as a person corrected them.
+    long : device id → sensor that is read block by block; such a sensor need not be among the streams.
     """
 
     streams: Mapping[str, ImuStream]
@@ -178,6 +227,8 @@ class Recording:
     sha256: Mapping[str, str] = field(default_factory=dict)
     notices: tuple[Notice, ...] = ()
     belt_speed_mps: float | None = None
+    test_limits: GivenLimits = field(default_factory=GivenLimits)
+    long: Mapping[str, LongStream] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_belt(self.belt_speed_mps, self.protocol)
@@ -202,13 +253,13 @@ class Recording:
                     sensor=device,
                 )
             worn[segment] = device
-        for name in ("streams", "segments", "mounting", "sha256"):
+        for name in ("streams", "segments", "mounting", "sha256", "long"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     @property
     def unassigned(self) -> tuple[str, ...]:
         """Device ids that nobody has mapped or set aside."""
-        return tuple(d for d in self.streams if d not in self.segments)
+        return tuple(d for d in dict.fromkeys((*self.streams, *self.long)) if d not in self.segments)
 
 
 @dataclass(frozen=True, eq=False)

@@ -110,22 +110,23 @@ def drop_false_rests(
     recording: UniformRecording, rests: tuple[Window, ...], params: RestParams | None = None
 ) -> tuple[Window, ...]:
     """The rests in which no sensor's vertical turns: the others are slow movements."""
-    params = params or RestParams()
-    return tuple(r for r in rests if not _drifts(recording, r, params))
+    params, rate = params or RestParams(), recording.rate_hz
+    sensors = recording.sensors.values()
+    return tuple(r for r in rests if not any(is_drifting(x, r, rate, params) for x in sensors))
 
 
-def _drifts(recording: UniformRecording, window: Window, params: RestParams) -> bool:
+def is_drifting(signals: SensorSignals, window: Window, rate_hz: float, params: RestParams) -> bool:
     """Does the vertical turn in a sensor between the ends of a window, a quarter of a second to one each?"""
-    part, rate = index_window(window, recording.rate_hz), recording.rate_hz
-    edge = max(1, min((part.stop - part.start) // 4, round(rate)))
-    seconds = (part.stop - part.start - edge) / rate
-    for x in recording.sensors.values():
-        ends = (x.acc[part.start : part.start + edge], x.acc[part.stop - edge : part.stop])
-        a, b = (f.mean(axis=0) for f in ends)
-        turned = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
-        if turned > params.drift and turned > params.drift_rate * seconds:
-            return True
-    return False
+    turned = measure_turn(signals.acc[index_window(window, rate_hz)], rate_hz)
+    return turned[0] > params.drift and turned[0] > params.drift_rate * turned[1]
+
+
+def measure_turn(acc: Floats, rate_hz: float) -> tuple[float, float]:
+    """Angle in rad by which the mean force (n, 3) differs at the ends of a rest, and the seconds between."""
+    edge = max(1, min(len(acc) // 4, round(rate_hz)))
+    a, b = acc[:edge].mean(axis=0), acc[-edge:].mean(axis=0)
+    turned = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+    return turned, (len(acc) - edge) / rate_hz
 
 
 def find_windows(quiet: Bools, rate_hz: float, params: RestParams | None = None) -> tuple[Window, ...]:

@@ -2,7 +2,9 @@
 
 An estimator measures how well its result hangs together (core/body/health.py). Where that is bad, the angles
 of the joint concerned still look like angles; they are taken out with the reason `estimator_bad`. So are
-the distances of a foot whose path does not fit its own rests, or whose chain does not hang together.
+the distances of feet whose chain does not hang together; those of a foot whose path does not fit its own
+rests have the reason `path_bad`. What a model of the leg holds fixed is no result either and goes with
+`fixed_by_model`.
 """
 
 from __future__ import annotations
@@ -18,13 +20,19 @@ from core.body.estimate import PoseEstimate
 from core.body.health import HealthFinding
 from core.body.poses import Poses
 from core.errors import Notice
-from core.estimators import BY_METHOD
+from core.estimators import BY_METHOD, PoseEstimator
 from core.frames import FOOT, SIDES, SUFFIX, Oriented, Segment, Side
 from core.rest import Window, find_runs
 from core.rotation import wrap_angle
 
 BAD: Final = "estimator_bad"
 """Reason of an angle whose estimator contradicts itself at that joint."""
+
+PATH: Final = "path_bad"
+"""Reason of distances of a foot whose path does not fit its own rests: one sensor is enough for that."""
+
+FIXED: Final = "fixed_by_model"
+"""Reason of an angle that the model of the leg holds where it is: its zero is no measurement."""
 
 OF_JOINT: Final = ("joint_residual_mm",)
 """Findings of a joint, "proximal-distal"."""
@@ -45,11 +53,12 @@ OF_PATH: Final = ("zero_velocity_refused_pct",)
 """Findings of the path of a foot."""
 
 AFTER_GAP_S: Final = 10.0
-"""For so long after a loss what the model of the leg says of it is doubtful (core/body/l7s/health.py)."""
+"""For so long after a loss what the model of the leg says of it is doubtful (core/body/l7s/health.py): a foot
+whose sensor was gone for 1 s can come back with another heading."""
 
 
 def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> JointAngles:
-    """Take out angles of joints whose estimator is bad, and note what an estimated knee can rest on.
+    """Take out angles of joints whose estimator is bad and those that its leg model holds fixed.
 
     Parameters
     ----------
@@ -57,13 +66,15 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
 
     Returns
     -------
-    JointAngles without them; `withheld` has their reasons, `bounds` the straight knee of a leg model, a
-    notice `angles_withheld` says which joints.
+    JointAngles without them; `withheld` has their reasons, `bounds` the straight knee of a leg model on which
+    an estimated knee can rest; a notice `angles_withheld` says which joints contradict each other.
     """
     estimated = frozenset(map(str, angles.diagnostics.get("estimated", ())))  # type: ignore[call-overload]
+    estimator = BY_METHOD.get(poses.method)
+    fixed = {name for name in angles.angles if name in estimated and _is_fixed(name, estimator)}
     bad = [f for f in poses.health if f.verdict == "bad"]
-    out = {name for f in bad for name in _concerned(f, estimated) if name in angles.angles}
-    kept = {name: x for name, x in angles.angles.items() if name not in out}
+    out = {name for f in bad for name in _concerned(f, estimated) if name in angles.angles} - fixed
+    kept = {name: x for name, x in angles.angles.items() if name not in out | fixed}
     for f in bad:
         side = _foot_side(f.of)
         if f.name == "gap_s" and f.bad is not None and side is not None and FOOT[side] in orientations.valid:
@@ -71,7 +82,6 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
             for name in kept:
                 if name in estimated and name.endswith(f"_{SUFFIX[side]}"):
                     kept[name] = np.where(long, np.nan, kept[name])
-    estimator = BY_METHOD.get(poses.method)
     modelled = estimator is not None and estimator.leg_model
     bounds = {
         name: wrap_angle(float(-angles.zero_offset[name]))
@@ -87,7 +97,11 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
         )
         notices = (*notices, Notice("angles_withheld", message))
     return replace(
-        angles, angles=kept, withheld=dict.fromkeys(sorted(out), BAD), bounds=bounds, notices=notices
+        angles,
+        angles=kept,
+        withheld={name: BAD if name in out else FIXED for name in sorted(out | fixed)},
+        bounds=bounds,
+        notices=notices,
     )
 
 
@@ -128,15 +142,17 @@ def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
     if not out:
         return posed
     whose = "both feet" if len(out) > 1 else f"the {out[0]} foot"
-    message = (
-        f"Distances of {whose} are withheld: the path does not fit the sensors. Check sides, segments, "
-        "mounting and lost samples, then record again."
+    why, todo = (
+        ("the path does not fit the sensors", "Check sides, segments, mounting and lost samples")
+        if chain
+        else ("the path does not fit its rests on the floor", "Fasten the sensor and check for lost samples")
     )
+    message = f"Distances of {whose} are withheld: {why}. {todo}, then record again."
     notices = (*posed.poses.notices, Notice("distances_withheld", message))
     return replace(
         posed,
         poses=replace(posed.poses, notices=notices),
-        feet=replace(feet, withheld=dict.fromkeys(out, BAD)),
+        feet=replace(feet, withheld=dict.fromkeys(out, BAD if chain else PATH)),
     )
 
 
@@ -156,6 +172,12 @@ def _concerned(f: HealthFinding, estimated: frozenset[str]) -> Iterator[str]:
         yield from (name for name in estimated if name.endswith(f"_{of[-1:]}"))
     elif f.name in OF_TAKE:
         yield from estimated
+
+
+def _is_fixed(name: str, estimator: PoseEstimator | None) -> bool:
+    """An angle that no two sensors measure and the estimator's model of the leg holds fixed."""
+    variable = name.removesuffix("_l").removesuffix("_r")
+    return estimator is not None and variable in estimator.fixed
 
 
 def _foot_side(of: str | None) -> Side | None:

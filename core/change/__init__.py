@@ -9,6 +9,7 @@ from core.change.limits import (
     find_relevant_change,
 )
 from core.change.verdict import (
+    NOT_MEASURED_ALIKE,
     UNLIKE,
     Change,
     parameter_changes,
@@ -19,6 +20,7 @@ from core.change.verdict import (
 )
 
 __all__ = [
+    "NOT_MEASURED_ALIKE",
     "UNLIKE",
     "Change",
     "ChangeLimit",

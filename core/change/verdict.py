@@ -37,6 +37,9 @@ STRIDES: Final = "strides and measurement of the two sessions, 95 %"
 UNLIKE: Final = "conditions_differ"
 """Reason of a change between takes that were not walked alike (core/condition.py)."""
 
+NOT_MEASURED_ALIKE: Final = "not_measured_alike"
+"""Reason of no change between an angle that a model of the leg estimated and one that sensors measured."""
+
 
 @dataclass(frozen=True)
 class Change:
@@ -48,8 +51,9 @@ class Change:
     limit, limit_source, people : the change must pass this to be real; None without a source.
     mcid, mcid_source : and this to matter; None without a source.
     verdict : None with a `reason`: "no_value" (one of the sessions has none, or of other sides),
-        "too_few_strides" in one of them, "no_mdc" (no source has a limit for it), "conditions_differ" (not
-        walked alike, core/condition.py).
+        "not_measured_alike" (one is estimated, the other measured: no difference either), "too_few_strides"
+        in one of them, "no_mdc" (no source has a limit for it), "conditions_differ" (not walked alike,
+        core/condition.py).
     towards_norm : nearer to the middle of the norm than before; None without a comparable norm.
     note : "from_standing": a change of how the person stands is part of it.
     """
@@ -151,6 +155,8 @@ def _parameter(
     change = _plain(new.name, new.side, new.unit, None if old is None else old.mean, new.mean)
     if old is None or old.mean is None or new.mean is None:
         return change
+    if old.estimated != new.estimated:
+        return replace(change, difference=None, reason=NOT_MEASURED_ALIKE)
     if not (has_enough_values(old) and has_enough_values(new)):
         return replace(change, reason=TOO_FEW)
     limb: Limb | None = None

@@ -76,26 +76,26 @@ def detect_contacts(
         motion = (motions or {}).get(FOOT[side])
         q, valid = orientations.q[FOOT[side]], orientations.valid[FOOT[side]]
         told = advance_foot_contacts(state, q, valid, *(() if motion is None else (motion.speed, motion.acc)))
-        waiting: dict[int, GaitEvent] = {}
-        reports = read_reports(told, side, float(orientations.t_s[0]), orientations.rate_hz, waiting)
-        final = [event for _, last, event in reports if last]
-        return [*final, *waiting.values()]
+        latest: dict[int, GaitEvent] = {}
+        for _ in read_reports(told, side, float(orientations.t_s[0]), orientations.rate_hz, latest):
+            pass
+        return list(latest.values())
 
     return _each_foot(orientations, rule, find)
 
 
 def read_reports(
-    told: ContactReports, side: Side, start_s: float, rate_hz: float, waiting: dict[int, GaitEvent]
+    told: ContactReports, side: Side, start_s: float, rate_hz: float, latest: dict[int, GaitEvent]
 ) -> Iterator[tuple[int, bool, GaitEvent]]:
-    """Sample at which it is told, whether nothing more follows about it, and the event.
+    """Sample at which it is told, whether nothing more is to come about it, and the event.
 
     Parameters
     ----------
-    start_s : time of sample 0. waiting : events of earlier blocks whose refined time is to come; kept up to
-        date.
+    start_s : time of sample 0. latest : number → event as it was told last, of earlier blocks too; kept up
+        to date. What is told again is one of the last few.
     """
     for kind, number, known, last, at, uncertainty in zip(*told, strict=True):
-        first = waiting.pop(int(number), None)
+        first = latest.get(int(number))
         event = GaitEvent(
             time_s=start_s + float(at) / rate_hz,
             side=side,
@@ -105,8 +105,7 @@ def read_reports(
             uncertainty_s=float(uncertainty),
             first_s=None if first is None else first.time_s,
         )
-        if not last:
-            waiting[int(number)] = event
+        latest[int(number)] = event
         yield int(known), bool(last), event
 
 

@@ -47,6 +47,8 @@ class FootContactParams:
     swing_rad_s, swing_s, longest_s, step_m : a movement between two rests that is so fast, so long and leads
         so far is a swing. Measured on ipol_walks: swings without pitch exceed 1.5 rad/s and 0.3 s and most
         lead 11 cm and more, shifts of a standing foot lead less far.
+    least_s : a shorter swing is none: the lowest pitch was that of the landing, and the foot-off is told
+        again where the movement begins. Our choice: landings of all sets have up to 0.08 s, swings from 0.16.
     pause_s : a swing without pitch is told where the foot's last pitched swing is no longer ago, else once
         the next follows within this: mobgap's longest pause inside a walk. A gait without any pitched swing
         is not told by halves.
@@ -74,6 +76,7 @@ class FootContactParams:
     still_s: float = 0.1
     swing_rad_s: float = 1.5
     swing_s: float = 0.25
+    least_s: float = 0.12
     longest_s: float = 2.0
     step_m: float = 0.1
     hump_rad: float = 0.07
@@ -94,7 +97,8 @@ class ContactReports(NamedTuple):
     """What a block made known, in order: (m,) each.
 
     kind : 0 = TC, 1 = IC. number : of the event, from 0. known : sample at which it is told. last : nothing
-    more follows about this event. at : sample of the event, with a fraction. uncertainty_s : standard.
+    more is to come about this event; a foot-off whose swing proves too short is told again all the same.
+    at : sample of the event, with a fraction. uncertainty_s : standard.
     """
 
     kind: NDArray[np.int64]
@@ -107,7 +111,7 @@ class ContactReports(NamedTuple):
 
 WINDOWS: Final = {
     "leaving": "leaving_s", "after": "contact_s", "quiet": "still_s", "apart": "knock_s", "swing": "swing_s",
-    "longest": "longest_s", "onset": "onset_s", "pause": "pause_s",
+    "longest": "longest_s", "onset": "onset_s", "pause": "pause_s", "least": "least_s",
 }  # fmt: skip
 """Name in the kernel → parameter that it takes in samples, at least one."""
 

@@ -29,7 +29,8 @@ BOTTOM: Final = 10
 TOP: Final = 11
 PITCHED: Final = 12
 HELD: Final = 13
-COUNTERS: Final = 14
+LEFT: Final = 14
+COUNTERS: Final = 15
 
 # places in `sums`
 FASTEST: Final = 0
@@ -38,7 +39,8 @@ WAY: Final = 3
 OFFSET: Final = 5
 HELD_TC: Final = 6
 HELD_IC: Final = 8
-SUMS: Final = 10
+LEFT_AT: Final = 10
+SUMS: Final = 11
 
 
 class ContactRule(NamedTuple):
@@ -70,15 +72,16 @@ class ContactRule(NamedTuple):
     longest: int
     onset: int
     pause: int
+    least: int
 
 
 @njit(cache=True, nogil=True)
 def _read_rule(x):  # type: ignore[no-untyped-def]
-    """The rule in an array (26,): a tuple would take longer to hand over than the block to go through."""
+    """The rule in an array (27,): a tuple would take longer to hand over than the block to go through."""
     return ContactRule(
         x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12], x[13], x[14], x[15],
         x[16], x[17], int(x[18]), int(x[19]), int(x[20]), int(x[21]), int(x[22]), int(x[23]), int(x[24]),
-        int(x[25]),
+        int(x[25]), int(x[26]),
     )  # fmt: skip
 
 
@@ -213,6 +216,21 @@ def _leaving(pitch, bottom, first, rate_hz, rule):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True)
+def _leaving_loosely(pitch, start, middle, reach, rule):  # type: ignore[no-untyped-def]
+    """Sample of the lowest pitch, foot-off and its uncertainty (s) of a movement from `start` on."""
+    size = pitch.shape[0]
+    bottom = _lowest(pitch, start, middle)
+    at, sd = np.nan, 0.0
+    if bottom < middle - 1 and pitch[start % size] - pitch[bottom % size] >= rule.dip_rad:
+        at, sd = _leaving(pitch, bottom, reach, rule.rate_hz, rule)
+    if at != at:
+        # the foot left the floor without a push
+        bottom = min(start + rule.onset, middle)
+        at, sd = float(bottom), 2.0 * rule.loose_sd_s
+    return bottom, at, max(sd, rule.loose_sd_s)
+
+
+@njit(cache=True, nogil=True)
 def _tell(found_int, found_float, total, kind, number, known, last, at, sd):  # type: ignore[no-untyped-def]
     """Write one report; returns how many there are."""
     found_int[total, 0], found_int[total, 1] = kind, number
@@ -230,6 +248,20 @@ def _tell_held(found_int, found_float, total, counters, sums, k):  # type: ignor
         counters[NUMBER] = number + 1
     counters[HELD] = NONE
     return total
+
+
+@njit(cache=True, nogil=True)
+def _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule):  # type: ignore[no-untyped-def]
+    """Tell the last foot-off again where a contact at `at` is too near; returns how many reports there are.
+
+    No swing is so short: the lowest pitch was that of the landing, the foot left as its movement began.
+    """
+    start, left = counters[START], sums[LEFT_AT]
+    if at - left >= rule.least or start < reach or start >= left:
+        return total
+    middle = start + (int(left) - start) // 2
+    _, off, sd = _leaving_loosely(pitch, start, middle, reach, rule)
+    return _tell(found_int, found_float, total, TC, counters[LEFT], k, 1, off, sd)
 
 
 @njit(cache=True, nogil=True)
@@ -310,6 +342,10 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             at, sd = _landing(pitch, accs, top, first, measured, moves, rate_hz, rule)
             if at != at:
                 at = top + sums[OFFSET] + rule.lead_s * rate_hz
+            if moves:
+                total = _mend_leaving(
+                    found_int, found_float, total, pitch, counters, sums, k, reach, at, rule
+                )
             number = counters[OPEN_NUMBER]
             total = _tell(found_int, found_float, total, IC, number, k, 1, at, sd)
             counters[OPEN_TOP] = -1
@@ -323,6 +359,9 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             counters[MEASURED], counters[RESTING], counters[MOVING], counters[BOTTOM] = 0, 0, 0, NONE
             counters[HELD] = NONE
             continue
+        if moves and n > 0 and kind[0] == TC and counters[MOVING] == 0:
+            # the foot rests with its heel raised: what leaves the floor moves
+            n, pitch_counters[2] = 0, 0
         for e in range(n):
             counters[TOLD], counters[PITCHED] = 1, k
             if counters[HELD] >= k - rule.pause:
@@ -334,7 +373,7 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
                 at, sd = _leaving(pitch, index[e], reach, rate_hz, rule)
                 if at != at:
                     at = index[e] + offset[e] - rule.lag_s * rate_hz
-                counters[BOTTOM] = index[e]
+                counters[BOTTOM], counters[LEFT], sums[LEFT_AT] = index[e], number, at
                 total = _tell(found_int, found_float, total, TC, number, k, 1, at, sd)
             else:
                 at = index[e] + offset[e] + rule.lead_s * rate_hz
@@ -373,22 +412,15 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             continue
         else:
             middle = top if top >= 0 else start + (end - start) // 2
-            bottom = _lowest(pitch, start, middle)
-            at, sd = np.nan, 0.0
-            if bottom < middle - 1 and pitch[start % size] - pitch[bottom % size] >= rule.dip_rad:
-                at, sd = _leaving(pitch, bottom, reach, rate_hz, rule)
-            if at != at:
-                # the foot left the floor without a push
-                bottom = min(start + rule.onset, middle)
-                at, sd = float(bottom), 2.0 * rule.loose_sd_s
-            sums[HELD_TC], sums[HELD_TC + 1] = at, max(sd, rule.loose_sd_s)
+            first, at, sd = _leaving_loosely(pitch, start, middle, reach, rule)
+            sums[HELD_TC], sums[HELD_TC + 1] = at, sd
             counters[HELD] = k
-            first = bottom
         if top < 0:
             top = _highest(pitch, first + (end - first) // 2, end)
         at, sd = _landing(pitch, accs, top, first, k, moves, rate_hz, rule)
         sd = max(sd, rule.loose_sd_s)
         if swinging:
+            total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule)
             total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, 1, at, sd)
             counters[NUMBER] += 1
         else:

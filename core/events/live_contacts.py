@@ -1,13 +1,13 @@
 """Contacts of the feet as samples come, told in the push in which they are known.
 
 The rules of core/events/foot_contact.py; they need neither heading nor the other sensors. A contact is told
-at once, and again when its refined time is known.
+at once, and again when its refined time is known; a foot-off again where its landing shows that it was none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from core.errors import SignalError
 from core.events.detection import read_reports
@@ -17,11 +17,15 @@ from core.events.foot_pitch import FootPitchParams
 from core.events.result import GaitEvent
 from core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
 
+REMEMBERED: Final = 4
+"""Events of a foot that may be told again: a foot-off, the contact after it, and a swing that is held."""
+
 
 class KnownContact(NamedTuple):
     """A contact and the sample, counted from the start of the chain, at which it is told.
 
-    Not `final`: its refined time is still to come. Then it is told again, its `first_s` the time it had.
+    Not `final`: its refined time is still to come. Then it is told again, its `first_s` the time it had. So
+    is a foot-off, though final, that the contact after it shows to have been the landing.
     """
 
     at: int
@@ -52,7 +56,7 @@ class ContactDetector:
             )
         self.sides: tuple[Side, ...] = tuple(s for f in feet for s in SIDES if FOOT[s] == f)
         self._feet = [FootContactState.start(rate_hz, pitch, params) for _ in self.sides]
-        self._waiting: list[dict[int, GaitEvent]] = [{} for _ in self.sides]
+        self._latest: list[dict[int, GaitEvent]] = [{} for _ in self.sides]
         self._rate_hz = rate_hz
 
     def push(
@@ -69,6 +73,8 @@ class ContactDetector:
         for i, (side, foot) in enumerate(zip(self.sides, self._feet, strict=True)):
             told = advance_foot_contacts(foot, q[:, i], valid[:, i], motions[i].speed, motions[i].acc)
             start_s = first / self._rate_hz
-            for known, final, event in read_reports(told, side, start_s, self._rate_hz, self._waiting[i]):
+            for known, final, event in read_reports(told, side, start_s, self._rate_hz, self._latest[i]):
                 found.append(KnownContact(known, event, final))
+            for number in list(self._latest[i])[:-REMEMBERED]:
+                del self._latest[i][number]
         return sorted(found, key=lambda x: (x.at, x.event.side))

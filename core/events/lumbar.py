@@ -91,7 +91,8 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
 
     Parameters
     ----------
-    recording : with "pelvis" or "chest"; neither rest nor calibration is needed.
+    recording : with "pelvis" or "chest"; neither rest nor calibration is needed. A sensor without a
+        gyroscope has zeros.
 
     Returns
     -------
@@ -115,11 +116,16 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
             sensor=segment,
         )
     signals = recording.sensors[segment]
-    vertical, yaw_rate = split_about_vertical(signals, rate, params)
-    moving = _moving(vertical, signals.valid, rate, params)
+    up, norm = _mean_up(signals, rate, params)
+    vertical, yaw_rate = _split_along(signals, up, norm)
+    moving = find_moving(vertical, signals.valid, rate, params)
     if not moving.any():
         return _nothing(segment, "no_walking", "The trunk hardly moved: no steps were found.")
-    rhythm = step_times(vertical, signals.gyr, rate, params.periodicity)
+    if signals.gyr.any():
+        rhythm = step_times(vertical, signals.gyr, rate, params.periodicity)
+    else:
+        horizontal = signals.acc - (vertical + norm)[:, None] * up
+        rhythm = step_times(vertical, None, rate, params.periodicity, horizontal)
     if not rhythm.walks(params.step_s, params.periodicity):
         return _nothing(
             segment,
@@ -172,16 +178,23 @@ def split_about_vertical(
 
     Up is where the specific force points on average over several steps: an upright trunk needs no filter.
     """
-    from scipy.ndimage import gaussian_filter1d
+    return _split_along(signals, *_mean_up(signals, rate_hz, params or LumbarParams()))
 
-    params = params or LumbarParams()
-    force = gaussian_filter1d(signals.acc, params.up_s * rate_hz, axis=0, mode="nearest")
-    norm = np.maximum(np.linalg.norm(force, axis=1), 1e-9)
-    up = force / norm[:, None]
+
+def _split_along(signals: SensorSignals, up: Floats, norm: Floats) -> tuple[Floats, Floats]:
     return np.einsum("ni,ni->n", signals.acc, up) - norm, np.einsum("ni,ni->n", signals.gyr, up)
 
 
-def _moving(vertical: Floats, valid: Bools, rate_hz: float, params: LumbarParams) -> Bools:
+def _mean_up(signals: SensorSignals, rate_hz: float, params: LumbarParams) -> tuple[Floats, Floats]:
+    """Where up is (n, 3), sensor axes, and the mean specific force (n,) along it, m/s²."""
+    from scipy.ndimage import gaussian_filter1d
+
+    force = gaussian_filter1d(signals.acc, params.up_s * rate_hz, axis=0, mode="nearest")
+    norm = np.maximum(np.linalg.norm(force, axis=1), 1e-9)
+    return force / norm[:, None], norm
+
+
+def find_moving(vertical: Floats, valid: Bools, rate_hz: float, params: LumbarParams) -> Bools:
     """Samples at which the trunk moves vertically as in walking and the sensor is there."""
     from scipy.ndimage import uniform_filter1d
 

@@ -6,7 +6,12 @@ half a stride later roll and yaw are reversed. The lag T at which all of this ho
     score(T) = ¼ (r_a(T) + r_a(2T) + r_ω(2T) − r_ω(T))
 
 with r the normalised autocorrelation of vertical acceleration (a) and of angular velocity as a vector (ω),
-which no mounting of the sensor changes. Step and stride regularity of the vertical acceleration alone
+which no mounting of the sensor changes. Without a gyroscope the horizontal acceleration (h) takes its place,
+which repeats with every stride whatever its share from side to side:
+
+    score(T) = ⅓ (r_a(T) + r_a(2T) + r_h(2T))
+
+Step and stride regularity of the vertical acceleration alone
 (Moe-Nilssen & Helbostad 2004, J Biomech 37:121) tell neither half nor double the step time apart: a slow walk
 has two peaks a step. The four terms together are our choice; on the simulated people (tests) they give the
 step time where the acceleration alone fails.
@@ -77,19 +82,27 @@ class Periodicity:
 
 
 def step_times(
-    vertical: Floats, gyr: Floats, rate_hz: float, params: PeriodicityParams | None = None
+    vertical: Floats,
+    gyr: Floats | None,
+    rate_hz: float,
+    params: PeriodicityParams | None = None,
+    horizontal: Floats | None = None,
 ) -> Periodicity:
     """Step time in windows along a take.
 
     Parameters
     ----------
-    vertical : (n,) m/s². gyr : (n, 3) rad/s, any mounting.
+    vertical : (n,) m/s². gyr : (n, 3) rad/s, any mounting; None without a gyroscope, then
+    horizontal : (n, 3) the rest of the acceleration, m/s².
     """
     params = params or PeriodicityParams()
-    a, w = (_between(x, rate_hz, params) for x in (vertical[:, None], gyr))
+    second = horizontal if gyr is None else gyr
+    assert second is not None  # noqa: S101 - the caller gives one of them
+    a, w = (_between(x, rate_hz, params) for x in (vertical[:, None], second))
     width = min(len(a), round(params.window_s * rate_hz))
     starts = range(0, max(1, len(a) - width + 1), max(1, round(params.hop_s * rate_hz)))
-    found = [_step_time(a[i : i + width], w[i : i + width], rate_hz, params) for i in starts]
+    turns = gyr is not None
+    found = [_step_time(a[i : i + width], w[i : i + width], turns, rate_hz, params) for i in starts]
     return Periodicity(
         t_s=np.array([(i + 0.5 * width) / rate_hz for i in starts]),
         step_s=np.array([f[0] for f in found]),
@@ -97,8 +110,10 @@ def step_times(
     )
 
 
-def _step_time(a: Floats, w: Floats, rate_hz: float, params: PeriodicityParams) -> tuple[float, float]:
-    """Step time in s and score of one window; (NaN, 0) without any."""
+def _step_time(
+    a: Floats, w: Floats, turns: bool, rate_hz: float, params: PeriodicityParams
+) -> tuple[float, float]:
+    """Step time in s and score of one window; (NaN, 0) without any. turns : w is an angular velocity."""
     first = max(2, round(params.shortest_s * rate_hz))
     last = min(round(params.longest_s * rate_hz), round(0.375 * len(a)))
     if last - first < 2:
@@ -106,7 +121,10 @@ def _step_time(a: Floats, w: Floats, rate_hz: float, params: PeriodicityParams) 
     r_a = _autocorrelation(a, 2 * last + 1)
     r_w = _autocorrelation(w, 2 * last + 1)
     lag = np.arange(first, last + 1)
-    score = 0.25 * (r_a[lag] + r_a[2 * lag] + r_w[2 * lag] - r_w[lag])
+    if turns:
+        score = 0.25 * (r_a[lag] + r_a[2 * lag] + r_w[2 * lag] - r_w[lag])
+    else:
+        score = (r_a[lag] + r_a[2 * lag] + r_w[2 * lag]) / 3.0
     peaks = np.flatnonzero((score[1:-1] >= score[:-2]) & (score[1:-1] > score[2:])) + 1
     if not len(peaks) or score[peaks].max() <= 0.0:
         return float("nan"), 0.0

@@ -68,6 +68,14 @@ class GaitEvents:
     notices: tuple[Notice, ...] = ()
     diagnostics: Mapping[str, object] = field(default_factory=dict)
 
+    @property
+    def contact_uncertainty_s(self) -> float | None:
+        """What the median contact is known to, standard; a person's own do not count; None where unknown."""
+        known = sorted(
+            e.uncertainty_s for e in self.events if e.uncertainty_s is not None and e.source != MANUAL
+        )
+        return known[len(known) // 2] if known else None
+
     def times(self, side: Side, kind: EventKind) -> tuple[float, ...]:
         """Event times in s of one side and kind, increasing."""
         return tuple(e.time_s for e in self.events if e.side == side and e.kind == kind)

@@ -90,7 +90,7 @@ def find_turns(
     Parameters
     ----------
     yaw_rate : (n,) rad/s about the vertical, left positive. valid : (n,) False where the sensor was lost; no
-        turn is reported that touches such a sample.
+        turn is reported that touches such a sample or an end of the take: how far it went nobody saw.
     """
     params = params or TurnParams()
     if len(yaw_rate) < rate_hz * params.seconds[0]:
@@ -100,7 +100,8 @@ def find_turns(
     found: list[tuple[int, int]] = []
     for sign in (1.0, -1.0):
         for first, end in _joined(find_runs(sign * smooth > params.edge_rad_s), params.join_s * rate_hz):
-            if (sign * smooth[first:end]).max() >= params.peak_rad_s and valid[first:end].all():
+            whole = first > 0 and end < len(smooth) and valid[first:end].all()
+            if whole and (sign * smooth[first:end]).max() >= params.peak_rad_s:
                 found.append((first, end))
     listed = []
     for first, end in sorted(found):

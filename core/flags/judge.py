@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import sqrt
+from math import hypot, sqrt
 from typing import Final, Literal
 
 import numpy as np
@@ -21,7 +21,7 @@ from core.parameters.catalogue.errors import LEVELS
 from core.parameters.flats import OTHER
 from core.parameters.kinematic import NO_STANDING, stride_figures
 from core.parameters.result import CycleCurves, Parameter
-from core.parameters.variability import TOO_FEW, Spread, differ
+from core.parameters.variability import NORMAL_95, TOO_FEW, Spread, differ
 
 Zero = Literal["anatomical", "standing"]
 
@@ -46,6 +46,9 @@ class Flag:
     source : of the limit. verified : False = to be shown as "unverified cut-off".
     note : "no_speed_matched_norm": the people of the limit walk faster than this person;
         "sides_stand_differently": the difference of two angles from standing contains that of the posture.
+    spread : sd of healthy people behind the limit, None where it is no such.
+    certain : the value is beyond its limit by more than its strides and its measurement leave open (95 %);
+        False where that is not known.
     """
 
     name: str
@@ -64,6 +67,8 @@ class Flag:
     zero: Zero | None = None
     reason: str | None = None
     note: str | None = None
+    spread: float | None = None
+    certain: bool = False
 
 
 @dataclass(frozen=True)
@@ -261,7 +266,16 @@ def _flag(rule: Rule, side: Side | None, value: _Value, zero: Zero | None) -> Fl
         marked=marked,
         zero=zero if value.mean is not None else None,
         reason=reason,
+        spread=rule.spread,
+        certain=bool(exceeded) and _is_certain(value, rule.limit),
     )
+
+
+def _is_certain(value: _Value, limit: float | None) -> bool:
+    """The 95 % interval of a value leaves its limit out."""
+    if value.mean is None or value.sd is None or limit is None:
+        return False
+    return abs(value.mean - limit) > NORMAL_95 * hypot(value.sd / sqrt(value.n), value.own)
 
 
 def _beyond(value: float, limit: float, beyond: Beyond) -> bool:

@@ -29,6 +29,7 @@ class Rule:
     limit : None = mean ± twice the sd of the clinic's own controls. marked : a second, stronger limit.
     level : the value means nothing without the anatomical zero.
     verified : False = "unverified cut-off": seen in the literature, not read in its source.
+    spread : sd of healthy people behind the limit, in its unit; None where the limit is no such.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Rule:
     marked: float | None = None
     level: bool = False
     verified: bool = True
+    spread: float | None = None
 
 
 CURVES: Final[Mapping[str, CurveFigure]] = {
@@ -73,7 +75,9 @@ def _wbds(parameter: str) -> tuple[float, float, float]:
 def _above_norm(name: str, measure: str, parameter: str, *, level: bool) -> Rule:
     mean, sd, apart = _wbds(parameter)
     sd = single_side_sd(sd, apart)
-    return Rule(name, measure, "value", "above", mean + 2.0 * sd, f"mean + 2 SD, {WBDS}", level=level)
+    return Rule(
+        name, measure, "value", "above", mean + 2.0 * sd, f"mean + 2 SD, {WBDS}", level=level, spread=sd
+    )
 
 
 def _below_norm(parameter: str) -> float:

@@ -17,7 +17,6 @@ nor manifest."""
 _MAGIC = {
     b"\x89HDF": "HDF5 (APDM, MATLAB 7.3)",
     b"MATLAB": "MATLAB",
-    b"MD\xfc\x03": "Axivity CWA",
     b"XTF\x00": "Xsens MTB",
     b"\xfa\xff": "Xsens MTB",
 }

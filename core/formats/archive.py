@@ -78,17 +78,18 @@ def expand(files: Iterable[SourceFile], limits: ArchiveLimits | None = None) -> 
         if not _looks_packed(file):
             members = [file]
         else:
-            data = file.read()
-            if is_zip(data):
-                members = _members(file.name, data, limits)
-            elif is_gzip(data):
-                members = [_unpacked(file.name, data, limits)]
+            with file.open() as opened:
+                head = opened.read(4)
+            if is_zip(head):
+                members = _members(file.name, file.read(), limits)
+            elif is_gzip(head):
+                members = [_unpacked(file.name, file.read(), limits)]
             else:
                 members = [file]
         for m in members:
             name = m.name if m.name not in taken else f"{file.name}/{m.name}"
             taken.add(name)
-            out.append(m if name == m.name else SourceFile(name, m.size, m.read))
+            out.append(m if name == m.name else SourceFile(name, m.size, m.read, m.opener))
     return out
 
 

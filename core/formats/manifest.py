@@ -11,12 +11,13 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
+from core.correction import AS_READ, SensorCorrection
 from core.errors import ManifestError, ParameterError
 from core.formats.aliases import segment_named
 from core.formats.json_tree import JsonNode, read_json
 from core.formats.source_spec import SourceSpec, read_source
 from core.frames import PROTOCOLS, SEGMENTS, Protocol, Segment
-from core.recording import Subject, check_belt
+from core.recording import GivenLimits, Subject, check_belt
 from core.shoe import Shoe
 
 MAX_BYTES: Final = 1_000_000
@@ -31,6 +32,8 @@ class Manifest:
     ----------
     sensors : device id → segment, None = ignore this sensor.
     protocol : None = not said (walk). belt_speed_mps : of a treadmill.
+    corrections : device id → what its file says wrongly.
+    test_limits : when a functional test began and ended, as a person says.
     """
 
     subject: Subject = field(default_factory=Subject)
@@ -39,6 +42,8 @@ class Manifest:
     sensors: Mapping[str, Segment | None] = field(default_factory=dict)
     sources: tuple[SourceSpec, ...] = ()
     belt_speed_mps: float | None = None
+    corrections: Mapping[str, SensorCorrection] = field(default_factory=dict)
+    test_limits: GivenLimits = field(default_factory=GivenLimits)
 
     def source_of(self, name: str) -> SourceSpec | None:
         """First entry of `sources` that covers a file."""
@@ -59,14 +64,19 @@ class Manifest:
             sensors=self.sensors or other.sensors,
             sources=(*self.sources, *other.sources),
             belt_speed_mps=self.belt_speed_mps if self.belt_speed_mps is not None else belt,
+            corrections=MappingProxyType({**other.corrections, **self.corrections}),
+            test_limits=self.test_limits if self.test_limits != GivenLimits() else other.test_limits,
         )
+
+
+KEYS: Final = frozenset(
+    {"sensors", "sources", "subject", "protocol", "mounting", "belt_speed_mps", "corrections", "test_limits"}
+)
 
 
 def is_manifest(value: object) -> bool:
     """Tell whether a JSON value means to be a manifest."""
-    return isinstance(value, dict) and bool(
-        value.keys() & {"sensors", "sources", "subject", "protocol", "mounting", "belt_speed_mps"}
-    )
+    return isinstance(value, dict) and bool(value.keys() & KEYS)
 
 
 def parse_manifest(data: bytes) -> Manifest:
@@ -78,7 +88,7 @@ def parse_manifest(data: bytes) -> Manifest:
         manifest_bad_json, manifest_unknown_key, manifest_bad_value, unknown_segment, duplicate_segment,
         unknown_protocol, height_implausible, standing_width_implausible, unknown_angle,
         standing_angle_implausible, shoe_implausible, unknown_unit, belt_speed_implausible,
-        belt_speed_without_treadmill; the message names the path inside the manifest.
+        belt_speed_without_treadmill, correction_implausible; the message names the path inside the manifest.
     """
     try:
         root = read_json(data, MAX_BYTES)
@@ -90,7 +100,16 @@ def parse_manifest(data: bytes) -> Manifest:
 def manifest_of(root: object) -> Manifest:
     """Build a manifest from decoded JSON; errors as in `parse_manifest`."""
     top = JsonNode(root, "")
-    top.only("subject", "protocol", "mounting", "sensors", "sources", "belt_speed_mps")
+    top.only(
+        "subject",
+        "protocol",
+        "mounting",
+        "sensors",
+        "sources",
+        "belt_speed_mps",
+        "corrections",
+        "test_limits",
+    )
     subject = top.child("subject")
     who = _subject(subject)
     protocol = top.text("protocol")
@@ -112,7 +131,35 @@ def manifest_of(root: object) -> Manifest:
         sensors=MappingProxyType(_sensors(sensors)),
         sources=tuple(read_source(n) for n in top.children("sources")),
         belt_speed_mps=belt,
+        corrections=_corrections(top.child("corrections")),
+        test_limits=_limits(top.child("test_limits")),
     )
+
+
+def _limits(node: JsonNode) -> GivenLimits:
+    node.only("start_s", "end_s")
+    try:
+        return GivenLimits(node.number("start_s"), node.number("end_s"))
+    except ParameterError as error:
+        raise ManifestError(error.code, f"test_limits: {error.message}") from error
+
+
+def _corrections(node: JsonNode) -> Mapping[str, SensorCorrection]:
+    return MappingProxyType({device: _correction(node.child(device)) for device in node.keys})
+
+
+def _correction(node: JsonNode) -> SensorCorrection:
+    node.only("acc_axes", "gyr_axes", "acc_times", "gyr_times")
+    acc, gyr = node.number("acc_times"), node.number("gyr_times")
+    try:
+        return SensorCorrection(
+            node.names("acc_axes", 3) or AS_READ,
+            node.names("gyr_axes", 3) or AS_READ,
+            1.0 if acc is None else acc,
+            1.0 if gyr is None else gyr,
+        )
+    except ParameterError as error:
+        raise ManifestError(error.code, f"{node.path}: {error.message}") from error
 
 
 def _subject(node: JsonNode) -> Subject:

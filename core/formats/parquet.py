@@ -9,7 +9,8 @@ Rows are the union of the times of all streams; a row that a stream does not hav
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Any, Final, cast
 
 import numpy as np
@@ -20,8 +21,10 @@ from numpy.typing import NDArray
 from core.errors import FormatError, Notice
 from core.formats.draft import signal_digest
 from core.formats.json_tree import read_json
+from core.formats.source import SourceFile
 from core.frames import Floats, Protocol, Segment
-from core.recording import ImuStream, Recording, Subject
+from core.recording import BLOCK_ROWS, ImuStream, Recording, Subject
+from core.sample_blocks import LongStream, SampleBlock
 from core.shoe import Shoe
 
 MAGIC: Final = b"PAR1"
@@ -133,22 +136,105 @@ def read_recording(data: bytes, source: str) -> Recording:
             raise FormatError(
                 "bad_parquet", f"{source} declares {meta.num_rows} rows, {unpacked} bytes: too large."
             )
-        stored = (meta.metadata or {}).get(_KEY)
-        if stored is None:
-            raise FormatError(
-                "foreign_parquet",
-                f"{source} is a Parquet file that Sagittal did not write; export the recording as CSV and "
-                "describe it in a manifest (docs/formats.md).",
-            )
-        info: Any = read_json(stored)
-        if info["schema"] > SCHEMA:
-            raise FormatError(
-                "newer_schema",
-                f"{source} was written by a newer Sagittal (schema {info['schema']}); update this one.",
-            )
+        info = _read_info((meta.metadata or {}).get(_KEY), source)
         return _recording(file.read(use_threads=False), info, source)
     except DAMAGE as e:
         raise FormatError("bad_parquet", f"{source} is a damaged recording ({e}); upload it again.") from e
+
+
+def count_rows(file: SourceFile) -> int:
+    """Rows of a Parquet file; 0 where it is damaged."""
+    try:
+        with file.open() as opened:
+            return int(pq.ParquetFile(opened).metadata.num_rows)
+    except DAMAGE:
+        return 0
+
+
+def open_long(file: SourceFile) -> Recording:
+    """A stored recording that is too long to hold: its sensors are read block by block.
+
+    Raises
+    ------
+    FormatError as `read_recording`.
+    """
+    try:
+        with file.open() as opened:
+            reader = pq.ParquetFile(opened)
+            meta = reader.metadata
+            info = _read_info((meta.metadata or {}).get(_KEY), file.name)
+            first = next(reader.iter_batches(1, columns=[_TIME]))[_TIME][0].as_py()
+            last = reader.read_row_group(meta.num_row_groups - 1, columns=[_TIME])[_TIME][-1].as_py()
+            there = set(reader.schema_arrow.names)
+        subject, sensors = _read_subject(info), _list(info["sensors"])
+        long = {}
+        for sensor in sensors:
+            device = str(sensor["id"])
+            has_gyro = f"{device}.gyr_x" in there
+            long[device] = LongStream(
+                device_id=device,
+                source=str(sensor["source"]),
+                rate_hz=float(str(sensor["rate_hz"])),
+                has_gyro=has_gyro,
+                duration_s=(last - first) * 1e-6,
+                open_blocks=partial(_read_blocks, file, device, has_gyro, first),
+                notices=tuple(_read_notice(n) for n in _list(sensor["notices"])),
+            )
+        return Recording(
+            streams={},
+            segments={str(s["id"]): cast("Segment | None", s["segment"]) for s in sensors if s["mapped"]},
+            subject=subject,
+            protocol=cast("Protocol", info["protocol"]),
+            mounting=_texts(info["mounting"]),
+            sha256=_texts(info["sha256"]),
+            notices=tuple(_read_notice(n) for n in _list(info["notices"])),
+            long=long,
+        )
+    except DAMAGE as e:
+        raise FormatError("bad_parquet", f"{file.name} is a damaged recording ({e}); upload it again.") from e
+
+
+def _read_blocks(file: SourceFile, device: str, has_gyro: bool, first_us: int) -> Iterator[SampleBlock]:
+    """Rows of one sensor from the first one."""
+    kinds = ("acc", "gyr") if has_gyro else ("acc",)
+    names = [f"{device}.{name}" for kind in kinds for name in _AXES[kind]]
+    with file.open() as opened:
+        reader = pq.ParquetFile(opened, page_checksum_verification=True)
+        for batch in reader.iter_batches(BLOCK_ROWS, columns=[_TIME, *names], use_threads=False):
+            columns = [batch[name].to_numpy(zero_copy_only=False) for name in names]
+            values = np.stack(columns, axis=-1).astype(np.float64)
+            values[~np.isfinite(values)] = np.nan
+            t_s = (batch[_TIME].to_numpy() - first_us) * 1e-6
+            yield SampleBlock(t_s, values[:, :3], values[:, 3:] if has_gyro else None)
+
+
+def _read_info(stored: bytes | None, source: str) -> dict[str, object]:
+    """Metadata of a stored recording; raises FormatError `foreign_parquet`, `newer_schema`."""
+    if stored is None:
+        raise FormatError(
+            "foreign_parquet",
+            f"{source} is a Parquet file that Sagittal did not write; export the recording as CSV and "
+            "describe it in a manifest (docs/formats.md).",
+        )
+    info: Any = read_json(stored)
+    if info["schema"] > SCHEMA:
+        raise FormatError(
+            "newer_schema",
+            f"{source} was written by a newer Sagittal (schema {info['schema']}); update this one.",
+        )
+    return cast("dict[str, object]", info)
+
+
+def _read_subject(info: Mapping[str, object]) -> Subject:
+    subject = info["subject"]
+    if not isinstance(subject, dict) or not isinstance(info["protocol"], str):
+        raise TypeError("metadata")
+    return Subject(
+        subject["height_m"],
+        subject.get("standing_width_m"),
+        subject.get("standing_angles_deg") or {},
+        None if (shoe := subject.get("shoe")) is None else Shoe(**shoe),
+    )
 
 
 def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Recording:
@@ -191,18 +277,10 @@ def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Reco
             segments[device] = sensor["segment"]
     if not streams:
         raise FormatError("no_signal", f"No sensor in {source} measured anything; record again.")
-    subject = info["subject"]
-    if not isinstance(subject, dict) or not isinstance(info["protocol"], str):
-        raise TypeError("metadata")
     return Recording(
         streams=streams,
         segments=cast("dict[str, Segment | None]", segments),  # Recording checks them
-        subject=Subject(
-            subject["height_m"],
-            subject.get("standing_width_m"),
-            subject.get("standing_angles_deg") or {},
-            None if (shoe := subject.get("shoe")) is None else Shoe(**shoe),
-        ),
+        subject=_read_subject(info),
         protocol=cast("Protocol", info["protocol"]),
         mounting=_texts(info["mounting"]),
         sha256=_texts(info["sha256"]),

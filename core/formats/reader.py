@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Final
 
+from core.correction import SensorCorrection
 from core.errors import ArchiveError, FormatError, InputError, ManifestError, Notice
-from core.formats import _sniff, live_reader, mapping_xml, parquet, table, text
+from core.formats import _sniff, cwa, live_reader, mapping_xml, parquet, table, text
 from core.formats.aliases import segment_named
 from core.formats.archive import ArchiveLimits, expand
 from core.formats.draft import Draft, finish
 from core.formats.manifest import Manifest, parse_manifest
-from core.formats.source import SourceFile, sha256
+from core.formats.source import SourceFile, digest_file, sha256
 from core.formats.vendors import find_vendor, list_formats
 from core.frames import Segment
-from core.recording import Recording
+from core.recording import ImuStream, Recording
+from core.sample_blocks import LongStream
 
 _SHOWN = 5
+
+LONG_ROWS: Final = 2_000_000
+"""A longer table is read block by block, for the monitor of daily life: five and a half hours at 100 Hz."""
 
 
 @dataclass
@@ -24,6 +30,7 @@ class _Upload:
     """What has been found so far."""
 
     drafts: list[Draft] = field(default_factory=list)
+    long: dict[str, LongStream] = field(default_factory=dict)
     stored: list[Recording] = field(default_factory=list)
     manifests: list[tuple[str, bytes]] = field(default_factory=list)
     mapping: dict[str, Segment | None] = field(default_factory=dict)
@@ -60,9 +67,11 @@ def read_recording(
     manifest = _find_manifest(members, manifest, upload)
     for member in members:
         _take(member, manifest, upload)
-    if not upload.drafts and not upload.stored:
+    if not upload.drafts and not upload.stored and not upload.long:
         raise _nothing_readable(upload)
-    recording = _stored(upload) if upload.stored else Recording(finish(upload.drafts), segments={})
+    recording = (
+        _stored(upload) if upload.stored else Recording(finish(upload.drafts), segments={}, long=upload.long)
+    )
     return _declared(recording, manifest, upload)
 
 
@@ -85,6 +94,8 @@ def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload
 
 def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> None:
     """Read one file; a file that cannot be read is remembered, it does not stop the others."""
+    if _take_long(member, manifest, upload):
+        return
     raw = member.read()
     data = raw if parquet.looks_like(raw) or live_reader.looks_like(raw) else text.to_utf8(raw)
     spec = manifest.source_of(member.name) if manifest else None
@@ -123,6 +134,45 @@ def _take(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> Non
         raise
     except FormatError as e:
         upload.problems.append((member.name, e))
+
+
+def _take_long(member: SourceFile, manifest: Manifest | None, upload: _Upload) -> bool:
+    """Whether a file is too long to hold and was opened to be read block by block; a CWA file always is.
+
+    A short CWA file is read as well, so that every protocol can use it.
+    """
+    with member.open() as opened:
+        head = opened.read(1 << 16)
+    spec = manifest.source_of(member.name) if manifest else None
+    long = False
+    try:
+        if cwa.looks_like(head):
+            stream = cwa.open_long(member.name, member.open)
+            if stream.device_id in upload.long:
+                raise FormatError(
+                    "duplicate_device",
+                    f"{upload.long[stream.device_id].source} and {member.name} both come from sensor "
+                    f"{stream.device_id}; upload one recording at a time.",
+                    sensor=stream.device_id,
+                )
+            upload.long[stream.device_id] = stream
+            long = stream.duration_s * stream.rate_hz > LONG_ROWS
+        elif parquet.looks_like(head):
+            long = parquet.count_rows(member) > LONG_ROWS
+            if long:
+                upload.stored.append(parquet.open_long(member))
+        elif spec and spec.columns and table.estimate_rows(head, member.size) > LONG_ROWS:
+            long = True
+            upload.long |= table.open_long_table(member, spec)
+        if not long:
+            return False
+        upload.sha256[member.name] = digest_file(member)
+    except ManifestError:
+        raise
+    except FormatError as e:
+        upload.problems.append((member.name, e))
+        return True
+    return True
 
 
 def _needs_manifest(name: str, data: bytes) -> str:
@@ -175,28 +225,59 @@ def _declared(recording: Recording, manifest: Manifest | None, upload: _Upload) 
         segments, missing = _assign(upload.mapping, recording, "mapping file")
         notices += missing
     taken = {s for s in segments.values() if s is not None}
-    for device in recording.streams:
+    for device in dict.fromkeys((*recording.streams, *recording.long)):
         own = segment_named(device) if manifest and manifest.sources and not manifest.sensors else None
         if own is not None and device not in segments and own not in taken:
             segments[device] = own
             taken.add(own)
+    declared = manifest.protocol if manifest else None
+    if declared is not None and recording.protocol not in ("walk", declared):
+        said = f"The file is of the protocol '{recording.protocol}', but it is analysed as '{declared}'"
+        todo = f"For '{recording.protocol}', make a session with that protocol and upload the file there."
+        notices.append(Notice("protocol_differs", f"{said}, as was declared. {todo}"))
+    streams, corrected = correct_streams(recording.streams, manifest.corrections if manifest else {})
     return replace(
         recording,
+        streams=streams,
         segments=segments,
         subject=manifest.subject.complete_from(recording.subject) if manifest else recording.subject,
-        protocol=(manifest.protocol if manifest else None) or recording.protocol,
+        protocol=declared or recording.protocol,
         belt_speed_mps=(manifest.belt_speed_mps if manifest else None) or recording.belt_speed_mps,
+        test_limits=manifest.test_limits if manifest else recording.test_limits,
         mounting={**recording.mounting, **(manifest.mounting if manifest else {})},
         sha256={**recording.sha256, **upload.sha256},
-        notices=tuple(notices),
+        notices=(*notices, *corrected),
     )
+
+
+def correct_streams(
+    streams: Mapping[str, ImuStream], corrections: Mapping[str, SensorCorrection]
+) -> tuple[dict[str, ImuStream], list[Notice]]:
+    """Streams with the axes and units that somebody declared to be the right ones, and a note for each."""
+    wanted = {device.lower(): x for device, x in corrections.items()}
+    out, notices = dict(streams), []
+    for device, stream in streams.items():
+        correction = wanted.get(device.lower())
+        if correction is None:
+            continue
+        out[device] = replace(
+            stream,
+            acc=correction.correct_acc(stream.acc),
+            gyr=None if stream.gyr is None else correction.correct_gyr(stream.gyr),
+            # the vendor made it from what was wrong
+            quat=None if correction.turns_axes else stream.quat,
+        )
+        what = ", ".join(f"{key} {value}" for key, value in correction.to_json().items())
+        message = f"Sensor {device} is read with a correction, as was declared: {what or 'none'}."
+        notices.append(Notice("sensor_corrected", message, device, severity="info"))
+    return out, notices
 
 
 def _assign(
     declared: Mapping[str, Segment | None], recording: Recording, by: str
 ) -> tuple[dict[str, Segment | None], list[Notice]]:
     """Match declared ids to streams without regard to case; a declared sensor without a file is said."""
-    ids = {d.lower(): d for d in recording.streams}
+    ids = {d.lower(): d for d in (*recording.long, *recording.streams)}
     segments: dict[str, Segment | None] = {}
     missing: list[Notice] = []
     for device, segment in declared.items():
@@ -208,7 +289,7 @@ def _assign(
                 Notice(
                     "sensor_missing",
                     f"The {by} puts sensor {device} on {segment}, but no file holds it (found: "
-                    f"{', '.join(recording.streams)}); results that need {segment} are left out.",
+                    f"{', '.join(ids.values())}); results that need {segment} are left out.",
                     device,
                 )
             )

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import hashlib
+import io
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO, Final
 
 from core.errors import InputError
+
+_PIECE: Final = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,11 +23,17 @@ class SourceFile:
     name : path as the sender gave it, with forward slashes; any Unicode.
     size : bytes (for an archive member the size its directory declares).
     read : returns all bytes; may raise `core.errors.ArchiveError`.
+    opener : opens the bytes to be read piece by piece; None = they can only be had at once.
     """
 
     name: str
     size: int
     read: Callable[[], bytes]
+    opener: Callable[[], BinaryIO] | None = None
+
+    def open(self) -> BinaryIO:
+        """The bytes from the start, to be closed by who asked."""
+        return io.BytesIO(self.read()) if self.opener is None else self.opener()
 
     @classmethod
     def of_bytes(cls, name: str, data: bytes) -> SourceFile:
@@ -33,7 +43,7 @@ class SourceFile:
     @classmethod
     def of_path(cls, path: Path, name: str | None = None) -> SourceFile:
         """Wrap a file on disk; `name` defaults to its last part."""
-        return cls(name or path.name, path.stat().st_size, path.read_bytes)
+        return cls(name or path.name, path.stat().st_size, path.read_bytes, lambda: path.open("rb"))
 
 
 def list_source_files(paths: Iterable[Path]) -> Iterator[SourceFile]:
@@ -56,6 +66,15 @@ def read_named_file(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise InputError("file_not_found", f"{path} cannot be read: {error.strerror or error}.") from error
+
+
+def digest_file(file: SourceFile) -> str:
+    """Hexadecimal sha256 of a file, read piece by piece."""
+    digest = hashlib.sha256()
+    with file.open() as opened:
+        while piece := opened.read(_PIECE):
+            digest.update(piece)
+    return digest.hexdigest()
 
 
 def sha256(data: bytes) -> str:

@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
 
 import numpy as np
 
 from core.errors import FormatError, ManifestError, Notice
 from core.formats import text
 from core.formats.draft import Draft
+from core.formats.source import SourceFile
 from core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, Counter, SourceSpec
 from core.frames import Floats
+from core.sample_blocks import LongStream, SampleBlock
 
 _ROWS_TO_LOOK_AT = 4
+_CHUNK: Final = 1 << 23
+"""Bytes of a long table that are read at a time."""
 
 
 def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
@@ -30,6 +38,36 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
     FormatError
         empty, bad_table.
     """
+    layout = _lay_out(data, source, spec)
+    body = text.after_lines(data, spec.skip_rows + spec.header_rows)
+    if layout.separator == b" ":
+        body = memoryview(_squeezed(bytes(body)))
+    table = layout.read(body, source)
+    ticks, clock = _time(table, spec, source)
+    return [
+        _sensor(device, channels, table, spec, source, ticks, clock)
+        for device, channels in spec.columns.items()
+    ]
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """How the rows of one table are cut. wanted : columns that are read."""
+
+    separator: bytes
+    names: list[str]
+    wanted: list[str]
+    comma: bool
+
+    def read(self, body: memoryview, source: str) -> text.Columns:
+        """Rows without a header as columns."""
+        return text.read_columns(
+            body, source, self.separator, self.names, self.wanted, decimal_comma=self.comma
+        )
+
+
+def _lay_out(data: bytes, source: str, spec: SourceSpec) -> _Layout:
+    """What the head of a table says; errors as in `read_table`."""
     _check(spec, source)
     lines = text.head_lines(data, spec.skip_rows + spec.header_rows + _ROWS_TO_LOOK_AT)
     header = lines[spec.skip_rows : spec.skip_rows + spec.header_rows]
@@ -43,17 +81,98 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
     if separator == b" ":
         header, rows = [_squeezed(h) for h in header], [_squeezed(r) for r in rows]
     names = _names(header, rows[0], separator, spec)
-    wanted = _wanted(spec, names, source)
-    body = text.after_lines(data, spec.skip_rows + spec.header_rows)
-    if separator == b" ":
-        body = memoryview(_squeezed(bytes(body)))
-    comma = text.has_decimal_comma(rows[0], separator)
-    table = text.read_columns(body, source, separator, names, wanted, decimal_comma=comma)
-    ticks, clock = _time(table, spec, source)
-    return [
-        _sensor(device, channels, table, spec, source, ticks, clock)
+    return _Layout(separator, names, _wanted(spec, names, source), text.has_decimal_comma(rows[0], separator))
+
+
+def estimate_rows(head: bytes, size: int) -> float:
+    """How many lines a text of so many bytes has, by its beginning; 0 for what is no text."""
+    return size * head.count(b"\n") / max(1, len(head)) if text.is_text(head) else 0.0
+
+
+def open_long_table(file: SourceFile, spec: SourceSpec) -> dict[str, LongStream]:
+    """The sensors of a table that is too long to hold: rows are read a few megabytes at a time.
+
+    Raises
+    ------
+    ManifestError, FormatError as `read_table`; and `counter_too_long`: a long table needs a time or a rate.
+    """
+    source = file.name
+    if spec.counter is not None:
+        raise ManifestError(
+            "counter_too_long",
+            f"{source} is too long to be timed by a counter; give time_column or rate_hz in the manifest.",
+        )
+    head, tail = _ends(file)
+    layout = _lay_out(head, source, spec)
+    scale = TIME_UNITS[spec.time_unit]
+    body = text.after_lines(head, spec.skip_rows + spec.header_rows)
+    first = layout.read(_whole_lines(body), source)
+    last = layout.read(_whole_lines(tail), source)
+    if spec.time_column is None:
+        rate = spec.rate_hz or 0.0
+        row = len(bytes(body)) / max(1, len(next(iter(first.values.values()))))
+        start, duration = 0.0, file.size / row / rate
+    else:
+        times, ends = first.values[spec.time_column] * scale, last.values[spec.time_column] * scale
+        rate = spec.rate_hz or 1.0 / float(np.median(np.diff(times[np.isfinite(times)])))
+        start, duration = float(times[0]), float(np.nanmax(ends) - times[0])
+    return {
+        device: LongStream(
+            device_id=device,
+            source=source,
+            rate_hz=rate,
+            has_gyro=channels.gyr is not None,
+            duration_s=duration,
+            open_blocks=partial(_read_blocks, file, spec, layout, channels, start, rate),
+        )
         for device, channels in spec.columns.items()
-    ]
+    }
+
+
+def _ends(file: SourceFile) -> tuple[bytes, memoryview]:
+    """Beginning of a table, and whole lines of its end."""
+    with file.open() as opened:
+        head = opened.read(_CHUNK)
+        opened.seek(max(0, file.size - _CHUNK // 8))
+        tail = opened.read()
+    return head, memoryview(tail[tail.find(b"\n") + 1 :])
+
+
+def _whole_lines(data: memoryview) -> memoryview:
+    """Up to the last end of a line; all of it without one."""
+    end = bytes(data).rfind(b"\n") + 1
+    return data[:end] if end else data
+
+
+def _read_blocks(
+    file: SourceFile, spec: SourceSpec, layout: _Layout, channels: Channels, start: float, rate: float
+) -> Iterator[SampleBlock]:
+    """Rows from the first one, a few megabytes at a time."""
+    acc_unit, gyr_unit = ACC_UNITS[spec.acc_unit or "m/s2"], GYR_UNITS[spec.gyr_unit or "rad/s"]
+    rows = 0
+    with file.open() as opened:
+        for _ in range(spec.skip_rows + spec.header_rows):
+            opened.readline()
+        rest = b""
+        while True:
+            data = opened.read(_CHUNK)
+            body = rest + data
+            end = len(body) if not data else body.rfind(b"\n") + 1
+            body, rest = body[:end], body[end:]
+            if body.strip():
+                part = memoryview(_squeezed(body) if layout.separator == b" " else body)
+                table = layout.read(part, file.name)
+                acc = _stack(table, channels.acc) * acc_unit
+                gyr = None if channels.gyr is None else _stack(table, channels.gyr) * gyr_unit
+                if spec.time_column is None:
+                    t_s = (rows + np.arange(len(acc))) / rate
+                else:
+                    t_s = table.values[spec.time_column] * TIME_UNITS[spec.time_unit] - start
+                rows += len(acc)
+                timed = np.isfinite(t_s)
+                yield SampleBlock(t_s[timed], acc[timed], None if gyr is None else gyr[timed])
+            if not data:
+                return
 
 
 def _squeezed(data: bytes) -> bytes:

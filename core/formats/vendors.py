@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from core.formats import xsens
+from core.formats import cwa, xsens
 from core.formats.draft import Draft
 from core.formats.source_spec import SourceSpec
 
@@ -30,6 +30,7 @@ VENDOR_FORMATS: Final[list[VendorFormat]] = [
     VendorFormat(
         "Xsens MT Manager text", xsens.looks_like, lambda data, name, spec: (xsens.read(data, name, spec),)
     ),
+    VendorFormat(cwa.LABEL, cwa.looks_like, cwa.read),
 ]
 """All of them, in the order in which they are tried (docs/contributing.md, "Add a reader")."""
 

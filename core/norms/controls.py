@@ -7,7 +7,7 @@ sessions there are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -139,11 +139,16 @@ def control_group(
     )
 
 
-def mean_curves(curves: CycleCurves) -> MeanCurves:
-    """Mean curves of the counted strides in degrees, as a control session keeps them; none of too few."""
+def mean_curves(curves: CycleCurves, estimated: Collection[str] = ()) -> MeanCurves:
+    """Mean curves of the counted strides in degrees, as a control session keeps them; none of too few.
+
+    Parameters
+    ----------
+    estimated : variables that no two sensors measure: nobody's reference.
+    """
     found: dict[Side, dict[str, Floats]] = {}
     for variable, sides in curves.curves.items():
-        for side in sides:
+        for side in () if variable in estimated else sides:
             mean = mean_curve(curves, variable, side)
             if mean.mean is not None and mean.n >= COMPARED:
                 found.setdefault(side, {})[variable] = np.degrees(mean.mean)
@@ -155,11 +160,11 @@ def _within(value: float | None, limits: Range | None) -> bool:
 
 
 def _mean_values(sessions: Sequence[ControlSession]) -> Values:
-    """A person's mean of every parameter over their sessions, of those with enough strides."""
+    """A person's mean of every measured parameter over their sessions, of those with enough strides."""
     found: dict[tuple[str, Side | None], list[float]] = {}
     for s in sessions:
         for p in s.parameters:
-            if p.mean is not None and has_enough_values(p):
+            if p.mean is not None and has_enough_values(p) and not p.estimated:
                 found.setdefault((p.name, p.side), []).append(p.mean)
     return {key: float(np.mean(v)) for key, v in found.items()}
 

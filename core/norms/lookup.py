@@ -25,6 +25,7 @@ from core.norms.values import (
     pace_of,
     predict_at_speed,
     temporal_values,
+    withdraw_shares,
 )
 
 
@@ -75,6 +76,7 @@ def look_up_norms(
     anatomical: Collection[str] = (),
     *,
     treadmill: bool = False,
+    contacts_s: float | None = 0.0,
 ) -> Norms:
     """Look up the reference of a person.
 
@@ -86,7 +88,22 @@ def look_up_norms(
         (`core.parameters.anatomical_zero`); figures of the others compare in range only.
     treadmill : steps on a belt are quicker and shorter than on the floor at the same speed; below comfortable
         speed they are held against people on a belt.
+    contacts_s : what the contacts are known to (`GaitEvents.contact_uncertainty_s`), 0 = exact, None = not
+        known; shares of the stride compare only where it is small.
     """
+    found = _look_up(age, sex, speed_mps, height_m, anatomical, treadmill=treadmill)
+    return replace(found, values=withdraw_shares(found.values, contacts_s))
+
+
+def _look_up(
+    age: float | None,
+    sex: Sex | None,
+    speed_mps: float | None,
+    height_m: float | None,
+    anatomical: Collection[str],
+    *,
+    treadmill: bool,
+) -> Norms:
     speed = None if speed_mps is None else walking_speed(speed_mps, height_m)
     usual = _at_comfortable_speed(age, sex, speed, anatomical)
     if speed is None or usual.reason == "no_norm_for_age":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from math import hypot, sqrt
 from typing import Final, Literal, cast
@@ -65,12 +65,9 @@ class NormValues:
     reason: str | None = None
 
 
-def withdraw_shares(
-    values: Mapping[str, NormValue], uncertainties_s: Sequence[float | None]
-) -> dict[str, NormValue]:
-    """References where shares of the stride compare only if the contacts (their uncertainties) are exact."""
-    known = sorted(u for u in uncertainties_s if u is not None)
-    if known and known[len(known) // 2] <= COARSE_S:
+def withdraw_shares(values: Mapping[str, NormValue], contacts_s: float | None) -> dict[str, NormValue]:
+    """References where shares of the stride compare only if the contacts are known to `COARSE_S`."""
+    if contacts_s is not None and contacts_s <= COARSE_S:
         return dict(values)
     return {
         name: replace(v, comparable=False, note=_COARSE) if name in _SHARES and v.comparable else v

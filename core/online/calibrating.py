@@ -16,6 +16,7 @@ import numpy as np
 
 from core.calibration import calibrate
 from core.calibration.calibrate import FEW_STEPS
+from core.calibration.functional import FUNCTIONAL, find_functional_movements
 from core.calibration.live_attempt import CalibrationSamples, WornSensors
 from core.calibration.live_standing import StandingNow, cut_last_part, find_upward_axes, judge_standing
 from core.calibration.result import Calibration
@@ -86,6 +87,13 @@ class LiveCalibrator:
         self._out: frozenset[Segment] = frozenset()
         self._walked = 0.0
         self._up: Mapping[Segment, Floats] = {}
+        self._standings: list[int] = []
+        self._functional = self._ongoing = False
+
+    def drain_standings(self) -> tuple[int, ...]:
+        """Samples of the axis up to which a standing lasted that began an attempt, since the last call."""
+        found, self._standings = tuple(self._standings), []
+        return found
 
     def push(self, block: UniformBlock) -> LiveCalibration | None:
         """Take the next samples; the calibration, once, when they complete it.
@@ -158,6 +166,7 @@ class LiveCalibrator:
         """Begin with this standing; what was before it is of no attempt, walking least of all."""
         self._attempt.keep_last(round(seen.stood_s * self.wearer.rate_hz))
         self._up, self._walked = find_upward_axes(recording), 0.0
+        self._standings.append(self._length)
         self.view = replace(self.view, walked_s=0.0, steps=0)
 
     def _there(self) -> tuple[Segment, ...]:
@@ -171,7 +180,13 @@ class LiveCalibrator:
         p, rate = self.params, self.wearer.rate_hz
         recording = self._attempt.recording(self._working)
         seen = judge_standing(cut_last_part(recording, p.kept_s), p.mounting.calibration.rest)
-        walked = float(np.count_nonzero(moving_mask(recording, p.mounting.calibration.walking)) / rate)
+        calibration = p.mounting.calibration
+        done = find_functional_movements(recording, calibration.functional).anywhere
+        self._functional = bool(done.any())
+        ongoing, before_ongoing = bool(done[-1:].any()), self._ongoing
+        self._ongoing = ongoing
+        moving = moving_mask(recording, calibration.walking) | done
+        walked = float(np.count_nonzero(moving) / rate)
         stood = self.view.stood_s if walked and not seen.stood_s else seen.stood_s
         self._walked, before = walked, self._walked
         self.view = replace(self.view, stood_s=stood, walked_s=walked, checks=self._checks(seen))
@@ -188,7 +203,9 @@ class LiveCalibrator:
             if seen.longest_s < p.stand_s:
                 self.stage = "stand"
             return None
-        found = self._calibration(recording) if walked >= p.first_look_s and walked > before else None
+        # swings and bows are looked at when they end
+        look = not ongoing and (walked > before or before_ongoing)
+        found = self._calibration(recording) if walked >= p.first_look_s and look else None
         if found is None and self.stage == "walk" and len(self._attempt) >= p.longest_s * rate:
             message = (
                 f"Only {walked:.0f} s were walked in {p.longest_s:.0f} s, {p.walk_s:.0f} s or {p.steps} "
@@ -206,7 +223,8 @@ class LiveCalibrator:
     def _calibration(self, recording: UniformRecording) -> LiveCalibration | None:
         """The calibration if it can be had and rests on enough; a walk that gives none begins anew."""
         p = self.params
-        late = self.view.walked_s >= p.walk_s
+        # who swings a leg or bows has the other leg and the trunk still to come
+        late = self.view.walked_s >= p.walk_s and not self._functional
         try:
             calibrated = calibrate(recording, p.mounting.calibration)
             found = calibrated.calibration
@@ -215,12 +233,14 @@ class LiveCalibrator:
             if found.posture != "standing":
                 raise SignalError(
                     "not_still",
-                    "A sensor moved slowly while all stood. Stand still again for 3 s, then walk straight "
-                    "ahead.",
+                    "A sensor moved slowly or one foot was ahead while all stood. Stand still for 3 s with "
+                    "both feet side by side, then walk straight ahead.",
                 )
             least = p.least_steps if late else p.steps
             if found.straight_steps is None and late:
                 least = 0  # a trunk sensor shows none
+            if all(x.method in FUNCTIONAL for x in found.segments.values()):
+                least = 0 if all(_is_enough(x) for x in found.diagnostics.values()) else steps + 1
             if steps < least or len(found.segments) < len(recording.sensors):
                 if late:
                     self._restart(_why(found, steps, p))
@@ -239,6 +259,11 @@ class LiveCalibrator:
 
     def _checks(self, seen: StandingNow) -> tuple[SegmentCheck, ...]:
         return tuple(SegmentCheck(s, s in seen.still) for s in self.wearer.segments)
+
+
+def _is_enough(facts: object) -> bool:
+    """Whether a segment was swung or bowed as often as is asked for."""
+    return isinstance(facts, Mapping) and facts["repetitions"] >= facts["asked"]
 
 
 def _why(found: Calibration, steps: int, params: CalibratingParams) -> Notice:

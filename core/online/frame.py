@@ -64,6 +64,7 @@ class SensorHealth:
     ----------
     rate_hz : as measured. lost_share, saturated_share : 0 to 1. silent_s : since its last sample, by the
         other streams' clocks. still : at rest now. stuck : sends values that it does not measure.
+    doubt : code of what the other sensors say of it (core/agreement/live.py) and still holds.
     """
 
     id: str
@@ -74,6 +75,7 @@ class SensorHealth:
     silent_s: float
     still: bool
     stuck: bool = False
+    doubt: str | None = None
 
 
 @dataclass(frozen=True, eq=False)

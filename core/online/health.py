@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -59,7 +59,11 @@ class _StreamHealth:
             self._total -= self._pieces.popleft().counts
 
     def read_health(
-        self, silent_s: float, still: Collection[Segment], stuck: Collection[Segment]
+        self,
+        silent_s: float,
+        still: Collection[Segment],
+        stuck: Collection[Segment],
+        doubts: Mapping[Segment, str],
     ) -> list[SensorHealth]:
         """Health of its sensors."""
         span_s = 1e-6 * (self._pieces[-1].end_us - self._pieces[0].start_us) if self._pieces else 1.0
@@ -74,6 +78,7 @@ class _StreamHealth:
                 silent_s=silent_s,
                 still=sensor.segment in still,
                 stuck=sensor.segment in stuck,
+                doubt=None if sensor.segment is None else doubts.get(sensor.segment),
             )
             for sensor, (measured, full) in zip(self.info.sensors, self._total.tolist(), strict=True)
         ]
@@ -95,12 +100,20 @@ class SensorHealthMonitor:
         self._now_us = max(self._now_us, batch.sent_us)
 
     def read_health(
-        self, still: Collection[Segment], stuck: Collection[Segment] = ()
+        self,
+        still: Collection[Segment],
+        stuck: Collection[Segment] = (),
+        doubts: Mapping[Segment, str] | None = None,
     ) -> tuple[SensorHealth, ...]:
-        """Every sensor in the order of the hello; `still` : segments at rest. stuck : that do not measure."""
+        """Every sensor in the order of the hello.
+
+        Parameters
+        ----------
+        still : segments at rest. stuck : that do not measure. doubts : segment → what others say of it.
+        """
         found: list[SensorHealth] = []
         for stream in self._streams.values():
             since = stream.sent_us if stream.sent_us is not None else self._begun_us
             silent_s = 0.0 if since is None else 1e-6 * (self._now_us - since)
-            found += stream.read_health(silent_s, still, stuck)
+            found += stream.read_health(silent_s, still, stuck, doubts or {})
         return tuple(found)

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from core.agreement.live import LiveAgreement, compile_live_agreement
+from core.agreement.params import LiveAgreementParams
 from core.body.live_still import StillnessDetector
 from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.tree import PRESETS
@@ -36,6 +38,7 @@ class OnlineParams:
     axis: LiveAxisParams = field(default_factory=LiveAxisParams)
     calibrating: CalibratingParams = field(default_factory=CalibratingParams)
     chain: ChainParams = field(default_factory=ChainParams)
+    agreement: LiveAgreementParams = field(default_factory=LiveAgreementParams)
 
 
 class OnlineSession:
@@ -74,6 +77,7 @@ class OnlineSession:
         self._health = SensorHealthMonitor(hello)
         self._still = StillnessDetector(len(self._axis.segments), self._axis.rate_hz)
         self._stuck = StuckSensors(self._axis.segments, self._axis.rate_hz)
+        self._agreement = LiveAgreement(self._axis.segments, self._axis.rate_hz, self.params.agreement)
         self.chain: LiveChain | None = None
 
     @property
@@ -82,7 +86,10 @@ class OnlineSession:
         return self._axis.segments
 
     def push(self, batch: SampleBatch) -> LiveFrame | None:
-        """Take the next batch of the log; the state after the samples it completes, None when it does not."""
+        """Take the next batch of the log; the state after the samples it completes, None when it does not.
+
+        Whoever has told what is in it calls `compare_sensors` then.
+        """
         self._health.push(batch)
         block = self._axis.push(batch)
         if block is None:
@@ -99,6 +106,7 @@ class OnlineSession:
                 notices += found.notices
                 start = found.past - block.first
                 outcomes += self._begin(found, notices)
+        self._agreement.push(block, self._calibrating.drain_standings())
         if self.chain is not None and start < len(block):
             outcomes.append(self.chain.push(block.acc[start:], block.gyr[start:], block.valid[start:]))
         frame = LiveFrame(
@@ -106,18 +114,25 @@ class OnlineSession:
             seq=batch.seq,
             stage=self._calibrating.stage,
             health=self._health.read_health(
-                [s for s, x in zip(self.segments, rests, strict=True) if x], self._stuck.now
+                [s for s, x in zip(self.segments, rests, strict=True) if x],
+                self._stuck.now,
+                self._agreement.doubts,
             ),
             calibration=self._calibrating.view,
             notices=tuple(notices),
         )
         return frame if self.chain is None or not outcomes else _told(frame, block, self.chain, outcomes)
 
+    def compare_sensors(self) -> list[Notice]:
+        """What the sensors say about each other of the seconds that the last push completed; takes ms."""
+        return self._agreement.compare()
+
     def command(self, name: str) -> None:
         """Do what the therapist asks for, from the next sample on: "redo_calibration"; nothing else."""
         if name == "redo_calibration":
             self.chain = None
             self._calibrating.redo()
+            self._agreement.forget()
 
     def _begin(self, found: LiveCalibration, notices: list[Notice]) -> list[ChainOutput]:
         """Start the chain and catch up; a calibration that no chain can run on is begun anew."""
@@ -156,19 +171,11 @@ def _told(
 def compile_live_kernels() -> None:
     """Compile or load every kernel of the chain, so that the first take does not wait for it."""
     compile_calibration_kernels()
-    _compile_chain(PRESETS["lower_body7"])
-    compile_small_kernels()
-
-
-def compile_small_kernels() -> None:
-    """Compile or load what the filter of seven sensors is no part of.
-
-    A second process may do that while the first is at that filter, which takes longer than all the rest.
-    """
     compile_axis_kernels()
     compile_stuck_kernel()
-    _compile_chain(PRESETS["feet_pelvis3"])
-    _compile_chain(PRESETS["feet2"])
+    compile_live_agreement()
+    for worn in ("lower_body7", "feet_pelvis3", "feet2"):
+        _compile_chain(PRESETS[worn])
 
 
 def _compile_chain(worn: tuple[Segment, ...]) -> None:

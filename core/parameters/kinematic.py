@@ -45,6 +45,9 @@ AT_BOUND: Final = "at_bound"
 BOUND_DEG: Final = 0.2
 """A leg at its full length leaves the knee within this of straight (core/body/l7s/poses.py)."""
 
+MOST: Final = 0.5
+"""Share of the counted strides at the bound beyond which neither a figure nor a point of a curve is told."""
+
 FOOT_PITCH: Final = ("foot_pitch_ic_deg", "foot_pitch_tc_deg")
 """Sole to floor at the contacts, toes up positive, 0 at standing."""
 
@@ -55,7 +58,8 @@ class MeanCurve:
 
     Parameters
     ----------
-    mean, sd : (101,) rad; None without strides, sd also with fewer than two. n : strides behind them.
+    mean, sd : (101,) rad; None without strides, sd also with fewer than two. NaN where most strides rest on
+        the bound of a leg model. n : strides behind them.
     """
 
     mean: Floats | None
@@ -128,13 +132,28 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
 
 
 def mean_curve(curves: CycleCurves, variable: str, side: Side) -> MeanCurve:
-    """Mean curve of the counted strides of a side; strides with gaps in this variable are left out."""
+    """Mean curve of the counted strides of a side; strides with gaps in this variable are left out.
+
+    Where more than half of them rest on the bound of a leg model there is no value, as in the figures.
+    """
     rows = curves.curves.get(variable, {}).get(side)
     if rows is None:
         return MeanCurve(None, None, 0)
     rows = rows[curves.used[side] & np.isfinite(rows).all(axis=1)]
     n = len(rows)
-    return MeanCurve(rows.mean(axis=0) if n else None, rows.std(axis=0, ddof=1) if n > 1 else None, n)
+    if not n:
+        return MeanCurve(None, None, 0)
+    held = rest_at_bound(curves, variable, side, rows).mean(axis=0) > MOST
+    sd = np.where(held, np.nan, rows.std(axis=0, ddof=1)) if n > 1 else None
+    return MeanCurve(np.where(held, np.nan, rows.mean(axis=0)), sd, n)
+
+
+def rest_at_bound(curves: CycleCurves, variable: str, side: Side, angle: Floats) -> Bools:
+    """Where an angle in rad, of any shape, is the bound of a leg model and no measurement."""
+    bound = curves.bounds.get(variable, {}).get(side)
+    if bound is None:
+        return np.zeros(angle.shape, np.bool_)
+    return np.asarray(np.abs(angle - bound) < np.radians(BOUND_DEG), np.bool_)
 
 
 def stride_figures(
@@ -226,7 +245,7 @@ def summarise_angles(
                 reason = (why or "gap") if used.any() else "no_strides"
                 counted = sides[side][used]
                 resting = _at_bound(curves, name, side, counted)
-                if np.count_nonzero(resting) > 0.5 * len(counted):
+                if np.count_nonzero(resting) > MOST * len(counted):
                     reason, counted = AT_BOUND, counted[:0]
                 values = counted[np.isfinite(counted)].tolist()
             parameters.append(summarise_values(name, side, values, "deg", None if values else reason))
@@ -237,10 +256,9 @@ def _at_bound(curves: CycleCurves, name: str, side: Side, values: Floats) -> Boo
     """Figures (strides,) in degrees that are the bound of a leg model and no measurement."""
     entry = CATALOGUE.get(name)
     figure = None if entry is None else entry.curve
-    bound = None if figure is None else curves.bounds.get(figure.variable, {}).get(side)
-    if figure is None or bound is None or figure.statistic == "range":
+    if figure is None or figure.statistic == "range":
         return np.zeros(len(values), np.bool_)
-    return np.asarray(np.abs(values - np.degrees(bound)) < BOUND_DEG, np.bool_)
+    return rest_at_bound(curves, figure.variable, side, np.radians(values))
 
 
 def without_bounds(

@@ -22,9 +22,10 @@ class Parameter:
     ci_low, ci_high : 95 % confidence interval of the mean over the strides, None when n < 2.
     note : what to know about the number: "few_strides" below 30; None.
     uncertainty : the value ± this holds the truth with 95 %, from its strides and its measurement
-        (core/parameters/uncertainty.py); None where the measurement's part is not known.
+        (core/parameters/uncertainty.py); None where the measurement's part is not known, and of one stride.
     u_own, u_common : standard uncertainties of the measurement that strides do not average out: of this side
         in this take, and shared by both sides and every take.
+    estimated : of an angle that no two sensors measure: a model of the leg gives it.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Parameter:
     uncertainty: float | None = None
     u_own: float | None = None
     u_common: float | None = None
+    estimated: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -122,8 +122,8 @@ def summarise_distances(
 
     Returns
     -------
-    without a value a reason: "no_strides", "estimator_bad" (the path of the foot is withheld) or one of
-    `Reason`, the most frequent of the strides.
+    without a value a reason: "no_strides", "estimator_bad" (the feet are withheld), "path_bad" (this
+    foot is) or one of `Reason`, the most frequent of the strides.
     """
     counted = [
         (s.side, row) for s, row in zip(strides.strides, rows, strict=True) if s.excluded_reason is None

@@ -25,8 +25,18 @@ from core.parameters.variability import NORMAL_95, t_quantile
 GONIOMETER_DEG: Final = 3.0
 """Standing angle read with a goniometer, standard. Our estimate: readings of two people differ by 3 to 5°."""
 
-ESTIMATED_DEG: Final[Mapping[str, float]] = {"hip": 7.0, "knee": 10.5, "ankle": 8.1}
-"""Joint → RMS error of an angle that two or three sensors do not measure (neura_walk, three sensors)."""
+ESTIMATED_DEG: Final[Mapping[str, float]] = {"hip": 7.5, "knee": 10.5, "ankle": 5.5}
+"""Joint → RMS error of a level or range that pelvis and feet do not measure: the worst of maximum, minimum,
+range, contact and mean of a stride, over neura_walk, qmt_fullbody and simulated people with and without
+disease (docs/accuracy.md, "L7S: levels and ranges" and "L7S: parameters of whole analyses"). The knee's is
+that of people who stand with bent knees."""
+
+FEET_ALONE_DEG: Final[Mapping[str, float]] = {"hip": 9.0, "knee": 11.0, "ankle": 7.0}
+"""The same from the feet alone."""
+
+FEET_ALONE_AT_CONTACT_DEG: Final[Mapping[str, float]] = {"knee": 12.5}
+"""The same of the angle at contact, which feet alone find at another moment: the knee is 10° more bent than
+it is (docs/accuracy.md, "L7S: parameters of whole analyses")."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +64,10 @@ REFINED: Final = ContactErrors(contact=0.014, foot_off=0.012, foot=0.006, random
 same sets (contact −19 to +22 ms), by laboratory for foot-off (+5, +6, −14 ms, rounded up: its persons are of
 one), and what is left of 20 ms within a walk."""
 
+WITHOUT_FOOT_S: Final = 0.050
+"""Events vaguer than this are of a shank or a trunk: how they err depends on how a leg swings, and so on the
+side (a simulated hemiparetic walk with shanks alone: contacts 90 ms apart in error between the sides)."""
+
 TYPICAL_S: Final = 0.020
 """Stated uncertainty of an event that `REFINED` describes; another one scales it."""
 
@@ -64,17 +78,35 @@ def state_uncertainty(
     estimated: Collection[str] = (),
     *,
     goniometer: bool = False,
+    feet_lag_s: float = 0.0,
 ) -> tuple[Parameter, ...]:
     """The parameters with what they are known to; those without a value or a declared error as they are.
+
+    One stride alone has the measurement's parts and no `uncertainty`: how strides differ is not known.
 
     Parameters
     ----------
     parameters : of one take. events : that they were measured on, for what its contacts are known to.
     estimated : variables that no two sensors measure. goniometer : a standing angle was added to the levels.
+    feet_lag_s : what one foot's clock may be late by, standard, where nothing between the feet shows it.
     """
     contacts = {side: _contact_errors(events, side) for side in SIDES}
     strides = {p.side: p.mean for p in parameters if p.name == "stride_time_s"}
-    return tuple(_stated(p, contacts, strides, estimated, goniometer=goniometer) for p in parameters)
+    return tuple(
+        _stated(p, contacts, strides, estimated, feet_lag_s, goniometer=goniometer)
+        for p in mark_estimated(parameters, estimated)
+    )
+
+
+def mark_estimated(parameters: Sequence[Parameter], variables: Collection[str]) -> tuple[Parameter, ...]:
+    """The parameters, those read from one of these variables marked as estimated."""
+    return tuple(replace(p, estimated=True) if _variable(p.name) in variables else p for p in parameters)
+
+
+def _variable(name: str) -> str | None:
+    """The curve that a parameter is read from."""
+    entry = CATALOGUE.get(name)
+    return None if entry is None or entry.curve is None else entry.curve.variable
 
 
 def difference_half_width(strides: float, *own: float | None) -> float:
@@ -87,6 +119,7 @@ def _stated(
     contacts: Mapping[Side, ContactErrors],
     strides: Mapping[Side | None, float | None],
     estimated: Collection[str],
+    feet_lag_s: float,
     *,
     goniometer: bool,
 ) -> Parameter:
@@ -94,21 +127,25 @@ def _stated(
     if p.mean is None or p.n < 1 or entry is None or entry.errors is None:
         return p
     errors = entry.errors
-    variable = None if entry.curve is None else entry.curve.variable
+    variable = _variable(p.name)
     if variable is not None and variable in estimated:
         joint = variable.partition("_")[0]
-        errors = replace(errors, own=max(errors.own, ESTIMATED_DEG.get(joint, errors.own)))
+        known = FEET_ALONE_DEG if "pelvis_tilt" in estimated else ESTIMATED_DEG
+        if known is FEET_ALONE_DEG and entry.curve is not None and entry.curve.statistic == "at":
+            known = {**known, **FEET_ALONE_AT_CONTACT_DEG}
+        errors = replace(errors, own=max(errors.own, known.get(joint, errors.own)))
     common, own, random = errors.common, errors.own, errors.random
     if errors.contacts is not None:
-        in_s = _of_contacts(errors.contacts, contacts, p.side)
+        in_s = _of_contacts(errors.contacts, contacts, p.side, feet_lag_s)
         scale = _per_second(p, strides)
         if scale is None:
             return p
         common, own, random = (hypot(a, scale * b) for a, b in zip((common, own, random), in_s, strict=True))
     if goniometer and variable is not None and not p.name.endswith("_rom_deg"):
         own = hypot(own, GONIOMETER_DEG)
-    sampled = 0.0 if p.sd is None else t_quantile(p.n - 1) * p.sd / sqrt(p.n)
-    open_by_strides = max(sampled, NORMAL_95 * random / sqrt(p.n))
+    if p.sd is None:  # one stride says nothing of how strides differ
+        return replace(p, u_own=own, u_common=common)
+    open_by_strides = max(t_quantile(p.n - 1) * p.sd, NORMAL_95 * random) / sqrt(p.n)
     whole = hypot(open_by_strides, NORMAL_95 * hypot(own, common))
     return replace(p, uncertainty=whole, u_own=own, u_common=common)
 
@@ -122,7 +159,7 @@ def _per_second(p: Parameter, strides: Mapping[Side | None, float | None]) -> fl
 
 
 def _of_contacts(
-    w: ContactWeights, contacts: Mapping[Side, ContactErrors], side: Side | None
+    w: ContactWeights, contacts: Mapping[Side, ContactErrors], side: Side | None, feet_lag_s: float
 ) -> tuple[float, float, float]:
     """Common, own and random error of a time in s, from those of the contacts that it lies between."""
     one: Side = side or "left"
@@ -131,7 +168,8 @@ def _of_contacts(
     contact = (w.start + w.end) * a.contact + w.other * b.contact
     foot_off = w.off * a.foot_off + w.other_off * b.foot_off
     # contacts of one foot share an error of that foot; so do its foot-offs
-    own = ((w.start + w.end) * a.foot, w.off * a.foot, w.other * b.foot, w.other_off * b.foot)
+    own = [(w.start + w.end) * a.foot, w.off * a.foot, w.other * b.foot, w.other_off * b.foot]
+    own.append((w.other + w.other_off) * feet_lag_s)  # a late clock delays all events of its foot
     random = hypot(
         w.start * a.random, w.off * a.random, w.end * a.random, w.other * b.random, w.other_off * b.random
     )
@@ -152,6 +190,5 @@ def _contact_errors(events: GaitEvents | None, side: Side) -> ContactErrors:
         return PITCH_RULE
     ic, tc = (float(np.sqrt(np.mean(np.square(found[kind])))) / TYPICAL_S for kind in ("ic", "tc"))
     both = hypot(ic, tc) / sqrt(2.0)
-    return ContactErrors(
-        REFINED.contact * ic, REFINED.foot_off * tc, REFINED.foot * both, REFINED.random * both
-    )
+    foot = REFINED.foot if both * TYPICAL_S <= WITHOUT_FOOT_S else REFINED.contact
+    return ContactErrors(REFINED.contact * ic, REFINED.foot_off * tc, foot * both, REFINED.random * both)

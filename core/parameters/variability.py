@@ -36,8 +36,8 @@ TOO_FEW: Final = "too_few_strides"
 
 
 def has_enough_values(p: Parameter) -> bool:
-    """Enough strides, or steps, to be held against the other side, a norm, a limit or another visit."""
-    return p.n >= COMPARED or name_counted(p.name) not in {"strides", "steps"}
+    """Enough strides, steps or repetitions to be held against another side or visit, a norm or a limit."""
+    return p.n >= COMPARED or name_counted(p.name) not in {"strides", "steps", "repetitions"}
 
 
 def summarise_values(

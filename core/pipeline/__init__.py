@@ -6,10 +6,12 @@
 
 from core.pipeline.analysis import TakeAnalysis
 from core.pipeline.config import PipelineConfig
-from core.pipeline.recipes import TRUNK_ONLY, WALK, Progress, analyse, resume
+from core.pipeline.recipes import ACTIVITY, SQUAT, TRUNK_ONLY, WALK, Progress, analyse, resume
 from core.pipeline.stages import PipelineStage
 
 __all__ = [
+    "ACTIVITY",
+    "SQUAT",
     "TRUNK_ONLY",
     "WALK",
     "PipelineConfig",

@@ -6,23 +6,30 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
+from core.activity.parameters import measure_day
+from core.activity.result import ActivityResult
 from core.agreement import Agreement
 from core.angles import JointAngles
+from core.body.chain.leg import LegMotion
 from core.body.estimate import PoseEstimate
 from core.body.feet import FootTracks
 from core.body.mounting import MountedSensors
 from core.body.poses import Poses
 from core.calibration.result import CalibratedRecording, Calibration
+from core.calibration.score import CalibrationScore
 from core.errors import Notice, ParameterError
 from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
 from core.events.turns import Turn
+from core.functional_tests.result import FunctionalTest
 from core.fusion.orientations import Orientations
 from core.measure import MeasuredGait, Tracks
 from core.parameters.result import Parameter
 from core.pipeline.config import PipelineConfig
 from core.quality import QualityReport
 from core.recording import Recording, UniformRecording
+from core.setup import SetupRepair
+from core.squat.measures import SquatSide
 
 SCHEMA: Final = 1
 """Version of the Analysis bundle and of analysis.json."""
@@ -67,9 +74,11 @@ class TakeAnalysis:
     ----------
     source : as read from the files.
     uniform : stage timeline; samples of sensors that do not measure are not valid.
+    setup : stage agreement; what is proposed where the set-up is wrong, None = nothing is seen.
     agreed : stage agreement; holds the recording with what could be repaired.
     report : stage quality.
     calibrated : stage calibration, with the mountings that each sensor shows on its own.
+    calibration_score : of stage calibration, and anew of stage mounting with the mountings as they are used.
     fused : stage orientation, with those mountings.
     contacts : stage events.
     mounted : stage mounting; None also for a single trunk sensor.
@@ -78,6 +87,10 @@ class TakeAnalysis:
     tracks : stage parameters, what strides and parameters are measured on, and after an edit are measured on
         again.
     measured : stage parameters.
+    activity : stage activity of daily life, which has no common axis and none of the stages above but
+        quality.
+    leg : stage poses of squats on one leg. squats : stage parameters of these.
+    functional : stage test of a functional test.
     problem : the error that stopped the chain, None when every stage ran. stopped_at : that stage's name.
     """
 
@@ -85,9 +98,11 @@ class TakeAnalysis:
     config: PipelineConfig = field(default_factory=PipelineConfig)
     version: str = ""
     uniform: UniformRecording | None = None
+    setup: SetupRepair | None = None
     agreed: Agreement | None = None
     report: QualityReport | None = None
     calibrated: CalibratedRecording | None = None
+    calibration_score: CalibrationScore | None = None
     fused: Orientations | None = None
     contacts: DetectedContacts | None = None
     mounted: MountedSensors | None = None
@@ -95,6 +110,10 @@ class TakeAnalysis:
     angles: JointAngles | None = None
     tracks: Tracks | None = None
     measured: MeasuredGait | None = None
+    leg: LegMotion | None = None
+    squats: SquatSide | None = None
+    functional: FunctionalTest | None = None
+    activity: ActivityResult | None = None
     problem: Notice | None = None
     stopped_at: str | None = None
 
@@ -141,8 +160,13 @@ class TakeAnalysis:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All parameters, empty when no events were reached."""
-        return () if self.measured is None else self.measured.parameters
+        """All parameters, those of a functional test first; empty when nothing was reached."""
+        if self.squats is not None:
+            return self.squats.parameters
+        if self.activity is not None:
+            return measure_day(self.activity)
+        of_test = () if self.functional is None else self.functional.parameters
+        return (*of_test, *(() if self.measured is None else self.measured.parameters))
 
     @property
     def notices(self) -> tuple[Notice, ...]:
@@ -150,7 +174,8 @@ class TakeAnalysis:
         detected = None if self.contacts is None else self.contacts.events
         speaking = (
             self.source, None if self.uniform is None else self.recording, self.report, self.calibration,
-            self.orientations, detected, self.measured, self.poses, self.angles,
+            self.orientations, detected, self.measured, self.poses, self.angles, self.functional,
+            self.activity,
         )  # fmt: skip
         found = [notice for part in speaking if part is not None for notice in part.notices]
         found += () if self.mounted is None else self.mounted.assumed

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar, get_args
 
+from core.activity.params import ActivityParams
 from core.agreement import AgreementParams
 from core.body.pose_params import PoseParams
 from core.calibration import CalibrationParams
@@ -19,9 +20,12 @@ from core.events.bouts import BoutParams
 from core.events.consensus import ConsensusParams
 from core.events.lumbar import LumbarParams
 from core.events.turns import TurnParams
+from core.functional_tests.params import FunctionalTestParams
 from core.fusion.mahony import MahonyParams
 from core.quality import QualityParams
 from core.quality.stuck import StuckParams
+from core.setup import SetupParams
+from core.squat.params import SquatParams
 from core.timeline import TimelineParams
 
 Settings = TypeVar("Settings")
@@ -52,6 +56,7 @@ class PipelineConfig:
 
     timeline: TimelineParams = field(default_factory=TimelineParams)
     stuck: StuckParams = field(default_factory=StuckParams)
+    setup: SetupParams = field(default_factory=SetupParams)
     agreement: AgreementParams = field(default_factory=AgreementParams)
     quality: QualityParams = field(default_factory=QualityParams)
     calibration: CalibrationParams = field(default_factory=CalibrationParams)
@@ -66,6 +71,9 @@ class PipelineConfig:
     poses: PoseParams = field(default_factory=PoseParams)
     strides: StrideParams = field(default_factory=StrideParams)
     bouts: BoutParams = field(default_factory=BoutParams)
+    squat: SquatParams = field(default_factory=SquatParams)
+    functional: FunctionalTestParams = field(default_factory=FunctionalTestParams)
+    activity: ActivityParams = field(default_factory=ActivityParams)
 
     def __post_init__(self) -> None:
         if self.detector not in get_args(Detector):

@@ -1,7 +1,7 @@
 """The order of the stages, and the loop that runs them.
 
-A recipe is a tuple of stages. Which one a take goes through is decided by its working sensors, once the
-signals were judged; another one for another movement is another tuple here.
+A recipe is a tuple of stages. Which one a take goes through is decided by what was done and by the working
+sensors, once the signals were judged; another one for another movement is another tuple here.
 """
 
 from __future__ import annotations
@@ -11,8 +11,11 @@ from dataclasses import replace
 from typing import Any, Final
 
 from core.errors import Notice, ParameterError, SagittalError
+from core.pipeline.activity_stages import ACTIVITY_MONITOR, ACTIVITY_QUALITY
 from core.pipeline.analysis import TakeAnalysis
 from core.pipeline.config import PipelineConfig
+from core.pipeline.functional_stages import TRUNK_TEST, WALK_TEST
+from core.pipeline.squat_stages import SQUAT_ANGLES, SQUAT_CALIBRATION, SQUAT_LEG, SQUAT_PARAMETERS
 from core.pipeline.stages import (
     AGREEMENT,
     ANGLES,
@@ -44,6 +47,20 @@ WALK: Final = (*SIGNALS, CALIBRATION, ORIENTATION, EVENTS, MOUNTING, POSES, ANGL
 TRUNK_ONLY: Final = (*SIGNALS, TRUNK_EVENTS, TRUNK_PARAMETERS)
 """Walking with sensors on the trunk alone: steps, bouts and turns, no angles."""
 
+SQUAT: Final = (*SIGNALS, SQUAT_CALIBRATION, SQUAT_LEG, SQUAT_ANGLES, SQUAT_PARAMETERS)
+"""Squats on one leg with sensors on shank, thigh and pelvis: no walking, no strides."""
+
+BY_TRUNK: Final = (*SIGNALS, TRUNK_TEST)
+"""A functional test that one sensor on the trunk tells: no calibration, no strides."""
+
+TRUNK_TESTS: Final = ("tug", "five_sit_to_stand", "standing_eyes_open", "standing_eyes_closed")
+WALK_TESTS: Final = ("walk_10m", "walk_6min")
+"""Protocols of functional tests by what tells them: the trunk, or the strides of a walk."""
+
+
+ACTIVITY: Final = (ACTIVITY_MONITOR, ACTIVITY_QUALITY)
+"""Daily life: hours to days of one sensor of the trunk, read block by block; nothing is laid beside it."""
+
 
 def say_nothing(stage: str, share: float) -> None:
     """Progress that nobody follows."""
@@ -74,8 +91,16 @@ def analyse(
 
 
 def choose_recipe(analysis: TakeAnalysis) -> tuple[PipelineStage, ...]:
-    """The recipe of the sensors that work; the stages timeline and quality have run."""
-    return TRUNK_ONLY if all(s in TRUNK for s in drop_stuck_sensors(analysis.recording).sensors) else WALK
+    """The recipe of the protocol and of the sensors that work; timeline and quality have run."""
+    if analysis.source.protocol == "activity":
+        return ACTIVITY
+    if analysis.source.protocol == "squat":
+        return SQUAT
+    if analysis.source.protocol in TRUNK_TESTS:
+        return BY_TRUNK
+    alone = all(s in TRUNK for s in drop_stuck_sensors(analysis.recording).sensors)
+    walk = TRUNK_ONLY if alone else WALK
+    return (*walk, WALK_TEST) if analysis.source.protocol in WALK_TESTS else walk
 
 
 def run_stages(analysis: TakeAnalysis, stages: Sequence[PipelineStage], progress: Progress) -> TakeAnalysis:
@@ -93,7 +118,7 @@ def run_stages(analysis: TakeAnalysis, stages: Sequence[PipelineStage], progress
         try:
             analysis = stage.run(analysis, analysis.config)
         except SagittalError as error:
-            if analysis.uniform is None:
+            if analysis.uniform is None and analysis.report is None:
                 raise
             problem = Notice(error.code, error.message, error.sensor, error.t_s, severity="error")
             analysis = replace(analysis, problem=problem)
@@ -153,7 +178,10 @@ def resume(
 
 def _run_from(analysis: TakeAnalysis, first: int, progress: Progress) -> TakeAnalysis:
     """Run the stages from this place in the recipe on; which recipe it is, the signals' stages decide."""
-    analysis = run_stages(analysis, SIGNALS[first:], progress)
-    analysis = run_stages(analysis, choose_recipe(analysis)[max(first, len(SIGNALS)) :], progress)
+    if analysis.source.protocol == "activity":
+        analysis = run_stages(analysis, ACTIVITY[first:], progress)
+    else:
+        analysis = run_stages(analysis, SIGNALS[first:], progress)
+        analysis = run_stages(analysis, choose_recipe(analysis)[max(first, len(SIGNALS)) :], progress)
     progress("done", 1.0)
     return analysis

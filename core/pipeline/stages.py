@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from core import body, calibration, quality, timeline
-from core.agreement import check_agreement
+from core.agreement import Agreement, check_agreement
 from core.agreement.joints import LEG_JOINTS
 from core.angles.measure import measure_angles
 from core.body.estimate import estimate_poses
@@ -21,6 +21,7 @@ from core.body.l7s.inputs import free_acceleration
 from core.body.mounting import mount_sensors
 from core.body.walking_frame import in_walking_frame
 from core.calibration.result import CalibratedRecording
+from core.calibration.score import score_calibration
 from core.errors import Notice
 from core.events.alternation import tell_foot_lag
 from core.events.consensus import agree_on_contacts, all_detectors, rate_confidence
@@ -39,6 +40,7 @@ from core.pipeline.config import PipelineConfig
 from core.quality.stuck import drop_stuck_sensors, mark_stuck
 from core.recording import UniformRecording
 from core.rest import STANDING, Window, find_rest_windows
+from core.setup.propose import propose_labels, propose_repair
 from core.withheld import withhold, withhold_at_slips, withhold_distances
 
 CHAIN: Final[frozenset[Segment]] = frozenset(s for joint in LEG_JOINTS for s in joint)
@@ -80,14 +82,29 @@ def lay_on_one_axis(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
 
 
 def compare_clocks(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """What the sensors say about each other; late ones are laid where they belong."""
+    """Whether the set-up is right, and what the sensors say about each other; late ones are laid right.
+
+    A set-up that is wrong, and known how, is an error: numbers of it would be wrong.
+    """
     uniform = require_stage(analysis.uniform, "timeline")
-    return replace(analysis, agreed=check_agreement(uniform, config.agreement, config.timeline))
+    setup = propose_repair(analysis.source, drop_stuck_sensors(uniform), config.setup, config.agreement)
+    if setup is None:
+        agreed = check_agreement(uniform, config.agreement, config.timeline)
+        setup = propose_labels(uniform, agreed)
+    else:
+        agreed = Agreement(uniform)
+    if setup is None:
+        return replace(analysis, setup=None, agreed=agreed)
+    told = setup.tell("error" if setup.is_sure and config.setup.refuse else "warning")
+    spoken = replace(agreed.recording, notices=(*agreed.recording.notices, told))
+    return replace(analysis, setup=setup, agreed=replace(agreed, recording=spoken))
 
 
 def judge_signals(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """The quality report; an error among its notices is the problem of the analysis."""
-    uniform = analysis.recording
+    uniform, agreed = analysis.recording, analysis.agreed
+    # what a slipped sensor measures is left out, not lost
+    uniform = uniform if agreed is None or agreed.whole is None else agreed.whole
     report = quality.assess(analysis.source, uniform, config.quality, drop_stuck_sensors(uniform).sensors)
     problem = next((n for n in report.notices if n.severity == "error"), None)
     return replace(analysis, report=report, problem=problem)
@@ -96,8 +113,10 @@ def judge_signals(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
 def calibrate_sensors(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """How each working sensor sits on its segment."""
     calibrated = calibration.calibrate(drop_stuck_sensors(analysis.recording), config.calibration)
+    score = score_calibration(calibrated, config.calibration.score, analysis.agreed)
     # the poses say what could not be had for want of a sensor that failed
-    return replace(analysis, calibrated=replace(calibrated, recording=analysis.recording))
+    calibrated = replace(calibrated, recording=analysis.recording)
+    return replace(analysis, calibrated=calibrated, calibration_score=score)
 
 
 def orient_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -152,7 +171,9 @@ def mount_on_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAna
     """Mountings as standing width and joints show them; everything behind takes these."""
     calibrated = require_stage(analysis.calibrated, "calibration")
     mounted = mount_sensors(calibrated, require_stage(analysis.fused, "orientation"), config.poses)
-    return replace(analysis, mounted=mounted)
+    used = replace(mounted.calibrated, recording=drop_stuck_sensors(analysis.recording))
+    score = score_calibration(used, config.calibration.score, analysis.agreed, mounted.turned_rad)
+    return replace(analysis, mounted=mounted, calibration_score=score)
 
 
 def build_figure(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -288,7 +309,9 @@ def _trunk_acceleration(analysis: TakeAnalysis, config: PipelineConfig) -> dict[
 
 
 TIMELINE: Final = PipelineStage("timeline", 0.0, lay_on_one_axis, ("uniform",), ("timeline", "stuck"))
-AGREEMENT: Final = PipelineStage("agreement", 0.02, compare_clocks, ("agreed",), ("agreement", "timeline"))
+AGREEMENT: Final = PipelineStage(
+    "agreement", 0.02, compare_clocks, ("agreed",), ("setup", "agreement", "timeline")
+)
 QUALITY: Final = PipelineStage("quality", 0.03, judge_signals, ("report",), ("quality",))
 CALIBRATION: Final = PipelineStage("calibration", 0.05, calibrate_sensors, ("calibrated",), ("calibration",))
 ORIENTATION: Final = PipelineStage("orientation", 0.1, orient_segments, ("fused",), ("fusion",))
@@ -301,7 +324,7 @@ EVENTS: Final = PipelineStage(
     runs_after_problem=True,
 )
 TRUNK_EVENTS: Final = PipelineStage("events", 0.14, detect_trunk_steps, ("contacts",), ("lumbar", "turns"))
-MOUNTING: Final = PipelineStage("mounting", 0.15, mount_on_segments, ("mounted",), ("poses",))
+MOUNTING: Final = PipelineStage("mounting", 0.15, mount_on_segments, ("mounted",), ("poses", "calibration"))
 POSES: Final = PipelineStage("poses", 0.4, build_figure, ("posed",), ("poses",))
 ANGLES: Final = PipelineStage("angles", 0.95, compute_angles, ("angles",))
 PARAMETERS: Final = PipelineStage(

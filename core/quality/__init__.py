@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from core.quality.assessment import QualityParams, QualityReport, SensorQuality, assess, find_shown_level
+from core.quality.assessment import (
+    QualityParams,
+    QualityReport,
+    SensorQuality,
+    assess,
+    concern_paths_alone,
+    find_shown_level,
+)
 from core.quality.inspection import DeviceFacts, Inspection, describe
 from core.quality.suggestion import Suggestion, suggest, suggest_segments
 
@@ -14,6 +21,7 @@ __all__ = [
     "SensorQuality",
     "Suggestion",
     "assess",
+    "concern_paths_alone",
     "describe",
     "find_shown_level",
     "suggest",

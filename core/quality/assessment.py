@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Literal, get_args
+from typing import Final, Literal, get_args
 
 import numpy as np
 
@@ -22,6 +22,13 @@ Level = Literal["good", "usable", "poor"]
 
 Verdict = Literal["good", "warn", "bad"]
 """Of an estimator, as core/body/health.py gives it."""
+
+OF_ONE_FOOT: Final = frozenset({"zero_velocity_refused_pct", "longest_moving_s", "climb_pct", "gap_s"})
+"""Findings of an estimator about the path of one foot: no second sensor has a part in them."""
+
+GAP_S: Final = 0.1
+"""Longest stretch that the time axis fills, s (docs/science/timeline.md, "Parameters"). Shorter ones are not
+told: at an end of the take a shift by a sensor's late clock leaves them, which is told itself."""
 
 
 @dataclass(frozen=True)
@@ -133,6 +140,11 @@ def find_shown_level(level: Level, verdict: Verdict | None) -> Level:
     """The level that people see: the worse of the signals' and the pose estimator's, None = none ran."""
     of_estimator: dict[Verdict | None, Level] = {"warn": "usable", "bad": "poor"}
     return max(level, of_estimator.get(verdict, "good"), key=get_args(Level).index)
+
+
+def concern_paths_alone(bad: Collection[str]) -> bool:
+    """Whether an estimator's findings that are bad, by their names, are all of the path of one foot."""
+    return bool(bad) and OF_ONE_FOOT.issuperset(bad)
 
 
 def assess(
@@ -247,16 +259,17 @@ def _sensor(
 def _gap_notice(
     segment: Segment, signals: SensorSignals, uniform: UniformRecording, invalid: float, params: QualityParams
 ) -> list[Notice]:
-    holes = find_runs(~signals.valid)
+    holes = [h for h in find_runs(~signals.valid) if h[1] - h[0] >= GAP_S * uniform.rate_hz]
     if not holes:
         return []
     start, end = max(holes, key=lambda h: h[1] - h[0])
     return [
         Notice(
             "gap",
-            f"{segment} has no data in {len(holes)} stretch(es) longer than 0.1 s, {100 * invalid:.1f} % "
-            f"of the take; the longest is {(end - start) / uniform.rate_hz:.2f} s. Angles there are missing "
-            "and strides that touch them are left out; heading is relearnt from the straight walking after.",
+            f"{segment} has no data in {len(holes)} stretch(es) of {GAP_S:g} s and more, {100 * invalid:.1f} "
+            f"% of the take; the longest is {(end - start) / uniform.rate_hz:.2f} s. Angles there are "
+            "missing and strides that touch them are left out; heading is relearnt from the straight walking "
+            "after.",
             segment,
             start / uniform.rate_hz,
             severity="warning" if invalid > params.invalid_usable else "info",

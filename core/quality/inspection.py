@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from core.errors import Notice
+from core.formats.aliases import segment_in
 from core.frames import Segment
 from core.quality.signals import measure_signal
 from core.quality.suggestion import Suggestion, suggest
 from core.quality.suspicion import list_suspicions
 from core.recording import ImuStream, Recording, Subject
+from core.sample_blocks import LongStream
 
 
 @dataclass(frozen=True)
@@ -118,12 +121,66 @@ def describe(recording: Recording) -> Inspection:
         )
     starts = [float(s.t_s[0]) for s in recording.streams.values()]
     ends = [float(s.t_s[-1]) for s in recording.streams.values()]
+    long = {d: s for d, s in recording.long.items() if d not in recording.streams}
+    devices += [
+        _long_device(s, declared=d in recording.segments, segment=recording.segments.get(d))
+        for d, s in long.items()
+    ]
+    lasts = [max(ends) - min(starts)] if ends else []
     return Inspection(
         devices=tuple(devices),
-        duration_s=max(ends) - min(starts) if ends else 0.0,
+        duration_s=max((*lasts, *(s.duration_s for s in long.values())), default=0.0),
         subject=recording.subject,
         protocol=recording.protocol,
         notices=recording.notices,
+    )
+
+
+LOOKED_AT_S: Final = 600.0
+"""A sensor that is read block by block is described by its first minutes."""
+
+
+def _long_device(s: LongStream, *, declared: bool, segment: Segment | None) -> DeviceFacts:
+    """A sensor whose recording is too long to hold, by its file's head and its first minutes."""
+    blocks = []
+    for block in s.open_blocks():
+        blocks.append(block)
+        if len(block.t_s) and block.t_s[-1] > LOOKED_AT_S:
+            break
+    t_s, acc = (np.concatenate([getattr(b, name) for b in blocks]) for name in ("t_s", "acc"))
+    gyr = [b.gyr for b in blocks if b.gyr is not None]
+    facts = measure_signal(acc, np.concatenate(gyr) if len(gyr) == len(blocks) else None, s.rate_hz)
+    holes = np.diff(t_s) - 1.0 / s.rate_hz
+    lost = float(np.where(holes > 0.5 / s.rate_hz, holes, 0.0).sum())
+    guess = segment_in(s.device_id) or segment_in(s.source)
+    return DeviceFacts(
+        device_id=s.device_id,
+        source=s.source,
+        rate_hz=s.rate_hz,
+        clock="device",
+        start_s=0.0,
+        duration_s=s.duration_s,
+        samples=round(s.duration_s * s.rate_hz),
+        lost_pct=100.0 * lost / max(float(t_s[-1] - t_s[0]), 1.0),
+        longest_gap_s=float(holes.max(initial=0.0)),
+        has_gyro=s.has_gyro,
+        has_mag=False,
+        has_orientation=False,
+        still_norm=facts.still_norm,
+        declared=declared,
+        segment=segment,
+        suggestion=Suggestion(guess, "label") if guess else Suggestion(),
+        duplicate_of=None,
+        notices=(
+            *s.notices,
+            Notice(
+                "read_in_blocks",
+                f"Sensor {s.device_id} recorded {s.duration_s / 3600:.0f} h: it serves the protocol daily "
+                "life. Its figures here are of the first ten minutes.",
+                s.device_id,
+                severity="info",
+            ),
+        ),
     )
 
 

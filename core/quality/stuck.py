@@ -343,9 +343,14 @@ NONE_LEFT: Final = (
 
 
 def drop_stuck_sensors(recording: UniformRecording) -> UniformRecording:
-    """The recording without sensors that were found stuck and measure for less than `LEAST` of it."""
+    """The recording without sensors that were found stuck and measure for less than `LEAST` of it, and
+    without those of which no sample is left."""
     stuck = {n.sensor for n in recording.notices if n.code in CODES}
-    kept = {s: x for s, x in recording.sensors.items() if s not in stuck or x.valid.mean() >= LEAST}
+    kept = {
+        s: x
+        for s, x in recording.sensors.items()
+        if (s not in stuck or x.valid.mean() >= LEAST) and x.valid.any()
+    }
     return recording if len(kept) == len(recording.sensors) else replace(recording, sensors=kept)
 
 

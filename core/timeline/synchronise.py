@@ -34,6 +34,12 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
         for d, s in recording.segments.items()
         if s is not None and d in recording.streams
     }
+    if not worn and any(recording.segments.get(d) is not None for d in recording.long):
+        raise SignalError(
+            "recording_too_long",
+            f"The recording is too long for the protocol '{recording.protocol}'. Choose daily life "
+            "(activity), or cut out the walk.",
+        )
     if not worn:
         raise SignalError(
             "no_mapping",

@@ -8,7 +8,18 @@ from __future__ import annotations
 
 from typing import Final
 
-from core.parameters.catalogue import angles, distances, phases, support, times, trunk, walking
+from core.parameters.catalogue import (
+    angles,
+    daily,
+    distances,
+    functional,
+    phases,
+    squat,
+    support,
+    times,
+    trunk,
+    walking,
+)
 from core.parameters.catalogue.entry import (
     NEEDS,
     Comparison,
@@ -22,7 +33,7 @@ from core.parameters.catalogue.entry import (
 
 CATALOGUE: Final[dict[str, ParameterEntry]] = {
     entry.name: entry
-    for part in (distances, times, phases, angles, walking, trunk, support)
+    for part in (distances, times, phases, angles, walking, trunk, support, squat, functional, daily)
     for entry in part.ENTRIES
 }
 """Parameter name → its entry, in the order of the tables. Read at every call, so that a test may add one."""

@@ -11,7 +11,7 @@ from core.parameters.catalogue.errors import MeasurementErrors
 
 Need = Literal[
     "foot_sensor", "foot_path", "foot_off", "other_foot", "linked_feet", "standing_width", "shoe",
-    "hip", "knee", "ankle", "pelvis_sensor", "forward",
+    "hip", "knee", "ankle", "pelvis_sensor", "trunk_sensor", "forward", "squat", "daily_life",
 ]  # fmt: skip
 
 NEEDS: Final[Mapping[Need, str]] = {
@@ -26,7 +26,10 @@ NEEDS: Final[Mapping[Need, str]] = {
     "knee": "sensors on thigh and shank",
     "ankle": "sensors on shank and foot",
     "pelvis_sensor": "a sensor on the pelvis",
+    "trunk_sensor": "a sensor on the pelvis or the chest",
     "forward": "the direction of walking",
+    "daily_life": "a recording of daily life with a sensor on the chest or the lower back",
+    "squat": "a take of squats with sensors on shank, thigh and pelvis",
 }
 """What a parameter cannot be measured without, beside contacts, in words."""
 
@@ -55,6 +58,14 @@ ANKLE_AND_FOOT: Final = "Ankle and foot angles"
 WALKING: Final = "Walking and turning"
 TRUNK: Final = "Regularity of the trunk"
 SUPPORT: Final = "Support in seconds"
+SQUAT: Final = "Squat on one leg"
+TUG: Final = "Timed up and go"
+CHAIR: Final = "Five times sit to stand"
+WALK_TESTS: Final = "Walk tests"
+SWAY: Final = "Sway in quiet standing"
+FUNCTIONAL: Final = (TUG, CHAIR, WALK_TESTS, SWAY)
+"""Groups of the functional tests (core/functional_tests)."""
+DAILY: Final = "Daily life"
 
 UNITS: Final[Mapping[str, tuple[str, str]]] = {
     "mps": ("m/s", "m/s"),
@@ -63,6 +74,10 @@ UNITS: Final[Mapping[str, tuple[str, str]]] = {
     "pct": ("%", "%"),
     "dps": ("deg/s", "°/s"),
     "min": ("min", "min"),
+    "mps2": ("m/s2", "m/s²"),
+    "m2ps4": ("m2/s4", "m²/s⁴"),
+    "m2ps5": ("m2/s5", "m²/s⁵"),
+    "hz": ("Hz", "Hz"),
     "m": ("m", "m"),
     "s": ("s", "s"),
 }
@@ -104,7 +119,7 @@ class ParameterEntry:
     digits : decimals as printed. scale : fixed ends of its range bar, in its unit.
     comparison : words for the larger and the smaller of two values. definition : one or two plain sentences.
     needs : what it cannot be measured without, beside contacts.
-    of : "stride" = of every stride, by side; "take" = of the whole take only.
+    of : "stride" = of every stride, by side; "take" = of the whole take only, squats by side.
     counted : what it is the mean of.
     curve : how it is read from a cycle curve; such a parameter needs no code of its own.
     trainable : a prescription may train it. everyday : what a patient reads in place of the label.
@@ -124,7 +139,9 @@ class ParameterEntry:
     definition: str
     needs: tuple[Need, ...] = ()
     of: Scope = "stride"
-    counted: Literal["strides", "steps", "feet", "bouts", "turns"] = "strides"
+    counted: Literal[
+        "strides", "steps", "feet", "bouts", "turns", "repetitions", "tests", "days"
+    ] = "strides"  # fmt: skip
     curve: CurveFigure | None = None
     trainable: bool = False
     everyday: str = ""

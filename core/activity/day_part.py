@@ -1,0 +1,248 @@
+"""One day of frames → what happened in it: wear, upright, lying, leans, steps.
+
+A recording is gone through in days of 24 h from its start, each with what lies around it, so that nothing
+that crosses a border is missed; how the postures follow from it, core/activity/postures.py decides for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.activity.params import ActivityParams
+from core.activity.reduction import FRAME_HZ, Frames, Slab
+from core.activity.result import PosturalTransition, TransitionCandidate, WearPeriod
+from core.activity.stairs import measure_walking, tell_stairs
+from core.activity.transitions import (
+    Lean,
+    Lying,
+    find_leans,
+    find_lying,
+    judge_leans,
+    tell_lying,
+)
+from core.activity.wear import Wear, describe_period, find_forward, find_upright, find_wear, group_periods
+from core.events.bouts import walking_bouts
+from core.events.turns import Turn
+from core.frames import Bools, Floats
+from core.rest import Window, find_runs
+
+NEAR_LYING_S = 10.0
+"""Leans so close to lying do not tell where forward is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """Inclination of every frame.
+
+    Parameters
+    ----------
+    known : (f,) it was worn and upright is known.
+    tilt : (f,) to any side, rad. lean : (f,) forward positive, rad; the tilt where forward is not known.
+    signed : (f,) forward is known.
+    """
+
+    known: Bools
+    tilt: Floats
+    lean: Floats
+    signed: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class DayPart:
+    """What one day of a recording tells, in s since its first sample; only what lies in it.
+
+    Parameters
+    ----------
+    no_baseline : worn, upright not known. tilted : beyond the limit of lying, not still. step_kinds : (n,) of
+        the steps, 0 level, 1 up, 2 down (core/activity/stairs.py). inclination_deg : (seconds,) NaN =
+        unknown.
+    """
+
+    gaps: tuple[Window, ...]
+    off: tuple[Window, ...]
+    no_baseline: tuple[Window, ...]
+    lying: tuple[Window, ...]
+    tilted: tuple[Window, ...]
+    periods: tuple[WearPeriod, ...]
+    transitions: tuple[PosturalTransition, ...]
+    candidates: tuple[TransitionCandidate, ...]
+    steps_s: Floats
+    step_kinds: np.ndarray
+    turns: tuple[Turn, ...]
+    inclination_deg: Floats
+
+
+def read_day(
+    slabs: Sequence[Slab], day: Window, before: WearPeriod | None, thigh_m: float, params: ActivityParams
+) -> DayPart:
+    """What happened from `day[0]` to `day[1]`, s.
+
+    Parameters
+    ----------
+    slabs : of the day and around it. before : the last period of wear before it, None without one.
+    """
+    frames = _join([s.frames for s in slabs])
+    offset = frames.first / FRAME_HZ
+    wear = find_wear(frames, params.wear)
+    steps = np.array([t for s in slabs for t in s.steps_s])
+    walking = _mark_walking(steps, frames, params)
+    posture, periods = _find_posture(frames, wear, walking, before, params)
+    lying = find_lying(posture.tilt, frames, posture.known, params.transitions)
+    posture, periods = _find_forward(frames, posture, periods, lying, walking, params)
+    steps = steps[_are_upright(steps, frames, posture, params)] if len(steps) else steps
+    walking = _mark_walking(steps, frames, params)
+    leans = find_leans(posture.lean, posture.known, params.transitions)
+    found, refused = judge_leans(leans, posture.lean, frames, lying, walking, thigh_m, params.transitions)
+    found += tell_lying(lying, frames, posture.tilt)
+    at = [_index(t, frames) for t in steps]
+    kinds = tell_stairs(*measure_walking(posture.lean, walking, at, params.stairs), params.stairs)
+
+    def clip(ranges: Sequence[tuple[int, int]]) -> tuple[Window, ...]:
+        windows = [
+            (max(day[0], offset + a / FRAME_HZ), min(day[1], offset + b / FRAME_HZ)) for a, b in ranges
+        ]
+        return tuple(w for w in windows if w[1] > w[0])
+
+    def holds(t: float) -> bool:
+        return day[0] <= t < day[1]
+
+    inside = (steps >= day[0]) & (steps < day[1])
+    return DayPart(
+        gaps=clip(wear.gaps),
+        off=clip(wear.off),
+        no_baseline=clip(find_runs(_mark(wear.worn, len(frames.valid)) & ~posture.known & frames.valid)),
+        lying=clip([(x.a, x.b) for x in lying if x.still]),
+        tilted=clip([(x.a, x.b) for x in lying if not x.still]),
+        periods=tuple(
+            describe_period(
+                max(day[0], p.start_s),
+                min(day[1], p.end_s),
+                _array(p.up),
+                _array(p.forward),
+                p.method,
+                p.leans,
+            )
+            for p in periods
+            if p.end_s > day[0] and p.start_s < day[1]
+        ),
+        transitions=tuple(sorted((t for t in found if holds(t.time_s)), key=lambda t: t.time_s)),
+        candidates=tuple(c for c in refused if holds(c.time_s)),
+        steps_s=steps[inside],
+        step_kinds=kinds[inside],
+        turns=tuple(t for s in slabs for t in s.turns if holds(t.start_s)),
+        inclination_deg=_seconds(frames, posture, day),
+    )
+
+
+def _join(parts: Sequence[Frames]) -> Frames:
+    return Frames(
+        parts[0].first,
+        *(
+            np.concatenate([getattr(p, name) for p in parts])
+            for name in ("valid", "gravity", "up", "spread", "sd", "wobble")
+        ),
+    )
+
+
+def _index(t: float, frames: Frames) -> int:
+    return int(np.clip(int(t * FRAME_HZ) - frames.first, 0, len(frames.valid) - 1))
+
+
+def _mark(ranges: Sequence[tuple[int, int]], n: int) -> Bools:
+    mask = np.zeros(n, np.bool_)
+    for a, b in ranges:
+        mask[a:b] = True
+    return mask
+
+
+def _mark_walking(steps: Floats, frames: Frames, params: ActivityParams) -> Bools:
+    """Frames (f,) from the first to the last step of a bout."""
+    bouts = walking_bouts(steps.tolist(), params=params.bouts)
+    return _mark([(_index(b.first_s, frames), _index(b.end_s, frames)) for b in bouts], len(frames.valid))
+
+
+def _are_upright(steps: Floats, frames: Frames, posture: Posture, params: ActivityParams) -> Bools:
+    at = np.array([_index(t, frames) for t in steps])
+    return np.asarray(frames.valid[at] & (~posture.known[at] | (posture.tilt[at] < params.upright_rad)))
+
+
+def _find_posture(
+    frames: Frames, wear: Wear, walking: Bools, before: WearPeriod | None, params: ActivityParams
+) -> tuple[Posture, list[WearPeriod]]:
+    """Tilt from the upright of each period; one that shows none takes that of its neighbour."""
+    n, offset = len(frames.valid), frames.first / FRAME_HZ
+    groups = group_periods(wear, params.wear)
+    own = [find_upright(frames, walking, group, params.upright) for group in groups]
+    sure = [axis for axis, method in own if method == "walking"]
+    lent = _array(before.up) if before is not None else sure[0] if sure else None
+    tilt, known = np.zeros(n), np.zeros(n, np.bool_)
+    worn = _mark(wear.worn, n) & frames.valid
+    periods = []
+    for (a, b), (axis, method) in zip(groups, own, strict=True):
+        if method != "walking" and lent is not None:
+            axis, method = lent, "neighbour"
+        elif method == "walking":
+            lent = axis
+        periods.append(describe_period(offset + a / FRAME_HZ, offset + b / FRAME_HZ, axis, None, method, 0))
+        if axis is not None:
+            gravity = frames.gravity[a:b]
+            size = np.maximum(np.sqrt(np.einsum("ni,ni->n", gravity, gravity)), 1e-9)
+            known[a:b] = worn[a:b]
+            tilt[a:b] = np.arccos(np.clip(gravity @ axis / size, -1.0, 1.0))
+    tilt[~known] = 0.0
+    return Posture(known, tilt, tilt, np.zeros(n, np.bool_)), periods
+
+
+def _find_forward(
+    frames: Frames,
+    posture: Posture,
+    periods: Sequence[WearPeriod],
+    lying: Sequence[Lying],
+    walking: Bools,
+    params: ActivityParams,
+) -> tuple[Posture, list[WearPeriod]]:
+    """Signed inclination where the leans of a period show forward."""
+    close, longest = round(NEAR_LYING_S * FRAME_HZ), round(params.upright.lean_s * FRAME_HZ)
+    leans = [
+        x
+        for x in find_leans(posture.tilt, posture.known, params.transitions)
+        if not walking[x.top]
+        and x.b - x.a <= longest
+        and not any(y.a - close <= x.top <= y.b + close for y in lying)
+    ]
+    lean, signed = posture.tilt.copy(), np.zeros(len(posture.tilt), np.bool_)
+    told = []
+    for p in periods:
+        a, b = (round(t * FRAME_HZ) - frames.first for t in (p.start_s, p.end_s))
+        axis = _array(p.up)
+        if axis is None:
+            told.append(p)
+            continue
+        own: list[Lean] = [x for x in leans if a <= x.top < b]
+        at = [(x.a, x.top, x.b) for x in own]
+        forward, count = find_forward(frames.gravity, axis, at, params.upright)
+        told.append(describe_period(p.start_s, p.end_s, axis, forward, p.method, count))
+        if forward is not None:
+            gravity = frames.gravity[a:b]
+            lean[a:b] = np.arctan2(-(gravity @ forward), gravity @ axis)
+            signed[a:b] = posture.known[a:b]
+    lean[~posture.known] = 0.0
+    return Posture(posture.known, posture.tilt, lean, signed), told
+
+
+def _seconds(frames: Frames, posture: Posture, day: Window) -> Floats:
+    """Mean inclination (seconds,) in degrees of every second of the day, NaN where it is not known."""
+    a, b = (round(t * FRAME_HZ) - frames.first for t in day)
+    count = -(-(b - a) // FRAME_HZ)
+    values, there = np.zeros(count * FRAME_HZ), np.zeros(count * FRAME_HZ, np.bool_)
+    values[: b - a], there[: b - a] = posture.lean[a:b], posture.signed[a:b]
+    number = there.reshape(count, FRAME_HZ).sum(axis=1)
+    total = np.where(there, values, 0.0).reshape(count, FRAME_HZ).sum(axis=1)
+    return np.where(number > 0, np.degrees(total / np.maximum(number, 1)), np.nan)
+
+
+def _array(axis: tuple[float, float, float] | None) -> Floats | None:
+    return None if axis is None else np.array(axis)

@@ -1,0 +1,308 @@
+"""The monitor of daily life: one sensor's recording, of whatever length, in bounded memory."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from core.activity.day_part import DayPart, read_day
+from core.activity.params import ActivityParams
+from core.activity.postures import FixedStretch, decide_postures
+from core.activity.reduction import FRAME_HZ, Slab, reduce_stream
+from core.activity.result import (
+    ActivityBout,
+    ActivityResult,
+    PosturalTransition,
+    TransitionCandidate,
+    WearPeriod,
+)
+from core.activity.stairs import KIND_OF, LEVEL
+from core.activity.totals import sum_days, sum_hours
+from core.body.model import NOMINAL_HEIGHT_M
+from core.errors import Notice, SignalError
+from core.events.bouts import Bout, walking_bouts
+from core.frames import Floats, Segment
+from core.rest import Window
+from core.sample_blocks import LongStream
+
+DAY_SLABS_S: Final = 86400
+AROUND_S: Final = 2400
+"""A day is read with so much around it: more than the shortest non-wear."""
+
+Progress = Callable[[float], None]
+"""Called with the share of the recording that was gone through, 0 to 1."""
+
+
+def monitor_activity(
+    stream: LongStream,
+    segment: Segment,
+    height_m: float | None = None,
+    params: ActivityParams | None = None,
+    progress: Progress = lambda share: None,
+) -> ActivityResult:
+    """Go through a recording of daily life.
+
+    Parameters
+    ----------
+    segment : "chest" or "pelvis". height_m : for the length of the thigh; None = nominal, with a notice.
+
+    Raises
+    ------
+    SignalError : `sample_rate_too_low`, `bad_signal`, `clock_jump`.
+    """
+    params = params or ActivityParams()
+    if stream.rate_hz < params.min_rate_hz:
+        raise SignalError(
+            "sample_rate_too_low",
+            f"Sensor {stream.device_id} was recorded at {stream.rate_hz:g} Hz; at least "
+            f"{params.min_rate_hz:g} Hz are needed to find steps. Record at 25 Hz or more.",
+            sensor=stream.device_id,
+        )
+    height = NOMINAL_HEIGHT_M if height_m is None else height_m
+    thigh = params.transitions.thigh_share * height
+    parts: list[DayPart] = []
+    end_s = 0.0
+    before: WearPeriod | None = None
+    for slabs, day in _days(reduce_stream(stream, segment, params), params):
+        part = read_day(slabs, day, before, thigh, params)
+        parts.append(part)
+        before = next((p for p in reversed(part.periods) if p.up is not None), before)
+        end_s = day[1]
+        progress(min(1.0, end_s / stream.duration_s) if stream.duration_s > 0.0 else 1.0)
+    return _put_together(stream, segment, height, parts, end_s, _say(stream, height_m, parts), params)
+
+
+def _days(slabs: Iterator[Slab], params: ActivityParams) -> Iterator[tuple[list[Slab], Window]]:
+    """Slabs of every day with those around it, and its range."""
+    per_day, around = DAY_SLABS_S // params.slab_s, -(-AROUND_S // params.slab_s)
+    kept: list[Slab] = []
+    number, end = 0, 0.0
+    for slab in slabs:
+        kept.append(slab)
+        end = (slab.frames.first + len(slab.frames.valid)) / FRAME_HZ
+        if slab.frames.first >= ((number + 1) * per_day + around) * params.slab_s * FRAME_HZ:
+            yield kept[:-1], (number * DAY_SLABS_S, (number + 1) * DAY_SLABS_S)
+            number += 1
+            first = (number * per_day - around) * params.slab_s * FRAME_HZ
+            kept = [s for s in kept if s.frames.first >= first]
+    while kept and number * DAY_SLABS_S < end:
+        yield kept, (number * DAY_SLABS_S, min(end, (number + 1) * DAY_SLABS_S))
+        number += 1
+        first = (number * per_day - around) * params.slab_s * FRAME_HZ
+        kept = [s for s in kept if s.frames.first >= first]
+
+
+def _put_together(
+    stream: LongStream,
+    segment: Segment,
+    height_m: float,
+    parts: Sequence[DayPart],
+    end_s: float,
+    notices: tuple[Notice, ...],
+    params: ActivityParams,
+) -> ActivityResult:
+    """Days → the whole: bouts and postures do not end at midnight."""
+    steps = np.concatenate([p.steps_s for p in parts]) if parts else np.empty(0)
+    kinds = np.concatenate([p.step_kinds for p in parts]) if parts else np.empty(0, int)
+    far = np.diff(steps, prepend=-np.inf) > 0.5 * params.steps.step_s[0]
+    steps, kinds = steps[far], kinds[far]
+    found = walking_bouts(steps.tolist(), params=params.bouts)
+    walked = np.zeros(len(steps), np.bool_)
+    for w in found:
+        walked[_within(steps, w.first_s, w.end_s)] = True
+    steps, kinds = steps[walked], kinds[walked]
+    transitions = [t for p in parts for t in p.transitions]
+    candidates = [c for p in parts for c in p.candidates]
+    walks, transitions, refused = _meet(found, transitions)
+    candidates = sorted((*candidates, *refused), key=lambda c: c.time_s)
+    fixed = _fix(parts, walks, steps, kinds)
+    spans, judged = decide_postures(
+        end_s,
+        fixed,
+        _merge_windows([w for p in parts for w in p.tilted]),
+        transitions,
+        candidates,
+        params.longest_stand_s,
+    )
+    bouts = tuple(_describe(w, steps, kinds) for w in walks)
+    return ActivityResult(
+        segment=segment,
+        device_id=stream.device_id,
+        source=stream.source,
+        rate_hz=stream.rate_hz,
+        has_gyro=stream.has_gyro,
+        started_at=stream.started_at,
+        duration_s=end_s,
+        height_m=height_m,
+        spans=spans,
+        transitions=judged,
+        candidates=tuple(candidates),
+        bouts=bouts,
+        steps_s=steps,
+        turns=tuple(t for p in parts for t in p.turns),
+        hours=sum_hours(end_s, stream.started_at, spans, steps),
+        days=sum_days(end_s, stream.started_at, spans, steps, bouts, judged),
+        periods=tuple(x for p in parts for x in p.periods),
+        inclination_deg=np.concatenate([p.inclination_deg for p in parts]) if parts else np.empty(0),
+        notices=notices,
+    )
+
+
+def _meet(
+    walks: Sequence[Bout], transitions: Sequence[PosturalTransition]
+) -> tuple[list[Bout], list[PosturalTransition], list[TransitionCandidate]]:
+    """Walking begins after rising and ends before sitting down; a transition amidst walking is none."""
+    kept, refused = [], []
+    ranges = {i: [w.start_s, w.end_s] for i, w in enumerate(walks)}
+    starts = np.array([w.start_s for w in walks])
+    for t in transitions:
+        i = int(np.searchsorted(starts, t.time_s, "right")) - 1
+        if t.rise_m is None or i < 0 or t.time_s >= ranges[i][1]:
+            kept.append(t)
+            continue
+        a, b = ranges[i]
+        if t.kind == "sit_to_stand" and t.time_s - a < min(3.0, 0.5 * (b - a)):
+            ranges[i][0] = t.time_s
+            kept.append(t)
+        elif t.kind == "stand_to_sit" and b - t.time_s < min(3.0, 0.5 * (b - a)):
+            ranges[i][1] = t.time_s
+            kept.append(t)
+        else:
+            refused.append(
+                TransitionCandidate(
+                    t.time_s, t.start_s, t.end_s, t.lean_deg, t.rise_m, "while_walking", t.kind
+                )
+            )
+    met = [replace(w, start_s=ranges[i][0], end_s=ranges[i][1]) for i, w in enumerate(walks)]
+    return met, kept, refused
+
+
+def _fix(
+    parts: Sequence[DayPart], walks: Sequence[Bout], steps: Floats, kinds: np.ndarray
+) -> list[FixedStretch]:
+    """What is certain, in order of time and without overlap; what comes first here wins."""
+    return _lay_by_rank(
+        (
+            [FixedStretch(a, b, "gap", "no_samples") for p in parts for a, b in p.gaps],
+            [FixedStretch(a, b, "non_wear", "no_movement") for p in parts for a, b in p.off],
+            [FixedStretch(a, b, "unknown", "no_baseline") for p in parts for a, b in p.no_baseline],
+            [
+                FixedStretch(a, b, "lying", "inclination")
+                for a, b in _merge_windows([w for p in parts for w in p.lying])
+            ],
+            [x for w in walks for x in _cut_stairs(w, steps, kinds)],
+        )
+    )
+
+
+def _lay_by_rank(classes: Sequence[Sequence[FixedStretch]]) -> list[FixedStretch]:
+    """Stretches in order of time; where two overlap, that of the earlier class stays."""
+    laid: list[FixedStretch] = []
+    for stretches in classes:
+        starts = [x.start_s for x in laid]
+        free = []
+        for x in stretches:
+            at = x.start_s
+            for taken in laid[max(0, bisect_right(starts, x.start_s) - 1) :]:
+                if taken.start_s >= x.end_s:
+                    break
+                if taken.start_s > at:
+                    free.append(replace(x, start_s=at, end_s=taken.start_s))
+                at = max(at, taken.end_s)
+            if at < x.end_s:
+                free.append(replace(x, start_s=at))
+        laid = sorted((*laid, *free), key=lambda x: x.start_s)
+    return laid
+
+
+def _cut_stairs(walk: Bout, steps: Floats, kinds: np.ndarray) -> list[FixedStretch]:
+    """A bout cut where its steps change between level and stairs."""
+    own = _within(steps, walk.start_s, walk.end_s)
+    steps, kinds = steps[own], kinds[own]
+    if not len(steps):
+        return [FixedStretch(walk.start_s, walk.end_s, "walking", "steps")]
+    changes = np.flatnonzero(np.diff(kinds)) + 1
+    edges = [walk.start_s, *(0.5 * (steps[i - 1] + steps[i]) for i in changes), walk.end_s]
+    firsts = [0, *changes.tolist()]
+    return [
+        FixedStretch(float(edges[k]), float(edges[k + 1]), KIND_OF[int(kinds[first])], "steps")
+        for k, first in enumerate(firsts)
+    ]
+
+
+def _within(steps: Floats, start_s: float, end_s: float) -> slice:
+    """Steps from one time to another, both included."""
+    return slice(int(np.searchsorted(steps, start_s)), int(np.searchsorted(steps, end_s, "right")))
+
+
+def _describe(walk: Bout, steps: Floats, kinds: np.ndarray) -> ActivityBout:
+    own = kinds[_within(steps, walk.first_s, walk.end_s)]
+    counts = [int(np.count_nonzero(own == kind)) for kind in range(len(KIND_OF))]
+    return ActivityBout(
+        start_s=walk.start_s,
+        end_s=walk.end_s,
+        kind=KIND_OF[int(np.argmax(counts))] if len(own) else KIND_OF[LEVEL],
+        steps=len(own),
+        stairs_up_steps=counts[1],
+        stairs_down_steps=counts[2],
+        cadence_spm=60.0 / walk.step_s,
+    )
+
+
+def _merge_windows(windows: Sequence[Window]) -> list[Window]:
+    """Windows that touch become one."""
+    merged: list[Window] = []
+    for a, b in sorted(windows):
+        if merged and a <= merged[-1][1] + 1e-6:
+            merged[-1] = (merged[-1][0], max(b, merged[-1][1]))
+        else:
+            merged.append((a, b))
+    return merged
+
+
+def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -> tuple[Notice, ...]:
+    """What the reader has to know."""
+    told = list(stream.notices)
+    if height_m is None:
+        told.append(
+            Notice(
+                "height_assumed",
+                f"Body height is not given; {NOMINAL_HEIGHT_M:.2f} m is taken. It decides how far a chest "
+                "must rise for getting up.",
+                severity="info",
+            )
+        )
+    periods = [p for part in parts for p in part.periods]
+    if periods and all(p.method == "none" for p in periods):
+        told.append(
+            Notice(
+                "no_baseline",
+                "Nobody walked and nobody held still for 5 s: which way is up is not known. Postures are "
+                "left open; record some walking.",
+                stream.device_id,
+            )
+        )
+    elif any(p.method == "first_rest" for p in periods):
+        told.append(
+            Notice(
+                "baseline_assumed",
+                "Without walking the first 5 s of rest are taken as upright. Where the person lay then, all "
+                "postures are wrong.",
+                stream.device_id,
+            )
+        )
+    if any(p.up is not None and p.forward is None for p in periods):
+        told.append(
+            Notice(
+                "forward_unknown",
+                "In some time worn no lean showed where forward is: inclination there has no sign and is "
+                "left out.",
+                stream.device_id,
+                severity="info",
+            )
+        )
+    return tuple(told)

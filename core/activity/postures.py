@@ -1,0 +1,176 @@
+"""What was done from when to when: postures between what is certain (docs/science/activity.md, "Postures").
+
+Certain are lying, walking, and transitions. A stretch between two of them is sitting or standing by what both
+ends say of it: after rising one stands, before sitting down too, before and after walking, beside lying one
+sits. Where the two ends contradict each other, a candidate that lacks nothing but the lean may settle it;
+else nobody knows, and the transition that came in the wrong posture is marked.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from types import MappingProxyType
+from typing import Final, Literal
+
+from core.activity.result import (
+    ActivityKind,
+    ActivitySpan,
+    Evidence,
+    PosturalTransition,
+    TransitionCandidate,
+    TransitionKind,
+)
+from core.rest import Window
+
+Upright = Literal["sitting", "standing"]
+
+AFTER: Final[Mapping[TransitionKind, Upright]] = MappingProxyType(
+    {"sit_to_stand": "standing", "stand_to_sit": "sitting"}
+)
+BEFORE: Final[Mapping[TransitionKind, Upright]] = MappingProxyType(
+    {"sit_to_stand": "sitting", "stand_to_sit": "standing"}
+)
+BESIDE: Final[Mapping[ActivityKind, Upright | None]] = MappingProxyType(
+    {"lying": "sitting", "walking": "standing", "stairs_up": "standing", "stairs_down": "standing"}
+)
+"""What somebody did before and after lying (thesis 7.2.4) and walking."""
+
+CONFIDENCE: Final[Mapping[Evidence, float]] = MappingProxyType(
+    {"both_ends": 1.0, "steps": 1.0, "inclination": 0.8, "one_end": 0.7, "sub_threshold": 0.5}
+)
+
+
+@dataclass(frozen=True)
+class FixedStretch:
+    """A stretch of which it is certain what it is."""
+
+    start_s: float
+    end_s: float
+    kind: ActivityKind
+    evidence: Evidence
+
+
+def decide_postures(
+    duration_s: float,
+    fixed: Sequence[FixedStretch],
+    tilted: Sequence[Window],
+    transitions: Sequence[PosturalTransition],
+    candidates: Sequence[TransitionCandidate],
+    longest_stand_s: float,
+) -> tuple[tuple[ActivitySpan, ...], tuple[PosturalTransition, ...]]:
+    """The whole time from 0 to `duration_s` in spans, and the transitions with their consistency.
+
+    Parameters
+    ----------
+    fixed : in order of time, none overlapping. tilted : beyond the limit of lying without being still.
+    candidates : of these only those that lack nothing but the lean, or were close to lying, settle anything.
+    """
+    spans: list[ActivitySpan] = []
+    judged: list[PosturalTransition] = []
+    upright = [t for t in transitions if t.kind in AFTER]
+    times = [t.time_s for t in upright]
+    settling = [c for c in candidates if c.refused in ("lean_below_limit", "near_lying")]
+    edges: list[FixedStretch | None] = [None, *fixed, None]
+    for left, right in pairwise(edges):
+        start = 0.0 if left is None else left.end_s
+        end = duration_s if right is None else right.start_s
+        if left is not None:
+            spans.append(_span(left.start_s, left.end_s, left.kind, left.evidence))
+        inside = upright[bisect_left(times, start) : bisect_right(times, end)] if end > start else []
+        spans += _fill(start, end, left, right, inside, settling, longest_stand_s, judged)
+    lying = [t for t in transitions if t.kind not in AFTER]
+    told = tuple(sorted((*judged, *lying), key=lambda t: t.time_s))
+    return tuple(_merge(_overlay(spans, tilted))), told
+
+
+def _fill(
+    start: float,
+    end: float,
+    left: FixedStretch | None,
+    right: FixedStretch | None,
+    inside: Sequence[PosturalTransition],
+    settling: Sequence[TransitionCandidate],
+    longest_stand_s: float,
+    judged: list[PosturalTransition],
+) -> list[ActivitySpan]:
+    """Spans between two certain stretches with the transitions in between; appends these to `judged`."""
+    if end <= start:
+        judged += inside
+        return []
+    spans: list[ActivitySpan] = []
+    marks = [start, *(t.time_s for t in inside), end]
+    for k, (a, b) in enumerate(pairwise(marks)):
+        first = _beside(left) if k == 0 else AFTER[inside[k - 1].kind]
+        last = _beside(right) if k == len(inside) else BEFORE[inside[k].kind]
+        consistent = True
+        if first is None or last is None:
+            kind = first or last
+            if kind is None:
+                spans.append(_span(a, b, "unknown", "nothing_known"))
+            else:
+                spans.append(_stand(a, b, kind, "one_end", longest_stand_s))
+        elif first == last:
+            spans.append(_stand(a, b, first, "both_ends", longest_stand_s))
+        else:
+            wanted = "sit_to_stand" if last == "standing" else "stand_to_sit"
+            between = [c for c in settling if a < c.time_s < b and c.likely == wanted]
+            if between:
+                t = max(between, key=lambda c: abs(c.rise_m)).time_s
+                spans.append(_stand(a, t, first, "sub_threshold", longest_stand_s))
+                spans.append(_stand(t, b, last, "sub_threshold", longest_stand_s))
+            else:
+                consistent = False
+                spans.append(_span(a, b, "unknown", "contradiction"))
+        if k < len(inside):
+            judged.append(inside[k] if consistent else replace(inside[k], consistent=False))
+    return [s for s in spans if s.end_s > s.start_s]
+
+
+def _beside(stretch: FixedStretch | None) -> Upright | None:
+    return None if stretch is None else BESIDE.get(stretch.kind)
+
+
+def _stand(a: float, b: float, kind: Upright, evidence: Evidence, longest_s: float) -> ActivitySpan:
+    """Sitting or standing; standing for too long without a step is neither."""
+    if kind == "standing" and b - a > longest_s:
+        return _span(a, b, "unknown", "too_long_still")
+    return _span(a, b, kind, evidence)
+
+
+def _span(a: float, b: float, kind: ActivityKind, evidence: Evidence) -> ActivitySpan:
+    return ActivitySpan(a, b, kind, CONFIDENCE.get(evidence), evidence)
+
+
+def _overlay(spans: Sequence[ActivitySpan], tilted: Sequence[Window]) -> list[ActivitySpan]:
+    """Spans with the stretches cut out in which the trunk was beyond lying for a moment."""
+    out: list[ActivitySpan] = []
+    ends = [w[1] for w in tilted]
+    for span in spans:
+        at = span.start_s
+        if span.kind in ("sitting", "standing", "walking"):
+            for w in tilted[bisect_right(ends, span.start_s) :]:
+                if w[0] >= span.end_s:
+                    break
+                a, b = max(at, w[0]), min(span.end_s, w[1])
+                if a > at:
+                    out.append(replace(span, start_s=at, end_s=a))
+                out.append(_span(a, b, "unknown", "brief_tilt"))
+                at = b
+        if span.end_s > at:
+            out.append(replace(span, start_s=at))
+    return out
+
+
+def _merge(spans: Sequence[ActivitySpan]) -> list[ActivitySpan]:
+    """Neighbours that say the same become one."""
+    merged: list[ActivitySpan] = []
+    for span in spans:
+        last = merged[-1] if merged else None
+        if last is not None and (last.kind, last.evidence) == (span.kind, span.evidence):
+            merged[-1] = replace(last, end_s=span.end_s)
+        else:
+            merged.append(span)
+    return merged

@@ -1,0 +1,401 @@
+"""Samples → ten frames a second: low-passed gravity, vertical acceleration, stillness, steps and turns.
+
+The recording is laid on a uniform axis (core/timeline/grid.py) and gone through in slabs of a fixed length,
+each with a margin on both sides, so that memory does not grow and nothing depends on how the blocks are cut.
+Equations: docs/science/activity.md, "Reduction".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from math import ceil, floor
+from typing import Final, TypeVar
+
+import numba
+import numpy as np
+
+from core.activity.params import ActivityParams
+from core.errors import SignalError
+from core.events.lumbar import LumbarParams, detect_steps, find_moving, split_about_vertical
+from core.events.turns import Turn, find_turns
+from core.frames import GRAVITY, Bools, Floats, Segment
+from core.recording import SensorSignals, Subject, UniformRecording
+from core.rest import find_runs
+from core.sample_blocks import LongStream, SampleBlock, find_complete_rows
+from core.timeline.grid import lay_signal
+from core.timeline.params import TimelineParams
+
+Samples = TypeVar("Samples", Floats, Bools)
+
+FRAME_HZ: Final = 10
+"""Frames a second: the low-passed signals have nothing above 1 Hz."""
+
+PASS_HZ: Final = 0.25
+RIPPLE_DB: Final = 0.01
+STOP_DB: Final = 100.0
+"""Edge of the pass band and ripples of the thesis' elliptic filter (7.2.3); −3 dB lies at 0.825 Hz."""
+
+KEEP_S: Final = 2.0
+"""With a gyroscope: time in which up goes back to where the specific force points, s [our choice]."""
+
+GATE: Final = 2.0
+"""It is drawn there the less the more |acc| differs from gravity, not at all from so much, m/s² [our
+choice]."""
+
+QUIET: Final = 0.1
+"""Rates below this tell the gyroscope's bias, rad/s [our choice]."""
+
+STEP_RATE: Final = 50
+"""Steps are looked for at this rate where the recording's is a multiple of it."""
+
+JOIN_S: Final = 10.0
+"""Movement with shorter pauses is looked through for steps as one."""
+
+EDGE_S: Final = 5.0
+"""Samples before and after movement that go with it, so that filters have settled."""
+
+TWICE_S: Final = 0.2
+"""Steps of two slabs that are nearer than this are one."""
+
+LONGEST_S: Final = 60 * 86400.0
+"""A longer recording is a clock that jumped."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Ten frames a second, f of them.
+
+    Parameters
+    ----------
+    first : number of the first frame since the recording's first sample. valid : (f,) every sample is there.
+    gravity : (f, 3) low-passed specific force, m/s², sensor axes. up : (f,) acceleration along it, mean of
+        the frame, m/s². spread : (f,) mean square of |acc| about its mean over 1 s, (m/s²)².
+    sd, wobble : (f / 600, 3) per minute: standard deviation of the samples and of their means over 1 s, m/s²;
+        NaN where less than half of it was measured.
+    """
+
+    first: int
+    valid: Bools
+    gravity: Floats
+    up: Floats
+    spread: Floats
+    sd: Floats
+    wobble: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Slab:
+    """Frames of one slab, the steps and the turns that lie in it (s since the recording's first sample)."""
+
+    frames: Frames
+    steps_s: tuple[float, ...]
+    turns: tuple[Turn, ...]
+
+
+def working_rate(rate_hz: float) -> int:
+    """Rate of the uniform axis: the next that a frame holds a whole number of samples of."""
+    return FRAME_HZ * max(2, ceil(rate_hz / FRAME_HZ - 0.01))
+
+
+def reduce_stream(stream: LongStream, segment: Segment, params: ActivityParams) -> Iterator[Slab]:
+    """Go through a recording slab by slab.
+
+    Raises
+    ------
+    SignalError : `bad_signal` without one complete sample, `clock_jump`.
+    """
+    rate = working_rate(stream.rate_hz)
+    margin, size = params.margin_s * rate, params.slab_s * rate
+    window = _Window(0, np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.bool_))
+    start = 0
+    for piece in _lay_pieces(stream, rate, size, margin):
+        window = window.extend(piece)
+        while window.end >= start + size + margin:
+            yield _reduce(window, start, start + size, rate, segment, params)
+            start += size
+            window = window.drop_before(start - margin)
+    if window.end > start:
+        yield _reduce(window, start, window.end, rate, segment, params)
+
+
+@dataclass(frozen=True, eq=False)
+class _Window:
+    """Successive points of the axis from `first` on."""
+
+    first: int
+    acc: Floats
+    gyr: Floats
+    valid: Bools
+
+    @property
+    def end(self) -> int:
+        return self.first + len(self.valid)
+
+    def extend(self, more: _Window) -> _Window:
+        return _Window(
+            self.first,
+            np.concatenate((self.acc, more.acc)),
+            np.concatenate((self.gyr, more.gyr)),
+            np.concatenate((self.valid, more.valid)),
+        )
+
+    def drop_before(self, first: int) -> _Window:
+        cut = max(0, first - self.first)
+        return _Window(self.first + cut, self.acc[cut:], self.gyr[cut:], self.valid[cut:])
+
+
+def _lay_pieces(stream: LongStream, rate: int, size: int, margin: int) -> Iterator[_Window]:
+    """Pieces of the axis, the first longer by the margin; the last ends with the recording.
+
+    Points of a piece depend on the last sample before it, those in it, and the first behind it.
+    """
+    kept: list[SampleBlock] = []
+    first, last_s, seen = 0, -np.inf, False
+    end = size + margin
+    for raw in stream.open_blocks():
+        block = _in_order(find_complete_rows(raw), last_s)
+        if not len(block.t_s):
+            continue
+        if float(block.t_s[-1]) > LONGEST_S:
+            raise SignalError(
+                "clock_jump",
+                f"The clock of {stream.source} runs over {block.t_s[-1] / 86400:.0f} days; at most "
+                f"{LONGEST_S / 86400:.0f} are read. Export the recording again.",
+                sensor=stream.device_id,
+            )
+        seen, last_s = True, float(block.t_s[-1])
+        kept.append(block)
+        while last_s > (end + 1) / rate:
+            rows = _join(kept)
+            yield _lay(rows, first, end, rate, stream)
+            # the last sample at or before the next point stays
+            cut = max(0, int(np.searchsorted(rows.t_s, end / rate, "right")) - 1)
+            kept = [_take(rows, slice(cut, None))]
+            first, end = end, end + size
+    if not seen:
+        raise SignalError(
+            "bad_signal",
+            f"{stream.source} has no complete sample; export it again.",
+            sensor=stream.device_id,
+        )
+    until = floor(last_s * rate + 0.01) + 1
+    if until > first:
+        yield _lay(_join(kept), first, until, rate, stream)
+
+
+def _lay(rows: SampleBlock, first: int, end: int, rate: int, stream: LongStream) -> _Window:
+    """Points first to end of the axis."""
+    upto = int(np.searchsorted(rows.t_s, (end + 1) / rate, "right")) + 1
+    channels = rows.acc[:upto]
+    if rows.gyr is not None:
+        channels = np.concatenate((channels, rows.gyr[:upto]), axis=1)
+    laid, valid, _ = lay_signal(
+        rows.t_s[:upto], channels, first / rate, end - first, stream.rate_hz, float(rate), TimelineParams()
+    )
+    return _Window(first, laid[0], laid[1] if len(laid) > 1 else np.zeros_like(laid[0]), valid)
+
+
+def _in_order(block: SampleBlock, after_s: float) -> SampleBlock:
+    """Rows whose time is later than all before them."""
+    if not len(block.t_s):
+        return block
+    before = np.maximum.accumulate(np.concatenate(([after_s], block.t_s[:-1])))
+    rising = block.t_s > before
+    return block if rising.all() else _take(block, rising)
+
+
+def _take(block: SampleBlock, rows: slice | Bools) -> SampleBlock:
+    return SampleBlock(block.t_s[rows], block.acc[rows], None if block.gyr is None else block.gyr[rows])
+
+
+def _join(blocks: Sequence[SampleBlock]) -> SampleBlock:
+    if len(blocks) == 1:
+        return blocks[0]
+    gyr = [b.gyr for b in blocks if b.gyr is not None]
+    return SampleBlock(
+        np.concatenate([b.t_s for b in blocks]),
+        np.concatenate([b.acc for b in blocks]),
+        np.concatenate(gyr) if len(gyr) == len(blocks) else None,
+    )
+
+
+@lru_cache(maxsize=16)
+def _gravity_filter(rate_hz: int) -> Floats:
+    """Second-order section (1, 6) of the thesis' low-pass."""
+    from scipy.signal import ellip
+
+    return np.asarray(ellip(2, RIPPLE_DB, STOP_DB, PASS_HZ / (0.5 * rate_hz), output="sos"))
+
+
+def _reduce(
+    window: _Window, start: int, end: int, rate: int, segment: Segment, params: ActivityParams
+) -> Slab:
+    """One slab: points start to end of a window that has margins around them."""
+    from scipy.ndimage import uniform_filter1d
+    from scipy.signal import sosfiltfilt
+
+    per = rate // FRAME_HZ
+    core = slice(start - window.first, end - window.first)
+    if not window.valid[core].any():
+        return Slab(_empty_frames(start // per, (end - start) // per), (), ())
+    reach = min(len(window.acc) - 1, params.margin_s * rate)
+    gravity = np.asarray(sosfiltfilt(_gravity_filter(rate), window.acc, axis=0, padlen=reach))
+    size = np.maximum(np.sqrt(np.einsum("ni,ni->n", gravity, gravity)), 1e-9)
+    along = np.einsum("ni,ni->n", window.acc, gravity) / size
+    moving = find_moving(along - size, window.valid, rate, params.steps)
+    if window.gyr.any():
+        gravity = size[:, None] * follow_up(window.acc, window.gyr, gravity / size[:, None], rate)
+    up = np.einsum("ni,ni->n", window.acc, gravity) / size
+    norm = np.sqrt(np.einsum("ni,ni->n", window.acc, window.acc))
+    away = norm - uniform_filter1d(norm, rate, mode="nearest")
+
+    def mean(x: Floats) -> Floats:
+        return np.asarray(_cut(x[core], per).mean(axis=1))
+
+    sd, wobble = _measure_minutes(window.acc[core], window.valid[core], rate)
+    frames = Frames(
+        start // per,
+        np.asarray(_cut(window.valid[core], per).all(axis=1)),
+        mean(gravity),
+        mean(up),
+        mean(away**2),
+        sd,
+        wobble,
+    )
+    steps, turns = _find_steps_and_turns(window, moving, rate, segment, params)
+    inside = start / rate, end / rate
+    return Slab(
+        frames,
+        tuple(t for t in steps if inside[0] <= t < inside[1]),
+        tuple(t for t in turns if inside[0] <= t.start_s < inside[1]),
+    )
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _turn_up(acc, rate, start, dt, keep_s, gate):  # type: ignore[no-untyped-def]
+    """Up (n, 3) in sensor axes, turned by the rates and drawn towards the specific force."""
+    n = len(acc)
+    out = np.empty((n, 3))
+    x, y, z = start[0], start[1], start[2]
+    for k in range(n):
+        wx, wy, wz = rate[k, 0], rate[k, 1], rate[k, 2]
+        # the world turns the other way in the sensor's axes
+        x, y, z = (
+            x - dt * (wy * z - wz * y),
+            y - dt * (wz * x - wx * z),
+            z - dt * (wx * y - wy * x),
+        )
+        ax, ay, az = acc[k, 0], acc[k, 1], acc[k, 2]
+        size = np.sqrt(ax * ax + ay * ay + az * az)
+        off = abs(size - GRAVITY) / gate
+        if size > 0.0 and off < 1.0:
+            gain = (1.0 - off) * dt / keep_s
+            x, y, z = x + gain * (ax / size - x), y + gain * (ay / size - y), z + gain * (az / size - z)
+        length = np.sqrt(x * x + y * y + z * z)
+        x, y, z = x / length, y / length, z / length
+        out[k, 0], out[k, 1], out[k, 2] = x, y, z
+    return out
+
+
+def follow_up(acc: Floats, gyr: Floats, coarse: Floats, rate_hz: float) -> Floats:
+    """Up (n, 3) in sensor axes of a sensor with a gyroscope: forwards and backwards through time, the mean.
+
+    Parameters
+    ----------
+    coarse : (n, 3) the same without a gyroscope, to start from. The gyroscope's bias is its mean while quiet.
+    """
+    quiet = np.linalg.norm(gyr, axis=1) < QUIET
+    rate = gyr - gyr[quiet].mean(axis=0) if quiet.any() else gyr
+    dt = 1.0 / rate_hz
+    there = _turn_up(acc, rate, coarse[0], dt, KEEP_S, GATE)
+    back = _turn_up(acc[::-1], -rate[::-1], coarse[-1], dt, KEEP_S, GATE)[::-1]
+    up = there + back
+    return np.asarray(up / np.maximum(np.linalg.norm(up, axis=1), 1e-9)[:, None])
+
+
+def _empty_frames(first: int, count: int) -> Frames:
+    """Frames of which nothing was measured."""
+    minutes = np.full((ceil(count / (60 * FRAME_HZ)), 3), np.nan)
+    nothing = np.zeros(count)
+    return Frames(first, np.zeros(count, np.bool_), np.zeros((count, 3)), nothing, nothing, minutes, minutes)
+
+
+def _cut(x: Samples, per: int) -> Samples:
+    """Whole frames (f, per, …) of samples (n, …); what is left at the end falls away."""
+    count = len(x) // per
+    return x[: count * per].reshape(count, per, *x.shape[1:])
+
+
+def _measure_minutes(acc: Floats, valid: Bools, rate: int) -> tuple[Floats, Floats]:
+    """Standard deviation (m, 3) of samples and of their means over 1 s in every minute begun."""
+    minute = 60 * rate
+    sd, wobble = [], []
+    for i in range(0, len(acc), minute):
+        part, there = acc[i : i + minute], valid[i : i + minute]
+        if np.count_nonzero(there) < 0.5 * minute:
+            sd.append(np.full(3, np.nan))
+            wobble.append(np.full(3, np.nan))
+            continue
+        sd.append(part[there].std(axis=0))
+        wobble.append(_cut(part, rate).mean(axis=1).std(axis=0))
+    return np.array(sd).reshape(-1, 3), np.array(wobble).reshape(-1, 3)
+
+
+def _find_steps_and_turns(
+    window: _Window, moving: Bools, rate: int, segment: Segment, params: ActivityParams
+) -> tuple[list[float], list[Turn]]:
+    """Steps of every stretch of movement of a window, and the turns of those in which somebody walks."""
+    signals = SensorSignals("", window.acc, window.gyr, None, window.valid, ~window.valid)
+    steps: list[float] = []
+    turns: list[Turn] = []
+    for a, b in _stretches(moving, rate, params.steps):
+        part = slice(max(0, a - round(EDGE_S * rate)), min(len(moving), b + round(EDGE_S * rate)))
+        offset = (window.first + part.start) / rate
+        thin = rate // STEP_RATE if rate % STEP_RATE == 0 else 1
+        alone = _take_alone(_cut_out(signals, part), rate, thin, segment)
+        found = detect_steps(alone, params.steps)
+        centre = offset + 0.5 * (thin - 1) / rate
+        steps += [s.time_s + centre for s in found.steps]
+        if found.steps and window.gyr.any():
+            whole = _cut_out(signals, part)
+            _, yaw_rate = split_about_vertical(whole, rate, params.steps)
+            turns += [
+                Turn(t.start_s + offset, t.end_s + offset, t.angle_rad, t.peak_rad_s)
+                for t in find_turns(yaw_rate, whole.valid, rate, params.turns)
+            ]
+    return steps, turns
+
+
+def _stretches(moving: Bools, rate: int, params: LumbarParams) -> list[tuple[int, int]]:
+    """Runs of movement long enough for a bout of steps, those with short pauses joined."""
+    joined: list[tuple[int, int]] = []
+    for a, b in find_runs(moving):
+        if joined and a - joined[-1][1] < JOIN_S * rate:
+            joined[-1] = (joined[-1][0], b)
+        else:
+            joined.append((a, b))
+    shortest = params.step_s[0] * (params.bouts.min_strides + 1) * rate
+    return [(a, b) for a, b in joined if b - a >= shortest]
+
+
+def _cut_out(signals: SensorSignals, part: slice) -> SensorSignals:
+    valid = signals.valid[part].copy()
+    return SensorSignals("", signals.acc[part].copy(), signals.gyr[part].copy(), None, valid, ~valid)
+
+
+def _take_alone(signals: SensorSignals, rate: int, thin: int, segment: Segment) -> UniformRecording:
+    """A stretch by its accelerometer alone: with and without a gyroscope the steps are the same.
+
+    Parameters
+    ----------
+    thin : so many samples become their mean.
+    """
+    acc = np.asarray(_cut(signals.acc, thin).mean(axis=1))
+    valid = np.asarray(_cut(signals.valid, thin).all(axis=1), np.bool_)
+    alone = SensorSignals("", acc, np.zeros_like(acc), None, valid, ~valid)
+    t_s = np.arange(len(acc), dtype=np.float64) * (thin / rate)
+    return UniformRecording(
+        np.asarray(t_s, np.float64), rate / thin, {segment: alone}, Subject(), "activity", {}
+    )

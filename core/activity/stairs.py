@@ -1,0 +1,104 @@
+"""Stairs among walking, experimental (docs/science/activity.md, "Stairs"; Nazarahari 2021, 7.2.6).
+
+On stairs the trunk leans more, and more unevenly, than in level walking: it rocks. The thesis takes the
+variance of the low-passed vertical acceleration, in which the bounce of the steps outweighs the inclination.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from core.activity.params import StairParams
+from core.activity.reduction import FRAME_HZ
+from core.errors import ParameterError
+from core.frames import Bools, Floats
+from core.rest import find_runs
+
+StepKind = Literal["walking", "stairs_up", "stairs_down"]
+
+EDGE_S = 1.5
+"""Left out where walking begins and ends: the trunk leans into it."""
+
+LEVEL, UP, DOWN = 0, 1, 2
+KIND_OF: tuple[StepKind, ...] = ("walking", "stairs_up", "stairs_down")
+
+
+def measure_walking(
+    theta: Floats, walking: Bools, at: Sequence[int], params: StairParams
+) -> tuple[Floats, Floats]:
+    """Standard deviation and mean of the inclination, rad, around frames.
+
+    Parameters
+    ----------
+    theta : (f,) signed inclination. walking : (f,) in a bout. at : frames of steps.
+
+    Returns
+    -------
+    (steps,) each; NaN where the walk is too short for them. Where walking begins and ends nothing is taken.
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    # a second holds two steps: what bounces with each is gone
+    smooth = uniform_filter1d(theta, FRAME_HZ, mode="nearest")
+    half, edge = round(0.5 * params.window_s * FRAME_HZ), round(EDGE_S * FRAME_HZ)
+    rocks, lean = np.full(len(at), np.nan), np.full(len(at), np.nan)
+    runs = find_runs(walking)
+    starts = [a for a, _ in runs]
+    for k, i in enumerate(at):
+        r = bisect_right(starts, i) - 1
+        if r < 0 or i > runs[r][1]:
+            continue
+        a, b = max(runs[r][0] + edge, i - half), min(runs[r][1] - edge, i + half + 1)
+        if b - a >= 1.8 * half:
+            rocks[k], lean[k] = smooth[a:b].std(), smooth[a:b].mean()
+    return rocks, lean
+
+
+def tell_stairs(rocks: Floats, lean: Floats, params: StairParams) -> np.ndarray:
+    """0 level, 1 up, 2 down (steps,), smoothed over five steps; what is not known is level."""
+    up = (rocks > params.rocks_rad) & (lean > params.lean_rad)
+    kinds = np.where(up, UP, np.where(rocks > params.down_rocks_rad, DOWN, LEVEL))
+    if len(kinds) < 5:
+        return kinds
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(kinds, 2, mode="edge"), 5)
+    counts = np.stack([(around == kind).sum(axis=1) for kind in (LEVEL, UP, DOWN)])
+    return np.asarray(counts.argmax(axis=0))
+
+
+def calibrate_stairs(
+    level: tuple[Floats, Floats],
+    up: tuple[Floats, Floats],
+    down: tuple[Floats, Floats],
+    params: StairParams | None = None,
+) -> StairParams:
+    """A person's own limits: halfway between level walking and stairs as they walked them once.
+
+    Parameters
+    ----------
+    level, up, down : rocking and inclination (n,) each, of `measure_walking`, of steps known to be such.
+
+    Raises
+    ------
+    ParameterError : `stairs_not_told_apart` where the person's stairs are like their level walking.
+    """
+    (flat, ahead), (climbs, leans), (descends, _) = (
+        (float(np.nanmedian(rocks)), float(np.nanmedian(lean))) for rocks, lean in (level, up, down)
+    )
+    if min(climbs, descends) <= flat or leans <= ahead:
+        raise ParameterError(
+            "stairs_not_told_apart",
+            f"The trunk rocks by {np.degrees(flat):.1f}° level, {np.degrees(climbs):.1f}° up and "
+            f"{np.degrees(descends):.1f}° down, and leans {np.degrees(leans - ahead):.1f}° further going up. "
+            "Expected more on stairs.",
+        )
+    return replace(
+        params or StairParams(),
+        rocks_rad=(flat * climbs) ** 0.5,
+        down_rocks_rad=(flat * descends) ** 0.5,
+        lean_rad=0.5 * (ahead + leans),
+    )

@@ -1,0 +1,227 @@
+"""Leans of the trunk and what they are: rising, sitting down, a bow; and when the person lay
+(docs/science/activity.md, "Transitions"; Nazarahari 2021, 7.2.4 and 7.2.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import degrees
+
+import numpy as np
+
+from core.activity.params import TransitionParams
+from core.activity.reduction import FRAME_HZ, Frames
+from core.activity.result import PosturalTransition, TransitionCandidate, TransitionKind, TransitionRefusal
+from core.frames import GRAVITY, Bools, Floats
+from core.rest import find_runs
+
+EDGE_RISE = 0.035
+"""A lean ends where the inclination rises again by so much, rad: 2°, above the unrest of sitting."""
+
+CALM_FRAMES = 2
+"""Calm is judged over so many frames to both sides."""
+
+JOIN_LYING_S = 60.0
+JOIN_LYING_RAD = 0.7
+"""Lying goes on through shorter stretches in which the trunk stays below the limit, but above this."""
+
+
+HALF_WAY = 3 * FRAME_HZ
+"""Lying begins and ends half way down and up, at most so many frames from the limit."""
+
+
+@dataclass(frozen=True)
+class Lying:
+    """Lying from half way down, frame a, to half way up, b; `still` where the person held still in it."""
+
+    a: int
+    b: int
+    still: bool
+
+
+@dataclass(frozen=True)
+class Lean:
+    """A lean: first frame, the frame of its largest inclination, last; its inclination there, rad."""
+
+    a: int
+    top: int
+    b: int
+    rad: float
+
+
+def find_lying(tilt: Floats, frames: Frames, there: Bools, params: TransitionParams) -> list[Lying]:
+    """Stretches beyond the limit of lying.
+
+    Parameters
+    ----------
+    tilt : (f,) inclination to any side, rad. there : (f,) worn and upright is known.
+    """
+    joined: list[tuple[int, int]] = []
+    for a, b in find_runs((tilt > params.lying_rad) & there):
+        between = slice(joined[-1][1], a) if joined else slice(0, 0)
+        if (
+            joined
+            and a - joined[-1][1] < JOIN_LYING_S * FRAME_HZ
+            and tilt[between].min() > JOIN_LYING_RAD
+            and there[between].all()
+        ):
+            joined[-1] = (joined[-1][0], b)
+        else:
+            joined.append((a, b))
+    calm = frames.spread < params.still**2
+    length = round(params.still_s * FRAME_HZ)
+    found = []
+    for a, b in joined:
+        still = b - a >= params.shortest_lie_s * FRAME_HZ and any(
+            y - x >= length for x, y in find_runs(calm[a:b])
+        )
+        if still:
+            half = 0.5 * float(np.median(tilt[a:b]))
+            a -= _count_above(
+                tilt[max(0, a - HALF_WAY) : a][::-1], there[max(0, a - HALF_WAY) : a][::-1], half
+            )
+            b += _count_above(tilt[b : b + HALF_WAY], there[b : b + HALF_WAY], half)
+        found.append(Lying(a, b, still))
+    return found
+
+
+def _count_above(tilt: Floats, there: Bools, limit: float) -> int:
+    """Frames from the first one on that stay above a limit."""
+    over = (tilt > limit) & there
+    return len(over) if over.all() else int(np.argmin(over))
+
+
+def find_leans(theta: Floats, there: Bools, params: TransitionParams) -> list[Lean]:
+    """Peaks of the inclination (f,) that are candidates, each with the minima beside it."""
+    from scipy.signal import find_peaks
+
+    tops, _ = find_peaks(
+        np.where(there, theta, 0.0), height=params.candidate_rad, prominence=0.5 * params.prominence_rad
+    )
+    reach = round(params.half_s * FRAME_HZ)
+    return [
+        Lean(
+            int(top) - _edge(theta[max(0, top - reach) : top + 1][::-1]),
+            int(top),
+            int(top) + _edge(theta[top : top + reach + 1]),
+            float(theta[top]),
+        )
+        for top in tops
+    ]
+
+
+def _edge(theta: Floats) -> int:
+    """How far from the peak, the first of them, the inclination (n,) has fallen before it rises again."""
+    low = np.minimum.accumulate(theta)
+    risen = np.flatnonzero(theta > low + EDGE_RISE)
+    upto = int(risen[0]) if len(risen) else len(theta)
+    return int(np.argmin(theta[:upto]))
+
+
+def find_calm_ends(lean: Lean, frames: Frames, params: TransitionParams) -> tuple[int, int]:
+    """Frames around a lean between which the chest goes up or down: the calmest near its two ends.
+
+    Where the trunk is upright again the body may still be stepping, or fall into the seat.
+    """
+    around, inside = round(params.calm_s * FRAME_HZ), round(params.calm_inside_s * FRAME_HZ)
+    n = len(frames.spread)
+
+    def calmest(a: int, b: int) -> int:
+        a, b = max(CALM_FRAMES, a), min(n - CALM_FRAMES - 1, b)
+        if b <= a:
+            return int(np.clip(a, 0, n - 1))
+        run = np.cumsum(frames.spread[a - CALM_FRAMES : b + CALM_FRAMES + 1])
+        width = 2 * CALM_FRAMES + 1
+        means = run[width - 1 :] - np.concatenate(([0.0], run[:-width]))
+        return a + int(np.argmin(means))
+
+    return calmest(lean.a - around, lean.a + inside), calmest(lean.b - inside, lean.b + around)
+
+
+def measure_rise(up: Floats) -> float:
+    """How far the chest rises over a lean, m (thesis Eq. 56).
+
+    Parameters
+    ----------
+    up : (n,) upward acceleration in frames; its mean is taken off, and with it the drift of the velocity:
+        the chest is still at both ends.
+    """
+    a = up - up.mean()
+    velocity = np.concatenate(([0.0], np.cumsum(a))) / FRAME_HZ
+    return float(0.5 * (velocity[1:] + velocity[:-1]).sum() / FRAME_HZ)
+
+
+def tell_direction(size: Floats) -> float:
+    """Positive = rising, negative = sitting down: the greatest value that the running sum reaches of the
+    low-passed acceleration's length (n,) less gravity, m/s (thesis Eq. 57 and 7.2.5)."""
+    a = size - GRAVITY
+    running = np.cumsum(a - a.mean()) / FRAME_HZ
+    return float(running[int(np.argmax(np.abs(running)))])
+
+
+def judge_leans(
+    leans: Sequence[Lean],
+    theta: Floats,
+    frames: Frames,
+    lying: Sequence[Lying],
+    walking: Bools,
+    thigh_m: float,
+    params: TransitionParams,
+) -> tuple[list[PosturalTransition], list[TransitionCandidate]]:
+    """Rising and sitting down among the leans; of the others those worth telling."""
+    found: list[PosturalTransition] = []
+    refused: list[TransitionCandidate] = []
+    close = round(params.near_lying_s * FRAME_HZ)
+    size = np.sqrt(np.einsum("ni,ni->n", frames.gravity, frames.gravity))
+    for lean in leans:
+        first, last = find_calm_ends(lean, frames, params)
+        part = slice(first, last + 1)
+        amidst = walking[lean.a] and walking[lean.b]
+        if lean.b - lean.a < 3 or not frames.valid[part].all() or amidst:
+            continue
+        rise = measure_rise(frames.up[part])
+        direction = tell_direction(size[part])
+        likely: TransitionKind = "sit_to_stand" if rise > 0.0 else "stand_to_sit"
+        near = any(x.a - close <= lean.top <= x.b + close for x in lying)
+        prominent = lean.rad - max(theta[lean.a], theta[lean.b]) >= params.prominence_rad
+        # from upright, or from how the person sat where that is further back
+        far = lean.rad - min(0.0, theta[lean.a], theta[lean.b])
+        large = far >= params.lean_rad and prominent
+        rises = abs(rise) >= params.rise_share * thigh_m
+        time, start, end = ((frames.first + i + 0.5) / FRAME_HZ for i in (lean.top, lean.a, lean.b))
+        reason: TransitionRefusal | None
+        if not rises:
+            reason = "chest_did_not_rise"
+        elif near:
+            reason = "near_lying"
+        elif direction * rise <= 0.0:
+            reason = "direction_unclear"
+        elif not large:
+            reason = "lean_below_limit"
+        else:
+            reason = None
+        if lean.rad >= params.lying_rad or (reason == "chest_did_not_rise" and not large):
+            continue
+        if reason is None:
+            found.append(PosturalTransition(likely, time, start, end, degrees(far), rise))
+        else:
+            named = None if reason in ("chest_did_not_rise", "direction_unclear") else likely
+            refused.append(TransitionCandidate(time, start, end, degrees(far), rise, reason, named))
+    return found, refused
+
+
+def tell_lying(lying: Sequence[Lying], frames: Frames, tilt: Floats) -> list[PosturalTransition]:
+    """Lying down and getting up where a stretch of lying begins and ends, in the direction of the tilt."""
+    found = []
+    n = len(frames.valid)
+    for x in lying:
+        if not x.still:
+            continue
+        ends: tuple[tuple[TransitionKind, int], ...] = (("sit_to_lie", x.a), ("lie_to_sit", x.b))
+        for kind, i in ends:
+            known = 0 < i < n and bool(frames.valid[max(0, i - 1) : i + 1].all())
+            if known:
+                time = (frames.first + i) / FRAME_HZ
+                most = float(tilt[x.a : x.b].max())
+                found.append(PosturalTransition(kind, time, time, time, degrees(most), None))
+    return found

@@ -1,0 +1,131 @@
+"""When the sensor was worn, and how it sat: holes, stretches that nobody wears, and where up and forward are.
+
+Up is the mean direction of gravity while the person walks: nobody walks lying down. Forward is where the
+trunk leans when it leans for a moment (docs/science/activity.md, "Upright and forward").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.activity.params import UprightParams, WearParams
+from core.activity.reduction import FRAME_HZ, Frames
+from core.activity.result import UprightMethod, WearPeriod
+from core.frames import Bools, Floats
+from core.rest import find_runs
+
+MINUTE = 60 * FRAME_HZ
+
+Axis = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Wear:
+    """Frames by index: half-open ranges of holes, of non-wear, and between them what was worn."""
+
+    gaps: tuple[tuple[int, int], ...]
+    off: tuple[tuple[int, int], ...]
+    worn: tuple[tuple[int, int], ...]
+
+
+def find_wear(frames: Frames, params: WearParams) -> Wear:
+    """Tell holes and non-wear of successive frames."""
+    n = len(frames.valid)
+    gaps = tuple((a, b) for a, b in find_runs(~frames.valid) if b - a >= params.gap_s * FRAME_HZ)
+    quiet = np.zeros(n, np.bool_)
+    with np.errstate(invalid="ignore"):
+        still = (frames.sd < params.sd).sum(axis=1) >= params.axes
+        still &= (frames.wobble < params.wobble).all(axis=1)
+    unmoved = frames.valid & (frames.spread < params.unmoved**2)
+    for a, b in find_runs(still):
+        if b - a >= params.still_min:
+            first, end = a * MINUTE, min(n, b * MINUTE)
+            # it was laid down within the minute before, and taken up within the one after
+            first -= _count_while(unmoved[max(0, first - MINUTE) : first][::-1])
+            end += _count_while(unmoved[end : end + MINUTE])
+            quiet[first:end] = True
+    for a, b in gaps:
+        quiet[a:b] = False
+    off = tuple(find_runs(quiet))
+    taken = quiet
+    for a, b in gaps:
+        taken[a:b] = True
+    return Wear(gaps, off, tuple(find_runs(~taken)))
+
+
+def _count_while(mask: Bools) -> int:
+    """How many entries are True before the first that is not."""
+    return int(np.argmin(mask)) if len(mask) and not mask.all() else len(mask)
+
+
+def group_periods(wear: Wear, params: WearParams) -> tuple[tuple[int, int], ...]:
+    """Periods of wear: worn stretches with nothing longer than `still_min` between them."""
+    periods: list[tuple[int, int]] = []
+    for a, b in wear.worn:
+        if periods and a - periods[-1][1] < params.still_min * MINUTE:
+            periods[-1] = (periods[-1][0], b)
+        else:
+            periods.append((a, b))
+    return tuple(periods)
+
+
+def find_upright(
+    frames: Frames, walking: Bools, period: tuple[int, int], params: UprightParams
+) -> tuple[Floats | None, UprightMethod]:
+    """Unit axis (3,) of the sensor that points up in the upright person of a period."""
+    part = slice(*period)
+    walks = walking[part] & frames.valid[part]
+    if np.count_nonzero(walks) >= params.walked_s * FRAME_HZ:
+        return _middle(frames.gravity[part][walks]), "walking"
+    length = round(params.still_s * FRAME_HZ)
+    still = frames.valid[part] & (frames.spread[part] < params.still**2)
+    rest = next(((a, b) for a, b in find_runs(still) if b - a >= length), None)
+    if rest is None:
+        return None, "none"
+    first = period[0] + rest[0]
+    return _middle(frames.gravity[first : first + length]), "first_rest"
+
+
+def _middle(gravity: Floats) -> Floats:
+    """Unit vector (3,) of the medians of directions (n, 3)."""
+    middle = np.median(gravity / np.linalg.norm(gravity, axis=1)[:, None], axis=0)
+    return np.asarray(middle / np.linalg.norm(middle))
+
+
+def find_forward(
+    gravity: Floats, up: Floats, at: Sequence[tuple[int, int, int]], params: UprightParams
+) -> tuple[Floats | None, int]:
+    """Unit axis (3,) of the sensor that points forward, across up, and how many leans showed it.
+
+    Parameters
+    ----------
+    gravity : (f, 3). at : first, most and last frame of every lean of a moment.
+    """
+    directions = []
+    for a, top, b in at:
+        unit = gravity[[a, top, b]] / np.linalg.norm(gravity[[a, top, b]], axis=1)[:, None]
+        lean = unit[1] - 0.5 * (unit[0] + unit[2])
+        lean = lean - (lean @ up) * up
+        size = float(np.linalg.norm(lean))
+        if size >= np.sin(params.lean_rad):
+            # what points up in the sensor moves backward when the trunk leans forward
+            directions.append(-lean / size)
+    if len(directions) < params.least:
+        return None, len(directions)
+    mean = np.mean(directions, axis=0)
+    size = float(np.linalg.norm(mean))
+    return (mean / size if size >= params.agreement else None), len(directions)
+
+
+def describe_period(
+    start_s: float, end_s: float, up: Floats | None, forward: Floats | None, method: UprightMethod, leans: int
+) -> WearPeriod:
+    """The period in words of the result."""
+    return WearPeriod(start_s, end_s, _axis(up), _axis(forward), method, leans)
+
+
+def _axis(v: Floats | None) -> Axis | None:
+    return None if v is None else (float(v[0]), float(v[1]), float(v[2]))

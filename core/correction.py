@@ -1,0 +1,108 @@
+"""What a sensor's values are multiplied by and which axes they belong to, where its file says it wrongly.
+
+A correction is part of what somebody declares about a take (docs/formats.md, "The manifest"); the files stay
+as they came.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from core.errors import ParameterError
+from core.frames import Floats
+
+AXES: Final = ("x", "y", "z")
+AS_READ: Final[tuple[str, ...]] = AXES
+
+
+@dataclass(frozen=True)
+class SensorCorrection:
+    """Axes and factors of one sensor.
+
+    Parameters
+    ----------
+    acc_axes, gyr_axes : for each of the right x, y and z the axis as read that shows it, such as
+        ("-y", "x", "z"). acc_times, gyr_times : factors, such as 9.80665 where g was read as m/s².
+
+    Raises
+    ------
+    ParameterError `correction_implausible`.
+    """
+
+    acc_axes: tuple[str, ...] = AS_READ
+    gyr_axes: tuple[str, ...] = AS_READ
+    acc_times: float = 1.0
+    gyr_times: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("acc_axes", "gyr_axes"):
+            axes = getattr(self, name)
+            if sorted(a.removeprefix("-") for a in axes) != list(AXES):
+                raise ParameterError(
+                    "correction_implausible",
+                    f"{name} is {list(axes)}; expected x, y and z once each, with or without a minus: "
+                    '["-y", "x", "z"].',
+                )
+        for name in ("acc_times", "gyr_times"):
+            if not 1e-4 <= getattr(self, name) <= 1e4:
+                raise ParameterError(
+                    "correction_implausible",
+                    f"{name} is {getattr(self, name):g}; expected a factor from 0.0001 to 10000.",
+                )
+
+    @property
+    def turns_axes(self) -> bool:
+        """Whether it changes more than units."""
+        return self.acc_axes != AS_READ or self.gyr_axes != AS_READ
+
+    def correct_acc(self, acc: Floats) -> Floats:
+        """Specific force (n, 3) in m/s² along the right axes."""
+        return acc @ (self.acc_times * to_axes_matrix(self.acc_axes)).T
+
+    def correct_gyr(self, gyr: Floats) -> Floats:
+        """Angular rate (n, 3) in rad/s along the right axes."""
+        return gyr @ (self.gyr_times * to_axes_matrix(self.gyr_axes)).T
+
+    def follow(self, first: SensorCorrection) -> SensorCorrection:
+        """The correction that does what `first` does and then what this one does."""
+        acc = to_axes_matrix(self.acc_axes) @ to_axes_matrix(first.acc_axes)
+        gyr = to_axes_matrix(self.gyr_axes) @ to_axes_matrix(first.gyr_axes)
+        return SensorCorrection(
+            name_axes(acc),
+            name_axes(gyr),
+            self.acc_times * first.acc_times,
+            self.gyr_times * first.gyr_times,
+        )
+
+    def to_json(self) -> dict[str, object]:
+        """As a manifest has it; what stays as read is left out."""
+        said: dict[str, object] = {
+            name: list(getattr(self, name))
+            for name in ("acc_axes", "gyr_axes")
+            if getattr(self, name) != AS_READ
+        }
+        return said | {
+            name: getattr(self, name) for name in ("acc_times", "gyr_times") if getattr(self, name) != 1.0
+        }
+
+
+def to_axes_matrix(axes: Sequence[str]) -> Floats:
+    """Matrix (3, 3) from values as read to the named axes.
+
+    >>> to_axes_matrix(("-y", "x", "z"))[0].tolist()
+    [0.0, -1.0, 0.0]
+    """
+    matrix = np.zeros((3, 3))
+    for row, name in enumerate(axes):
+        matrix[row, AXES.index(name.removeprefix("-"))] = -1.0 if name.startswith("-") else 1.0
+    return matrix
+
+
+def name_axes(matrix: Floats) -> tuple[str, ...]:
+    """The names for a signed permutation (3, 3): the opposite of `to_axes_matrix`."""
+    columns = np.argmax(np.abs(matrix), axis=1)
+    return tuple(("-" if matrix[row, c] < 0.0 else "") + AXES[c] for row, c in enumerate(columns))

@@ -1,0 +1,245 @@
+"""The one function: an analysed take through several filters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from core.angles import JointAngles
+from core.angles.measure import measure_angles
+from core.errors import EstimationError, Notice
+from core.events.result import Strides
+from core.filter_comparison.reference import (
+    PlacedReference,
+    compare_by_bland_altman,
+    lean_and_course,
+    measure_reference_angles,
+    place_reference,
+)
+from core.filter_comparison.result import (
+    BlandAltman,
+    FilterAgreement,
+    FilterComparison,
+    FilterRequest,
+    ReferenceScores,
+)
+from core.filter_comparison.run import Clock, FilterRun, prepare_signals, run_filter
+from core.filter_comparison.spread import (
+    choose_samples,
+    cut_into_cycles,
+    pool_scores,
+    score_between,
+    spread_of_angles,
+    spread_of_segment,
+)
+from core.formats.orientation_table import OrientationTable
+from core.frames import SIDES, Bools, Floats, Segment
+from core.fusion.algorithms.choice import LABELS
+from core.fusion.orientations import Orientations
+from core.pipeline import Progress, TakeAnalysis
+from core.rest import Window
+
+OWN_CHAIN: Final = "Sagittal, as analysed"
+"""The product's own orientations, to which every filter is compared."""
+
+FAR_CODE: Final = "far_from_others"
+FAR: Final = float(np.radians(20.0))
+"""Orientation against the median from which a filter is told to be far from the others (our choice)."""
+
+
+def compare_filters(
+    analysis: TakeAnalysis,
+    strides: Strides,
+    request: FilterRequest,
+    progress: Progress,
+    clock: Clock,
+    reference: OrientationTable | None = None,
+) -> FilterComparison:
+    """Run filters on the sensors of an analysed take and compare them.
+
+    All get the same samples, mountings, start and strides: those of the analysis. A filter that cannot run or
+    diverges is told and left out; the others are compared without it.
+
+    Parameters
+    ----------
+    strides : of the analysis, as a person may have changed them.
+    clock : seconds; its differences are the cost.
+    reference : orientations of another system.
+
+    Raises
+    ------
+    EstimationError `nothing_calibrated`; `no_orientations` of squats; `no_filter_ran` where every filter
+    refused or diverged.
+    FormatError of `place_reference`.
+    """
+    mounted = analysis.mounted
+    calibrated = analysis.calibrated if mounted is None else mounted.calibrated
+    alone = analysis.fused if mounted is None else mounted.orientations
+    own = analysis.orientations
+    if calibrated is None or alone is None or own is None:
+        if analysis.leg is not None:
+            raise EstimationError(
+                "no_orientations",
+                "Squats are followed by the chain of the leg; filters are compared on walks.",
+            )
+        why = "" if analysis.problem is None else f" {analysis.problem.message}"
+        raise EstimationError("nothing_calibrated", f"No sensor of this take is calibrated.{why}")
+    recording = calibrated.recording
+    keep = choose_samples(len(recording.t_s), recording.rate_hz)
+    signals = prepare_signals(calibrated, alone, magnetometer=request.magnetometer)
+    signals = {s: x for s, x in signals.items() if s in own.q}
+    kept = _Kept(
+        recording.t_s[keep],
+        recording.rate_hz / keep.step,
+        calibrated.calibration.zero,
+        {s: own.q[s][keep] for s in signals},
+        {s: recording.sensors[s].valid[keep] for s in signals},
+    )
+    runs: dict[str, FilterRun] = {}
+    for k, name in enumerate(dict.fromkeys(request.filters)):
+        progress("filters", k / len(request.filters))
+        runs[name] = run_filter(name, signals, recording.rate_hz, keep, clock)
+    if not any(run.q for run in runs.values()):
+        told = next(run.told[0].message for run in runs.values())
+        raise EstimationError("no_filter_ran", f"No filter gave a result. The first says: {told}")
+    progress("comparing", 1.0)
+    angles = {name: kept.measure_angles(run.q).angles for name, run in runs.items() if run.q}
+    chain_angles = kept.measure_angles(kept.chain)
+    spreads, medians = _spread_segments(runs, kept)
+    spreads |= spread_of_angles(list(angles.values()), chain_angles.angles)
+    scores = None
+    every: dict[str | None, Mapping[Segment, Floats]] = {None: kept.chain}
+    every.update((name, run.q) for name, run in runs.items())
+    if reference is not None:
+        placed = place_reference(reference, analysis.source.segments, medians, kept.valid, kept.t_s)
+        measured: dict[str | None, Mapping[str, Floats]] = {None: chain_angles.angles}
+        measured.update(angles.items())
+        scores = _score(reference, placed, every, measured, kept.valid, chain_angles.zero_offset)
+    own_run = FilterRun(kept.chain, None, ())
+    agreements = [_agree(name, run, medians, kept) for name, run in ((None, own_run), *runs.items())]
+    return FilterComparison(
+        request,
+        kept.t_s,
+        tuple(signals),
+        {s: sum(x.side == s and x.excluded_reason is None for x in strides.strides) for s in SIDES},
+        tuple(agreements),
+        tuple(
+            cut_into_cycles(name, n, sd, reach, kept.t_s, strides)
+            for name, (sd, reach, n) in spreads.items()
+            if np.isfinite(sd).any()
+        ),
+        scores,
+        _tell(agreements),
+        every,
+        kept.valid,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """The take on the samples on which filters are compared.
+
+    Parameters
+    ----------
+    zero : of joint angles. chain : segment → (m, 4) to W by the product. valid : segment → (m,).
+    """
+
+    t_s: Floats
+    rate_hz: float
+    zero: Window
+    chain: Mapping[Segment, Floats]
+    valid: Mapping[Segment, Bools]
+
+    def measure_angles(self, q: Mapping[Segment, Floats]) -> JointAngles:
+        """Joint angles of orientations on these samples, zeroed as the take's."""
+        valid = {s: self.valid[s] for s in q}
+        return measure_angles(Orientations(self.t_s, self.rate_hz, q, valid, "compared"), self.zero)
+
+
+def _spread_segments(
+    runs: Mapping[str, FilterRun], kept: _Kept
+) -> tuple[dict[str, tuple[Floats, Floats, int]], dict[Segment, Floats]]:
+    """Spread of inclination and heading by quantity: SD, range, of how many filters; and their medians."""
+    spreads: dict[str, tuple[Floats, Floats, int]] = {}
+    medians = {}
+    for s, near in kept.chain.items():
+        rows = [run.q[s] for run in runs.values() if s in run.q]
+        if rows:
+            found, medians[s] = spread_of_segment(s, np.stack(rows), near, kept.valid[s])
+            spreads |= {name: (*pair, len(rows)) for name, pair in found.items()}
+    return spreads, medians
+
+
+def _agree(
+    name: str | None, run: FilterRun, medians: Mapping[Segment, Floats], kept: _Kept
+) -> FilterAgreement:
+    """One row of the table: RMS over all segments against the median and the product's own chain."""
+    by_median, by_own = (
+        {
+            s: score
+            for s, q in run.q.items()
+            if s in other and (score := score_between(q, other[s], kept.valid[s])) is not None
+        }
+        for other in (medians, kept.chain)
+    )
+    told = run.told
+    to_median = pool_scores(list(by_median.values()))
+    if name is not None and to_median is not None and to_median.total > FAR:
+        message = (
+            f"{np.degrees(to_median.total):.0f}° from the median: far from the others. "
+            "Leave it out to see the spread of the rest."
+        )
+        told = (*told, Notice(FAR_CODE, message))
+    label = OWN_CHAIN if name is None else LABELS[name]
+    to_own = None if name is None else pool_scores(list(by_own.values()))
+    return FilterAgreement(name, label, run.cost_us, to_median, to_own, by_median, told)
+
+
+def _tell(agreements: list[FilterAgreement]) -> tuple[Notice, ...]:
+    """What of all filters must be said above the results."""
+    missing = [a.label for a in agreements if a.to_median is None]
+    far = [a.label for a in agreements if any(n.code == FAR_CODE for n in a.told)]
+    told = []
+    if missing:
+        told.append(Notice("filters_left_out", f"No result, the table says why: {', '.join(missing)}."))
+    if far:
+        told.append(Notice("filters_far", f"Far from the others, and in the spread: {', '.join(far)}."))
+    return tuple(told)
+
+
+def _score(
+    table: OrientationTable,
+    placed: PlacedReference,
+    every: Mapping[str | None, Mapping[Segment, Floats]],
+    angles: Mapping[str | None, Mapping[str, Floats]],
+    valid: Mapping[Segment, Bools],
+    zero_offset: Mapping[str, float],
+) -> ReferenceScores:
+    """RMS errors and Bland–Altman of every filter, segment and joint angle that the reference has."""
+    known = {s: np.isfinite(q[:, 0]) & valid[s] for s, q in placed.q.items()}
+    whole = {s: np.where(known[s][:, None], q, (1.0, 0.0, 0.0, 0.0)) for s, q in placed.q.items()}
+    joints = measure_reference_angles(whole, known, zero_offset) if whole else {}
+    scores, pairs = {}, []
+    for name, q in every.items():
+        common = [s for s in placed.q if s in q]
+        found = {s: score_between(q[s], whole[s], known[s]) for s in common}
+        scores[name] = {s: score for s, score in found.items() if score is not None}
+        for s in common:
+            values = zip(
+                ("inclination", "heading"),
+                lean_and_course(q[s]),
+                lean_and_course(np.where(known[s][:, None], placed.q[s], np.nan)),
+                strict=True,
+            )
+            pairs += [(name, f"{s}_{quantity}", mine, theirs) for quantity, mine, theirs in values]
+        mine = angles.get(name, {})
+        pairs += [(name, joint, mine[joint], x) for joint, x in joints.items() if joint in mine]
+    found_pairs = (compare_by_bland_altman(*pair) for pair in pairs)
+    agreement: tuple[BlandAltman, ...] = tuple(x for x in found_pairs if x is not None)
+    notices = (*(replace(n, severity="info") for n in table.notices), *placed.notices)
+    return ReferenceScores(
+        table.source, placed.lag_s, placed.correlation, tuple(placed.q), scores, agreement, notices
+    )

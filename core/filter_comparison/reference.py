@@ -1,0 +1,276 @@
+"""A reference from another system laid onto a take: its clock, its world, and how its markers sit.
+
+Three things are fitted and told, because no file says them. The lag: where the angular speeds, which no frame
+changes, correlate best. And by segment one constant turn of the world and one of the sensor, to the median of
+the filters: what all have in common does not show, and filters near the median look better than others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.signal import correlate
+
+from core.angles.kernel import AngleKernel
+from core.errors import FormatError, Notice
+from core.filter_comparison.result import BlandAltman
+from core.formats.aliases import segment_named
+from core.formats.orientation_table import OrientationTable
+from core.frames import SEGMENTS, Bools, Floats, Segment
+from core.rotation import conjugate, log, mean, multiply, normalise, rotate, wrap_angle, yaw
+
+LEAST_OVERLAP_S: Final = 5.0
+"""Shortest stretch on which a lag is looked for (our choice: some strides)."""
+LONGEST_S: Final = 3 * 3600.0
+"""Longest reference (our choice): beyond it a clock in ms or µs was most likely read as seconds."""
+LEAST_SHARE: Final = 0.5
+"""Share of the shorter of both that has to meet the other."""
+LEAST_CORRELATION: Final = 0.7
+"""Of angular speeds; the same movement gives 0.9 and more, another walk at the same pace about 0.5."""
+NEAR_S: Final = 0.5
+NEAR_ENOUGH: Final = 0.02
+"""The file's own clock is believed to within `NEAR_S` when no other lag correlates better by this much: a
+walk looks the same a stride later."""
+GAP_S: Final = 0.1
+FITTED: Final = 4000
+"""Samples that the constant turns are fitted to at most."""
+ROUNDS: Final = 30
+"""Of the fit, which settles in less than ten."""
+POINTS: Final = 80
+"""Of a Bland–Altman plot."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedReference:
+    """A reference in W, as the take's segments: segment → (m, 4) on the kept samples, NaN where unknown."""
+
+    q: Mapping[Segment, Floats]
+    lag_s: float
+    correlation: float
+    notices: tuple[Notice, ...]
+
+
+def place_reference(
+    table: OrientationTable,
+    worn: Mapping[str, Segment | None],
+    median: Mapping[Segment, Floats],
+    valid: Mapping[Segment, Bools],
+    t_s: Floats,
+) -> PlacedReference:
+    """Lay a reference onto a take.
+
+    Parameters
+    ----------
+    worn : device → segment, for columns that are named by the sensor. median : segment → (m, 4) segment to W
+        of the filters. t_s : (m,) uniform.
+
+    Raises
+    ------
+    FormatError `no_common_segment`, `too_long`, `no_overlap`, `other_movement`.
+    """
+    named = name_segments(table, worn)
+    common = [s for s in SEGMENTS if s in named and s in median]
+    if not common:
+        raise FormatError(
+            "no_common_segment",
+            f"{table.source} has {', '.join(list(table.q)[:8])}, the take {', '.join(median)}. "
+            "Name columns by segments or by sensor ids of this take.",
+        )
+    lasts_s = float(table.t_s[-1] - table.t_s[0])
+    if lasts_s > LONGEST_S:
+        raise FormatError(
+            "too_long",
+            f"{table.source} lasts {lasts_s:.6g} s by its time; expected at most {LONGEST_S:g} s. "
+            "A column in ms or µs says so in its name: time_ms, time_us.",
+        )
+    if lasts_s < LEAST_OVERLAP_S:
+        raise _too_short(table.source)
+    step = float(t_s[1] - t_s[0])
+    own_t = np.arange(table.t_s[0], table.t_s[-1], step)
+    pairs = [
+        (
+            np.where(valid[s][1:] & valid[s][:-1], _speed(median[s]), np.nan),
+            _speed(interpolate(own_t, table.t_s, named[s])),
+        )
+        for s in common
+    ]
+    lag_s, correlation = find_lag(pairs, step, float(t_s[0] - own_t[0]), table.source)
+    q = {}
+    for s in common:
+        seen = interpolate(t_s - lag_s, table.t_s, named[s])
+        known = np.flatnonzero(np.isfinite(seen[:, 0]) & valid[s])
+        if len(known) * step < LEAST_OVERLAP_S:
+            continue
+        known = known[:: -(-len(known) // FITTED)]
+        world, sensor = fit_frames(seen[known], median[s][known])
+        q[s] = multiply(multiply(conjugate(world), seen), conjugate(sensor))
+    told = (
+        Notice(
+            "reference_lag",
+            f"The reference's clock was moved {'back' if lag_s < 0.0 else 'on'} by {abs(lag_s):.3f} s, "
+            f"where the angular speeds correlate best ({correlation:.3f}).",
+            severity="info",
+        ),
+        Notice(
+            "reference_turned",
+            "By segment, one constant turn of the world and one of the sensor were fitted to the median of "
+            "the filters. A constant error that all filters share does not show. Filters near the median "
+            "look better: errors that differ by less than about a degree rank no filter.",
+            severity="info",
+        ),
+    )
+    return PlacedReference(q, lag_s, correlation, told)
+
+
+def name_segments(table: OrientationTable, worn: Mapping[str, Segment | None]) -> dict[Segment, Floats]:
+    """Columns of the reference by segment, named by the segment or by the sensor worn there."""
+    devices = {device.lower(): segment for device, segment in worn.items()}
+    found: dict[Segment, Floats] = {}
+    for name, q in table.q.items():
+        segment = devices.get(name.lower()) or segment_named(name)
+        if segment is not None:
+            found.setdefault(segment, q)
+    return found
+
+
+def interpolate(t_new: Floats, t_s: Floats, q: Floats) -> Floats:
+    """Orientations (k, 4) at other times; NaN outside, and in gaps longer than 0.1 s or two samples."""
+    known = np.isfinite(q[:, 0])
+    t, x = t_s[known], q[known]
+    out = np.full((len(t_new), 4), np.nan)
+    if len(t) < 2:
+        return out
+    flips = np.sign((x[1:] * x[:-1]).sum(axis=1))
+    x = x * np.concatenate(([1.0], np.cumprod(np.where(flips == 0.0, 1.0, flips))))[:, None]
+    longest = max(GAP_S, 2.1 * float(np.median(np.diff(t_s))))
+    before = np.clip(np.searchsorted(t, t_new, "right") - 1, 0, len(t) - 2)
+    inside = (t_new >= t[0]) & (t_new <= t[-1]) & (t[before + 1] - t[before] <= longest)
+    out[inside] = normalise(np.stack([np.interp(t_new[inside], t, x[:, c]) for c in range(4)], axis=1))
+    return out
+
+
+def find_lag(
+    pairs: Sequence[tuple[Floats, Floats]], step_s: float, ahead_s: float, source: str
+) -> tuple[float, float]:
+    """What to add to the reference's clock, s, and the correlation of the angular speeds there.
+
+    Parameters
+    ----------
+    pairs : by segment the speeds of the take (m,) and of the reference (k,), NaN where unknown, both every
+        `step_s`. ahead_s : how much later the take's first sample is by the two clocks.
+
+    Raises
+    ------
+    FormatError `no_overlap`, `other_movement`.
+    """
+    above, left, right, both = (np.zeros(1) for _ in range(4))
+    for take, reference in pairs:
+        (a, here), (b, there) = (_known(x) for x in (take, reference))
+        n = np.maximum(_meet(here, there), 1.0)
+        mean_a, mean_b = _meet(a, there) / n, _meet(here, b) / n
+        above = above + _meet(a, b) - n * mean_a * mean_b
+        left = left + _meet(a**2, there) - n * mean_a**2
+        right = right + _meet(here, b**2) - n * mean_b**2
+        both = np.maximum(both, n)
+    shorter = min(len(x) for x in pairs[0])
+    enough = both >= max(LEAST_OVERLAP_S / step_s, LEAST_SHARE * shorter)
+    if not enough.any():
+        raise _too_short(source)
+    power = np.sqrt(np.maximum(left, 0.0) * np.maximum(right, 0.0))
+    r = np.where(enough & (power > 1e-12 * power.max()), above / np.where(power > 0.0, power, 1.0), -1.0)
+    # sample k of the take meets sample k − shift of the reference
+    lags = (np.arange(len(r)) - (len(pairs[0][1]) - 1)) * step_s + ahead_s
+    best = int(np.argmax(r))
+    near = np.where(np.abs(lags) <= NEAR_S, r, -1.0)
+    if near.max() >= r[best] - NEAR_ENOUGH:
+        best = int(np.argmax(near))
+    if r[best] < LEAST_CORRELATION:
+        raise FormatError(
+            "other_movement",
+            f"{source} moves differently from the take: angular speeds correlate by {r[best]:.2f} at best, "
+            f"expected {LEAST_CORRELATION:g}. Is it of this take, and are the segments right?",
+        )
+    a, b, c = r[max(best - 1, 0)], r[best], r[min(best + 1, len(r) - 1)]
+    bend = a - 2.0 * b + c
+    return float(lags[best] + (0.5 * step_s * (a - c) / bend if bend < 0.0 else 0.0)), float(b)
+
+
+def _too_short(source: str) -> FormatError:
+    return FormatError(
+        "no_overlap",
+        f"{source} and the take have less than {LEAST_OVERLAP_S:g} s in common; give the whole of it.",
+    )
+
+
+def fit_frames(reference: Floats, q: Floats) -> tuple[Floats, Floats]:
+    """Constant rotations a, b (4,) with reference ≈ a ⊗ q ⊗ b over samples (k, 4), least squares of sines.
+
+    ⟨reference, a q b⟩ is linear in a bᵀ: the greatest eigenvector of its square is the start, and the
+    mean rotation (Markley 2007) of one given the other the rest, until they stay.
+    """
+    basis = np.eye(4)
+    parts = [(multiply(multiply(a, q), b) * reference).sum(axis=1) for a in basis for b in basis]
+    linear = np.stack(parts, axis=1)
+    left, _, right = np.linalg.svd(np.linalg.eigh(linear.T @ linear)[1][:, -1].reshape(4, 4))
+    world, sensor = normalise(left[:, 0]), normalise(right[0])
+    for _ in range(ROUNDS):
+        world = mean(multiply(reference, conjugate(multiply(q, sensor))))
+        sensor = mean(multiply(conjugate(multiply(world, q)), reference))
+    return world, sensor
+
+
+def measure_reference_angles(
+    q: Mapping[Segment, Floats], known: Mapping[Segment, Bools], zero_offset: Mapping[str, float]
+) -> dict[str, Floats]:
+    """Joint angles (m,) of a placed reference from the take's own zero: it need not show the standing.
+
+    Parameters
+    ----------
+    zero_offset : angle → what is taken off, rad; others are left out.
+    """
+    kernel = AngleKernel.between(tuple(q))
+    zero = np.array([zero_offset.get(name, np.nan) for name in kernel.names])
+    angles = kernel.measure(np.stack([*q.values()], axis=1), np.stack([known[s] for s in q], axis=1), zero)
+    return {name: angles[:, i] for i, name in enumerate(kernel.names) if name in zero_offset}
+
+
+def compare_by_bland_altman(
+    name: str | None, quantity: str, value: Floats, reference: Floats
+) -> BlandAltman | None:
+    """Differences of angles (m,) in rad where both are known; None with fewer than two."""
+    known = np.isfinite(value) & np.isfinite(reference)
+    if np.count_nonzero(known) < 2:
+        return None
+    apart = wrap_angle(value[known] - reference[known])
+    bias, sd = float(apart.mean()), float(apart.std(ddof=1))
+    shown = np.linspace(0, len(apart) - 1, min(POINTS, len(apart))).round().astype(np.int64)
+    return BlandAltman(
+        name, quantity, len(apart), bias, bias - 1.96 * sd, bias + 1.96 * sd,
+        float(np.sqrt((apart**2).mean())),
+        wrap_angle(reference[known][shown] + 0.5 * apart[shown]), apart[shown],
+    )  # fmt: skip
+
+
+def lean_and_course(q: Floats) -> tuple[Floats, Floats]:
+    """Inclination of a segment's long axis (m,) and its course over the floor, rad; NaN where q is."""
+    up = rotate(q, np.array([0.0, 1.0, 0.0]))[..., 2]
+    return np.arccos(np.clip(up, -1.0, 1.0)), yaw(q)
+
+
+def _speed(q: Floats) -> Floats:
+    """Turn from sample to sample (m − 1,), rad."""
+    return np.asarray(np.linalg.norm(log(multiply(conjugate(q[:-1]), q[1:])), axis=1))
+
+
+def _known(x: Floats) -> tuple[Floats, Floats]:
+    """The signal with unknown samples as zero, and where it is known as 1."""
+    known = np.isfinite(x)
+    return np.where(known, x, 0.0), known.astype(np.float64)
+
+
+def _meet(a: Floats, b: Floats) -> Floats:
+    """Sums of products of two signals at every lag."""
+    return np.asarray(correlate(a, b, method="fft"))

@@ -1,0 +1,170 @@
+"""Any filter on the sensors of a calibrated take, so that all give the same thing: segment to W.
+
+Every filter starts in the middle of the calibration's zero window, at the tilt and the heading that the
+product has there, and runs from it to both ends of the take; backwards the rates are negated, which is the
+inverse motion. A constant turn about the vertical lays its world on W. What differs later, the filter did.
+
+A published filter turns by a sample's rate from the sample before to this one. That rate is the mean of both,
+as the product takes it: by the later one alone all are ahead by half a sample, 1.5° at 300 °/s and 100 Hz.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from core.calibration.result import CalibratedRecording
+from core.errors import Notice, SagittalError
+from core.frames import Floats, Segment
+from core.fusion.algorithms.choice import OWN
+from core.fusion.algorithms.filter import FusionFilter, RestMeans
+from core.fusion.orientations import Orientations
+from core.fusion.self_calibrating import SelfCalibratingFilter
+from core.rest import index_window
+from core.rotation import about, conjugate, from_matrix, multiply, rotate, split_heading
+
+Clock = Callable[[], float]
+"""Seconds of a clock that only goes forward; core has none of its own."""
+
+BOTH_WAYS: Final = {o.name: o.both_ways for o in OWN}
+WARM_UP: Final = 50
+"""Samples of a first run that only loads what is compiled, so that it is not counted as cost."""
+
+
+@dataclass(frozen=True, eq=False)
+class MountedSignals:
+    """One sensor as every filter gets it.
+
+    Parameters
+    ----------
+    gyr, acc, mag : (n, 1, 3), NaN where the sensor was lost; mag None without a magnetometer. gyr is the rate
+        from the sample before to this one.
+    rest : what filters start from, in the middle `at` of the zero window. start : (4,) sensor to W there.
+    sensor_q : (4,) segment to sensor.
+    """
+
+    gyr: Floats
+    acc: Floats
+    mag: Floats | None
+    rest: RestMeans
+    at: int
+    start: Floats
+    sensor_q: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class FilterRun:
+    """One filter on all sensors: segment → (m, 4) segment to W on the kept samples, and what went wrong."""
+
+    q: Mapping[Segment, Floats]
+    cost_us: float | None
+    told: tuple[Notice, ...]
+
+
+def prepare_signals(
+    calibrated: CalibratedRecording, alone: Orientations, *, magnetometer: bool
+) -> dict[Segment, MountedSignals]:
+    """Signals and start of every calibrated sensor.
+
+    Parameters
+    ----------
+    alone : orientations of each sensor on its own, with the same mountings.
+    """
+    recording, zero = calibrated.recording, calibrated.calibration.zero
+    window = index_window(zero, recording.rate_hz)
+    at = min((window.start + window.stop) // 2, len(recording.t_s) - 1)
+    found = {}
+    for segment, mounted in calibrated.calibration.segments.items():
+        signals = recording.sensors[segment]
+        sensor = from_matrix(mounted.R_segment_sensor)
+        q = multiply(alone.q[segment], sensor)
+        lost = ~signals.valid[:, None]
+        acc, gyr = (np.where(lost, np.nan, x)[:, None] for x in (signals.acc, signals.gyr))
+        gyr[1:] = 0.5 * (gyr[1:] + gyr[:-1])
+        mag, north = None, None
+        if magnetometer and signals.mag is not None:
+            mag = np.where(lost, np.nan, signals.mag)[:, None]
+            field = rotate(q[window], mag[window, 0])
+            field = field[np.isfinite(field).all(axis=1)]
+            # seen from the sensor in the middle: a walk that serves as zero turns it meanwhile
+            north = rotate(conjugate(q[at]), field.mean(axis=0))[None] if len(field) else None
+        up = rotate(conjugate(q[at]), np.array([0.0, 0.0, mounted.rest_norm]))
+        rest = RestMeans(up[None], mounted.gyro_bias[None], north)
+        found[segment] = MountedSignals(
+            gyr, acc, None if north is None else mag, rest, at, q[at], conjugate(sensor)
+        )
+    return found
+
+
+def run_filter(
+    name: str,
+    signals: Mapping[Segment, MountedSignals],
+    rate_hz: float,
+    keep: slice,
+    clock: Clock,
+) -> FilterRun:
+    """Run one filter on every sensor; where it cannot, the notice of that segment says why.
+
+    Parameters
+    ----------
+    keep : samples of the result.
+    """
+    q: dict[Segment, Floats] = {}
+    told, spent_s, samples = [], 0.0, 0
+    orient = _orient_by_own if name in BOTH_WAYS else _orient_by_published
+    for segment, x in signals.items():
+        try:
+            if not samples:
+                orient(name, _first(x), rate_hz)
+            began = clock()
+            sensor = orient(name, x, rate_hz)
+            spent_s += clock() - began
+        except SagittalError as error:
+            told.append(Notice(error.code, error.message, segment))
+            continue
+        samples += len(x.gyr)
+        _, turn = split_heading(multiply(x.start, conjugate(sensor[x.at])))
+        q[segment] = multiply(multiply(about(2, turn), sensor[keep]), x.sensor_q)
+    return FilterRun(q, 1e6 * spent_s / samples if samples else None, _join(told, len(signals)))
+
+
+def _orient_by_published(name: str, x: MountedSignals, rate_hz: float) -> Floats:
+    """Sensor to the filter's world (n, 4), from the middle of the rest to both ends."""
+    out = np.empty((len(x.gyr), 4))
+    later, before = slice(x.at + 1, None), slice(x.at - 1, None, -1)
+    run = FusionFilter(name, rate_hz, x.rest)
+    out[x.at] = run.q[0]
+    if x.at + 1 < len(out):
+        out[later] = run.advance(x.gyr[later], x.acc[later], _part(x.mag, later))[:, 0]
+    if x.at:
+        # from a sample to the one before by the rate that led from that to this
+        back = FusionFilter(name, rate_hz, RestMeans(x.rest.acc, -x.rest.gyr, x.rest.mag))
+        rate = -x.gyr[1 : x.at + 1][::-1]
+        out[before] = back.advance(rate, x.acc[before], _part(x.mag, before))[:, 0]
+    return out
+
+
+def _orient_by_own(name: str, x: MountedSignals, rate_hz: float) -> Floats:
+    """The same by the self-calibrating filter, which needs no rest."""
+    run = SelfCalibratingFilter(rate_hz, magnetometer=x.mag is not None)
+    return np.asarray((run.smooth if BOTH_WAYS[name] else run.advance)(x.gyr, x.acc, x.mag)[:, 0])
+
+
+def _first(x: MountedSignals) -> MountedSignals:
+    """The first samples, started as the whole take is."""
+    part = slice(0, WARM_UP)
+    return replace(x, gyr=x.gyr[part], acc=x.acc[part], mag=_part(x.mag, part), at=0)
+
+
+def _part(mag: Floats | None, part: slice) -> Floats | None:
+    return None if mag is None else mag[part]
+
+
+def _join(told: list[Notice], sensors: int) -> tuple[Notice, ...]:
+    """One notice for all segments where the same happened on each."""
+    if len(told) == sensors and len({(n.code, n.message) for n in told}) == 1:
+        return (Notice(told[0].code, told[0].message),)
+    return tuple(told)

@@ -1,0 +1,18 @@
+"""Parameters of everything that is done with a functional test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from core.functional_tests.rising import RisingParams
+from core.functional_tests.sway import SwayParams
+from core.functional_tests.walks import WalkTestParams
+
+
+@dataclass(frozen=True)
+class FunctionalTestParams:
+    """Of the rises, of quiet standing and of the walk tests; turns are those of `PipelineConfig.turns`."""
+
+    rising: RisingParams = field(default_factory=RisingParams)
+    sway: SwayParams = field(default_factory=SwayParams)
+    walks: WalkTestParams = field(default_factory=WalkTestParams)

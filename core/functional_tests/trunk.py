@@ -1,0 +1,104 @@
+"""How the trunk moves, by one sensor on pelvis or chest that may sit anyhow: no calibration.
+
+The vertical comes from the filter of core/fusion/attitude.py, the gyroscope's bias from the longest rest of
+the sensor. docs/science/timed-tests.md, "Motion of the trunk".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from core.errors import EstimationError
+from core.frames import GRAVITY, Bools, Floats, Segment
+from core.fusion.attitude import AttitudeParams, estimate_orientation
+from core.recording import UniformRecording
+from core.rest import find_rest_windows, index_window
+from core.rotation import conjugate, exp, rotate
+
+TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
+"""Sensors that tell how the trunk moves, the better known first."""
+
+UP: Final = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class TrunkMotion:
+    """A trunk sensor over a take.
+
+    Parameters
+    ----------
+    t_s : (n,). up : (n, 3) the vertical in axes of the sensor. acc : (n, 3) free of gravity, sensor axes,
+        m/s². gyr : (n, 3) rad/s without bias. valid : (n,).
+    rests : windows in which the sensor was still, s.
+    """
+
+    segment: Segment
+    t_s: Floats
+    rate_hz: float
+    up: Floats
+    acc: Floats
+    gyr: Floats
+    valid: Bools
+    rests: tuple[tuple[float, float], ...]
+
+    @property
+    def upward(self) -> Floats:
+        """Vertical acceleration (n,), m/s²."""
+        return np.asarray(np.einsum("ni,ni->n", self.acc, self.up))
+
+    @property
+    def yaw_rate(self) -> Floats:
+        """Turning about the vertical (n,), rad/s, left positive."""
+        return np.asarray(np.einsum("ni,ni->n", self.gyr, self.up))
+
+
+def find_trunk_sensor(recording: UniformRecording) -> Segment:
+    """The segment whose sensor tells how the trunk moves; raises EstimationError `segments_missing`."""
+    for segment in TRUNK:
+        if segment in recording.sensors and recording.sensors[segment].valid.any():
+            return segment
+    raise EstimationError(
+        "segments_missing",
+        "This test needs a sensor on the pelvis or the chest, and none of them measures; wear or map one.",
+    )
+
+
+def follow_trunk(recording: UniformRecording) -> TrunkMotion:
+    """Follow the trunk through a take.
+
+    Raises
+    ------
+    EstimationError `segments_missing` without a sensor on pelvis or chest; `no_rest` where it never rests.
+    """
+    segment = find_trunk_sensor(recording)
+    signals, rate = recording.sensors[segment], recording.rate_hz
+    rests = find_rest_windows(recording, segments=(segment,))
+    if not rests:
+        raise EstimationError(
+            "no_rest",
+            f"The sensor on the {segment} never rests for a second. Let the person sit or stand still for a"
+            " few seconds before the test begins.",
+            sensor=segment,
+        )
+    longest = index_window(max(rests, key=lambda r: r[1] - r[0]), rate)
+    gyr = signals.gyr - signals.gyr[longest].mean(axis=0)
+    force = signals.acc[longest].mean(axis=0)
+    norm = float(np.linalg.norm(force))
+    q = estimate_orientation(
+        _level(force / norm), longest.start, gyr, signals.acc, signals.valid, rate, norm, AttitudeParams()
+    )
+    up = rotate(conjugate(q), UP)
+    acc = signals.acc * (GRAVITY / norm) - GRAVITY * up
+    return TrunkMotion(segment, recording.t_s, rate, up, acc, gyr, signals.valid, rests)
+
+
+def _level(up: Floats) -> Floats:
+    """Shortest turn (4,) that takes a unit vector (3,) to the vertical."""
+    axis = np.cross(up, UP)
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-9:
+        axis, sine = np.array([1.0, 0.0, 0.0]), 1.0
+    return exp(float(np.arctan2(np.linalg.norm(np.cross(up, UP)), up @ UP)) * axis / sine)

@@ -1,0 +1,52 @@
+"""What healthy people need for a timed test, by age; only figures of which the source was read.
+
+Timed up and go: Bohannon 2006, J Geriatr Phys Ther 29:64, doi:10.1519/00139143-200608000-00004, mean and
+upper end of its 95 % confidence interval. Five times sit to stand: Bohannon 2006, Percept Mot Skills 103:215,
+doi:10.2466/pms.103.1.215-222, the time beyond which a person is worse than average (13 papers).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True)
+class TimedTestNorm:
+    """Reference of the total time of a test at an age.
+
+    Parameters
+    ----------
+    ages : first and last year it holds for. mean_s : of healthy people, None where only a limit is known.
+    limit_s : above it a person is slower than average. source : as printed.
+    """
+
+    ages: tuple[int, int]
+    mean_s: float | None
+    limit_s: float
+    source: str
+
+
+_TUG: Final = "Bohannon 2006, J Geriatr Phys Ther 29:64"
+_CHAIR: Final = "Bohannon 2006, Percept Mot Skills 103:215"
+
+TEST_NORMS: Final[dict[str, tuple[TimedTestNorm, ...]]] = {
+    "tug_duration_s": (
+        TimedTestNorm((60, 69), 8.1, 9.0, _TUG),
+        TimedTestNorm((70, 79), 9.2, 10.2, _TUG),
+        TimedTestNorm((80, 99), 11.3, 12.7, _TUG),
+    ),
+    "five_sit_to_stand_s": (
+        TimedTestNorm((60, 69), None, 11.4, _CHAIR),
+        TimedTestNorm((70, 79), None, 12.6, _CHAIR),
+        TimedTestNorm((80, 89), None, 14.8, _CHAIR),
+    ),
+}
+"""Parameter → its references by age."""
+
+
+def find_test_norm(name: str, age: float | None) -> TimedTestNorm | None:
+    """The reference of a total time at an age; None where there is none or the age is not known."""
+    if age is None:
+        return None
+    return next((n for n in TEST_NORMS.get(name, ()) if n.ages[0] <= age < n.ages[1] + 1), None)

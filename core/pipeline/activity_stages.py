@@ -1,0 +1,94 @@
+"""The stages of a recording of daily life: one sensor of the trunk, read block by block."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from core.activity.monitor import monitor_activity
+from core.activity.result import ActivityResult
+from core.errors import SignalError
+from core.frames import Segment
+from core.pipeline.analysis import TakeAnalysis
+from core.pipeline.config import PipelineConfig
+from core.pipeline.stages import PipelineStage
+from core.quality.assessment import Level, QualityReport
+from core.recording import Recording, as_long_stream
+from core.sample_blocks import LongStream
+
+TRUNK: Final[tuple[Segment, ...]] = ("chest", "pelvis")
+"""Where the sensor of daily life is worn, the published place first."""
+
+WORN_SHARE: Final = 0.5
+"""Of the time that is recorded and worn, postures are known in at least so much, else the take is usable at
+best [our choice]."""
+
+
+def find_trunk_stream(recording: Recording) -> tuple[Segment, LongStream]:
+    """The sensor of daily life; a single sensor that nobody assigned is taken to be on the chest.
+
+    Raises
+    ------
+    SignalError : `no_trunk_sensor`.
+    """
+    known = {s: d for d, s in recording.segments.items() if s is not None}
+    there = {**{d: as_long_stream(s) for d, s in recording.streams.items()}, **recording.long}
+    for segment in TRUNK:
+        if known.get(segment) in there:
+            return segment, there[known[segment]]
+    if len(there) == 1 and not known:
+        return "chest", next(iter(there.values()))
+    raise SignalError(
+        "no_trunk_sensor",
+        "Daily life needs a sensor on the chest or the lower back. Say in the mapping which sensor was worn "
+        f"there (sensors found: {', '.join(there)}).",
+    )
+
+
+def watch_activity(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
+    """What the person did from hour to hour."""
+    segment, stream = find_trunk_stream(analysis.source)
+    found = monitor_activity(stream, segment, analysis.source.subject.height_m, config.activity)
+    return replace(analysis, activity=found)
+
+
+def judge_activity(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
+    """How much of the recording says something; an error of its signals has stopped it before."""
+    found = analysis.activity
+    if found is None:
+        level: Level = "poor"
+        report = QualityReport(level, ("Nothing could be read from the sensor.",), 0.0, 0.0, {}, (), ())
+        return replace(analysis, report=report)
+    reasons = list_doubts(found)
+    level = "good" if not reasons else "usable" if share_known(found) >= WORN_SHARE else "poor"
+    notices = tuple(n for n in found.notices if n.severity != "info")
+    report = QualityReport(level, reasons, found.duration_s, found.rate_hz, {}, (), notices)
+    return replace(analysis, report=report)
+
+
+def share_known(found: ActivityResult) -> float:
+    """Share of the worn time in which the posture is known, 0 to 1."""
+    worn = sum(s.duration_s for s in found.spans if s.kind not in ("non_wear", "gap"))
+    known = sum(s.duration_s for s in found.spans if s.kind not in ("non_wear", "gap", "unknown"))
+    return known / worn if worn > 0.0 else 0.0
+
+
+def list_doubts(found: ActivityResult) -> tuple[str, ...]:
+    """Why the level is not good, as sentences."""
+    doubts = []
+    total = max(found.duration_s, 1e-9)
+    unknown = 1.0 - share_known(found)
+    if unknown > 0.1:
+        doubts.append(f"The posture is not known in {100 * unknown:.0f} % of the time worn.")
+    lost = 60.0 * found.minutes("gap") / total
+    if lost > 0.1:
+        doubts.append(f"{100 * lost:.0f} % of the time nothing was recorded.")
+    if any(n.code in ("no_baseline", "baseline_assumed") for n in found.notices):
+        doubts.append("Without walking it is not certain which way is up.")
+    return tuple(doubts)
+
+
+ACTIVITY_MONITOR: Final = PipelineStage("activity", 0.0, watch_activity, ("activity",), ("activity",))
+ACTIVITY_QUALITY: Final = PipelineStage(
+    "quality", 0.95, judge_activity, ("report",), ("activity",), runs_after_problem=True
+)

@@ -1,0 +1,147 @@
+"""A device against itself: its newest check beside the earlier ones (docs/science/devices.md, "Limits").
+
+Every limit is about what the analysis can bear and what devices do that nothing is wrong with, not about what
+a maker promises: the wearer's own movement is in every figure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, radians
+from typing import Final, Literal
+
+import numpy as np
+
+from core.quality.devices import DeviceCheck
+
+Quantity = Literal["gyro_bias", "scale", "scale_off", "gyro_noise", "acc_noise"]
+"""scale: against earlier checks in the same posture; scale_off: against gravity."""
+
+BIAS_MOVED: Final = radians(0.8)
+"""rad/s. 64 of 65 checks of three worn devices were within 0.8 °/s of their median; 16 K at 0.05 °/s per K
+(docs/science/devices.md, "Limits")."""
+
+SCATTER: Final = 2.2
+"""Times the median distance of the earlier biases from their median: 99 % of a normal scatter in three axes
+is within (3.37 by 1.54 standard deviations). So a bias that differs at every start is not told for it."""
+
+SCALE_MOVED: Final = 0.02
+"""20 mg: 20 K at 1 mg per K (docs/science/devices.md, "Limits")."""
+
+SCALE_OFF: Final = 0.05
+"""Half of what the analysis refuses (core/quality/suspicion.py)."""
+
+GYRO_NOISE_ROSE: Final = 3.0
+ACC_NOISE_ROSE: Final = 2.0
+"""Times the median; the largest of 65 checks of worn devices were 2.7 and 1.4 times theirs."""
+
+SAME_POSTURE: Final = cos(radians(30.0))
+"""Verticals closer than this are one posture of the device (our choice)."""
+
+SAME_RATE: Final = 0.05
+"""Noise is compared at one rate, within this share: devices filter by their rate (our choice)."""
+
+
+@dataclass(frozen=True)
+class DeviceFinding:
+    """Something beyond its limit in the newest check.
+
+    Parameters
+    ----------
+    value, limit : rad/s for a bias, a share for a scale, times the usual for noise.
+    since : index of the last earlier check that was within the limit, None for what is told of one alone.
+    """
+
+    quantity: Quantity
+    value: float
+    limit: float
+    since: int | None
+
+
+@dataclass(frozen=True)
+class DeviceCourse:
+    """What can be said of a device by all its checks.
+
+    Parameters
+    ----------
+    compared : earlier checks the newest was held against; 0 = there is nothing to compare with.
+    newest : index of the newest check in which it could be measured, None where there is none.
+    """
+
+    newest: int | None
+    compared: int
+    findings: tuple[DeviceFinding, ...] = ()
+
+
+def follow_device(checks: Sequence[DeviceCheck]) -> DeviceCourse:
+    """Hold the newest check of a device against the median of the earlier ones.
+
+    Parameters
+    ----------
+    checks : of one device, oldest first; those without a measurement are passed over.
+
+    Notes
+    -----
+    A median follows a step once half of the checks show it: then the new level is the device's own. A bias
+    has moved beyond `BIAS_MOVED`, twice what the wearer may have turned in both rests, and its own scatter.
+    """
+    known = [i for i, check in enumerate(checks) if check.reason is None]
+    if not known:
+        return DeviceCourse(None, 0)
+    *earlier, last = known
+    new = checks[last]
+    assert new.gyro_bias is not None  # noqa: S101 (no reason: measured)
+    assert new.gravity_scale is not None  # noqa: S101 (the same)
+    findings = []
+    off = abs(new.gravity_scale - 1.0)
+    if off > SCALE_OFF:
+        findings.append(DeviceFinding("scale_off", new.gravity_scale - 1.0, SCALE_OFF, None))
+    before = [checks[i] for i in earlier]
+    biases = [c.gyro_bias for c in before if c.gyro_bias is not None]
+    if biases:
+        usual = np.median(biases, axis=0)
+        unsure = 2.0 * ((new.bias_error or 0.0) + float(np.median([c.bias_error or 0.0 for c in before])))
+        away = [float(np.linalg.norm(b - usual)) for b in (*biases, new.gyro_bias)]
+        scatter = SCATTER * float(np.median(away[:-1]))
+        findings += _beyond("gyro_bias", away, max(BIAS_MOVED, unsure, scatter), earlier)
+    lying = [i for i in earlier if _in_same_posture(checks[i], new)]
+    scales = [checks[i].gravity_scale or 1.0 for i in lying]
+    if scales:
+        middle = float(np.median(scales))
+        moved = [x / middle - 1.0 for x in (*scales, new.gravity_scale)]
+        findings += _beyond("scale", moved, SCALE_MOVED, lying)
+    alike = [i for i in earlier if abs(checks[i].rate_hz / new.rate_hz - 1.0) < SAME_RATE]
+    findings += _louder("gyro_noise", GYRO_NOISE_ROSE, checks, alike, new)
+    findings += _louder("acc_noise", ACC_NOISE_ROSE, checks, alike, new)
+    return DeviceCourse(last, len(earlier), tuple(findings))
+
+
+def _louder(
+    quantity: Literal["gyro_noise", "acc_noise"],
+    limit: float,
+    checks: Sequence[DeviceCheck],
+    alike: Sequence[int],
+    new: DeviceCheck,
+) -> list[DeviceFinding]:
+    there = [i for i in alike if getattr(checks[i], quantity) is not None]
+    now = getattr(new, quantity)
+    if now is None or not there:
+        return []
+    values = [float(getattr(checks[i], quantity)) for i in there]
+    middle = float(np.median(values))
+    return _beyond(quantity, [x / middle for x in (*values, float(now))], limit, there)
+
+
+def _beyond(
+    quantity: Quantity, values: Sequence[float], limit: float, earlier: Sequence[int]
+) -> list[DeviceFinding]:
+    """The last of the values where it is beyond its limit, with the last earlier check that was not."""
+    if abs(values[-1]) <= limit:
+        return []
+    within = [i for i, value in zip(earlier, values, strict=False) if abs(value) <= limit]
+    return [DeviceFinding(quantity, values[-1], limit, within[-1] if within else None)]
+
+
+def _in_same_posture(a: DeviceCheck, b: DeviceCheck) -> bool:
+    return a.up is not None and b.up is not None and float(a.up @ b.up) > SAME_POSTURE

@@ -1,0 +1,240 @@
+"""Look at a take's set-up and propose what would put it right, one kind of mistake at a time.
+
+Wrong units hide wrong axes, and wrong axes hide wrong labels: the first kind that is found is proposed, the
+next once that is confirmed and the take is analysed again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import product
+from math import degrees, radians
+from typing import Final
+
+import numpy as np
+
+from core.agreement import Agreement, AgreementParams
+from core.agreement.agree import compare_sensors
+from core.agreement.exchange import find_exchange
+from core.correction import AS_READ, SensorCorrection, name_axes
+from core.frames import FOOT, GRAVITY, SHANK, SIDES, THIGH, Floats, Segment
+from core.quality.sides import find_left_leg
+from core.quality.signals import measure_signal
+from core.quality.suspicion import list_suspicions
+from core.recording import ImuStream, Recording, UniformRecording
+from core.setup.axes import CHOICES, REVERSED, fit_axes, refuses_choice
+from core.setup.params import SetupParams
+from core.setup.repair import SetupRepair
+
+ACC_FACTORS: Final = (1.0, GRAVITY, 1e-3 * GRAVITY, 1.0 / GRAVITY)
+GYR_FACTORS: Final = (1.0, radians(1.0), degrees(1.0))
+AGAINST: Final = ("-x", "-y", "-z")
+"""All signs turned round."""
+
+
+def propose_repair(
+    recording: Recording,
+    uniform: UniformRecording,
+    params: SetupParams | None = None,
+    agreement: AgreementParams | None = None,
+) -> SetupRepair | None:
+    """What is wrong with units or axes, before the sensors are compared with each other; None = nothing seen.
+
+    Parameters
+    ----------
+    recording : as read. uniform : the same take on its axis.
+    """
+    params, agreement = params or SetupParams(), agreement or AgreementParams()
+    worn = {s: recording.streams[x.device_id] for s, x in uniform.sensors.items()}
+    return _propose_units(worn) or _propose_axes(uniform, params, agreement)
+
+
+def propose_labels(uniform: UniformRecording, agreed: Agreement) -> SetupRepair | None:
+    """What the sensors say of each other beyond the exchanges that an analysis undoes by itself."""
+    exchange = agreed.exchange
+    if exchange is not None and exchange.mirrored:
+        turned = {uniform.sensors[s].device_id: SensorCorrection(acc_axes=AGAINST) for s in exchange.mirrored}
+        which = _list(sorted(exchange.mirrored))
+        said = f"The accelerometer of {which} has its signs turned round: the joints beside it fit a mirror."
+        return SetupRepair("axes", (said,), exchange.ratio, corrections=turned)
+    if exchange is not None and exchange.mixed_up:
+        segments = {uniform.sensors[x].device_id: s for s, x in exchange.mixed_up.items()}
+        moved = [f"that of {x} is worn on {s}" for s, x in exchange.mixed_up.items() if s != x]
+        said = f"The joints show that sensors are mixed up: {_list(moved)}."
+        return SetupRepair("labels", (said,), exchange.ratio, segments)
+    if exchange is None or exchange.cosine is None:
+        return _propose_legs(uniform)
+    return None
+
+
+def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
+    """Factors of sensors whose unit physics refuses, where exactly one simple change satisfies it."""
+    corrections: dict[str, SensorCorrection] = {}
+    said: list[str] = []
+    for segment, stream in worn.items():
+        wrong = _list_errors(stream, SensorCorrection())
+        if not wrong:
+            continue
+        signs = AS_READ if "gravity_sign" not in wrong else AGAINST
+        tried = [
+            SensorCorrection(acc_axes=signs, acc_times=a, gyr_times=g)
+            for a, g in product(ACC_FACTORS, GYR_FACTORS)
+        ]
+        good = [x for x in tried if not _list_errors(stream, x)]
+        least = min((len(x.to_json()) for x in good), default=0)
+        simplest = [x for x in good if len(x.to_json()) == least]
+        if len(simplest) == 1:
+            corrections[stream.device_id] = simplest[0]
+            said.append(segment)
+    if not corrections:
+        return None
+    if len(set(corrections.values())) == 1 and 2 * len(corrections) > len(worn):
+        # one that moves too little to be refused was read like the others of its export
+        one = next(iter(corrections.values()))
+        rest = {s: x for s, x in worn.items() if x.device_id not in corrections}
+        follow = {s: x for s, x in rest.items() if not _list_errors(x, one)}
+        corrections |= {x.device_id: one for x in follow.values()}
+        said += follow
+    return SetupRepair(
+        "units", (f"Units or signs of {_list(said)} are not those of a body.",), np.inf, {}, corrections
+    )
+
+
+def _list_errors(stream: ImuStream, correction: SensorCorrection) -> set[str]:
+    acc = correction.correct_acc(stream.acc)
+    gyr = None if stream.gyr is None else correction.correct_gyr(stream.gyr)
+    facts = measure_signal(acc, gyr, stream.rate_hz)
+    return {
+        n.code for n in list_suspicions(stream.device_id, facts, acc, stream.quat) if n.severity == "error"
+    }
+
+
+def _propose_axes(
+    uniform: UniformRecording, params: SetupParams, agreement: AgreementParams
+) -> SetupRepair | None:
+    """Gyroscopes that do not carry gravity where their accelerometer finds it."""
+    found = {s: fit_axes(x, uniform.rate_hz, params) for s, x in uniform.sensors.items()}
+    wrong = {s: f.misfits for s, f in found.items() if f is not None and f.misfits is not None}
+    if not wrong:
+        return None
+    which = _list(sorted(wrong))
+    said = [f"The gyroscope of {which} does not turn as its accelerometer shows; other axes or units do."]
+    margin = min(fits[0] / fits[1:].min() for fits in wrong.values())
+    judged = len([f for f in found.values() if f is not None])
+    gyr = _choose_axes(wrong, judged, params)
+    if gyr is not None and 2 * len(wrong) > judged and len(wrong) > 1:
+        # one that hardly moves follows the others of its export
+        one = next(iter(gyr.values()))
+        gyr |= {
+            s: one
+            for s, x in uniform.sensors.items()
+            if s not in gyr and not refuses_choice(x, uniform.rate_hz, one, params)
+        }
+    if gyr is None:
+        return SetupRepair("axes", tuple(said), margin)
+    turned = _judge_hands(uniform, gyr, agreement)
+    if turned is None and not any(_leaves_hands_open(x) for x in gyr.values()):
+        turned = frozenset()
+    if turned is None:
+        said.append("Whether its accelerometer is turned round too cannot be told from these sensors.")
+        return SetupRepair("axes", tuple(said), margin)
+    corrections = {
+        uniform.sensors[s].device_id: _correct_gyr(x, AGAINST if s in turned else AS_READ)
+        for s, x in gyr.items()
+    }
+    only_units = all(not x.turns_axes for x in corrections.values())
+    return SetupRepair("units" if only_units else "axes", tuple(said), margin, corrections=corrections)
+
+
+def _correct_gyr(gyr: Floats, acc_axes: tuple[str, ...]) -> SensorCorrection:
+    """The correction that multiplies a gyroscope by one of `CHOICES`."""
+    return SensorCorrection(acc_axes, name_axes(gyr), gyr_times=float(np.abs(gyr).max()))
+
+
+def _choose_axes(
+    wrong: Mapping[Segment, Floats], judged: int, params: SetupParams
+) -> dict[Segment, Floats] | None:
+    """What each gyroscope is to be multiplied by; None where several fit alike.
+
+    Sensors of one export are read alike: where most of them are wrong they are judged together.
+    """
+    if 2 * len(wrong) > judged and len(wrong) > 1:
+        # every sensor counts by how well it can be told
+        shares = [np.log(fits / fits[1:].min()) for fits in wrong.values()]
+        one = _choose_one(np.exp(np.mean(shares, axis=0)), params)
+        return None if one is None else dict.fromkeys(wrong, one)
+    found = {segment: _choose_one(fits, params) for segment, fits in wrong.items()}
+    clear = {segment: one for segment, one in found.items() if one is not None}
+    return clear if len(clear) == len(found) else None
+
+
+def _choose_one(misfits: Floats, params: SetupParams) -> Floats | None:
+    """The only one of `CHOICES` that is not ruled out; all signs round where that is the best of several."""
+    best = int(np.argmin(misfits))
+    alone = np.count_nonzero(misfits <= params.distinct * misfits[best]) == 1
+    return np.asarray(CHOICES[best]) if alone or best == REVERSED else None
+
+
+def _leaves_hands_open(gyr: Floats) -> bool:
+    """Whether an accelerometer in a mirror is as likely as a right one, by what its gyroscope needs.
+
+    With all signs round the file may have left-handed axes; what is a rotation of the gyroscope may as well
+    be a sign of the accelerometer. Else it would take two mistakes.
+    """
+    a_unit = np.array_equal(gyr, gyr[0, 0] * np.eye(3)) and gyr[0, 0] > 0.0
+    return not a_unit and bool(np.linalg.det(gyr) > 0.0 or np.array_equal(gyr, -np.eye(3)))
+
+
+def _judge_hands(
+    uniform: UniformRecording, gyr: Mapping[Segment, Floats], agreement: AgreementParams
+) -> frozenset[Segment] | None:
+    """Those whose accelerometer must be turned round too, once gyroscopes go with them; None = unknown.
+
+    Left-handed axes of a whole export make a mirror image, which only the hips tell, left and right of the
+    way the feet go. Exchanged legs would look the same: one mistake is likelier than two.
+    """
+    fixed = {
+        s: replace(x, gyr=np.ascontiguousarray(x.gyr @ gyr[s].T)) if s in gyr else x
+        for s, x in uniform.sensors.items()
+    }
+    joints, terms = compare_sensors(replace(uniform, sensors=fixed), agreement.joints)
+    chain = {s for w in joints if len(w.t_s) for s in (w.first, w.second)}
+    if not chain.issuperset(gyr):
+        return None
+    exchange = find_exchange(terms, joints, uniform.rate_hz, agreement.joints, agreement.exchange)
+    if len(gyr) < len(chain):
+        # the others are right, so whoever is a mirror image of them is turned round
+        return exchange.mirrored if exchange.mirrored <= frozenset(gyr) else None
+    if exchange.mirrored or exchange.cosine is None or abs(exchange.cosine) < -agreement.exchange.cosine:
+        return None
+    return frozenset(gyr) if exchange.cosine < 0.0 else frozenset()
+
+
+LOOK_HZ: Final = 50.0
+
+
+def _propose_legs(uniform: UniformRecording) -> SetupRepair | None:
+    """Left and right exchanged, where the pelvis is pushed to the side of the leg that is said to stand."""
+    pelvis = uniform.sensors.get("pelvis")
+    pair = next((p for p in (FOOT, SHANK, THIGH) if set(p.values()) <= set(uniform.sensors)), None)
+    if pelvis is None or pair is None:
+        return None
+    left, right = (uniform.sensors[pair[side]] for side in ("left", "right"))
+    thin = max(1, round(uniform.rate_hz / LOOK_HZ))
+    first, second = (np.linalg.norm(x.gyr - np.median(x.gyr, axis=0), axis=1)[::thin] for x in (left, right))
+    said = find_left_leg(pelvis.acc[::thin], pelvis.gyr[::thin], first, second, uniform.rate_hz / thin)
+    if said != 2:
+        return None
+    across: dict[Segment, Segment] = {
+        p[side]: p[other]
+        for p in (FOOT, SHANK, THIGH)
+        for side, other in zip(SIDES, reversed(SIDES), strict=True)
+    }
+    segments = {x.device_id: across.get(s, s) for s, x in uniform.sensors.items()}
+    evidence = "The pelvis is pushed away from the leg that swings: left and right sensors seem exchanged."
+    return SetupRepair("labels", (evidence,), 1.0, segments)
+
+
+def _list(words: list[str]) -> str:
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))

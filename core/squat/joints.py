@@ -1,0 +1,43 @@
+"""Angles of a chain's joints under the names of core/angles."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from core.angles import SIGNS, cardan_zxy
+from core.frames import SUFFIX, Floats, Side
+from core.rotation import about, multiply
+
+JOINTS: Final = (
+    "ankle_rotation", "ankle_inversion", "ankle_dorsiflexion", "knee_flexion", "hip_flexion", "hip_adduction",
+    "hip_rotation",
+)  # fmt: skip
+"""The seven angles in the order of Kianifar's tables 2 and 3: ankle IR/ER, Abd/Add, Flex/Ext, knee, then the
+hip, there Flex/Ext first."""
+
+
+def name_joint_angles(angles: Floats, side: Side) -> dict[str, Floats]:
+    """Angles (n,) in rad, anatomical and not from standing, by name with the suffix of the side.
+
+    Ankle and knee are the chain's own joints with the sign of distal against proximal; the hip turns about
+    its axes in another order than core/angles has (docs/science/squat.md, "Angles").
+
+    Parameters
+    ----------
+    angles : (n, 7) of the chain.
+    """
+    hip = multiply(multiply(about(1, -angles[:, 6]), about(0, -angles[:, 5])), about(2, -angles[:, 4]))
+    about_axes = {
+        "ankle": -angles[:, [2, 1, 0]],
+        "knee": -angles[:, [3]],
+        "hip": cardan_zxy(hip),
+    }
+    found = {}
+    for joint, values in about_axes.items():
+        for (name, right, left), column in zip(SIGNS[joint], values.T, strict=False):
+            found[f"{name}_{SUFFIX[side]}"] = np.ascontiguousarray(
+                (right if side == "right" else left) * column
+            )
+    return found

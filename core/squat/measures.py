@@ -1,0 +1,127 @@
+"""What is measured on the squats of one leg: depth, times, how the knee falls inward, curves.
+
+Dynamic knee valgus is adduction and internal rotation of the thigh together (Kianifar et al. 2019,
+doi:10.1177/2055668318813455; docs/science/squat.md, "Measures").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from core.angles import JointAngles
+from core.body.chain.leg import LegMotion
+from core.frames import FOOT, SUFFIX, Floats, Side
+from core.parameters.catalogue import list_names, unit_of
+from core.parameters.catalogue.entry import SQUAT
+from core.parameters.result import Parameter
+from core.parameters.variability import summarise_values
+from core.recording import UniformRecording
+from core.squat.curves import CURVES, INWARD, KNEE, cut_curves
+from core.squat.repetitions import Repetition, RepetitionParams, find_repetitions
+
+MEASURES: Final = list_names(SQUAT, "take")
+"""Names in the order of the table; what each is: docs/science/squat.md, "Measures"."""
+
+
+@dataclass(frozen=True, eq=False)
+class SquatSide:
+    """The squats of one leg.
+
+    Parameters
+    ----------
+    repetitions : all that were found. values : measure → (counted,) in its unit, of those that count.
+    curves : `CURVES` and `VALGUS` → (counted, 101) rad over the repetition, 0 start, 100 end.
+    parameters : mean and spread of every measure; without repetitions a reason.
+    """
+
+    side: Side
+    repetitions: tuple[Repetition, ...]
+    values: Mapping[str, Floats]
+    curves: Mapping[str, Floats]
+    parameters: tuple[Parameter, ...]
+
+
+def measure_squats(
+    angles: JointAngles,
+    leg: LegMotion,
+    side: Side,
+    recording: UniformRecording | None = None,
+    params: RepetitionParams | None = None,
+) -> SquatSide:
+    """Find and measure the squats of one leg; two legs are compared by `core.parameters.symmetry`.
+
+    Parameters
+    ----------
+    angles : of `leg`, from standing. recording : to see by its sensor whether the foot stood.
+
+    Returns
+    -------
+    SquatSide; `parameters` have no value and the reason "no_angles" where the knee has none,
+    "no_repetitions" where nobody squatted, "no_counted_repetitions" where none counts.
+    """
+    suffix = SUFFIX[side]
+    own = {name: angles.angles.get(f"{name}_{suffix}") for name in CURVES}
+    known = {name: values for name, values in own.items() if values is not None}
+    if len(known) < len(CURVES):
+        return SquatSide(side, (), {}, {}, _summarise({}, side, "no_angles"))
+    t_s = angles.t_s
+    repetitions = find_repetitions(known[KNEE], t_s, side, _foot_rate(recording, side), params)
+    counted = [r for r in repetitions if r.excluded is None]
+    if not counted:
+        reason = "no_counted_repetitions" if repetitions else "no_repetitions"
+        return SquatSide(side, repetitions, {}, {}, _summarise({}, side, reason))
+    found = cut_curves(angles, side, [(r.start_s, r.end_s) for r in counted])
+    values = _measure(counted, known, leg)
+    return SquatSide(side, repetitions, values, found, _summarise(values, side, None))
+
+
+def _measure(counted: list[Repetition], angles: Mapping[str, Floats], leg: LegMotion) -> dict[str, Floats]:
+    """Measure → values (counted,)."""
+    height = _hip_height(leg)
+    rows: list[tuple[float, ...]] = []
+    for r in counted:
+        part, at = slice(r.first, r.last + 1), r.bottom - r.first
+        adduction, rotation = (angles[name][part] - angles[name][r.first] for name in INWARD)
+        valgus = adduction + rotation
+        rows.append(
+            (
+                np.degrees(angles[KNEE][r.bottom]),
+                float(height[r.first] - height[part].min()),
+                np.degrees(valgus.max()),
+                np.degrees(valgus[at]),
+                np.degrees(adduction[at]),
+                np.degrees(rotation[at]),
+                r.end_s - r.start_s,
+                r.descent_s,
+                r.ascent_s,
+            )
+        )
+    return dict(zip(MEASURES, np.array(rows).T, strict=True))
+
+
+def _hip_height(leg: LegMotion) -> Floats:
+    """Height (n,) of the hip centre over the ankle, m; NaN before the chain begins."""
+    height = np.full(len(leg.orientations.t_s), np.nan)
+    shank, thigh, _ = leg.chain.links(leg.motion.angles)
+    knee, hip = leg.chain.offsets[leg.chain.first[1]], leg.chain.offsets[leg.chain.first[2]]
+    height[leg.first :] = shank[:, 2] @ knee + thigh[:, 2] @ hip
+    return height
+
+
+def _foot_rate(recording: UniformRecording | None, side: Side) -> Floats | None:
+    """|ω| (n,) of the foot's sensor, its median taken off as bias; None without one."""
+    sensor = None if recording is None else recording.sensors.get(FOOT[side])
+    if sensor is None or not sensor.valid.any():
+        return None
+    return np.asarray(np.linalg.norm(sensor.gyr - np.median(sensor.gyr[sensor.valid], axis=0), axis=1))
+
+
+def _summarise(values: Mapping[str, Floats], side: Side, reason: str | None) -> tuple[Parameter, ...]:
+    return tuple(
+        summarise_values(name, side, values.get(name, np.empty(0)).tolist(), unit_of(name), reason)
+        for name in MEASURES
+    )

@@ -1,0 +1,153 @@
+"""Where a squat begins, is deepest and ends, by the flexion of the knee.
+
+docs/science/squat.md, "Repetitions".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import radians
+from typing import Final
+
+import numpy as np
+
+from core.errors import ParameterError
+from core.frames import Floats, Side
+
+CODES: Final = ("incomplete", "signal_lost", "foot_moved")
+"""Why a repetition does not count: the take cut it, a sensor was silent in it, the foot moved."""
+
+
+@dataclass(frozen=True)
+class RepetitionParams:
+    """What counts as a squat (our choice).
+
+    Parameters
+    ----------
+    least_rad : flexion of the knee beyond that of the straighter position before and after it.
+    edge : share of this flexion at which a repetition begins and ends.
+    level : share at which the knee has come back: a movement that does not reach it is the same repetition.
+    foot_rate : mean rate of the foot's sensor in a repetition, rad/s, from which the foot moved.
+
+    Raises
+    ------
+    ParameterError `parameter_out_of_range`.
+    """
+
+    least_rad: float = radians(20.0)
+    edge: float = 0.05
+    level: float = 0.5
+    foot_rate: float = radians(10.0)
+
+    def __post_init__(self) -> None:
+        if not (self.least_rad > 0.0 and 0.0 < self.edge < self.level < 1.0 and self.foot_rate > 0.0):
+            raise ParameterError(
+                "parameter_out_of_range",
+                "A repetition needs 0 < edge < level < 1 and a least flexion and foot rate above 0.",
+            )
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """One squat; times in s from the start of the recording.
+
+    Parameters
+    ----------
+    first, bottom, last : samples of its start, its deepest point and its end.
+    excluded : None where it counts, else one of `CODES`.
+    """
+
+    side: Side
+    first: int
+    bottom: int
+    last: int
+    start_s: float
+    bottom_s: float
+    end_s: float
+    excluded: str | None = None
+
+    @property
+    def descent_s(self) -> float:
+        """From the start to the deepest point."""
+        return self.bottom_s - self.start_s
+
+    @property
+    def ascent_s(self) -> float:
+        """From the deepest point to the end."""
+        return self.end_s - self.bottom_s
+
+
+def find_repetitions(
+    knee: Floats,
+    t_s: Floats,
+    side: Side,
+    foot_rate: Floats | None = None,
+    params: RepetitionParams | None = None,
+) -> tuple[Repetition, ...]:
+    """Find the squats in the flexion of a knee.
+
+    Parameters
+    ----------
+    knee : (n,) rad, NaN where it is not known. t_s : (n,).
+    foot_rate : (n,) |ω| of the sensor on the standing foot, rad/s, None without one.
+
+    Returns
+    -------
+    Repetitions in order, those that do not count with their reason. What happens where the knee is not known
+    for the whole way down and up is none.
+    """
+    params = params or RepetitionParams()
+    known = np.isfinite(knee)
+    if known.sum() < 2:
+        return ()
+    # a bridge over silences, so that a squat with one in it is found and excluded
+    bridged = np.interp(t_s, t_s[known], knee[known])
+    begins, ends = np.flatnonzero(known)[[0, -1]]
+    found = []
+    for before, bottom, after in _find_bottoms(bridged, params):
+        first, last = _find_edges(bridged, before, bottom, after, params)
+        part = slice(first, last + 1)
+        down, up = bridged[bottom] - bridged[first], bridged[bottom] - bridged[last]
+        cut = (first <= begins or last >= ends) and min(down, up) < params.level * max(down, up)
+        why = None
+        if cut:
+            why = "incomplete"
+        elif not known[part].all():
+            why = "signal_lost"
+        elif foot_rate is not None and float(np.mean(foot_rate[part])) > params.foot_rate:
+            why = "foot_moved"
+        start_s, bottom_s, end_s = (float(t_s[k]) for k in (first, bottom, last))
+        found.append(Repetition(side, first, bottom, last, start_s, bottom_s, end_s, why))
+    return tuple(found)
+
+
+def _find_bottoms(knee: Floats, params: RepetitionParams) -> list[tuple[int, int, int]]:
+    """Of each squat the straightest sample before it, the deepest, and the straightest after it."""
+    from scipy.signal import find_peaks
+
+    # at the ends as straight as ever, so that a squat that the take cuts is a peak too
+    low = float(knee.min())
+    peaks = find_peaks(np.concatenate(([low], knee, [low])), prominence=params.least_rad)[0] - 1
+    bottoms: list[int] = []
+    for peak in peaks.tolist():
+        if bottoms:
+            last = bottoms[-1]
+            top, valley = min(knee[last], knee[peak]), knee[last : peak + 1].min()
+            if valley - low > params.level * (top - low):
+                bottoms[-1] = max(last, peak, key=lambda k: float(knee[k]))
+                continue
+        bottoms.append(peak)
+    between = [a + int(np.argmin(knee[a : b + 1])) for a, b in pairwise(bottoms)]
+    starts, ends = [0, *between], [*between, len(knee) - 1]
+    return list(zip(starts, bottoms, ends, strict=False))
+
+
+def _find_edges(
+    knee: Floats, before: int, bottom: int, after: int, params: RepetitionParams
+) -> tuple[int, int]:
+    """Last sample before and first after the deepest one at which the knee is nearly straight again."""
+    down, up = knee[before : bottom + 1], knee[bottom : after + 1]
+    start = down.min() + params.edge * (knee[bottom] - down.min())
+    end = up.min() + params.edge * (knee[bottom] - up.min())
+    return before + int(np.flatnonzero(down <= start)[-1]), bottom + int(np.flatnonzero(up <= end)[0])

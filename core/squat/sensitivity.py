@@ -1,0 +1,283 @@
+"""How far joint angles move when one measure of the body or one sensor's place or direction is off.
+
+One at a time, 24 parameters, as Kianifar et al. 2019 (equation 1, tables 2 and 3); beside their relative
+figure the change of the error itself, for ± 5 % and for steps that also exist where the nominal value is 0
+(docs/science/squat.md, "Sensitivity").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import radians
+from typing import Final
+
+import numpy as np
+
+from core.angles import cardan_zxy
+from core.body.chain.filter import ChainFilter, ChainFilterParams
+from core.body.chain.geometry import LegGeometry
+from core.body.chain.model import build_leg_chain, leg_segments
+from core.body.corrected import correct_signals
+from core.calibration.fixed_offset import BACK, FRONT
+from core.calibration.result import CalibratedRecording
+from core.errors import EstimationError, ParameterError
+from core.frames import SUFFIX, Bools, Floats, Segment
+from core.rest import index_window
+from core.rotation import about, from_matrix, to_matrix
+from core.squat.joints import JOINTS, name_joint_angles
+
+UP, FORWARD, RIGHT = 1, 0, 2
+
+LENGTHS: Final[Mapping[str, str]] = {
+    "LTib2Knee": "tibia_to_knee",
+    "CTib": "tibia_circumference",
+    "Zr3S": "tibia_aside",
+    "Ltibia": "tibia",
+    "Yr3": "knee_forward",
+    "Zr3": "knee_inward",
+    "LThi2Knee": "thigh_to_knee",
+    "CThi": "thigh_circumference",
+    "Zr4S": "thigh_aside",
+    "Lthigh": "thigh",
+    "Yr4": "hip_forward",
+    "Zr4": "hip_inward",
+    "PW": "pelvis_width",
+    "PD": "pelvis_depth",
+    "LL": "leg_length",
+}
+"""The paper's name → field of `LegGeometry`."""
+
+TURNS: Final[Mapping[str, tuple[int, int]]] = {
+    "Roll-tib": (0, UP),
+    "Pitch-tib": (0, FORWARD),
+    "Yaw-tib": (0, RIGHT),
+    "Roll-thi": (1, UP),
+    "Pitch-thi": (1, FORWARD),
+    "Yaw-thi": (1, RIGHT),
+    "Roll-bac": (2, RIGHT),
+    "Pitch-bac": (2, FORWARD),
+    "Yaw-bac": (2, UP),
+}
+"""The paper's name → sensor from the foot up, and axis of its segment. The axes are not written there; they
+are those for which tables 2 and 3 make sense: a roll of 45° on the shin is about the bone, yaw of shin and
+thigh shows in flexion, on the back roll does."""
+
+PARAMETERS: Final = (*LENGTHS, *TURNS)
+
+LEAST_NOMINAL: Final = {"m": 1e-4, "rad": radians(0.1)}
+"""A nominal value below this is 0: nothing can be 5 % off it."""
+LEAST_ERROR: Final = radians(0.1)
+"""An error below this cannot be divided by: the quotient says nothing of a person."""
+GIMBAL: Final = radians(80.0)
+
+
+@dataclass(frozen=True, eq=False)
+class SquatCase:
+    """A take with a reference.
+
+    Parameters
+    ----------
+    gyr, acc : (n, 3, 3) rad/s, m/s² of shank, thigh and pelvis, biases taken off, from standing on.
+    valid : (n, 3). rest_force : (3, 3) m/s² mean over standing.
+    reference : `JOINTS` → (n,) rad, anatomical or from standing; NaN where there is none.
+    zero : samples whose mean is subtracted from the estimate, where the reference is from standing; None.
+    """
+
+    rate_hz: float
+    geometry: LegGeometry
+    mounts: Mapping[Segment, Floats]
+    gyr: Floats
+    acc: Floats
+    valid: Bools
+    rest_force: Floats
+    reference: Mapping[str, Floats]
+    zero: slice | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SensitivityRow:
+    """One parameter; the seven angles in the order of `JOINTS`.
+
+    Parameters
+    ----------
+    name : the paper's. nominal : m or rad, None where it is not defined. unit : "m" or "rad".
+    sensitivity_pct : (7,) of equation 1, mean of both directions; None where `reason` says why: of a nominal
+        value of 0 "parameter_nominal_zero", near a pole of its angles "gimbal". NaN where the error itself is
+        too small to divide by.
+    relative_rad : (7,) |change of the RMS error| at ± 5 %, mean of both directions; None like the former.
+    step : m or rad, and absolute_rad : (7,) the same at ± step.
+    """
+
+    name: str
+    nominal: float | None
+    unit: str
+    sensitivity_pct: Floats | None
+    relative_rad: Floats | None
+    step: float
+    absolute_rad: Floats
+    reason: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SensitivityTable:
+    """All parameters; errors : (7,) rad, RMS with nominal values."""
+
+    errors: Floats
+    relative: float
+    rows: tuple[SensitivityRow, ...]
+
+
+def make_case(
+    calibrated: CalibratedRecording,
+    geometry: LegGeometry,
+    t_s: Floats,
+    reference: Mapping[str, Floats],
+    *,
+    from_standing: bool,
+) -> SquatCase:
+    """A case from a calibrated take and reference angles on their own times.
+
+    Parameters
+    ----------
+    t_s : (m,) s on the recording's clock. reference : name with suffix → (m,) rad. from_standing : they are
+        zeroed on standing, so the estimate is too.
+
+    Raises
+    ------
+    EstimationError `segments_missing`, `no_reference`.
+    """
+    recording, calibration = calibrated.recording, calibrated.calibration
+    segments = leg_segments(geometry.side)
+    mounts = {s: m.R_segment_sensor for s, m in calibration.segments.items()}
+    build_leg_chain(geometry, mounts)
+    names = [f"{joint}_{SUFFIX[geometry.side]}" for joint in JOINTS]
+    missing = [name for name in names if name not in reference]
+    if missing:
+        raise EstimationError(
+            "no_reference",
+            f"The reference has no {', '.join(missing)}; it needs the seven angles of the leg.",
+        )
+    acc, gyr, valid = correct_signals(calibrated, segments)
+    standing = index_window(calibration.zero, recording.rate_hz)
+    first = standing.start
+    at = recording.t_s[first:]
+    found = {
+        joint: np.interp(at, t_s, reference[name], left=np.nan, right=np.nan)
+        for joint, name in zip(JOINTS, names, strict=True)
+    }
+    if not all(np.isfinite(a).any() for a in found.values()):
+        raise EstimationError("no_reference", "Reference and recording have no time in common.")
+    return SquatCase(
+        rate_hz=recording.rate_hz,
+        geometry=geometry,
+        mounts={s: mounts[s] for s in segments},
+        gyr=np.ascontiguousarray(gyr[first:]),
+        acc=np.ascontiguousarray(acc[first:]),
+        valid=np.ascontiguousarray(valid[first:]),
+        rest_force=acc[standing].mean(axis=0),
+        reference=found,
+        zero=slice(0, standing.stop - first) if from_standing else None,
+    )
+
+
+def analyse_sensitivity(
+    case: SquatCase,
+    relative: float = 0.05,
+    step_m: float = 0.005,
+    step_rad: float = radians(2.0),
+    params: ChainFilterParams | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> SensitivityTable:
+    """Run the chain with every parameter up and down, one at a time.
+
+    Parameters
+    ----------
+    relative : share of the nominal value. step_m, step_rad : absolute steps.
+    progress : called with each parameter and the share of the work done before it.
+
+    Raises
+    ------
+    ParameterError `parameter_out_of_range`; EstimationError `filter_diverged`.
+    """
+    if not (0.0 < relative < 1.0 and step_m > 0.0 and step_rad > 0.0):
+        raise ParameterError("parameter_out_of_range", "Steps of a sensitivity analysis are above 0.")
+    errors = _run(case, case.geometry, case.mounts, params)
+    rows = []
+    for i, name in enumerate(PARAMETERS):
+        if progress is not None:
+            progress(name, i / len(PARAMETERS))
+        nominal, reason = _find_nominal(case, name)
+        unit = "m" if name in LENGTHS else "rad"
+        changes = pct = None
+        if reason is None and nominal is not None:
+            changes = _change(case, name, relative * nominal, errors, params)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                pct = 100.0 * np.where(errors > LEAST_ERROR, changes / errors, np.nan) / relative
+        step = step_m if unit == "m" else step_rad
+        absolute = _change(case, name, step, errors, params)
+        rows.append(SensitivityRow(name, nominal, unit, pct, changes, step, absolute, reason))
+    return SensitivityTable(errors, relative, tuple(rows))
+
+
+def _change(
+    case: SquatCase, name: str, step: float, errors: Floats, params: ChainFilterParams | None
+) -> Floats:
+    """|Change of the errors| (7,) with a parameter off by ± step, mean of both."""
+    both = []
+    for by in (step, -step):
+        geometry, mounts = _put_off(case, name, by)
+        both.append(np.abs(_run(case, geometry, mounts, params) - errors))
+    return np.asarray(0.5 * (both[0] + both[1]))
+
+
+def _put_off(case: SquatCase, name: str, by: float) -> tuple[LegGeometry, Mapping[Segment, Floats]]:
+    """The model with one parameter off by m or rad."""
+    if name in LENGTHS:
+        field = LENGTHS[name]
+        return replace(case.geometry, **{field: getattr(case.geometry, field) + by}), case.mounts
+    sensor, axis = TURNS[name]
+    segment = leg_segments(case.geometry.side)[sensor]
+    turned = to_matrix(about(axis, by)) @ case.mounts[segment]
+    return case.geometry, {**case.mounts, segment: turned}
+
+
+def _find_nominal(case: SquatCase, name: str) -> tuple[float | None, str | None]:
+    """Nominal value, and why nothing can be 5 % off it."""
+    if name in LENGTHS:
+        value = float(getattr(case.geometry, LENGTHS[name]))
+        return value, "parameter_nominal_zero" if abs(value) < LEAST_NOMINAL["m"] else None
+    sensor, axis = TURNS[name]
+    segment = leg_segments(case.geometry.side)[sensor]
+    plain = BACK if segment == "pelvis" else FRONT
+    turns = cardan_zxy(from_matrix(case.mounts[segment] @ plain.T))
+    if abs(float(turns[1])) > GIMBAL:
+        return None, "gimbal"
+    value = float(turns[{RIGHT: 0, FORWARD: 1, UP: 2}[axis]])
+    return value, "parameter_nominal_zero" if abs(value) < LEAST_NOMINAL["rad"] else None
+
+
+def _run(
+    case: SquatCase, geometry: LegGeometry, mounts: Mapping[Segment, Floats], params: ChainFilterParams | None
+) -> Floats:
+    """RMS errors (7,) of the angles, rad."""
+    chain = build_leg_chain(geometry, mounts)
+    motion = ChainFilter(chain, case.rate_hz, case.rest_force, params).advance(case.gyr, case.acc, case.valid)
+    found = name_joint_angles(motion.angles, geometry.side)
+    all_there = case.valid.all(axis=1)
+    errors = []
+    for joint in JOINTS:
+        estimate = found[f"{joint}_{SUFFIX[geometry.side]}"]
+        if case.zero is not None:
+            estimate = estimate - estimate[case.zero].mean()
+        off = (estimate - case.reference[joint])[all_there]
+        errors.append(float(np.sqrt(np.nanmean(off**2))))
+    return np.array(errors)
+
+
+def average_sensitivity(values: Sequence[Floats | None]) -> Floats:
+    """Column means of what is defined, as the last row of the paper's tables; NaN where nothing is."""
+    rows = np.array([v for v in values if v is not None]).reshape(-1, len(JOINTS))
+    known = np.isfinite(rows)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(known, rows, 0.0).sum(axis=0) / known.sum(axis=0))
