@@ -99,7 +99,7 @@ class Analysis:
     def parameters(self) -> pa.Table:
         """One row per parameter and side: `name`, `side`, `n`, `mean`, `sd`, `unit`, `reason` …"""
         rows = [asdict(p) for p in self._found.parameters]
-        kinds = {name: pa.float64() for name in NUMBERS} | {"n": pa.int64()}
+        kinds = {name: pa.float64() for name in NUMBERS} | {"n": pa.int64(), "estimated": pa.bool_()}
         names = tuple(Parameter.__dataclass_fields__)
         return pa.table(
             {name: pa.array([r[name] for r in rows], kinds.get(name, pa.string())) for name in names}

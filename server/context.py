@@ -73,6 +73,7 @@ Failures = Annotated[Throttle, Depends(_throttle)]
 HEX_ID = r"^[0-9a-f]{32}$"
 """How an identifier looks."""
 Id = Annotated[str, Path(pattern=HEX_ID, description="32 hex digits")]
+DeviceId = Annotated[str, Path(pattern=r"^[0-9A-Za-z:-]{2,32}$", description="serial number of a sensor")]
 
 
 def address_of(connection: HTTPConnection) -> str:

@@ -81,9 +81,52 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--script",
         default="comfortable",
-        help="comfortable, fast_with_turns, hemiparetic, squats, postures … (docs/simulation.md)",
+        help="comfortable, fast_with_turns, hemiparetic, squats, postures, activity … (docs/simulation.md)",
     )
-    p.add_argument("--seed", type=int, default=1)
+    p.add_argument("--seed", type=_whole, default=1)
+    p.add_argument("--hours", type=float, default=24.0, help="of daily life, --script activity (default 24)")
+    p = add("bench", "Score published algorithms on recordings with a reference, or list them.")
+    p.add_argument("what", choices=("fusion",), help="fusion: orientation filters of one sensor")
+    p.add_argument("folder", nargs="?", type=Path, metavar="DIR", help="recordings (docs/science/filters.md)")
+    p.add_argument("--list", dest="show_list", action="store_true", help="list them, with their sources")
+    p.add_argument("--out", type=Path, metavar="CSV", help="write every score into a file")
+    p.add_argument("--every", action="store_true", help="print every recording instead of their mean")
+    p = add("sensitivity", "Say how far angles of a squat move with each measure and each sensor.")
+    p.add_argument(
+        "paths", nargs="*", type=Path, metavar="PATH", help="files of one take (default: a simulated one)"
+    )
+    p.add_argument("--reference", type=Path, help="angles.parquet with the true angles of the take")
+    p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")
+    p.add_argument("--table-top", type=Path, metavar="PATH", help="take in which sensors left the table")
+    p.add_argument(
+        "--side", choices=("left", "right"), help="leg that squats (default: the one with sensors)"
+    )
+    p.add_argument("--measures", type=Path, help="JSON: lengths in m (docs/science/squat.md)")
+    p.add_argument("--from-standing", action="store_true", help="compare angles from standing")
+    p.add_argument("--out", type=Path, metavar="CSV", help="write every figure into a file")
+    p.add_argument("--seed", type=_whole, default=1, help="of the simulated take")
+    p = add("tune", "Fit the gains of a filter to recordings with a reference; others judge them.")
+    p.add_argument("folder", type=Path, metavar="DIR", help="recordings (docs/science/filters.md)")
+    p.add_argument("--algorithm", required=True, help="of `sagittal bench fusion --list`")
+    p.add_argument(
+        "--validate",
+        dest="validation",
+        nargs="+",
+        required=True,
+        metavar="NAME",
+        help="recordings that only judge, without .npz",
+    )
+    p.add_argument("--out", type=Path, default=Path("tuned.json"), metavar="JSON", help="default tuned.json")
+    p.add_argument("--resume", type=Path, metavar="FILE", help="go on from the checkpoint of a stopped run")
+    p.add_argument(
+        "--scheme",
+        choices=("fixed", "two_levels", "three_levels"),
+        help="how gains follow the motion (default: as the algorithm's own)",
+    )
+    p.add_argument("--magnetometer", action=argparse.BooleanOptionalAction, help="default: where it can")
+    p.add_argument("--seed", type=_whole, default=0)
+    for name in ("particles", "iterations", "rounds", "random-rounds"):
+        p.add_argument(f"--{name}", type=int, metavar="N", help="of the swarm (default: the thesis')")
     _data_option(
         add("check", "Check the database, every stored file by its hash, live logs, trash, the audit chain.")
     )
@@ -101,6 +144,13 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("name")
     p.add_argument("--role", default="clinician", choices=("admin", "clinician", "assistant", "viewer"))
     return parser
+
+
+def _whole(text: str) -> int:
+    """A seed: generators take none below zero."""
+    if not (text.isascii() and text.isdigit()):
+        raise argparse.ArgumentTypeError(f"'{text}' is no whole number of 0 or more")
+    return int(text)
 
 
 def _data_option(parser: argparse.ArgumentParser) -> None:

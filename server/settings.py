@@ -43,7 +43,7 @@ class Settings:
     workers : worker processes started by `sagittal serve`; each keeps one warm child.
     live_workers : processes that estimate live takes; each carries many, 0 = takes are recorded only.
     lease_s : a worker that has not renewed its job for so long is taken for dead; renewed every third of it.
-    job_timeout_s : longest run of one job.
+    job_timeout_s : longest run of one job, or of the part of it since its last checkpoint.
     child_memory_bytes : address space of the computing child (RLIMIT_AS; libraries alone map 1 GB), 0 = none.
     sweep_grace_s : age from which a file that nothing refers to goes to the trash.
     idle_minutes, absolute_hours : life of a sign-in.

@@ -28,7 +28,7 @@ CHUNK_BYTES = 1_000_000
 """One thread hop and one write per megabyte, whatever pieces the network delivers."""
 
 FileName = Annotated[str, Path(max_length=2000, description="with folders; any Unicode")]
-_RAW = {"content": {"application/octet-stream": {"schema": BINARY}}}
+RAW_BODY = {"content": {"application/octet-stream": {"schema": BINARY}}}
 _FORM = {
     "content": {
         "multipart/form-data": {
@@ -47,7 +47,7 @@ _FORM = {
     status_code=201,
     response_model=recordings.RecordedFile,
     responses=refusals(413),
-    openapi_extra={"requestBody": {"required": True, **_RAW}},
+    openapi_extra={"requestBody": {"required": True, **RAW_BODY}},
 )
 async def put_file(
     session_id: Id,
@@ -59,15 +59,9 @@ async def put_file(
     who: Annotated[Identity, require(Action.UPLOAD)],
 ) -> recordings.RecordedFile:
     """Add a file to the current recording, the raw body as its content; the same name replaces it."""
-    size = _declared(request, settings.max_file_bytes)
+    size = read_size(request, settings.max_file_bytes)
     upload = await run_in_threadpool(recordings.receive, db, blobs, settings, who, session_id, name, size)
-    with upload:
-        try:
-            async for chunk in _megabytes(request):
-                await run_in_threadpool(upload.write, chunk)
-        except ClientDisconnect:
-            raise _cut() from None
-        return await run_in_threadpool(upload.keep)
+    return await receive_body(request, upload)
 
 
 @router.post(
@@ -91,7 +85,7 @@ async def post_files(
             411, "length_required", "A form upload must say its length. Send a Content-Length header."
         )
     # boundaries and part headers take some hundred bytes a file
-    size = _declared(request, settings.max_set_bytes + 1000 * settings.max_files)
+    size = read_size(request, settings.max_set_bytes + 1000 * settings.max_files)
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise Problem(422, "no_form", "Expected multipart/form-data with the field 'files'.")
     await run_in_threadpool(recordings.require_room, blobs, settings, size)
@@ -126,7 +120,7 @@ async def post_files(
 @router.get(
     "/{name:path}",
     response_class=Response,
-    responses={200: {"description": "The file", **_RAW}},
+    responses={200: {"description": "The file", **RAW_BODY}},
 )
 def read_file(
     session_id: Id,
@@ -153,7 +147,18 @@ def delete_file(
         return schemas.make_answer(schemas.RecordingAnswer, recordings.remove_file(c, who, session_id, name))
 
 
-def _declared(request: Request, limit: int) -> int:
+async def receive_body(request: Request, upload: recordings.receive) -> recordings.RecordedFile:
+    """Keep the raw body of a request as a file."""
+    with upload:
+        try:
+            async for chunk in _megabytes(request):
+                await run_in_threadpool(upload.write, chunk)
+        except ClientDisconnect:
+            raise _cut() from None
+        return await run_in_threadpool(upload.keep)
+
+
+def read_size(request: Request, limit: int) -> int:
     """Return how many bytes the client announces, 0 = it does not say; raise Problem 413 beyond it."""
     declared = request.headers.get("content-length", "0")
     if not declared.isdecimal() or int(declared) > limit:

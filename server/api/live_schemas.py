@@ -88,12 +88,16 @@ class PairingCode(Request):
 
 @dataclass(frozen=True)
 class PairedTablet:
-    """What the tablet needs to stream; the token opens this take only, for twelve hours."""
+    """What the tablet needs to stream; the token opens this take only, for twelve hours.
+
+    `remembered` has the serial numbers of the clinic's sensors with the segment each was worn on last.
+    """
 
     token: str
     take: HexId
     session_title: str
     patient_code: str
+    remembered: dict[str, str]
     socket: str
 
 

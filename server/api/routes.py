@@ -10,8 +10,10 @@ from server.api import (
     analyses,
     audit_log,
     comparisons,
+    devices,
     estimators,
     files,
+    filters,
     health,
     jobs,
     live,
@@ -24,6 +26,7 @@ from server.api import (
     sessions,
     sign_in,
     trends,
+    tunings,
     users,
 )
 from server.api.documents import openapi
@@ -47,18 +50,22 @@ def build_api(app: FastAPI) -> APIRouter:
         sessions,
         files,
         analyses,
+        tunings,
         estimators,
+        filters,
         reports,
         reviews,
         trends,
         comparisons,
         live,
         jobs,
+        devices,
         users,
         audit_log,
         tablet,
     ):
         api.include_router(part.router)
+    api.include_router(filters.references)
 
     @api.get("/openapi.json", include_in_schema=False)
     def document(who: Annotated[Identity, require(Action.READ_API)]) -> dict[str, Any]:

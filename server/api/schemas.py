@@ -15,6 +15,7 @@ from server.auth.roles import Role
 from server.jobs.queue import JobView
 from server.report.behind import StrideValue
 from server.services.recordings import RecordedFile, RecordingState
+from server.services.tunings import MOST_OF_SWARM, Scheme
 
 # one line of text: starts and ends with something visible, no control characters
 _LINE = r"^[^\s\x00-\x1f\x7f]([^\x00-\x1f\x7f]*[^\s\x00-\x1f\x7f])?$"
@@ -218,6 +219,22 @@ class AnalysisNew(Request):
     config: Json | None = None
 
 
+class TuningNew(Request):
+    """Which filter to tune, and the trials that only judge; it is fitted to the session's others."""
+
+    algorithm: Line
+    validation: Annotated[
+        tuple[Line, ...], Field(min_length=1, max_length=100, description="names without .npz")
+    ]
+    scheme: Scheme | None = None
+    magnetometer: bool | None = None
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+    particles: Annotated[int, Field(ge=1, le=MOST_OF_SWARM["particles"])] | None = None
+    iterations: Annotated[int, Field(ge=1, le=MOST_OF_SWARM["iterations"])] | None = None
+    rounds: Annotated[int, Field(ge=1, le=MOST_OF_SWARM["rounds"])] | None = None
+    random_rounds: Annotated[int, Field(ge=1, le=MOST_OF_SWARM["random_rounds"])] | None = None
+
+
 @dataclass(frozen=True)
 class AnalysisAnswer:
     """A finished analysis; its input, settings and code version give the same numbers again."""
@@ -257,6 +274,9 @@ class ReportAnswer:
     estimator: dict[str, Any] | None
     profile: dict[str, Any] | None
     limits: dict[str, Any] | None
+    squats: dict[str, Any] | None
+    functional: dict[str, Any] | None
+    daily: dict[str, Any] | None
 
 
 @dataclass(frozen=True)

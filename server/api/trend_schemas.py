@@ -47,7 +47,10 @@ class OtherWalksAnswer:
 
 @dataclass(frozen=True)
 class TrendPoint:
-    """A value at a visit (index into `visits`); `change` from the first assessment, null with feedback."""
+    """A value at a visit (index into `visits`); `change` from the first assessment, null with feedback.
+
+    `estimated`: a model of the leg gives it, no two sensors measure it.
+    """
 
     visit: int
     value: float
@@ -56,6 +59,7 @@ class TrendPoint:
     ci_low: float | None
     ci_high: float | None
     change: Change | None
+    estimated: bool
 
 
 @dataclass(frozen=True)

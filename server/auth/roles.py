@@ -43,6 +43,8 @@ class Action(StrEnum):
     """Sends the samples of one take; the take's token in the first message is the door."""
     READ_JOB = "read_job"
     CANCEL_JOB = "cancel_job"
+    READ_DEVICE = "read_device"
+    """Looks at the clinic's sensors; says nothing of who wore them."""
     MANAGE_USERS = "manage_users"
     READ_AUDIT = "read_audit"
 
@@ -81,6 +83,7 @@ POLICY: dict[Action, frozenset[Role]] = {
     Action.RUN_LIVE: _CLINICAL,
     Action.READ_JOB: _ALL,
     Action.CANCEL_JOB: _UPLOADERS,
+    Action.READ_DEVICE: _UPLOADERS,
     Action.MANAGE_USERS: _ADMIN,
     Action.READ_AUDIT: _ADMIN,
 }

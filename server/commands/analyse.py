@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
 from core.errors import InputError, SagittalError
 from core.formats.json_tree import read_json
+from server.report import activity_files
 from server.report.estimator import estimator_view
 from server.storage import fs
 
@@ -48,6 +50,9 @@ def analyse(
         fs.write_file(out / name, content)
     result = json.loads(files["analysis.json"])
     print_summary(result, out)
+    if activity_files.NAME in files:
+        print_day(json.loads(files[activity_files.NAME]))
+        return 0
     return 0 if any(p["mean"] is not None for p in result["parameters"]) else 1
 
 
@@ -87,6 +92,19 @@ def print_summary(result: dict[str, Any], out: Path) -> None:
     lines.append(f"Results in {out}")
     sys.stdout.write("\n".join(lines) + "\n")
     sys.stdout.flush()
+
+
+def print_day(found: dict[str, Any]) -> None:
+    """Daily life in one look: time of each kind, steps and transitions, on stdout."""
+    times = [f"{kind} {minutes:.0f} min" for kind, minutes in found["minutes"].items() if minutes >= 0.5]
+    counts = Counter(t["kind"] for t in found["transitions"])
+    changes = [f"{kind} {number}" for kind, number in sorted(counts.items())]
+    lines = [
+        f"Worn on the {found['segment']} for {found['duration_s'] / 3600:.1f} h: {', '.join(times)}.",
+        f"{found['steps']} steps in {len(found['bouts'])} bouts; {', '.join(changes) or 'no transitions'}.",
+        f"{found['sub_threshold']} candidates lack nothing but the lean.",
+    ]
+    sys.stdout.write("\n".join(lines) + "\n")
 
 
 class _ProgressBar:

@@ -8,25 +8,40 @@ import sys
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from server.storage import fs
 
 if TYPE_CHECKING:
-    from core.simulate import ChestTruth, SquatTruth, WalkTruth
+    from core.simulate import ChestTruth, FunctionalTruth, SquatTruth, WalkTruth
+    from core.simulate.tug import ChairTruth
 
 
-def simulate(out: Path, script: str, seed: int) -> int:
+ACTIVITY: Final = "activity"
+"""The script of hours of daily life."""
+
+
+def simulate(out: Path, script: str, seed: int, hours: float = 24.0) -> int:
     """Write `recording.parquet` and `truth/` into `out`; 2 = no such script.
 
-    Truth of a walk: angles, events, strides; of squats: angles, phases; of a chest: trunk, phases.
+    Truth of a walk: angles, events, strides; of squats, of swings and bows: angles, phases; of a chest:
+    trunk, phases; of a test that begins on a chair: trunk, segments, scripted changes; of daily life: phases
+    and steps.
+
+    Parameters
+    ----------
+    hours : of the script "activity".
     """
     from core.formats import write_recording
     from core.simulate import MOVEMENTS, SCRIPTS, Simulation, simulate_movement, simulate_scenario
+    from core.simulate.functional import FunctionalSimulation
     from core.simulate.squat import SquatSimulation
+    from core.simulate.tug import ChairSimulation
 
+    if script == ACTIVITY:
+        return _simulate_activity(out, seed, hours)
     if script not in SCRIPTS and script not in MOVEMENTS:
-        known = ", ".join((*SCRIPTS, *MOVEMENTS))
+        known = ", ".join((*SCRIPTS, *MOVEMENTS, ACTIVITY))
         sys.stderr.write(f"No script '{script}'; expected one of {known}.\n")
         return 2
     made = simulate_scenario(script, seed) if script in SCRIPTS else simulate_movement(script, seed)
@@ -34,6 +49,10 @@ def simulate(out: Path, script: str, seed: int) -> int:
         files, facts = _walk(made.truth)
     elif isinstance(made, SquatSimulation):
         files, facts = _squats(made.truth)
+    elif isinstance(made, FunctionalSimulation):
+        files, facts = _functional(made.truth)
+    elif isinstance(made, ChairSimulation):
+        files, facts = _chair(made.truth)
     else:
         files, facts = _chest(made.truth)
     title = (SCRIPTS[script] if script in SCRIPTS else MOVEMENTS[script]).title
@@ -46,6 +65,32 @@ def simulate(out: Path, script: str, seed: int) -> int:
         fs.make_folder((out / name).parent)
         fs.write_file(out / name, content)
     sys.stdout.write(f"{title}, {made.truth.t_s[-1]:.1f} s, seed {seed}, in {out}\n")
+    sys.stdout.flush()
+    return 0
+
+
+def _simulate_activity(out: Path, seed: int, hours: float) -> int:
+    """Write hours of daily life of one sensor on the chest."""
+    from core.errors import ParameterError
+    from core.formats import write_recording
+    from core.simulate import phase_table
+    from core.simulate.daily import plan_daily_life, record_daily_life, simulate_daily_life
+
+    try:
+        made = simulate_daily_life(plan_daily_life(hours, seed), seed=seed)
+    except ParameterError as error:
+        sys.stderr.write(f"{error.message}\n")
+        return 2
+    truth = {"script": ACTIVITY, "title": "Daily life", "seed": seed, "steps_s": made.steps_s.tolist()}
+    files = {
+        "recording.parquet": write_recording(record_daily_life(made)),
+        "truth/phases.csv": _csv(phase_table(made.phases)),
+        "truth/truth.json": json.dumps(truth, indent=1).encode(),
+    }
+    for name, content in files.items():
+        fs.make_folder((out / name).parent)
+        fs.write_file(out / name, content)
+    sys.stdout.write(f"Daily life, {made.stream.duration_s / 3600:.1f} h, seed {seed}, in {out}\n")
     sys.stdout.flush()
     return 0
 
@@ -86,6 +131,38 @@ def _squats(truth: SquatTruth) -> Made:
     return files, {"depths_deg": [math.degrees(depth) for depth in truth.depths_rad]}
 
 
+def _functional(truth: FunctionalTruth) -> Made:
+    from core.angles import JointAngles
+    from core.simulate import phase_table
+    from server.report.exports import angles_parquet
+
+    zero = {name: float(values[0]) for name, values in truth.angles.items()}
+    from_standing = {name: values - zero[name] for name, values in truth.angles.items()}
+    files = {
+        "truth/angles.parquet": angles_parquet(JointAngles(truth.t_s, from_standing, zero)),
+        "truth/phases.csv": _csv(phase_table(truth.phases)),
+    }
+    return files, {}
+
+
+def _chair(truth: ChairTruth) -> Made:
+    from core.simulate import phase_table
+
+    trunk = {
+        "t_s": truth.t_s.tolist(),
+        "trunk_lean_deg": [math.degrees(lean) for lean in truth.chest_rad.tolist()],
+        "hip_height_m": truth.height_m.tolist(),
+        "heading_deg": [math.degrees(heading) for heading in truth.heading_rad.tolist()],
+    }
+    parts = truth.segments or truth.changes
+    files = {
+        "truth/trunk.csv": _csv(trunk),
+        "truth/segments.csv": _csv(phase_table(parts)),
+        "truth/scripted.csv": _csv(phase_table(truth.scripted)),
+    }
+    return files, {"duration_s": truth.duration_s, "contacts_s": list(truth.contacts_s)}
+
+
 def _chest(truth: ChestTruth) -> Made:
     from core.simulate import phase_table
 
@@ -100,6 +177,6 @@ def _chest(truth: ChestTruth) -> Made:
 
 
 def _csv(columns: Mapping[str, Sequence[object]]) -> bytes:
-    from server.report.exports import write_csv
+    from server.report.columns import write_csv
 
     return write_csv(tuple(columns), list(zip(*columns.values(), strict=True)))

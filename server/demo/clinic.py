@@ -14,7 +14,7 @@ from math import degrees, hypot, inf
 from typing import TYPE_CHECKING
 
 from core.condition import USUAL, WalkingCondition
-from core.frames import Segment, Side
+from core.frames import SEGMENTS, Segment, Side
 from server.jobs.table import TableQueue
 from server.services import analyses, patients, prescriptions, recordings, sessions
 from server.services.reviewed import ReviewedAnalyses
@@ -24,12 +24,16 @@ from server.storage.db import Database
 from server.storage.tables import now
 
 if TYPE_CHECKING:
+    from core.recording import Recording
     from core.simulate import Simulation
 
 GONIOMETER = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 """Angles of standing that are entered."""
 
 FEET: tuple[Segment, ...] = ("foot_l", "foot_r")
+
+SENSORS: Mapping[Segment, str] = {segment: f"00B4D3A{i}" for i, segment in enumerate(SEGMENTS)}
+"""The clinic's own, each worn at one place."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +134,13 @@ def record(visit: DemoVisit) -> Simulation:
     return simulate_scenario(visit.script, visit.seed, visit.person.height_m, worn=visit.worn, dropouts=fails)
 
 
+def label_sensors(recording: Recording) -> Recording:
+    """The same take as one of the clinic's own seven sensors recorded it: one serial number per segment."""
+    own = {d: SENSORS[s] for d, s in recording.segments.items() if s is not None}
+    streams = {own[d]: replace(x, device_id=own[d]) for d, x in recording.streams.items()}
+    return replace(recording, streams=streams, segments={own[d]: s for d, s in recording.segments.items()})
+
+
 def fill(settings: Settings) -> None:
     """Add all patients and visits and ask for their analyses."""
     from core.simulate import mt_files
@@ -145,17 +156,19 @@ def fill(settings: Settings) -> None:
             prescriptions.write(c, ReviewedAnalyses(blobs), None, known[person.code], content)
         for visit in VISITS:
             made = record(visit)
-            files = mt_files(made.recording, visit.script, made.first_counter)
-            _add(db, blobs, settings, visit, known[visit.person.code], _manifest(made), files)
+            worn = label_sensors(made.recording)
+            files = mt_files(worn, visit.script, made.first_counter)
+            manifest = _manifest(made) | {"sensors": dict(worn.segments)}
+            _add(db, blobs, settings, visit, known[visit.person.code], manifest, files)
 
 
 def _manifest(made: Simulation) -> dict[str, object]:
-    """The sensors, and what a therapist would take with tape and goniometer while the person stands."""
+    """What a therapist would take with tape and goniometer while the person stands."""
     truth = made.truth
     apart = truth.p["foot_l"][0, :2] - truth.p["foot_r"][0, :2]
     angles = {n: round(degrees(a)) for n, a in truth.zero_offset.items() if n.startswith(GONIOMETER)}
     subject = {"standing_width_m": round(float(hypot(*apart)), 2), "standing_angles_deg": angles}
-    return {"sensors": dict(made.recording.segments), "subject": subject}
+    return {"subject": subject}
 
 
 def _add(

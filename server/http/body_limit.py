@@ -11,7 +11,7 @@ from server.http.problems import Problem, send_problem
 
 MAX_BODY_BYTES = 1_000_000
 """A manifest of eight sensors has some 4 kB."""
-_UPLOAD = re.compile(r"/api/v1/sessions/[^/]+/files(/|$)")
+_UPLOAD = re.compile(r"/api/v1/sessions/[^/]+/(files|references)(/|$)")
 
 
 class BodyLimit:

@@ -12,7 +12,7 @@ import datetime as dt
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Literal, Protocol
+from typing import Any, Final, Literal, Protocol
 
 from sqlalchemy import Connection, Row
 
@@ -21,6 +21,11 @@ from server.storage.tables import job
 Publish = Callable[[Connection], None]
 """Writes a result's rows; called inside the transaction that marks the job done."""
 
+
+TUNE: Final = "tune"
+COMPARE_FILTERS: Final = "compare_filters"
+BESIDE: Final = (TUNE, COMPARE_FILTERS)
+"""Kinds of jobs beside a visit's analysis: it stays what pages show, whatever becomes of them."""
 
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
@@ -68,7 +73,12 @@ def job_view(row: Row[Any]) -> JobView:
 
 @dataclass(frozen=True)
 class Claim:
-    """The right of one worker to one attempt; what it may write is fenced by it."""
+    """The right of one worker to one attempt; what it may write is fenced by it.
+
+    Parameters
+    ----------
+    checkpoint : sha256 of what an earlier attempt kept, None = from the start.
+    """
 
     job_id: str
     attempt: int
@@ -77,12 +87,15 @@ class Claim:
     recording_id: str | None
     requested_by: str | None
     params: Mapping[str, Any]
+    checkpoint: str | None = None
 
 
 class LeaseState(Enum):
-    """What a heartbeat found: the job is still ours, is to be stopped, or is somebody else's."""
+    """What a heartbeat found: the job is still ours, makes way, is to be stopped, or is somebody else's."""
 
     OURS = "ours"
+    YIELD = "yield"
+    """A more urgent job waits: give this one back, it goes on from its checkpoint."""
     CANCEL = "cancel"
     LOST = "lost"
 
@@ -120,6 +133,15 @@ class JobQueue(Protocol):
 
     def progress(self, claim: Claim, stage: str, fraction: float, message: str | None = None) -> bool:
         """Say how far the attempt is."""
+
+    def keep(self, claim: Claim, sha256: str, require: Publish) -> str | None:
+        """Keep a checkpoint that `require` finds stored, and forgive deaths until now.
+
+        Returns
+        -------
+        The checkpoint that no longer refers to anything: the earlier one, `sha256` itself when the claim is
+        lost, None when there is none.
+        """
 
     def finish(self, claim: Claim, publish: Publish) -> bool:
         """Publish and mark done in one transaction; refused also after a request to cancel."""

@@ -24,7 +24,9 @@ POISONED = (
     "the recording breaks a library. Try fewer or shorter files; the server's log has the signal."
 )
 
-_CLAIMED = tuple(job.c[k] for k in ("id", "attempt", "kind", "recording_id", "requested_by", "params"))
+_CLAIMED = tuple(
+    job.c[k] for k in ("id", "attempt", "kind", "recording_id", "requested_by", "params", "checkpoint")
+)
 
 
 class TableQueue:
@@ -127,14 +129,13 @@ class TableQueue:
                     fraction=None,
                     message=None,
                 )
-                .returning(
-                    *(job.c[k] for k in ("id", "attempt", "kind", "recording_id", "requested_by", "params"))
-                )
+                .returning(*_CLAIMED)
             )
             row = c.execute(taken).first()
         if row is None:
             return None
-        return Claim(row.id, row.attempt, worker, row.kind, row.recording_id, row.requested_by, row.params)
+        job_id, attempt, *rest = row
+        return Claim(job_id, attempt, worker, *rest)
 
     def heartbeat(self, claim: Claim) -> LeaseState:
         """See JobQueue."""
@@ -147,15 +148,28 @@ class TableQueue:
     def look(self, claim: Claim) -> LeaseState:
         """See JobQueue."""
         with self._db.read() as c:
-            row = c.execute(select(job.c.cancel_requested).where(_fence(claim))).first()
-        if row is None:
-            return LeaseState.LOST
-        return LeaseState.CANCEL if row.cancel_requested else LeaseState.OURS
+            row = c.execute(select(job.c.cancel_requested, job.c.priority).where(_fence(claim))).first()
+            if row is None:
+                return LeaseState.LOST
+            if row.cancel_requested:
+                return LeaseState.CANCEL
+            urgent = select(job.c.seq).where(job.c.state == "queued", job.c.priority < row.priority).limit(1)
+            return LeaseState.OURS if c.execute(urgent).first() is None else LeaseState.YIELD
 
     def progress(self, claim: Claim, stage: str, fraction: float, message: str | None = None) -> bool:
         """See JobQueue."""
         share = min(max(fraction, 0.0), 1.0)
         return self._fenced(claim, stage=stage[:64], fraction=share, message=message and message[:500])
+
+    def keep(self, claim: Claim, sha256: str, require: Publish) -> str | None:
+        """See JobQueue."""
+        with self._db.write() as c:
+            old = c.execute(select(job.c.checkpoint).where(_fence(claim))).first()
+            if old is None:
+                return sha256
+            require(c)
+            c.execute(update(job).where(_fence(claim)).values(checkpoint=sha256, deaths=0))
+            return None if old.checkpoint == sha256 else old.checkpoint
 
     def finish(self, claim: Claim, publish: Publish) -> bool:
         """See JobQueue."""
@@ -188,7 +202,8 @@ class TableQueue:
             return c.execute(update(job).where(_fence(claim)).values(**values)).rowcount == 1
 
     def _ended(self, state: str) -> dict[str, object]:
-        return {"state": state, "worker": None, "lease_until": None, "finished_at": self._clock()}
+        ended = {"state": state, "worker": None, "lease_until": None, "finished_at": self._clock()}
+        return {**ended, "checkpoint": None}
 
     def _dead(self, time: dt.datetime) -> ColumnElement[bool]:
         expired = or_(job.c.lease_until < time, job.c.lease_until > time + 2 * self._lease)

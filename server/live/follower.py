@@ -169,6 +169,9 @@ class Follower:
             self._next_seq = batch.seq + 1
             if frame is not None:
                 self._tell(frame)
+                # once a second that takes milliseconds: the cue is out by now
+                for notice in self._online.compare_sensors():
+                    self._item("notice", notice.t_s, wire.notice(notice))
             self._obey()
         elif record.kind == "F":
             self._say(LogProcessed(self.take))

@@ -18,11 +18,19 @@ from core.frames import SIDES, SUFFIX, Floats, Side
 from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SensorHealth
 from core.parameters.live_stride import LiveStride
 from server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
+from server.report.wording import speak_places
 
 LOST_WARN, LOST_BAD = 0.01, 0.20
 """Shares of lost samples, as the report judges a whole take (core/quality/assessment.py)."""
 SATURATED_WARN: Final = 0.001
 """Share of samples at range, as there."""
+DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
+    "sensors_exchanged": ("bad", "exchanged"),
+    "sensor_slipped": ("bad", "slipped"),
+    "sensor_late": ("warn", "late"),
+    "clocks_disagree": ("warn", "clock in doubt"),
+}
+"""What the other sensors say of one (core/agreement/live.py) → its state and words."""
 CURVE_POINTS: Final = 51
 """Every second of the 101 points of a cycle: a chart on a tablet shows no more."""
 
@@ -121,10 +129,11 @@ def notice(given: Notice) -> dict[str, Any]:
 
 
 def _notice(given: Notice) -> dict[str, Any]:
+    words = speak_places(given.message)
     return {
         "severity": _SEVERITY[given.severity],
-        "text": given.message,
-        "message": given.message,
+        "text": words,
+        "message": words,
         "code": given.code,
         "sensor": given.sensor,
         "t_s": _number(given.t_s, 3),
@@ -179,6 +188,8 @@ def _judged(row: SensorHealth, battery_pct: float | None) -> tuple[str, str]:
         return "bad", "does not measure"
     if row.lost_share > LOST_BAD:
         return "bad", f"{100.0 * row.lost_share:.0f} % lost"
+    if row.doubt is not None:
+        return DOUBTS[row.doubt]
     if row.lost_share > LOST_WARN:
         return "warn", f"{100.0 * row.lost_share:.0f} % lost"
     if row.saturated_share > SATURATED_WARN:

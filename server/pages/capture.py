@@ -9,7 +9,7 @@ from starlette.responses import Response
 from server.auth.access import require
 from server.auth.roles import Action
 from server.http.templates import TEMPLATES
-from server.pages.words import SEGMENT_NAMES
+from server.pages.words import CALIBRATIONS, SEGMENT_NAMES
 from server.services.live import ALPHABET, CODE_LENGTH
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -24,6 +24,7 @@ def show_capture(request: Request) -> Response:
     context = {
         "alphabet": ALPHABET,
         "code_length": CODE_LENGTH,
+        "calibrations": CALIBRATIONS,
         "places": [(place, SEGMENT_NAMES[place]) for place in PLACES],
     }
     return TEMPLATES.TemplateResponse(request, "capture.html", context)

@@ -19,8 +19,9 @@ from server.context import Blobs, Db, Id
 from server.pages.session_context import read_context
 from server.pages.shell import record_opening, render_page
 from server.pages.words import SEGMENT_NAMES
-from server.report.estimator import EstimatorView, choice_label, estimator_view
-from server.services import analyses, recordings
+from server.report.estimator import choice_label, estimator_view
+from server.report.sensor_checks import sensor_checks
+from server.services import analyses, recordings, repairs
 from server.storage.blobs import BlobStore
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -30,8 +31,19 @@ FILE_WORDS: Final[Mapping[str, str]] = {
     "angles.parquet": "Joint angles in degrees over time",
     "poses.parquet": "Orientation and position of every segment over time",
     "tracks.parquet": "Paths of the feet and what else strides are measured on",
+    "repaired.json": "The set-up that is proposed instead of this one",
     "signals.parquet": "What the sensors measured, on one time axis",
     "events.csv": "Contacts and foot-offs as detected",
+    "steps.csv": "Steps of the trunk sensor, where no foot carries one",
+    "repetitions.csv": "Every squat with its measures, and why it was left out",
+    "activity.json": "Daily life: days, hours, transitions, walking bouts, how the sensor was worn",
+    "activity_spans.parquet": "What the person did from when to when",
+    "activity_spans.csv": "The same as text",
+    "activity_inclination.parquet": "Inclination of the trunk in degrees, once a second",
+    "activity_steps.parquet": "Time of every step of daily life",
+    "activity_hours.csv": "Steps and minutes of each posture in every hour",
+    "transitions.csv": "Postural transitions, and leans that do not count with the reason",
+    "walking_bouts.csv": "Every walk of daily life with its steps and cadence",
     "strides.csv": "Every stride with its parameters, and why it was left out",
 }
 
@@ -49,16 +61,24 @@ def show_data(
 
 
 def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results: bool) -> dict[str, Any]:
-    """Files to download, estimator, provenance and the mapping behind the shown analysis."""
+    """Files to download, estimator, sensor checks, provenance and the mapping behind the shown analysis."""
     this = recordings.current(c, session_id)
     found = analyses.of_session(c, session_id) if results else []
     shown = found[0] if found else None
+    stored = {} if shown is None else json.loads(analyses.file_bytes(blobs, shown, "analysis.json"))
     files = [] if shown is None else [(shown.id, name, blob.size) for name, blob in shown.files.items()]
     return {
         "analysis": shown,
-        "estimator": None if shown is None else _estimator(blobs, shown),
+        "estimator": estimator_view(stored.get("estimator")),
+        "sensors": sensor_checks(stored.get("agreement")),
         "earlier": [
-            {"id": a.id, "created_at": a.created_at, "estimator": _asked_for(a.config)} for a in found[1:]
+            {
+                "id": a.id,
+                "created_at": a.created_at,
+                "estimator": _asked_for(a.config),
+                "again": _ask_again(this, shown, a),
+            }
+            for a in found[1:]
         ],
         "results": [
             {
@@ -78,8 +98,20 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
     }
 
 
-def _estimator(blobs: BlobStore, shown: analyses.AnalysisRecord) -> EstimatorView | None:
-    return estimator_view(json.loads(analyses.file_bytes(blobs, shown, "analysis.json")).get("estimator"))
+def _ask_again(
+    this: recordings.StoredRecording | None,
+    shown: analyses.AnalysisRecord | None,
+    earlier: analyses.AnalysisRecord,
+) -> dict[str, Any] | None:
+    """What asks for an earlier set-up of the same files again; None where it is that of the shown one."""
+    if this is None or shown is None or earlier.recording_id != this.id:
+        return None
+    if repairs.take_setup(None, earlier.manifest) == repairs.take_setup(None, shown.manifest):
+        return None
+    return {
+        "manifest": repairs.take_setup(this.manifest, earlier.manifest),
+        "config": dict(earlier.config),
+    }
 
 
 def _asked_for(config: Mapping[str, Any]) -> str | None:

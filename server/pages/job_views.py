@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from sqlalchemy import Connection
 
-from server.jobs.queue import JobView
+from server.jobs.queue import BESIDE, JobView
 from server.services import jobs
 
 FOLLOWED: Final = 3
@@ -28,7 +28,7 @@ def follow_few(found: Sequence[dict[str, Any] | None]) -> None:
 
 def find_newest_job(c: Connection, session_id: str) -> JobView | None:
     """The job a session's pages speak of."""
-    return next(iter(jobs.of_session(c, session_id)), None)
+    return next((view for view in jobs.of_session(c, session_id) if view.kind not in BESIDE), None)
 
 
 def find_active_jobs(
@@ -37,5 +37,7 @@ def find_active_jobs(
     """The running job, else the newest that waits, by what `whose` takes of it (patient or session)."""
     found: dict[str | None, dict[str, Any]] = {}
     for listed in jobs.list_active(c):
+        if listed.kind in BESIDE:
+            continue
         found.setdefault(whose(listed), view_job(listed))
     return found

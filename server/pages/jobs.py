@@ -31,7 +31,12 @@ JOB_WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "cancelled": ("none", "Cancelled"),
 }
 
-KIND_WORDS: Final = {"inspect": "Reading the files", "analyse": "Analysis"}
+KIND_WORDS: Final = {
+    "inspect": "Reading the files",
+    "analyse": "Analysis",
+    "compare_filters": "Comparison of filters",
+    "tune": "Tuning of a filter",
+}
 
 
 @router.get("/jobs")

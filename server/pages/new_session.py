@@ -14,7 +14,7 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id
 from server.pages.shell import record_opening, render_page
-from server.pages.words import PROTOCOLS
+from server.pages.words import PROTOCOLS, TEST_PROTOCOLS
 from server.services import patients, programmes
 from server.storage.tables import now
 
@@ -34,6 +34,7 @@ def show_new_session(
     open_visits = [v for plan in plans[:1] for v in plan.visits if v.session_id is None]
     return render_page(
         request, db, who, "session-new.html", "patients",
-        patient=patient, protocols=PROTOCOLS, today=today.isoformat(), open_visits=open_visits,
+        patient=patient, protocols=(*PROTOCOLS, *TEST_PROTOCOLS),
+        today=today.isoformat(), open_visits=open_visits,
         near=plans[0].near(today) if plans else None, usual=USUAL,
     )  # fmt: skip

@@ -6,10 +6,13 @@ from fastapi import APIRouter
 
 from server.pages import (
     account,
+    algorithms,
     audit_log,
+    calibration,
     capture,
     compare,
     data,
+    devices,
     jobs,
     live,
     new_session,
@@ -28,10 +31,13 @@ from server.pages import (
 
 ROUTERS: tuple[APIRouter, ...] = (
     account.router,
+    algorithms.router,
     audit_log.router,
+    calibration.router,
     capture.router,
     compare.router,
     data.router,
+    devices.router,
     jobs.router,
     live.router,
     new_session.router,

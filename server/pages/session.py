@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
+from core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, Reviewed
+from server.pages import daily
 from server.pages.charts import COLUMNS, KEY_HEIGHT, PAGE_HEIGHTS, PAPER_HEIGHTS, draw_chart
 from server.pages.session_context import read_context
 from server.pages.shell import record_opening, render_page
-from server.pages.words import PROTOCOL_NAMES, describe_person
+from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
 from server.report import level
 from server.report.curves import strip_svg
+from server.report.headline import BEYOND_SD
 from server.report.model import ReportModel
 from server.report.table import ParameterRow
-from server.services import analyses, comparisons, edit_log, feedback, histories, reports
+from server.report.wording import speak_places
+from server.services import analyses, comparisons, edit_log, feedback, histories, repairs, reports
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
@@ -43,13 +47,40 @@ SECONDARY: Final = (
 )
 """Groups for those who look closer: folded on the page, not on paper."""
 
+MATTERING: Final = (
+    "gait_speed_mps",
+    "cadence_spm",
+    "step_length_m",
+    "stance_pct",
+    "double_support_pct",
+    "knee_flexion_max_swing_deg",
+    "hip_flexion_min_deg",
+    "ankle_dorsiflexion_ic_deg",
+    "foot_pitch_ic_deg",
+    "pci_pct",
+    "foot_pitch_tc_deg",
+    "max_heel_clearance_m",
+    "circumduction_m",
+    "stride_time_s",
+    "step_time_s",
+    "step_regularity_v",
+    "stride_regularity_v",
+    "harmonic_ratio_v",
+    "step_count",
+    "walking_duration_min",
+)
+"""What a therapist reads first, of what the sensors can give."""
+
+FIRST_ROWS: Final = 10
+
+FIRST_CURVES: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
+
 NOT_ON_PAPER: Final = ("swing_pct", "swing_time_s", "turning_angle_deg")
 """What the rest of a stride leaves, and what a straight walk has none of."""
 
 SHOWN: Final = (
     "problem",
     "quality",
-    "kpis",
     "strides",
     "duration_s",
     "norm_note",
@@ -61,6 +92,9 @@ SHOWN: Final = (
     "condition",
     "profile",
     "limits",
+    "squats",
+    "headline",
+    "functional",
 )
 """Members of ReportModel that templates use as they are."""
 
@@ -119,11 +153,19 @@ def _show_report(
         if this is not None:
             context["before"] = comparisons.find_previous(c, this.session, done)
             trained = feedback.gather(c, patient, sid, done)
+            if not paper and who.may(Action.ANALYSE):
+                repair = repairs.read_proposal(c, reviewed.blobs, this.found)
+                context["repair"] = repair
+                if this.session.protocol in TEST_NAMES:
+                    context["test_manifest"] = repairs.read_without_limits(c, this.found)
+                context["repair_says"] = [speak_places(s) for s in repair.evidence] if repair else []
     if this is None and paper:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
     if this is not None:
         context["report"] = view_report(reviewed, this.found, this.edits, context, paper=paper)
         context["feedback"] = feedback.view(reviewed, trained)
+    if context["session"].protocol == "activity":
+        template = daily.TEMPLATES.get(template, template)
     record_opening(request, who, "session", sid)
     return render_page(request, db, who, template, "patients", **context)
 
@@ -147,11 +189,13 @@ def view_report(
     used, total = sum(model.used.values()), len(model.strides)
     return {
         **{name: getattr(model, name) for name in SHOWN},
+        "daily": daily.draw_daily(model.daily),
         "estimator": model.estimator,
         "groups": select_groups(model, paper=paper),
         "since": None if paper else model.since,
         "not_compared": _not_compared(session, model),
-        "more": [(name, rows) for name, rows in model.groups if name in SECONDARY],
+        "first": (first := select_first(model)),
+        "folds": fold_groups(model, first),
         "missing": [
             (r.title, r.reason.removeprefix("not measured: "))
             for name, rows in model.groups
@@ -160,7 +204,11 @@ def view_report(
         ],
         "warnings": _notices(model),
         "curves": curves,
-        "key_curve": draw_chart(model.key_curve, KEY_HEIGHT, x_unit=True),
+        "sagittal": [
+            draw_chart(p, KEY_HEIGHT, x_unit=True)
+            for p in model.panels
+            if p.variable.name in FIRST_CURVES and p.sides
+        ],
         "strip": strip_svg(bundle.strides, model.duration_s) if model.strides else "",
         "stride_words": f"{used} of {total} used",
         "empty_reason": explain_emptiness(model),
@@ -169,6 +217,37 @@ def view_report(
         f"input {found.input_sha256[:8]} · {day(found.created_at)}",
         "has_poses": "poses.parquet" in found.files,
     }
+
+
+def select_first(model: ReportModel) -> tuple[ParameterRow, ...]:
+    """The ten rows that matter most of what these sensors gave, in fixed order; of squats and tests all.
+
+    An angle from the anatomical zero stands in for the same one from standing.
+    """
+    rows = {row.name: row for _, group in model.groups for row in group}
+    if model.squats is not None:
+        return tuple(row for row in rows.values() if row.group == SQUAT)
+    if model.functional is not None and not model.strides:
+        return tuple(row for row in rows.values() if row.group in FUNCTIONAL and row.reason is None)
+    from_zero = {level.from_standing(name): row for name, row in rows.items()}
+    found = (from_zero.get(name) or rows.get(name) for name in MATTERING)
+    return tuple(row for row in found if row is not None and row.reason is None)[:FIRST_ROWS]
+
+
+def fold_groups(model: ReportModel, first: Sequence[ParameterRow]) -> list[dict[str, Any]]:
+    """All other rows by group; the head of each says how many are beyond the norm, so that none hides."""
+    shown = {row.name for row in first}
+    groups = ((name, [row for row in rows if row.name not in shown]) for name, rows in model.groups)
+    return [{"name": name, "rows": rows, "words": _count_beyond(rows)} for name, rows in groups if rows]
+
+
+def _count_beyond(rows: Sequence[ParameterRow]) -> str:
+    beyond = sum(
+        any(c is not None and c.z is not None and abs(c.z) > BEYOND_SD for c in (r.both, r.left, r.right))
+        for r in rows
+    )
+    values = f"{len(rows)} value{'' if len(rows) == 1 else 's'}"
+    return f"{values}, {beyond} beyond {BEYOND_SD:g} SD" if beyond else values
 
 
 def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[ParameterRow, ...]]]:
@@ -191,9 +270,12 @@ def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[P
 
 
 def explain_emptiness(model: ReportModel) -> str:
-    """Say why an analysis has no strides to show."""
+    """Say why an analysis has no strides, or no squats, to show."""
     causes = [w.message for code in NO_STRIDE_CODES for w in model.warnings if w.code == code]
-    read = f"{seconds(model.duration_s)} of data were read, but no complete stride was seen in them."
+    what = "squat" if any(name == SQUAT for name, _ in model.groups) else "stride"
+    read = f"{seconds(model.duration_s)} of data were read, but no complete {what} was seen in them."
+    if what == "squat":
+        return model.problem or f"{read} A squat bends the knee by 20° or more, and comes back."
     asked = "Is a sensor on each foot, and is it the one the mapping says?"
     return model.problem or " ".join([read, *(causes or [asked])])
 
@@ -227,6 +309,6 @@ def _identity(patient: Patient, session: Session, condition: str) -> list[tuple[
         ("Age, sex", describe_person(patient.sex, patient.birth_year) or "not given"),
         ("Height", f"{height:.2f} m" if height else "not given"),
         ("Protocol", PROTOCOL_NAMES.get(session.protocol, session.protocol)),
-        ("Walked", condition),
+        ("Condition" if session.protocol == "squat" else "Walked", condition),
         ("Date", day(session.performed_on)),
     ]

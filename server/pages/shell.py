@@ -16,6 +16,7 @@ from server.trail import AuditTrail
 NAVIGATION = (
     ("patients", "people", "Patients", "/patients", Action.READ_PATIENT),
     ("jobs", "jobs", "Jobs", "/jobs", Action.READ_JOB),
+    ("devices", "sensor", "Sensors", "/sensors", Action.READ_DEVICE),
     ("users", "users", "Users", "/users", Action.MANAGE_USERS),
     ("audit", "audit", "Audit", "/audit", Action.READ_AUDIT),
 )

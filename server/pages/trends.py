@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
+from core.activity.parameters import WORN_H
 from core.frames import Protocol
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -16,6 +17,8 @@ from server.auth.roles import Action
 from server.context import HEX_ID, Db, Id, Reviewed
 from server.pages.shell import record_opening, render_page
 from server.report.change_words import change_words, find_term
+from server.report.daily_life import format_hours
+from server.report.daily_trend import PerformanceDay, draw_daily_trend
 from server.report.trend_chart import PlannedAssessment, trend_svg
 from server.report.trends import PRIMARY, AnalysedVisit, Trend, TrendSeries, follow_figures, names_in
 from server.report.wording import GROUPS, format_number
@@ -51,6 +54,12 @@ def show_trends(
     history = histories.read_history(reviewed, patient, done, plans, protocol, like)
     record_opening(request, who, "patient", pid)
     view = view_trends(history, show)
+    performance = histories.read_performance(reviewed, done)
+    if performance:
+        walks = [a for a in done if a.session.protocol != "activity"]
+        walked = histories.read_history(reviewed, patient, walks, plans) if walks else None
+        shown = history if history.condition and history.condition.protocol != "activity" else walked
+        view["daily"] = view_daily_trend(shown, performance)
     return render_page(request, db, who, "trends.html", "patients", patient=patient, trends=view)
 
 
@@ -63,6 +72,46 @@ def list_ahead(history: PatientHistory) -> list[PlannedAssessment]:
         for v in plan.visits
         if v.kind == "assessment" and v.state in {"next", "planned"}
     ]
+
+
+def view_daily_trend(walked: PatientHistory | None, performance: Sequence[PerformanceDay]) -> dict[str, Any]:
+    """Capacity beside performance: charts over one time axis, and every value in a table.
+
+    Parameters
+    ----------
+    walked : visits in the clinic that were walked alike, None where there is none.
+    """
+    capacity = [] if walked is None else histories.read_capacity(walked)
+    rows = [
+        {
+            "day": v.day,
+            "href": f"/sessions/{v.session_id}",
+            "where": "clinic",
+            "speed": None if v.speed_mps is None else format_number(v.speed_mps, 2),
+            "steps": None,
+            "cadence": None if v.cadence_spm is None else format_number(v.cadence_spm, 0),
+            "worn": None,
+        }
+        for v in capacity
+    ] + [
+        {
+            "day": d.day,
+            "href": f"/sessions/{d.session_id}",
+            "where": "home" if d.counted else "home, worn too short",
+            "speed": None,
+            "steps": str(d.steps),
+            "cadence": None if d.cadence_spm is None else format_number(d.cadence_spm, 0),
+            "worn": format_hours(60.0 * d.worn_h),
+        }
+        for d in performance
+    ]
+    return {
+        "panels": draw_daily_trend(capacity, performance),
+        "rows": sorted(rows, key=lambda row: row["day"]),
+        "has_capacity": bool(capacity),
+        "condition": None if walked is None or walked.condition is None else walked.condition.words,
+        "worn_h": f"{WORN_H:.0f}",
+    }
 
 
 def draw_teaser(history: PatientHistory) -> dict[str, Any] | None:
@@ -81,6 +130,7 @@ def view_trends(history: PatientHistory, chosen: Sequence[str]) -> dict[str, Any
     """The trends page: charts of the chosen figures, the choice, limits with sources, and the table."""
     there = names_in(history.visits)
     names = [n for n in there if n in chosen] or [n for n in PRIMARY if n in there]
+    names = names or list(there[: len(PRIMARY)])
     found = follow_figures(history.visits, names, history.norms, history.usual, history.patient.affected_side)
     groups: dict[str, list[dict[str, Any]]] = {}
     for name in there:
@@ -120,6 +170,7 @@ def _shown(history: PatientHistory, found: Sequence[Trend], height: int) -> dict
         "norms": [(", ".join(labels), s) for s, labels in norms.items()],
         "has_mdc": any(line.mdc is not None for _, line in lines),
         "has_mcid": any(line.mcid is not None for _, line in lines),
+        "has_estimated": any(p.estimated for _, line in lines for p in line.points),
         "has_training": any(v.kind == "training" for v in history.visits),
     }
 
@@ -146,7 +197,12 @@ def _figure(
 
 def _waiting(line: TrendSeries) -> str:
     """What is said as long as there are not two assessments."""
-    return "no assessment yet" if line.base is None else "one assessment so far"
+    if line.base is None:
+        return "no assessment yet"
+    if line.points[line.base].estimated:
+        return "one estimated assessment so far"
+    mixed = any(p.estimated for p in line.points)
+    return "one measured assessment so far" if mixed else "one assessment so far"
 
 
 def _column(v: AnalysedVisit) -> dict[str, Any]:
@@ -168,7 +224,7 @@ def _rows(trend: Trend, visits: Sequence[AnalysedVisit]) -> list[dict[str, Any]]
             p = by_visit.get(i)
             mark = "" if p is None or p.change is None else change_words(p.change).mark
             text = None if p is None else format_number(p.value, trend.term.digits)
-            cells.append({"text": text, "mark": mark})
+            cells.append({"text": text, "mark": mark, "estimated": p is not None and p.estimated})
         change = line.change
         rows.append(
             {

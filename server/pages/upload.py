@@ -21,6 +21,7 @@ from server.pages.shell import record_opening, render_page
 from server.pages.words import SEGMENT_NAMES
 from server.report.bundle import ABOUT_FILES
 from server.services import histories, patients, recordings, sessions
+from server.services.devices import NO_PLACES, LastPlaces, recall_places
 from server.services.patients import Patient
 from server.services.recordings import StoredRecording
 from server.services.sessions import Session
@@ -41,6 +42,7 @@ BASIS_WORDS: Final = {
     "remembered": "As at this patient's last visit with these sensors. Check it.",
     "declared": "As the files say. Change what is not right.",
     "label": "Guessed from the names. Change what is not right.",
+    "last_take": "As in the last take with these sensors. Check it.",
     "movement": "Guessed from how each sensor moves.",
 }
 
@@ -94,7 +96,7 @@ def view_upload(c: Connection, this: StoredRecording | None, s: Session, p: Pati
         "problem": problem,
         "found": None
         if this is None or this.inspection is None or waiting
-        else view_inspection(this, find_remembered(c, s)),
+        else view_inspection(this, find_remembered(c, s), _recall(c, this, s)),
         "segments": SEGMENT_CHOICES,
         "said": _said({"subject": found.get("subject") or {}}) | _said({**manifest, "subject": measured}),
         "goniometer": GONIOMETER,
@@ -126,6 +128,20 @@ def find_remembered(c: Connection, s: Session) -> Mapping[str, str | None]:
     return {}
 
 
+def _recall(c: Connection, this: StoredRecording, s: Session) -> LastPlaces:
+    """Where the sensors of this upload were in the clinic's last takes, those of other patients too."""
+    own = [d["device_id"] for d in (this.inspection or {})["devices"]]
+    return recall_places(c, own, but=s.id)
+
+
+def fits_names(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, str | None]) -> bool:
+    """Whether no file and no sensor's name says another place, or such a place of another sensor."""
+    by_name = [d for d in devices if d["basis"] in {"declared", "label"} and d["suggested"]]
+    named = {d["device_id"]: d["suggested"] for d in by_name}
+    taken = {segment: device for device, segment in named.items()}
+    return all(named.get(d, s) == s and taken.get(s, d) == d for d, s in sensors.items() if s)
+
+
 def fits_movement(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, str | None]) -> bool:
     """Whether a remembered mapping covers these sensors and does not contradict how they move now."""
     own = {d["device_id"] for d in devices}
@@ -145,18 +161,28 @@ def fits_movement(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, st
     return all(len(found) <= 1 for found in sides.values()) and not sides[1] & sides[2]
 
 
-def view_inspection(this: StoredRecording, earlier: Mapping[str, str | None]) -> dict[str, Any]:
+def view_inspection(
+    this: StoredRecording, earlier: Mapping[str, str | None], last: LastPlaces = NO_PLACES
+) -> dict[str, Any]:
     """What the inspection found: facts, sensors with their most likely segment, notices.
+
+    A sensor's place is, in this order: what a person set, what the files declare, that of this patient's last
+    visit with these sensors, what a name says, that of the clinic's last take with it, what movement
+    suggests. Earlier takes count as a whole or not at all: names or movement may contradict them.
 
     Parameters
     ----------
     earlier : mapping of an earlier visit; used when it covers these sensors and fits how they move.
+    last : of the clinic's last takes; used where nothing else is known and it fits names and movement.
     """
     found: Mapping[str, Any] = this.inspection or {}
     devices: Sequence[Mapping[str, Any]] = found["devices"]
     said: Mapping[str, str | None] = (this.manifest or {}).get("sensors") or {}
     past = earlier if not said and fits_movement(devices, earlier) else {}
-    chosen = {d["device_id"]: _segment(d, said, past) for d in devices}
+    usual: Mapping[str, str | None] = {} if said or past else last.segments
+    if not (fits_names(devices, usual) and fits_movement(devices, usual)):
+        usual = {}
+    chosen = {d["device_id"]: _segment(d, said, past, usual) for d in devices}
     guessed = any(basis == "movement" for _, basis in chosen.values())
     known = {basis for segment, basis in chosen.values() if segment and basis}
     hint = next(
@@ -171,11 +197,27 @@ def view_inspection(this: StoredRecording, earlier: Mapping[str, str | None]) ->
         "manifest": dict(this.manifest or {}),
         "hint": hint,
         "ask_sides": guessed,
+        "as_before": _as_before(chosen, last),
     }
 
 
+def _as_before(
+    chosen: Mapping[str, tuple[str | None, str | None]], last: LastPlaces
+) -> dict[str, Any] | None:
+    """How many places were taken over from an earlier take and from whose, for one notice; None = none."""
+    bases = [basis for segment, basis in chosen.values() if segment]
+    for basis in ("remembered", "last_take"):
+        if n := bases.count(basis):
+            day = last.day if basis == "last_take" else None
+            return {"count": n, "day": day, "of_patient": basis == "remembered"}
+    return None
+
+
 def _segment(
-    device: Mapping[str, Any], said: Mapping[str, str | None], past: Mapping[str, str | None]
+    device: Mapping[str, Any],
+    said: Mapping[str, str | None],
+    past: Mapping[str, str | None],
+    usual: Mapping[str, str | None],
 ) -> tuple[str | None, str | None]:
     """Segment to preselect and what that rests on; of a leg whose side is unknown, leg 1 is tried as left."""
     if device["device_id"] in said:
@@ -186,9 +228,11 @@ def _segment(
         return past.get(device["device_id"]), "remembered"
     if device["duplicate_of"]:
         return None, None
-    if device["suggested"]:
+    if device["device_id"] in usual and device["basis"] != "label":
+        return usual[device["device_id"]], "last_take"
+    if device["suggested"] and (device["basis"] == "label" or device["suggested"] not in usual.values()):
         return device["suggested"], device["basis"]
-    if device["suggested_part"] and device["suggested_leg"]:
+    if not usual and device["suggested_part"] and device["suggested_leg"]:
         return f"{device['suggested_part']}_{'l' if device['suggested_leg'] == 1 else 'r'}", "movement"
     return None, None
 

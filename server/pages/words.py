@@ -11,9 +11,81 @@ from server.auth.roles import Role
 PROTOCOLS: Final = (
     ("walk", "Walk", "Over ground, there and back, with a few seconds of quiet standing before or after."),
     ("treadmill", "Treadmill", "Walking on the belt, with a few seconds of quiet standing before or after."),
+    (
+        "squat",
+        "Squats on one leg",
+        "Three or more, with two seconds of quiet standing first. Sensors on shin, thigh and lower back.",
+    ),
+    ("activity", "Daily life", "Hours to days at home with one sensor on the chest or the lower back."),
 )
 
-PROTOCOL_NAMES: Final = {value: name for value, name, _ in PROTOCOLS}
+CALIBRATIONS: Final = (
+    (
+        "walk",
+        "Stand and walk",
+        "Stand still for 3 to 5 s with both feet side by side. Then walk straight ahead, at least 8 steps.",
+    ),
+    (
+        "swing",
+        "Stand and swing each leg",
+        "Stand still, hold a rail. Swing each leg at least 10 times from the hip, further forward than back.",
+    ),
+    (
+        "bow",
+        "Stand and bow",
+        "For the pelvis: stand still, then bow from the hips at least 5 times. Keep both feet still.",
+    ),
+    (
+        "table",
+        "From the table",
+        "For squats: sensors lie still on the table, arrows forward. Put all on within a minute, then stand.",
+    ),
+    (
+        "declared",
+        "Mounting as declared",
+        "Nobody has to move: the recording's manifest says how each sensor sits. Stand still for 3 s.",
+    ),
+    (
+        "take",
+        "From the take itself",
+        "Who cannot stand still just walks. The walk itself calibrates; angles then have no level.",
+    ),
+)
+"""Ways to calibrate: name of the drawing, title, what to do. The analysis finds by itself which was done."""
+
+TEST_PROTOCOLS: Final = (
+    (
+        "tug",
+        "Timed up and go",
+        "Sit quietly, rise, walk 3 m, turn, walk back, sit down. Sensor on pelvis or chest.",
+    ),
+    (
+        "five_sit_to_stand",
+        "Five times sit to stand",
+        "Sit quietly, rise and sit down five times with folded arms. Sensor on pelvis or chest.",
+    ),
+    (
+        "walk_10m",
+        "Ten-metre walk",
+        "Quiet standing, 14 m straight ahead, quiet standing. Sensors on both feet.",
+    ),
+    ("walk_6min", "Six-minute walk", "Quiet standing, then six minutes to and fro. Sensors on both feet."),
+    (
+        "standing_eyes_open",
+        "Standing, eyes open",
+        "Stand quietly for 30 s or more. Sensor on pelvis or chest.",
+    ),
+    (
+        "standing_eyes_closed",
+        "Standing, eyes closed",
+        "The same with closed eyes, somebody beside the person.",
+    ),
+)
+"""Functional tests."""
+
+TEST_NAMES: Final = frozenset(value for value, _, _ in TEST_PROTOCOLS)
+
+PROTOCOL_NAMES: Final = {value: name for value, name, _ in (*PROTOCOLS, *TEST_PROTOCOLS)}
 
 ROLE_WORDS: Final[Mapping[Role, str]] = {
     Role.ADMIN: "Everything, users and the audit log included.",

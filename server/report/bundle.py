@@ -13,6 +13,7 @@ from typing import Any, Final, cast
 
 import numpy as np
 
+from core.activity.result import ActivityResult
 from core.angles import JointAngles
 from core.body.model import BodyModel
 from core.body.poses import Poses
@@ -22,8 +23,11 @@ from core.events.result import EventKind, GaitEvent, GaitEvents, Stride, StrideF
 from core.events.strides import NOTICES
 from core.frames import SEGMENTS, Segment, Side
 from core.measure import MeasuredGait
+from core.parameters.catalogue import CATALOGUE
+from core.parameters.catalogue.entry import FUNCTIONAL
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
+from server.report import activity_files
 from server.report.columns import SCHEMA, bools_of, floats_of, read_table
 from server.report.exports import STRIDE_COLUMNS
 
@@ -41,12 +45,25 @@ ABOUT_FILES: Final = frozenset({"ignored_file", "file_not_read", "file_given_twi
 """Codes of notices about files of an upload that hold nothing for this take; the upload page lists them."""
 
 
+@dataclass(frozen=True)
+class StoredRepetition:
+    """A squat of repetitions.csv; values : measure → number, empty where it does not count."""
+
+    side: Side
+    start_s: float
+    end_s: float
+    values: Mapping[str, float]
+    excluded: str | None
+
+
 @dataclass(frozen=True, eq=False)
 class Bundle:
     """A finished analysis as stored; a part that was not reached is None or empty.
 
     Parameters
     ----------
+    repetitions : of a take of squats, None of any other. functional : of a functional test, as in
+        analysis.json; None of any other. activity : of a take of daily life, None of any other.
     quality, calibration, estimator, provenance : the JSON of analysis.json. warnings : its notices but for
         those that the upload page has told.
     """
@@ -60,6 +77,9 @@ class Bundle:
     angles: JointAngles | None = None
     events: GaitEvents = field(default_factory=lambda: GaitEvents(()))
     strides: Strides = field(default_factory=lambda: Strides(()))
+    repetitions: tuple[StoredRepetition, ...] | None = None
+    functional: Mapping[str, Any] | None = None
+    activity: ActivityResult | None = None
 
 
 def load_bundle(files: Mapping[str, bytes]) -> Bundle:
@@ -88,7 +108,21 @@ def load_bundle(files: Mapping[str, bytes]) -> Bundle:
         angles=read_angles(files["angles.parquet"]) if "angles.parquet" in files else None,
         events=read_events(files["events.csv"]) if "events.csv" in files else GaitEvents(()),
         strides=read_strides(files["strides.csv"]) if "strides.csv" in files else Strides(()),
+        repetitions=read_repetitions(files["repetitions.csv"]) if "repetitions.csv" in files else None,
+        functional=data.get("functional"),
+        activity=activity_files.read_activity(files) if activity_files.NAME in files else None,
     )
+
+
+def read_repetitions(data: bytes) -> tuple[StoredRepetition, ...]:
+    """Squats of repetitions.csv in order of time."""
+    found = []
+    for row in csv.DictReader(io.StringIO(data.decode())):
+        side, start, end = cast("Side", row.pop("side")), float(row.pop("start_s")), float(row.pop("end_s"))
+        excluded = row.pop("excluded_reason") or None
+        values = {name: float(x) for name, x in row.items() if name != "bottom_s" and x}
+        found.append(StoredRepetition(side, start, end, values, excluded))
+    return tuple(found)
 
 
 def read_warnings(data: Mapping[str, Any]) -> tuple[Notice, ...]:
@@ -108,14 +142,22 @@ def apply_review(bundle: Bundle, measured: MeasuredGait, edits: Sequence[Edit]) 
         severity="info",
     )
     warnings = [n for n in bundle.warnings if n.code not in NOTICES]
+    # a functional test is measured by the analysis; edits of strides leave it
+    of_test = tuple(p for p in bundle.parameters if is_functional(p.name))
     return replace(
         bundle,
         events=measured.events,
         strides=measured.strides,
-        parameters=measured.parameters,
+        parameters=(*of_test, *measured.parameters),
         warnings=(*warnings, *measured.notices, notice),
         provenance={**bundle.provenance, "edits": len(edits)},
     )
+
+
+def is_functional(name: str) -> bool:
+    """Is a parameter one of a functional test?"""
+    entry = CATALOGUE.get(name)
+    return entry is not None and entry.group in FUNCTIONAL
 
 
 def read_angles(data: bytes) -> JointAngles:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from core.change import UNLIKE, Change
+from core.change import NOT_MEASURED_ALIKE, UNLIKE, Change
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.variability import TOO_FEW
 from server.report.wording import Term, format_number, parameter_term, title_of
@@ -20,6 +20,7 @@ VERDICTS: Final[Mapping[str, str]] = {
 
 NO_LIMIT: Final = "no measurement error known"
 TOO_FEW_WORDS: Final = "too few strides to compare"
+NOT_ALIKE_WORDS: Final = "not compared: one is measured, the other estimated"
 UNLIKE_WORDS: Final = "not judged, the conditions differ"
 
 SCORE_TERMS: Final[Mapping[str, Term]] = {
@@ -65,7 +66,8 @@ def change_words(change: Change) -> ChangeWords:
     """Say a change in words."""
     term = find_term(change.name, change.unit)
     if change.difference is None:
-        return ChangeWords(change.side, "–", "none", "not measured in both", limit_words(change))
+        said = NOT_ALIKE_WORDS if change.reason == NOT_MEASURED_ALIKE else "not measured in both"
+        return ChangeWords(change.side, "–", "none", said, limit_words(change))
     mark = "none" if change.verdict is None else ""
     if change.verdict in {"real_change", "clinically_relevant"}:
         mark = "up" if change.difference > 0 else "down"

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,9 +36,20 @@ def reduce_to_plain(value: object) -> object:
     return str(value)
 
 
-def parquet_file(t_s: Floats, columns: Mapping[str, np.ndarray], meta: Mapping[str, object]) -> bytes:
+def repeat_words(words: Sequence[str], times: int) -> pa.Array[Any]:
+    """A column with every word so many times, each word stored once."""
+    known = list(dict.fromkeys(words))
+    places = np.repeat(np.array([known.index(word) for word in words], np.int16), times)
+    return pa.DictionaryArray.from_arrays(places, pa.array(known, pa.string()))
+
+
+def parquet_file(
+    t_s: Floats, columns: Mapping[str, np.ndarray | pa.Array[Any]], meta: Mapping[str, object]
+) -> bytes:
     """Columns over time as Parquet with `meta` as JSON under "sagittal"; NaN becomes null."""
-    arrays = {"t_s": pa.array(t_s)} | {k: pa.array(v, from_pandas=True) for k, v in columns.items()}
+    arrays = {"t_s": pa.array(t_s)} | {
+        k: v if isinstance(v, pa.Array) else pa.array(v, from_pandas=True) for k, v in columns.items()
+    }
     table = pa.table(arrays).replace_schema_metadata({"sagittal": json.dumps(reduce_to_plain(meta))})
     # neighbouring samples share their high bytes: splitting the bytes halves the file
     split = [k for k, a in arrays.items() if pa.types.is_floating(a.type)]
@@ -62,3 +74,20 @@ def floats_of(table: pa.Table, name: str) -> Floats:
 def bools_of(table: pa.Table, name: str) -> Bools:
     """A column of truth values."""
     return np.asarray(table.column(name).to_numpy(zero_copy_only=False), dtype=np.bool_)
+
+
+def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
+    """UTF-8 comma-separated text with a header; None and non-finite numbers are empty, numbers to 1e-6."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([_cell(v) for v in row] for row in rows)
+    return text.getvalue().encode()
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return repr(round(value, 6) + 0.0) if math.isfinite(value) else ""
+    return "" if value is None else value

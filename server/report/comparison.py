@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from core.change import Change, parameter_changes, withdraw_verdicts
+from core.change import NOT_MEASURED_ALIKE, Change, parameter_changes, withdraw_verdicts
 from core.frames import Side
 from core.norms import Norms, NormValue
 from core.parameters.catalogue import CATALOGUE
 from server.report.change_words import SCORE_TERMS, ChangeWords, change_words, find_term
-from server.report.exports import write_csv
+from server.report.columns import write_csv
 from server.report.numbers import Numbers
 from server.report.table import ParameterRow
 from server.report.trends import collect_figures
@@ -79,10 +79,13 @@ def compare_rows(
 
 
 def add_changes(groups: Sequence[Group], found: Sequence[Change]) -> tuple[Group, ...]:
-    """Rows of a session's table with their change since an earlier one, where both have a number."""
+    """Rows of a session's table with their change since an earlier one, where both have a number.
+
+    Of a number that is not measured alike it says so.
+    """
     words: dict[str, list[ChangeWords]] = {}
     for c in found:
-        if c.difference is not None:
+        if c.difference is not None or c.reason == NOT_MEASURED_ALIKE:
             words.setdefault(c.name, []).append(change_words(c))
     return tuple(
         (name, tuple(replace(row, change=tuple(words.get(row.name, ()))) for row in rows))

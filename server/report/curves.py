@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from typing import Final
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Side
+from core.rest import find_runs
 from server.report.panels import CurvePanel, SideCurve
 from server.report.svg import (
     KEY,
@@ -23,6 +25,20 @@ from server.report.svg import (
 from server.report.wording import explain_exclusion, format_number
 
 X_TICKS: Final = (0, 20, 40, 60, 80, 100)
+
+
+@dataclass(frozen=True)
+class CycleWords:
+    """What a chart goes over, what its parts are called, and the unit of its x axis."""
+
+    over: str
+    counted: str
+    unit: str
+
+
+STRIDE: Final = CycleWords("the gait cycle", "strides", "% of gait cycle")
+SQUAT: Final = CycleWords("the squat", "squats", "% of squat")
+
 _TOP, _BOTTOM, _BOTTOM_WITH_UNIT = 18, 20, 34
 _CLOSE_PCT = 6.0
 
@@ -34,13 +50,14 @@ def cycle_svg(
     x_unit: bool = False,
     single_strides: bool = True,
     earlier: CurvePanel | None = None,
+    over: CycleWords = STRIDE,
 ) -> str:
     """Draw one panel: band, grid, foot-off, single strides, means, cursor, words, from back to front.
 
     Parameters
     ----------
     height : px with margins, of which the stylesheet gives 18 above and 20 (34 with `x_unit`) below.
-    x_unit : print "% of gait cycle" below; once per column.
+    x_unit : print the unit of the x axis below; once per column. over : what the curves go over.
     single_strides : draw thin strides, each a path with its number in the stride list as `data-stride`.
     earlier : the same variable in an earlier session; its means are drawn thin, behind.
 
@@ -69,12 +86,12 @@ def cycle_svg(
                 plot.curve(curve.mean_deg, f"{css}{KEY[side]}")
     plot.foot_offs(panel.sides)
     plot.cursor()
-    plot.x_axis("% of gait cycle" if x_unit else None)
+    plot.x_axis(over.unit if x_unit else None)
     plot.words(v.up, v.down)
     n = ", ".join(f"{side} mean of {c.n}" for side, c in panel.sides.items())
     return plot.draw(
         "chart cycle x-unit" if x_unit else "chart cycle",
-        f"{panel.title} over the gait cycle: {n} strides",
+        f"{panel.title} over {over.over}: {n} {over.counted}",
         f' data-variable="{v.name}"',
     )
 
@@ -185,9 +202,11 @@ class _CyclePlot(PlotArea):
         self.add_text("0", 0, f"{up} ↑", "words halo", "start", dx=5, dy=11)
         self.add_text("0", self.height, f"{down} ↓", "words halo", "start", dx=5, dy=-5)
 
-    def _points(self, angle: Floats, step: int = 1) -> list[str]:
+    def _points(self, angle: Floats, step: int = 1, first: int = 0) -> list[str]:
         y = np.rint(1000 * (self.high - angle) / (self.high - self.low)).astype(np.int64).tolist()
-        return [f"{10 * step * i} {v}" for i, v in enumerate(y)]
+        return [f"{10 * step * i} {v}" for i, v in enumerate(y, first)]
 
     def _path(self, angle: Floats, step: int) -> str:
-        return "M" + "L".join(self._points(angle, step))
+        """The curve in % of the plot, interrupted where it has no value."""
+        known = find_runs(np.isfinite(angle))
+        return "".join("M" + "L".join(self._points(angle[a:b], step, a)) for a, b in known)

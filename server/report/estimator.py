@@ -23,7 +23,7 @@ VERDICTS: Final[Mapping[str, str]] = {"good": "consistent", "warn": "doubtful in
 REDUCED: Final[Mapping[str, str]] = {
     "sensor_failed": "reduced: a sensor failed in this take",
     "not_calibrated": "reduced: which way a sensor faces is not known",
-    "no_standing": "none: nobody stood still in this take",
+    "no_standing": "none: no usable standing in this take",
     "estimator_failed": "reduced: the better estimator could not finish",
 }
 
@@ -108,7 +108,7 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
             (AUTO, "Automatic: the best for what is worn", asked == AUTO),
             *((x, choice_label(x), asked == x) for x in e["possible"]),
         ),
-        estimated=_estimated(list_estimated_angles(e)),
+        estimated=_estimated(_told(list_estimated_angles(e), name)),
         paper=BY_METHOD[name].paper if name in BY_METHOD else None,
     )
 
@@ -137,6 +137,12 @@ def list_estimated_angles(e: Mapping[str, Any] | None) -> frozenset[str]:
 def list_estimated_variables(e: Mapping[str, Any] | None) -> frozenset[str]:
     """The same without the side."""
     return frozenset(a.removesuffix("_l").removesuffix("_r") for a in list_estimated_angles(e))
+
+
+def _told(angles: frozenset[str], method: str) -> frozenset[str]:
+    """Those that are a result: not what the model holds fixed."""
+    fixed = BY_METHOD[method].fixed if method in BY_METHOD else ()
+    return frozenset(a for a in angles if a.removesuffix("_l").removesuffix("_r") not in fixed)
 
 
 def _estimated(angles: frozenset[str]) -> str:

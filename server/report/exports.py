@@ -1,6 +1,6 @@
 """The files an analysis yields, the same for the command line, the worker and the downloads page.
 
-analysis.json   quality, calibration, parameters, warnings, provenance (schema 1)
+analysis.json   quality, devices, calibration and its score, parameters, warnings, provenance (schema 1)
 angles.parquet  joint angles in degrees on the uniform axis
 poses.parquet   segment poses for the replay
 tracks.parquet  what strides and parameters are measured on (server/report/tracks.py)
@@ -8,18 +8,19 @@ signals.parquet what the sensors measured, on the common time axis (server/repor
 events.csv      contacts: time_s, side, kind (ic | tc), source, confidence (share of detectors),
                 uncertainty_s (standard)
 steps.csv       steps of a trunk sensor, where no foot carries one: time_s, side
+activity…        of daily life, in place of all but the first (server/report/activity_files.py)
+repetitions.csv squats on one leg with their measures and why one was left out, of takes of squats
 strides.csv     one row per stride with its temporal parameters and why it was left out
+repaired.json   the manifest that is proposed where the set-up is wrong (server/services/analyses.py)
 
 Undefined is an empty cell or null, never NaN. `server.report.bundle` reads them back.
 """
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Final
 
@@ -30,19 +31,28 @@ from core.body.health import find_worst_verdict
 from core.body.poses import Poses
 from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
+from core.frames import SEGMENTS
 from core.parameters import cycle_curves
+from core.parameters.catalogue import list_names
+from core.parameters.catalogue.entry import SQUAT
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
-from core.quality import find_shown_level
+from core.quality import concern_paths_alone, find_shown_level
+from core.quality.devices import check_device, is_serial
 from core.scores import Scores, score_curves
 from server.report import signals, tracks
-from server.report.columns import SCHEMA, parquet_file, reduce_to_plain
+from server.report.activity_files import write_activity
+from server.report.columns import SCHEMA, parquet_file, reduce_to_plain, write_csv
 from server.report.estimator import list_estimated_variables
 
 if TYPE_CHECKING:
     # these packages bring numba, which the web process does without
     from core.calibration.result import Calibration
     from core.pipeline import TakeAnalysis
+    from core.squat.measures import SquatSide
+
+MEASURES: Final = list_names(SQUAT, "take")
+"""Columns of a squat in repetitions.csv."""
 
 STRIDE_COLUMNS = ("side", "start_s", "tc_s", "end_s", "opposite_tc_s", "opposite_ic_s", "turn_deg")
 """What a stride is; its parameters, `flags` and `excluded_reason` follow in strides.csv."""
@@ -50,12 +60,17 @@ STRIDE_COLUMNS = ("side", "start_s", "tc_s", "end_s", "opposite_tc_s", "opposite
 
 def analysis_files(analysis: TakeAnalysis) -> dict[str, bytes]:
     """Write an analysis as files, name → bytes; a stage that gave nothing leaves its file out."""
+    if analysis.source.protocol == "activity":
+        written = {} if analysis.activity is None else write_activity(analysis.activity)
+        return {"analysis.json": _json_bytes(summarise_analysis(analysis)), **written}
     files = {"analysis.json": _json_bytes(summarise_analysis(analysis))}
     if analysis.measured is not None:
         files["events.csv"] = events_csv(analysis.measured.events)
         files["strides.csv"] = strides_csv(analysis.measured.strides, analysis.measured.columns)
         if analysis.measured.steps is not None:
             files["steps.csv"] = steps_csv(analysis.measured.steps)
+    if analysis.squats is not None:
+        files["repetitions.csv"] = repetitions_csv(analysis.squats)
     if analysis.angles is not None:
         files["angles.parquet"] = angles_parquet(analysis.angles)
     if analysis.poses is not None:
@@ -72,13 +87,32 @@ def summarise_analysis(analysis: TakeAnalysis) -> dict[str, object]:
     return {
         "schema": SCHEMA,
         "quality": _quality(analysis),
+        "devices": _devices(analysis),
+        "setup": None if analysis.setup is None else reduce_to_plain(analysis.setup.to_json()),
+        "agreement": _agreement(analysis),
         "calibration": _calibration(analysis.calibration, analysis.angles),
+        "calibration_score": _score_calibration(analysis),
         "estimator": _estimator(analysis),
         "parameters": [parameter_row(p) for p in analysis.parameters],
+        "functional": _functional(analysis),
         "scores": _scores(analysis),
         "walking": _walking(analysis),
         "warnings": [n.to_json() for n in analysis.notices],
         "provenance": reduce_to_plain(analysis.provenance),
+    }
+
+
+def _functional(analysis: TakeAnalysis) -> dict[str, object] | None:
+    """Start, end and segments of a functional test; None of any other take."""
+    test = analysis.functional
+    if test is None:
+        return None
+    return {
+        "start_s": test.start_s,
+        "end_s": test.end_s,
+        "segments": [asdict(s) for s in test.segments],
+        "sensor": test.sensor,
+        "corrected": test.corrected,
     }
 
 
@@ -88,7 +122,9 @@ def _quality(analysis: TakeAnalysis) -> dict[str, object]:
     assert isinstance(found, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
     verdict = None if analysis.poses is None else find_worst_verdict(analysis.poses.health)
     level = find_shown_level(analysis.quality.level, verdict)
-    reasons = [*analysis.quality.reasons, *([JUDGED[verdict]] if verdict in JUDGED else [])]
+    bad = [] if analysis.poses is None else [f.name for f in analysis.poses.health if f.verdict == "bad"]
+    judged = PATH_JUDGED if concern_paths_alone(bad) else JUDGED.get(verdict)
+    reasons = [*analysis.quality.reasons, *([] if judged is None else [judged])]
     return {**found, "level": level, "signals_level": analysis.quality.level, "reasons": reasons}
 
 
@@ -97,6 +133,60 @@ JUDGED: Final[Mapping[str | None, str]] = {
     "bad": "The sensors contradict each other: the pose estimator cannot stand behind its result.",
 }
 """Verdict of the estimator → reason of the level."""
+
+PATH_JUDGED: Final = (
+    "The path of a foot does not fit its rests on the floor: the estimator cannot stand behind its distances."
+)
+"""The same where nothing but the path of a foot is bad."""
+
+
+def _devices(analysis: TakeAnalysis) -> list[dict[str, object]]:
+    """What each worn device showed of itself, in SI units, and where the analysis took it to be."""
+    if analysis.uniform is None:
+        return []
+    agreed = analysis.agreed
+    pairs = () if agreed is None or agreed.exchange is None else agreed.exchange.swap
+    swapped = {segment for pair in pairs for segment in pair}
+    return [
+        {**check_device(stream).to_json(), "segment": segment, "exchanged": segment in swapped}
+        for segment, sensor in analysis.recording.sensors.items()
+        if is_serial(sensor.device_id)
+        and (stream := analysis.source.streams.get(sensor.device_id)) is not None
+    ]
+
+
+CLOCK_DOUBTS: Final = ("feet_out_of_time", "clocks_disagree")
+"""Notices that accuse a clock which nothing could put right."""
+
+
+def _agreement(analysis: TakeAnalysis) -> dict[str, object] | None:
+    """What was found of the clock and the place of every sensor, and of whom nothing could be found."""
+    agreed = analysis.agreed
+    if agreed is None:
+        return None
+    # a lag that was told names its sensors once; what is below the limits is agreement
+    lags = {s: x for x in agreed.lags if x.told for s in x.sensors}
+    drifts = {x.sensor: x for x in agreed.drifts}
+    slips = {x.segment: x for x in agreed.slips}
+    doubted = {n.sensor for n in analysis.notices if n.code in CLOCK_DOUBTS and n.severity != "info"}
+    return {
+        "exchanged": [] if agreed.exchange is None else [list(pair) for pair in agreed.exchange.swap],
+        "sensors": [
+            {
+                "sensor": s,
+                "clock_judged": s in agreed.judged_clocks,
+                "lag_ms": 1e3 * lags[s].lag_s if s in lags else None,
+                "drift_ms": 1e3 * drifts[s].change_s if s in drifts else None,
+                "shifted": s in agreed.shifted_s,
+                "clock_doubted": s in doubted,
+                "place_judged_s": agreed.judged_places.get(s),
+                "slip_deg": math.degrees(slips[s].turn_rad) if s in slips else None,
+                "slip_at_s": slips[s].at_s if s in slips else None,
+            }
+            for s in SEGMENTS
+            if s in agreed.recording.sensors
+        ],
+    }
 
 
 def _scores(analysis: TakeAnalysis) -> list[dict[str, object]]:
@@ -134,6 +224,7 @@ def parameter_row(p: Parameter) -> dict[str, object]:
         "uncertainty": reduce_to_plain(p.uncertainty),
         "u_own": reduce_to_plain(p.u_own),
         "u_common": reduce_to_plain(p.u_common),
+        "estimated": p.estimated,
     }
 
 
@@ -181,6 +272,16 @@ def steps_csv(steps: Steps) -> bytes:
     return write_csv(("time_s", "side"), ((s.time_s, s.side) for s in steps.steps))
 
 
+def repetitions_csv(squats: SquatSide) -> bytes:
+    """Every squat, counted or not; measures of those that count."""
+    rows = []
+    counted = iter(zip(*(squats.values[name].tolist() for name in squats.values), strict=True))
+    for r in squats.repetitions:
+        measured = next(counted) if r.excluded is None else ("",) * len(MEASURES)
+        rows.append((r.side, r.start_s, r.bottom_s, r.end_s, *measured, r.excluded or ""))
+    return write_csv(("side", "start_s", "bottom_s", "end_s", *MEASURES, "excluded_reason"), rows)
+
+
 def strides_csv(strides: Strides, columns: Mapping[str, Column]) -> bytes:
     """Every stride, used or not, with its own parameters and the rules that it meets.
 
@@ -206,15 +307,6 @@ def strides_csv(strides: Strides, columns: Mapping[str, Column]) -> bytes:
     return write_csv((*STRIDE_COLUMNS, *columns, "flags", "excluded_reason"), lines)
 
 
-def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
-    """UTF-8 comma-separated text with a header; None and non-finite numbers are empty, numbers to 1e-6."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows([_cell(v) for v in row] for row in rows)
-    return text.getvalue().encode()
-
-
 def _calibration(calibration: Calibration | None, angles: JointAngles | None) -> dict[str, object] | None:
     if calibration is None:
         return None
@@ -223,6 +315,7 @@ def _calibration(calibration: Calibration | None, angles: JointAngles | None) ->
         name: {
             "method": s.method,
             "score": s.score,
+            "forward_sd_deg": None if (sd := getattr(s, "forward_sd", None)) is None else math.degrees(sd),
             "rest_norm_mps2": s.rest_norm,
             "gyro_bias_dps": np.degrees(s.gyro_bias),
             "R_segment_sensor": s.R_segment_sensor,
@@ -246,12 +339,19 @@ def _calibration(calibration: Calibration | None, angles: JointAngles | None) ->
     return result
 
 
+def _score_calibration(analysis: TakeAnalysis) -> object:
+    """Every check of the calibration with its verdict and words; None where it was not reached."""
+    score = analysis.calibration_score
+    return None if score is None else reduce_to_plain(score.to_json())
+
+
 def _walking(analysis: TakeAnalysis) -> dict[str, object] | None:
-    """Walking bouts with their stops, and turns."""
+    """What contacts are known to, walking bouts with their stops, and turns."""
     measured = analysis.measured
     if measured is None:
         return None
     return {
+        "contact_uncertainty_s": measured.events.contact_uncertainty_s,
         "bouts": [
             {
                 "start_s": b.start_s,
@@ -312,11 +412,3 @@ def _estimator(analysis: TakeAnalysis) -> dict[str, object] | None:
 
 def _json_bytes(value: object) -> bytes:
     return json.dumps(value, ensure_ascii=False, allow_nan=False, indent=1).encode()
-
-
-def _cell(value: object) -> object:
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float):
-        return repr(round(value, 6) + 0.0) if math.isfinite(value) else ""
-    return "" if value is None else value

@@ -6,37 +6,39 @@ A pure function of stored results (law 10): under 50 ms for a 10 min session.
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
 
 from core.errors import Notice
-from core.events.result import MANUAL
-from core.flags import judge_flags
+from core.flags import Flag, judge_flags
 from core.frames import SIDES, Floats, Side
 from core.norms.adults import adult_reference_at_speed
 from core.norms.controls import ControlGroup
 from core.norms.kinematics import NormBand
 from core.norms.lookup import Norms, look_up_norms
 from core.norms.profile import CurveReference
-from core.norms.values import withdraw_shares
 from core.parameters import cycle_curves
 from core.parameters.anatomical_zero import anatomical_variables
 from core.parameters.result import CycleCurves
 from core.scores import Scores, score_curves
 from server.report.bundle import Bundle
 from server.report.columns import reduce_to_plain
+from server.report.daily_life import DailyLifeView, daily_life_view
 from server.report.estimator import EstimatorView, estimator_view, list_estimated_variables
+from server.report.functional import TEST_NORM_NOTE, FunctionalView, functional_view
+from server.report.headline import Headline, find_standouts, say_badge
 from server.report.level import level_rows
 from server.report.limits import LimitsView, limits_view
 from server.report.notes import curve_notes, norm_note
 from server.report.panels import CurvePanel, SideCurve, curve_panels
 from server.report.profile import ProfileView, profile_view
 from server.report.quality_box import QualityBox, quality_box
+from server.report.squat import NORM_NOTE, SquatView, squat_view
 from server.report.table import ParameterRow, group_rows, parameter_rows
-from server.report.wording import explain_exclusion, place_words
+from server.report.wording import explain_exclusion, place_words, speak_places
 
 Sex = Literal["female", "male"]
 
@@ -47,6 +49,14 @@ KEY_NUMBERS: Final = (
     "knee_flexion_rom_deg",
     "stride_time_s",
     "stance_pct",
+    "squat_depth_deg",
+    "squat_knee_valgus_deg",
+    "squat_hip_drop_m",
+    "squat_duration_s",
+    "daily_step_count",
+    "daily_walking_min",
+    "daily_sitting_min",
+    "daily_rise_count",
 )
 """Parameters for the overview, in this order of preference."""
 
@@ -119,6 +129,9 @@ class ReportModel:
     curve_notes : how to read the curves, in sentences: zero, offsets, confidence, what is drawn.
     since : the visit that `change` of the rows refers to, None without an earlier one walked alike.
     condition : how the take was walked, in words.
+    squats : of a take of squats on one leg, None of any other. functional : of a functional test, likewise.
+    daily : of a take of daily life, None of any other.
+    headline : what stands out and what changed, in sentences; None where there is no walk to speak of.
     """
 
     problem: str | None
@@ -140,6 +153,10 @@ class ReportModel:
     limits: LimitsView | None = None
     since: PreviousVisit | None = None
     condition: str = ""
+    squats: SquatView | None = None
+    headline: Headline | None = None
+    functional: FunctionalView | None = None
+    daily: DailyLifeView | None = None
 
     @property
     def key_curve(self) -> CurvePanel:
@@ -191,6 +208,10 @@ class ReportModel:
                 "limits": None if self.limits is None else asdict(self.limits),
                 "since": None if self.since is None else asdict(self.since),
                 "condition": self.condition,
+                "squats": None if self.squats is None else self.squats.to_json(),
+                "functional": None if self.functional is None else self.functional.to_json(),
+                "headline": None if self.headline is None else asdict(self.headline),
+                "daily": None if self.daily is None else self.daily.to_json(),
                 "provenance": self.provenance,
             }
         )
@@ -219,9 +240,8 @@ def report_model(
     """
     if speed_mps is None:
         speed_mps = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
-    norms = look_up_norms(age, sex, speed_mps, height_m, treadmill=treadmill)
-    found = [e.uncertainty_s for e in bundle.events.events if e.source != MANUAL]
-    norms = replace(norms, values=withdraw_shares(norms.values, found))
+    contacts_s = bundle.events.contact_uncertainty_s
+    norms = look_up_norms(age, sex, speed_mps, height_m, treadmill=treadmill, contacts_s=contacts_s)
     own = None if controls is None else controls.norms(speed_mps, height_m)
     if own is not None:
         compared = {name: v for name, v in norms.values.items() if v.comparable or name not in own.values}
@@ -235,9 +255,12 @@ def report_model(
         rows += level_rows(curves, standing, level, list_estimated_variables(bundle.estimator))
     stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
     angles = bundle.angles
+    quality = quality_box(bundle)
+    flags = _judge_limits(bundle, curves, height_m, age, own)
+    by_trunk = bundle.functional is not None and not bundle.strides.strides
     return ReportModel(
-        problem=stopped,
-        quality=quality_box(bundle),
+        problem=None if stopped is None else speak_places(stopped),
+        quality=quality,
         warnings=tuple(_warning(n) for n in bundle.warnings),
         kpis=tuple(
             _key_number(r)
@@ -259,16 +282,24 @@ def report_model(
             for s in bundle.strides.strides
         ),
         duration_s=_duration(bundle),
-        norm_note=norm_note(rows, panels, norms, controls),
+        norm_note=TEST_NORM_NOTE
+        if by_trunk
+        else _norm_note(bundle) or norm_note(rows, panels, norms, controls),
         norm_source=next((p.norm.source for p in panels if p.norm is not None), None),
         curve_notes=curve_notes(bundle, panels),
         angle_zero=None if angles is None else angles.zero,
         zero_offset_deg={}
         if angles is None
-        else {k: float(np.degrees(v)) for k, v in angles.zero_offset.items()},
+        else {k: float(np.degrees(v)) for k, v in angles.zero_offset.items() if k in angles.angles},
         provenance=bundle.provenance,
         estimator=estimator_view(bundle.estimator),
-        limits=_limits(bundle, curves, height_m, age, own),
+        squats=squat_view(bundle),
+        functional=functional_view(bundle, age),
+        limits=limits_view(flags) if flags else None,
+        headline=None
+        if bundle.repetitions is not None or bundle.activity is not None or by_trunk
+        else _headline(bundle, quality, rows, norms, flags),
+        daily=daily_life_view(bundle.activity),
         profile=None
         if curves is None
         else profile_view(
@@ -288,33 +319,57 @@ def _scores(
     return score_curves(curves, standing, reference, estimated=unsure, age=age)
 
 
-def _limits(
+def _judge_limits(
     bundle: Bundle,
     curves: CycleCurves | None,
     height_m: float | None,
     age: float | None,
     own: Norms | None,
-) -> LimitsView | None:
-    """Estimated angles are not held against anything."""
+) -> tuple[Flag, ...]:
+    """Values against limits, none where no stride counts. Estimated angles are not held against anything."""
     if not bundle.strides.select_used():
-        return None
+        return ()
     unsure = list_estimated_variables(bundle.estimator)
     if curves is not None:
         measured = {v: c for v, c in curves.curves.items() if v not in unsure}
         curves = replace(curves, curves=measured)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
-    return limits_view(judge_flags(curves, bundle.parameters, standing, height_m, own, age))
+    return judge_flags(curves, bundle.parameters, standing, height_m, own, age)
 
 
-def round_curve(values: Floats | None) -> list[float] | None:
-    """A curve for the wire, to 0.01°."""
-    return None if values is None else np.round(values, 2).tolist()
+def _headline(
+    bundle: Bundle,
+    quality: QualityBox,
+    rows: Sequence[ParameterRow],
+    norms: Norms,
+    flags: Sequence[Flag],
+) -> Headline:
+    """Poor data say nothing of the person: then the badge alone speaks."""
+    badge = say_badge(quality.kind, bundle.strides, bundle.warnings)
+    if quality.kind == "bad":
+        return Headline(badge)
+    standouts, looked_at = find_standouts(rows, norms, flags)
+    return Headline(badge, standouts, looked_at=looked_at)
+
+
+def round_curve(values: Floats | None) -> list[float | None] | None:
+    """A curve for the wire, to 0.01°; None where it has no value."""
+    if values is None:
+        return None
+    return [x if np.isfinite(x) else None for x in np.round(values, 2).tolist()]
 
 
 def _duration(bundle: Bundle) -> float:
     if bundle.angles is not None and len(bundle.angles.t_s):
         return float(bundle.angles.t_s[-1])
     return float(bundle.quality.get("duration_s") or 0.0)
+
+
+def _norm_note(bundle: Bundle) -> str | None:
+    """What is said where nobody has a norm for the movement, None of walking."""
+    if bundle.activity is not None:
+        return "Daily life is held against no norm."
+    return NORM_NOTE if bundle.repetitions is not None else None
 
 
 def _warning(n: Notice) -> ReportWarning:
@@ -324,7 +379,7 @@ def _warning(n: Notice) -> ReportWarning:
         kind=_KINDS[n.severity],
         code=n.code,
         title=f"{title}{where}",
-        message=n.message,
+        message=speak_places(n.message),
         sensor=n.sensor,
         t_s=n.t_s,
     )
@@ -348,13 +403,14 @@ def _key_number(row: ParameterRow) -> KeyNumber:
 
 
 def _plus_minus(row: ParameterRow) -> str:
-    """What the numbers are known to: "± 0.02", of two sides "± 4 | 5" where they differ."""
-    found = [c.plus_minus for c in (row.both, row.left, row.right) if c is not None and c.plus_minus]
-    return (
-        found[0]
-        if len(set(found)) == 1
-        else " | ".join((*found[:1], *(x.removeprefix("± ") for x in found[1:])))
-    )
+    """What the numbers are known to: "± 0.02", of two sides "± 4 | 5" where they differ, "± 4 | –" of one."""
+    cells = (row.both,) if row.both is not None else (row.left, row.right)
+    found = ["" if c is None else c.plus_minus for c in cells]
+    if not any(found):
+        return ""
+    if len(set(found)) == 1:
+        return found[0]
+    return f"± {' | '.join(x.removeprefix('± ') or '–' for x in found)}"
 
 
 def _profile_json(profile: ProfileView) -> dict[str, object]:

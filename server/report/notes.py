@@ -14,7 +14,7 @@ from core.norms.values import is_angle
 from server.report.bundle import Bundle
 from server.report.estimator import estimator_view
 from server.report.panels import DRAWN_STRIDES, CurvePanel
-from server.report.table import ParameterRow
+from server.report.table import FEW_NOTE, ParameterRow
 from server.report.wording import GROUPS, NO_NORM, VARIABLES, format_number
 
 SPEED: Final = "gait_speed_mps"
@@ -55,6 +55,8 @@ def norm_note(
         and r.unit != "°"
     ]:
         sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
+    if any(r.norm_note == FEW_NOTE for r in rows):
+        sentences.append(FEW_NOTE)
     if any(r.name == SPEED and r.norm is not None for r in rows):
         usual = norms.values[SPEED]
         sentences.append(f"Gait speed: {GROUPS.get(usual.group, usual.group)} ({usual.source}).")
@@ -87,6 +89,8 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
     labels = {v.name: v.label.lower() for v in VARIABLES if v.plane == "sagittal"}
     offsets = []
     for name, value in bundle.angles.zero_offset.items():
+        if name not in bundle.angles.angles:
+            continue
         base, _, suffix = name.rpartition("_")
         side = {"l": " left", "r": " right"}.get(suffix)
         label = labels.get(base if side else name)
@@ -111,6 +115,7 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
     notes = [
         *about_zero,
         *([view.estimated] if view is not None and view.estimated else []),
+        *_interrupted(panels),
         *_norm_notes(panels),
     ]
     drawn = max((len(c.strides) for p in panels for c in p.sides.values()), default=0)
@@ -120,6 +125,17 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
             f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the take; means are of all."
         )
     return tuple(notes)
+
+
+def _interrupted(panels: Sequence[CurvePanel]) -> list[str]:
+    """Which curves have no value at some of their points."""
+    broken = [
+        p.variable.label
+        for p in panels
+        if any(c.mean_deg is not None and np.isnan(c.mean_deg).any() for c in p.sides.values())
+    ]
+    why = "interrupted where the leg model's knee rests on its limit in most strides"
+    return [f"{', '.join(broken).capitalize()}: {why}; nothing is measured there."] if broken else []
 
 
 def _norm_notes(panels: Sequence[CurvePanel]) -> list[str]:

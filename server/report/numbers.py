@@ -10,6 +10,7 @@ from typing import Any
 from core.norms.profile import ScoreSpread
 from core.parameters import cycle_curves
 from core.parameters.result import Parameter
+from core.parameters.uncertainty import mark_estimated
 from core.scores import Score, score_curves
 from server.report.bundle import Bundle, read_warnings
 from server.report.estimator import list_estimated_variables
@@ -18,11 +19,17 @@ from server.report.quality_box import data_verdict
 
 @dataclass(frozen=True)
 class Numbers:
-    """Parameters, the scores over several curves, and the verdict on the data (its shape and word)."""
+    """Parameters, the scores over several curves, and the verdict on the data (its shape and word).
+
+    Parameters
+    ----------
+    contacts_s : what the contacts are known to, s; None where nothing says so.
+    """
 
     parameters: tuple[Parameter, ...]
     scores: tuple[Score, ...]
     verdict: tuple[str, str]
+    contacts_s: float | None = None
 
 
 def read_numbers(content: bytes) -> Numbers | None:
@@ -30,25 +37,30 @@ def read_numbers(content: bytes) -> Numbers | None:
     data = json.loads(content)
     if "scores" not in data:
         return None
-    parameters = tuple(Parameter(**row) for row in data["parameters"])
+    # the files of earlier versions say only of the angles which are estimated
+    unsure = list_estimated_variables(data.get("estimator"))
+    parameters = mark_estimated([Parameter(**row) for row in data["parameters"]], unsure)
     judged = data_verdict(
         data["quality"], data.get("estimator"), {n.severity for n in read_warnings(data)}, parameters
     )
-    return Numbers(parameters, tuple(_score(row) for row in data["scores"]), judged)
+    contacts_s = (data.get("walking") or {}).get("contact_uncertainty_s")
+    return Numbers(parameters, tuple(_score(row) for row in data["scores"]), judged, contacts_s)
 
 
 def numbers_of(bundle: Bundle) -> Numbers:
     """The numbers of an analysis that was read with its curves."""
+    unsure = list_estimated_variables(bundle.estimator)
+    parameters = mark_estimated(bundle.parameters, unsure)
     judged = data_verdict(
         bundle.quality, bundle.estimator, {n.severity for n in bundle.warnings}, bundle.parameters
     )
+    contacts_s = bundle.events.contact_uncertainty_s
     if bundle.angles is None:
-        return Numbers(bundle.parameters, (), judged)
+        return Numbers(parameters, (), judged, contacts_s)
     curves = cycle_curves(bundle.angles, bundle.strides)
-    found = score_curves(
-        curves, bundle.angles.standing_deg, estimated=list_estimated_variables(bundle.estimator)
-    )
-    return Numbers(bundle.parameters, tuple(s for s in found.scores if s.variable is None), judged)
+    found = score_curves(curves, bundle.angles.standing_deg, estimated=unsure)
+    scores = tuple(s for s in found.scores if s.variable is None)
+    return Numbers(parameters, scores, judged, contacts_s)
 
 
 def _score(row: Mapping[str, Any]) -> Score:

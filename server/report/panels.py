@@ -8,13 +8,14 @@ from typing import Final
 
 import numpy as np
 
+from core.events.result import COMPARED
 from core.frames import SIDES, Floats, Side
 from core.norms import NormBand
 from core.norms.kinematics import Zero
 from core.norms.lookup import Norms
 from core.parameters import mean_curve
 from core.parameters.anatomical_zero import anatomical_variables, standing_offset_deg
-from core.parameters.kinematic import MEAN_ZERO
+from core.parameters.kinematic import MEAN_ZERO, rest_at_bound
 from core.parameters.result import CycleCurves
 from server.report.bundle import Bundle
 from server.report.estimator import list_estimated_variables
@@ -23,11 +24,14 @@ from server.report.wording import VARIABLES, ZERO_WORDS, Variable, reason_words
 NO_BAND: Final[Mapping[Zero, str]] = {
     "standing": "No norm band: these curves start from this person's standing, the norm from the anatomical "
     "zero. Enter goniometer angles of standing to compare.",
-    "walking": "No norm band: nobody stood still, so these curves start from their own mean in walking.",
+    "walking": "No norm band: no usable standing, so these curves start from their own mean in walking.",
     "stride_mean": "No norm band: measured from its own mean over the stride, the norm is not.",
     "anatomical": "No norm band: the norm is measured from standing.",
 }
 """Zero of a curve → why none of the known bands may stand behind it."""
+
+FEW_BAND: Final = f"No norm band: fewer than {COMPARED} strides of a side are compared with nothing."
+"""The same where no side has enough strides."""
 
 DRAWN_STRIDES: Final = 40
 """Single strides drawn per side at most, spread over the take; more only make the page heavy."""
@@ -39,8 +43,10 @@ class SideCurve:
 
     Parameters
     ----------
-    mean_deg, sd_deg : (101,) over the counted strides; None without strides, sd also with one.
-    n : strides behind the mean. strides : index in the stride list → (101,) deg, counted strides to draw.
+    mean_deg, sd_deg : (101,) over the counted strides; None without strides, sd also with one. NaN where the
+        leg model's knee rests on its limit in most strides.
+    n : strides behind the mean. strides : index in the stride list → (101,) deg, counted strides to draw, NaN
+        where they rest there.
     foot_off_pct, foot_off_sd : terminal contact, % of cycle, None if not found.
     """
 
@@ -152,7 +158,9 @@ def _panel(
         zero = "stride_mean" if variable.name in MEAN_ZERO else "anatomical" if added else curves.zero
     fitting = next((b for b in bands if b.zero == zero), None) if sure and reason is None else None
     note = "" if fitting is None else fitting.note
-    if fitting is None and bands and sure and zero is not None:
+    if fitting is not None and all(c.n < COMPARED for c in sides.values()):
+        fitting, note = None, FEW_BAND
+    elif fitting is None and bands and sure and zero is not None:
         note = NO_BAND[zero]
     return CurvePanel(
         variable=variable,
@@ -198,7 +206,8 @@ def _side(curves: CycleCurves, name: str, side: Side) -> SideCurve:
         if len(counted) > DRAWN_STRIDES:
             counted = counted[np.linspace(0, len(counted) - 1, DRAWN_STRIDES).round().astype(np.int64)]
         index = curves.stride_index[side]
-        strides = {index[i]: np.degrees(rows[i]) for i in counted}
+        shown = np.where(rest_at_bound(curves, name, side, rows), np.nan, np.degrees(rows))
+        strides = {index[i]: shown[i] for i in counted}
     return SideCurve(
         mean_deg=None if mean.mean is None else np.degrees(mean.mean),
         sd_deg=None if mean.sd is None else np.degrees(mean.sd),

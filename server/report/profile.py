@@ -24,9 +24,9 @@ MODE: Final[Mode] = "offset_removed"
 
 
 TOTALS: Final[tuple[tuple[str, Mode, str], ...]] = (
-    ("gps_sagittal_deg", "offset_removed", "gps_sagittal"),
+    ("gps_sagittal_deg", "offset_removed", "Sagittal profile score, levels removed"),
     ("gps_deg", "offset_removed", "GPS, levels removed"),
-    ("gps_sagittal_deg", "raw", "gps_sagittal with levels"),
+    ("gps_sagittal_deg", "raw", "Sagittal profile score, with levels"),
     ("gps_deg", "raw", "GPS"),
 )
 """Profiles over several curves → their titles; those with levels need goniometer angles of standing."""

@@ -7,18 +7,23 @@ from dataclasses import dataclass
 from typing import Any, Final, cast
 
 from core.parameters.result import Parameter
-from core.quality import find_shown_level
+from core.quality import concern_paths_alone, find_shown_level
 from core.quality.assessment import Verdict
-from server.report.bundle import Bundle
+from server.report.bundle import Bundle, is_functional
 from server.report.estimator import estimator_view
 from server.report.wording import format_number, place_words
 
-_METHODS: Final[Mapping[str, str]] = {
+CALIBRATION_METHODS: Final[Mapping[str, str]] = {
     "walking_direction": "from standing and walking",
     "gyro_pca": "from leg rotation",
     "declared": "mounting as declared",
     "neighbour": "guessed from neighbours",
+    "fixed_offset": "put on as agreed",
+    "table_top": "carried from a table",
+    "hip_swing": "from swings of the leg",
+    "trunk_bow": "from bows of the trunk",
 }
+"""Method of a calibration → words."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +68,15 @@ def quality_box(bundle: Bundle) -> QualityBox:
     )
     items = [
         *_counted(bundle),
-        *_signals(bundle.quality),
-        *_calibration(bundle.calibration, needed=not _trunk_steps(bundle.parameters)),
+        *_signals(bundle.quality, rest=bundle.activity is None),
+        *_calibration(
+            bundle.calibration,
+            needed=bundle.activity is None
+            and (
+                bool(bundle.strides.strides)
+                or not (_trunk_steps(bundle.parameters) or is_test(bundle.parameters))
+            ),
+        ),
         *_estimator(bundle.estimator),
     ]
     return QualityBox(kind, word, tuple(items))
@@ -86,13 +98,32 @@ def data_verdict(
     level = find_shown_level(quality.get("level", "good"), health)
     if "error" in severities:
         return "bad", "Analysis stopped"
-    if not any(p.name == "stride_time_s" and p.n for p in parameters) and not _trunk_steps(parameters):
+    squats = _squats(parameters)
+    if squats is not None and not squats.n:
+        return "bad", "No squats"
+    if is_test(parameters):
+        total = next((p for p in parameters if is_functional(p.name) and p.mean is not None), None)
+        if total is None:
+            return "bad", "Test not found"
+    walked = (
+        is_test(parameters)
+        or any(p.name == "stride_time_s" and p.n for p in parameters)
+        or _trunk_steps(parameters)
+    )
+    daily = _daily_steps(parameters) is not None
+    if squats is None and not daily and not walked:
         return "bad", "No strides"
     if level == "poor":
-        return "bad", "Sensors disagree" if health == "bad" else "Poor data"
+        return "bad", "Poor data" if estimator is None or health != "bad" else _name_bad_estimate(estimator)
     if level == "usable" or "warning" in severities:
         return "warn", "Usable, see notices"
     return "ok", "Good data"
+
+
+def _name_bad_estimate(estimator: Mapping[str, Any]) -> str:
+    """What disagrees: the sensors, or the path of a foot with its own rests."""
+    bad = [f["name"] for f in estimator.get("health", ()) if f["verdict"] == "bad"]
+    return "Foot path in doubt" if concern_paths_alone(bad) else "Sensors disagree"
 
 
 def _trunk_steps(parameters: Sequence[Parameter]) -> int:
@@ -100,8 +131,40 @@ def _trunk_steps(parameters: Sequence[Parameter]) -> int:
     return next((int(p.mean) for p in parameters if p.name == "step_count" and p.mean is not None), 0)
 
 
+def is_test(parameters: Sequence[Parameter]) -> bool:
+    """Is the take a functional test?"""
+    return any(is_functional(p.name) for p in parameters)
+
+
+def _squats(parameters: Sequence[Parameter]) -> Parameter | None:
+    """The depth of a take of squats, with the number of those that count; None of any other take."""
+    return next((p for p in parameters if p.name == "squat_depth_deg"), None)
+
+
+def _daily_steps(parameters: Sequence[Parameter]) -> Parameter | None:
+    """Steps a day of a take of daily life, with the number of days behind them; None of any other take."""
+    return next((p for p in parameters if p.name == "daily_step_count"), None)
+
+
 def _counted(bundle: Bundle) -> list[QualityItem]:
-    """Strides of the feet, or steps of the trunk where there are none."""
+    """Strides of the feet, or steps of the trunk where there are none; of squats those that count.
+
+    Of daily life the hours worn, and the days that were worn long enough.
+    """
+    if bundle.activity is not None:
+        worn = sum(day.worn_h for day in bundle.activity.days)
+        whole, days = _daily_steps(bundle.parameters), len(bundle.activity.days)
+        return [
+            QualityItem("Worn", f"{format_number(worn, 1)}\u202fh"),
+            QualityItem(
+                "Days that count", f"{0 if whole is None else whole.n} of {days}", "worn 10 h or longer"
+            ),
+        ]
+    if is_test(bundle.parameters) and not bundle.strides.strides:
+        return []
+    squats = _squats(bundle.parameters)
+    if squats is not None:
+        return [QualityItem("Squats used", str(squats.n), f"{squats.side} leg")]
     steps = _trunk_steps(bundle.parameters)
     if steps and not bundle.strides.strides:
         return [QualityItem("Steps", str(steps), "trunk sensor")]
@@ -120,8 +183,8 @@ def _strides(bundle: Bundle) -> QualityItem:
     )
 
 
-def _signals(quality: Mapping[str, Any]) -> list[QualityItem]:
-    """Lost samples of the worst sensor, rest, magnetic field."""
+def _signals(quality: Mapping[str, Any], *, rest: bool) -> list[QualityItem]:
+    """Lost samples of the worst sensor, magnetic field, and rest where the analysis looked for it."""
     items = []
     sensors = [s for s in quality.get("sensors", ()) if isinstance(s, Mapping)]
     lost = [(float(s["lost_pct"]), _sensor_name(s)) for s in sensors if s.get("lost_pct") is not None]
@@ -129,10 +192,10 @@ def _signals(quality: Mapping[str, Any]) -> list[QualityItem]:
         worst, name = max(lost)
         extra = "" if worst == 0 else f"at most, {name}"
         items.append(QualityItem("Lost samples", f"{format_number(worst, 1)} %", extra))
-    rest = quality.get("rest_s")
-    if rest is not None:
-        total = sum(end - start for start, end in rest)
-        times = f"in {len(rest)} parts" if len(rest) > 1 else ""
+    still = quality.get("rest_s") if rest else None
+    if still is not None:
+        total = sum(end - start for start, end in still)
+        times = f"in {len(still)} parts" if len(still) > 1 else ""
         items.append(QualityItem("Standing still", f"{format_number(total, 1)} s", times))
     magnetic = [float(s["magnetic_pct"]) for s in sensors if s.get("magnetic_pct") is not None]
     if magnetic:
@@ -146,13 +209,13 @@ def _calibration(calibration: Mapping[str, Any] | None, *, needed: bool) -> list
         # steps of a trunk sensor are read from it as it sits
         return [] if not needed else [QualityItem("Calibration", "not reached", kind="bad")]
     scores = [float(s["score"]) for s in calibration["segments"].values() if s.get("score") is not None]
-    method = _METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
+    method = CALIBRATION_METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
     if calibration.get("posture") == "walking" and calibration["method"] == "walking_direction":
         method = "from walking alone"
     value = f"{format_number(100 * min(scores))}" if scores else method
     items = [QualityItem("Calibration", value, f"/ 100, {method}" if scores else "")]
     if calibration.get("posture", "standing") == "walking":
-        items.append(QualityItem("Posture", "from walking", "nobody stood still", kind="warn"))
+        items.append(QualityItem("Posture", "from walking", "no usable standing", kind="warn"))
     if calibration.get("angle_zero") is not None:
         items.append(QualityItem("Angle zero", str(calibration["angle_zero"])))
     return items

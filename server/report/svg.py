@@ -161,6 +161,10 @@ class PlotArea:
         """Add a label; as `make_label`."""
         self._fixed.append(make_label(x, y, text, css, anchor, dx, dy))
 
+    def add_fixed(self, labels: str) -> None:
+        """Add labels that are made already."""
+        self._fixed.append(labels)
+
     def add_dot(self, x: float, value: float, css: str, radius: float) -> None:
         """Add a dot that stays round, at 0 to 1000 of the width."""
         self._fixed.append(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from math import hypot, sqrt
 from typing import Final
 
+from core.events.result import COMPARED
 from core.frames import Side
 from core.norms.kinematics import Zero
 from core.norms.lookup import Norms
@@ -31,6 +32,10 @@ from server.report.wording import (
 
 NOBODY: Final = Norms(None, None)
 """No reference people at all."""
+
+
+FEW_NOTE: Final = f"No norm: fewer than {COMPARED} strides of a side are compared with nothing."
+"""What stands in place of a norm where no side has enough strides."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,8 @@ class ParameterRow:
     ----------
     both : value of the whole take; else `left` and `right`, None where not measured.
     difference : left against right in words. norm : "62.6 ± 2.0". norm_mean, norm_sd, norm_n, norm_source :
-        behind it; None where no comparable norm exists, `norm_note` then says why if there is a reason.
+        behind it; None where no comparable norm exists or too few strides of every side count, `norm_note`
+        then says why if there is a reason.
         norm_group : its people in words.
     comfortable : norm of people at their comfortable speed, with its figures, where `norm` is of people at
         the person's own; else None.
@@ -123,9 +129,11 @@ class ParameterRow:
     def plot(self) -> str:
         """Range bar as SVG."""
         cells = {"left": self.left, "right": self.right, "both": self.both}
-        marks = {key: cell.value for key, cell in cells.items() if cell is not None}
         if self.norm_mean is None or self.norm_sd is None:
+            marks = {key: cell.value for key, cell in cells.items() if cell is not None}
             return range_svg(marks, None, self.scale)
+        # a side of too few strides is not put over the norm of the other
+        marks = {key: cell.value for key, cell in cells.items() if cell is not None and not cell.few}
         return range_svg(marks, (self.norm_mean, self.norm_sd), self.scale)
 
 
@@ -168,6 +176,8 @@ def _row(
     missing = both is None and left is None and right is None
     symmetry = next(iter(compare_sides(tuple(sides.values()), affected)), None)
     shown = norm if norm is not None and norm.comparable else None
+    few = shown is not None and not missing and all(c is None or c.few for c in (both, left, right))
+    shown = None if few else shown
     usual = None if shown is None else norms.comfortable.get(name)
     usual = usual if usual is not None and usual.comparable else None
     return ParameterRow(
@@ -187,7 +197,7 @@ def _row(
         norm_n=None if shown is None else shown.n,
         norm_source=None if shown is None else shown.source,
         norm_group=None if shown is None else GROUPS.get(shown.group, shown.group),
-        norm_note="" if norm is None else norm.note,
+        norm_note=FEW_NOTE if few else "" if norm is None else norm.note,
         comfortable=_norm_text(usual, term),
         comfortable_mean=None if usual is None else usual.mean,
         comfortable_sd=None if usual is None else usual.sd,
@@ -259,7 +269,7 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
         told.append(f"95 % CI {format_number(ci[0], digits)} to {format_number(ci[1], digits)}")
     if p.cv_pct is not None:
         told.append(
-            f"CV {format_number(p.cv_pct, 1)} %{' of few strides' if p.note == 'few_strides' else ''}"
+            f"CV {format_number(p.cv_pct, 1)} %{f' of few {what}' if p.note == 'few_strides' else ''}"
         )
     enough = has_enough_values(p)
     place = norms.place(p.name, p.mean if enough else None, p.uncertainty)
@@ -287,11 +297,16 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
 def _known_by(p: Parameter, term: Term) -> str:
     """What the uncertainty is made of, in words; empty where it is not known."""
     entry = CATALOGUE.get(p.name)
-    if p.uncertainty is None or entry is None or entry.errors is None:
+    if p.u_own is None or p.u_common is None or entry is None or entry.errors is None:
         return ""
-    measured = NORMAL_95 * hypot(p.u_own or 0.0, p.u_common or 0.0)
-    strides = sqrt(max(p.uncertainty**2 - measured**2, 0.0))
+    measured = NORMAL_95 * hypot(p.u_own, p.u_common)
     digits = max(term.digits, 1)
+    if p.uncertainty is None:
+        return (
+            f"± not known: {p.n} of {name_counted(p.name)} does not say how they differ; "
+            f"{entry.errors.source} ± {format_number(measured, digits)}\u202f{term.unit} (95 %)"
+        )
+    strides = sqrt(max(p.uncertainty**2 - measured**2, 0.0))
     return (
         f"± {format_number(p.uncertainty, digits)}\u202f{term.unit} (95 %): strides "
         f"± {format_number(strides, digits)}, {entry.errors.source} ± {format_number(measured, digits)}"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import isfinite
 
 from core.change import Change
+from core.events.result import COMPARED
 from core.feedback.summary import classify_stride
 from core.parameters.catalogue import unit_of
-from core.parameters.kinematic import POINTS
-from server.report.exports import write_csv
+from core.parameters.kinematic import AT_BOUND, POINTS
+from server.report.columns import write_csv
 from server.report.feedback import FeedbackView
 from server.report.model import ReportModel
 from server.report.trends import AnalysedVisit, Trend
@@ -51,6 +53,8 @@ def parameters_csv(report: ReportModel) -> bytes:
                     numbers = (0, None, None, None) if c is None else (c.n, c.value, c.sd, c.uncertainty)
                     norm = (r.norm_mean, r.norm_sd, r.norm_source, r.norm_group)
                     usual = (r.comfortable_mean, r.comfortable_sd)
+                    if c is not None and c.few:
+                        norm, usual = (None, None, None, None), (None, None)
                     yield (
                         r.name,
                         side,
@@ -71,7 +75,7 @@ def trends_csv(visits: Sequence[AnalysedVisit], found: Sequence[Trend]) -> bytes
     """One row per figure, side and visit, with its change against the first assessment and the limits."""
     header = (
         *("name", "side", "unit", "date", "session_id", "visit", "kind"),
-        *("n", "mean", "sd", "ci_low", "ci_high"),
+        *("n", "mean", "sd", "ci_low", "ci_high", "estimated"),
         *("change", "verdict", "mdc", "mdc_source", "mcid", "mcid_source", "reason", "condition"),
     )
 
@@ -83,7 +87,7 @@ def trends_csv(visits: Sequence[AnalysedVisit], found: Sequence[Trend]) -> bytes
                     yield (
                         *(trend.name, line.side or "", trend.term.unit),
                         *(v.performed_on.isoformat(), v.session_id, v.label or "", v.kind),
-                        *(p.n, p.value, p.sd, p.ci_low, p.ci_high),
+                        *(p.n, p.value, p.sd, p.ci_low, p.ci_high, int(p.estimated)),
                         *((None,) * 7 if c is None else _judged(c)),
                         v.condition.words,
                     )
@@ -96,7 +100,10 @@ def _judged(c: Change) -> tuple[object, ...]:
 
 
 def curves_csv(report: ReportModel) -> bytes:
-    """One row per variable, side and % of cycle: mean and sd over the counted strides, norm of that zero."""
+    """One row per variable, side and % of cycle: mean and sd over the counted strides, norm of that zero.
+
+    Where the leg model's knee rests on its limit in most strides the mean is empty and `reason` says so.
+    """
     header = (
         "variable",
         "side",
@@ -110,6 +117,7 @@ def curves_csv(report: ReportModel) -> bytes:
         "comfortable_mean_deg",
         "comfortable_sd_deg",
         "zero",
+        "reason",
     )
 
     def rows() -> Iterator[Sequence[object]]:
@@ -117,6 +125,7 @@ def curves_csv(report: ReportModel) -> bytes:
             for side, c in p.sides.items():
                 if c.mean_deg is None:
                     continue
+                norm, usual = (p.norm, p.comfortable) if c.n >= COMPARED else (None, None)
                 for i in range(POINTS):
                     yield (
                         p.variable.name,
@@ -125,12 +134,13 @@ def curves_csv(report: ReportModel) -> bytes:
                         c.n,
                         float(c.mean_deg[i]),
                         None if c.sd_deg is None else float(c.sd_deg[i]),
-                        None if p.norm is None else float(p.norm.mean_deg[i]),
-                        None if p.norm is None else float(p.norm.sd_deg[i]),
-                        None if p.norm is None else p.norm.group,
-                        None if p.comfortable is None else float(p.comfortable.mean_deg[i]),
-                        None if p.comfortable is None else float(p.comfortable.sd_deg[i]),
+                        None if norm is None else float(norm.mean_deg[i]),
+                        None if norm is None else float(norm.sd_deg[i]),
+                        None if norm is None else norm.group,
+                        None if usual is None else float(usual.mean_deg[i]),
+                        None if usual is None else float(usual.sd_deg[i]),
                         p.zero,
+                        None if isfinite(c.mean_deg[i]) else AT_BOUND,
                     )
 
     return write_csv(header, rows())

@@ -125,13 +125,15 @@ class _TrendPlot(PlotArea):
     def points(self, line: TrendSeries, digits: int) -> None:
         key = "b" if line.side is None else KEY[line.side]
         assessed = [p for p in line.points if self._visits[p.visit].kind == "assessment"]
-        for a, b in pairwise(assessed):
+        # what is estimated is on no line with what is measured
+        for a, b in pairwise([p for p in assessed if not p.estimated] or assessed):
             ends = (self._at(a.visit), a.value), (self._at(b.visit), b.value)
             d = "L".join(f"{format_coordinate(x)} {format_coordinate(self.y(value))}" for x, value in ends)
             self.add(f'<path class="tr-{key}" d="M{d}"/>')
         for p in line.points:
             large = self._visits[p.visit].kind == "assessment"
             css, radius = (f"pl-{key}", 5.0) if large else (f"ps-{key}", 2.8)
+            css += " est" if p.estimated else ""
             self.add_dot(self._at(p.visit), p.value, css, radius)
         for i in sorted({i for i in (line.base, line.latest) if i is not None}):
             p = line.points[i]

@@ -33,7 +33,7 @@ PRIMARY: Final = (
     "stance_pct",
     "gps_sagittal_deg",
 )
-"""Figures shown when the reader has chosen none."""
+"""Figures shown when the reader has chosen none; without any of them the first that are there."""
 
 SCORE_MODE: Final = "offset_removed"
 """Shape without level: angles start from the standing of that day."""
@@ -66,7 +66,10 @@ class AnalysedVisit:
 
 @dataclass(frozen=True)
 class TrendValue:
-    """A value at a visit; `change` = against the base, None for the base itself and with feedback."""
+    """A value at a visit; `change` = against the base, None for the base itself and with feedback.
+
+    `estimated` : a model of the leg gives it; it is on no line with values that sensors measured.
+    """
 
     visit: int
     value: float
@@ -75,6 +78,7 @@ class TrendValue:
     ci_low: float | None
     ci_high: float | None
     change: Change | None
+    estimated: bool = False
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,8 @@ class TrendSeries:
 
     Parameters
     ----------
-    points : visits with a value, oldest first. base : index of the first assessment among them, None = none.
+    points : visits with a value, oldest first. base : index of the first assessment among them, of the first
+        that was measured if any was; None = none.
     latest : index of the last assessment after it, else None: nothing to judge yet.
     mdc, mcid : around the base; None without a source.
     """
@@ -210,7 +215,7 @@ def _line(
     if not measured:
         return None
     assessed = [k for k, (i, _, _) in enumerate(measured) if visits[i].kind == "assessment"]
-    base = assessed[0] if assessed else None
+    base = next((k for k in assessed if not measured[k][1].estimated), assessed[0] if assessed else None)
     first = None if base is None else measured[base][1]
     known = None if norm is None else {name: norm}
 
@@ -221,10 +226,10 @@ def _line(
         return parameter_changes([first], [p], affected, known)[0]
 
     points = [
-        TrendValue(i, value, p.sd, p.n, p.ci_low, p.ci_high, change(k))
+        TrendValue(i, value, p.sd, p.n, p.ci_low, p.ci_high, change(k), p.estimated)
         for k, (i, p, value) in enumerate(measured)
     ]
-    latest = assessed[-1] if len(assessed) > 1 else None
+    latest = assessed[-1] if base is not None and assessed[-1] > base else None
     mdc, mcid = (None, None) if first is None else _limits(first, points, latest, affected)
     return TrendSeries(side, tuple(points), base, latest, mdc, mcid)
 
@@ -234,7 +239,7 @@ def _limits(
 ) -> tuple[float | None, float | None]:
     """What the last assessment is judged by; before there is one, what it will be."""
     change = None if latest is None else points[latest].change
-    if change is not None:
+    if change is not None and change.difference is not None:
         return change.limit, change.mcid
     limb: Limb | None = None
     if affected is not None and first.side is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -109,6 +110,18 @@ def title_of(name: str, label: str, zero: str = "standing") -> str:
 REASONS: Final[Mapping[str, str]] = {
     "no_strides": "not measured: no stride of this side counts",
     "too_few_strides": "not measured: fewer than 4 strides of this side count",
+    "no_angles": "not measured: the leg has no joint angles",
+    "no_whole_day": "not measured: no day was worn for ten hours",
+    "no_repetitions": "not measured: nobody squatted",
+    "no_counted_repetitions": "not measured: no squat counts",
+    "no_rise": "not measured: nobody rises from a chair",
+    "no_sit_down": "not measured: nobody sits down after rising",
+    "turn_missing": "not measured: two half turns between rising and sitting down were not found",
+    "too_few_rises": "not measured: fewer than five rises in a row",
+    "standing_too_short": "not measured: nobody stands quietly for 20 s",
+    "noise_dominated": "withheld: the sensor's own noise makes too much of it",
+    "walk_too_short": "not measured: the walk is too short for this test",
+    "test_not_found": "not measured: the test was not found",
     "in_place": "not measured: the foot came down where it was",
     "no_terminal_contact": "not measured: no foot-off was found",
     "no_turns": "not measured: no turn in this take",
@@ -120,6 +133,8 @@ REASONS: Final[Mapping[str, str]] = {
     "no_double_support": "not measured: the feet were never on the floor together",
     "joint_missing": "not measured: a segment of this joint carries no sensor",
     "estimator_bad": "withheld: the sensors contradict each other here",
+    "path_bad": "withheld: the foot's path does not fit its rests on the floor",
+    "fixed_by_model": "not measured: the leg model holds it fixed",
     "at_bound": "withheld: the leg model's knee rests on its limit",
     "impossible": "withheld: nobody can walk like this",
     "gap": "not measured: the sensor was lost in every stride",
@@ -127,7 +142,7 @@ REASONS: Final[Mapping[str, str]] = {
     "treadmill": "not measured: on a treadmill the belt's speed is needed, and gives speed and stride length",
     "no_foot_track": "not measured: no sensor on this foot",
     "no_foot_flat": "not measured: the foot never rested on the floor",
-    "no_standing": "not measured: nobody stood still in this take",
+    "no_standing": "not measured: no usable standing in this take",
     "angle_zero_standing": "not measured: angles start from standing; enter goniometer angles",
     "no_level": "not measured: has a shape over the stride, no level against the walking direction",
     "variables_missing": "not measured: some of its variables are missing",
@@ -189,6 +204,30 @@ def place_words(sensor: str) -> str:
     name, _, suffix = sensor.rpartition("_")
     side = {"l": "left", "r": "right"}.get(suffix)
     return sensor if side is None or not name else f"{side} {name}"
+
+
+def speak_places(text: str) -> str:
+    """A sentence with its segments in words.
+
+    >>> speak_places("Units of shank_r and foot_l; columns shank_l_qw stay.")
+    'Units of right shank and left foot; columns shank_l_qw stay.'
+    """
+    return _SIDED.sub(lambda found: place_words(found[0]), text)
+
+
+_SIDED: Final = re.compile(r"\b(?:thigh|shank|foot)_[lr]\b")
+
+NOT_COUNTED: Final[Mapping[str, str]] = {
+    "incomplete": "cut by the start or end of the take",
+    "signal_lost": "a sensor was silent",
+    "foot_moved": "the foot moved",
+}
+"""Why a squat does not count → words."""
+
+
+def explain_repetition(code: str) -> str:
+    """Words for a squat left out."""
+    return NOT_COUNTED.get(code, code)
 
 
 def explain_exclusion(code: str) -> str:

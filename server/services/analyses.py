@@ -7,7 +7,7 @@ import hashlib
 import json
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from sqlalchemy import Connection, Select, func, insert, select, update
 
@@ -21,7 +21,11 @@ from server.storage.tables import analysis, analysis_file, job, new_id, now, pat
 
 if TYPE_CHECKING:
     from core.formats.source import SourceFile
-    from core.pipeline import Progress
+    from core.pipeline import Progress, TakeAnalysis
+
+
+REPAIRED: Final = "repaired.json"
+"""The manifest that puts a wrong set-up right, where an analysis proposes one; nobody has confirmed it."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,27 @@ def run(
     config: Mapping[str, Any] | None,
     progress: Progress,
 ) -> dict[str, bytes]:
-    """Files of one take in, result files out (server/report/exports.py); pure but for `progress`.
+    """Files of one take in, result files out (server/report/exports.py); as `analyse_files`."""
+    from core.formats.json_tree import read_json
+    from server.report.exports import analysis_files
+
+    result = analyse_files(files, manifest, config, progress)
+    found = analysis_files(result)
+    if result.setup is not None and result.setup.can_be_applied:
+        declared = read_json(manifest) if manifest is not None else {}
+        assert isinstance(declared, dict)  # noqa: S101 - `parse_manifest` has read it
+        repaired = result.setup.complete_manifest(declared)
+        found[REPAIRED] = json.dumps(repaired, ensure_ascii=False, indent=1).encode()
+    return found
+
+
+def analyse_files(
+    files: Sequence[SourceFile],
+    manifest: bytes | None,
+    config: Mapping[str, Any] | None,
+    progress: Progress,
+) -> TakeAnalysis:
+    """Files of one take through the whole chain; pure but for `progress`.
 
     Parameters
     ----------
@@ -64,13 +88,11 @@ def run(
     from core.formats.manifest import parse_manifest
     from core.pipeline import PipelineConfig, analyse
     from core.pipeline.config import override_config
-    from server.report.exports import analysis_files
 
     progress("reading", 0.0)
     take = read_recording(files, parse_manifest(manifest) if manifest is not None else None)
     chosen = override_config(PipelineConfig(), config or {})
-    result = analyse(take, chosen, progress, CODE_VERSION)
-    return analysis_files(result)
+    return analyse(take, chosen, progress, CODE_VERSION)
 
 
 def inspect(files: Sequence[SourceFile], manifest: Mapping[str, Any] | None, progress: Progress) -> bytes:
@@ -114,7 +136,7 @@ def submit(
     manifest = complete_manifest(c, session_id, this.manifest)
     chosen = dict(config or {})
     params = {**recordings.job_inputs(this), "manifest": manifest, "config": chosen}
-    key = f"{this.id}:{recordings.ANALYSE}:{_digest(params)}:{CODE_VERSION}"
+    key = f"{this.id}:{recordings.ANALYSE}:{digest_json(params)}:{CODE_VERSION}"
     view = queue.submit(
         c,
         key=key,
@@ -247,6 +269,7 @@ def complete_manifest(c: Connection, session_id: str, manifest: Mapping[str, Any
     return said
 
 
-def _digest(value: object) -> str:
+def digest_json(value: object) -> str:
+    """sha256 of a value as JSON, whatever the order of its members."""
     text = json.dumps(value, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()

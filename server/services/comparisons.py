@@ -118,7 +118,14 @@ def find_norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
     speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
     age = session.performed_on.year - patient.birth_year if patient.birth_year else None
     height = session.height_m if session.height_m is not None else patient.height_m
-    return look_up_norms(age, patient.sex, speed, height, treadmill=session.protocol == "treadmill")
+    return look_up_norms(
+        age,
+        patient.sex,
+        speed,
+        height,
+        treadmill=session.protocol == "treadmill",
+        contacts_s=numbers.contacts_s,
+    )
 
 
 def _analysed(c: Connection, session_id: str) -> AnalysedSession:

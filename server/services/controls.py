@@ -12,6 +12,8 @@ from sqlalchemy import Connection, select
 from core.condition import WalkingCondition
 from core.norms.controls import ControlGroup, ControlSession, control_group, mean_curves
 from core.parameters import cycle_curves
+from core.parameters.uncertainty import mark_estimated
+from server.report.estimator import list_estimated_variables
 from server.services import analyses, edit_log
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
@@ -82,8 +84,10 @@ def _session(reviewed: ReviewedAnalyses, visit: ControlVisit) -> ControlSession:
         # of somebody who never stood still the curves have no level
         stood = bundle.angles is not None and bundle.angles.zero == "standing"
         angles = bundle.angles if stood else None
-        curves = {} if angles is None else mean_curves(cycle_curves(angles, bundle.strides))
+        unsure = list_estimated_variables(bundle.estimator)
+        curves = {} if angles is None else mean_curves(cycle_curves(angles, bundle.strides), unsure)
+        parameters = mark_estimated(bundle.parameters, unsure)
         age = None if visit.birth_year is None else float(visit.performed_on.year - visit.birth_year)
-        return ControlSession(visit.person, age, visit.sex, bundle.parameters, curves)  # type: ignore[arg-type]
+        return ControlSession(visit.person, age, visit.sex, parameters, curves)  # type: ignore[arg-type]
 
     return reviewed.keep_control(visit.found, visit.edits, read)

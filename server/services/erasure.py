@@ -31,7 +31,10 @@ from server.storage.db import Database
 from server.storage.tables import (
     analysis,
     analysis_file,
+    device_check,
     edit,
+    filter_run,
+    filter_run_file,
     job,
     live_event,
     live_take,
@@ -42,7 +45,9 @@ from server.storage.tables import (
     programme,
     recording,
     recording_file,
+    reference_file,
     session,
+    tuning,
 )
 from server.storage.tables import audit as audit_table
 from server.storage.trash import Trash
@@ -107,10 +112,16 @@ def _erase_session_rows(c: Connection, session_id: str) -> list[str]:
     c.execute(delete(live_take).where(live_take.c.id.in_(takes)))
     recordings = select(recording.c.id).where(recording.c.session_id == session_id).scalar_subquery()
     analyses = select(analysis.c.id).where(analysis.c.recording_id.in_(recordings)).scalar_subquery()
+    runs = select(filter_run.c.id).where(filter_run.c.analysis_id.in_(analyses)).scalar_subquery()
+    c.execute(delete(filter_run_file).where(filter_run_file.c.filter_run_id.in_(runs)))
+    c.execute(delete(filter_run).where(filter_run.c.analysis_id.in_(analyses)))
+    c.execute(delete(reference_file).where(reference_file.c.session_id == session_id))
     c.execute(delete(edit).where(edit.c.analysis_id.in_(analyses)))
     c.execute(delete(analysis_file).where(analysis_file.c.analysis_id.in_(analyses)))
     c.execute(delete(analysis).where(analysis.c.recording_id.in_(recordings)))
+    c.execute(delete(tuning).where(tuning.c.recording_id.in_(recordings)))
     c.execute(delete(job).where(job.c.recording_id.in_(recordings)))
+    c.execute(delete(device_check).where(device_check.c.recording_id.in_(recordings)))
     c.execute(delete(recording_file).where(recording_file.c.recording_id.in_(recordings)))
     c.execute(delete(recording).where(recording.c.session_id == session_id))
     # the plan outlives the session: its visit is open again
@@ -165,7 +176,7 @@ def list_unfinished(settings: Settings) -> tuple[set[str], set[str]]:
 def _files_of(c: Connection, session_id: str, patient_id: str) -> set[tuple[str, str]]:
     """Every file of a session, also those that were taken out of it and may lie in the trash."""
     added = select(audit_table.c.detail["sha256"].as_string()).where(
-        audit_table.c.action == "recording.file_added",
+        audit_table.c.action.in_(("recording.file_added", "reference.added")),
         audit_table.c.detail["session_id"].as_string() == session_id,
     )
     earlier = {(patient_id, sha256) for sha256 in c.execute(added).scalars() if sha256}

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from sqlalchemy import Connection
 
 from core.condition import WalkingCondition, is_alike
 from core.norms import Norms, NormValue, look_up_norms, temporal_values
+from server.report import daily_trend
+from server.report.daily_trend import CapacityVisit, PerformanceDay
 from server.report.trends import AnalysedVisit, VisitKind
 from server.services import analyses, edit_log, programmes, sessions
 from server.services.errors import NotFound
@@ -44,7 +47,14 @@ class PatientHistory:
         numbers = next((v for v in reversed(self.visits) if not v.feedback), self.visits[-1]).numbers
         speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
         belt = self.condition is not None and self.condition.protocol == "treadmill"
-        return look_up_norms(self._age, self.patient.sex, speed, self.patient.height_m, treadmill=belt)
+        return look_up_norms(
+            self._age,
+            self.patient.sex,
+            speed,
+            self.patient.height_m,
+            treadmill=belt,
+            contacts_s=numbers.contacts_s,
+        )
 
     @property
     def usual(self) -> dict[str, NormValue]:
@@ -96,11 +106,14 @@ def list_analysed(c: Connection, patient_id: str) -> list[AnalysedSession]:
 def baseline(done: Sequence[AnalysedSession]) -> AnalysedSession | None:
     """The newest visit that says how somebody walks: at own pace where there is one, never with feedback.
 
+    Daily life only where there is nothing else.
+
     Parameters
     ----------
     done : oldest first.
     """
     untold = [a for a in reversed(done) if not a.session.feedback]
+    untold = [a for a in untold if a.session.protocol != "activity"] or untold
     return next((a for a in untold if a.condition.is_at_own_pace), untold[0] if untold else None)
 
 
@@ -147,6 +160,32 @@ def read_history(
     rest = [a for a in done if a.session.id not in shown]
     condition = None if chosen is None else replace(chosen.condition, feedback=False)
     return PatientHistory(patient, condition, tuple(visits), _others(rest), tuple(plans))
+
+
+def read_performance(reviewed: ReviewedAnalyses, done: Sequence[AnalysedSession]) -> list[PerformanceDay]:
+    """Read the days of all recordings of daily life, oldest first; raises IntegrityError."""
+
+    def read(a: AnalysedSession) -> list[PerformanceDay]:
+        found = reviewed.read_bundle(a.found, a.edits).activity
+        if found is None:
+            return []
+        return daily_trend.read_performance(a.session.id, a.session.performed_on, found)
+
+    days: list[PerformanceDay] = []
+    for a in done:
+        if a.session.protocol == "activity":
+            days += reviewed.keep_part((a.found.id, "performance"), partial(read, a))
+    return sorted(days, key=lambda d: d.day)
+
+
+def read_capacity(history: PatientHistory) -> list[CapacityVisit]:
+    """Read what the walks of a history say, oldest first; none of daily life."""
+    found = (
+        daily_trend.read_capacity(v.session_id, v.performed_on, v.title, v.numbers.parameters)
+        for v in history.visits
+        if v.condition.protocol != "activity"
+    )
+    return [v for v in found if v is not None]
 
 
 def classify_visit(session: Session, planned: VisitKind | None) -> VisitKind:

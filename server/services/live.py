@@ -21,7 +21,7 @@ from sqlalchemy import Connection, insert, select, update
 
 from server import audit
 from server.auth.tokens import new_token, token_hash
-from server.services import sessions
+from server.services import devices, sessions
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.storage.tables import (
     OPEN_TAKE_STATES,
@@ -91,6 +91,8 @@ class TabletAccess:
     session_id: str
     session_title: str
     patient_code: str
+    remembered: Mapping[str, str]
+    """Serial number → segment it was worn on last."""
 
 
 @dataclass(frozen=True)
@@ -175,7 +177,8 @@ def pair(c: Connection, code: str) -> TabletAccess:
     }
     c.execute(update(live_take).where(live_take.c.id == row.id).values(values))
     audit.record(c, None, "live.paired", "session", row.session_id, {"take_id": row.id})
-    return TabletAccess(token, row.id, row.session_id, row.title, row.code)
+    places = devices.recall_places(c).segments
+    return TabletAccess(token, row.id, row.session_id, row.title, row.code, places)
 
 
 def by_token(c: Connection, take_id: str, token: str) -> LiveTakeRecord | None:

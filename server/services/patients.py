@@ -12,6 +12,7 @@ from sqlalchemy.exc import IntegrityError
 
 from core.frames import Side
 from server import audit
+from server.jobs.queue import BESIDE
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.storage.tables import ACTIVE_STATES, job, new_id, now, patient, recording, session
 
@@ -132,7 +133,11 @@ def _listing() -> Any:
         select(job.c.seq)
         .join(recording, recording.c.id == job.c.recording_id)
         .join(session, session.c.id == recording.c.session_id)
-        .where(session.c.patient_id == patient.c.id, job.c.state.in_(ACTIVE_STATES))
+        .where(
+            session.c.patient_id == patient.c.id,
+            job.c.state.in_(ACTIVE_STATES),
+            job.c.kind.not_in(BESIDE),
+        )
         .correlate(patient)
         .exists()
     )

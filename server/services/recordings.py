@@ -1,6 +1,6 @@
 """Upload sets: the files of a take as they came, what was found in them, and which sensor is worn where.
 
-A session's current recording is its newest. Its files may change until an analysis of them was asked for;
+A session's current recording is its newest. Its files may change until an analysis or a tuning was asked for;
 after that it never changes, and the next added or removed file starts a new one with the same other files.
 
     with recordings.receive(db, blobs, settings, actor, sid, "left.csv") as upload:
@@ -15,13 +15,13 @@ import shutil
 import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, Final, Literal, Self
 
 from sqlalchemy import Connection, delete, func, insert, literal, select, update
 
 from core.errors import InputError
 from server import audit
-from server.jobs.queue import VIEW_COLUMNS, JobQueue, JobView, job_view
+from server.jobs.queue import TUNE, VIEW_COLUMNS, JobQueue, JobView, job_view
 from server.services.errors import Conflict, NotFound, ServiceError, TooLarge
 from server.services.provenance import CODE_VERSION
 from server.settings import Settings
@@ -287,7 +287,12 @@ def check_name(name: str) -> str:
     """A file's name as we keep it: forward slashes, composed Unicode; raises InputError bad_file_name."""
     plain = unicodedata.normalize("NFC", name).replace("\\", "/").strip("/")
     parts = plain.split("/")
-    if not plain or len(plain) > 500 or any(p in {"", ".", ".."} for p in parts) or _unprintable(plain):
+    if (
+        not plain
+        or len(plain) > 500
+        or any(p.strip() in {"", ".", ".."} for p in parts)
+        or _unprintable(plain)
+    ):
         raise InputError(
             "bad_file_name", "A file's name has 1 to 500 printable characters and no '..' among its folders."
         )
@@ -295,8 +300,17 @@ def check_name(name: str) -> str:
 
 
 def _unprintable(name: str) -> bool:
-    # control characters and lone surrogates; joiners stay, emoji are made of them
-    return any(unicodedata.category(character) in {"Cc", "Cs"} for character in name)
+    # control characters, lone surrogates, marks that turn the direction of writing and so show another
+    # ending, and what stands for bytes that were no text; joiners stay, emoji are made of them
+    return any(
+        unicodedata.category(c) in {"Cc", "Cs"}
+        or unicodedata.bidirectional(c) in _TURNING
+        or c in "\u200e\u200f\u061c\ufffd"
+        for c in name
+    )
+
+
+_TURNING: Final = frozenset(("LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"))
 
 
 _NEWEST = (recording.c.created_at.desc(), recording.c.id)
@@ -348,7 +362,7 @@ def _editable(c: Connection, session_id: str) -> str:
             .select_from(job)
             .where(
                 job.c.recording_id == this.id,
-                job.c.kind == ANALYSE,
+                job.c.kind.in_((ANALYSE, TUNE)),
                 job.c.state.in_(("queued", "running", "done")),
             )
         ).scalar_one()

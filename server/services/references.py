@@ -4,25 +4,36 @@ from __future__ import annotations
 
 from sqlalchemy import Connection, select, union
 
-from server.storage.tables import analysis, analysis_file, patient, recording, recording_file, session
+from server.storage.tables import (
+    analysis,
+    analysis_file,
+    filter_run,
+    filter_run_file,
+    job,
+    patient,
+    recording,
+    recording_file,
+    reference_file,
+    session,
+)
 
 
 def list_referenced(c: Connection, session_id: str | None = None) -> set[tuple[str, str]]:
     """Every (space, sha256) that a row refers to, of one session or all."""
-    originals = (
-        select(patient.c.id, recording_file.c.sha256)
-        .join(session, session.c.patient_id == patient.c.id)
-        .join(recording, recording.c.session_id == session.c.id)
-        .join(recording_file, recording_file.c.recording_id == recording.c.id)
+    of_session = patient.join(session, session.c.patient_id == patient.c.id)
+    of_take = of_session.join(recording, recording.c.session_id == session.c.id)
+    of_analysis = of_take.join(analysis, analysis.c.recording_id == recording.c.id)
+    of_run = of_analysis.join(filter_run, filter_run.c.analysis_id == analysis.c.id)
+    places = (
+        (recording_file.c.sha256, of_take.join(recording_file)),
+        (analysis_file.c.sha256, of_analysis.join(analysis_file)),
+        (reference_file.c.sha256, of_session.join(reference_file)),
+        (filter_run_file.c.sha256, of_run.join(filter_run_file)),
+        # what a run was held against stays, also when the file was replaced
+        (filter_run.c.reference_sha256, of_run),
+        (job.c.checkpoint, of_take.join(job, job.c.recording_id == recording.c.id)),
     )
-    results = (
-        select(patient.c.id, analysis_file.c.sha256)
-        .join(session, session.c.patient_id == patient.c.id)
-        .join(recording, recording.c.session_id == session.c.id)
-        .join(analysis, analysis.c.recording_id == recording.c.id)
-        .join(analysis_file, analysis_file.c.analysis_id == analysis.c.id)
-    )
+    queries = [select(patient.c.id, sha256).select_from(tables) for sha256, tables in places]
     if session_id is not None:
-        originals = originals.where(session.c.id == session_id)
-        results = results.where(session.c.id == session_id)
-    return {(row[0], row[1]) for row in c.execute(union(originals, results))}
+        queries = [query.where(session.c.id == session_id) for query in queries]
+    return {(row[0], row[1]) for row in c.execute(union(*queries)) if row[1] is not None}

@@ -8,6 +8,7 @@ from dataclasses import replace
 from server.report.behind import ParameterStrides, open_row
 from server.report.bundle import Bundle
 from server.report.comparison import add_changes, compare_figures
+from server.report.headline import find_changes
 from server.report.level import level_column
 from server.report.model import PreviousVisit, ReportModel, report_model
 from server.services import analyses, controls, edit_log
@@ -55,7 +56,13 @@ def read(
     old, new = reviewed.read_numbers(before.found, before.edits), reviewed.read_numbers(found, edits)
     changed = compare_figures(old, new, find_norms(patient, session, new), patient.affected_side)
     since = PreviousVisit(before.session.id, before.session.performed_on)
-    return bundle, replace(model, groups=add_changes(model.groups, changed), since=since)
+    headline = model.headline
+    if headline is not None and model.quality.kind != "bad":
+        told, within, unlimited = find_changes(changed)
+        headline = replace(headline, changed=told, within=within, unlimited=unlimited)
+    groups = add_changes(model.groups, changed)
+    test = None if model.functional is None else model.functional.compare_with(old.parameters)
+    return bundle, replace(model, groups=groups, since=since, headline=headline, functional=test)
 
 
 def behind_number(

@@ -19,6 +19,7 @@ from core.parameters.rows import Column
 from server.report import signals, tracks
 from server.report.bundle import Bundle, apply_review, load_bundle, read_columns
 from server.report.numbers import Numbers, numbers_of, read_numbers
+from server.report.wording import speak_places
 from server.services import analyses
 from server.services.edit_log import EditHistory
 from server.services.errors import Conflict
@@ -49,7 +50,9 @@ class StoredAnalysis:
             return None
         stopped = next((n.message for n in self.bundle.warnings if n.severity == "error"), None)
         if stopped is not None:
-            return f"The analysis stopped before events were looked for. {stopped}"
+            return f"The analysis stopped before events were looked for. {speak_places(stopped)}"
+        if self.bundle.repetitions is not None:
+            return "Squats have no contacts and no strides. The overview lists every squat."
         return (
             "This analysis was made by an earlier version, which did not keep what an edit is measured on. "
             "Run the analysis again."

@@ -12,6 +12,7 @@ from sqlalchemy import Connection, case, exists, func, insert, select, update
 from core.condition import CHOICES, Footwear, Orthosis, WalkingAid, WalkingCondition, WalkingPace
 from core.frames import PROTOCOLS, Protocol
 from server import audit
+from server.jobs.queue import BESIDE
 from server.services.errors import NotFound, ServiceError
 from server.storage.tables import (
     ACTIVE_STATES,
@@ -146,7 +147,11 @@ def newest_of(c: Connection, patient_ids: Collection[str]) -> dict[str, Session]
 _NEWEST = (session.c.performed_on.desc(), session.c.created_at.desc(), session.c.id)
 
 _MINE = recording.c.session_id == session.c.id
-_JOBS = select(job.c.state).join(recording, recording.c.id == job.c.recording_id).where(_MINE)
+_JOBS = (
+    select(job.c.state)
+    .join(recording, recording.c.id == job.c.recording_id)
+    .where(_MINE, job.c.kind.not_in(BESIDE))
+)
 _STATE = case(
     (_JOBS.where(job.c.state.in_(ACTIVE_STATES)).correlate(session).exists(), "running"),
     (exists().where(analysis.c.recording_id == recording.c.id, _MINE).correlate(session), "done"),

@@ -15,11 +15,12 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import BinaryIO, Self
 
 from core.errors import SagittalError
 from server.storage import fs
 
+_PIECE = 1 << 20
 _HEX32 = re.compile(r"[0-9a-f]{32}")
 _HEX64 = re.compile(r"[0-9a-f]{64}")
 INCOMING = "incoming"
@@ -93,12 +94,24 @@ class BlobStore:
         except FileNotFoundError:
             raise _missing(sha256) from None
         if hashlib.sha256(content).hexdigest() != sha256:
-            raise IntegrityError(
-                "blob_damaged",
-                f"The stored file {sha256[:12]}… has changed on the disk; its content is not used. "
-                "Restore it from a backup or upload the original again.",
-            )
+            raise _damaged(sha256)
         return content
+
+    def open(self, space: str, sha256: str) -> BinaryIO:
+        """Open the bytes, verified before the first is given; raises IntegrityError as `read`."""
+        path = self.path(space, sha256)
+        try:
+            file = path.open("rb")
+        except FileNotFoundError:
+            raise _missing(sha256) from None
+        digest = hashlib.sha256()
+        while piece := file.read(_PIECE):
+            digest.update(piece)
+        if digest.hexdigest() != sha256:
+            file.close()
+            raise _damaged(sha256)
+        file.seek(0)
+        return file
 
     def require(self, space: str, sha256: str) -> None:
         """Raise IntegrityError unless the file is there; call it in the transaction that refers to it."""
@@ -154,6 +167,14 @@ class Receiver:
 
     def __exit__(self, *error: object) -> None:
         self._file.__exit__(None, None, None)
+
+
+def _damaged(sha256: str) -> IntegrityError:
+    return IntegrityError(
+        "blob_damaged",
+        f"The stored file {sha256[:12]}… has changed on the disk; its content is not used. "
+        "Restore it from a backup or upload the original again.",
+    )
 
 
 def _missing(sha256: str) -> IntegrityError:

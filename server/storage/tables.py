@@ -4,7 +4,10 @@ Nothing is deleted by cascade (RESTRICT everywhere): clinical rows leave only th
 
 patient ─< session ─< recording ─< recording_file          user ─< login_session, one_time_token
                           └──< analysis ─< analysis_file    audit (append-only, refers to nothing)
-        │                 └──< job ─── analysis ─< edit (append-only, undo is a row too)
+        │          │      ├──< job ─── analysis ─< edit (append-only, undo is a row too)
+        │          │      │               └──< filter_run ─< filter_run_file
+        │          │      └──< device_check (of the session's last published analysis)
+        │          └──< reference_file
         ├──< programme ─< planned_visit ─── session (at most one each)
         └──< prescription ─< live_take >── session, recording (the one it became)
                                  └──< live_event (append-only)
@@ -244,6 +247,7 @@ job = Table(
     Column("stage", String(64)),
     Column("fraction", Float),
     Column("message", String(500)),
+    Column("checkpoint", String(64)),  # sha256 of what the next attempt goes on from
     Column("error_code", String(64)),
     Column("error_message", Text),
     Column("created_at", Utc, nullable=False),
@@ -287,6 +291,52 @@ analysis_file = Table(
     CheckConstraint("size >= 0", name="size"),
 )
 
+device_check = Table(
+    "device_check",
+    metadata,
+    Column("recording_id", ForeignKey("recording.id", ondelete="RESTRICT"), primary_key=True),
+    Column("device_id", String(32), primary_key=True, index=True),  # serial numbers only, never a file's name
+    Column("segment", String(16), nullable=False),  # where the analysis took it to be
+    Column("exchanged", Boolean, nullable=False),  # its place was said wrongly: it is not offered again
+    Column("content", Json, nullable=False),  # core.quality.devices.DeviceCheck
+    Column("at", Utc, nullable=False),
+)
+
+reference_file = Table(
+    "reference_file",
+    metadata,
+    Column("session_id", ForeignKey("session.id", ondelete="RESTRICT"), primary_key=True),
+    Column("name", String(500), primary_key=True),  # as uploaded; orientations of another system
+    Column("size", Integer, nullable=False),
+    Column("sha256", String(64), nullable=False, index=True),
+    Column("added_at", Utc, nullable=False),
+    CheckConstraint("size >= 0", name="size"),
+)
+
+filter_run = Table(
+    "filter_run",
+    metadata,
+    _id(),
+    _ref("analysis_id", "analysis"),
+    Column("job_id", ForeignKey("job.id", ondelete="RESTRICT"), nullable=False),
+    Column("settings", Json, nullable=False),  # core.filter_comparison.FilterRequest
+    Column("reference_name", String(500)),  # None: compared with each other only
+    Column("reference_sha256", String(64)),
+    Column("code_version", String(64), nullable=False),
+    Column("created_at", Utc, nullable=False),
+    UniqueConstraint("job_id"),
+)
+
+filter_run_file = Table(
+    "filter_run_file",
+    metadata,
+    Column("filter_run_id", ForeignKey("filter_run.id", ondelete="RESTRICT"), primary_key=True),
+    Column("name", String(100), primary_key=True),
+    Column("size", Integer, nullable=False),
+    Column("sha256", String(64), nullable=False, index=True),
+    CheckConstraint("size >= 0", name="size"),
+)
+
 edit = Table(
     "edit",
     metadata,
@@ -298,6 +348,19 @@ edit = Table(
     Column("at", Utc, nullable=False),
     _one_of("kind", EDIT_KINDS),
     sqlite_autoincrement=True,  # a number is never given twice: it says which state of a review was seen
+)
+
+tuning = Table(
+    "tuning",
+    metadata,
+    _id(),
+    _ref("recording_id", "recording"),
+    Column("job_id", ForeignKey("job.id", ondelete="RESTRICT"), nullable=False),
+    Column("input_sha256", String(64), nullable=False),
+    Column("code_version", String(64), nullable=False),
+    Column("result", Json, nullable=False),  # core.fusion.algorithms.tuning.TuningResult
+    Column("created_at", Utc, nullable=False),
+    UniqueConstraint("job_id"),  # one job, one visible result
 )
 
 programme = Table(

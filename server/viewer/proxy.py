@@ -21,7 +21,7 @@ import math
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import viser
 from fastapi import APIRouter, FastAPI, Query, Request, WebSocket
@@ -84,6 +84,11 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         app.state.views = views
         yield
 
+
+NO_FIGURE: Final = (
+    "This take has no figure: it needs sensors on the pelvis and a leg, on pelvis and feet or on both feet."
+)
+"""Of an analysis that is done and has no poses: another one will not bring them."""
 
 router = APIRouter(lifespan=_lifespan, include_in_schema=False)
 
@@ -188,6 +193,11 @@ async def _open(
             comparisons.pair(c, sid, other)  # refuses a visit of somebody else
             return this, _replayable(c, other)
 
+    def why_nothing() -> str:
+        with db.read() as c:
+            done = analyses.latest(c, sid) is not None
+        return NO_FIGURE if done else "There is nothing to replay: nothing is analysed yet."
+
     this, before = await asyncio.to_thread(latest)
     for seen in (this, before):
         if seen is not None:
@@ -195,7 +205,7 @@ async def _open(
                 ws.app.state.trail.record_watched, who, "replay.opened", "session", seen.session.id
             )
     if this is None:
-        raise Problem(404, "no_poses", "There is nothing to replay: no analysis has reached the poses yet.")
+        raise Problem(404, "no_poses", await asyncio.to_thread(why_nothing))
 
     def load() -> ReplayMotion:
         motion = _motion(reviewed.blobs, this)

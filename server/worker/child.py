@@ -9,10 +9,21 @@ import logging
 
 from core.errors import SagittalError
 from core.formats.source import SourceFile
+from server.jobs.attempt import Attempt
 from server.processes.channel import Channel
 from server.processes.child import enter_child
 from server.storage.blobs import BlobStore
-from server.worker.messages import ChildReady, Failure, Input, Order, Result, Stage, decode_order, encode
+from server.worker.messages import (
+    Checkpoint,
+    ChildReady,
+    Failure,
+    Input,
+    Order,
+    Result,
+    Stage,
+    decode_order,
+    encode,
+)
 from server.worker.task import TASKS, load
 
 log = logging.getLogger("server.worker.child")
@@ -38,8 +49,17 @@ def compute(order: Order, store: BlobStore, line: Channel) -> Result | Failure:
     """Carry out one order; whatever goes wrong is an answer, never the end of the process."""
     try:
         files = [open_source(store, order.space, file) for file in order.files]
-        progress = lambda stage, share: line.send(encode(Stage(stage, float(share))))  # noqa: E731
-        return Result(TASKS[order.kind].run(files, order.params, progress))
+        left = None
+        if order.space is not None and order.checkpoint is not None:
+            left = store.read(order.space, order.checkpoint)
+        attempt = Attempt(
+            progress=lambda stage, share, message=None: line.send(
+                encode(Stage(stage, float(share), message))
+            ),
+            keep=lambda content: line.send(encode(Checkpoint(content))),
+            checkpoint=left,
+        )
+        return Result(TASKS[order.kind].run(files, order.params, attempt))
     except SagittalError as error:
         return Failure(error.code, error.message)
     except MemoryError:
@@ -61,7 +81,12 @@ def open_source(store: BlobStore, space: str | None, file: Input) -> SourceFile:
     """A blob as a source, read and verified when somebody needs it."""
     if space is None:
         raise ValueError("An order with files names the space they lie in.")
-    return SourceFile(file.name, file.size, lambda: store.read(space, file.sha256))
+    return SourceFile(
+        file.name,
+        file.size,
+        lambda: store.read(space, file.sha256),
+        lambda: store.open(space, file.sha256),
+    )
 
 
 if __name__ == "__main__":

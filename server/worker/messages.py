@@ -25,6 +25,7 @@ class Order(msgspec.Struct, frozen=True, tag=True):
     space: str | None
     files: list[Input]
     params: dict[str, Any]
+    checkpoint: str | None = None
 
 
 class ChildReady(msgspec.Struct, frozen=True, tag=True):
@@ -32,10 +33,17 @@ class ChildReady(msgspec.Struct, frozen=True, tag=True):
 
 
 class Stage(msgspec.Struct, frozen=True, tag=True):
-    """Child to worker: a stage starts."""
+    """Child to worker: a stage starts, or goes on and has something to say."""
 
     name: str
     fraction: float
+    message: str | None = None
+
+
+class Checkpoint(msgspec.Struct, frozen=True, tag=True):
+    """Child to worker: another attempt could go on from here."""
+
+    content: bytes
 
 
 class Result(msgspec.Struct, frozen=True, tag=True):
@@ -51,7 +59,7 @@ class Failure(msgspec.Struct, frozen=True, tag=True):
     message: str
 
 
-Reply = ChildReady | Stage | Result | Failure
+Reply = ChildReady | Stage | Checkpoint | Result | Failure
 
 encode = msgspec.msgpack.encode
 decode_order = msgspec.msgpack.Decoder(Order).decode

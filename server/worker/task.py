@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection
 
+from server.jobs.attempt import Attempt
 from server.jobs.queue import Claim
 from server.storage.blobs import Blob
 
 if TYPE_CHECKING:
     from core.formats.source import SourceFile
-    from core.pipeline import Progress
 
 
 def _nothing() -> None:
@@ -27,7 +27,7 @@ class Task:
 
     Parameters
     ----------
-    run : in the child: (files, the job's params, progress) → result files; raises SagittalError.
+    run : in the child: (files, the job's params, attempt) → result files; raises SagittalError.
     publish : in the worker, inside the transaction that marks the job done: (connection, claim, result files,
         the same as blobs). It may raise SagittalError: then the job fails and nothing is written.
     keeps_files : whether the result files are stored as blobs before the transaction.
@@ -35,7 +35,7 @@ class Task:
     """
 
     kind: str
-    run: Callable[[Sequence[SourceFile], Mapping[str, Any], Progress], dict[str, bytes]]
+    run: Callable[[Sequence[SourceFile], Mapping[str, Any], Attempt], dict[str, bytes]]
     publish: Callable[[Connection, Claim, Mapping[str, bytes], Mapping[str, Blob]], None]
     keeps_files: bool
     warm: Callable[[], None] = _nothing

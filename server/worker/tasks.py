@@ -1,4 +1,4 @@
-"""The two kinds of job of this version: look into a recording, and analyse it."""
+"""The kinds of job of this version: look into a recording, analyse it, run filters on it or tune one."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection
 
-from server.jobs.queue import Claim
-from server.services import analyses, recordings
+from server.jobs.attempt import Attempt
+from server.jobs.queue import COMPARE_FILTERS, TUNE, Claim
+from server.services import analyses, devices, filter_runs, recordings, tunings
 from server.storage.blobs import Blob
 from server.worker.task import Task, register
 
 if TYPE_CHECKING:
     from core.formats.source import SourceFile
-    from core.pipeline import Progress
 
 FOUND = "inspection.json"
 
 
-def _inspect(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progress) -> dict[str, bytes]:
-    return {FOUND: analyses.inspect(files, params["manifest"], progress)}
+def _inspect(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
+    return {FOUND: analyses.inspect(files, params["manifest"], attempt.progress)}
 
 
 def _publish_inspection(
@@ -31,22 +31,45 @@ def _publish_inspection(
     recordings.publish_inspection(c, str(claim.recording_id), claim.params["input_sha256"], found)
 
 
-def _analyse(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progress) -> dict[str, bytes]:
+def _analyse(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
     manifest = json.dumps(params["manifest"], ensure_ascii=False).encode()
-    return analyses.run(files, manifest, params["config"], progress)
+    return analyses.run(files, manifest, params["config"], attempt.progress)
 
 
 def _publish_analysis(
     c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
 ) -> None:
-    provenance = json.loads(files["analysis.json"])["provenance"]
-    analyses.publish(c, claim, blobs, provenance["parameters_sha256"])
+    found = json.loads(files["analysis.json"])
+    analyses.publish(c, claim, blobs, found["provenance"]["parameters_sha256"])
+    devices.keep_checks(c, str(claim.recording_id), found["devices"])
+
+
+def _tune(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
+    return {tunings.RESULT: tunings.run(files, params["order"], attempt)}
+
+
+def _publish_tuning(
+    c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
+) -> None:
+    tunings.publish(c, claim, files[tunings.RESULT])
+
+
+def _compare_filters(
+    files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
+) -> dict[str, bytes]:
+    return filter_runs.run(files, params, attempt.progress)
+
+
+def _publish_filters(
+    c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
+) -> None:
+    filter_runs.publish(c, claim, blobs)
 
 
 def _warm() -> None:
     """Import readers and pipeline, compile the kernels or load them from the cache."""
     import server.report.exports  # noqa: F401
-    from core.agreement.windows import compile_agreement_kernels
+    from core.agreement.slips import compile_agreement_kernels
     from core.body import estimate
     from core.events import foot_contact
     from core.fusion import attitude
@@ -59,3 +82,5 @@ def _warm() -> None:
 
 register(Task(recordings.INSPECT, _inspect, _publish_inspection, keeps_files=False))
 register(Task(recordings.ANALYSE, _analyse, _publish_analysis, keeps_files=True, warm=_warm))
+register(Task(TUNE, _tune, _publish_tuning, keeps_files=False))
+register(Task(COMPARE_FILTERS, _compare_filters, _publish_filters, keeps_files=True))

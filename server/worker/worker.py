@@ -28,7 +28,7 @@ from server.storage.blobs import Blob, BlobStore
 from server.storage.db import Database
 from server.storage.migrate import require_current
 from server.storage.tables import new_id
-from server.worker.messages import ChildReady, Failure, Input, Order, Result, Stage
+from server.worker.messages import Checkpoint, ChildReady, Failure, Input, Order, Result, Stage
 from server.worker.runner import Child, ChildDiedError
 from server.worker.task import TASKS, Task, load
 
@@ -38,6 +38,8 @@ IDLE_S = 0.2
 """Pause between two looks for work; a look is one read of an index."""
 LOOK_S = 0.5
 """Pause between two looks for a request to cancel, and between two progress writes (at most 2 per second)."""
+CHECKPOINT_S = 5.0
+"""Least pause between two checkpoints that are stored."""
 SWEEP_S = 3600.0
 """Pause between two sweeps for files that nothing refers to."""
 WARM_LIMIT_S = 300.0
@@ -127,23 +129,36 @@ class Worker:
             case LeaseState.LOST:
                 log.warning("job %s: the lease is lost, its result is not used", claim.job_id)
                 self._drop_child()
-            case LeaseState.OURS:
+            case LeaseState.OURS | LeaseState.YIELD:
                 self._drop_child()
                 self._queue.release(claim)
 
     def _listen(self, claim: Claim, child: Child) -> Result | Failure | LeaseState:
-        """Keep the lease, pass on progress until the child is done or must end (OURS: we are stopped)."""
+        """Keep the lease, pass on progress until the child is done or must end (OURS: we are stopped).
+
+        The time limit counts from the last checkpoint: whoever leaves one is not stuck.
+        """
         beat_s = self._settings.lease_s / 3
         began = time.monotonic()
         next_beat, next_look = began + beat_s, began + LOOK_S
+        next_keep = began
         stage: Stage | None = None
+        heard = False
+        checkpoint: Checkpoint | None = None
         while not self._stop.is_set():
             reply = child.receive(min(IDLE_S, beat_s / 2))
             if isinstance(reply, Result | Failure):
                 return reply
             if isinstance(reply, Stage):
+                if not heard:  # the first word is passed on at once: a short job has no second
+                    heard, next_look = True, began
                 stage = reply
+            if isinstance(reply, Checkpoint):
+                checkpoint = reply
             time_now = time.monotonic()
+            if checkpoint is not None and time_now >= next_keep:
+                self._keep(claim, checkpoint.content)
+                checkpoint, began, next_keep = None, time_now, time_now + CHECKPOINT_S
             if time_now - began > self._settings.job_timeout_s:
                 self._drop_child()
                 return Failure(
@@ -158,10 +173,24 @@ class Worker:
                     return hold
                 if due:
                     next_beat = time_now + beat_s
-                if stage is not None and not self._queue.progress(claim, stage.name, stage.fraction):
+                if stage is not None and not self._queue.progress(
+                    claim, stage.name, stage.fraction, stage.message
+                ):
                     return LeaseState.LOST
                 stage, next_look = None, time_now + LOOK_S
         return LeaseState.OURS
+
+    def _keep(self, claim: Claim, content: bytes) -> None:
+        """Store a checkpoint, then remove the one before it; the job goes on without where that fails."""
+        space = str(claim.params["space"])
+        try:
+            blob = self._blobs.put(space, content)
+            idle = self._queue.keep(claim, blob.sha256, lambda _: self._blobs.require(space, blob.sha256))
+        except (OSError, SagittalError):
+            log.exception("job %s: a checkpoint could not be stored", claim.job_id)
+            return
+        if idle is not None:
+            erasure.discard(self._db, self._blobs, space, [idle])
 
     def _publish(self, claim: Claim, files: Mapping[str, bytes]) -> None:
         """Files first, then one transaction under the fence."""
@@ -225,7 +254,7 @@ class Worker:
 def _order(claim: Claim) -> Order:
     params = dict(claim.params)
     files = [Input(f["name"], f["size"], f["sha256"]) for f in params.pop("files", ())]
-    return Order(claim.kind, params.get("space"), files, params)
+    return Order(claim.kind, params.get("space"), files, params, claim.checkpoint)
 
 
 def run_worker(settings: Settings, *, with_starter: bool = False) -> None:

@@ -1,7 +1,7 @@
 // Forms that speak to the API, dialogs, whole-row links and back buttons: behaviour by data attributes, for every page.
 import { request, showProblem } from "./common/api.js";
 
-const TYPES = { int: (v) => parseInt(v, 10), float: (v) => parseFloat(v.replace(",", ".")), bool: (v) => v === "true" };
+const TYPES = { int: (v) => parseInt(v, 10), float: (v) => parseFloat(v.replace(",", ".")), bool: (v) => v === "true", json: JSON.parse };
 
 function values(form) {
   const body = {};

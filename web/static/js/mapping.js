@@ -24,6 +24,9 @@ class SensorMap extends HTMLElement {
     const swap = this.querySelector("[data-swap]");
     swap.addEventListener("click", () => this.swap());
     swap.disabled = false;
+    const clear = this.querySelector("[data-clear]");
+    clear?.addEventListener("click", () => this.clear());
+    if (clear) clear.disabled = false;
     for (const b of this.querySelectorAll("[data-sides]")) {
       b.disabled = false;
       b.addEventListener("click", () => {
@@ -52,6 +55,14 @@ class SensorMap extends HTMLElement {
       if (side) select.value = select.value.slice(0, -1) + (side === "left" ? "r" : "l");
     }
     this.draw();
+  }
+
+  // The places of an earlier take are not those of this one.
+  clear() {
+    for (const row of this.rows) row.querySelector("select").value = "";
+    this.querySelector("[data-as-before]").remove();
+    this.draw();
+    this.rows[0].querySelector("select").focus();
   }
 
   // The side of a leg was a try: nothing is analysed before a person has said which leg it is.
@@ -118,6 +129,15 @@ class SensorMap extends HTMLElement {
     );
   }
 
+  // What the movement needs and nobody wears.
+  lacks(worn) {
+    if (this.getAttribute("protocol") === "squat") {
+      const leg = ["l", "r"].some((side) => worn.has(`thigh_${side}`) && worn.has(`shank_${side}`));
+      return leg && worn.has("pelvis") ? "" : "; a squat needs shank, thigh and pelvis";
+    }
+    return worn.has("foot_l") && worn.has("foot_r") ? "" : "; without both feet there are no strides";
+  }
+
   report(worn, clashes) {
     const clash = this.querySelector("[data-clash]");
     clash.hidden = clashes.size === 0;
@@ -133,10 +153,10 @@ class SensorMap extends HTMLElement {
         this.ask.querySelector("[data-ask-id]").textContent = row.dataset.device;
       }
     }
-    const feet = worn.has("foot_l") && worn.has("foot_r");
+    const lacks = worn.size ? this.lacks(worn) : "";
     const sum = this.querySelector("[data-sum]");
     const asked = this.ask && !this.ask.hidden;
-    sum.textContent = asked ? "First say which foot is the left one" : `${worn.size} of ${this.rows.length} sensors placed${feet || !worn.size ? "" : "; without both feet there are no strides"}`;
+    sum.textContent = asked ? "First say which foot is the left one" : `${worn.size} of ${this.rows.length} sensors placed${lacks}`;
     const button = this.querySelector("[data-analyse]");
     if (button) button.disabled = worn.size === 0 || clashes.size > 0 || Boolean(asked);
   }

@@ -1,4 +1,4 @@
-// Which segment a sensor is worn on: what its name says, else what this tablet remembers of it.
+// Which segment a sensor is worn on: what its name says, else the clinic's last take with it, else this tablet's.
 const KEY = "sagittal.capture.segments";
 const PARTS = {
   pelvis: /pelvis|sacrum|lumbar/, thigh: /thigh|femur|up(per)?_?leg/, shank: /shank|tibia|low(er)?_?leg/,
@@ -21,16 +21,18 @@ export function remember(segments) {
   try { localStorage.setItem(KEY, JSON.stringify({ ...memory(), ...segments })); } catch { /* storage refused: ask again next time */ }
 }
 
-// Give every sensor without a segment a suggestion that no other one has taken.
-export function suggest(sensors) {
-  const known = memory();
+// Give every sensor without a segment a suggestion that no other one has taken; `clinic`: id → segment.
+export function suggest(sensors, clinic = {}) {
+  const known = { ...memory(), ...clinic };
   const taken = new Set(sensors.map((s) => s.segment).filter(Boolean));
   for (const sensor of sensors) {
     if (sensor.segment || sensor.asked) continue;
     sensor.asked = true;
-    const segment = segmentInName(sensor.label ?? sensor.id) ?? known[sensor.id] ?? null;
+    const named = segmentInName(sensor.label ?? sensor.id);
+    const segment = named ?? known[sensor.id] ?? null;
     if (segment && !taken.has(segment)) {
       sensor.segment = segment;
+      sensor.asBefore = named ? null : segment;
       taken.add(segment);
     }
   }

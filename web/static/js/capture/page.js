@@ -264,6 +264,7 @@ class CapturePage extends HTMLElement {
 
   enter(state) {
     this.dataset.state = state;
+    this.worn.remembered = this.outbox?.record.remembered ?? {};
     this.entered = performance.now();
     if (state === "running") this.stage = undefined;
     stayAwake(state === "running" || state === "sending");

@@ -77,6 +77,9 @@ export class View {
     const counted = `${ready.length} of ${rows.length} ready${copies}`;
     const recorded = paused ? `${rows.length} of ${wanted(record)} connected` : `${worn} recorded`;
     set(this.part("sum"), !source ? "Where do they come from?" : prepare ? counted : recorded);
+    const before = prepare ? rows.filter(({ sensor }) => sensor.segment && sensor.segment === sensor.asBefore).length : 0;
+    this.part("as-before").hidden = !before;
+    set(this.part("as-before-say"), words.asBefore(before));
     this.list.draw(prepare || paused ? rows : rows.filter(({ sensor }) => sensor.segment), { fixed: !prepare });
     this.axes(source, prepare);
   }

@@ -110,3 +110,6 @@ export function hours(value) {
   if (value >= 1) return `this tablet keeps ${Math.floor(value)} h of data`;
   return `this tablet keeps only ${Math.max(1, Math.floor(value * 60))} min of data`;
 }
+
+/** @param {number} n */
+export const asBefore = (n) => `As last time: ${n} sensor${n === 1 ? "" : "s"}`;

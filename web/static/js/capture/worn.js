@@ -11,6 +11,7 @@ export class Worn {
   constructor(told) {
     this.told = told; // {onchange, onend, onbattery}
     this.source = null;
+    this.remembered = {}; // id → segment of the clinic's last take, told with the pairing
   }
 
   get kind() { return this.source?.kind; }
@@ -51,7 +52,7 @@ export class Worn {
   }
 
   changed() {
-    suggest(this.sensors);
+    suggest(this.sensors, this.remembered);
     this.told.onchange();
   }
 

@@ -65,8 +65,8 @@ export class Notes {
     setTimeout(() => this.shown.get("problem") === note && this.take("problem"), NOTICE_MS);
   }
 
-  notice({ severity, text, code }) {
-    const key = `notice:${code ?? text}`;
+  notice({ severity, text, code, sensor }) {
+    const key = `notice:${code ?? text}:${sensor ?? ""}`;
     const note = this.put(key, severity === "bad" ? "bad" : severity === "warn" ? "warn" : "", "", text);
     setTimeout(() => this.shown.get(key) === note && this.take(key), NOTICE_MS);
   }

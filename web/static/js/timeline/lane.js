@@ -61,7 +61,7 @@ export class SignalLane {
     const room = Math.max((most - least) * 0.08, 1e-6);
     [this.bottom, this.top] = [least - room, most + room];
     const digits = most - least < 5 ? 2 : 0;
-    const text = (v) => `${v.toFixed(digits).replace("-", "−")}${this.lane.unit === "°" ? "°" : ` ${this.lane.unit}`}`;
+    const text = (v) => `${v.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−")}${this.lane.unit === "°" ? "°" : ` ${this.lane.unit}`}`;
     this.digits = digits;
     this.high.textContent = text(most);
     this.low.textContent = text(least);

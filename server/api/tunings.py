@@ -1,0 +1,54 @@
+"""Tunings of filters on trials with a reference: asked for, listed, downloaded."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter
+
+from server.api import schemas
+from server.api.documents import refusals
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db, Id, OpenTrail, Queue
+from server.http.json_body import StrictJsonRoute
+from server.jobs.queue import JobView
+from server.services import tunings
+
+router = APIRouter(route_class=StrictJsonRoute, tags=["tunings"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+
+
+@router.post(
+    "/sessions/{session_id}/tunings", status_code=202, response_model=JobView, responses=refusals(409)
+)
+def tune(
+    session_id: Id,
+    body: schemas.TuningNew,
+    db: Db,
+    queue: Queue,
+    who: Annotated[Identity, require(Action.ANALYSE)],
+) -> JobView:
+    """Fit the gains of a filter to the trials (.npz) among the session's files; analyses go before it."""
+    order = tunings.TuningOrder(**body.model_dump())
+    with db.write() as c:
+        return tunings.submit(c, queue, who, session_id, order)
+
+
+@router.get("/sessions/{session_id}/tunings", response_model=list[tunings.StoredTuning])
+def list_tunings(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[tunings.StoredTuning]:
+    """The finished tunings of a session, the newest first."""
+    with db.read() as c:
+        made = tunings.of_session(c, session_id)
+    trail.record_watched(who, "tunings.opened", "session", session_id)
+    return made
+
+
+@router.get("/tunings/{tuning_id}", response_model=tunings.StoredTuning)
+def read_tuning(tuning_id: Id, db: Db, trail: OpenTrail, who: Reader) -> tunings.StoredTuning:
+    """One tuning: gains, errors before and after on both halves, the sha256 of the data, and the verdict."""
+    with db.read() as c:
+        found = tunings.get(c, tuning_id)
+    trail.record_opened(who, "tuning.opened", "tuning", tuning_id)
+    return found

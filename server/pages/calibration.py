@@ -1,0 +1,36 @@
+"""How good the calibration of a take is: every check of every sensor, why, and what to do."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+from starlette.responses import Response
+
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Blobs, Db, Id
+from server.pages.session_context import read_context
+from server.pages.shell import record_opening, render_page
+from server.report.calibration_checks import view_calibration_checks
+from server.services import analyses
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+
+@router.get("/sessions/{sid}/calibration")
+def show_calibration(
+    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+) -> Response:
+    """The picture of the body, the verdict, and the checks of every sensor."""
+    with db.read() as c:
+        context = read_context(c, sid)
+        found = analyses.latest(c, sid)
+    stored = {} if found is None else json.loads(analyses.file_bytes(blobs, found, "analysis.json"))
+    context["analysed"] = found is not None
+    context["view"] = view_calibration_checks(stored.get("calibration_score"), stored.get("calibration"))
+    record_opening(request, who, "session", sid)
+    return render_page(request, db, who, "calibration.html", "patients", **context)

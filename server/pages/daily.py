@@ -1,0 +1,46 @@
+"""Daily life on the session page and in the week report, and beside the clinic's walks on the trends page."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from core.activity.parameters import WORN_H
+from core.activity.result import KINDS
+from server.report.daily_charts import bouts_svg, inclination_svg, kind_swatch, ribbon_svg, steps_svg
+from server.report.daily_life import (
+    EVENTS_SHOWN,
+    KIND_LABELS,
+    KIND_WORDS,
+    DailyLifeView,
+    format_hours,
+)
+
+DAYS_A_SHEET: Final = 7
+"""Days on one sheet of the printed report."""
+
+TEMPLATES: Final = {"session.html": "daily.html", "print.html": "daily-print.html"}
+"""Page of a walk → page of daily life."""
+
+
+def draw_daily(view: DailyLifeView | None) -> dict[str, Any] | None:
+    """What the templates of daily life show, with the charts drawn."""
+    if view is None:
+        return None
+    found = view.found
+    days = [
+        {"totals": d, "ribbon": ribbon_svg(found, d), "lean": inclination_svg(found, d)} for d in view.days
+    ]
+    there = [k for k in KINDS if found.minutes(k) > 0.0]
+    return {
+        "view": view,
+        "days": days,
+        "sheets": [days[i : i + DAYS_A_SHEET] for i in range(0, len(days), DAYS_A_SHEET)],
+        "legend": [(kind_swatch(k), KIND_LABELS[k]) for k in there],
+        "definitions": [(KIND_LABELS[k], KIND_WORDS[k], format_hours(found.minutes(k))) for k in there],
+        "bouts": bouts_svg(view.bins),
+        "steps": steps_svg(found, view.days),
+        "steps_title": "Steps per day" if len(days) > 1 else "Steps per hour",
+        "stairs": any(found.minutes(k) for k in ("stairs_up", "stairs_down")),
+        "worn_h": f"{WORN_H:.0f}",
+        "events_shown": EVENTS_SHOWN,
+    }

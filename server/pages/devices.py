@@ -1,0 +1,135 @@
+"""The clinic's sensors: how each one is, and what its takes showed; no patient and no visit is named."""
+
+from __future__ import annotations
+
+from math import degrees
+from typing import Annotated, Any, Final
+from urllib.parse import quote
+
+import numpy as np
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+from starlette.responses import Response
+
+from core.frames import GRAVITY
+from core.quality.device_course import (
+    ACC_NOISE_ROSE,
+    BIAS_MOVED,
+    GYRO_NOISE_ROSE,
+    SCALE_MOVED,
+    SCALE_OFF,
+)
+from core.quality.devices import DeviceCheck
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db, DeviceId
+from server.pages.shell import render_page
+from server.pages.words import SEGMENT_NAMES
+from server.report.device_chart import draw_device
+from server.report.device_words import judge_device
+from server.report.wording import format_number
+from server.services import devices
+from server.services.devices import KnownDevice
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+LIMITS: Final = {
+    "bias": f"{degrees(BIAS_MOVED):g}",
+    "scale": f"{100 * SCALE_MOVED:g}",
+    "off": f"{100 * SCALE_OFF:g}",
+    "gyro_noise": f"{GYRO_NOISE_ROSE:g}",
+    "acc_noise": f"{ACC_NOISE_ROSE:g}",
+}
+"""Limits as the pages say them: °/s, %, %, times, times."""
+
+
+@router.get("/sensors")
+def show_devices(request: Request, db: Db, who: Annotated[Identity, require(Action.READ_DEVICE)]) -> Response:
+    """Every sensor of the clinic with its last place and its verdict."""
+    with db.read() as c:
+        rows = [_row(d) for d in devices.list_devices(c)]
+    rows.sort(key=lambda row: row["verdict"].kind != "warn")
+    return render_page(request, db, who, "devices.html", "devices", devices=rows, limits=LIMITS)
+
+
+@router.get("/sensors/{device_id}")
+def show_device(
+    request: Request, db: Db, device_id: DeviceId, who: Annotated[Identity, require(Action.READ_DEVICE)]
+) -> Response:
+    """One sensor over its takes."""
+    with db.read() as c:
+        known = devices.get(c, device_id)
+    view = {"d": _row(known), "charts": _charts(known), "takes": _takes(known), "limits": LIMITS}
+    return render_page(request, db, who, "device.html", "devices", **view)
+
+
+def _row(d: KnownDevice) -> dict[str, Any]:
+    newest = None if d.course.newest is None else d.checks[d.course.newest].check
+    return {
+        "id": d.device_id,
+        "href": f"/sensors/{quote(d.device_id, safe='')}",
+        "day": d.last.day,
+        "segment": SEGMENT_NAMES[d.last.segment],
+        "takes": d.takes,
+        "verdict": judge_device(d.course, [x.check for x in d.checks], [x.day for x in d.checks]),
+        **_figures(newest),
+    }
+
+
+def _figures(check: DeviceCheck | None) -> dict[str, str]:
+    """Figures of a check as text, a dash where there is none."""
+    if check is None or check.gyro_bias is None or check.gravity_scale is None:
+        return dict.fromkeys(("bias", "scale", "gyro_noise", "acc_noise", "rest"), "–")
+    start, end = check.rest_s or (0.0, 0.0)
+    return {
+        "bias": " ".join(format_number(degrees(b), 2) for b in check.gyro_bias),
+        "scale": format_number(100 * check.gravity_scale, 1),
+        "gyro_noise": "–" if check.gyro_noise is None else format_number(degrees(check.gyro_noise), 3),
+        "acc_noise": "–" if check.acc_noise is None else format_number(1e6 * check.acc_noise / GRAVITY),
+        "rest": format_number(end - start, 1),
+    }
+
+
+def _takes(d: KnownDevice) -> list[dict[str, Any]]:
+    """The takes of a sensor as rows of a table, the newest first."""
+    return [
+        {
+            "day": x.day,
+            "segment": SEGMENT_NAMES[x.segment],
+            "rate": f"{x.check.rate_hz:g}",
+            "measured": x.check.reason is None,
+            **_figures(x.check),
+        }
+        for x in reversed(d.checks)
+    ]
+
+
+def _charts(d: KnownDevice) -> list[dict[str, str]]:
+    """Bias of each axis and gravity with the bands of no change, and both noises."""
+    checks, days = [x.check for x in d.checks], [x.day for x in d.checks]
+    charts: list[dict[str, str]] = []
+
+    def add(
+        title: str, unit: str, values: list[float | None], digits: int, least: float, reach: float = 0.0
+    ) -> None:
+        known = [v for v in values if v is not None]
+        usual = float(np.median(known)) if known else 0.0
+        band = (usual - reach, usual + reach) if reach else None
+        svg = draw_device(title, days, values, digits=digits, least=least, band=band)
+        if svg is not None:
+            charts.append({"title": title, "unit": unit, "svg": svg})
+
+    biases = [None if k.gyro_bias is None else np.degrees(k.gyro_bias) for k in checks]
+    for i, axis in enumerate("xyz"):
+        values = [None if b is None else float(b[i]) for b in biases]
+        add(f"Gyroscope bias, {axis}", "°/s", values, 2, 0.0, degrees(BIAS_MOVED))
+    scale = [_times(100.0, k.gravity_scale) for k in checks]
+    add("Gravity at rest", "% of 9.81 m/s²", scale, 1, 0.0, 100.0 * SCALE_MOVED)
+    add("Gyroscope noise", "°/s/√Hz", [_times(degrees(1.0), k.gyro_noise) for k in checks], 3, 0.01)
+    add("Accelerometer noise", "µg/√Hz", [_times(1e6 / GRAVITY, k.acc_noise) for k in checks], 0, 100.0)
+    return charts
+
+
+def _times(factor: float, value: float | None) -> float | None:
+    return None if value is None else factor * value

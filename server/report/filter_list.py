@@ -1,0 +1,65 @@
+"""The orientation filters one can ask for, in words: engines, grades, who needs a magnetometer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from core.estimators import PaperReference
+from core.fusion.algorithms.choice import OWN
+from core.fusion.algorithms.listed import ALGORITHMS, ENGINES, GRADES
+
+OWN_ENGINE: Final = "Sagittal"
+"""The group of the project's own filters, beside the six engines."""
+
+NEEDS: Final[Mapping[str, str]] = {"needed": "needs a magnetometer", "unused": "uses no magnetometer"}
+"""What is not the rule: most use one where there is one."""
+
+PROPOSED: Final = (
+    *(o.name for o in OWN), "madgwick_2011_imu", "choukroun_2006", "sabatini_2006", "srckf", "markley_2003",
+    "hyyti_2015",
+)  # fmt: skip
+"""Chosen until somebody chooses: our own, and one of each engine that runs without a magnetometer."""
+
+
+@dataclass(frozen=True)
+class ListedFilter:
+    """A filter as forms offer it.
+
+    Parameters
+    ----------
+    name : as it is asked for. label : as it is shown; a reconstruction says so. engine : its group.
+    grade : how sure its equations are, None for our own. magnetometer : needed, optional or unused.
+    """
+
+    name: str
+    label: str
+    engine: str
+    grade: str | None
+    magnetometer: str
+    paper: PaperReference | None
+
+    @property
+    def remark(self) -> str:
+        """Grade, and what a magnetometer is to it where that is not the rule."""
+        grade = None if self.grade is None else GRADES_IN_WORDS[self.grade]
+        return ", ".join(x for x in (grade, NEEDS.get(self.magnetometer)) if x)
+
+
+GRADES_IN_WORDS: Final[Mapping[str, str]] = {grade: f"{grade}, {words}" for grade, words in GRADES.items()}
+
+ENGINE_WORDS: Final[Mapping[str, str]] = {
+    OWN_ENGINE: "Self-calibrating, our own",
+    **{engine: words[0].upper() + words[1:] for engine, words in ENGINES.items()},
+}
+
+FILTERS: Final = (
+    *(ListedFilter(o.name, o.label, OWN_ENGINE, None, "optional", None) for o in OWN),
+    *(ListedFilter(a.name, a.shown, a.engine, a.grade, a.magnetometer, a.paper) for a in ALGORITHMS),
+)
+
+
+def list_engines() -> list[tuple[str, str, list[ListedFilter]]]:
+    """Engine, its words, its filters, in reading order."""
+    return [(e, words, [f for f in FILTERS if f.engine == e]) for e, words in ENGINE_WORDS.items()]

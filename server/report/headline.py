@@ -1,0 +1,358 @@
+"""What stands out in a take and what changed since the visit before, in a few sentences.
+
+Every figure may speak by its distance from the norm, from the other side or from the visit before. Its size
+says how far beyond what people and measurement vary by: a figure speaks when that is above 1. Of the figures
+that tell the same thing the largest speaks (docs/science/headline.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import hypot
+from typing import Final, Literal
+
+from core.change import Change
+from core.errors import Notice
+from core.events.result import COMPARED, Strides
+from core.flags import Flag
+from core.frames import SIDES, Side
+from core.norms.lookup import Norms
+from core.parameters.flats import OTHER
+from core.parameters.variability import NORMAL_95
+from server.report.headline_phrases import (
+    BOTH_STEPS,
+    PELVIS_RISES,
+    PHRASES,
+    SHORT_AND_QUICK,
+    Family,
+    Phrases,
+)
+from server.report.level import from_standing
+from server.report.table import ParameterRow, TableCell
+from server.report.wording import format_number, parameter_term
+
+Kind = Literal["norm", "limit", "sides", "change"]
+
+BEYOND_SD: Final = 2.0
+"""A value further from the norm's mean is beyond what healthy people vary by."""
+
+NEARLY: Final = 0.8
+"""A difference of the sides is told before one from the norm unless that is larger by more than this."""
+
+LARGEST: Final = 5.0
+"""Sizes are cut here: what is further off is not told first for being absurd."""
+
+MOST: Final = 6
+"""Sentences on the page, changes among them."""
+
+FEW: Final = 4
+"""With fewer sentences on what stands out, a third change has room; else two."""
+
+
+@dataclass(frozen=True)
+class HeadlineSentence:
+    """One sentence: `before`, then in bold `strong`, then `after`.
+
+    Parameters
+    ----------
+    name : parameter that proves it. side : leg spoken of, None = both or none.
+    kind : what the figure was held against. size : how often it is beyond what varies by itself.
+    """
+
+    name: str
+    side: Side | None
+    family: Family
+    kind: Kind
+    size: float
+    before: str
+    strong: str
+    after: str
+
+    @property
+    def text(self) -> str:
+        """The sentence without its bold part marked."""
+        return f"{self.before}{self.strong}{self.after}"
+
+
+@dataclass(frozen=True)
+class Headline:
+    """What a person reads first.
+
+    Parameters
+    ----------
+    badge : how many strides count and what to do first, in one sentence.
+    stands_out, changed : all sentences, largest first. looked_at : figures that could have spoken.
+    within, unlimited : changes within measurement error, and changes that no known limit judges.
+    """
+
+    badge: str
+    stands_out: tuple[HeadlineSentence, ...] = ()
+    changed: tuple[HeadlineSentence, ...] = ()
+    looked_at: int = 0
+    within: int = 0
+    unlimited: int = 0
+
+    @property
+    def shown_changes(self) -> tuple[HeadlineSentence, ...]:
+        """Changes that have room."""
+        return self.changed[: 3 if len(self.stands_out) < FEW else 2]
+
+    @property
+    def shown(self) -> tuple[HeadlineSentence, ...]:
+        """What stands out, as far as there is room."""
+        return self.stands_out[: MOST - len(self.shown_changes)]
+
+    @property
+    def more(self) -> tuple[str, ...]:
+        """Labels of what has no room."""
+        left = (*self.stands_out[len(self.shown) :], *self.changed[len(self.shown_changes) :])
+        return tuple(
+            dict.fromkeys(parameter_term(from_standing(s.name) or s.name).label.lower() for s in left)
+        )
+
+
+def say_badge(kind: str, strides: Strides, notices: Sequence[Notice]) -> str:
+    """How many strides count and what to know of them, in one sentence.
+
+    Parameters
+    ----------
+    kind : ok, warn or bad, of the data as a whole.
+    """
+    left, right = (len(strides.select_used(side)) for side in SIDES)
+    count = left + right
+    counted = f"{count} stride{'' if count == 1 else 's'} used, {left} left and {right} right"
+    if kind == "bad":
+        stopped = next((n.message for n in notices if n.severity == "error"), None)
+        return stopped or "Numbers are withheld or in doubt; the notices below say why."
+    if min(left, right) < COMPARED and strides.strides:
+        return f"{counted}: fewer than {COMPARED} of a side are compared with nobody."
+    if not strides.strides:
+        return "Steps are told by the trunk; sides are not compared."
+    told = sum(n.severity == "warning" for n in notices)
+    if kind == "warn" and told:
+        return f"{counted}; {'one notice says' if told == 1 else f'{told} notices say'} what to check below."
+    return f"{counted}."
+
+
+def find_standouts(
+    rows: Sequence[ParameterRow], norms: Norms, flags: Sequence[Flag] = ()
+) -> tuple[tuple[HeadlineSentence, ...], int]:
+    """Figures beyond the norm, a limit or the other side, largest first, and how many could have been.
+
+    Parameters
+    ----------
+    rows : of the parameter table, those from the anatomical zero too. norms : they were held against.
+    flags : values against limits.
+    """
+    told = [row for row in rows if _phrases(row.name) is not None and not row.low_confidence]
+    found = [s for row in told for s in _of_row(row, norms)]
+    found = _join_steps(found, {row.name: row for row in told})
+    found += _of_flags(flags)
+    looked_at = sum(
+        any(c is not None and c.z is not None for c in (row.both, row.left, row.right))
+        or row.symmetry is not None
+        for row in told
+    )
+    return _largest_of_families(found), looked_at
+
+
+def find_changes(changes: Sequence[Change]) -> tuple[tuple[HeadlineSentence, ...], int, int]:
+    """Changes beyond the measurement error, largest first; how many are within it, and how many unjudged."""
+    real: dict[str, list[tuple[Change, float]]] = {}
+    within = unlimited = 0
+    for c in changes:
+        if c.difference is None or c.name not in PHRASES:
+            continue
+        if c.verdict is None or not c.limit:
+            unlimited += 1
+        elif c.verdict == "within_measurement_error":
+            within += 1
+        else:
+            real.setdefault(c.name, []).append((c, min(abs(c.difference) / c.limit, LARGEST)))
+    found = [s for group in real.values() for s in _of_change(group)]
+    return _largest_of_families(found), within, unlimited
+
+
+def _largest_of_families(found: Sequence[HeadlineSentence]) -> tuple[HeadlineSentence, ...]:
+    order = {name: i for i, name in enumerate(PHRASES)}
+    ranked = sorted(found, key=lambda s: (-s.size, order.get(from_standing(s.name) or s.name, len(order))))
+    largest: dict[str, HeadlineSentence] = {}
+    for s in ranked:
+        largest.setdefault(s.family, s)
+    return tuple(largest.values())
+
+
+def _phrases(name: str) -> Phrases | None:
+    return PHRASES.get(from_standing(name) or name)
+
+
+def _of_row(row: ParameterRow, norms: Norms) -> Iterator[HeadlineSentence]:
+    """At most one sentence: whichever comparison says most of the figure."""
+    p = _phrases(row.name)
+    if p is None:
+        return
+    if row.both is not None:
+        z = _certain_z(row, row.both)
+        if z is not None and abs(z) > BEYOND_SD:
+            yield from _against_norm(row, p.both_low if z < 0 else p.both_high, None, abs(z), p)
+        return
+    z_of = {side: z for side in SIDES if (z := _certain_z(row, _cell(row, side))) is not None}
+    apart = _of_sides(row, p, norms)
+    if len(z_of) == len(SIDES) and (apart is None or apart.size <= 1.0):
+        # sides that cannot be told apart speak together
+        mean = sum(z_of.values()) / len(SIDES)
+        if abs(mean) > BEYOND_SD:
+            yield from _against_norm(row, p.both_low if mean < 0 else p.both_high, None, abs(mean), p)
+        return
+    far = {side: z for side, z in z_of.items() if abs(z) > BEYOND_SD}
+    size = max((abs(z) for z in far.values()), default=0.0) / BEYOND_SD
+    if apart is not None and apart.size > 1.0 and apart.size >= NEARLY * min(size, LARGEST):
+        yield apart
+    elif far:
+        side: Side = max(far, key=lambda s: abs(far[s]))
+        yield from _against_norm(row, p.side_low if far[side] < 0 else p.side_high, side, abs(far[side]), p)
+
+
+def _certain_z(row: ParameterRow, cell: TableCell | None) -> float | None:
+    """Deviations from the norm's mean, of people and of the measurement together; None without a norm."""
+    if cell is None or cell.z is None or row.norm_sd is None:
+        return None
+    measured = 0.0 if cell.uncertainty is None else cell.uncertainty / NORMAL_95
+    return cell.z * row.norm_sd / hypot(row.norm_sd, measured)
+
+
+def _against_norm(
+    row: ParameterRow, pattern: str, side: Side | None, z: float, p: Phrases
+) -> Iterator[HeadlineSentence]:
+    if not pattern or row.norm_mean is None or row.norm_sd is None:
+        return
+    words = {
+        "a": _number(row, row.norm_mean - row.norm_sd),
+        "b": _number(row, row.norm_mean + row.norm_sd),
+        **{key: _number(row, c.value) for key, c in (("l", row.left), ("r", row.right)) if c is not None},
+    }
+    spoken = row.both if row.both is not None else _cell(row, side)
+    if spoken is not None:
+        words["v"] = _number(row, spoken.value)
+    yield _sentence(row.name, p.family, "norm", z / BEYOND_SD, pattern, words, side)
+
+
+def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence | None:
+    """The sides against each other, None where their strides and measurement leave open which is larger."""
+    s = row.symmetry
+    if s is None or not s.clear or s.low is None or s.high is None or not (p.smaller or p.larger):
+        return None
+    if row.left is None or row.right is None:
+        return None
+    norm = norms.values.get(row.name) or norms.comfortable.get(row.name)
+    healthy = BEYOND_SD * norm.difference_sd if norm is not None and norm.difference_sd else 0.0
+    share = p.apart * 0.5 * (abs(row.left.value) + abs(row.right.value))
+    size = abs(s.difference) / max(0.5 * (s.high - s.low), healthy, share, p.least)
+    larger: Side = s.first if s.difference > 0.0 else OTHER[s.first]
+    side = _side_spoken_of(row, larger, p)
+    words = {"d": _number(row, abs(s.difference)), "cm": format_number(100.0 * abs(s.difference), 0)}
+    return _sentence(
+        row.name, p.family, "sides", size, p.larger if side == larger else p.smaller, words, side
+    )
+
+
+def _side_spoken_of(row: ParameterRow, larger: Side, p: Phrases) -> Side:
+    """Of two sides with words for both the one further from the norm; without a norm the smaller."""
+    if not (p.smaller and p.larger):
+        return OTHER[larger] if p.smaller else larger
+    most, least = _cell(row, larger), _cell(row, OTHER[larger])
+    if most is None or least is None or most.z is None or least.z is None:
+        return OTHER[larger]
+    return larger if abs(most.z) > abs(least.z) else OTHER[larger]
+
+
+def _join_steps(found: list[HeadlineSentence], rows: Mapping[str, ParameterRow]) -> list[HeadlineSentence]:
+    """Short steps and a quick cadence are one sentence."""
+    steps, cadence = rows.get("step_length_m"), rows.get("cadence_spm")
+    if steps is None or cadence is None or cadence.both is None or steps.norm_mean is None:
+        return found
+    z = [z for c in (steps.left, steps.right) if (z := _certain_z(steps, c)) is not None]
+    quick = _certain_z(cadence, cadence.both)
+    if len(z) < len(SIDES) or max(z) >= -BEYOND_SD or quick is None or quick <= BEYOND_SD:
+        return found
+    low, high = steps.norm_mean - (steps.norm_sd or 0.0), steps.norm_mean + (steps.norm_sd or 0.0)
+    mean = sum(c.value for c in (steps.left, steps.right) if c is not None) / len(SIDES)
+    words = {
+        "l": _number(steps, mean),
+        "c": _number(cadence, cadence.both.value),
+        "a": _number(steps, low),
+        "b": _number(steps, high),
+    }
+    size = max(-min(z), quick) / BEYOND_SD
+    others = [s for s in found if s.name not in ("step_length_m", "cadence_spm")]
+    return [*others, _sentence("step_length_m", "step", "norm", size, SHORT_AND_QUICK, words, None)]
+
+
+def _of_flags(flags: Sequence[Flag]) -> list[HeadlineSentence]:
+    """What only a limit judges: the pelvis that a side lifts in swing."""
+    return [
+        _sentence(
+            f.measure,
+            "trunk",
+            "limit",
+            1.0 + (f.value - f.limit) / f.spread,
+            PELVIS_RISES,
+            {"v": format_number(f.value, 0), "b": format_number(f.limit, 0)},
+            f.side,
+        )
+        for f in flags
+        if f.name == "hip_hiking" and f.exceeded and f.certain and f.verified
+        if f.value is not None and f.limit is not None and f.spread is not None and f.side is not None
+    ]
+
+
+def _of_change(group: Sequence[tuple[Change, float]]) -> Iterator[HeadlineSentence]:
+    """One sentence of the sides of a figure that changed."""
+    worst, size = max(group, key=lambda pair: pair[1])
+    p, by = PHRASES[worst.name], worst.difference or 0.0
+    sides = {c.side: c.difference or 0.0 for c, _ in group}
+    if worst.name == "step_length_m" and set(sides) == set(SIDES) and sides["left"] * sides["right"] > 0.0:
+        digits = parameter_term(worst.name).digits
+        words = {
+            "word": "longer" if by > 0 else "shorter",
+            "l": format_number(abs(sides["left"]), digits),
+            "r": format_number(abs(sides["right"]), digits),
+        }
+        yield _sentence(worst.name, p.family, "change", size, BOTH_STEPS, words, None)
+        return
+    pattern = p.up if by > 0 else p.down
+    if pattern:
+        words = {
+            "d": format_number(abs(by), _digits(worst.name)),
+            "cm": format_number(100.0 * abs(by), 0),
+        }
+        yield _sentence(worst.name, p.family, "change", size, pattern, words, worst.side)
+
+
+def _sentence(
+    name: str,
+    family: Family,
+    kind: Kind,
+    size: float,
+    pattern: str,
+    words: Mapping[str, str],
+    side: Side | None,
+) -> HeadlineSentence:
+    legs = {} if side is None else {"side": side, "other": OTHER[side]}
+    before, strong, after = pattern.format(**words, **legs).split("*")
+    return HeadlineSentence(name, side, family, kind, min(size, LARGEST), before, strong, after)
+
+
+def _cell(row: ParameterRow, side: Side | None) -> TableCell | None:
+    return {"left": row.left, "right": row.right}[side] if side is not None else None
+
+
+def _number(row: ParameterRow, value: float) -> str:
+    return format_number(value, _digits(from_standing(row.name) or row.name))
+
+
+def _digits(name: str) -> int:
+    """Degrees and steps a minute whole, shares to a tenth, metres and seconds to a hundredth."""
+    term = parameter_term(name)
+    return {"°": 0, "steps/min": 0, "%": 1}.get(term.unit, 2)

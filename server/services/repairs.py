@@ -1,0 +1,58 @@
+"""Repairs of a set-up: what an analysis proposes, and set-ups of earlier ones, to be asked for again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from sqlalchemy import Connection
+
+from server.services import recordings
+from server.services.analyses import REPAIRED, AnalysisRecord, file_bytes
+from server.storage.blobs import BlobStore
+
+SETUP_KEYS: Final = ("sensors", "corrections")
+"""What of a manifest says how sensors are worn and read."""
+
+
+@dataclass(frozen=True)
+class ProposedRepair:
+    """What is wrong, in sentences, and the manifest that would put it right."""
+
+    evidence: tuple[str, ...]
+    manifest: Mapping[str, Any]
+
+
+def read_proposal(c: Connection, blobs: BlobStore, found: AnalysisRecord) -> ProposedRepair | None:
+    """What an analysis proposes; None where it proposes nothing, or its files are no longer the session's."""
+    if REPAIRED not in found.files:
+        return None
+    this = recordings.current(c, found.session_id)
+    if this is None or this.id != found.recording_id:
+        return None
+    said = json.loads(file_bytes(blobs, found, "analysis.json"))["setup"]
+    repaired = json.loads(file_bytes(blobs, found, REPAIRED))
+    return ProposedRepair(tuple(said["evidence"]), take_setup(this.manifest, repaired))
+
+
+def read_without_limits(c: Connection, found: AnalysisRecord) -> dict[str, Any] | None:
+    """The manifest of an analysis without what a person said of a test's start and end.
+
+    None where its files are no longer the session's.
+    """
+    this = recordings.current(c, found.session_id)
+    if this is None or this.id != found.recording_id:
+        return None
+    return {key: value for key, value in (this.manifest or {}).items() if key != "test_limits"}
+
+
+def take_setup(manifest: Mapping[str, Any] | None, other: Mapping[str, Any] | None) -> dict[str, Any]:
+    """A manifest with the set-up of another one; height, protocol and columns stay.
+
+    >>> take_setup({"protocol": "walk", "corrections": {}}, {"sensors": {"A": "pelvis"}, "protocol": "tug"})
+    {'protocol': 'walk', 'sensors': {'A': 'pelvis'}}
+    """
+    said = {key: value for key, value in (manifest or {}).items() if key not in SETUP_KEYS}
+    return said | {key: (other or {})[key] for key in SETUP_KEYS if key in (other or {})}

@@ -1,0 +1,91 @@
+// <filter-choice>: whole engines or single filters, then one job. <reference-files>: orientations of another system.
+import { Problem, request, showProblem } from "./common/api.js";
+
+class FilterChoice extends HTMLElement {
+  connectedCallback() {
+    this.form = this.querySelector("form");
+    /** @type {HTMLInputElement[]} */
+    this.filters = [...this.querySelectorAll("[data-filter]")];
+    this.addEventListener("change", (e) => {
+      const engine = /** @type {HTMLInputElement} */ (e.target).closest("[data-engine]");
+      if (engine) for (const box of engine.closest("fieldset").querySelectorAll("[data-filter]")) box.checked = engine.checked;
+      this.show();
+    });
+    this.form.addEventListener("submit", (e) => {
+      e.preventDefault();
+      this.run();
+    });
+    this.show();
+  }
+
+  chosen() {
+    return this.filters.filter((box) => box.checked).map((box) => box.value);
+  }
+
+  show() {
+    for (const engine of this.querySelectorAll("[data-engine]")) {
+      const boxes = [...engine.closest("fieldset").querySelectorAll("[data-filter]")];
+      const on = boxes.filter((box) => box.checked).length;
+      engine.checked = on === boxes.length;
+      engine.indeterminate = on > 0 && on < boxes.length;
+    }
+    const n = this.chosen().length;
+    this.querySelector("[data-count]").textContent = `${n} of ${this.filters.length} chosen`;
+  }
+
+  async run() {
+    const button = this.querySelector("[type=submit]");
+    if (!this.chosen().length) {
+      showProblem(this.querySelector(".form-error"), new Problem(422, { title: "No filter chosen", detail: "Choose one or more, two to see how far they are apart." }));
+      return;
+    }
+    button.disabled = true;
+    try {
+      await request("POST", `/api/v1/sessions/${this.getAttribute("session")}/filter-runs`, {
+        filters: this.chosen(),
+        magnetometer: this.querySelector("[data-magnetometer]").checked,
+        reference: this.querySelector("[data-reference]").value || null,
+      });
+      location.assign(location.pathname);
+    } catch (problem) {
+      button.disabled = false;
+      showProblem(this.querySelector(".form-error"), problem);
+    }
+  }
+}
+
+class ReferenceFiles extends HTMLElement {
+  connectedCallback() {
+    this.base = `/api/v1/sessions/${this.getAttribute("session")}/references/`;
+    const input = this.querySelector("[data-file]");
+    this.querySelector("[data-pick]")?.addEventListener("click", () => input.click());
+    input?.addEventListener("change", () => input.files[0] && this.change(() => this.send(input.files[0])));
+    for (const button of this.querySelectorAll("[data-remove]")) {
+      button.addEventListener("click", () => this.change(() => request("DELETE", this.base + encodeURIComponent(button.dataset.remove))));
+    }
+  }
+
+  async change(action) {
+    try {
+      await action();
+      location.reload();
+    } catch (problem) {
+      this.querySelector("[data-say]").textContent = "";
+      showProblem(this.querySelector(".form-error"), problem);
+    }
+  }
+
+  async send(file) {
+    this.querySelector("[data-say]").textContent = `Uploading ${file.name}…`;
+    const answer = await fetch(this.base + encodeURIComponent(file.name), {
+      method: "PUT",
+      headers: { "Content-Type": "application/octet-stream" },
+      body: file,
+    });
+    if (!answer.ok) throw new Problem(answer.status, await answer.json().catch(() => ({})));
+  }
+}
+
+customElements.define("filter-choice", FilterChoice);
+customElements.define("reference-files", ReferenceFiles);
+for (const select of document.querySelectorAll("select[data-show]")) select.addEventListener("change", () => select.form.requestSubmit());
