@@ -15,12 +15,15 @@ import hypothesis
 import pytest
 
 from server.processes.compile_cache import has_compiled_filters, share_compile_cache
+from server.processes.environment import ONE_THREAD
 from tests.accuracy.report import WRITE
 from tests.compiling import compile_filters
 from tests.passed import Passed
 
 # before anything imports numba: every process that a test starts inherits it
 share_compile_cache(Path(tempfile.gettempdir()) / "sagittal-tests")
+# and before anything imports numpy: sums are split over as many threads as in the product
+os.environ.update(ONE_THREAD)
 
 MEMORY_DISK: Final = Path("/dev/shm")  # noqa: S108
 ROOM: Final = 8 << 30
@@ -43,6 +46,8 @@ FIRST: Final = "pytest.mark.first"
 """Written in the files of long folders that have a test for every run; the others are not imported then."""
 ORDER: Final = ("core", "server", "web", "test_", "accuracy", "acceptance", "faults", "browser", "bench")
 """Which tests come first: what a change breaks is seen in the first seconds."""
+LONGEST: Final = ("test_perturbations.py",)
+"""Files of minutes: first in their room, so that no process is left alone with one at the end."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -123,7 +128,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         room = item.path.relative_to(here).parts[0]
         if room in MARKED:
             item.add_marker(room)
-    items.sort(key=lambda item: _rank(item.path.relative_to(here).parts[0]))
+    items.sort(key=lambda item: (_rank(item.path.relative_to(here).parts[0]), item.path.name not in LONGEST))
 
 
 def _rank(room: str) -> int:

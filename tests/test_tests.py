@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -24,18 +24,19 @@ def modules() -> dict[Path, ast.Module]:
     return {path: ast.parse(path.read_text("utf-8")) for path in sorted(TESTS.rglob("*.py"))}
 
 
-def functions(tree: ast.AST) -> Iterator[Function]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            yield node
+@cache
+def functions(tree: ast.AST) -> Sequence[Function]:
+    return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
 
 
+@cache
 def called(function: ast.AST) -> set[str]:
     """Names of what is called, or waited in by `with`, without what stands before the dot."""
     calls = (node.func for node in ast.walk(function) if isinstance(node, ast.Call))
     return {getattr(f, "attr", getattr(f, "id", "")) for f in calls}
 
 
+@cache
 def asserts(function: ast.AST) -> bool:
     return any(
         isinstance(node, ast.Assert)

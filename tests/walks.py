@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 
 import numpy as np
+import pytest
 
+from core.events.result import Stride
 from core.formats import SourceFile, parse_manifest, read_recording
 from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment
+from core.parameters.result import Parameter
 from core.pipeline import TakeAnalysis, analyse
 from core.recording import Recording, SensorSignals, UniformRecording
 from core.rotation import rotate
 from core.simulate import SCRIPTS, WalkTruth, simulate, simulate_scenario
-from core.simulate.script import Script
+from core.simulate.script import Script, SingleSteps
 from core.simulate.walker import SIGN, Walker
 from core.timeline import synchronise
 from tests.data import data_folder
@@ -25,6 +29,9 @@ NEURA = {
     "00B40C35": "shank_r", "00B40C55": "foot_l", "00B40C48": "foot_r", "00B40C44": None, "00B40C47": None,
     "00B40C49": None, "00B40C4A": None,
 }  # fmt: skip
+
+TOGETHER: Script = (SingleSteps(((0.02, 0.0, 0.55),)),)
+"""A step that sets the foot beside the other: without it a simulated walk stops with one foot ahead."""
 
 
 @keep
@@ -134,3 +141,25 @@ def rms_deg(x: Floats, where: Bools | None = None) -> float:
     """Root mean square in degrees of the finite values of x (rad)."""
     x = x[np.isfinite(x) if where is None else where & np.isfinite(x)]
     return float(np.degrees(np.sqrt(np.mean(x**2))))
+
+
+def assert_same_figures(found: Iterable[Parameter | Stride], expected: Iterable[Parameter | Stride]) -> None:
+    """The same in every field, to 1e-12: sums over arrays of another layout differ in their last bit."""
+    for a, b in zip(found, expected, strict=True):
+        assert [f for f in _flat(a) if not isinstance(f, float)] == [
+            f for f in _flat(b) if not isinstance(f, float)
+        ]
+        assert [f for f in _flat(a) if isinstance(f, float)] == pytest.approx(
+            [f for f in _flat(b) if isinstance(f, float)], rel=1e-12, abs=1e-12
+        )
+
+
+def _flat(figure: object) -> Iterator[object]:
+    if is_dataclass(figure):
+        for field in fields(figure):
+            yield from _flat(getattr(figure, field.name))
+    elif isinstance(figure, tuple):
+        for item in figure:
+            yield from _flat(item)
+    else:
+        yield figure

@@ -18,6 +18,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.data import ROOT, data_folder
+from tests.marks import slow_beyond
 
 NEURA = {
     "subject": {"height_m": 1.70},
@@ -201,7 +202,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
+@pytest.mark.parametrize("case", slow_beyond(1, list(BAD)))
 def test_nothing_analysable_is_exit_1_with_a_sentence(case: str, tmp_path: Path) -> None:
     name, content, code = BAD[case]
     (tmp_path / name).write_bytes(content)

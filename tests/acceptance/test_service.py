@@ -20,6 +20,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
         yield running
 
 
+@pytest.mark.slow
 def test_a_set_up_address_works_once(service: Service) -> None:
     again = service.client.post(
         "/api/v1/set-up/guess", json={"name": "eve", "password": "long enough to pass"}
@@ -48,6 +49,12 @@ def test_neura_walk_through_rest_equals_the_command_line(service: Service, tmp_p
     analyses = client.get(f"/api/v1/sessions/{session}/analyses").raise_for_status().json()
     address = f"/api/v1/analyses/{analyses[0]['id']}/files"
     report = client.get(f"{address}/analysis.json").raise_for_status().json()
+
+    known = client.get("/api/v1/devices").raise_for_status().json()
+    worn = {d["device_id"]: d["last_segment"] for d in known}
+    assert worn.items() <= NEURA["sensors"].items()  # type: ignore[attr-defined]  # of JSON
+    assert len(worn) == 7
+    assert {d["checks"][0]["reason"] for d in known} == {None}
 
     manifest = tmp_path / "manifest.json"
     manifest.write_text(json.dumps(NEURA), "utf-8")

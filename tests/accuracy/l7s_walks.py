@@ -75,10 +75,12 @@ class Trial:
     truth: WalkTruth
 
     def run(self, worn: Worn, adjoint: Adjoint = "printed", body: BodyModel | None = None) -> Poses:
-        """L7S on it."""
+        """The filter on it, which is what Sy 2021 describes and what live shows."""
         body = body or self.truth.body
         params = L7sParams(adjoint=adjoint)
-        return l7s_poses(self.orientations, self.acceleration, self.steps, body, params, worn)
+        return l7s_poses(
+            self.orientations, self.acceleration, self.steps, body, params, worn, both_ways=False
+        )
 
 
 def steps_of(calibrated: CalibratedRecording) -> dict[Side, Bools]:

@@ -34,6 +34,16 @@ class Period:
     cadence_spm: float
 
 
+@dataclass(frozen=True)
+class SeenTurn:
+    """A turn as the cameras have it, left positive; `whole` = it neither begins nor ends with its walk."""
+
+    start_s: float
+    end_s: float
+    angle_deg: float
+    whole: bool
+
+
 def _signals(trial: tuple[str, str]) -> object:
     data = loadmat(
         data_folder("mobgap_lowback", "data", "lab", "HA", "001") / "data.mat",
@@ -80,3 +90,27 @@ def periods(trial: tuple[str, str]) -> tuple[Period, ...]:
         feet = tuple(str(s).lower() for s in np.asarray(w.InitialContact_LeftRight)[whole])
         found.append(Period(float(w.Start), float(w.End), times[whole], feet, float(w.Cadence)))
     return tuple(found)
+
+
+@cache
+def turns_of(trial: tuple[str, str]) -> tuple[tuple[tuple[float, float], ...], tuple[SeenTurn, ...]]:
+    """Walks of the stereophotogrammetry, s, and the turns it saw in them."""
+    walks, found = [], []
+    reference = _signals(trial).Standards.Stereophoto.ContinuousWalkingPeriod  # type: ignore[attr-defined]
+    for w in np.atleast_1d(reference):
+        walks.append((float(w.Start), float(w.End)))
+        rows = (np.atleast_1d(getattr(w, f"Turn_{name}")).astype(float) for name in ("Start", "End", "Angle"))
+        for start, end, angle in zip(*rows, strict=True):
+            whole = start > w.Start + 0.1 and end < w.End - 0.1
+            found.append(SeenTurn(float(start), float(end), float(angle), bool(whole)))
+    return tuple(walks), tuple(found)
+
+
+def turns(trial: tuple[str, str]) -> tuple[tuple[float, float], ...]:
+    """Turns of at least 45° of INDIP while walking, s; parts of one direction that touch are one turn."""
+    listed: list[tuple[float, float, float]] = []
+    reference = _signals(trial).Standards.INDIP.ContinuousWalkingPeriod  # type: ignore[attr-defined]
+    for w in np.atleast_1d(reference):
+        columns = (np.atleast_1d(getattr(w, f"Turn_{name}")) for name in ("Start", "End", "Angle"))
+        listed += [(float(a), float(b), float(angle)) for a, b, angle in zip(*columns, strict=True)]
+    return tuple((a, b) for a, b, angle in listed if abs(angle) >= 45.0)

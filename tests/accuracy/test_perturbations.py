@@ -176,12 +176,18 @@ def judge(name: str, make: Make) -> Outcome:
     return Outcome(told, worst)
 
 
+def cases_of(name: str, kind: str) -> dict[str, Make]:
+    """Both legs of the healthy simulated person are one: the right one's sensors are left out."""
+    cases = (MUST | LISTED)[kind]
+    return {k: x for k, x in cases.items() if not (name == "healthy" and k.endswith("_r"))}
+
+
 @cache
 def outcomes(name: str) -> Mapping[tuple[str, str], Outcome]:
     return {
         (kind, case): judge(name, make)
-        for kind, cases in (MUST | LISTED).items()
-        for case, make in cases.items()
+        for kind in MUST | LISTED
+        for case, make in cases_of(name, kind).items()
     }
 
 
@@ -236,10 +242,10 @@ def test_right_walks_are_accused_of_nothing() -> None:
 
 def test_write_down_the_figures() -> None:
     rows = []
-    for kind, cases in (MUST | LISTED).items():
+    for kind in MUST | LISTED:
         row = [kind]
         for name in TAKES:
-            found = [outcomes(name)[kind, case] for case in cases]
+            found = [outcomes(name)[kind, case] for case in cases_of(name, kind)]
             codes = sorted(set().union(*(x.told for x in found)))
             shown = [x.worst_deg for x in found if x.worst_deg is not None]
             row.append(f"{sum(bool(x.told) for x in found)} of {len(found)}")

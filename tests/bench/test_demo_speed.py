@@ -15,8 +15,9 @@ from server.demo.clinic import VISITS, DemoVisit, record
 from tests.compiling import compile_filters
 from tests.data import ROOT
 
-LIMIT = 1.3
-"""Time until all visits are analysed, over the time in which one process simulates and analyses them."""
+LIMIT = 1.6
+"""Time until all visits are analysed, over the time in which one process simulates and analyses them: 1.4.
+The start, of about 3 s, weighs the more the faster analyses become."""
 
 
 def run_demo() -> float:

@@ -9,9 +9,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.l7s.filter import L7sInputs, L7sParams, Worn, compile_l7s_kernel, filter_block, start_l7s_state
+from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
 from core.body.l7s.inputs import free_acceleration, inputs_of
 from core.body.l7s.legs import LegModel
+from core.body.l7s.poses import compile_l7s_kernel
+from core.body.l7s.smoother import smooth_track
 from core.body.still import FOOT_STILL, still_samples
 from core.calibration import calibrate
 from core.frames import FOOT, SIDES
@@ -85,6 +87,21 @@ def test_a_step_takes_at_most_fifty_microseconds_and_a_twentieth_of_the_form_wit
     print(f"\nL7S-{worn} {step:.1f} µs/step, with matrices {matrices:.0f}, ratio {matrices / step:.0f}")
     assert step <= STEP_US
     assert matrices / step >= RATIO
+
+
+@pytest.mark.parametrize("worn", ["3I", "2I"])
+def test_the_whole_take_at_once_costs_no_more_than_twice_the_filter(worn: Worn) -> None:
+    inputs, model = walk(worn)
+    compile_l7s_kernel()
+    state, valid = start_l7s_state(inputs, model), np.ones((len(inputs.step), 3), bool)
+    track, _ = filter_block(state, inputs, model, RATE)
+    smoothed, filtered = [], []
+    for _ in range(3):
+        smoothed.append(best(lambda: smooth_track(track, inputs, valid, model, RATE), 2))
+        filtered.append(best(lambda: filter_block(state, inputs, model, RATE), 2))
+    ratio = min(smoothed) / min(filtered)
+    print(f"\nL7S-{worn}: the whole take {ratio:.2f} times the filter")
+    assert ratio < 2.0
 
 
 def test_the_cost_grows_with_the_duration_and_no_faster() -> None:

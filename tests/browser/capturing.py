@@ -95,6 +95,12 @@ def choose(page: Page, files: list[tuple[str, bytes]]) -> None:
 
 
 def place(page: Page, segments: dict[str, str]) -> None:
+    """Put these sensors on and no others: the clinic may remember all of them from another test."""
+    page.evaluate(
+        "(worn) => { const page = document.querySelector('capture-page');"
+        "for (const s of page.worn.sensors) if (!worn.includes(s.id)) page.worn.place(s, null); }",
+        list(segments),
+    )
     for device, segment in segments.items():
         page.locator(f"li[data-sensor='{device}'] [data-place]").click()
         page.locator(f"dialog[open] button[value={segment}]").click()

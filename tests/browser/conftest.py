@@ -17,12 +17,14 @@ from pathlib import Path
 import httpx
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, Playwright, expect, sync_playwright
+from sqlalchemy import delete
 
 from server.auth import accounts
 from server.auth.passwords import hash_password
 from server.auth.roles import Role
 from server.storage.db import Database
 from server.storage.migrate import upgrade
+from server.storage.tables import device_check
 from tests.browser import filling
 from tests.data import ROOT
 
@@ -158,6 +160,13 @@ def solid(playwright_: Playwright) -> Iterator[Browser]:
     browser = playwright_.chromium.launch(executable_path=CHROMIUM, args=SOLID)
     yield browser
     browser.close()
+
+
+@pytest.fixture
+def unknown_sensors(running: RunningServer) -> None:
+    """The clinic remembers no sensor of another test's take."""
+    with contextlib.closing(Database(running.folder / "sagittal.db")) as db, db.write() as c:
+        c.execute(delete(device_check))
 
 
 @pytest.fixture(scope="session")

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from core.formats import SourceFile, read_recording
@@ -40,6 +41,8 @@ from tests.browser.conftest import NAME, PASSWORD, RunningServer, serve
 from tests.browser.design import layout_faults, text_faults
 from tests.browser.network import Network
 from tests.browser.test_upload import SEGMENTS
+
+pytestmark = pytest.mark.usefixtures("unknown_sensors")
 
 __all__ = ["clinic", "network"]
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser import filling
 from tests.browser.conftest import PASSWORD, Filled, Opener, RunningServer
+
+pytestmark = pytest.mark.usefixtures("unknown_sensors")
 
 
 def test_a_wrong_password_is_said_and_the_right_one_leads_on(opened: Opener, filled: Filled) -> None:
@@ -146,7 +149,7 @@ def test_an_assistant_sees_uploads_but_no_results(
     page.get_by_label("Password").fill(PASSWORD)
     page.get_by_role("button", name="Sign in").click()
     page.wait_for_url(re.compile(r":\d+/patients$"))
-    expect(page.locator(".rail .item")).to_have_text(["Patients", "Jobs", "Theme", "Account"])
+    expect(page.locator(".rail .item")).to_have_text(["Patients", "Jobs", "Sensors", "Theme", "Account"])
     page.goto(f"/sessions/{filled.done}")
     assert page.locator(".params").count() == 0
     assert page.goto(f"/sessions/{filled.done}/kinematics").status == 403  # type: ignore[union-attr]

@@ -10,6 +10,8 @@ from playwright.sync_api import expect
 from tests.browser import filling
 from tests.browser.conftest import Filled, Opener, RunningServer
 
+pytestmark = pytest.mark.usefixtures("unknown_sensors")
+
 
 @pytest.fixture(scope="module")
 def walk(running: RunningServer, filled: Filled) -> str:
@@ -25,6 +27,7 @@ def walk(running: RunningServer, filled: Filled) -> str:
 
 def test_the_overview_names_the_estimator_and_leads_to_its_health(opened: Opener, walk: str) -> None:
     page = opened(f"/sessions/{walk}")
+    page.get_by_role("link", name="How it was measured").click()
     quality = page.locator(".quality")
     expect(quality).to_contain_text("ErKF, smoothed")
     quality.get_by_role("link", name="ErKF, smoothed").click()
@@ -86,7 +89,7 @@ def test_the_belts_speed_is_asked_for_on_a_treadmill_only(
     page.get_by_label("Speed of the belt").fill("1.1")
     page.get_by_role("button", name="Analyse").click()
     page.wait_for_url(re.compile(rf"/sessions/{session}$"), wait_until="commit")
-    expect(page.locator(".kpis")).to_contain_text("1.10", timeout=60_000)
+    expect(page.locator("#rows")).to_contain_text("1.10", timeout=60_000)
     expect(page.locator(".params tr", has_text="Step length")).to_contain_text("on a treadmill")
 
 

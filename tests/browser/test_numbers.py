@@ -11,6 +11,7 @@ from tests.browser.conftest import Filled, Opener
 
 def test_a_number_opens_to_its_strides_and_a_stride_to_its_moment(opened: Opener, filled: Filled) -> None:
     page = opened(f"/sessions/{filled.done}")
+    page.locator("summary", has_text="Timing").click()
     page.locator(".params").get_by_role("link", name="Stride time").click()
     page.wait_for_url(re.compile(r"/parameters/stride_time_s$"))
     expect(page.locator("main")).to_contain_text("From a contact of the foot to its next.")

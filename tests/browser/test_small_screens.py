@@ -14,6 +14,8 @@ from tests.browser.conftest import Filled, Opener, RunningServer
 from tests.browser.filling import add, add_session, upload
 from tests.data import data_folder
 
+pytestmark = pytest.mark.usefixtures("unknown_sensors")
+
 SIZES = ((1280, 800), (820, 1180), (390, 844))
 
 
@@ -112,3 +114,37 @@ def test_progress_is_told_once_by_the_bar_and_not_counted_in_steps(
     )
     expect(page.locator("main [data-message]").last).to_have_text("Stage 4")
     expect(page.locator("main [data-percent]").last).to_have_text("5 %")
+
+
+@pytest.mark.parametrize("width", [1280, 820])
+def test_titles_of_charts_are_read_whole_and_charts_of_a_row_stand_level(
+    width: int, opened: Opener, filled: Filled
+) -> None:
+    page = opened(f"/sessions/{filled.done}/kinematics", width=width, height=1180)
+    cells = page.locator(".kin .cell")
+    expect(cells).to_have_count(12)
+    cut = page.evaluate(
+        "() => [...document.querySelectorAll('.kin figcaption h3')]"
+        ".filter((h) => h.scrollWidth > h.clientWidth + 1).map((h) => h.textContent)"
+    )
+    assert cut == []
+    inside = page.evaluate(
+        "() => [...document.querySelectorAll('.kin figcaption > *')].every((e) =>"
+        " e.getBoundingClientRect().right <= e.closest('.cell').getBoundingClientRect().right + 1)"
+    )
+    assert inside
+    feet = page.evaluate(
+        "() => [...document.querySelectorAll('.kin .chart')].map((c) => c.getBoundingClientRect().bottom)"
+    )
+    for row in range(0, len(feet) - 2, 3):
+        assert max(feet[row : row + 3]) - min(feet[row : row + 3]) < 1.5
+
+
+def test_a_tablet_held_upright_shows_the_norm(opened: Opener, filled: Filled) -> None:
+    page = opened(f"/sessions/{filled.done}", width=820, height=1180)
+    expect(page.get_by_role("columnheader", name="Norm", exact=True)).to_be_visible()
+    table, card = page.locator("table.params"), page.locator(".card", has=page.locator("table.params"))
+    inner, outer = table.first.bounding_box(), card.first.bounding_box()
+    assert inner is not None
+    assert outer is not None
+    assert inner["x"] + inner["width"] <= outer["x"] + outer["width"] + 1

@@ -10,7 +10,7 @@ import pytest
 
 from core.formats import SourceFile, manifest_of, read_recording
 from core.frames import GRAVITY, Floats, Segment
-from core.quality import QualityReport, assess, describe, suggest, suggest_segments
+from core.quality import QualityReport, assess, concern_paths_alone, describe, suggest, suggest_segments
 from core.quality.signals import magnetic_share, measure_signal, saturation
 from core.recording import ImuStream, Recording
 from core.rotation import about
@@ -158,6 +158,21 @@ def test_losses_and_holes_are_counted() -> None:
     assert foot.invalid_pct == pytest.approx(10.0)
     assert [(n.code, n.sensor, n.t_s) for n in report.notices] == [("gap", "foot_l", 12.0)]
     assert report.level == "usable"
+
+
+@pytest.mark.parametrize(("lost_s", "told"), [(0.07, False), (0.3, True)])
+def test_the_end_that_a_late_clock_leaves_empty_is_told_from_a_tenth_of_a_second_on(
+    lost_s: float, told: bool
+) -> None:
+    acc, gyr = signals(2000, still=500)
+    recording = take({"foot_l": stream("a", acc, gyr)})
+    uniform = synchronise(recording)
+    foot = uniform.sensors["foot_l"]
+    late = replace(foot, valid=foot.valid & (uniform.t_s >= lost_s))
+    report = assess(recording, replace(uniform, sensors={"foot_l": late}))
+    messages = [n.message for n in report.notices if n.code == "gap"]
+    assert len(messages) == told
+    assert all("1 stretch(es) of 0.1 s and more" in m and f"{lost_s:.2f} s" in m for m in messages)
 
 
 def test_errors_of_the_reader_stop_the_analysis_only_for_worn_sensors() -> None:
@@ -330,3 +345,17 @@ def test_infinite_samples_are_no_plateau() -> None:
     acc = ACC.copy()
     acc[100:110] = np.inf
     assert saturation(acc, 10.0) == (0.0, None)
+
+
+@pytest.mark.parametrize(
+    ("bad", "alone"),
+    [
+        ([], False),
+        (["zero_velocity_refused_pct"], True),
+        (["zero_velocity_refused_pct", "climb_pct"], True),
+        (["zero_velocity_refused_pct", "joint_residual_mm"], False),
+        (["start_heading_off_deg"], False),
+    ],
+)
+def test_the_path_of_one_foot_is_no_disagreement_of_sensors(bad: list[str], alone: bool) -> None:
+    assert concern_paths_alone(bad) is alone

@@ -23,6 +23,7 @@ from tests.accuracy import gaitmap, mobgap
 from tests.core.formats.making import stream, take
 from tests.data import data_folder
 from tests.live_walks import live
+from tests.marks import slow_beyond
 from tests.walks import cut, neura_walk, simulated
 
 Spoil = Callable[[Floats, Floats, int], None]
@@ -242,7 +243,7 @@ def test_real_sensors_all_measure(takes: Callable[[], list[UniformRecording]]) -
         assert mark_stuck(rounded) is rounded
 
 
-@pytest.mark.parametrize("script", [s for s in SCRIPTS if s != "five_minutes"])
+@pytest.mark.parametrize("script", slow_beyond(1, [s for s in SCRIPTS if s != "five_minutes"]))
 def test_simulated_sensors_all_measure(script: str) -> None:
     recording = synchronise(simulate_scenario(script, 0).recording)
     assert mark_stuck(recording) is recording

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -14,6 +15,7 @@ from core.angles import JointAngles
 from core.body.erkf.health import REFUSED_PCT
 from core.body.estimate import PoseEstimate
 from core.body.health import HealthFinding, find_worst_verdict
+from core.estimators import HINGES
 from core.events.result import Stride, Strides
 from core.frames import Segment
 from core.measure import measure_gait
@@ -28,12 +30,16 @@ from core.recording import Recording
 from core.simulate import simulate_scenario
 from core.withheld import withhold_distances
 from server.report.bundle import load_bundle
+from server.report.curves import cycle_svg
 from server.report.exports import analysis_files
+from server.report.model import report_model
 from server.report.panels import curve_panels
 from server.report.quality_box import quality_box
 from server.report.table import NOBODY
+from server.report.tables import curves_csv
 from server.report.tracks import read_tracks
 from server.report.wording import REASONS
+from tests.marks import slow_beyond
 from tests.walks import neura_recording
 
 
@@ -59,6 +65,25 @@ def sparse() -> TakeAnalysis:
     return analyse(worn(simulate_scenario("comfortable", 0).recording, None, "pelvis", "foot_l", "foot_r"))
 
 
+@cache
+def feet_alone() -> TakeAnalysis:
+    """The same walk from the feet."""
+    return analyse(worn(simulate_scenario("comfortable", 0).recording, None, "foot_l", "foot_r"))
+
+
+def at_the_bound(found: TakeAnalysis) -> TakeAnalysis:
+    """The same with legs too short for the way their feet go: knees rest at their bound through stance."""
+    assert found.angles is not None
+    assert found.tracks is not None
+    ends = {name: bound + np.radians(12.0) for name, bound in found.angles.bounds.items()}
+    assert len(ends) == 2
+    held = {name: np.maximum(found.angles.angles[name], end) for name, end in ends.items()}
+    angles = replace(found.angles, angles={**found.angles.angles, **held}, bounds=ends)
+    tracks = replace(found.tracks, angles=angles)
+    return replace(found, angles=angles, tracks=tracks, measured=measure_gait(tracks))
+
+
+@pytest.mark.slow
 def test_the_level_people_see_is_the_worst_of_signals_and_estimator() -> None:
     assert [find_shown_level(level, None) for level in ("good", "usable", "poor")] == [
         "good",
@@ -148,20 +173,22 @@ def test_distances_of_a_foot_that_refuses_its_own_rests_are_withheld_of_it_alone
     poses = replace(found.poses, health=(refused,))
     made = withhold_distances(PoseEstimate(found.orientations, poses, found.feet))
     assert made.feet is not None
-    assert made.feet.withheld == {"left": "estimator_bad"}
+    assert made.feet.withheld == {"left": "path_bad"}
+    (told,) = (n.message for n in made.poses.notices if n.code == "distances_withheld")
+    assert "left foot are withheld: the path does not fit its rests on the floor" in told
+    assert "path" in REASONS["path_bad"]
+    assert "sensors" not in REASONS["path_bad"]
     assert found.tracks is not None
     measured = measure_gait(replace(found.tracks, feet=made.feet))
     of = {(p.name, p.side): p for p in measured.parameters}
-    assert of["stride_length_m", "left"].reason == "estimator_bad"
+    assert of["stride_length_m", "left"].reason == "path_bad"
     assert of["stride_length_m", "right"].mean is not None
     assert of["gait_speed_mps", None].n == of["stride_length_m", "right"].n
     assert of["total_distance_m", None].n == 1
 
 
 def test_a_figure_that_rests_on_the_bound_of_the_leg_model_is_withheld() -> None:
-    found = sparse()
-    assert found.poses is not None
-    assert found.poses.method == "l7s_3i"
+    found = at_the_bound(sparse())
     assert found.measured is not None
     knees = {(p.name, p.side): p for p in found.parameters if p.name.startswith("knee_")}
     for side in ("left", "right"):
@@ -176,18 +203,74 @@ def test_a_figure_that_rests_on_the_bound_of_the_leg_model_is_withheld() -> None
     assert set(counted) == {None}
     # no spread of zero is left anywhere
     assert all(p.sd is None or p.sd > 0.05 for p in knees.values())
+    # nor in any point of a curve that the figures are read from
     bundle = load_bundle(analysis_files(found))
+    report = report_model(bundle)
+    rows = [line.split(",") for line in curves_csv(report).decode().splitlines()]
+    mean, reason = rows[0].index("mean_deg"), rows[0].index("reason")
+    written = [r for r in rows[1:] if r[0] == "knee_flexion"]
+    assert {r[reason] for r in written if not r[mean]} == {"at_bound"}
+    assert {r[reason] for r in written if r[mean]} == {""}
+    for side, bound in (("left", "knee_flexion_l"), ("right", "knee_flexion_r")):
+        told = [float(r[mean]) for r in written if r[1] == side and r[mean]]
+        assert min(told) > np.degrees(found.angles.bounds[bound] if found.angles else np.nan) + 0.1
+        shown = report.replay["curves"]["knee_flexion"][side]  # type: ignore[index]
+        assert [x is None for x in shown] == [not r[mean] for r in written if r[1] == side]
+        assert None in shown
+    assert any(note.startswith("Knee flexion: interrupted") for note in report.curve_notes)
+    drawn = cycle_svg(report.key_curve)
+    assert "nan" not in drawn
+    assert drawn.split('class="ml" d="')[1].split('"')[0].count("M") > 1
     assert bundle.angles is not None
     assert bundle.angles.bounds == pytest.approx(found.angles.bounds if found.angles else {})
 
 
-@pytest.mark.parametrize("walk", ["neura", "comfortable", "hemiparetic", "stiff_knee", "crouch"])
+HINGED = {f"{v}_{side}" for v in HINGES for side in "lr"}
+
+
+@pytest.mark.parametrize(
+    ("take", "fixed"), [(sparse, HINGED), (feet_alone, HINGED | {"pelvis_tilt", "pelvis_obliquity"})]
+)
+def test_what_the_leg_model_holds_fixed_is_no_result(
+    take: Callable[[], TakeAnalysis], fixed: set[str]
+) -> None:
+    found = take()
+    assert found.angles is not None
+    assert {n for n, why in found.angles.withheld.items() if why == "fixed_by_model"} == fixed
+    assert not fixed & set(found.angles.angles)
+    # the others move
+    assert all(np.nanstd(x) > np.radians(0.1) for x in found.angles.angles.values())
+    variables = {name.removesuffix("_l").removesuffix("_r") for name in fixed}
+    assert found.measured is not None
+    curves = cycle_curves(found.angles, found.measured.strides)
+    for variable in variables:
+        assert curves.why[variable] == dict.fromkeys(("left", "right"), "fixed_by_model")
+    assert "angles_withheld" not in [n.code for n in found.notices]
+    bundle = load_bundle(analysis_files(found))
+    report = report_model(bundle)
+    panels = {p.variable.name: p for p in report.panels}
+    assert {v for v, p in panels.items() if p.reason == REASONS["fixed_by_model"]} == variables
+    written = {line.split(",")[0] for line in curves_csv(report).decode().splitlines()[1:]}
+    assert not written & variables
+    assert "knee_flexion" in written
+    assert not fixed & set(report.zero_offset_deg)
+    notes = " ".join(report.curve_notes)
+    assert ("pelvic tilt" in notes) == (take is sparse)
+    assert "Ankle, hip, knee angles of both sides are estimated" in notes
+    # the figure keeps what it is drawn with
+    assert found.poses is not None
+    assert {"shank_l", "thigh_l", "pelvis"} <= set(found.poses.q)
+
+
+@pytest.mark.parametrize(
+    "walk", slow_beyond(2, ["neura", "comfortable", "hemiparetic", "stiff_knee", "crouch"])
+)
 def test_nothing_is_withheld_of_a_right_setup(walk: str) -> None:
     recording = neura_recording() if walk == "neura" else simulate_scenario(walk, 0).recording
     found = analyse(recording)
     assert found.angles is not None
     assert (found.angles.withheld, found.angles.bounds) == ({}, {})
-    withheld = {"estimator_bad", "at_bound", "impossible"}
+    withheld = {"estimator_bad", "path_bad", "at_bound", "impossible"}
     assert not [p for p in found.parameters if p.reason in withheld]
 
 

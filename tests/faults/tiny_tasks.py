@@ -11,26 +11,24 @@ import signal
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sqlalchemy import Connection
 
 from core.errors import SignalError
 from core.formats.source import SourceFile
+from server.jobs.attempt import Attempt
 from server.jobs.queue import Claim
 from server.services import analyses
 from server.storage.blobs import Blob
 from server.worker.task import Task, register
 
-if TYPE_CHECKING:
-    from core.pipeline import Progress
-
 STAGES = ("first", "second", "third")
 
 
-def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progress) -> dict[str, bytes]:
+def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
     for i, stage in enumerate(STAGES):
-        progress(stage, i / len(STAGES))
+        attempt.progress(stage, i / len(STAGES))
         _meet(params, stage)
         if params.get("die_at") == stage:
             os.kill(os.getpid(), signal.SIGKILL)

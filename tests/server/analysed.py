@@ -14,14 +14,19 @@ from core.body.estimate import PoseEstimate
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
 from core.errors import Notice
 from core.events.foot_pitch import pitch_signal
+from core.filter_comparison.result import FilterAgreement, FilterComparison, FilterRequest, FilterSpread
 from core.frames import FOOT, SIDES, Segment
+from core.fusion.algorithms.benchmark import OrientationScore
 from core.fusion.orientations import Orientations
 from core.measure import measure_gait
 from core.pipeline import TakeAnalysis
 from core.quality import QualityReport
 from core.recording import Recording, SensorSignals, Subject, UniformRecording
+from core.rotation import about
+from server.jobs.queue import COMPARE_FILTERS
 from server.report.exports import analysis_files
-from server.services import analyses, recordings
+from server.report.filter_files import filter_run_files
+from server.services import analyses, filter_runs, recordings, sessions
 from tests.server import walk
 from tests.server.clinic import Clinic
 
@@ -95,8 +100,61 @@ def finish(
         if manifest is not None:
             recordings.set_manifest(c, None, session_id, manifest)
         analyses.submit(c, state.queue, None, session_id)
+    return publish_next(clinic, session_id, results)
+
+
+def publish_next(clinic: Clinic, session_id: str, results: Mapping[str, bytes] | None = None) -> str:
+    """Do what a worker does with the next analysis that was asked for; returns the id of the shown one."""
+    state = clinic.app.state
+    with clinic.db.read() as c:
+        patient_id = sessions.get(c, session_id).patient_id
     claim = state.queue.claim("test", [recordings.ANALYSE])
-    stored = {name: state.blobs.put(patient_id, content) for name, content in results.items()}
+    stored = {name: state.blobs.put(patient_id, x) for name, x in (results or files()).items()}
     assert state.queue.finish(claim, lambda c: analyses.publish(c, claim, stored, "0" * 64))
     with clinic.db.read() as c:
         return analyses.get_shown(c, session_id).id
+
+
+def comparison() -> FilterComparison:
+    """Two filters, 1° apart in the left knee in stance and 2° in swing, and one that needs a magnetometer."""
+    t_s = np.linspace(0.0, 10.0, 101)
+    sd = np.radians(np.full(101, 0.5))
+    half = OrientationScore(*np.radians((0.5, 0.3, 0.4)).tolist())
+    knee = FilterSpread(
+        "knee_flexion_l", 2, sd, 2.0 * sd, {"left": sd}, {"left": float(sd[0])}, {"left": float(2 * sd[0])}
+    )
+    pelvis = FilterSpread("pelvis_heading", 2, sd, 2.0 * sd, {}, {}, {})
+    refused = Notice("no_magnetometer", "Martin2010 needs a magnetometer.")
+    rows = (
+        FilterAgreement(None, "Sagittal, as analysed", None, half, None, {}),
+        FilterAgreement("mahony_2008", "Mahony2008", 0.25, half, half, {"pelvis": half}),
+        FilterAgreement("wu_2018", "Wu2018 (reconstruction)", 0.5, half, half, {"pelvis": half}),
+        FilterAgreement("martin_2010", "Martin2010", None, None, None, {}, (refused,)),
+    )
+    request = FilterRequest(("mahony_2008", "wu_2018", "martin_2010"), magnetometer=False)
+    return FilterComparison(
+        request,
+        t_s,
+        ("pelvis",),
+        {"left": 4, "right": 0},
+        rows,
+        (knee, pelvis),
+        None,
+        (),
+        {name: {"pelvis": about(2, 0.1 * t_s)} for name in (None, "mahony_2008", "wu_2018")},
+        {"pelvis": t_s < 9.95},
+    )
+
+
+def compare(clinic: Clinic, patient_id: str, session_id: str) -> str:
+    """Do what form and worker do with `comparison`; returns the id of the run."""
+    state = clinic.app.state
+    with clinic.db.write() as c:
+        filters = ["mahony_2008", "wu_2018", "martin_2010"]
+        filter_runs.submit(c, state.queue, None, session_id, filters=filters, magnetometer=False)
+    claim = state.queue.claim("test", [COMPARE_FILTERS])
+    results = filter_run_files(comparison())
+    stored = {name: state.blobs.put(patient_id, content) for name, content in results.items()}
+    assert state.queue.finish(claim, lambda c: filter_runs.publish(c, claim, stored))
+    with clinic.db.read() as c:
+        return filter_runs.of_session(c, session_id)[0].id

@@ -10,11 +10,14 @@ from typing import Any
 
 from sqlalchemy import Engine, Table, event, insert
 
+from core.frames import SEGMENTS
+from core.quality.devices import DeviceCheck
 from server.services.provenance import CODE_VERSION
 from server.storage.blobs import Blob
 from server.storage.tables import (
     analysis,
     analysis_file,
+    device_check,
     job,
     new_id,
     patient,
@@ -27,7 +30,10 @@ from tests.server.clinic import Clinic
 FIRST_DAY = dt.date(2024, 1, 1)
 MORNING = dt.datetime(2024, 1, 1, 8, tzinfo=dt.UTC)
 
-TABLES = (patient, session, recording, recording_file, job, analysis, analysis_file)
+TABLES = (patient, session, recording, recording_file, job, analysis, analysis_file, device_check)
+
+DEVICES = tuple(f"00B4290{i}" for i in range(7))
+"""Worn in every visit."""
 Rows = dict[Table, list[dict[str, Any]]]
 
 
@@ -87,6 +93,11 @@ def _visit(rows: Rows, person: str, day: int, stored: Mapping[str, Blob]) -> str
         {"id": aid, "recording_id": rid, "job_id": jid, "input_sha256": "0" * 64, "config_sha256": "0" * 64,
          "code_version": CODE_VERSION, "manifest": mapped, "config": {}, "created_at": at}
     )  # fmt: skip
+    rows[device_check] += [
+        {"recording_id": rid, "device_id": device, "segment": segment, "exchanged": False, "at": at,
+         "content": DeviceCheck(device, 100.0, reason="no_rest").to_json()}
+        for device, segment in zip(DEVICES, SEGMENTS, strict=False)
+    ]  # fmt: skip
     rows[analysis_file] += [
         {"analysis_id": aid, "name": name, "size": blob.size, "sha256": blob.sha256}
         for name, blob in stored.items()

@@ -99,6 +99,7 @@ def test_the_floor_stays_at_zero_and_segments_hang_together() -> None:
     assert np.sqrt(np.mean(np.sum((knee - poses.p["shank_r"]) ** 2, axis=1))) < 0.01
 
 
+@pytest.mark.slow
 def test_feet_are_linked_only_by_a_whole_chain() -> None:
     assert walk().feet is not None
     assert walk().feet.linked  # type: ignore[union-attr]
@@ -151,6 +152,7 @@ def test_a_failed_foot_leaves_one_leg_with_the_pelvis() -> None:
     assert {n.code for n in made.poses.notices} >= {"sensor_failed", "figure_incomplete"}
 
 
+@pytest.mark.slow
 def test_a_short_loss_is_no_failure() -> None:
     take = simulated("lost_sensor", 41)[0]
     made = estimated(take)

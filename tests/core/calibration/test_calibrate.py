@@ -15,7 +15,7 @@ from core.frames import SEGMENTS, Floats, Segment
 from core.recording import UniformRecording
 from core.rotation import exp, from_matrix, log, normalise, rotate, to_matrix
 from core.simulate import Arc, Pivot, Stand, Straight, WalkTruth
-from tests.walks import cut, only, scripted, simulated, turned
+from tests.walks import TOGETHER, cut, only, scripted, simulated, turned
 
 LEGS: tuple[Segment, ...] = ("thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r")
 
@@ -90,7 +90,7 @@ def test_any_subset_of_segments_works(segments: tuple[Segment, ...]) -> None:
 
 def test_rest_only_at_the_end_works() -> None:
     """As on gaitmap_foot: the take starts in the middle of the walk."""
-    recording, truth = simulated("slow")
+    recording, truth = scripted((Stand(3.0), Straight(14.4, 0.45, 0.68), *TOGETHER, Stand(5.0)))
     late = cut(recording, truth.stands[-1][0] - 12.0, recording.t_s[-1])
     found = calibrate(late).calibration
     assert len(found.rest) == 1
@@ -105,9 +105,22 @@ def test_turning_before_walking_does_not_turn_the_segments() -> None:
         (Stand(5.0), Pivot(np.pi / 2, np.pi / 4, 0.55), Straight(12.0, 0.64, 0.54), Stand(4.0))
     )
     found = calibrate(recording).calibration
-    assert "facing_not_walking" in codes(found)
+    (told,) = (n.message for n in found.notices if n.code == "facing_not_walking")
+    assert "between standing and walking" in told
     for s in ("pelvis", "thigh_l", "thigh_r", "shank_l", "shank_r"):
         assert abs(axial_error_deg(found, truth, s)) < 20.0, s
+
+
+def test_turning_after_walking_is_told_as_such() -> None:
+    """As on gaitmap_foot, where the only standing is after a turn at the end: nobody started from it."""
+    recording, truth = scripted(
+        (Stand(5.0), Straight(12.0, 0.64, 0.54), Pivot(np.pi / 2, np.pi / 4, 0.55), *TOGETHER, Stand(5.0))
+    )
+    found = calibrate(cut(recording, truth.stands[0][1] + 1.0, recording.t_s[-1])).calibration
+    assert found.posture == "standing"
+    (told,) = (n.message for n in found.notices if n.code == "facing_not_walking")
+    assert "between walking and standing" in told
+    assert "Start" not in told
 
 
 @pytest.mark.parametrize("seed", [0, 1])

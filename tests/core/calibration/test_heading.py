@@ -12,6 +12,7 @@ from core.calibration.heading import (
     rest_to_rest_velocity,
     start_direction,
     step_time,
+    stride_direction,
     subtract_angles,
     velocity_direction,
 )
@@ -41,6 +42,27 @@ def test_velocity_that_disagrees_with_itself_gives_no_direction() -> None:
     assert velocity_direction(v, 0, [(200, 700), (900, 1400)], [0.0, 0.0], PARAMS) is None
     assert velocity_direction(0.01 * v, 0, [(200, 700)], [0.0], PARAMS) is None
     assert velocity_direction(v, 0, [], [], PARAMS) is None
+
+
+def test_a_foot_goes_where_each_of_its_strides_goes_in_spite_of_a_bias() -> None:
+    """Ten strides of 1.1 s that swing 10 cm outwards, from flat to flat, five ahead and five back."""
+    swing = np.linspace(0.0, 2.0 * np.pi, 70)
+    ahead, outward = 2.0 * (1.0 - np.cos(swing)), 0.5 * np.sin(swing)
+    v = np.concatenate(
+        [np.concatenate((sign * (ahead + 1j * outward), np.zeros(40))) for sign in (1,) * 5 + (-1,) * 5]
+    )
+    a = np.gradient(v) * RATE * np.exp(0.6j) + 0.3 - 0.2j
+    flats = np.arange(90, len(v), 110)
+    found = stride_direction(a, flats, [(0, 550), (550, 1100)], [0.0, np.pi], RATE, PARAMS)
+    assert found is not None
+    assert abs(subtract_angles(found.angle, 0.6)) < np.radians(1.0)
+    assert found.score > 0.99
+
+
+@pytest.mark.parametrize("flats", [[], [90], [90, 900]], ids=["none", "one", "too far apart"])
+def test_a_foot_without_strides_has_no_direction(flats: list[int]) -> None:
+    a = np.ones(1100, complex)
+    assert stride_direction(a, np.array(flats, np.int64), [(0, 1100)], [0.0], RATE, PARAMS) is None
 
 
 @pytest.mark.parametrize("leads", [True, False])

@@ -51,6 +51,19 @@ def test_three_strides_are_no_change_whatever_they_measure(few: str) -> None:
     assert (found.before, found.after, found.difference) == (40.0, 60.0, 20.0)
 
 
+@pytest.mark.parametrize("guessed", ["before", "after"])
+def test_an_estimated_angle_is_not_compared_with_a_measured_one(guessed: str) -> None:
+    old, new = (
+        replace(parameter("knee_flexion_rom_deg", v, "left"), estimated=k == guessed)
+        for k, v in (("before", 52.4), ("after", 79.2))
+    )
+    (found,) = parameter_changes([old], [new])
+    assert (found.verdict, found.difference, found.reason) == (None, None, "not_measured_alike")
+    assert (found.before, found.after) == (52.4, 79.2)
+    (alike,) = parameter_changes([replace(old, estimated=True)], [replace(new, estimated=True)])
+    assert alike.difference == pytest.approx(26.8)
+
+
 @pytest.mark.parametrize(
     ("before", "after", "limit", "verdict"),
     [

@@ -45,7 +45,9 @@ def test_a_limp_that_swings_unequally_is_no_lag() -> None:
 def test_a_late_foot_is_told_by_its_side() -> None:
     assert [n.sensor for n in tell_foot_lag(walk(0.1), PARAMS)] == ["foot_r"]
     assert [n.sensor for n in tell_foot_lag(walk(-0.1), PARAMS)] == ["foot_l"]
-    assert tell_foot_lag(walk(0.04), PARAMS) == ()
+    (note,) = tell_foot_lag(walk(0.04), PARAMS)
+    assert (note.sensor, note.severity) == ("foot_r", "info")
+    assert tell_foot_lag(walk(0.02), PARAMS) == ()
 
 
 def test_few_steps_and_one_foot_say_nothing() -> None:

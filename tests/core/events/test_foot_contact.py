@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,8 @@ from core.events.foot_contact import (
     advance_foot_contacts,
 )
 from core.events.foot_movement import FootMovement, measure_foot_movements
+from core.events.live_contacts import ContactDetector
+from core.events.result import GaitEvent
 from core.frames import FOOT, GRAVITY, SIDES, Floats
 from core.rotation import conjugate, rotate
 from tests.core.events.foot_signal import foot_pitch, orientation, orientations
@@ -54,13 +58,21 @@ def joined(parts: list[ContactReports]) -> list[tuple[int, int, int, bool, float
 
 
 def moved(
-    t: Floats, start: float, seconds: float, metres: float, turn: float, pitched_at: float | None = None
+    t: Floats,
+    start: float,
+    seconds: float,
+    metres: float,
+    turn: float,
+    pitched_at: float | None = None,
+    toes_down: float = 0.0,
 ) -> tuple[Floats, Floats, Floats]:
     """Orientations, speed and specific force of a flat foot that turns about the vertical and goes aside.
 
-    At `pitched_at` an ordinary swing begins.
+    At `pitched_at` an ordinary swing begins. The foot lands with its toes `toes_down`.
     """
     pitch = np.zeros_like(t) if pitched_at is None else walk_pitch(t - pitched_at + REST_S, 1)
+    pitch += burst(t, start + 0.45 * seconds, 0.5 * seconds, -toes_down)
+    pitch += burst(t, start + 0.95 * seconds, 0.05 * seconds, toes_down)
     heading = burst(t, start, seconds, turn)
     q = orientation(pitch, heading)
     x = np.clip((t - start) / seconds, 0.0, 1.0)
@@ -137,6 +149,48 @@ def test_a_shift_on_the_spot_and_a_slow_slide_are_no_steps(metres: float, turn: 
     q, speed, acc = moved(t, 2.0, 0.6, metres, np.radians(turn), 0.8)
     told = advance_foot_contacts(FootContactState.start(RATE), q, np.ones(len(t), np.bool_), speed, acc)
     assert len(told.kind) == 3, "the pitched swing alone"
+
+
+@pytest.mark.parametrize("block", [1, 7, 500])
+def test_a_foot_off_that_was_the_landing_of_a_step_is_told_again(block: int) -> None:
+    """A foot that turns and comes down on its toes is lowest as it lands: so short is no swing."""
+    params = FootContactParams()
+    t = np.arange(500) / RATE
+    q, speed, acc = moved(t, 2.0, 0.6, 0.3, np.radians(90.0), 0.8, np.radians(16.0))
+    told = advance_foot_contacts(FootContactState.start(RATE), q, t >= 0.0, speed, acc)
+    wrong, mended = (i for i, kind in enumerate(told.kind) if kind == 0 and told.known[i] > 2.0 * RATE)
+    assert told.number[wrong] == told.number[mended]
+    assert told.at[wrong] / RATE > 2.4
+    assert 2.0 < told.at[mended] / RATE < 2.3
+    assert told.uncertainty_s[mended] >= params.loose_sd_s
+    here = replace(orientations(RATE, {"foot_l": t}), q={"foot_l": q})
+    whole = detect_contacts(here, motions={"foot_l": FootMovement(speed, acc)})
+    assert [e.kind for e in whole.events] == ["tc", "ic", "tc", "ic"], "each once, at its last time"
+    detector = ContactDetector(("foot_l",), RATE)
+    streamed: dict[float, GaitEvent] = {}
+    for k in range(0, len(t), block):
+        part = slice(k, k + block)
+        motion = FootMovement(speed[part], acc[part])
+        for x in detector.push(q[part, None], np.ones((len(t[part]), 1), np.bool_), [motion], 0):
+            assert x.final or x.event.kind == "ic"
+            streamed[x.event.first_s or x.event.time_s] = x.event
+    assert sorted(streamed.values(), key=lambda e: e.time_s) == list(whole.events)
+
+
+def test_a_heel_that_is_raised_and_held_is_no_foot_off() -> None:
+    t = np.arange(500) / RATE
+    held = burst(t, 0.3, 0.8, np.radians(-13.0)) + burst(t, 1.2, 0.4, np.radians(-1.0))
+    held += burst(t, 1.6, 0.3, np.radians(1.0)) - burst(t, 3.2, 0.3, np.radians(-13.0))
+    pitch = held + walk_pitch(t - 2.5 + REST_S, 1)
+    speed, acc = np.abs(np.gradient(pitch, t)), np.tile([0.0, 0.0, GRAVITY], (len(t), 1))
+    assert speed[110:190].max() < FootContactParams().still_rad_s
+    q = orientation(pitch)
+    assert advance_foot_contacts(FootContactState.start(RATE), q, t >= 0.0).at[0] / RATE < 1.7, (
+        "by pitch alone"
+    )
+    told = advance_foot_contacts(FootContactState.start(RATE), q, t >= 0.0, speed, acc)
+    assert told.kind.tolist() == [0, 1, 1]
+    assert told.at[0] / RATE == pytest.approx(2.5 + PUSH_S, abs=0.1)
 
 
 def test_a_sensor_lost_in_the_window_ends_the_wait_for_the_refined_time() -> None:

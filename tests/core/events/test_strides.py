@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from core.events import StrideParams, detect, stride_list
-from core.events.result import GaitEvent, GaitEvents, Strides
+from core.events.result import MANUAL, GaitEvent, GaitEvents, Strides
 from core.frames import FOOT, Bools, Floats, Side
 from core.fusion.orientations import Orientations
 from tests.core.events.foot_signal import orientation, orientations, walk
@@ -248,3 +248,18 @@ def test_a_person_is_told_from_a_rule_and_the_flags_stay() -> None:
     taken_in = replace(first, excluded_reason=None)
     assert (taken_in.excluded_by, taken_in.flags) == (None, ("first",))
     assert replace(first, excluded_reason="manual:stumbled").excluded_by == "person"
+
+
+@pytest.mark.parametrize(
+    ("uncertainties", "median"),
+    [((0.02, 0.02, 0.1), 0.02), ((None, 0.06, None), 0.06), ((None,), None), ((), None)],
+)
+def test_what_contacts_are_known_to_is_the_median_of_the_machines_own(
+    uncertainties: tuple[float | None, ...], median: float | None
+) -> None:
+    found = [
+        GaitEvent(float(i), "left", "ic", "any", float(i), uncertainty_s=u)
+        for i, u in enumerate(uncertainties)
+    ]
+    by_hand = GaitEvent(9.0, "left", "ic", MANUAL, 9.0, uncertainty_s=0.5)
+    assert GaitEvents((*found, by_hand)).contact_uncertainty_s == median

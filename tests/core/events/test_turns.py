@@ -12,7 +12,7 @@ from core.events.lumbar import split_about_vertical
 from core.events.turns import Turn, body_yaw_rate, find_turns
 from core.frames import Floats, Segment
 from core.fusion.orientations import Orientations
-from tests.walks import simulated
+from tests.walks import neura_analysis, simulated
 
 RATE = 100.0
 
@@ -78,6 +78,27 @@ def test_a_turn_in_which_the_sensor_was_lost_is_not_reported() -> None:
     lost = always(rate)
     lost[620:640] = False
     assert find_turns(rate, lost, RATE) == ()
+
+
+@pytest.mark.parametrize("seconds", [4.5, 6.0, 6.5, 7.0])
+def test_a_turn_cut_by_an_end_of_the_take_is_not_reported(seconds: float) -> None:
+    """Half of a turn is no small turn."""
+    rate = bump(pi, 5.0, 3.0)
+    n = round(seconds * RATE)
+    assert find_turns(rate[:n], always(rate[:n]), RATE) == ()
+    assert find_turns(rate[:n][::-1], always(rate[:n]), RATE) == ()
+    (whole,) = find_turns(rate[:950], always(rate[:950]), RATE)
+    assert whole.angle_rad == pytest.approx(pi, rel=0.02)
+
+
+def test_a_real_turn_cut_by_the_end_of_the_take_is_not_reported() -> None:
+    take = neura_analysis()
+    assert take.fused is not None
+    rate, valid = body_yaw_rate(take.fused, take.fused.rate_hz)
+    (whole,) = find_turns(rate, valid, take.fused.rate_hz)
+    assert np.degrees(abs(whole.angle_rad)) == pytest.approx(191.0, abs=3.0)
+    n = round(15.3 * take.fused.rate_hz)
+    assert find_turns(rate[:n], valid[:n], take.fused.rate_hz) == ()
 
 
 @pytest.mark.parametrize("n", [0, 1, 10, 40])

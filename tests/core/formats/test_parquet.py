@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
@@ -13,14 +14,26 @@ from hypothesis import strategies as st
 
 from core.errors import FormatError, Notice
 from core.formats import SourceFile, read_recording, write_recording
+from core.formats.manifest import manifest_of
 from core.quality import describe
 from core.recording import ImuStream, Recording, Subject
 from core.shoe import Shoe
-from tests.core.formats.making import mt_file, signals, stream
+from tests.core.formats.making import mt_file, signals, source, stream
 
 
 def back(recording: Recording) -> Recording:
     return read_recording([SourceFile.of_bytes("take.parquet", write_recording(recording))])
+
+
+def test_a_file_of_squats_that_is_declared_a_walk_says_so() -> None:
+    squats = replace(read_recording([mt_file()]), protocol="squat")
+    stored = [source("recording.parquet", write_recording(squats))]
+    codes = {
+        declared: [n.code for n in read_recording(stored, manifest_of({"protocol": declared})).notices]
+        for declared in ("walk", "squat")
+    }
+    assert "protocol_differs" in codes["walk"]
+    assert "protocol_differs" not in codes["squat"]
 
 
 def test_everything_that_was_known_comes_back() -> None:

@@ -40,7 +40,6 @@ READABLE = [
 REFUSED = [
     (MT + "MT_012005D6-000_sit_to_stand-000_00B421ED.txt", "missing_acc"),
     ("formats/mvnx/SYNTHETIC_lowerbody.mvnx", "unsupported_format"),
-    ("formats/axivity/ax3_sample.cwa", "unsupported_format"),
     ("formats/apdm/apdm_format7.csv", "unsupported_format"),
     ("formats/apdm/SYNTHETIC_v5.h5", "unsupported_format"),
     ("formats/opensense/imuOrientations.sto", "unsupported_format"),

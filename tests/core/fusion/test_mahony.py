@@ -54,6 +54,7 @@ def test_quaternions_are_unit_finite_and_deterministic() -> None:
     assert once.engine == "mahony"
 
 
+@pytest.mark.slow
 def test_inclination_follows_the_truth_within_a_degree() -> None:
     """Long axis of the shank against the truth, both relative to standing, over 5 min."""
     recording, truth = simulated("five_minutes")

@@ -76,6 +76,25 @@ def test_visits_of_too_few_strides_make_no_reference() -> None:
     assert mean_curves(curves) == {}
 
 
+def test_estimated_angles_of_controls_are_no_reference() -> None:
+    def of(person: str, value: float, *, estimated: bool) -> ControlSession:
+        knee = Parameter("knee_flexion_rom_deg", "left", 20, value, 1.0, "deg", estimated=estimated)
+        return replace(session(person), parameters=[*session(person).parameters, knee])
+
+    measured = [of(f"c{i}", 60.0 + i, estimated=False) for i in range(5)]
+    guessed = [of(f"e{i}", 30.0, estimated=True) for i in range(5)]
+    values = control_group([*measured, *guessed]).values
+    assert values["knee_flexion_rom_deg"].mean == pytest.approx(62.0)
+    assert values["knee_flexion_rom_deg"].n == 5
+    assert values["stance_pct"].n == 10
+    curves = CycleCurves(
+        {"knee_flexion": {"left": np.full((5, 101), 0.2)}}, {"left": (0, 1, 2, 3, 4)},
+        {"left": np.ones(5, np.bool_)}, {"left": np.full(5, 62.0)},
+    )  # fmt: skip
+    assert "knee_flexion" in mean_curves(curves)["left"]
+    assert mean_curves(curves, ("knee_flexion",)) == {}
+
+
 def test_fewer_than_five_people_are_no_group() -> None:
     group = control_group([session(f"c{i % 4}") for i in range(20)])
     assert (group.n, group.reason, dict(group.values), dict(group.bands)) == (4, "few_controls", {}, {})

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from core.frames import SIDES, Floats
-from core.norms import adult_kinematics, angle_values, predict_at_speed, temporal_values
+from core.norms import adult_kinematics, angle_values, look_up_norms, predict_at_speed, temporal_values
 from core.norms.tables import read_rows
-from core.norms.values import COARSE_S, withdraw_shares
+from core.norms.values import COARSE_S
 from core.parameters.catalogue import CATALOGUE, list_curve_figures
 from tests.data import data_folder
 from tests.wbds import people
@@ -166,14 +166,13 @@ FIGURE: dict[str, Callable[[Floats], float]] = {
 
 
 @pytest.mark.parametrize(
-    ("uncertainties", "compared"),
-    [((0.02, 0.02, 0.1), True), ((0.06, 0.06, 0.02), False), ((None, None), False), ((COARSE_S,), True)],
+    ("contacts_s", "compared"), [(0.02, True), (0.06, False), (None, False), (COARSE_S, True)]
 )
 def test_shares_of_the_stride_compare_only_where_contacts_are_exact(
-    uncertainties: tuple[float | None, ...], compared: bool
+    contacts_s: float | None, compared: bool
 ) -> None:
-    values = temporal_values(72, "female").values
-    held = withdraw_shares(values, uncertainties)
+    values = look_up_norms(72, "female").values
+    held = look_up_norms(72, "female", contacts_s=contacts_s).values
     for name in ("stance_pct", "swing_pct", "double_support_pct", "single_support_pct"):
         assert held[name].comparable == compared
         assert compared or held[name].note.startswith("Not comparable")

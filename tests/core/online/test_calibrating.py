@@ -25,7 +25,7 @@ from core.recording import Subject, UniformRecording
 from core.rotation import conjugate, exp, multiply, rotate
 from core.simulate import Arc, Pivot, Stand, Straight
 from core.timeline.live import UniformBlock
-from tests.walks import cut, lost, neura_walk, only, scripted, simulated
+from tests.walks import TOGETHER, cut, lost, neura_walk, only, scripted, simulated
 
 Seen = tuple[int, Stage, CalibrationView]
 
@@ -164,8 +164,11 @@ def test_a_sensor_that_moves_is_named_and_nothing_begins() -> None:
 @pytest.mark.slow
 def test_redo_begins_anew_with_the_next_sample() -> None:
     recording, _ = scripted(
-        (Stand(5.0), Straight(12.0, 0.6, 0.55), Stand(5.0), Straight(12.0, 0.6, 0.55), Stand(2.0))
-    )
+        (
+            Stand(5.0), Straight(12.0, 0.6, 0.55), *TOGETHER, Stand(5.0), Straight(12.0, 0.6, 0.55),
+            Stand(2.0),
+        )
+    )  # fmt: skip
     first = run(recording).found[0]
     assert len(run(recording).found) == 1
 
@@ -289,8 +292,11 @@ def test_strapping_sensors_on_is_no_walk(seed: int) -> None:
 
 def test_a_sensor_turned_between_two_standings_makes_the_second_count() -> None:
     recording, _ = scripted(
-        (Stand(5.0), Straight(2.4, 0.6, 0.55), Stand(6.0), Straight(14.0, 0.6, 0.55), Stand(2.0))
-    )
+        (
+            Stand(5.0), Straight(2.4, 0.6, 0.55), *TOGETHER, Stand(6.0), Straight(14.0, 0.6, 0.55),
+            Stand(2.0),
+        )
+    )  # fmt: skip
     n = 700
     by = exp(np.array([0.0, 0.0, 0.6]))
     x = recording.sensors["shank_r"]

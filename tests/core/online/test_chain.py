@@ -23,6 +23,7 @@ from core.online.chain import COURSES
 from core.parameters.live_stride import NOT_YET
 from core.recording import UniformRecording
 from tests.live_walks import Run, batches, hello_of, live, recorded
+from tests.marks import slow_beyond
 from tests.walks import cut, lost, neura_walk, only, simulated
 
 FILTER_DELAY_S = {"neura_walk": 0.07, "simulated": 0.08}
@@ -118,7 +119,7 @@ def same(a: Told, b: Told) -> None:
 
 
 @pytest.mark.parametrize("name", SETS)
-@pytest.mark.parametrize("sizes", [pytest.param(1, marks=pytest.mark.slow), 7, (64, 3, 21, 1, 40), 200])
+@pytest.mark.parametrize("sizes", slow_beyond(1, [7, ((64, 3, 21, 1, 40),), 200, 1]))
 def test_batches_of_any_size_give_the_same_bits(name: str, sizes: int | tuple[int, ...]) -> None:
     same(streamed(name)[1], told(live(worn(name), sizes)[1]))
 

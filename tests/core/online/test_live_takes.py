@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from core.body.erkf.live_figure import LinkedBody
-from core.errors import ParameterError
+from core.body.tree import PRESETS
+from core.errors import Notice, ParameterError
 from core.frames import SIDES, Segment
 from core.online import LiveFrame, LiveStride, OnlineSession
 from core.parameters.spatial import NAMES as SPATIAL
 from core.recording import SensorSignals, UniformRecording
 from tests.live_walks import batches, hello_of, live, recorded
+from tests.perturbations import delay_sensor
 from tests.walks import cut, lost, only, simulated
 
 BELT = 1.1
@@ -217,3 +219,30 @@ def test_one_foot_may_walk_on_while_the_other_is_away() -> None:
     assert away
     assert {s.side for s in away} == {"left"}
     assert all(s.values["stride_length_m"] is not None for s in away)
+
+
+def compared(take: UniformRecording, sizes: int | tuple[int, ...]) -> tuple[OnlineSession, list[Notice]]:
+    """A take whose sensors are compared after every batch, as an estimator process does."""
+    online, told = OnlineSession(hello_of(take), take.subject), []
+    for batch in batches(take, sizes):
+        if online.push(batch) is not None:
+            told += online.compare_sensors()
+    return online, told
+
+
+def test_a_late_sensor_is_told_and_marked_until_calibrated_again() -> None:
+    late = delay_sensor(only(walk(), *PRESETS["lower_body7"]), "shank_l", 0.05)
+    online, told = compared(late, 10)
+    assert [(n.code, n.sensor) for n in told] == [("sensor_late", "shank_l")]
+    assert compared(late, (3, 41, 170))[1] == told
+    last = list(batches(late))[-1]
+    again = replace(last, seq=last.seq + 1, t0_us=last.t0_us + 100_000, sent_us=last.sent_us + 100_000)
+    frame = online.push(again)
+    assert frame is not None
+    assert {h.segment: h.doubt for h in frame.health if h.doubt} == {"shank_l": "sensor_late"}
+    online.command("redo_calibration")
+    frame = online.push(
+        replace(again, seq=again.seq + 1, t0_us=again.t0_us + 100_000, sent_us=again.sent_us + 100_000)
+    )
+    assert frame is not None
+    assert not any(h.doubt for h in frame.health)

@@ -7,12 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.activity.parameters import MEASURES as DAILY
+from core.functional_tests import chair, sway, tug, walks
 from core.measure import measure_gait
 from core.parameters.catalogue import CATALOGUE
 from core.simulate import simulate_scenario
+from core.squat.measures import MEASURES
 from server.report.wording import REASONS
 from tests.parameter_page import PAGE, render_page
 from tests.true_walks import true_tracks
+
+TESTS = {*tug.NAMES, *chair.NAMES, *walks.TEN, *walks.SIX, *sway.NAMES}
+"""Parameters of functional tests; each measures all of its own (tests/core/functional_tests)."""
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +26,8 @@ def names() -> set[str]:
     tracks = true_tracks(simulate_scenario("comfortable", 5).truth)
     whole = replace(tracks, trunk={"pelvis": np.zeros((len(tracks.t_s), 3))})
     # steps are those of a trunk sensor alone
-    return {p.name for p in measure_gait(whole).parameters} | {"step_count"}
+    others = {"step_count"} | set(MEASURES) | set(DAILY) | TESTS
+    return {p.name for p in measure_gait(whole).parameters} | others
 
 
 def test_the_catalogue_knows_what_is_measured_and_nothing_else(names: set[str]) -> None:

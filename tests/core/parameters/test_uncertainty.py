@@ -60,9 +60,14 @@ def test_strides_that_happen_to_be_alike_do_not_hide_the_error_of_one() -> None:
     alike = stated(figure("stride_length_m", 1.2, 0.0, 2))["stride_length_m"]
     assert alike.uncertainty is not None
     assert alike.uncertainty > 1.96 * 0.017 / sqrt(2)
-    single = stated(replace(alike, n=1, sd=None, uncertainty=None))["stride_length_m"]
-    assert single.uncertainty is not None
-    assert single.uncertainty > alike.uncertainty
+
+
+def test_one_stride_has_the_errors_of_measurement_and_no_whole() -> None:
+    """It would be said to be known better than two, whose spread is seen."""
+    two = stated(figure("stride_length_m", 1.2, 0.03, 2))["stride_length_m"]
+    one = stated(replace(two, n=1, sd=None, uncertainty=None))["stride_length_m"]
+    assert one.uncertainty is None
+    assert (one.u_own, one.u_common) == (two.u_own, two.u_common)
 
 
 @pytest.mark.parametrize("errors", [PITCH_RULE, REFINED])
@@ -107,9 +112,9 @@ def test_angles_without_two_sensors_and_levels_of_a_goniometer_are_known_less_we
     knee = figure("knee_flexion_max_swing_deg", 55.0, 2.0, 20)
     (measured,) = state_uncertainty([knee])
     (modelled,) = state_uncertainty([knee], estimated=("knee_flexion",))
+    (feet_alone,) = state_uncertainty([knee], estimated=("knee_flexion", "pelvis_tilt"))
     (level,) = state_uncertainty([knee], goniometer=True)
-    assert measured.u_own == 2.0
-    assert modelled.u_own == 10.5
+    assert (measured.u_own, modelled.u_own, feet_alone.u_own) == (2.0, 10.5, 11.0)
     assert level.u_own == pytest.approx(hypot(2.0, 3.0))
 
 
@@ -206,3 +211,24 @@ def test_the_truth_lies_within_as_often_as_said(n: int) -> None:
     # and it is not said by saying little
     assert np.mean(widths["stance_time_s"]) < 0.053
     assert np.mean(widths["stance_pct"]) < 5.0
+
+
+def test_a_clock_that_may_be_late_makes_sides_no_clear_difference() -> None:
+    """One clock 60 ms late makes of steps of 0.55 s 0.49 and 0.61; swing and stride know nothing of it."""
+    names = ("step_time_s", "initial_double_support_s", "swing_time_s", "stride_time_s", "double_support_s")
+    values = [figure(name, 0.55, 0.01, 20, side) for name in names for side in SIDES]
+    sure, doubtful = (
+        {(p.name, p.side): p for p in state_uncertainty(values, told(TYPICAL_S), feet_lag_s=lag)}
+        for lag in (0.0, 0.06)
+    )
+    for name in names:
+        a, b = sure[name, "left"].u_own, doubtful[name, "left"].u_own
+        assert a is not None
+        expected = hypot(a, 0.06) if name in ("step_time_s", "initial_double_support_s") else a
+        assert b == pytest.approx(expected), name
+    steps = [
+        replace(doubtful["step_time_s", side], mean=mean)
+        for side, mean in zip(SIDES, (0.49, 0.61), strict=True)
+    ]
+    (compared,) = compare_sides(steps)
+    assert not compared.clear

@@ -47,6 +47,7 @@ def off() -> TakeAnalysis:
         return analyse(simulate_scenario("comfortable", 0).recording)
 
 
+@pytest.mark.slow
 def test_the_trunk_of_a_pelvis_20_degrees_off_is_as_regular_as_of_one_that_is_not(
     right: TakeAnalysis, off: TakeAnalysis
 ) -> None:

@@ -13,10 +13,12 @@ import pytest
 import core
 from core.errors import ParameterError
 from core.events.consensus import ConsensusParams
-from core.pipeline import TRUNK_ONLY, WALK, PipelineConfig
+from core.pipeline import SQUAT, TRUNK_ONLY, WALK, PipelineConfig
+from core.pipeline.recipes import ACTIVITY, BY_TRUNK
 
-ELSEWHERE = ("core.online", "core.simulate")
-"""Samples as they come have a configuration of their own (`OnlineParams`), so has a simulation."""
+ELSEWHERE = ("core.online", "core.simulate", "core.fusion.self_calibrating")
+"""Samples as they come have a configuration of their own (`OnlineParams`), so have a simulation and a filter
+that no stage runs."""
 
 LIVE = "Live"
 """So begin the names of those that stand beside their twin for files."""
@@ -59,7 +61,7 @@ def test_parameters_of_every_stage_are_in_the_config() -> None:
 
 
 def test_every_part_of_the_config_is_read_by_a_stage_that_says_so() -> None:
-    read = {name for stage in (*WALK, *TRUNK_ONLY) for name in stage.reads}
+    read = {name for stage in (*WALK, *TRUNK_ONLY, *SQUAT, *BY_TRUNK, *ACTIVITY) for name in stage.reads}
     assert read == {f.name for f in dataclasses.fields(PipelineConfig)}
 
 

@@ -96,6 +96,7 @@ def test_with_a_foot_sensor_the_foot_decides() -> None:
     assert all(b.initiation_s is not None and 0.2 < b.initiation_s < 1.5 for b in a.measured.bouts)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_calibrated_leaves_the_steps_of_the_trunk_and_says_why() -> None:
     take = simulate_scenario("fast_with_turns", 1, worn=("pelvis", "foot_l", "foot_r")).recording
     streams = {

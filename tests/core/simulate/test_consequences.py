@@ -42,12 +42,14 @@ def test_a_healthy_walk_is_told_without_a_word() -> None:
     assert told()[1].notices == ()
 
 
+@pytest.mark.slow
 def test_steps_beyond_the_range_of_the_feet_are_told() -> None:
     made, found = told(impact=3.0)
     assert made.clipped["foot_l"].mean() > 0.003
     assert {n.sensor for n in found.notices if n.code == "saturated"} == {"foot_l", "foot_r"}
 
 
+@pytest.mark.slow
 def test_iron_beside_the_walkway_is_told_and_costs_nothing() -> None:
     made, found = told(RecordingSetup(dipoles=ROOM))
     assert {n.code for n in found.notices} == {"magnetic_disturbed"}
@@ -57,6 +59,7 @@ def test_iron_beside_the_walkway_is_told_and_costs_nothing() -> None:
 
 
 @pytest.mark.parametrize(("late_s", "expected"), [(0.01, 1.1), (0.02, 2.1)])
+@pytest.mark.slow
 def test_a_clock_that_lags_at_the_thighs_costs_what_the_specification_measured(
     late_s: float, expected: float
 ) -> None:

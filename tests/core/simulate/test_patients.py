@@ -37,6 +37,7 @@ from core.simulate.walker import REFERENCE_HEIGHT_M
 from core.timeline import synchronise
 from tests.accuracy.event_scoring import match
 from tests.gait_features import Features, features
+from tests.marks import slow_beyond
 from tests.walks import joint_gap
 
 SEEDS = (5, 11, 23, 31)
@@ -148,6 +149,7 @@ def test_the_signature_shows(name: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", SIGNATURES)
+@pytest.mark.slow
 def test_every_person_can_turn_stop_and_walk_arcs(name: str) -> None:
     """docs/science/simulation.md, "Limits on construction"."""
     patient = PATIENTS[name]
@@ -180,7 +182,7 @@ def test_contacts_of_healthy_walking_are_found_when_they_happen(seed: int) -> No
         assert abs(ic.mean_ms) <= 10
 
 
-@pytest.mark.parametrize("name", SIGNATURES)
+@pytest.mark.parametrize("name", slow_beyond(3, list(SIGNATURES)))
 @pytest.mark.parametrize("rising", [True, False])
 def test_the_rule_invents_nothing_and_finds_all_heel_contacts(name: str, rising: bool) -> None:
     """In both ways of landing: the counts must not rest on the shaped pitch
@@ -235,6 +237,7 @@ def test_a_landing_on_the_forefoot_has_no_largest_pitch_at_contact() -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.slow
 def test_a_lower_threshold_loses_the_contacts_of_a_drop_foot(seed: int) -> None:
     """The forefoot touches down at s of about −0.13, below −0.1
     (docs/science/simulation.md, "Virtual people").
@@ -266,6 +269,7 @@ def test_festination_gets_shorter_and_quicker_and_freezes() -> None:
     assert np.polyfit(index, [f.step_s for f in first], 1)[0] == pytest.approx(-0.02 * 0.43, rel=0.5)
 
 
+@pytest.mark.slow
 def test_a_tall_patient_walks_with_the_same_angles() -> None:
     tall, reference = (
         simulate_scenario("drop_foot", seed=5, height_m=height) for height in (1.9, REFERENCE_HEIGHT_M)

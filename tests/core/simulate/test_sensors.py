@@ -22,6 +22,7 @@ from core.simulate import (
 )
 from core.simulate.mems import add_sensor_errors
 from core.simulate.sensors import SimulatedSignals
+from core.simulate.soft_tissue import SoftTissue
 
 SHORT: Script = (Stand(3.0), Straight(5.0, 0.6, 0.54), Stand(2.0))
 
@@ -54,6 +55,18 @@ def test_noise_and_losses_do_not_change_the_walk() -> None:
     for segment, p in plain.truth.p.items():
         assert np.array_equal(p, rough.truth.p[segment])
         assert np.array_equal(plain.ideal[segment].acc, rough.ideal[segment].acc)
+
+
+def test_the_orientation_of_a_sensor_is_that_of_its_bone_and_with_skin_what_its_gyroscope_felt() -> None:
+    stiff = simulate(SHORT, seed=3)
+    for segment, q in stiff.sensor_q.items():
+        assert angle_between(q, _sensor_orientation(stiff, segment)).max() < 1e-7
+    setup = RecordingSetup(tissue=SoftTissue(), impacts=True, sampling="increment")
+    soft = simulate(SHORT, seed=3, setup=setup)
+    q, gyr = soft.sensor_q["thigh_r"], soft.ideal["thigh_r"].gyr
+    assert angle_between(q, _sensor_orientation(soft, "thigh_r")).max() > 0.01
+    turned = multiply(q[:-1], exp(gyr[1:] / 100.0))
+    assert angle_between(turned, q[1:]).max() < 1e-9
 
 
 def test_sensors_at_rest_read_gravity_upwards_and_no_rate(mixed: Simulation) -> None:

@@ -181,7 +181,7 @@ def test_whatever_is_lost_and_however_times_jitter_the_points_are_those_of_the_f
     rng = np.random.default_rng(seed)
     devices = []
     for number, segments in ((0, FEET), (1, ("pelvis",))):
-        d = device(number, rate if number else 100.0, segments, 8.0, 1.0 + 0.3 * rng.random())
+        d = device(number, rate if number else 100.0, segments, 8.0, 1.0 + 0.2 * rng.random())
         samples = d.samples.copy()
         samples[rng.random(samples.shape[:2]) < 0.15 * rng.random()] = np.nan
         shift = rng.integers(-4000, 4000, len(d.t_us))

@@ -69,7 +69,7 @@ async def test_progress_is_pushed_until_the_job_is_done(visit: Visit) -> None:
         assert job[-1]["fraction"] == 1.0
         attempts = [e["fraction"] for e in job if e["fraction"] is not None]
         assert attempts == sorted(attempts)
-    assert {e["stage"] for e in visit.analysis} - {None}
+    assert visit.analysis[-1]["stage"] is not None
 
 
 async def test_what_was_found_is_in_the_recording(visit: Visit) -> None:
@@ -165,7 +165,7 @@ async def test_every_page_about_a_person_leaves_one_audit_row(visit: Visit) -> N
     async with clinic.client("admin", headers={"Accept": "text/html"}) as client:
         patient = (await client.get(f"{API}/sessions/{visit.session}")).json()["patient_id"]
         pages = {f"/patients/{patient}": patient, f"/patients/{patient}/sessions/new": patient}
-        for tab in ("", "/upload", "/timeline", "/kinematics", "/data", "/print"):
+        for tab in ("", "/upload", "/timeline", "/kinematics", "/algorithms", "/data", "/print"):
             pages[f"/sessions/{visit.session}{tab}"] = visit.session
         for page, resource in pages.items():
             before = (await client.get(f"{API}/audit", params={"limit": 1})).json()[0]["seq"]
@@ -213,3 +213,98 @@ async def test_another_estimator_runs_on_the_same_take_and_the_first_can_be_show
         jobs = (await client.get(f"{API}/jobs")).json()
         assert any(j["error_code"] == "unknown_estimator" for j in jobs)
         await run({})
+
+
+async def reference_of(visit: Visit, client: httpx.AsyncClient) -> bytes:
+    """The shanks' orientations of the analysis as a table of another system, whose clock is 2 s ahead."""
+    analysis = (await client.get(f"{visit.path}/analyses")).json()[0]
+    poses = await client.get(f"{API}/analyses/{analysis['id']}/files/poses.parquet")
+    table = pq.read_table(io.BytesIO(poses.content))
+    names = [f"shank_{side}_q_{part}" for side in "lr" for part in "wxyz"]
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(["time", *names])
+    columns = [table.column(name).to_pylist() for name in ("t_s", *names)]
+    writer.writerows([t + 2.0, *q] for t, *q in zip(*columns, strict=True))
+    return text.getvalue().encode()
+
+
+async def compare(visit: Visit, client: httpx.AsyncClient, **body: Any) -> dict[str, Any]:
+    """Run filters; the last event of the job."""
+    asked = await client.post(f"{visit.path}/filter-runs", json={"filters": ["mahony_2008"], **body})
+    assert asked.status_code == 202
+    return events(await client.get(f"{API}/jobs/{asked.json()['id']}/events"))[-1]
+
+
+async def test_filters_run_on_the_take_as_one_job_and_against_a_reference(visit: Visit) -> None:
+    chosen = {"filters": ["mahony_2008", "wu_2018"], "magnetometer": False, "reference": "labor/optisch.csv"}
+    async with visit.clinic.client("clinician", timeout=300) as client:
+        content = await reference_of(visit, client)
+        put = await client.put(f"{visit.path}/references/labor/optisch.csv", content=content)
+        assert put.status_code == 201
+        assert (await client.get(f"{visit.path}/references/labor/optisch.csv")).content == content
+        # it is no part of the recording
+        assert len((await client.get(f"{visit.path}/recording")).json()["files"]) == 7
+        last = await compare(visit, client, **chosen)
+        assert last["state"] == "done", last
+        assert (await compare(visit, client, **chosen))["id"] == last["id"], "the same is run once"
+        run = (await client.get(f"{visit.path}/filter-runs")).json()[0]
+        assert (await client.get(f"{API}/filter-runs/{run['id']}")).json() == run
+        assert run["reference_name"] == "labor/optisch.csv"
+        files = f"{API}/filter-runs/{run['id']}/files"
+        found = (await client.get(f"{files}/filters.json")).json()
+        own, mahony, wu = found["filters"]
+        assert (own["name"], own["label"], mahony["cost_us"] > 0.0) == (None, "Sagittal, as analysed", True)
+        assert wu["to_median"] is None
+        assert wu["label"] == "Wu2018 (reconstruction)"
+        assert wu["told"][0]["code"] == "no_magnetometer"
+        assert found["reference"]["lag_s"] == pytest.approx(-2.0, abs=0.01)
+        assert all(s["total"] < 3.0 for s in found["reference"]["scores"])
+        rows = list(csv.DictReader(io.StringIO((await client.get(f"{files}/reference.csv")).text)))
+        assert {r["filter"] for r in rows} == {"Sagittal, as analysed", "Mahony2008"}
+        page = await client.get(
+            f"/sessions/{visit.session}/algorithms?of=shank_l&over=time&against=mahony_2008"
+        )
+        for text in (
+            "Wu2018 (reconstruction)",
+            "needs a magnetometer",
+            "Left shank, inclination",
+            "+1.96 SD",
+        ):
+            assert text in page.text
+
+
+async def test_a_reference_that_cannot_be_used_fails_the_job_with_a_reason(visit: Visit) -> None:
+    async with visit.clinic.client("clinician", timeout=300) as client:
+        await client.put(f"{visit.path}/references/bad.sto", content=b"DataType=double\nendheader\ntime\n0\n")
+        last = await compare(visit, client, reference="bad.sto")
+        assert (last["state"], last["error_code"]) == ("failed", "no_quaternions")
+        page = await client.get(f"/sessions/{visit.session}/algorithms")
+        assert "bad.sto is an OpenSim file without DataType=Quaternion" in page.text
+        assert (await client.get(f"{API}/sessions/{visit.session}")).json()["state"] == "done"
+        assert (await client.delete(f"{visit.path}/references/bad.sto")).status_code == 204
+        assert [f["name"] for f in (await client.get(f"{visit.path}/references")).json()] == [
+            "labor/optisch.csv"
+        ]
+        for body, status in (
+            ({"filters": []}, 422),
+            ({"filters": ["kalman_1960"]}, 422),
+            ({"filters": ["mahony_2008"], "reference": "bad.sto"}, 404),
+        ):
+            assert (await client.post(f"{visit.path}/filter-runs", json=body)).status_code == status
+
+
+async def test_who_reads_results_sees_comparisons_and_only_who_analyses_asks_for_one(visit: Visit) -> None:
+    for role, asks, reads in (("viewer", 403, 200), ("assistant", 403, 403)):
+        async with visit.clinic.client(role) as client:
+            asked = await client.post(f"{visit.path}/filter-runs", json={"filters": ["mahony_2008"]})
+            assert asked.status_code == asks
+            assert (await client.get(f"{visit.path}/filter-runs")).status_code == reads
+            page = await client.get(f"/sessions/{visit.session}/algorithms")
+            assert page.status_code == reads
+            assert "Run on this take" not in page.text
+    async with visit.clinic.client("viewer") as client:
+        assert (await client.put(f"{visit.path}/references/x.sto", content=b"x")).status_code == 403
+        listed = (await client.get(f"{API}/filters")).json()
+        assert len(listed) == 39
+        assert all("reconstruction" in f["label"] for f in listed if f["grade"] == "C")

@@ -15,9 +15,10 @@ from server import audit
 from server.auth.roles import Action
 from server.auth.routes import list_declared_actions
 from server.auth.tokens import token_hash
+from server.jobs.queue import Claim
 from server.pages.timeline import FRAGMENT
-from server.services import patients, sessions
-from server.storage.tables import job
+from server.services import patients, reference_files, sessions, tunings
+from server.storage.tables import job, tuning
 from server.trail import MOST_REFUSED, QUIET_S, AuditTrail
 from tests.server import analysed, walk
 from tests.server.clinic import PASSWORD, Clinic, open_clinic
@@ -35,6 +36,7 @@ OF_NO_PATIENT = {
     Action.LOAD_ASSET,
     Action.USE_ACCOUNT,
     Action.READ_API,
+    Action.READ_DEVICE,  # serial numbers and days, nobody who wore them
     Action.MANAGE_USERS,
     Action.READ_AUDIT,
     Action.PAIR,  # its row is "live.paired" (test_tablet.py)
@@ -77,11 +79,15 @@ CHANGES: dict[str, dict[str, Any]] = {
     f"POST {SESSION}/edits": {"json": EDIT},
     f"DELETE {SESSION}/edits": {},
     f"PUT {SESSION}/files/{{name:path}}": {"content": b"x"},
-    f"POST {SESSION}/files": {"files": {"files": ("c.txt", b"x")}},
+    f"POST {SESSION}/files": {"files": {"files": ("judge.npz", b"x")}},
     f"DELETE {SESSION}/files/{{name:path}}": {},
     f"PUT {SESSION}/manifest": {"json": {"sensors": {"A1": "pelvis"}}},
     f"POST {SESSION}/inspections": {},
     f"POST {SESSION}/analyses": {"json": {}},
+    f"POST {SESSION}/tunings": {"json": {"algorithm": "mahony_2008", "validation": ["judge"]}},
+    f"POST {SESSION}/filter-runs": {"json": {"filters": ["mahony_2008"]}},
+    f"PUT {SESSION}/references/{{name:path}}": {"content": b"x"},
+    f"DELETE {SESSION}/references/{{name:path}}": {},
     f"POST {SESSION}/live": {},
     f"POST {SESSION}/live/code": {},
     f"POST {SESSION}/live/close": {},
@@ -101,8 +107,18 @@ class Visits:
             this, other = (sessions.create(c, None, patient).id for _ in range(2))
         analysed.finish(clinic, patient, other, analysed.files())
         analysis = analysed.finish(clinic, patient, this, analysed.files())
-        with clinic.db.read() as c:
-            job_id = c.execute(job.select().limit(1)).one().id
+        with clinic.db.write() as c:
+            first = c.execute(job.select().limit(1)).one()
+            job_id = first.id
+            claim = Claim(job_id, 1, "w", "tune", first.recording_id, None, {"input_sha256": "0" * 64})
+            tunings.publish(c, claim, b"{}")
+            tuning_id = c.execute(tuning.select()).one().id
+        run = analysed.compare(clinic, patient, this)
+        with reference_files.receive_reference(
+            clinic.db, clinic.app.state.blobs, clinic.settings, None, this, "optical.sto"
+        ) as upload:
+            upload.write(b"x")
+            upload.keep()
         self.values = {
             "patient_id": patient,
             "pid": patient,
@@ -112,15 +128,24 @@ class Visits:
             "other": other,
             "analysis_id": analysis,
             "job_id": job_id,
+            "tuning_id": tuning_id,
+            "run_id": run,
         }
-        self.ids = {patient, this, other, analysis, job_id, None}
+        self.ids = {patient, this, other, analysis, job_id, tuning_id, run, None}
 
     def address(self, route: str) -> str:
         """The route with its parameters filled; fails for one that this test does not know."""
         path = route.partition(" ")[2]
-        names = {"files": "walk.txt", "parameters": "stride_time_s", "signals": "foot_pitch"}
+        names = {
+            "references": "optical.sto",
+            "files": "walk.txt",
+            "parameters": "stride_time_s",
+            "signals": "foot_pitch",
+        }
         if path.startswith(f"{API}/analyses"):
             names["files"] = "events.csv"
+        if path.startswith(f"{API}/filter-runs"):
+            names["files"] = "filters.csv"
 
         def value(found: re.Match[str]) -> str:
             name = found[1]

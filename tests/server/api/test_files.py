@@ -70,7 +70,7 @@ async def test_a_file_comes_back_byte_for_byte_under_its_own_name(clinic: Clinic
 
 
 @pytest.mark.parametrize(
-    "name", ["../x", "a/../../x", "..", "a/./b", "", "a//b", "a\x00b", "..\\x", "x" * 600]
+    "name", ["../x", "a/../../x", "..", "a/./b", "", "a//b", "a\x00b", "..\\x", "x" * 600, " ", "a/\u2003"]
 )
 async def test_names_that_lead_elsewhere_are_refused(clinic: Clinic, name: str) -> None:
     session = await new_session(clinic, f"bad {abs(hash(name))}")

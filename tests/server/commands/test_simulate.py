@@ -21,6 +21,7 @@ def _rows(file: Path) -> list[dict[str, str]]:
     [
         ("drop_foot", {"angles.parquet", "events.csv", "strides.csv", "truth.json"}, "walk"),
         ("squats_left", {"angles.parquet", "phases.csv", "truth.json"}, "squat"),
+        ("tug_parkinson", {"trunk.csv", "segments.csv", "scripted.csv", "truth.json"}, "tug"),
         ("chair_rises", {"trunk.csv", "phases.csv", "truth.json"}, "activity"),
     ],
 )

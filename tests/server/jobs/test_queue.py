@@ -13,6 +13,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from sqlalchemy import select
 
 from server.jobs.queue import Claim, JobView, LeaseState
 from server.jobs.table import MAX_DEATHS, TableQueue
@@ -52,6 +53,11 @@ class Bench:
         claim = self.queue.claim(worker, ("k",))
         assert claim is not None
         return claim
+
+    def claim_again(self, claim: Claim) -> Claim:
+        """What the next worker has after this one gave the job back."""
+        assert self.queue.release(claim)
+        return self.claim()
 
     def finish(self, claim: Claim) -> bool:
         return self.queue.finish(claim, lambda c: self.published.append((claim.job_id, claim.attempt)))
@@ -104,6 +110,38 @@ def test_the_important_one_first_then_the_oldest(bench: Bench) -> None:
 def test_a_worker_takes_only_kinds_it_knows(bench: Bench) -> None:
     bench.submit("a")
     assert bench.queue.claim("w", ("other",)) is None
+
+
+def test_a_checkpoint_goes_to_the_next_attempt_and_forgives_deaths(bench: Bench) -> None:
+    view = bench.submit("a")
+    first = bench.claim()
+    assert first.checkpoint is None
+    for _ in range(2 * MAX_DEATHS):
+        assert bench.queue.note_death(first)
+        first = bench.claim()
+        bench.queue.keep(first, f"{first.attempt:064}", lambda c: None)
+    second = bench.claim_again(first)
+    assert second.checkpoint == f"{first.attempt:064}"
+    assert bench.queue.keep(second, "f" * 64, lambda c: None) == second.checkpoint
+    assert bench.queue.keep(second, "f" * 64, lambda c: None) is None
+    # whoever lost the claim is told that nothing refers to what was stored
+    assert bench.queue.keep(first, "e" * 64, lambda c: None) == "e" * 64
+    assert bench.finish(second)
+    with bench.db.read() as c:
+        assert c.execute(select(job.c.checkpoint).where(job.c.id == view.id)).scalar_one() is None
+
+
+def test_a_job_makes_way_for_a_more_urgent_one_only(bench: Bench) -> None:
+    bench.submit("long", priority=10)
+    claim = bench.claim()
+    bench.submit("as long", priority=10)
+    assert bench.queue.look(claim) is LeaseState.OURS
+    urgent = bench.submit("urgent")
+    assert bench.queue.look(claim) is LeaseState.YIELD
+    assert bench.queue.heartbeat(claim) is LeaseState.YIELD
+    bench.cancel(claim.job_id)
+    assert bench.queue.look(claim) is LeaseState.CANCEL
+    assert bench.claim().job_id == urgent.id
 
 
 def test_a_renewed_lease_is_not_taken_an_expired_one_is(bench: Bench) -> None:
@@ -277,7 +315,7 @@ class QueueModel(RuleBasedStateMachine):
         self.ended = {row.id: row.state for row in rows if row.finished_at is not None}
 
 
-TestQueueModel = QueueModel.TestCase
+TestQueueModel = pytest.mark.slow(QueueModel.TestCase)
 TestQueueModel.settings = settings(
     max_examples=25,
     stateful_step_count=25,

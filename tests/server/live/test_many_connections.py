@@ -56,6 +56,7 @@ async def closed(ws: ClientConnection) -> None:
             pass
 
 
+@pytest.mark.slow
 async def test_connections_that_come_and_go_leave_no_descriptor_and_no_task(
     clinic: Clinic, port: int
 ) -> None:

@@ -80,6 +80,7 @@ async def walking(ws: ClientConnection) -> None:
         await asyncio.sleep(BATCH_S)
 
 
+@pytest.mark.slow
 async def test_clock_and_sensors_are_told_before_the_estimator_is_ready(
     unready: tuple[Clinic, int, Path],
 ) -> None:
@@ -106,6 +107,7 @@ async def test_clock_and_sensors_are_told_before_the_estimator_is_ready(
     assert told["elapsed_s"] - BATCH_S <= marked["marks"][0]["t_s"] <= polled["elapsed_s"] + BATCH_S
 
 
+@pytest.mark.slow
 async def test_a_take_that_ended_before_the_estimator_was_ready_leaves_no_error(
     unready: tuple[Clinic, int, Path], capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -39,6 +39,7 @@ async def run(*words: str) -> int:
     return await asyncio.to_thread(main, ["replay", *words])
 
 
+@pytest.mark.slow
 async def test_a_folder_is_replayed_through_a_bad_network(
     clinic: Clinic, port: int, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

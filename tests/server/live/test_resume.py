@@ -12,6 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
@@ -251,7 +252,7 @@ class Stream(RuleBasedStateMachine):
 
 
 Stream.TestCase.settings = settings(max_examples=100, stateful_step_count=40, deadline=None)
-TestStream = Stream.TestCase
+TestStream = pytest.mark.slow(Stream.TestCase)
 
 
 def test_the_model_fits_the_limits_of_the_protocol() -> None:

@@ -133,6 +133,7 @@ async def test_what_cannot_be_adopted_is_refused_with_a_sentence_and_left(
 
 
 @pytest.mark.parametrize("broken", ["copy", "publish"])
+@pytest.mark.slow
 async def test_an_adoption_that_dies_half_way_is_finished_by_the_next_start(
     tmp_path: Path, broken: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -154,6 +155,7 @@ async def test_an_adoption_that_dies_half_way_is_finished_by_the_next_start(
             assert live.get(c, STRAY).recording_id == recordings.require_current(c, session).id
 
 
+@pytest.mark.slow
 async def test_a_damaged_log_keeps_its_original_and_the_session_says_so(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -65,6 +65,10 @@ def test_trails_that_were_not_sent_are_joined_and_other_names_are_another_curve(
         ({"lost_share": 0.25}, "bad", "25 % lost"),
         ({"lost_share": 0.02, "saturated_share": 0.1}, "warn", "2 % lost"),
         ({"saturated_share": 0.01}, "warn", "at its range"),
+        ({"doubt": "sensors_exchanged", "lost_share": 0.02}, "bad", "exchanged"),
+        ({"doubt": "sensor_slipped"}, "bad", "slipped"),
+        ({"doubt": "sensor_late"}, "warn", "late"),
+        ({"doubt": "clocks_disagree"}, "warn", "clock in doubt"),
     ],
 )
 def test_a_sensor_is_judged_by_the_worst(change: dict[str, Any], state: str, words: str) -> None:

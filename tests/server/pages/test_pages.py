@@ -62,6 +62,27 @@ def row_of(html: str, code: str) -> str:
         ("Q-USABLE", {"quality": {"level": "usable"}, "warnings": []}, "warn", "Usable, see notices"),
         ("Q-POOR", {"quality": {"level": "poor"}, "warnings": []}, "bad", "Poor data"),
         ("Q-APART", {"estimator": {"verdict": "bad"}, "warnings": []}, "bad", "Sensors disagree"),
+        (
+            "Q-PATH",
+            {
+                "estimator": {
+                    "verdict": "bad",
+                    "health": [
+                        {
+                            "name": "zero_velocity_refused_pct",
+                            "of": "foot_r",
+                            "value": 28.0,
+                            "warn": 2.0,
+                            "bad": 20.0,
+                            "verdict": "bad",
+                        }
+                    ],
+                },
+                "warnings": [],
+            },
+            "bad",
+            "Foot path in doubt",
+        ),
         ("Q-NONE", {"parameters": [], "warnings": []}, "bad", "No strides"),
     ],
 )

@@ -62,7 +62,14 @@ async def full(
             pid = sessions.get(c, last).patient_id
         yield (
             clinic,
-            {"pid": pid, "sid": last, "other": earlier[-1], "name": "stance_pct", "token": "x" * 43},
+            {
+                "pid": pid,
+                "sid": last,
+                "other": earlier[-1],
+                "name": "stance_pct",
+                "token": "x" * 43,
+                "device_id": crowd.DEVICES[0],
+            },
         )
 
 

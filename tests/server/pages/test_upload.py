@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import pytest
 
 from server.pages.upload import fits_movement, view_inspection
+from server.services.devices import LastPlaces
 from server.services.recordings import StoredRecording
 
 
@@ -75,9 +77,51 @@ def test_an_earlier_visit_that_contradicts_the_movement_is_not(earlier: dict[str
     assert view_inspection(recording(WALKER), earlier)["ask_sides"]
 
 
+LAST = LastPlaces({"P": "pelvis", "A": "foot_r", "B": "foot_l"}, dt.date(2026, 5, 3))
+
+
+def test_the_clinics_last_take_goes_before_movement_and_is_said() -> None:
+    view = view_inspection(recording(WALKER), {}, LAST)
+    assert chosen(view) == {**LAST.segments, "C": None}
+    assert view["as_before"] == {"count": 3, "day": LAST.day, "of_patient": False}
+    assert not view["ask_sides"]
+
+
+def test_a_patients_own_last_visit_goes_before_the_clinics() -> None:
+    left_first = LastPlaces({"P": "pelvis", "A": "foot_l", "B": "foot_r"}, LAST.day)
+    view = view_inspection(recording(WALKER), RIGHT_WAY, left_first)
+    assert chosen(view) == RIGHT_WAY
+    assert view["as_before"] == {"count": 4, "day": None, "of_patient": True}
+
+
+@pytest.mark.parametrize(
+    "devices",
+    [
+        [device("A", "shank", 1), *WALKER[:1], *WALKER[2:]],  # it moves like another segment
+        [
+            device("A", "foot", suggested="foot_l", basis="label"),
+            *WALKER[:1],
+            *WALKER[2:],
+        ],  # its name says so
+        [*WALKER, device("D", "foot", suggested="foot_r", basis="label")],  # another sensor's name says so
+    ],
+)
+def test_the_clinics_last_take_counts_as_a_whole_or_not_at_all(devices: list[dict[str, Any]]) -> None:
+    view = view_inspection(recording(devices), {}, LAST)
+    assert view["as_before"] is None
+    assert chosen(view)["A"] != "foot_r"
+
+
+def test_a_name_that_agrees_leaves_the_rest_to_the_last_take() -> None:
+    devices = [device("A", "foot", suggested="foot_r", basis="label"), device("B"), device("P")]
+    view = view_inspection(recording(devices), {}, LAST)
+    assert chosen(view) == dict(LAST.segments)
+    assert view["as_before"]["count"] == 2
+
+
 def test_what_a_person_has_set_goes_before_everything() -> None:
     manifest = {"sensors": {"A": "foot_l", "B": None}}
-    view = view_inspection(recording(WALKER, manifest), RIGHT_WAY)
+    view = view_inspection(recording(WALKER, manifest), RIGHT_WAY, LAST)
     assert chosen(view)["A"] == "foot_l"
     assert chosen(view)["B"] is None
 

@@ -8,7 +8,9 @@ import re
 import pytest
 
 from core.pipeline import WALK
+from server.pages.data import FILE_WORDS
 from server.pages.session_context import STAGE_NAMES
+from server.report import activity_files, exports
 from web.words import day, filesize, moment, number, pattern, seconds
 
 
@@ -42,6 +44,13 @@ def test_times_are_said_in_utc() -> None:
 def test_a_code_as_a_pattern_matches_itself_only(code: str) -> None:
     assert re.fullmatch(pattern(code), code)
     assert not re.fullmatch(pattern(code), code + "x")
+
+
+def test_every_result_file_has_words_on_the_data_page() -> None:
+    documented = f"{exports.__doc__}\n{activity_files.__doc__}"
+    told = re.findall(r"^([a-z_]+\.(?:json|parquet|csv)) ", documented, re.MULTILINE)
+    assert len(told) >= 8
+    assert set(FILE_WORDS) == set(told)
 
 
 def test_every_stage_of_the_pipeline_has_words_in_its_order() -> None:

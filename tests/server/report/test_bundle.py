@@ -42,7 +42,12 @@ def test_analysis_json_is_strict_json_of_schema_1(files: Mapping[str, bytes]) ->
     assert set(data) == {
         "schema",
         "quality",
+        "devices",
+        "setup",
+        "agreement",
         "calibration",
+        "calibration_score",
+        "functional",
         "estimator",
         "parameters",
         "scores",
@@ -56,7 +61,7 @@ def test_analysis_json_is_strict_json_of_schema_1(files: Mapping[str, bytes]) ->
     assert row["mean"] == pytest.approx(walk.STRIDE_S)
     assert set(row) == {
         *("name", "side", "n", "mean", "sd", "unit", "reason"),
-        *("cv_pct", "ci_low", "ci_high", "note", "uncertainty", "u_own", "u_common"),
+        *("cv_pct", "ci_low", "ci_high", "note", "uncertainty", "u_own", "u_common", "estimated"),
     }
 
 

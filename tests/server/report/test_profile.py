@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from server.report.model import report_model
-from server.report.profile import profile_view
+from server.report.profile import TOTALS, profile_view
 from tests.server.report.conftest import MakeBundle
 from tests.server.report.test_estimator import section
 
@@ -12,7 +12,8 @@ def test_every_scored_curve_has_a_bar_and_the_profile_comes_last(make_bundle: Ma
     profile = report_model(make_bundle()).profile
     assert profile is not None
     titles = [row.title for row in profile.rows]
-    assert titles[-1] == "gps_sagittal"
+    assert titles[-1] == "Sagittal profile score, levels removed"
+    assert not any("_" in title for _, _, title in TOTALS)
     assert "Knee flexion" in titles
     assert "Pelvic rotation" not in titles, "not measured against the walking direction"
     assert [row.total for row in profile.rows].count(True) == 1
@@ -37,7 +38,7 @@ def test_estimated_angles_are_not_scored(make_bundle: MakeBundle) -> None:
     profile = report_model(bundle).profile
     assert profile is not None
     assert "Knee flexion" not in [row.title for row in profile.rows]
-    assert "gps_sagittal" not in [row.title for row in profile.rows]
+    assert not any("profile score" in row.title for row in profile.rows)
 
 
 def test_without_angles_there_is_none(make_bundle: MakeBundle) -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import datetime as dt
+import io
+import json
 import re
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import pytest
 from defusedxml import ElementTree
@@ -13,7 +16,8 @@ from core.condition import USUAL
 from core.norms import look_up_norms, temporal_values
 from core.parameters.result import Parameter
 from server.report.change_words import change_words
-from server.report.numbers import Numbers
+from server.report.numbers import Numbers, read_numbers
+from server.report.tables import trends_csv
 from server.report.trend_chart import PlannedAssessment, trend_svg, value_range
 from server.report.trends import AnalysedVisit, Trend, VisitKind, follow_figures, names_in
 
@@ -100,6 +104,63 @@ def test_a_base_without_a_value_is_the_next_assessment_that_has_one() -> None:
     assert line.base == 0
     assert line.change is not None
     assert line.change.before == 0.5
+
+
+def knee(value: float, *, estimated: bool = False) -> Parameter:
+    return Parameter("knee_flexion_rom_deg", "left", 40, value, 1.0, "deg", estimated=estimated)
+
+
+def test_an_estimated_angle_is_on_no_line_with_measured_ones() -> None:
+    visits = (
+        visit(0, knee(52.4, estimated=True)),
+        visit(7, knee(79.2)),
+        visit(14, knee(60.0, estimated=True)),
+        visit(21, knee(70.0)),
+    )
+    trend = one(*visits, name="knee_flexion_rom_deg")
+    (line,) = trend.lines
+    assert [p.estimated for p in line.points] == [True, False, True, False]
+    # the first that was measured is the base
+    assert (line.base, line.latest) == (1, 3)
+    assert line.change is not None
+    assert line.change.difference == pytest.approx(-9.2)
+    for k in (0, 2):
+        told = line.points[k].change
+        assert told is not None
+        assert (told.difference, told.reason) == (None, "not_measured_alike")
+        assert change_words(told).verdict == "not compared: one is measured, the other estimated"
+    drawn = trend_svg(trend, line, visits)
+    assert drawn.count('class="pl-l est"') == 2
+    assert drawn.count('class="tr-l"') == 1
+    rows = list(csv.DictReader(io.StringIO(trends_csv(visits, [trend]).decode())))
+    assert [r["estimated"] for r in rows] == ["1", "0", "1", "0"]
+    assert [r["change"] for r in rows] == ["", "", "", "-9.2"]
+
+
+def test_where_the_last_is_estimated_nothing_is_compared() -> None:
+    line = one(visit(0, knee(79.2)), visit(7, knee(52.4, estimated=True)), name="knee_flexion_rom_deg").lines[
+        0
+    ]
+    assert (line.base, line.latest) == (0, 1)
+    assert line.change is not None
+    assert (line.change.verdict, line.change.reason) == (None, "not_measured_alike")
+
+
+@pytest.mark.parametrize("stored", ["with", "without"])
+def test_numbers_of_a_file_say_which_angles_are_estimated(stored: str) -> None:
+    rows = [asdict(knee(52.4, estimated=True)), asdict(speed(1.0))]
+    if stored == "without":
+        rows = [{k: v for k, v in row.items() if k != "estimated"} for row in rows]
+    data = {
+        "quality": {"level": "good", "reasons": []},
+        "estimator": {"estimated_angles": ["knee_flexion_l", "knee_flexion_r"], "verdict": "good"},
+        "parameters": rows,
+        "scores": [],
+        "warnings": [],
+    }
+    found = read_numbers(json.dumps(data).encode())
+    assert found is not None
+    assert [p.estimated for p in found.parameters] == [True, False]
 
 
 def test_few_strides_widen_the_band_to_what_they_leave_open() -> None:

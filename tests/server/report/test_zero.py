@@ -40,6 +40,7 @@ def panel(model: ReportModel, variable: str) -> CurvePanel:
 
 @settings(deadline=None, max_examples=12)
 @given(st.dictionaries(st.sampled_from(NAMES), st.floats(-40.0, 40.0)))
+@pytest.mark.slow
 def test_a_curve_has_a_norm_band_of_its_own_zero_or_none(
     make_bundle: MakeBundle, standing: dict[str, float]
 ) -> None:

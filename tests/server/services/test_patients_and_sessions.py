@@ -11,9 +11,20 @@ from sqlalchemy import select
 
 from core.errors import SagittalError
 from server import audit
+from server.jobs.queue import COMPARE_FILTERS
 from server.jobs.table import TableQueue
-from server.services import analyses, checks, erasure, jobs, patients, recordings, sessions
-from server.services.errors import Conflict, NotFound, ServiceError
+from server.services import (
+    analyses,
+    checks,
+    erasure,
+    filter_runs,
+    jobs,
+    patients,
+    recordings,
+    reference_files,
+    sessions,
+)
+from server.services.errors import Conflict, NotFound, ServiceError, TooLarge
 from server.services.reviewed import ReviewedAnalyses
 from server.services.sweep import sweep
 from server.settings import Settings
@@ -72,6 +83,23 @@ class Clinic:
             found = analyses.latest(c, session_id)
         assert found is not None
         return found
+
+    def compare(self, session_id: str, reference: bytes, content: bytes = b"{}") -> None:
+        """A comparison of filters against a reference, without the numbers."""
+        with reference_files.receive_reference(
+            self.db, self.blobs, self.settings, self.who, session_id, "optical.sto"
+        ) as upload:
+            upload.write(reference)
+            upload.keep()
+        with self.db.write() as c:
+            filter_runs.submit(
+                c, self.queue, None, session_id,
+                filters=["mahony_2008"], magnetometer=True, reference="optical.sto",
+            )  # fmt: skip
+        claim = self.queue.claim("w", (COMPARE_FILTERS,))
+        assert claim is not None
+        stored = {"filters.json": self.blobs.put(claim.params["space"], content)}
+        assert self.queue.finish(claim, lambda c: filter_runs.publish(c, claim, stored))
 
     def trail(self) -> list[str]:
         with self.db.read() as c:
@@ -167,7 +195,10 @@ def test_files_are_added_replaced_and_removed(clinic: Clinic) -> None:
         recordings.remove_file(c, clinic.who, session_id, "left 🦶.csv")
 
 
-@pytest.mark.parametrize("name", ["", "/", "../a", "a/../b", "a\x00b", "a\nb", "x" * 501])
+@pytest.mark.parametrize(
+    "name",
+    ["", "/", "../a", "a/../b", "a\x00b", "a\nb", "x" * 501, "a\u202etxt.exe", "caf\ufffd.csv", "\u200ea"],
+)
 def test_a_name_that_is_no_name_is_refused(clinic: Clinic, name: str) -> None:
     session_id = clinic.session(clinic.patient())
     with pytest.raises(SagittalError) as caught:
@@ -335,6 +366,7 @@ def test_no_byte_of_an_erased_patient_is_left_in_the_data_folder(clinic: Clinic)
         session_id = sessions.create(c, clinic.who, patient_id, title="CANARY-TITLE").id
     clinic.upload(session_id, "CANARY-FILE", b"CANARY-BYTES")
     clinic.analyse(session_id, b"CANARY-RESULT")
+    clinic.compare(session_id, b"CANARY-REFERENCE", b"CANARY-FILTERS")
 
     def found() -> set[str]:
         files = [p for p in clinic.settings.data_dir.rglob("*") if p.is_file()]
@@ -362,6 +394,7 @@ def test_no_byte_of_an_erased_session_is_left_and_who_reads_an_older_state_only_
         sessions.change(c, clinic.who, session_id, {"note": "CANARY-NOTE " * 500})
     clinic.upload(session_id, "CANARY-FILE", b"CANARY-BYTES")
     clinic.analyse(session_id, b"CANARY-RESULT")
+    clinic.compare(session_id, b"CANARY-REFERENCE", b"CANARY-FILTERS")
 
     def found() -> bool:
         return any(b"CANARY" in p.read_bytes() for p in clinic.settings.data_dir.rglob("*") if p.is_file())
@@ -386,6 +419,43 @@ def test_erasing_a_session_keeps_the_files_another_one_shares(clinic: Clinic) ->
     erasure.erase_session(clinic.db, ReviewedAnalyses(clinic.blobs), clinic.settings, clinic.who, one)
     assert [f.path.read_bytes() for f in clinic.blobs.files()] == [b"shared"]
     assert checks.check(clinic.db, clinic.blobs, clinic.settings) == []
+
+
+def test_a_reference_that_was_replaced_stays_with_the_comparison_that_used_it(clinic: Clinic) -> None:
+    session_id = clinic.session(clinic.patient())
+    clinic.upload(session_id)
+    clinic.analyse(session_id)
+    clinic.compare(session_id, b"first")
+    clinic.compare(session_id, b"second")
+    with clinic.db.write() as c:
+        assert len(reference_files.list_files(c, session_id)) == 1
+        reference_files.remove(c, clinic.who, session_id, "optical.sto")
+        assert reference_files.list_files(c, session_id) == []
+        used = [run.reference_sha256 for run in filter_runs.of_session(c, session_id)]
+    assert len(set(used)) == 2
+    # the newest recording, its analysis and the state of the session do not know of it
+    assert clinic.recording(session_id).files[0].name == "a.txt"
+    assert sweep(clinic.db, clinic.blobs, replace(clinic.settings, sweep_grace_s=0.0)) == 0
+    assert {f.name for f in clinic.blobs.files()} > set(used)
+    assert clinic.trail().count("reference.added") == 2
+
+
+def test_more_references_than_a_session_takes_are_refused(
+    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reference_files, "MOST_FILES", 1)
+    session_id = clinic.session(clinic.patient())
+    for name in ("a.sto", "a.sto", "b.sto"):
+        with reference_files.receive_reference(
+            clinic.db, clinic.blobs, clinic.settings, clinic.who, session_id, name
+        ) as upload:
+            upload.write(name.encode())
+            if name == "a.sto":
+                upload.keep()
+                continue
+            with pytest.raises(TooLarge) as caught:
+                upload.keep()
+            assert caught.value.code == "too_many_files"
 
 
 def test_the_sweep_takes_only_old_files_that_nothing_refers_to(clinic: Clinic) -> None:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,12 +29,13 @@ def motion() -> ReplayMotion:
 
 @dataclass
 class Ward:
-    """A clinic on a port with one visit that can be replayed and one that cannot."""
+    """A clinic on a port with a visit that can be replayed, one not analysed, and one without a figure."""
 
     clinic: Clinic
     port: int
     session_id: str
     empty_session_id: str
+    trunk_session_id: str
 
     def cookie(self, role: str = "clinician") -> dict[str, str]:
         """Header of a fresh sign-in."""
@@ -51,9 +52,10 @@ async def open_ward(folder: Path) -> AsyncIterator[Ward]:
     async with open_clinic(folder) as clinic, serve(clinic.app) as port:
         with clinic.db.write() as c:
             patient_id = patients.create(c, None, code="V-1").id
-            session_id, empty_id = (sessions.create(c, None, patient_id).id for _ in range(2))
-        _finish_analysis(clinic, patient_id, session_id)
-        yield Ward(clinic, port, session_id, empty_id)
+            session_id, empty_id, trunk_id = (sessions.create(c, None, patient_id).id for _ in range(3))
+        _finish_analysis(clinic, patient_id, session_id, {"poses.parquet": poses_parquet(walk.poses())})
+        _finish_analysis(clinic, patient_id, trunk_id, {"steps.csv": b"time_s,side\n"})
+        yield Ward(clinic, port, session_id, empty_id, trunk_id)
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +83,7 @@ def served(loop: asyncio.AbstractEventLoop, tmp_path_factory: pytest.TempPathFac
     asyncio.run_coroutine_threadsafe(ward.__aexit__(None, None, None), loop).result(30)
 
 
-def _finish_analysis(clinic: Clinic, patient_id: str, session_id: str) -> None:
+def _finish_analysis(clinic: Clinic, patient_id: str, session_id: str, files: Mapping[str, bytes]) -> None:
     """Do what upload and worker do, with poses whose truth is known instead of a computed result."""
     state = clinic.app.state
     with recordings.receive(clinic.db, state.blobs, clinic.settings, None, session_id, "walk.txt") as upload:
@@ -90,5 +92,5 @@ def _finish_analysis(clinic: Clinic, patient_id: str, session_id: str) -> None:
     with clinic.db.write() as c:
         analyses.submit(c, state.queue, None, session_id)
     claim = state.queue.claim("test", [recordings.ANALYSE])
-    stored = {"poses.parquet": state.blobs.put(patient_id, poses_parquet(walk.poses()))}
+    stored = {name: state.blobs.put(patient_id, content) for name, content in files.items()}
     assert state.queue.finish(claim, lambda c: analyses.publish(c, claim, stored, "0" * 64))

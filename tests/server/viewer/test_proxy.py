@@ -17,6 +17,7 @@ from websockets.typing import Subprotocol
 from server.auth.identity import Identity
 from server.auth.roles import Role
 from server.viewer import pipe
+from server.viewer.proxy import NO_FIGURE
 from server.viewer.views import FigureView, FigureViews
 from tests.server.viewer.conftest import Ward
 
@@ -70,10 +71,18 @@ async def test_a_message_that_makes_no_sense_is_answered_not_fatal(ward: Ward, m
 async def test_a_session_without_poses_says_so(ward: Ward) -> None:
     async with replaying(ward, ward.cookie(), ward.empty_session_id) as (ws, answer):
         assert answer["error"]["code"] == "no_poses"  # type: ignore[index]
+        assert "nothing is analysed yet" in str(answer["error"])
         with pytest.raises(ConnectionClosed) as closed:
             await ws.recv()
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 4404
+
+
+async def test_an_analysis_without_a_figure_does_not_read_as_pending(ward: Ward) -> None:
+    async with replaying(ward, ward.cookie(), ward.trunk_session_id) as (_, answer):
+        assert answer["error"]["code"] == "no_poses"  # type: ignore[index]
+        assert NO_FIGURE in str(answer["error"])
+        assert "yet" not in NO_FIGURE
 
 
 async def test_a_tab_gets_its_own_view_and_a_reload_the_same(ward: Ward) -> None:

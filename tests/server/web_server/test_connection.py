@@ -163,6 +163,7 @@ async def test_a_body_that_stops_or_only_drips_is_closed(knock: Knock, impatient
     await asyncio.gather(dripping, return_exceptions=True)
 
 
+@pytest.mark.slow
 async def test_a_slow_upload_that_goes_on_is_kept_whole(tmp_path: Path) -> None:
     chunk, chunks, window_s = b"a" * 100, 10, 1.0  # longer: a busy machine stands still for a moment
 

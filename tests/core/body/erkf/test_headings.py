@@ -106,6 +106,7 @@ def test_what_was_turned_is_told_as_health() -> None:
     assert told["thigh_r"].value == pytest.approx(20.0)
 
 
+@pytest.mark.slow
 def test_an_axis_turned_right_round_is_not_told_as_more_than_half_a_turn() -> None:
     wrong, orientations, _ = take(3, {"shank_r": 180.0})
     body, _ = nominal_body(wrong.recording.subject.height_m)

@@ -260,12 +260,7 @@ def test_a_burst_of_no_numbers_is_a_gap(estimator: Estimator) -> None:
         assert np.isfinite(done.poses.p[segment]).all()
         assert np.isfinite(done.poses.q[segment]).all()
     assert done.angles is not None
-    if estimator == "l7s_2i":
-        # two sensors do not find back: the legs come off their hinges, and nothing of them is shown
-        assert {"legs_do_not_fit", "angles_withheld"} <= {n.code for n in done.notices}
-        assert "knee_flexion_r" not in done.angles.angles
-    else:
-        assert np.isnan(done.angles.angles["knee_flexion_r"][2005:2035]).all()
+    assert np.isnan(done.angles.angles["knee_flexion_r"][2005:2035]).all()
 
 
 def test_a_number_that_is_none_inside_a_valid_sample_is_refused() -> None:
@@ -335,7 +330,7 @@ def test_a_treadmill_is_told_because_its_signals_are_those_of_the_floor(estimato
 
 
 @pytest.mark.parametrize("estimator", BOTH)
-@pytest.mark.parametrize("protocol", ["squat", "activity", "tug"])
+@pytest.mark.parametrize("protocol", slow_beyond(1, ["squat", "activity", "tug"]))
 def test_a_protocol_in_which_the_pelvis_sinks_is_told(estimator: Estimator, protocol: str) -> None:
     made = run(replace(take(estimator), protocol=protocol), estimator)  # type: ignore[arg-type]
     assert "pelvis_height_assumed" in codes(made)

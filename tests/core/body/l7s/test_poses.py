@@ -11,6 +11,7 @@ import pytest
 from core.angles.measure import measure_angles
 from core.body.l7s.constraints import constraint_rows
 from core.body.l7s.filter import L7sInputs, L7sParams, Worn, filter_block, start_l7s_state
+from core.body.l7s.health import l7s_health
 from core.body.l7s.inputs import free_acceleration, inputs_of
 from core.body.l7s.legs import LegModel
 from core.body.l7s.poses import l7s_poses
@@ -27,6 +28,7 @@ from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import about, exp, multiply, to_matrix
 from core.simulate import WalkTruth
+from core.withheld import withhold
 from tests.walks import simulated
 
 BODY = BodyModel.from_height(1.75)
@@ -52,10 +54,10 @@ def walk() -> tuple[CalibratedRecording, Orientations, dict[Side, Bools], WalkTr
     return calibrated, estimate_orientations(calibrated), still_feet(calibrated), truth
 
 
-def poses_of(worn: Worn, params: L7sParams | None = None) -> Poses:
+def poses_of(worn: Worn, params: L7sParams | None = None, *, both_ways: bool = True) -> Poses:
     calibrated, orientations, steps, truth = walk()
     acceleration = free_acceleration(calibrated, orientations)
-    return l7s_poses(orientations, acceleration, steps, truth.body, params, worn)
+    return l7s_poses(orientations, acceleration, steps, truth.body, params, worn, both_ways=both_ways)
 
 
 def random_state(seed: int) -> tuple[Floats, Floats, Floats]:
@@ -134,10 +136,11 @@ LIMITS = {
 FLEXION = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 
 
+@pytest.mark.parametrize("both_ways", [False, True])
 @pytest.mark.parametrize("worn", ["3I", "2I"])
-def test_angles_and_strides_of_a_simulated_walk_are_within_the_limits(worn: Worn) -> None:
+def test_angles_and_strides_of_a_simulated_walk_are_within_the_limits(worn: Worn, both_ways: bool) -> None:
     calibrated, _, _, truth = walk()
-    found = poses_of(worn)
+    found = poses_of(worn, both_ways=both_ways)
     posed = Orientations(found.t_s, found.rate_hz, found.q, dict.fromkeys(found.q, found.valid), found.method)
     angles = measure_angles(posed, calibrated.calibration.zero).angles
     true, n = truth.subtract_standing(), len(found.t_s)
@@ -160,7 +163,7 @@ def test_angles_and_strides_of_a_simulated_walk_are_within_the_limits(worn: Worn
 def test_the_share_of_straight_knees_does_not_depend_on_the_number_of_projections(worn: Worn) -> None:
     shares, excess = [], []
     for projections in (1, 2, 3):
-        diagnostics = poses_of(worn, L7sParams(projections=projections)).diagnostics
+        diagnostics = poses_of(worn, L7sParams(projections=projections), both_ways=False).diagnostics
         shares.append(list(diagnostics["knee_straight_share"].values()))  # type: ignore[attr-defined]
         excess.append(max(diagnostics["excess_m"].values()))  # type: ignore[attr-defined]
     np.testing.assert_allclose(shares[1:], shares[:2], atol=0.02)
@@ -246,3 +249,22 @@ def test_a_foot_that_never_rests_is_told() -> None:
     never = {**steps, "left": np.zeros_like(steps["left"])}
     found = l7s_poses(orientations, free_acceleration(calibrated, orientations), never, truth.body)
     assert "foot_never_still" in {n.code for n in found.notices}
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(0.19, "good"), (0.4, "warn"), (0.6, "bad")])
+def test_a_knee_that_mostly_rests_on_its_bound_is_no_measurement(share: float, verdict: str) -> None:
+    made = poses_of("3I")
+    diagnostics = {**made.diagnostics, "knee_straight_share": {"left": 0.05, "right": share}}
+    judged = replace(made, health=l7s_health(replace(made, diagnostics=diagnostics)))
+    found = {f.of: f.verdict for f in judged.health if f.name == "knee_straight_pct"}
+    assert found == {"leg_l": "good", "leg_r": verdict}
+    calibrated, orientations, _, _ = walk()
+    posed = Orientations(made.t_s, made.rate_hz, made.q, dict.fromkeys(made.q, made.valid), made.method)
+    angles = replace(
+        measure_angles(posed, calibrated.calibration.zero),
+        diagnostics={"estimated": ("knee_flexion_l", "knee_flexion_r", "hip_flexion_r")},
+    )
+    kept = withhold(angles, judged, orientations)
+    gone = {"knee_flexion_r", "hip_flexion_r"} if verdict == "bad" else set()
+    assert set(kept.withheld) == gone
+    assert "knee_flexion_l" in kept.angles

@@ -1,0 +1,92 @@
+"""Simulated squats with sensors where the chain expects them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import radians
+
+import numpy as np
+
+from core.body.chain.filter import ChainFilter, ChainFilterParams, ChainMotion
+from core.body.chain.geometry import LegGeometry
+from core.body.chain.model import build_leg_chain, leg_segments
+from core.calibration.fixed_offset import make_fixed_mounts
+from core.frames import FOOT, Floats, Segment, Side
+from core.rotation import from_matrix
+from core.simulate import RecordingSetup, SensorNoise, Squats, SquatSimulation, simulate_squats
+from core.simulate.squat_chain import measure_leg, place_sensors
+from core.simulate.truth import joint_angles
+from core.squat.joints import JOINTS
+
+HEIGHT_M = 1.75
+
+
+def squat_on(
+    side: Side = "right",
+    rate_hz: float = 50.0,
+    noise: SensorNoise | None = None,
+    seed: int = 0,
+    repetitions: int = 3,
+) -> SquatSimulation:
+    """A hinge for a knee, sensors put on by the fixed offset."""
+    squats = Squats(side=side, hinged=True, repetitions=repetitions)
+    setup = RecordingSetup(rate_hz=rate_hz, noise=noise)
+    return simulate_squats(
+        squats, HEIGHT_M, seed, setup, place_sensors(measure_leg(HEIGHT_M, side), HEIGHT_M)
+    )
+
+
+def stack_signals(made: SquatSimulation, side: Side) -> tuple[Floats, Floats]:
+    """Rates and forces (n, 3, 3) of errorless sensors, from the foot up."""
+    worn = leg_segments(side)
+    return tuple(np.stack([getattr(made.ideal[s], k) for s in worn], axis=1) for k in ("gyr", "acc"))  # type: ignore[return-value]
+
+
+def start_filter(
+    acc: Floats,
+    rate_hz: float,
+    leg: LegGeometry,
+    mounts: Mapping[Segment, Floats] | None = None,
+    params: ChainFilterParams | None = None,
+) -> ChainFilter:
+    """A filter that has seen two seconds of standing."""
+    chain = build_leg_chain(leg, mounts or make_fixed_mounts(leg.side))
+    return ChainFilter(chain, rate_hz, acc[: round(2.0 * rate_hz)].mean(axis=0), params)
+
+
+def find_errors_deg(
+    motion: ChainMotion,
+    leg: LegGeometry,
+    made: SquatSimulation,
+    mounts: Mapping[Segment, Floats] | None = None,
+) -> Floats:
+    """RMS errors (7,) of the angles `JOINTS`."""
+    links = build_leg_chain(leg, mounts or make_fixed_mounts(leg.side)).links(motion.angles)
+    q = {s: from_matrix(R) for s, R in zip(leg_segments(leg.side), links, strict=True)}
+    foot = FOOT[leg.side]
+    angles = joint_angles({**q, foot: made.truth.q[foot]})
+    errors = [angles[f"{j}_{leg.side[0]}"] - made.truth.angles[f"{j}_{leg.side[0]}"] for j in JOINTS]
+    return np.asarray(np.degrees(np.sqrt(np.mean(np.square(errors), axis=1))))
+
+
+def run(
+    made: SquatSimulation,
+    leg: LegGeometry,
+    mounts: Mapping[Segment, Floats] | None = None,
+    bias_deg: float = 0.0,
+    params: ChainFilterParams | None = None,
+) -> Floats:
+    """RMS errors (7,) in degrees of a chain on errorless signals with a bias of all gyroscopes, °/s."""
+    gyr, acc = stack_signals(made, leg.side)
+    motion = start_filter(acc, made.truth.rate_hz, leg, mounts, params).advance(gyr + radians(bias_deg), acc)
+    return find_errors_deg(motion, leg, made, mounts)
+
+
+def split(n: int, sizes: Sequence[int]) -> list[slice]:
+    """Blocks of these sizes in turn, over n samples."""
+    found, at, k = [], 0, 0
+    while at < n:
+        size = sizes[k % len(sizes)]
+        found.append(slice(at, min(n, at + size)))
+        at, k = at + size, k + 1
+    return found

@@ -1,0 +1,163 @@
+"""A take of squats, whole chain: depth, times and valgus of every repetition, no strides."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from core.errors import ParameterError
+from core.frames import FOOT, Segment
+from core.pipeline import SQUAT, PipelineConfig, TakeAnalysis, analyse, resume
+from core.pipeline.recipes import choose_recipe
+from core.recording import ImuStream, Recording, Subject, UniformRecording
+from core.rotation import multiply
+from core.simulate import SquatSimulation, simulate_movement
+from core.squat.params import SquatParams
+from core.squat.side import find_squat_side
+from core.timeline import synchronise
+from server.report.bundle import load_bundle
+from server.report.exports import analysis_files
+from server.report.model import report_model
+from tests.core.body.chain.squats import HEIGHT_M, squat_on
+from tests.core.calibration.test_table_top import RATE, WORN, carry
+from tests.walks import assert_same_figures
+
+
+@cache
+def made(name: str = "squats_agreed") -> SquatSimulation:
+    found = simulate_movement(name, 1)
+    assert isinstance(found, SquatSimulation)
+    return found
+
+
+@cache
+def analysis(name: str = "squats_agreed") -> TakeAnalysis:
+    return analyse(made(name).recording)
+
+
+def test_the_protocol_decides_the_recipe_and_the_squats_are_the_true_ones() -> None:
+    a = analysis()
+    assert a.problem is None
+    assert choose_recipe(a) == SQUAT
+    assert [n.code for n in a.notices] == ["mounting_agreed"]
+    found = {p.name: p for p in a.parameters}
+    depths = np.degrees(made().truth.depths_rad)
+    assert {p.side for p in a.parameters} == {"right"}
+    assert found["squat_depth_deg"].n == len(depths) == 6
+    assert found["squat_depth_deg"].mean == pytest.approx(depths.mean(), abs=3.0)
+    assert a.strides is None
+    assert a.poses is None
+
+
+def test_the_files_give_the_report_back() -> None:
+    files = analysis_files(analysis())
+    assert set(files) == {"analysis.json", "angles.parquet", "repetitions.csv", "signals.parquet"}
+    rows = list(csv.DictReader(io.StringIO(files["repetitions.csv"].decode())))
+    assert len(rows) == 6
+    assert all(50.0 < float(row["squat_depth_deg"]) < 90.0 and not row["excluded_reason"] for row in rows)
+    report = report_model(load_bundle(files))
+    assert [name for name, _ in report.groups] == ["Squat on one leg"]
+    assert report.quality.word == "Good data"
+    assert ("Squats used", "6", "right leg") in [(i.label, i.value, i.extra) for i in report.quality.items]
+    assert report.problem is None
+
+
+def test_a_height_that_nobody_gave_is_told() -> None:
+    recording = replace(made().recording, subject=Subject())
+    a = analyse(recording)
+    assert [n.code for n in a.notices] == ["mounting_agreed", "height_assumed"]
+    by_angle = {p.name: p.mean for p in a.parameters}
+    known = {p.name: p.mean for p in analysis().parameters}
+    assert by_angle["squat_depth_deg"] == pytest.approx(known["squat_depth_deg"], abs=0.5)
+
+
+def test_sensors_that_sit_anyhow_stop_it() -> None:
+    a = analysis("squats")
+    assert a.problem is not None
+    assert (a.problem.code, a.stopped_at) == ("mounting_not_as_agreed", "calibration")
+    assert a.parameters == ()
+    assert "repetitions.csv" not in analysis_files(a)
+
+
+def test_an_analysis_goes_on_from_any_stage() -> None:
+    whole = analysis()
+    for stage in ("poses", "angles", "parameters"):
+        again = resume(whole, stage)
+        assert_same_figures(again.parameters, whole.parameters)
+    strict = replace(
+        PipelineConfig().squat, repetitions=replace(PipelineConfig().squat.repetitions, least_rad=2.0)
+    )
+    none = resume(whole, "calibration", replace(PipelineConfig(), squat=strict))
+    assert {p.reason for p in none.parameters} == {"no_repetitions"}
+    assert report_model(load_bundle(analysis_files(none))).quality.word == "No squats"
+
+
+def test_of_two_legs_with_sensors_the_standing_foot_tells() -> None:
+    uniform = synchronise(made().recording)
+    both = dict(uniform.sensors)
+    other: dict[Segment, Segment] = {"shank_l": "shank_r", "thigh_l": "thigh_r", "foot_l": "thigh_r"}
+    both |= {left: uniform.sensors[right] for left, right in other.items()}
+    assert find_squat_side(replace(uniform, sensors=both)) == "right"
+    del both[FOOT["right"]]
+    assert refusal(replace(uniform, sensors=both)) == "side_unknown"
+    del both["pelvis"]
+    assert refusal(replace(uniform, sensors=both)) == "segments_missing"
+
+
+def refusal(recording: UniformRecording) -> str:
+    from core.errors import EstimationError
+
+    with pytest.raises(EstimationError) as caught:
+        find_squat_side(recording)
+    return caught.value.code
+
+
+@cache
+def from_table() -> Recording:
+    """Squats of a take that begins on the table: three sensors are put on one after the other."""
+    rng = np.random.default_rng(3)
+    squats = squat_on("right", RATE, repetitions=2)
+    streams: dict[str, ImuStream] = {}
+    segments: dict[str, Segment | None] = {}
+    for i, segment in enumerate(WORN):
+        truth = squats.truth
+        worn = multiply(truth.q[segment][0], truth.mounts[segment].q_segment_sensor)
+        way, done = carry(worn, rng, None, 0.5, move_s=6.0), squats.ideal[segment]
+        lying = np.zeros((round(3.0 * i * RATE), 3))
+        standing = np.zeros((round(3.0 * (2 - i) * RATE), 3))
+        bias = np.radians(0.5) * np.array([1.0, -1.0, 1.0])
+        gyr = np.concatenate((lying + bias, way.gyr, standing + bias, done.gyr + bias))
+        acc = np.concatenate((lying + way.acc[0], way.acc, standing + way.acc[-1], done.acc))
+        noise = rng.normal(0.0, 0.005, (2, *gyr.shape))
+        gyr, acc = gyr + 0.2 * noise[0], acc + noise[1]
+        t = np.arange(len(gyr)) / RATE
+        streams[segment] = ImuStream(segment, segment, t, acc, gyr, None, None, RATE, "counter", segment)
+        segments[segment] = segment
+    return Recording(streams, segments, Subject(HEIGHT_M), "squat")
+
+
+def test_a_take_that_begins_on_the_table_calibrates_itself() -> None:
+    config = PipelineConfig(squat=SquatParams(mounting="table_top"))
+    a = analyse(from_table(), config)
+    assert a.problem is None, a.problem
+    assert a.calibration is not None
+    assert a.calibration.method == "table_top"
+    depth = next(p for p in a.parameters if p.name == "squat_depth_deg")
+    truth = np.degrees(squat_on("right", RATE, repetitions=2).truth.depths_rad)
+    assert depth.n == 2
+    assert depth.mean == pytest.approx(truth.mean(), abs=3.0)
+    assert "mounting_agreed" not in [n.code for n in a.notices]
+
+
+def test_a_take_that_does_not_begin_on_the_table_is_refused() -> None:
+    a = analyse(made().recording, PipelineConfig(squat=SquatParams(mounting="table_top")))
+    assert a.problem is not None
+    assert a.problem.code == "body_not_still"
+    with pytest.raises(ParameterError) as caught:
+        SquatParams(mounting="by_hand")  # type: ignore[arg-type]
+    assert caught.value.code == "unknown_mounting"

@@ -1,0 +1,147 @@
+"""The sensitivity analysis on simulated squats, whose truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import radians
+
+import numpy as np
+import pytest
+
+from core.body.chain.leg import estimate_leg
+from core.calibration.fixed_offset import make_fixed_mounts
+from core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
+from core.errors import EstimationError, ParameterError
+from core.rotation import about, to_matrix
+from core.simulate import RecordingSetup
+from core.simulate.squat_chain import measure_leg
+from core.simulate.truth import joint_angles
+from core.squat.joints import JOINTS, name_joint_angles
+from core.squat.sensitivity import (
+    PARAMETERS,
+    SensitivityTable,
+    SquatCase,
+    analyse_sensitivity,
+    average_sensitivity,
+    make_case,
+)
+from core.timeline import synchronise
+from tests.core.body.chain.squats import HEIGHT_M, squat_on
+
+
+@cache
+def case() -> SquatCase:
+    """Two squats with noise, every sensor exactly as agreed."""
+    made = squat_on("right", 50.0, RecordingSetup().noise, repetitions=2)
+    calibrated = calibrate_with_mounts(
+        synchronise(made.recording), make_fixed_mounts("right"), "fixed_offset", FIXED_OFFSET
+    )
+    leg = measure_leg(HEIGHT_M, "right")
+    return make_case(calibrated, leg, made.truth.t_s, made.truth.angles, from_standing=False)
+
+
+@cache
+def table() -> SensitivityTable:
+    return analyse_sensitivity(case())
+
+
+def test_the_24_parameters_of_the_paper() -> None:
+    assert len(PARAMETERS) == 24
+    assert tuple(row.name for row in table().rows) == PARAMETERS
+    assert np.degrees(table().errors[:6]).max() < 1.0
+
+
+def test_nothing_is_five_percent_off_zero() -> None:
+    zero = {
+        "Zr3S",
+        "Yr3",
+        "Zr3",
+        "Zr4S",
+        "Yr4",
+        "Zr4",
+        *(n for n in PARAMETERS if n[-4:] in ("-tib", "-thi", "-bac")),
+    }
+    zero.discard("Roll-tib")
+    rows = {row.name: row for row in table().rows}
+    for name in PARAMETERS:
+        row = rows[name]
+        assert (row.reason == "parameter_nominal_zero") == (name in zero), name
+        assert (row.relative_rad is None) == (row.sensitivity_pct is None) == (name in zero), name
+        assert np.isfinite(row.absolute_rad).all()
+    assert rows["Roll-tib"].nominal == pytest.approx(radians(45.0))
+
+
+def test_what_is_above_does_not_move_what_is_below() -> None:
+    for row in table().rows:
+        if row.name.endswith("-thi") or row.name in ("LThi2Knee", "CThi"):
+            assert row.absolute_rad[:3] == pytest.approx(0.0)
+        if row.name.endswith("-bac") or row.name in ("PW", "PD", "LL", "Lthigh"):
+            assert row.absolute_rad[:4] == pytest.approx(0.0)
+
+
+def test_a_change_is_that_of_equation_1() -> None:
+    """The figure of one parameter, worked out by hand from three runs."""
+    row = next(r for r in table().rows if r.name == "Roll-tib")
+    turn = 0.05 * radians(45.0)
+    mount = case().mounts["shank_r"]
+    errors = []
+    for by in (turn, -turn):
+        off = replace(case(), mounts={**case().mounts, "shank_r": to_matrix(about(1, by)) @ mount})
+        errors.append(analyse_errors(off))
+    change = np.mean(np.abs(np.array(errors) - table().errors), axis=0)
+    assert row.relative_rad == pytest.approx(change)
+    known = table().errors > radians(0.1)
+    assert row.sensitivity_pct is not None
+    assert row.sensitivity_pct[known] == pytest.approx(100.0 * change[known] / table().errors[known] / 0.05)
+    assert np.isnan(row.sensitivity_pct[~known]).all()
+
+
+def analyse_errors(off: SquatCase) -> np.ndarray:
+    from core.squat.sensitivity import _run
+
+    return _run(off, off.geometry, off.mounts, None)
+
+
+def test_from_standing_a_turned_sensor_costs_little() -> None:
+    rolled = {**case().mounts, "thigh_r": to_matrix(about(2, radians(5.0))) @ case().mounts["thigh_r"]}
+    off = replace(case(), mounts=rolled)
+    assert np.degrees(analyse_errors(off)[3]) > 4.5
+    standing = slice(0, 100)
+    zeroed = {name: a - a[standing].mean() for name, a in case().reference.items()}
+    assert np.degrees(analyse_errors(replace(off, zero=standing, reference=zeroed))[3]) < 0.5
+
+
+def test_joint_angles_are_those_of_the_orientations() -> None:
+    made = squat_on("left", 50.0, repetitions=1)
+    calibrated = calibrate_with_mounts(
+        synchronise(made.recording), make_fixed_mounts("left"), "fixed_offset", FIXED_OFFSET
+    )
+    leg = estimate_leg(calibrated, measure_leg(HEIGHT_M, "left"))
+    named = name_joint_angles(leg.motion.angles, "left")
+    expected = joint_angles(leg.orientations.q)
+    assert len(named) == len(JOINTS)
+    for name, values in named.items():
+        assert values == pytest.approx(expected[name][leg.first :], abs=1e-9), name
+
+
+def test_averages_leave_out_what_is_not_defined() -> None:
+    rows = [np.full(7, 2.0), None, np.array([4.0, np.nan, 4.0, 4.0, 4.0, 4.0, np.nan])]
+    assert average_sensitivity(rows).tolist() == [3.0, 2.0, 3.0, 3.0, 3.0, 3.0, 2.0]
+    assert np.isnan(average_sensitivity([None])).all()
+
+
+def test_a_reference_that_does_not_fit_is_refused() -> None:
+    made = squat_on("right", 50.0, repetitions=1)
+    calibrated = calibrate_with_mounts(
+        synchronise(made.recording), make_fixed_mounts("right"), "fixed_offset", FIXED_OFFSET
+    )
+    leg, truth = measure_leg(HEIGHT_M, "right"), made.truth
+    with pytest.raises(EstimationError) as caught:
+        make_case(calibrated, leg, truth.t_s, {"knee_flexion_r": truth.t_s}, from_standing=False)
+    assert caught.value.code == "no_reference"
+    with pytest.raises(EstimationError) as caught:
+        make_case(calibrated, leg, truth.t_s + 1e4, truth.angles, from_standing=False)
+    assert caught.value.code == "no_reference"
+    with pytest.raises(ParameterError):
+        analyse_sensitivity(case(), relative=0.0)

@@ -1,0 +1,75 @@
+"""`sagittal sensitivity`."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from core.angles import JointAngles
+from core.formats import write_recording
+from core.simulate.mems import MEMS
+from server.main import main
+from server.report.exports import angles_parquet
+from tests.core.body.chain.squats import squat_on
+
+
+@pytest.fixture(scope="module")
+def take(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One squat, and its truth as an optical system would give it."""
+    folder = tmp_path_factory.mktemp("take")
+    made = squat_on("right", 50.0, MEMS, repetitions=1)
+    truth = JointAngles(made.truth.t_s, made.truth.subtract_standing(), made.truth.zero_offset)
+    (folder / "recording.parquet").write_bytes(write_recording(made.recording))
+    (folder / "angles.parquet").write_bytes(angles_parquet(truth))
+    (folder / "truth.json").write_text('{"t_s": 1}')
+    return folder
+
+
+def test_a_take_with_a_reference_gives_the_tables(
+    take: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measures, out = tmp_path / "measures.json", tmp_path / "out" / "all.csv"
+    measures.write_text(json.dumps({"tibia": 0.42, "thigh": 0.42}))
+    call = [
+        "sensitivity",
+        str(take / "recording.parquet"),
+        "--reference",
+        str(take / "angles.parquet"),
+    ]
+    assert main([*call, "--measures", str(measures), "--out", str(out)]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert sum(line.startswith("LTib2Knee") for line in said) == 4
+    assert sum(line.startswith("Yaw-bac") for line in said) == 4
+    with out.open() as lines:
+        rows = list(csv.DictReader(lines))
+    assert len(rows) == 24 * 7
+    assert all(float(row["error_deg"]) < 3.0 for row in rows)
+    tilted = next(r for r in rows if r["parameter"] == "Yaw-thi" and r["angle"] == "knee_flexion")
+    assert 1.0 < float(tilted["delta_step_deg"]) < 2.5
+    assert (tilted["sensitivity_pct"], tilted["reason"]) == ("", "parameter_nominal_zero")
+
+
+TAKE = "{take}/recording.parquet"
+TRUE = ("--reference", "{take}/angles.parquet")
+
+
+@pytest.mark.parametrize(
+    ("call", "code", "said"),
+    [
+        ((TAKE,), 2, "needs --reference"),
+        ((TAKE, "--reference", "{take}/none.parquet"), 1, "file_not_found"),
+        ((TAKE, "--reference", "{take}/truth.json"), 1, "reference_unreadable"),
+        ((TAKE, *TRUE, "--side", "left"), 1, "segments_missing"),
+        ((TAKE, *TRUE, "--table-top", TAKE), 1, "table_orientation"),
+        ((TAKE, *TRUE, "--measures", "{take}/truth.json"), 1, "measures_unreadable"),
+        ((TAKE, *TRUE, "--measures", TAKE), 1, "measures_unreadable"),
+    ],
+)
+def test_what_is_missing_is_said(
+    take: Path, call: tuple[str, ...], code: int, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["sensitivity", *(word.format(take=take) for word in call)]) == code
+    assert said in capsys.readouterr().err

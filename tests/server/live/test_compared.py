@@ -1,0 +1,64 @@
+"""Sensors of a followed take are compared behind all that a batch has to say, and what is found is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from core.errors import Notice
+from core.formats.live_log import SampleBatch
+from core.frames import Segment
+from core.online import LiveFrame, OnlineSession
+from core.simulate import simulate_scenario
+from server.live.follower import Follower
+from server.live.messages import FeedItem, FollowTake, Report
+from tests.live import send, shared
+
+FEET: dict[Segment | None, Segment] = {"foot_l": "foot_r", "foot_r": "foot_l"}
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A take whose feet were exchanged."""
+    made = simulate_scenario("comfortable", 3).recording
+    wrong = replace(made, segments={d: FEET.get(s, s) for d, s in made.segments.items()})
+    path = tmp_path_factory.mktemp("log") / "take"
+    path.write_bytes(send([shared(wrong)]).log())
+    return path
+
+
+def test_sensors_are_compared_when_strides_and_cues_are_out(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[Report] = []
+    told: list[tuple[int, int]] = []  # strides of the frames so far, and those said of them
+    strides = 0
+    push, compare = OnlineSession.push, OnlineSession.compare_sensors
+
+    def pushed(online: OnlineSession, batch: SampleBatch) -> LiveFrame | None:
+        nonlocal strides
+        frame = push(online, batch)
+        strides += 0 if frame is None else len(frame.strides)
+        return frame
+
+    def compared(online: OnlineSession) -> list[Notice]:
+        told.append((strides, sum(isinstance(x, FeedItem) and x.kind == "stride" for x in said)))
+        return compare(online)
+
+    monkeypatch.setattr(OnlineSession, "push", pushed)
+    monkeypatch.setattr(OnlineSession, "compare_sensors", compared)
+    follower = Follower(
+        FollowTake("take", str(log), log.stat().st_size, 1.75, "walk", None, None, []), said.append
+    )
+    while follower.has_work:
+        follower.step()
+    follower.close()
+    assert strides > 20
+    assert all(expected == out for expected, out in told)
+    notices = [msgspec.json.decode(x.body) for x in said if isinstance(x, FeedItem) and x.kind == "notice"]
+    (found,) = [x for x in notices if x["code"] == "sensors_exchanged"]
+    assert found["sensor"] == "foot_l"
+    assert "left foot with right foot" in found["text"]

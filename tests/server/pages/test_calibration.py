@@ -1,0 +1,93 @@
+"""The page of a calibration: its verdict, the picture, and what to do."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import AsyncIterator
+
+import pytest
+
+from core.calibration import calibrate
+from core.calibration.score import score_calibration
+from server.report.calibration_checks import view_calibration_checks
+from tests.server import analysed
+from tests.server.clinic import Clinic, open_clinic
+from tests.walks import simulated
+
+pytestmark = pytest.mark.anyio
+
+
+@pytest.fixture(scope="module")
+def anyio_backend() -> str:
+    return "asyncio"
+
+
+@pytest.fixture(scope="module")
+def walk() -> dict[str, bytes]:
+    """Result files with the score of a simulated walk."""
+    files = dict(analysed.files())
+    stored = json.loads(files["analysis.json"])
+    calibrated = calibrate(simulated()[0])
+    stored["calibration_score"] = score_calibration(calibrated).to_json()
+    mounted = calibrated.calibration.segments.items()
+    stored["calibration"]["segments"] = {s: {"method": x.method} for s, x in mounted}
+    return files | {"analysis.json": json.dumps(stored).encode()}
+
+
+@pytest.fixture(scope="module")
+async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
+    async with open_clinic(tmp_path_factory.mktemp("calibration")) as running:
+        yield running
+
+
+async def show(clinic: Clinic, code: str, files: dict[str, bytes] | None) -> str:
+    async with clinic.client("admin") as client:
+        patient = (await client.post("/api/v1/patients", json={"code": code})).json()["id"]
+        session = (await client.post(f"/api/v1/patients/{patient}/sessions", json={})).json()["id"]
+        if files is not None:
+            analysed.finish(clinic, patient, session, files)
+        answer = await client.get(f"/sessions/{session}/calibration")
+    assert answer.status_code == 200, answer.text
+    return answer.text
+
+
+async def test_a_good_calibration(clinic: Clinic, walk: dict[str, bytes]) -> None:
+    html = await show(clinic, "GOOD", walk)
+    assert "The calibration passes all" in html
+    assert 'aria-label="Left thigh: pass"' in html
+    assert 'href="#checks-thigh_l"' in html
+    assert 'id="checks-thigh_l"' in html
+    assert 'id="checks-take"' in html
+    assert "from standing and walking" in html
+
+
+async def test_a_failed_check_says_why_and_what_to_do(clinic: Clinic, walk: dict[str, bytes]) -> None:
+    files = walk
+    stored = json.loads(files["analysis.json"])
+    score = stored["calibration_score"]
+    score["verdict"] = score["segments"]["shank_l"] = "redo"
+    check = next(c for c in score["checks"] if c["segment"] == "shank_l" and c["name"] == "knee_axis")
+    check |= {"verdict": "redo", "value": 21.3, "why": "Thigh and shank disagree.", "todo": "Fasten both."}
+    stored["calibration"]["segments"]["shank_l"]["forward_sd_deg"] = 2.04
+    html = await show(clinic, "BAD", files | {"analysis.json": json.dumps(stored).encode()})
+    assert "Calibrate again: 1 of" in html
+    assert "at the left shank." in html
+    assert 'aria-label="Left shank: redo"' in html
+    assert 'aria-label="Right shank: pass"' in html
+    assert "Thigh and shank disagree." in html
+    assert "Fasten both." in html
+    assert "21.3°" in html
+    assert "forward axis ± 2.0°" in html
+
+
+async def test_nothing_to_judge_yet(clinic: Clinic, walk: dict[str, bytes]) -> None:
+    assert "No recording yet" in await show(clinic, "EMPTY", None)
+    files = walk
+    stored = json.loads(files["analysis.json"])
+    del stored["calibration_score"]
+    html = await show(clinic, "OLD", files | {"analysis.json": json.dumps(stored).encode()})
+    assert "No calibration to judge" in html
+
+
+def test_no_score_no_view() -> None:
+    assert view_calibration_checks(None, None) is None

@@ -1,0 +1,124 @@
+"""The session page of a functional test: total, segments, norm, last visit, times by hand."""
+
+from __future__ import annotations
+
+import html as escaped
+import json
+import re
+from collections.abc import AsyncIterator
+from dataclasses import replace
+
+import pytest
+
+from core.pipeline import analyse
+from core.recording import GivenLimits
+from core.simulate.scripts import ON_SKIN
+from core.simulate.tug import simulate_tug
+from server.report.exports import analysis_files
+from tests.kept import keep
+from tests.server import analysed
+from tests.server.clinic import Clinic, open_clinic
+
+pytestmark = pytest.mark.anyio
+
+YEAR = 1950
+
+
+@pytest.fixture(scope="module")
+def anyio_backend() -> str:
+    return "asyncio"
+
+
+@pytest.fixture(scope="module")
+async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
+    async with open_clinic(tmp_path_factory.mktemp("tests")) as running:
+        yield running
+
+
+@keep
+def files(patient: str, start_s: float | None = None) -> dict[str, bytes]:
+    made = simulate_tug(patient, 1, setup=replace(ON_SKIN, worn=("pelvis",)))
+    return analysis_files(analyse(replace(made.recording, test_limits=GivenLimits(start_s))))
+
+
+@pytest.fixture(scope="module")
+async def visits(clinic: Clinic) -> list[str]:
+    """Two visits of one person, the second one corrected by hand."""
+    found = []
+    async with clinic.client("admin") as client:
+        who = {"code": "TUG", "birth_year": YEAR}
+        patient = (await client.post("/api/v1/patients", json=who)).json()["id"]
+        for day, content in (("2026-01-10", files("elderly")), ("2026-03-10", files("healthy", 3.0))):
+            asked = {"title": "Up and go", "protocol": "tug", "performed_on": day}
+            made = (await client.post(f"/api/v1/patients/{patient}/sessions", json=asked)).json()
+            analysed.finish(clinic, patient, made["id"], content)
+            found.append(str(made["id"]))
+    return found
+
+
+async def page(clinic: Clinic, path: str) -> str:
+    async with clinic.client("admin") as client:
+        answer = await client.get(path)
+    assert answer.status_code == 200, answer.text
+    return answer.text
+
+
+def card_of(html: str) -> str:
+    card = html[html.index('id="h-test"') :]
+    return card[: card.index("</section>")]
+
+
+async def test_the_card_has_total_segments_norm_and_no_last_visit_at_first(
+    clinic: Clinic, visits: list[str]
+) -> None:
+    card = card_of(await page(clinic, f"/sessions/{visits[0]}"))
+    total = re.search(r'class="v">([\d.]+)<', card)
+    assert total is not None
+    assert float(total.group(1)) == pytest.approx(20.9, abs=0.3)
+    labels = re.findall(r"<td>(.*?)</td>", card)
+    assert labels == ["Rising", "Way out", "Turn", "Way back", "Turn and sitting down"]
+    assert card.count("<rect") == 5
+    assert "slower than average above 10.2 s" in card
+    assert "Bohannon 2006" in card
+    assert "Visit before" not in card
+    assert "by the sensor: pelvis" in card
+
+
+async def test_the_second_visit_stands_beside_the_first_and_tells_the_hand(
+    clinic: Clinic, visits: list[str]
+) -> None:
+    html = await page(clinic, f"/sessions/{visits[1]}")
+    card = card_of(html)
+    before = card[card.index("Visit before") :]
+    assert re.search(r'class="v">2[01]\.\d<', before)
+    assert "start or end set by hand" in card
+    assert "No strides" not in html
+    said = re.search(r'name="manifest" data-type="json" value="(.*?)"', card)
+    assert said is not None
+    assert "test_limits" not in json.loads(escaped.unescape(said.group(1)))
+    assert 'name="manifest.test_limits.start_s"' in card
+    assert 'value="3.00"' in card
+
+
+@pytest.mark.parametrize("part", ["kinematics", "data", "print", "timeline", "parameters/tug_duration_s"])
+async def test_the_other_pages_of_the_session_open(clinic: Clinic, visits: list[str], part: str) -> None:
+    assert "TUG" in await page(clinic, f"/sessions/{visits[1]}/{part}")
+
+
+async def test_the_api_tells_the_test(clinic: Clinic, visits: list[str]) -> None:
+    async with clinic.client("admin") as client:
+        found = (await client.get(f"/api/v1/sessions/{visits[1]}/report")).json()
+    test = found["functional"]
+    assert [s["label"] for s in test["segments"]][:2] == ["Rising", "Way out"]
+    assert test["corrected"]
+    assert found["quality"]["kind"] == "ok"
+    rows = {p["name"]: p for p in found["parameters"]}
+    assert rows["tug_duration_s"]["both"]["uncertainty"] > 0.0
+
+
+async def test_a_new_visit_offers_the_tests(clinic: Clinic) -> None:
+    async with clinic.client("admin") as client:
+        made = await client.post("/api/v1/patients", json={"code": "NEW"})
+        html = (await client.get(f"/patients/{made.json()['id']}/sessions/new")).text
+    for name in ("tug", "five_sit_to_stand", "walk_10m", "walk_6min", "standing_eyes_open"):
+        assert f'value="{name}"' in html

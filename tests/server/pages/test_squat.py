@@ -1,0 +1,119 @@
+"""The session page of a take of squats."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import AsyncIterator
+
+import pytest
+
+from core.pipeline import analyse
+from core.simulate.mems import MEMS
+from server.report.exports import analysis_files
+from tests.core.body.chain.squats import squat_on
+from tests.server import analysed
+from tests.server.clinic import Clinic, open_clinic
+
+pytestmark = pytest.mark.anyio
+
+
+@pytest.fixture(scope="module")
+def anyio_backend() -> str:
+    return "asyncio"
+
+
+@pytest.fixture(scope="module")
+async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
+    async with open_clinic(tmp_path_factory.mktemp("squats")) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+async def session(clinic: Clinic) -> str:
+    """A visit with three squats, the second of them left out."""
+    files = analysis_files(analyse(squat_on("left", 50.0, MEMS).recording))
+    rows = files["repetitions.csv"].decode().splitlines()
+    start = rows[2].split(",")[:4]
+    rows[2] = ",".join([*start, *[""] * (len(rows[2].split(",")) - 5), "foot_moved"])
+    files["repetitions.csv"] = "\n".join(rows).encode()
+    async with clinic.client("admin") as client:
+        patient = (await client.post("/api/v1/patients", json={"code": "SQUAT"})).json()["id"]
+        asked = {"title": "Squats", "protocol": "squat"}
+        made = (await client.post(f"/api/v1/patients/{patient}/sessions", json=asked)).json()
+    analysed.finish(clinic, patient, made["id"], files)
+    return str(made["id"])
+
+
+async def page(clinic: Clinic, path: str) -> str:
+    async with clinic.client("admin") as client:
+        answer = await client.get(path)
+    assert answer.status_code == 200, answer.text
+    return answer.text
+
+
+async def test_the_page_lists_every_squat_and_draws_those_that_count(clinic: Clinic, session: str) -> None:
+    html = await page(clinic, f"/sessions/{session}")
+    card = html[html.index('id="h-squats"') :]
+    card = card[: card.index("</section>")]
+    assert "Squats, left leg" in card
+    rows = re.findall(r"<tr>\s*<td.*?</tr>", card, re.DOTALL)
+    assert len(rows) == 3
+    assert "the foot moved" in rows[1]
+    assert "–" in rows[1]
+    assert "the foot moved" not in rows[0] + rows[2]
+    assert card.count("chart cycle x-unit") == 6
+    assert "% of squat" in card
+    assert "gait cycle" not in card
+    assert "left mean of 2 squats" in card
+    assert "mean of the squats used" in html
+    assert "Depth: knee flexion at the deepest point" in html
+    assert "No strides" not in html
+    assert "Squats have no norm." in html
+
+
+@pytest.mark.parametrize("part", ["kinematics", "data", "print", "parameters/squat_depth_deg", "timeline"])
+async def test_the_other_pages_of_the_session_open(clinic: Clinic, session: str, part: str) -> None:
+    html = await page(clinic, f"/sessions/{session}/{part}")
+    assert "SQUAT" in html
+    if part == "data":
+        assert "repetitions.csv" in html
+
+
+async def test_what_is_said_of_strides_is_not_said_of_squats(clinic: Clinic, session: str) -> None:
+    timeline = await page(clinic, f"/sessions/{session}/timeline")
+    assert "Squats have no contacts and no strides." in timeline
+    assert "earlier version" not in timeline
+    assert "Run again" not in timeline
+    kinematics = await page(clinic, f"/sessions/{session}/kinematics")
+    assert "Curves of squats are on the overview" in kinematics
+    assert "no stride of this side counts" not in kinematics
+    algorithms = await page(clinic, f"/sessions/{session}/algorithms")
+    assert "Filters are compared on walks" in algorithms
+    assert "Run on this take" not in algorithms
+    assert "Walks:" not in await page(clinic, f"/sessions/{session}")
+
+
+async def test_paper_has_every_squat_and_their_curves(clinic: Clinic, session: str) -> None:
+    paper = await page(clinic, f"/sessions/{session}/print")
+    assert "Squats, left leg" in paper
+    assert paper.count("chart cycle x-unit") == 6
+    assert "the foot moved" in paper
+    assert "no stride" not in paper
+    assert "Walked" not in paper
+
+
+async def test_the_form_of_a_new_visit_offers_squats(clinic: Clinic, session: str) -> None:
+    async with clinic.client("admin") as client:
+        patient = (await client.get(f"/api/v1/sessions/{session}")).json()["patient_id"]
+    form = await page(clinic, f"/patients/{patient}/sessions/new")
+    assert re.findall(r'name="protocol" value="(\w+)"', form)[:3] == ["walk", "treadmill", "squat"]
+
+
+async def test_the_api_tells_the_squats(clinic: Clinic, session: str) -> None:
+    async with clinic.client("admin") as client:
+        found = (await client.get(f"/api/v1/sessions/{session}/report")).json()
+    assert found["squats"]["side"] == "left"
+    assert [r["excluded"] for r in found["squats"]["repetitions"]] == [None, "the foot moved", None]
+    assert "squat_depth_deg" in {p["name"] for p in found["parameters"]}
+    assert json.dumps(found["squats"])

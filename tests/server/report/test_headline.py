@@ -1,0 +1,166 @@
+"""What the headline says, and of whom it is silent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from string import Formatter
+
+import pytest
+
+from core.change import Change
+from core.change.verdict import Verdict
+from core.frames import Side
+from core.norms.lookup import Norms
+from core.norms.values import NormValue
+from core.parameters.catalogue import CATALOGUE
+from core.parameters.result import Parameter
+from server.report.headline import LARGEST, MOST, Headline, find_changes, find_standouts
+from server.report.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
+from server.report.table import parameter_rows
+
+WORDS = {"side", "other", "d", "v", "l", "r", "a", "b", "cm", "c", "word"}
+LONGEST = 100
+"""Characters of a pattern; two lines on a tablet."""
+
+
+def measured(name: str, side: Side | None, mean: float, sd: float = 0.5, n: int = 30) -> Parameter:
+    return Parameter(name, side, n, mean, sd, "", u_own=0.0, u_common=0.0, uncertainty=0.1)
+
+
+def both_sides(name: str, left: float, right: float, sd: float = 0.5) -> tuple[Parameter, ...]:
+    return measured(name, "left", left, sd), measured(name, "right", right, sd)
+
+
+def norm(name: str, mean: float, sd: float, apart: float | None = None) -> Norms:
+    return Norms(None, None, values={name: NormValue(name, mean, sd, 20, "adults", "a table", apart)})
+
+
+def said(norms: Norms, *parameters: Parameter) -> list[str]:
+    return [s.text for s in find_standouts(parameter_rows(parameters, norms), norms)[0]]
+
+
+def every_pattern() -> list[str]:
+    found = [SHORT_AND_QUICK, BOTH_STEPS, PELVIS_RISES]
+    for p in PHRASES.values():
+        found += [
+            p.smaller, p.larger, p.both_low, p.both_high, p.side_low, p.side_high, p.up, p.down
+        ]  # fmt: skip
+    return [pattern for pattern in found if pattern]
+
+
+@pytest.mark.parametrize("pattern", every_pattern())
+def test_a_pattern_has_one_bold_part_and_known_words(pattern: str) -> None:
+    assert pattern.count("*") == 2
+    assert len(pattern) <= LONGEST
+    assert {field for _, field, _, _ in Formatter().parse(pattern) if field} <= WORDS
+
+
+def test_only_figures_of_the_catalogue_speak() -> None:
+    assert set(PHRASES) <= set(CATALOGUE)
+
+
+def test_a_side_that_differs_is_named_with_the_difference() -> None:
+    norms = norm("knee_flexion_max_swing_deg", 60.0, 5.0, apart=3.0)
+    told = said(norms, *both_sides("knee_flexion_max_swing_deg", 42.0, 60.0))
+    assert told == ["The left knee bends 18° less in swing than the right"]
+
+
+def test_sides_within_what_healthy_sides_differ_by_are_not_told() -> None:
+    norms = norm("knee_flexion_max_swing_deg", 60.0, 5.0, apart=3.4)
+    assert said(norms, *both_sides("knee_flexion_max_swing_deg", 57.0, 63.0)) == []
+
+
+def test_sides_whose_strides_overlap_are_not_told() -> None:
+    nobody = Norms(None, None)
+    assert said(nobody, *both_sides("foot_pitch_ic_deg", 8.0, 14.0, sd=0.5)) != []
+    assert said(nobody, *both_sides("foot_pitch_ic_deg", 8.0, 14.0, sd=30.0)) == []
+
+
+def test_both_sides_beyond_the_norm_are_one_sentence() -> None:
+    norms = norm("knee_flexion_rom_deg", 62.0, 5.0, apart=3.8)
+    told = said(norms, *both_sides("knee_flexion_rom_deg", 40.0, 41.0))
+    assert told == ["Both knees move little: 40° and 41°, usual 57° to 67°"]
+
+
+def test_of_two_sides_that_differ_the_one_off_the_norm_is_spoken_of() -> None:
+    norms = norm("hip_flexion_rom_deg", 37.0, 4.5, apart=2.6)
+    told = said(norms, *both_sides("hip_flexion_rom_deg", 52.0, 36.0))
+    assert told == ["The left hip moves 16° more than the right"]
+
+
+def test_within_two_deviations_nothing_stands_out() -> None:
+    norms = norm("gait_speed_mps", 1.25, 0.16)
+    found, looked_at = find_standouts(parameter_rows((measured("gait_speed_mps", None, 0.94),), norms), norms)
+    assert (found, looked_at) == ((), 1)
+    told = said(norms, measured("gait_speed_mps", None, 0.80))
+    assert told == ["Walks slower than usual for the age: 0.80 m/s, usual 1.09 to 1.41"]
+
+
+def test_a_value_that_is_hardly_known_is_not_called_unusual() -> None:
+    norms = norm("stance_pct", 63.0, 1.8)
+    sure = both_sides("stance_pct", 59.0, 59.0)
+    assert said(norms, *sure) == [
+        "Both feet carry shortly: 59.0 % and 59.0 % of the stride, usual 61.2 to 64.8"
+    ]
+    assert said(norms, *(replace(p, uncertainty=4.3) for p in sure)) == []
+
+
+def test_few_strides_are_compared_with_nobody() -> None:
+    few = measured("knee_flexion_rom_deg", "left", 20.0, n=3), measured("knee_flexion_rom_deg", "right", 60.0)
+    assert said(Norms(None, None), *few) == []
+
+
+def test_short_and_quick_steps_are_one_sentence() -> None:
+    norms = Norms(
+        None,
+        None,
+        values={
+            "step_length_m": NormValue("step_length_m", 0.51, 0.05, 20, "adults", "a table"),
+            "cadence_spm": NormValue("cadence_spm", 75.0, 7.3, 20, "adults", "a table"),
+        },
+    )
+    steps = both_sides("step_length_m", 0.28, 0.27, sd=0.01)
+    told = said(norms, *steps, measured("cadence_spm", None, 140.0))
+    assert told == ["Steps are short and quick: 0.28 m at 140 a minute, usual at this speed 0.46 to 0.56 m"]
+
+
+def change(name: str, side: Side | None, by: float, limit: float, verdict: Verdict | None) -> Change:
+    return Change(
+        name, side, "", 1.0, 1.0 + by, by, verdict, limit, "a table", None, None, None, None, None, None
+    )
+
+
+def test_changes_beyond_their_limit_are_told_and_the_others_counted() -> None:
+    found, within, unlimited = find_changes([
+        change("gait_speed_mps", None, 0.22, 0.1, "real_change"),
+        change("step_length_m", "left", 0.11, 0.05, "real_change"),
+        change("step_length_m", "right", 0.12, 0.05, "clinically_relevant"),
+        change("stance_pct", "left", 0.4, 2.0, "within_measurement_error"),
+        replace(change("circumduction_m", "left", 0.1, 1.0, None), limit=None),
+    ])  # fmt: skip
+    assert [s.text for s in found] == [
+        "Both steps are longer: left by 0.11 m, right by 0.12 m",
+        "Walks faster: by 0.22 m/s",
+    ]
+    assert (within, unlimited) == (1, 1)
+
+
+def test_at_most_six_sentences_and_the_rest_is_named() -> None:
+    norms = Norms(None, None)
+    parameters = [
+        p
+        for name, left, right in (
+            ("step_length_m", 0.3, 0.6), ("stance_pct", 50.0, 70.0), ("foot_pitch_ic_deg", -5.0, 20.0),
+            ("circumduction_m", 0.2, 0.0), ("foot_pitch_tc_deg", -30.0, -60.0),
+            ("hip_flexion_rom_deg", 20.0, 50.0), ("knee_flexion_max_swing_deg", 20.0, 60.0),
+            ("knee_flexion_ic_deg", 30.0, 5.0),
+        )
+        for p in both_sides(name, left, right, sd=0.01)
+    ]  # fmt: skip
+    found, _ = find_standouts(parameter_rows(parameters, norms), norms)
+    changed, _, _ = find_changes([change("gait_speed_mps", None, 0.22, 0.1, "real_change")])
+    headline = Headline("", found, changed)
+    assert len(found) == 8
+    assert max(s.size for s in found) == LARGEST
+    assert len(headline.shown) + len(headline.shown_changes) == MOST
+    assert len(headline.more) == 3
