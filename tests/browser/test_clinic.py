@@ -51,6 +51,7 @@ def test_a_patient_is_added_found_renamed_and_deleted(opened: Opener) -> None:
     rows = page.locator("#patient-rows tr:visible")
     expect(rows).to_have_count(1)
     rows.first.click()
+    page.wait_for_url(re.compile(r"/patients/[0-9a-f]{32}$"))  # loaded: its buttons work
     _delete(page, typed="Ü-17 (b)")
     assert page.locator("dialog[open] input:invalid").count() == 1, "a wrong code must not pass"
     page.keyboard.press("Escape")
