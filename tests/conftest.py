@@ -50,6 +50,12 @@ LONGEST: Final = ("test_perturbations.py",)
 """Files of minutes: first in their room, so that no process is left alone with one at the end."""
 
 
+@pytest.fixture(scope="session")
+def anyio_backend() -> str:
+    """The loop of every asynchronous test and of fixtures that outlive one."""
+    return "asyncio"
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options of our own."""
     parser.addoption(

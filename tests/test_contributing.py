@@ -53,11 +53,6 @@ ADDED: Final = ParameterEntry(
 
 
 @pytest.fixture
-def anyio_backend() -> str:
-    return "asyncio"
-
-
-@pytest.fixture
 def added(monkeypatch: pytest.MonkeyPatch) -> ParameterEntry:
     """The parameter in the catalogue, for the length of a test."""
     monkeypatch.setitem(CATALOGUE, ADDED.name, ADDED)

@@ -56,9 +56,6 @@ JOIN_S: Final = 10.0
 EDGE_S: Final = 5.0
 """Samples before and after movement that go with it, so that filters have settled."""
 
-TWICE_S: Final = 0.2
-"""Steps of two slabs that are nearer than this are one."""
-
 LONGEST_S: Final = 60 * 86400.0
 """A longer recording is a clock that jumped."""
 

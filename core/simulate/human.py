@@ -27,24 +27,34 @@ HINGE_FROM_PELVIS = 0.65
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
-    """Exact poses on a fine grid.
+class BodyPath:
+    """Where each segment is and how it is turned, on a fine grid.
 
     Parameters
     ----------
-    t_s : (n,), step 1 / rate_hz. q : segment → (n, 4). p : segment → (n, 3) m, origins as in core.body.poses.
+    t_s : (n,). q : segment → (n, 4). p : segment → (n, 3) m, origins as in core.body.poses.
+    """
+
+    t_s: Floats
+    q: Mapping[Segment, Floats]
+    p: Mapping[Segment, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion(BodyPath):
+    """Exact poses of a walk; t_s in steps of 1 / rate_hz.
+
+    Parameters
+    ----------
     timings : side → events of each swing. sole_height : side → (n,) lowest sole point, m.
     guard_m : largest lowering of the pelvis because a leg would have been too short.
     lifts_m : side → lift of each swing added for clearance; it costs knee flexion.
     heading_rad : (n,) of the path, unwrapped, without the pelvis' own rotation.
     """
 
-    t_s: Floats
     rate_hz: float
     plan: Plan
     walker: Walker
-    q: Mapping[Segment, Floats]
-    p: Mapping[Segment, Floats]
     timings: Mapping[Side, FootTiming]
     sole_height: Mapping[Side, Floats]
     guard_m: float
@@ -102,7 +112,7 @@ def move(plan: Plan, walker: Walker, rate_hz: float, chair: tuple[ChairChange, .
         _leg(walker, s, feet[s], mid_hip, q_pelvis, q, p)
         sole_height[s] = Sole.of(walker).lowest(p[FOOT[s]], q[FOOT[s]], feet[s].pitch)
     lifts = {s: feet[s].lifts for s in SIDES}
-    return Motion(t, rate_hz, plan, walker, q, p, timings, sole_height, lowered, lifts, heading)
+    return Motion(t, q, p, rate_hz, plan, walker, timings, sole_height, lowered, lifts, heading)
 
 
 def _touching(t: Floats, timing: FootTiming, margin_s: float) -> Bools:

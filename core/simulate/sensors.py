@@ -14,7 +14,7 @@ import numpy as np
 
 from core.frames import GRAVITY, Floats, Segment
 from core.rotation import about, conjugate, exp, log, multiply, rotate
-from core.simulate.human import Motion
+from core.simulate.human import BodyPath
 from core.simulate.impacts import Impact, shake_sensor
 from core.simulate.magnetics import Dipole, field_at
 from core.simulate.soft_tissue import SoftTissue, skin_motion
@@ -97,23 +97,27 @@ def draw_mounts(
 
 
 def place_sensor(
-    motion: Motion, segment: Segment, mount: Mount, tissue: SoftTissue | None, impacts: tuple[Impact, ...]
+    body: BodyPath,
+    segment: Segment,
+    mount: Mount,
+    tissue: SoftTissue | None,
+    impacts: tuple[Impact, ...] = (),
 ) -> SensorPath:
-    """The way of a walker's sensor.
+    """The way of a sensor on a moving body.
 
     Parameters
     ----------
     tissue : between sensor and bone, None = stiff. impacts : contacts that shake it.
     """
-    place, turn, bone = mount.position_m, mount.q_segment_sensor, motion.q[segment]
-    skin = None if tissue is None else skin_motion(motion.q, segment, tissue)
+    place, turn, bone = mount.position_m, mount.q_segment_sensor, body.q[segment]
+    skin = None if tissue is None else skin_motion(body.q, segment, tissue)
     if skin is not None:
         place, turn = place + skin[1], multiply(skin[0], turn)
-    p = motion.p[segment] + rotate(bone, place)
+    p = body.p[segment] + rotate(bone, place)
     if impacts:
-        shift, angle = shake_sensor(motion.t_s, segment, impacts)
+        shift, angle = shake_sensor(body.t_s, segment, impacts)
         p, bone = p + shift, multiply(bone, about(2, angle))
-    return SensorPath(motion.t_s, p, sign_continuous(multiply(bone, turn)))
+    return SensorPath(body.t_s, p, sign_continuous(multiply(bone, turn)))
 
 
 def ideal_signals(

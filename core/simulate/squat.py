@@ -17,13 +17,12 @@ import numpy as np
 from core.errors import ParameterError
 from core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
 from core.rotation import about, multiply, rotate
+from core.simulate.human import BodyPath
 from core.simulate.phases import Phase
 from core.simulate.recorder import Draws, Recorded, oversampling, record
-from core.simulate.sensors import PLACES, Mount, SensorPath, draw_mounts
+from core.simulate.sensors import PLACES, Mount, draw_mounts, place_sensor
 from core.simulate.setup import RecordingSetup
 from core.simulate.shapes import smoothstep
-from core.simulate.soft_tissue import skin_motion
-from core.simulate.spline import sign_continuous
 from core.simulate.stance import Q_NEUTRAL
 from core.simulate.truth import joint_angles
 from core.simulate.walker import SIGN, Anatomy, Walker
@@ -146,14 +145,8 @@ def simulate_squats(
     places = {segment: PLACES[segment] for segment in q}
     drawn = draw_mounts(places, person.scale, setup.mount_spread_rad, draws.mounts)
     mounts = drawn | {segment: mount for segment, mount in (mounts or {}).items() if segment in drawn}
-    paths: dict[Segment, SensorPath] = {}
-    for segment, mount in mounts.items():
-        place, turn = mount.position_m, mount.q_segment_sensor
-        skin = None if setup.tissue is None else skin_motion(q, segment, setup.tissue)
-        if skin is not None:
-            place, turn = place + skin[1], multiply(skin[0], turn)
-        way = p[segment] + rotate(q[segment], place)
-        paths[segment] = SensorPath(t, way, sign_continuous(multiply(q[segment], turn)))
+    body = BodyPath(t, q, p)
+    paths = {s: place_sensor(body, s, mount, setup.tissue) for s, mount in mounts.items()}
     made = record(paths, setup, draws, height_m, protocol="squat")
 
     q, p = ({s: a[::every] for s, a in of.items()} for of in (q, p))

@@ -61,9 +61,7 @@ def simulate(out: Path, script: str, seed: int, hours: float = 24.0) -> int:
         "recording.parquet": write_recording(made.recording),
         "truth/truth.json": json.dumps(truth, indent=1).encode(),
     }
-    for name, content in files.items():
-        fs.make_folder((out / name).parent)
-        fs.write_file(out / name, content)
+    _write_files(out, files)
     sys.stdout.write(f"{title}, {made.truth.t_s[-1]:.1f} s, seed {seed}, in {out}\n")
     sys.stdout.flush()
     return 0
@@ -87,12 +85,16 @@ def _simulate_activity(out: Path, seed: int, hours: float) -> int:
         "truth/phases.csv": _csv(phase_table(made.phases)),
         "truth/truth.json": json.dumps(truth, indent=1).encode(),
     }
-    for name, content in files.items():
-        fs.make_folder((out / name).parent)
-        fs.write_file(out / name, content)
+    _write_files(out, files)
     sys.stdout.write(f"Daily life, {made.stream.duration_s / 3600:.1f} h, seed {seed}, in {out}\n")
     sys.stdout.flush()
     return 0
+
+
+def _write_files(out: Path, files: Mapping[str, bytes]) -> None:
+    for name, content in files.items():
+        fs.make_folder((out / name).parent)
+        fs.write_file(out / name, content)
 
 
 Made = tuple[dict[str, bytes], dict[str, object]]

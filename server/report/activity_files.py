@@ -36,7 +36,15 @@ from core.activity.result import (
 )
 from core.errors import FormatError, Notice
 from core.events.turns import Turn
-from server.report.columns import SCHEMA, floats_of, parquet_file, read_table, reduce_to_plain, write_csv
+from server.report.columns import (
+    SCHEMA,
+    floats_of,
+    list_turns,
+    parquet_file,
+    read_table,
+    reduce_to_plain,
+    write_csv,
+)
 
 NAME: Final = "activity.json"
 SPANS: Final = "activity_spans.parquet"
@@ -95,17 +103,7 @@ def summarise_activity(found: ActivityResult) -> dict[str, object]:
         "transitions": [_plain(t) for t in found.transitions],
         "candidates": [_plain(c) for c in found.candidates],
         "bouts": [_plain(b) for b in found.bouts],
-        "turns": [
-            {
-                "start_s": t.start_s,
-                "end_s": t.end_s,
-                "turn_angle_deg": math.degrees(t.angle_rad),
-                "turn_duration_s": t.duration_s,
-                "turn_peak_velocity_dps": math.degrees(t.peak_rad_s),
-                "turn_direction": t.direction,
-            }
-            for t in found.turns
-        ],
+        "turns": list_turns(found.turns),
         "notices": [n.to_json() for n in found.notices],
     }
 

@@ -7,13 +7,16 @@ import io
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from core.frames import Bools, Floats
+
+if TYPE_CHECKING:
+    from core.events.turns import Turn  # brings numba, which the web process does without
 
 SCHEMA = 1
 """Version of analysis.json and of the columns beside it; readers refuse a newer one."""
@@ -34,6 +37,21 @@ def reduce_to_plain(value: object) -> object:
     if value is None or isinstance(value, (str, bool, int)):
         return value
     return str(value)
+
+
+def list_turns(turns: Iterable[Turn]) -> list[dict[str, object]]:
+    """Turns as analysis.json and activity.json name them: s, degrees, degrees/s."""
+    return [
+        {
+            "start_s": t.start_s,
+            "end_s": t.end_s,
+            "turn_angle_deg": math.degrees(t.angle_rad),
+            "turn_duration_s": t.duration_s,
+            "turn_peak_velocity_dps": math.degrees(t.peak_rad_s),
+            "turn_direction": t.direction,
+        }
+        for t in turns
+    ]
 
 
 def repeat_words(words: Sequence[str], times: int) -> pa.Array[Any]:

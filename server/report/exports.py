@@ -42,7 +42,7 @@ from core.quality.devices import check_device, is_serial
 from core.scores import Scores, score_curves
 from server.report import signals, tracks
 from server.report.activity_files import write_activity
-from server.report.columns import SCHEMA, parquet_file, reduce_to_plain, write_csv
+from server.report.columns import SCHEMA, list_turns, parquet_file, reduce_to_plain, write_csv
 from server.report.estimator import list_estimated_variables
 
 if TYPE_CHECKING:
@@ -364,17 +364,7 @@ def _walking(analysis: TakeAnalysis) -> dict[str, object] | None:
             }
             for b in measured.bouts
         ],
-        "turns": [
-            {
-                "start_s": t.start_s,
-                "end_s": t.end_s,
-                "turn_angle_deg": math.degrees(t.angle_rad),
-                "turn_duration_s": t.duration_s,
-                "turn_peak_velocity_dps": math.degrees(t.peak_rad_s),
-                "turn_direction": t.direction,
-            }
-            for t in measured.turns
-        ],
+        "turns": list_turns(measured.turns),
     }
 
 

@@ -30,11 +30,6 @@ EDITS = 9
 
 
 @pytest.fixture(scope="module")
-def anyio_backend() -> str:
-    return "asyncio"
-
-
-@pytest.fixture(scope="module")
 async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
     async with open_clinic(tmp_path_factory.mktemp("clinic")) as running:
         yield running

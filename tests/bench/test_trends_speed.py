@@ -19,11 +19,6 @@ VISITS = 24
 LIMIT_S = 0.3
 
 
-@pytest.fixture
-def anyio_backend() -> str:
-    return "asyncio"
-
-
 @pytest.mark.bench
 @pytest.mark.anyio
 async def test_trends_of_24_visits_are_read_within_300_ms(tmp_path: Path) -> None:

@@ -31,11 +31,6 @@ API = "/api/v1"
 CONTACT = walk.events().times("left", "ic")[3]
 
 
-@pytest.fixture(scope="session")
-def anyio_backend() -> str:
-    return "asyncio"
-
-
 @pytest.fixture
 def disk(tmp_path: Path) -> Iterator[Path]:
     with mounted(tmp_path / "disk", 24) as folder:

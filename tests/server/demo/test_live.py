@@ -16,11 +16,6 @@ from tests.server.clinic import open_clinic
 from tests.server.serving import serve
 
 
-@pytest.fixture(scope="session")
-def anyio_backend() -> str:
-    return "asyncio"
-
-
 @pytest.mark.slow
 @pytest.mark.anyio
 async def test_the_demo_s_live_patient_walks_is_told_how_and_becomes_a_recording(tmp_path: Path) -> None:

@@ -24,11 +24,6 @@ SOON_S = 10.0
 SHEET = "/static/css/base.css"
 
 
-@pytest.fixture(scope="module")
-def anyio_backend() -> str:
-    return "asyncio"
-
-
 @dataclass
 class Visit:
     """An analysed session in a clinic on a port, and one whose job waits for a worker that does not come."""

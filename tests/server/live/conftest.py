@@ -8,11 +8,6 @@ from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
 
-@pytest.fixture(scope="session")
-def anyio_backend() -> str:
-    return "asyncio"
-
-
 @pytest.fixture(scope="module")
 async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
     """A clinic whose takes are recorded and not estimated."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import AsyncIterator
 
 import pytest
 
@@ -11,15 +10,10 @@ from core.calibration import calibrate
 from core.calibration.score import score_calibration
 from server.report.calibration_checks import view_calibration_checks
 from tests.server import analysed
-from tests.server.clinic import Clinic, open_clinic
+from tests.server.clinic import Clinic
 from tests.walks import simulated
 
 pytestmark = pytest.mark.anyio
-
-
-@pytest.fixture(scope="module")
-def anyio_backend() -> str:
-    return "asyncio"
 
 
 @pytest.fixture(scope="module")
@@ -32,12 +26,6 @@ def walk() -> dict[str, bytes]:
     mounted = calibrated.calibration.segments.items()
     stored["calibration"]["segments"] = {s: {"method": x.method} for s, x in mounted}
     return files | {"analysis.json": json.dumps(stored).encode()}
-
-
-@pytest.fixture(scope="module")
-async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
-    async with open_clinic(tmp_path_factory.mktemp("calibration")) as running:
-        yield running
 
 
 async def show(clinic: Clinic, code: str, files: dict[str, bytes] | None) -> str:

@@ -3,25 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import AsyncIterator
 
 import pytest
 
 from tests.server import analysed, daily
-from tests.server.clinic import Clinic, open_clinic
+from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
-
-
-@pytest.fixture(scope="module")
-def anyio_backend() -> str:
-    return "asyncio"
-
-
-@pytest.fixture(scope="module")
-async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
-    async with open_clinic(tmp_path_factory.mktemp("daily")) as running:
-        yield running
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import html as escaped
 import json
 import re
-from collections.abc import AsyncIterator
 from dataclasses import replace
 
 import pytest
@@ -17,22 +16,11 @@ from core.simulate.tug import simulate_tug
 from server.report.exports import analysis_files
 from tests.kept import keep
 from tests.server import analysed
-from tests.server.clinic import Clinic, open_clinic
+from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
 
 YEAR = 1950
-
-
-@pytest.fixture(scope="module")
-def anyio_backend() -> str:
-    return "asyncio"
-
-
-@pytest.fixture(scope="module")
-async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
-    async with open_clinic(tmp_path_factory.mktemp("tests")) as running:
-        yield running
 
 
 @keep

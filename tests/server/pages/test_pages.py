@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import AsyncIterator
 from typing import Any
 
 import pytest
@@ -13,20 +12,9 @@ from core.body.model import NOMINAL_HEIGHT_M
 from core.online.calibrating import CalibratingParams
 from tests.data import ROOT
 from tests.server import analysed
-from tests.server.clinic import Clinic, open_clinic
+from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
-
-
-@pytest.fixture(scope="module")
-def anyio_backend() -> str:
-    return "asyncio"
-
-
-@pytest.fixture(scope="module")
-async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
-    async with open_clinic(tmp_path_factory.mktemp("pages")) as running:
-        yield running
 
 
 async def visit(clinic: Clinic, code: str, **changed: Any) -> tuple[str, str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import AsyncIterator
 
 import pytest
 
@@ -13,20 +12,9 @@ from core.simulate.mems import MEMS
 from server.report.exports import analysis_files
 from tests.core.body.chain.squats import squat_on
 from tests.server import analysed
-from tests.server.clinic import Clinic, open_clinic
+from tests.server.clinic import Clinic
 
 pytestmark = pytest.mark.anyio
-
-
-@pytest.fixture(scope="module")
-def anyio_backend() -> str:
-    return "asyncio"
-
-
-@pytest.fixture(scope="module")
-async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
-    async with open_clinic(tmp_path_factory.mktemp("squats")) as running:
-        yield running
 
 
 @pytest.fixture(scope="module")

@@ -29,11 +29,6 @@ TODAY = now().date()
 CODE = "SECRET-PERSON"
 
 
-@pytest.fixture(scope="module")
-def anyio_backend() -> str:
-    return "asyncio"
-
-
 @pytest.fixture
 async def clinic(tmp_path: Path) -> AsyncIterator[Clinic]:
     async with open_clinic(tmp_path, live_workers=0) as running:

@@ -25,11 +25,6 @@ LEAVE_OUT = Edit("exclude_stride", "right", CONTACT + 0.4, reason="stumbled")
 
 
 @pytest.fixture
-def anyio_backend() -> str:
-    return "asyncio"
-
-
-@pytest.fixture
 async def clinic(tmp_path: Path, anyio_backend: str) -> AsyncIterator[Clinic]:
     async with open_clinic(tmp_path) as running:
         yield running

@@ -18,11 +18,6 @@ from tests.server.serving import serve
 
 
 @pytest.fixture(scope="session")
-def anyio_backend() -> str:
-    return "asyncio"
-
-
-@pytest.fixture(scope="session")
 def motion() -> ReplayMotion:
     return prepare_motion(walk.poses())
 

@@ -1,8 +1,1 @@
 from __future__ import annotations
-
-import pytest
-
-
-@pytest.fixture(scope="session")
-def anyio_backend() -> str:
-    return "asyncio"
