@@ -30,6 +30,11 @@ def caption_chart(panel: CurvePanel, svg: str) -> dict[str, Any]:
     }
 
 
-def draw_chart(panel: CurvePanel, height: int, *, x_unit: bool) -> dict[str, Any]:
-    """Draw a panel `height` px high, with or without the unit of its x axis, and caption it."""
-    return caption_chart(panel, cycle_svg(panel, height=height, x_unit=x_unit))
+def draw_chart(panel: CurvePanel, height: int, *, x_unit: bool, glance: bool = False) -> dict[str, Any]:
+    """Draw a panel `height` px high, with or without the unit of its x axis, and caption it.
+
+    Parameters
+    ----------
+    glance : for a first look: single strides coarsely.
+    """
+    return caption_chart(panel, cycle_svg(panel, height=height, x_unit=x_unit, glance=glance))

@@ -17,7 +17,7 @@ from server.context import Db, Id, Reviewed
 from server.pages import daily
 from server.pages.charts import COLUMNS, KEY_HEIGHT, PAGE_HEIGHTS, PAPER_HEIGHTS, draw_chart
 from server.pages.session_context import read_context
-from server.pages.shell import record_opening, render_page
+from server.pages.shell import FRAGMENT, record_opening, render_page
 from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
 from server.report import level
 from server.report.curves import strip_svg
@@ -25,7 +25,9 @@ from server.report.headline import BEYOND_SD
 from server.report.model import ReportModel
 from server.report.table import ParameterRow
 from server.report.wording import speak_places
-from server.services import analyses, comparisons, edit_log, feedback, histories, repairs, reports
+from server.services import comparisons, feedback, histories, repairs, reports
+from server.services.controls import ControlVisit
+from server.services.histories import AnalysedSession
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
@@ -73,6 +75,11 @@ MATTERING: Final = (
 
 FIRST_ROWS: Final = 10
 
+OVERVIEW, PAPER, VALUES = "session.html", "print.html", "_values.html"
+
+STRIP_STRIDES: Final = 150
+"""A longer walk has too many strides to be told apart beside the figure; the timeline shows them."""
+
 FIRST_CURVES: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 
 NOT_ON_PAPER: Final = ("swing_pct", "swing_time_s", "turning_angle_deg")
@@ -108,7 +115,7 @@ def show_overview(
     who: Annotated[Identity, require(Action.READ_SESSION)],
 ) -> Response:
     """Is the data good, how does this person walk."""
-    return _show_report(request, db, reviewed, sid, who, "session.html")
+    return _show_report(request, db, reviewed, sid, who, OVERVIEW)
 
 
 @router.get("/sessions/{sid}/kinematics")
@@ -123,6 +130,19 @@ def show_kinematics(
     return _show_report(request, db, reviewed, sid, who, "kinematics.html")
 
 
+@router.get("/sessions/{sid}/values")
+def show_values(
+    request: Request,
+    db: Db,
+    reviewed: Reviewed,
+    sid: Id,
+    who: Annotated[Identity, require(Action.READ_RESULT)],
+) -> Response:
+    """All other values by group: a page, and the part of the overview that opens with its first fold."""
+    template = VALUES if FRAGMENT in request.headers else "values.html"
+    return _show_report(request, db, reviewed, sid, who, template)
+
+
 @router.get("/sessions/{sid}/print")
 def show_print(
     request: Request,
@@ -132,7 +152,7 @@ def show_print(
     who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """Two sheets of A4 for the browser's own print."""
-    return _show_report(request, db, reviewed, sid, who, "print.html", paper=True)
+    return _show_report(request, db, reviewed, sid, who, PAPER)
 
 
 def _show_report(
@@ -142,9 +162,8 @@ def _show_report(
     sid: str,
     who: Identity,
     template: str,
-    *,
-    paper: bool = False,
 ) -> Response:
+    paper = template == PAPER
     with db.read() as c:
         context = read_context(c, sid)
         patient = context["patient"]
@@ -162,30 +181,45 @@ def _show_report(
     if this is None and paper:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
     if this is not None:
-        context["report"] = view_report(reviewed, this.found, this.edits, context, paper=paper)
+        context["report"] = view_report(reviewed, this, context, page=template)
         context["feedback"] = feedback.view(reviewed, trained)
     if context["session"].protocol == "activity":
         template = daily.TEMPLATES.get(template, template)
-    record_opening(request, who, "session", sid)
+    if template == VALUES:
+        request.app.state.trail.record_watched(who, "numbers.opened", "session", sid)
+    else:
+        record_opening(request, who, "session", sid)
     return render_page(request, db, who, template, "patients", **context)
 
 
 def view_report(
-    reviewed: ReviewedAnalyses,
-    found: analyses.AnalysisRecord,
-    edits: edit_log.EditHistory,
-    context: Mapping[str, Any],
-    *,
-    paper: bool,
-) -> dict[str, Any]:
-    """The report of an analysis with its charts drawn, for the page or for paper."""
-    patient, session = context["patient"], context["session"]
-    bundle, model = reports.read(
-        reviewed, found, edits, patient, session, context.get("before"), context["controls"]
+    reviewed: ReviewedAnalyses, this: AnalysedSession, context: Mapping[str, Any], *, page: str
+) -> Mapping[str, Any]:
+    """The report of an analysis with its charts drawn for a page; drawn once for the same records."""
+    before: AnalysedSession | None = context.get("before")
+    controls: Sequence[ControlVisit] = context["controls"]
+    key = (
+        page,
+        context["patient"],
+        _name(this),
+        before and _name(before),
+        *((v.person, v.sex, v.birth_year, v.performed_on, v.found.id, v.edits.key) for v in controls),
     )
-    last_row = len(model.panels) - COLUMNS
-    heights = PAPER_HEIGHTS if paper else PAGE_HEIGHTS
-    curves = [draw_chart(p, heights[i >= last_row], x_unit=i >= last_row) for i, p in enumerate(model.panels)]
+    return reviewed.keep_page(key, lambda: _draw_report(reviewed, this, context, page))
+
+
+def _name(visit: AnalysedSession) -> tuple[object, ...]:
+    return visit.session, visit.found.id, visit.edits.key
+
+
+def _draw_report(
+    reviewed: ReviewedAnalyses, this: AnalysedSession, context: Mapping[str, Any], page: str
+) -> dict[str, Any]:
+    paper, overview = page == PAPER, page == OVERVIEW
+    patient, session, found = context["patient"], context["session"], this.found
+    bundle, model = reports.read(
+        reviewed, found, this.edits, patient, session, context.get("before"), context["controls"]
+    )
     used, total = sum(model.used.values()), len(model.strides)
     return {
         **{name: getattr(model, name) for name in SHOWN},
@@ -203,13 +237,14 @@ def view_report(
             if r.reason and name not in SECONDARY
         ],
         "warnings": _notices(model),
-        "curves": curves,
+        "replay": _list_for_clock(model, FIRST_CURVES) if overview else model.replay,
+        "curves": [] if overview else _draw_panels(model, PAPER_HEIGHTS if paper else PAGE_HEIGHTS),
         "sagittal": [
-            draw_chart(p, KEY_HEIGHT, x_unit=True)
+            draw_chart(p, KEY_HEIGHT, x_unit=True, glance=True)
             for p in model.panels
-            if p.variable.name in FIRST_CURVES and p.sides
+            if overview and p.variable.name in FIRST_CURVES and p.sides
         ],
-        "strip": strip_svg(bundle.strides, model.duration_s) if model.strides else "",
+        "strip": strip_svg(bundle.strides, model.duration_s) if 0 < total <= STRIP_STRIDES else "",
         "stride_words": f"{used} of {total} used",
         "empty_reason": explain_emptiness(model),
         "identity": _identity(patient, session, model.condition),
@@ -217,6 +252,18 @@ def view_report(
         f"input {found.input_sha256[:8]} · {day(found.created_at)}",
         "has_poses": "poses.parquet" in found.files,
     }
+
+
+def _draw_panels(model: ReportModel, heights: Mapping[bool, int]) -> list[dict[str, Any]]:
+    """All cycle charts; those of the last row also say the unit of the x axis."""
+    last_row = len(model.panels) - COLUMNS
+    return [draw_chart(p, heights[i >= last_row], x_unit=i >= last_row) for i, p in enumerate(model.panels)]
+
+
+def _list_for_clock(model: ReportModel, variables: Sequence[str]) -> dict[str, Any]:
+    """What the page's clock needs, with the curves of some variables only."""
+    curves: Mapping[str, Any] = model.replay["curves"]  # type: ignore[assignment]
+    return {**model.replay, "curves": {v: curves[v] for v in variables if v in curves}}
 
 
 def select_first(model: ReportModel) -> tuple[ParameterRow, ...]:

@@ -23,6 +23,10 @@ NAVIGATION = (
 """Rail entries: page, icon, word, address, and what one must be allowed to do to see it."""
 
 
+FRAGMENT = "x-sagittal-fragment"
+"""Header by which a page's own script asks for a part of it."""
+
+
 def record_opening(request: Request, who: Identity, resource: str, resource_id: str) -> None:
     """Write down that somebody looked at it."""
     trail: AuditTrail = request.app.state.trail

@@ -17,14 +17,11 @@ from server.http.templates import TEMPLATES
 from server.pages.charts import KEY_HEIGHT, draw_chart
 from server.pages.session import explain_emptiness, select_groups
 from server.pages.session_context import read_context
-from server.pages.shell import record_opening, render_page
+from server.pages.shell import FRAGMENT, record_opening, render_page
 from server.services import analyses, edit_log, reports, signals
 from server.services.reviewed import ReviewedAnalyses
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
-
-FRAGMENT = "x-sagittal-fragment"
-"""Header by which the page's own script asks for a part of it."""
 
 
 @router.get("/sessions/{sid}/timeline")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -49,6 +50,7 @@ def cycle_svg(
     height: int = 176,
     x_unit: bool = False,
     single_strides: bool = True,
+    glance: bool = False,
     earlier: CurvePanel | None = None,
     over: CycleWords = STRIDE,
 ) -> str:
@@ -59,6 +61,7 @@ def cycle_svg(
     height : px with margins, of which the stylesheet gives 18 above and 20 (34 with `x_unit`) below.
     x_unit : print the unit of the x axis below; once per column. over : what the curves go over.
     single_strides : draw thin strides, each a path with its number in the stride list as `data-stride`.
+    glance : draw single strides coarsely, every 4 % of the cycle.
     earlier : the same variable in an earlier session; its means are drawn thin, behind.
 
     Returns
@@ -79,7 +82,7 @@ def cycle_svg(
         plot.foot_off_spread(side, curve)
     if single_strides:
         for side, curve in panel.sides.items():
-            plot.strides(side, curve)
+            plot.strides(side, curve, 4 if glance else 2)
     for css, drawn in (("pv", {} if earlier is None else earlier.sides), ("m", panel.sides)):
         for side, curve in drawn.items():
             if curve.mean_deg is not None:
@@ -168,9 +171,9 @@ class _CyclePlot(PlotArea):
             x, w = 10 * (curve.foot_off_pct - curve.foot_off_sd), 20 * curve.foot_off_sd
             self.add_column(f"fos{KEY[side]}", x, w)
 
-    def strides(self, side: Side, curve: SideCurve) -> None:
+    def strides(self, side: Side, curve: SideCurve, step: int) -> None:
         for index, angle in curve.strides.items():
-            d = self._path(angle[::2], 2)
+            d = self._path(angle[::step], step)
             self.add(f'<path class="s{KEY[side]}" data-stride="{index}" d="{d}"/>')
 
     def curve(self, angle: Floats, css: str) -> None:
@@ -202,11 +205,21 @@ class _CyclePlot(PlotArea):
         self.add_text("0", 0, f"{up} ↑", "words halo", "start", dx=5, dy=11)
         self.add_text("0", self.height, f"{down} ↓", "words halo", "start", dx=5, dy=-5)
 
-    def _points(self, angle: Floats, step: int = 1, first: int = 0) -> list[str]:
-        y = np.rint(1000 * (self.high - angle) / (self.high - self.low)).astype(np.int64).tolist()
-        return [f"{10 * step * i} {v}" for i, v in enumerate(y, first)]
+    def _points(self, angle: Floats) -> list[str]:
+        return [f"{10 * i} {v}" for i, v in enumerate(self._heights(angle))]
+
+    def _heights(self, angle: Floats) -> list[int]:
+        """Whole thousandths of the plot from its top."""
+        heights: list[int] = np.rint(1000 * (self.high - angle) / (self.high - self.low)).astype(int).tolist()
+        return heights
 
     def _path(self, angle: Floats, step: int) -> str:
         """The curve in % of the plot, interrupted where it has no value."""
         known = find_runs(np.isfinite(angle))
-        return "".join("M" + "L".join(self._points(angle[a:b], step, a)) for a, b in known)
+        return "".join(self._run(angle[a:b], step, a) for a, b in known)
+
+    def _run(self, angle: Floats, step: int, first: int) -> str:
+        """One piece of a curve: its first point, then where each next one lies from the last."""
+        y = self._heights(angle)
+        moves = " ".join(f"{10 * step}{b - a:+d}" for a, b in pairwise(y))
+        return f"M{10 * step * first} {y[0]}" + (f"l{moves}" if moves else "")

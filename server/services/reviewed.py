@@ -30,10 +30,11 @@ _Value = TypeVar("_Value")
 NOT_READ: Final = ("poses.parquet", signals.NAME)
 """Files that only the replay and the drawing of signals need."""
 
-ANALYSES_KEPT, RESULTS_KEPT, PARTS_KEPT = 3, 12, 24
+ANALYSES_KEPT, RESULTS_KEPT, PARTS_KEPT, PAGES_KEPT = 3, 12, 24, 24
 NUMBERS_KEPT, CONTROLS_KEPT, VERDICTS_KEPT = 240, 500, 5000
 """Finished analyses, results of edits, signals of one sensor and numbers kept in memory: those at work. Ten
-minutes are some 20 MB, 1 MB, 2 MB and 50 kB; a verdict is two words."""
+minutes are some 20 MB, 1 MB, 2 MB and 50 kB; a page that was put into words and drawn is 1 MB, a verdict two
+words."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,7 @@ class ReviewedAnalyses:
         self._controls: RecentValues[ControlSession] = RecentValues(CONTROLS_KEPT)
         self._verdicts: RecentValues[tuple[str, str]] = RecentValues(VERDICTS_KEPT)
         self._parts: RecentValues[Any] = RecentValues(PARTS_KEPT)
+        self._pages: RecentValues[Any] = RecentValues(PAGES_KEPT)
 
     def open(self, found: analyses.AnalysisRecord) -> StoredAnalysis:
         """Return an analysis as it is stored, read once while it is at work; raises IntegrityError."""
@@ -159,11 +161,21 @@ class ReviewedAnalyses:
         """Return what serves as reference of a finished analysis of a control."""
         return self._controls.get((found.id, edits.key), make_value)
 
+    def keep_page(self, key: Hashable, make_value: Callable[[], _Value]) -> _Value:
+        """Return what a page shows of analyses, drawn once for the same records; `key` names all of them."""
+        return cast("_Value", self._pages.get(key, make_value))
+
     def forget(self) -> None:
         """Keep nothing in memory: what is erased on disk must not stay here."""
         for memory in (
-            self._analyses, self._results, self._numbers, self._controls, self._parts, self._verdicts
-        ):  # fmt: skip
+            self._analyses,
+            self._results,
+            self._numbers,
+            self._controls,
+            self._parts,
+            self._verdicts,
+            self._pages,
+        ):
             memory.clear()
 
 

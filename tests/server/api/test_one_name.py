@@ -59,7 +59,7 @@ async def test_no_name_occurs_twice_with_different_values(clinic: Clinic) -> Non
             assert answer.status_code == 200, (address, answer.text[:300])
             return answer.text
 
-        page = await read(f"/sessions/{session}")
+        page = await read(f"/sessions/{session}") + await read(f"/sessions/{session}/values")
         kinematics = await read(f"/sessions/{session}/kinematics")
         paper = await read(f"/sessions/{session}/print")
         numbers = await read(f"/sessions/{session}/timeline/numbers")

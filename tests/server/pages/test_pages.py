@@ -10,6 +10,8 @@ import pytest
 
 from core.body.model import NOMINAL_HEIGHT_M
 from core.online.calibrating import CalibratingParams
+from server.pages.charts import draw_chart
+from server.report.panels import CurvePanel
 from tests.data import ROOT
 from tests.server import analysed
 from tests.server.clinic import Clinic
@@ -156,3 +158,38 @@ def test_tablet_and_therapist_are_told_to_stand_as_long_as_the_server_waits() ->
     assert by_hand == []
     shown = [p.name for p in static.rglob("*.js") if "${STAND_S} seconds" in p.read_text()]
     assert sorted(shown) == ["calibration.js", "view.js", "words.js"]
+
+
+async def test_the_overview_is_light_and_the_rest_comes_when_it_is_opened(clinic: Clinic) -> None:
+    _, session = await visit(clinic, "LIGHT")
+    overview = await page(clinic, f"/sessions/{session}")
+    assert len(overview.encode()) < 80_000
+    names = set(re.findall(r'class="plain" href="[^"]*/parameters/(\w+)"', overview))
+    values = await page(clinic, f"/sessions/{session}/values")
+    others = set(re.findall(r'class="plain" href="[^"]*/parameters/(\w+)"', values))
+    assert len(names) == 10
+    assert others > {"swing_time_s", "turning_angle_deg"}
+    assert not names & others
+
+
+async def test_a_report_is_drawn_once_until_something_it_shows_changes(
+    clinic: Clinic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    patient, session = await visit(clinic, "ONCE")
+    drawn: list[str] = []
+
+    def draw(panel: CurvePanel, *args: Any, **kwargs: Any) -> dict[str, Any]:
+        drawn.append(panel.variable.name)
+        return draw_chart(panel, *args, **kwargs)
+
+    monkeypatch.setattr("server.pages.session.draw_chart", draw)
+    first = await page(clinic, f"/sessions/{session}")
+    assert drawn
+    drawn.clear()
+    assert await page(clinic, f"/sessions/{session}") == first
+    assert not drawn
+    async with clinic.client("admin") as client:
+        answer = await client.patch(f"/api/v1/patients/{patient}", json={"sex": "male", "birth_year": 1950})
+    assert answer.status_code == 200, answer.text
+    assert await page(clinic, f"/sessions/{session}") != first
+    assert drawn

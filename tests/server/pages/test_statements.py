@@ -12,7 +12,7 @@ from sqlalchemy import insert, select
 
 from core.feedback import Baseline, Cue
 from server.pages.routes import ROUTERS
-from server.pages.timeline import FRAGMENT
+from server.pages.shell import FRAGMENT
 from server.services import live, prescriptions, programmes, sessions
 from server.storage.tables import analysis, live_take, new_id, recording
 from tests.server import analysed, crowd

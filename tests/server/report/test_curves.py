@@ -4,6 +4,7 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import accumulate
 
 import pytest
 from defusedxml.ElementTree import fromstring
@@ -86,12 +87,31 @@ def test_the_mean_passes_through_its_values(bundle: Bundle, knee: ET.Element) ->
     panel = report_model(bundle).key_curve
     mean = panel.sides["left"].mean_deg
     assert mean is not None
-    d = all_of(knee, "ml")[0].get("d") or ""
-    points = [tuple(map(float, p.split())) for p in d.removeprefix("M").split("L")]
+    x, y = follow_path(all_of(knee, "ml")[0].get("d") or "")
     low, high = panel.variable.y_range
-    assert [x for x, _ in points] == [10 * i for i in range(101)]
-    for (_, y), angle in zip(points, mean, strict=True):
-        assert high - y / 1000 * (high - low) == pytest.approx(angle, abs=0.06)
+    assert x == [10 * i for i in range(101)]
+    for at, angle in zip(y, mean, strict=True):
+        assert high - at / 1000 * (high - low) == pytest.approx(angle, abs=0.06)
+
+
+def follow_path(d: str) -> tuple[list[int], list[int]]:
+    """Places of a path that begins with M and goes on with relative steps."""
+    start, steps = d.removeprefix("M").split("l")
+    moves = [re.fullmatch(r"(\d+)([+-]\d+)", step) for step in steps.split()]
+    dx, dy = zip(*((int(m[1]), int(m[2])) for m in moves if m), strict=True)
+    assert len(dx) == len(moves)
+    x0, y0 = map(int, start.split())
+    return list(accumulate(dx, initial=x0)), list(accumulate(dy, initial=y0))
+
+
+def test_single_strides_are_coarser_at_a_glance(bundle: Bundle) -> None:
+    panel = report_model(bundle).key_curve
+    fine, coarse = (
+        follow_path(all_of(fromstring(cycle_svg(panel, glance=glance)), "sl")[0].get("d") or "")
+        for glance in (False, True)
+    )
+    assert len(coarse[0]) == 26
+    assert coarse == (fine[0][::2], fine[1][::2])
 
 
 def test_title_speaks_for_the_picture(knee: ET.Element) -> None:
