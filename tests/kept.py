@@ -25,6 +25,8 @@ R = TypeVar("R")
 SOURCES: Final = ("core", "sagittal", "tests")
 """Folders of which every module counts, and the tables beside them."""
 FOLDER: Final = Path(tempfile.gettempdir()) / f"sagittal-tests-{os.getuid()}"
+IN_MEMORY: Final = 6
+"""Values of a function that stay in a process; the others are read again, for three processes have one memory."""
 FORGOTTEN_S: Final = 24 * 3600.0
 """What other sources gave is removed after this time."""
 
@@ -38,14 +40,14 @@ copyreg.pickle(MappingProxyType, lambda seen: (view, (dict(seen),)))
 
 
 def keep(make: Callable[P, R]) -> Callable[P, R]:
-    """Keep what a function gives for its arguments, in this process and on disk.
+    """Keep what a function gives for its arguments, the last in this process and all on disk.
 
     Parameters
     ----------
     make : gives the same for the same arguments; what it gives is never changed, and can be pickled.
     """
 
-    @functools.cache
+    @functools.lru_cache(IN_MEMORY)
     def kept(*args: P.args, **kwargs: P.kwargs) -> R:
         said = f"{make.__module__}.{make.__qualname__}{args}{sorted(kwargs.items())}"
         path = folder() / hashlib.sha256(said.encode()).hexdigest()[:32]
