@@ -26,7 +26,7 @@ SOURCES: Final = ("core", "sagittal", "tests")
 """Folders of which every module counts, and the tables beside them."""
 FOLDER: Final = Path(tempfile.gettempdir()) / f"sagittal-tests-{os.getuid()}"
 IN_MEMORY: Final = 6
-"""Values of a function that stay in a process; the others are read again, for three processes have one memory."""
+"""Values of a function that stay in a process; the rest are read again, as several share the memory."""
 FORGOTTEN_S: Final = 24 * 3600.0
 """What other sources gave is removed after this time."""
 
