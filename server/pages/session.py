@@ -230,6 +230,7 @@ def _draw_report(
         "not_compared": _not_compared(session, model),
         "first": (first := select_first(model)),
         "folds": fold_groups(model, first),
+        "ranks": {} if model.headline is None else model.headline.ranks,
         "missing": [
             (r.title, r.reason.removeprefix("not measured: "))
             for name, rows in model.groups

@@ -104,6 +104,11 @@ class Headline:
         return self.stands_out[: MOST - len(self.shown_changes)]
 
     @property
+    def ranks(self) -> dict[str, int]:
+        """Parameter → place of the sentence that it proves; the number stands before its row."""
+        return {s.name: rank for rank, s in enumerate(self.shown, 1)}
+
+    @property
     def more(self) -> tuple[str, ...]:
         """Labels of what has no room."""
         left = (*self.stands_out[len(self.shown) :], *self.changed[len(self.shown_changes) :])

@@ -193,3 +193,23 @@ async def test_a_report_is_drawn_once_until_something_it_shows_changes(
     assert answer.status_code == 200, answer.text
     assert await page(clinic, f"/sessions/{session}") != first
     assert drawn
+
+
+async def test_a_sentence_leads_to_what_proves_it_and_its_number_stands_there(clinic: Clinic) -> None:
+    _, session = await visit(clinic, "RANK")
+    overview = await page(clinic, f"/sessions/{session}")
+    values = await page(clinic, f"/sessions/{session}/values")
+    said = re.findall(r'href="([^"]*)">\s*<span class="rank"[^>]*>(\d)<', overview)
+    assert said
+    proofs = {rank: address for address, rank in said}
+    rows = re.findall(
+        r'<span class="rank"[^>]*>(\d)</span>\s*<a class="plain" href="([^"]*)"', overview + values
+    )
+    for rank, address in rows:
+        assert proofs.pop(rank) == address
+        await page(clinic, address)
+    assert set(proofs.values()) == {"#limits"}
+    assert 'id="limits"' in overview
+    assert all(
+        f'aria-hidden="true">{rank}</span></summary>' in re.sub(r"\s+<", "<", values) for rank in proofs
+    )
