@@ -20,7 +20,7 @@ from server.pages.session_context import read_context
 from server.pages.shell import FRAGMENT, record_opening, render_page
 from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
 from server.report import level
-from server.report.curves import strip_svg
+from server.report.curves import GLANCE_STRIDES, strip_svg
 from server.report.headline import BEYOND_SD
 from server.report.model import ReportModel
 from server.report.table import ParameterRow
@@ -246,6 +246,7 @@ def _draw_report(
             if overview and p.variable.name in FIRST_CURVES and p.sides
         ],
         "strip": strip_svg(bundle.strides, model.duration_s) if 0 < total <= STRIP_STRIDES else "",
+        "drawn": "some strides" if overview and max(model.used.values()) > GLANCE_STRIDES else "",
         "stride_words": f"{used} of {total} used",
         "empty_reason": explain_emptiness(model),
         "identity": _identity(patient, session, model.condition),

@@ -40,6 +40,8 @@ class CycleWords:
 STRIDE: Final = CycleWords("the gait cycle", "strides", "% of gait cycle")
 SQUAT: Final = CycleWords("the squat", "squats", "% of squat")
 
+GLANCE_STRIDES: Final = 15
+
 _TOP, _BOTTOM, _BOTTOM_WITH_UNIT = 18, 20, 34
 _CLOSE_PCT = 6.0
 
@@ -61,7 +63,7 @@ def cycle_svg(
     height : px with margins, of which the stylesheet gives 18 above and 20 (34 with `x_unit`) below.
     x_unit : print the unit of the x axis below; once per column. over : what the curves go over.
     single_strides : draw thin strides, each a path with its number in the stride list as `data-stride`.
-    glance : draw single strides coarsely, every 4 % of the cycle.
+    glance : of single strides draw at most `GLANCE_STRIDES` a side, spread over the take, in steps of 4 %.
     earlier : the same variable in an earlier session; its means are drawn thin, behind.
 
     Returns
@@ -82,7 +84,7 @@ def cycle_svg(
         plot.foot_off_spread(side, curve)
     if single_strides:
         for side, curve in panel.sides.items():
-            plot.strides(side, curve, 4 if glance else 2)
+            plot.strides(side, curve, glance)
     for css, drawn in (("pv", {} if earlier is None else earlier.sides), ("m", panel.sides)):
         for side, curve in drawn.items():
             if curve.mean_deg is not None:
@@ -143,13 +145,13 @@ def _stride_mark(index: int, s: Stride, duration_s: float) -> str:
     cross = ""
     if s.excluded_reason is not None:
         said += f", left out: {explain_exclusion(s.excluded_reason)}"
-        a, b = f"{start:.2f}", f"{end:.2f}"
+        a, b = f"{start:.1f}", f"{end:.1f}"
         cross = f'<path class="xx" d="M{a} {top + 60}L{b} {top + 360}M{a} {top + 360}L{b} {top + 60}"/>'
     faded = " x" if out else ""
     return (
         f'<g data-stride="{index}"><title>{escape(said)}</title>'
-        f'<rect class="st{k}{faded}" x="{start:.2f}" width="{off - start:.2f}" y="{top}" height="420"/>'
-        f'<rect class="sw{k}{faded}" x="{off:.2f}" width="{end - off:.2f}" y="{top}" height="420"/>'
+        f'<rect class="st{k}{faded}" x="{start:.1f}" width="{off - start:.1f}" y="{top}" height="420"/>'
+        f'<rect class="sw{k}{faded}" x="{off:.1f}" width="{end - off:.1f}" y="{top}" height="420"/>'
         f"{cross}</g>"
     )
 
@@ -171,8 +173,10 @@ class _CyclePlot(PlotArea):
             x, w = 10 * (curve.foot_off_pct - curve.foot_off_sd), 20 * curve.foot_off_sd
             self.add_column(f"fos{KEY[side]}", x, w)
 
-    def strides(self, side: Side, curve: SideCurve, step: int) -> None:
-        for index, angle in curve.strides.items():
+    def strides(self, side: Side, curve: SideCurve, glance: bool) -> None:
+        step = 4 if glance else 2
+        apart = -(-len(curve.strides) // GLANCE_STRIDES) if glance else 1
+        for index, angle in list(curve.strides.items())[:: max(1, apart)]:
             d = self._path(angle[::step], step)
             self.add(f'<path class="s{KEY[side]}" data-stride="{index}" d="{d}"/>')
 
