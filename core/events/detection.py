@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -39,11 +40,12 @@ KINDS: Final[tuple[EventKind, EventKind]] = ("tc", "ic")
 
 @dataclass(frozen=True)
 class PitchFigures:
-    """What one foot did: extremes of s, its level in quiet standing (None without any), events found."""
+    """What one foot did: extremes of s, its level when quiet and in mid-stance or None, and events found."""
 
     s_min: float
     s_max: float
     s_quiet: float | None
+    s_flat: float | None
     n_ic: int
     n_tc: int
 
@@ -151,6 +153,7 @@ def _each_foot(
             s_min=float(s[valid].min(initial=1.0)),
             s_max=float(s[valid].max(initial=-1.0)),
             s_quiet=_quiet_level(orientations.q[foot], s, valid, orientations.rate_hz, params),
+            s_flat=_flat_level(found, s, valid, orientations),
             n_ic=sum(e.kind == "ic" for e in found),
             n_tc=sum(e.kind == "tc" for e in found),
         )
@@ -194,6 +197,20 @@ def _quiet_level(q: Floats, s: Floats, valid: Bools, rate_hz: float, params: Foo
     return float(s[: whole * second].reshape(seconds)[quiet].mean()) if quiet.any() else None
 
 
+def _flat_level(events: list[GaitEvent], s: Floats, valid: Bools, orientations: Orientations) -> float | None:
+    """Median over a foot's stances of the mean s in their middle thirds, None without a whole stance."""
+    ordered = sorted(events, key=lambda e: e.time_s)
+    middles = []
+    for contact, off in pairwise(ordered):
+        if (contact.kind, off.kind) == ("ic", "tc"):
+            lasts = off.time_s - contact.time_s
+            times = contact.time_s + np.array([lasts / 3.0, 2.0 * lasts / 3.0])
+            a, b = np.searchsorted(orientations.t_s, times)
+            if b > a and valid[a:b].all():
+                middles.append(float(s[a:b].mean()))
+    return float(np.median(middles)) if middles else None
+
+
 def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list[Notice]:
     """Say what makes the events of one foot absent or doubtful."""
     foot = FOOT[side]
@@ -208,7 +225,7 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list
                 foot,
             )
         )
-    elif figures.s_max < params.suspect_max:
+    elif figures.s_max < params.suspect_max and not _stood_as_in_stance(figures, params):
         remarks.append(
             Notice(
                 "rest_pose_suspect",
@@ -229,6 +246,11 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list
             )
         )
     return remarks
+
+
+def _stood_as_in_stance(figures: PitchFigures, params: FootPitchParams) -> bool:
+    """Whether a foot was pitched at rest as in mid-stance: one that drops, or hardly lifts its toes."""
+    return figures.s_flat is not None and abs(figures.s_flat) <= params.suspect_quiet
 
 
 def _threshold_notice(figures: dict[str, PitchFigures], params: FootPitchParams) -> Notice:

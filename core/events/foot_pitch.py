@@ -37,8 +37,9 @@ class FootPitchParams:
         the additive noise on s that the rule stands (tests/core/events). A foot that lands on its heel
         falls so far within a few samples: real recordings give the same contacts with and without.
     min_rate_hz : below it the window holds fewer than six samples.
-    suspect_max : a foot that never pitches up beyond this was not level at rest: 6°, our choice.
-    suspect_quiet : largest mean |s| of quiet standing: 6°, our choice.
+    suspect_max : a foot that never pitches up beyond this was not level at rest, unless it is in mid-stance:
+        6°, our choice.
+    suspect_quiet : largest mean |s| of quiet standing, and of mid-stance: 6°, our choice.
     quiet_rad_s : a second counts as quiet below this mean angular speed: standing, our choice.
     """
 

@@ -58,6 +58,13 @@ def test_a_foot_that_is_not_level_at_rest_is_suspected() -> None:
     )
 
 
+def test_a_foot_that_drops_in_swing_but_stands_flat_is_not_suspected() -> None:
+    t = np.arange(1500) / 100.0
+    pitch = foot_pitch(t, 2.0, 8, 1.1)
+    dropping = np.where(pitch > 0.0, 0.25 * pitch, pitch)
+    assert codes(orientations(100.0, {"foot_l": dropping})) == {"foot_missing"}
+
+
 def test_a_rate_below_40_hz_is_refused() -> None:
     with pytest.raises(SignalError, match="at least 40 Hz") as error:
         detect(walk(rate_hz=30.0))
