@@ -2,7 +2,8 @@
 (docs/science/simulation.md, "Squat").
 
 For estimators that build on a fixed foot (Kianifar et al.: sensors on shank, thigh and lower back) and as a
-motion that breaks those made for walking. The other leg is left out, or lifted until its turn, or squats along.
+motion that breaks those made for walking. The other leg is left out, or lifted until its turn, or squats
+along.
 """
 
 from __future__ import annotations
@@ -228,9 +229,7 @@ def _place_body(
     t: Floats, squats: Squats, deep: Floats, anatomy: Anatomy
 ) -> tuple[dict[Segment, Floats], dict[Segment, Floats]]:
     """Orientations (n, 4) and origins (n, 3) in m of all segments; deep (turns, repetitions)."""
-    depths = [
-        _depth(t, squats, starts, shares) for starts, shares in zip(squats.starts_s, deep, strict=True)
-    ]
+    depths = [_depth(t, squats, starts, shares) for starts, shares in zip(squats.starts_s, deep, strict=True)]
     legs = [_stand_on(squats, side, depths[0], anatomy) for side in squats.sides]
     if squats.other == "left_out":
         return legs[0]

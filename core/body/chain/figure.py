@@ -72,6 +72,4 @@ def draw_legs(legs: Mapping[Side, LegMotion], height_m: float | None) -> PoseEst
     shown = replace(joined, q=q, valid=valid)
     poses = forward_kinematics(shown, nominal_body(height_m)[0], contacts)
     told = {"requested": AUTO, "sensors": tuple(s for s in valid if s in (SQUAT_CHAIN.sensors or ()))}
-    return PoseEstimate(
-        joined, replace(poses, method=SQUAT_CHAIN.method, notices=(), diagnostics=told), None
-    )
+    return PoseEstimate(joined, replace(poses, method=SQUAT_CHAIN.method, notices=(), diagnostics=told), None)
