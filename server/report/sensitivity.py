@@ -336,10 +336,8 @@ def _view_leg(leg: Mapping[str, Any], shown: str, *, against: bool) -> Sensitivi
             )
             for of, names in GROUPS
         )
-        last = tuple(_texts(leg["average_pct"], columns, averaged, 0))
+        average = tuple(_texts(leg["average_pct"], columns, averaged, 0)) if shown == "quotient" else None
         header = (*(COLUMNS[i] for i in columns), name)
-        tables.append(
-            SensitivityTableView(title, header, groups, None if average is None else tuple(average))
-        )
+        tables.append(SensitivityTableView(title, header, groups, average))
     errors = (f"{n} {format_number(e, 1)}°" for n, e in zip(COLUMNS, leg["error_deg"], strict=True))
     return SensitivityLeg(leg["side"], tuple(tables), ", ".join(errors) if against else "")

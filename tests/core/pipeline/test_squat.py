@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from core.errors import ParameterError
-from core.frames import FOOT, Segment
+from core.frames import Segment
 from core.pipeline import SQUAT, PipelineConfig, TakeAnalysis, analyse, resume
 from core.pipeline.recipes import choose_recipe
 from core.recording import ImuStream, Recording, Subject, UniformRecording
 from core.rotation import multiply
 from core.simulate import SquatSimulation, simulate_movement
 from core.squat.params import SquatParams
-from core.squat.side import find_squat_side
+from core.squat.side import find_squat_sides
 from core.timeline import synchronise
 from server.report.bundle import load_bundle
 from server.report.exports import analysis_files
@@ -51,12 +51,17 @@ def test_the_protocol_decides_the_recipe_and_the_squats_are_the_true_ones() -> N
     assert found["squat_depth_deg"].n == len(depths) == 6
     assert found["squat_depth_deg"].mean == pytest.approx(depths.mean(), abs=3.0)
     assert a.strides is None
-    assert a.poses is None
 
 
 def test_the_files_give_the_report_back() -> None:
     files = analysis_files(analysis())
-    assert set(files) == {"analysis.json", "angles.parquet", "repetitions.csv", "signals.parquet"}
+    assert set(files) == {
+        "analysis.json",
+        "angles.parquet",
+        "poses.parquet",
+        "repetitions.csv",
+        "signals.parquet",
+    }
     rows = list(csv.DictReader(io.StringIO(files["repetitions.csv"].decode())))
     assert len(rows) == 6
     assert all(50.0 < float(row["squat_depth_deg"]) < 90.0 and not row["excluded_reason"] for row in rows)
@@ -97,23 +102,21 @@ def test_an_analysis_goes_on_from_any_stage() -> None:
     assert report_model(load_bundle(analysis_files(none))).quality.word == "No squats"
 
 
-def test_of_two_legs_with_sensors_the_standing_foot_tells() -> None:
-    uniform = synchronise(made().recording)
-    both = dict(uniform.sensors)
-    other: dict[Segment, Segment] = {"shank_l": "shank_r", "thigh_l": "thigh_r", "foot_l": "thigh_r"}
-    both |= {left: uniform.sensors[right] for left, right in other.items()}
-    assert find_squat_side(replace(uniform, sensors=both)) == "right"
-    del both[FOOT["right"]]
-    assert refusal(replace(uniform, sensors=both)) == "side_unknown"
-    del both["pelvis"]
-    assert refusal(replace(uniform, sensors=both)) == "segments_missing"
+def test_what_legs_need_is_said() -> None:
+    uniform = synchronise(made("squats_both_legs").recording)
+    assert find_squat_sides(uniform) == ("left", "right")
+    worn = dict(uniform.sensors)
+    del worn["thigh_l"]
+    assert find_squat_sides(replace(uniform, sensors=worn)) == ("right",)
+    del worn["pelvis"]
+    assert refusal(replace(uniform, sensors=worn)) == "segments_missing"
 
 
 def refusal(recording: UniformRecording) -> str:
     from core.errors import EstimationError
 
     with pytest.raises(EstimationError) as caught:
-        find_squat_side(recording)
+        find_squat_sides(recording)
     return caught.value.code
 
 

@@ -20,6 +20,7 @@ from core.simulate.truth import joint_angles
 from core.squat.joints import JOINTS, name_joint_angles
 from core.squat.sensitivity import (
     PARAMETERS,
+    ReferenceAngles,
     SensitivityTable,
     SquatCase,
     analyse_sensitivity,
@@ -38,7 +39,8 @@ def case() -> SquatCase:
         synchronise(made.recording), make_fixed_mounts("right"), "fixed_offset", FIXED_OFFSET
     )
     leg = measure_leg(HEIGHT_M, "right")
-    return make_case(calibrated, leg, made.truth.t_s, made.truth.angles, from_standing=False)
+    truth = ReferenceAngles(made.truth.t_s, made.truth.angles)
+    return make_case(calibrated, leg, truth, from_standing=False)
 
 
 @cache
@@ -138,10 +140,12 @@ def test_a_reference_that_does_not_fit_is_refused() -> None:
     )
     leg, truth = measure_leg(HEIGHT_M, "right"), made.truth
     with pytest.raises(EstimationError) as caught:
-        make_case(calibrated, leg, truth.t_s, {"knee_flexion_r": truth.t_s}, from_standing=False)
+        make_case(
+            calibrated, leg, ReferenceAngles(truth.t_s, {"knee_flexion_r": truth.t_s}), from_standing=False
+        )
     assert caught.value.code == "no_reference"
     with pytest.raises(EstimationError) as caught:
-        make_case(calibrated, leg, truth.t_s + 1e4, truth.angles, from_standing=False)
+        make_case(calibrated, leg, ReferenceAngles(truth.t_s + 1e4, truth.angles), from_standing=False)
     assert caught.value.code == "no_reference"
     with pytest.raises(ParameterError):
         analyse_sensitivity(case(), relative=0.0)
