@@ -219,29 +219,37 @@ def _layout(header: Sequence[str], rows: Sequence[tuple[str, list[str]]]) -> lis
 
 
 @dataclass(frozen=True)
-class SensitivityGroup:
-    """Rows of one kind; a row: the parameter in words, the paper's name, its cells, and why one is empty."""
+class SensitivityCell:
+    """A number; `nothing` = it rounds to 0."""
 
-    title: str
-    rows: tuple[tuple[str, str, tuple[str, ...], str], ...]
+    text: str
+    nothing: bool
 
 
 @dataclass(frozen=True)
-class SensitivityTableView:
-    """One of the two tables of a leg."""
+class SensitivityLine:
+    """A parameter in words, the paper's name, its cells, and why they are empty."""
 
-    title: str
-    header: tuple[str, ...]
-    groups: tuple[SensitivityGroup, ...]
-    average: tuple[str, ...] | None
+    words: str
+    name: str
+    cells: tuple[SensitivityCell, ...]
+    why: str
 
 
 @dataclass(frozen=True)
 class SensitivityLeg:
-    """The tables of a leg, and its errors against the reference in words, empty without one."""
+    """Tables 2 and 3 of a leg side by side.
+
+    Parameters
+    ----------
+    parts : title of each table and its columns. groups : title and lines. average : last line, None where
+        quantities are no quotients. errors : RMS errors against the reference in words, empty without one.
+    """
 
     side: str
-    tables: tuple[SensitivityTableView, ...]
+    parts: tuple[tuple[str, tuple[str, ...]], ...]
+    groups: tuple[tuple[str, tuple[SensitivityLine, ...]], ...]
+    average: tuple[SensitivityCell, ...] | None
     errors: str
 
 
@@ -319,25 +327,20 @@ def _find_largest(found: Mapping[str, Any], names: Mapping[str, str]) -> tuple[f
 def _view_leg(leg: Mapping[str, Any], shown: str, *, against: bool) -> SensitivityLeg:
     rows = {row["name"]: row for row in leg["rows"]}
     digits = 0 if shown == "quotient" else 2
-    tables = []
-    for title, columns, averaged, name in TABLES:
-        groups = tuple(
-            SensitivityGroup(
-                of,
-                tuple(
-                    (
-                        words,
-                        key,
-                        tuple(_texts(rows[key][SHOWN[shown]], columns, averaged, digits)),
-                        "" if shown == "step" else REASONS.get(rows[key]["reason"], ""),
-                    )
-                    for key, words in names.items()
-                ),
-            )
-            for of, names in GROUPS
-        )
-        average = tuple(_texts(leg["average_pct"], columns, averaged, 0)) if shown == "quotient" else None
-        header = (*(COLUMNS[i] for i in columns), name)
-        tables.append(SensitivityTableView(title, header, groups, average))
+
+    def cells(values: Sequence[float | None] | None) -> tuple[SensitivityCell, ...]:
+        texts = [x for _, columns, averaged, _ in TABLES for x in _texts(values, columns, averaged, digits)]
+        return tuple(SensitivityCell(x, not x.strip("0.–")) for x in texts)
+
+    def line(name: str, words: str) -> SensitivityLine:
+        why = "" if shown == "step" else REASONS.get(rows[name]["reason"], "")
+        return SensitivityLine(words, name, cells(rows[name][SHOWN[shown]]), why)
+
     errors = (f"{n} {format_number(e, 1)}°" for n, e in zip(COLUMNS, leg["error_deg"], strict=True))
-    return SensitivityLeg(leg["side"], tuple(tables), ", ".join(errors) if against else "")
+    return SensitivityLeg(
+        side=leg["side"],
+        parts=tuple((title, (*(COLUMNS[i] for i in columns), "Average")) for title, columns, _, _ in TABLES),
+        groups=tuple((of, tuple(line(*entry) for entry in names.items())) for of, names in GROUPS),
+        average=cells(leg["average_pct"]) if shown == "quotient" else None,
+        errors=", ".join(errors) if against else "",
+    )

@@ -77,7 +77,7 @@ def test_what_can_run_is_what_the_list_says_of_every_set_of_sensors() -> None:
         assert set(list_possible_estimators(worn)) == {e.name for e in ESTIMATORS if e.runs_on(worn)}
 
 
-@pytest.mark.parametrize("estimator", (*ESTIMATORS, SQUAT_CHAIN), ids=lambda e: e.name)
+@pytest.mark.parametrize("estimator", [*ESTIMATORS, SQUAT_CHAIN], ids=lambda e: e.name)
 def test_the_documents_have_its_names_its_equations_and_its_paper(estimator: PoseEstimator) -> None:
     overview = (ROOT / "docs" / "estimators.md").read_text("utf-8")
     assert f"`{estimator.name}`" in overview

@@ -12,11 +12,13 @@ import pytest
 
 from core.errors import ParameterError
 from core.frames import Segment
+from core.parameters.symmetry import compare_sides
 from core.pipeline import SQUAT, PipelineConfig, TakeAnalysis, analyse, resume
 from core.pipeline.recipes import choose_recipe
 from core.recording import ImuStream, Recording, Subject, UniformRecording
 from core.rotation import multiply
 from core.simulate import SquatSimulation, simulate_movement
+from core.squat.measures import MEASURES
 from core.squat.params import SquatParams
 from core.squat.side import find_squat_sides
 from core.timeline import synchronise
@@ -100,6 +102,65 @@ def test_an_analysis_goes_on_from_any_stage() -> None:
     none = resume(whole, "calibration", replace(PipelineConfig(), squat=strict))
     assert {p.reason for p in none.parameters} == {"no_repetitions"}
     assert report_model(load_bundle(analysis_files(none))).quality.word == "No squats"
+
+
+@pytest.mark.parametrize("name", ["squats_both_legs", "squats_together"])
+def test_both_legs_of_a_take_are_measured_and_compared(name: str) -> None:
+    a, truth = analysis(name), made(name).truth
+    assert a.problem is None
+    assert a.legs is not None
+    assert a.squats is not None
+    assert a.angles is not None
+    found = {(p.name, p.side): p for p in a.parameters}
+    depths = np.degrees(truth.depths_rad)
+    of = {"right": depths, "left": depths}
+    if name == "squats_both_legs":
+        of = {"right": depths[:5], "left": depths[5:]}
+    for side, true in of.items():
+        depth = found["squat_depth_deg", side]  # type: ignore[index]
+        assert depth.n == len(true)
+        assert depth.mean == pytest.approx(true.mean(), abs=2.0)
+        end = side[0]
+        at = [r.bottom for leg in a.squats if leg.side == side for r in leg.repetitions if not r.excluded]
+        standing = truth.subtract_standing()
+        for joint, most in (("knee_flexion", 2.0), ("hip_flexion", 2.0), ("hip_rotation", 4.0)):
+            off = a.angles.angles[f"{joint}_{end}"][at] - standing[f"{joint}_{end}"][at]
+            assert np.degrees(np.abs(off)).max() < most, joint
+    compared = {s.name: s for s in compare_sides(a.parameters)}
+    assert set(compared) == set(MEASURES)
+    rows = list(csv.DictReader(io.StringIO(analysis_files(a)["repetitions.csv"].decode())))
+    lifted = [r["side"] for r in rows if r["excluded_reason"] == "foot_lifted"]
+    assert sorted(lifted) == (["left", "right"] if name == "squats_both_legs" else [])
+    assert [float(r["start_s"]) for r in rows] == sorted(float(r["start_s"]) for r in rows)
+
+
+def test_a_lifted_foot_has_no_ankle_and_its_knee_is_followed() -> None:
+    a, truth = analysis("squats_both_legs"), made("squats_both_legs").truth
+    assert a.angles is not None
+    height = truth.p["foot_l"][: len(a.angles.t_s), 2]
+    lifted = height > height[0] + 0.09
+    assert np.isnan(a.angles.angles["ankle_dorsiflexion_l"][lifted]).all()
+    off = a.angles.angles["knee_flexion_l"] - truth.subtract_standing()["knee_flexion_l"][: len(lifted)]
+    assert np.degrees(np.abs(off[lifted])).max() < 4.0
+
+
+@pytest.mark.parametrize("name", ["squats_agreed", "squats_both_legs", "squats_together"])
+def test_the_figure_stands_on_its_feet(name: str) -> None:
+    a, truth = analysis(name), made(name).truth
+    poses = a.poses
+    assert poses is not None
+    assert set(poses.q) == set(truth.q)
+    assert poses.valid.mean() > 0.99
+    n, body = len(poses.t_s), poses.body
+    for segment in truth.p:
+        true = truth.p[segment][:n] - truth.p["pelvis"][:n]
+        drawn = poses.p[segment] - poses.p["pelvis"]
+        assert np.linalg.norm(drawn - true, axis=1).max() < 0.06, segment
+    for foot, stood in poses.contact.items():
+        still = truth.p[foot][:n, 2] < truth.p[foot][0, 2] + 0.005
+        assert stood[still].mean() > 0.99
+        assert np.ptp(poses.p[foot][still], axis=0).max() < 0.03, "a standing foot stays where it is"
+        assert abs(poses.p[foot][still, 2].mean() - body.ankle_height) < 0.02
 
 
 def test_what_legs_need_is_said() -> None:

@@ -138,3 +138,46 @@ def test_impossible_squats_are_refused(wrong: dict[str, float], code: str) -> No
     with pytest.raises(ParameterError) as caught:
         Squats(**wrong)  # type: ignore[arg-type]
     assert caught.value.code == code
+
+
+BOTH = Squats(repetitions=2, other="lifted", hinged=True)
+
+
+@pytest.fixture(scope="module")
+def both() -> SquatSimulation:
+    return simulate_squats(BOTH, REFERENCE_HEIGHT_M, setup=EXACT)
+
+
+def test_of_two_legs_one_stands_while_the_other_is_off_the_floor(both: SquatSimulation) -> None:
+    truth, body = both.truth, Anatomy()
+    assert len(truth.depths_rad) == 4
+    for side, sign in (("l", -1.0), ("r", 1.0)):
+        joints: tuple[tuple[str, str, list[float]], ...] = (
+            ("pelvis", f"thigh_{side}", [0.0, 0.0, sign * body.hip_width / 2.0]),
+            (f"thigh_{side}", f"shank_{side}", [0.0, -body.thigh, 0.0]),
+            (f"shank_{side}", f"foot_{side}", [0.0, -body.shank, 0.0]),
+        )
+        for upper, lower, joint in joints:
+            end = truth.p[upper] + rotate(truth.q[upper], np.array(joint))  # type: ignore[index]
+            assert np.abs(end - truth.p[lower]).max() <= 1e-9  # type: ignore[index]
+    height = {side: truth.p[f"foot_{side}"][:, 2] - body.ankle_height for side in "lr"}  # type: ignore[index]
+    assert min(h.min() for h in height.values()) > -1e-9
+    assert np.minimum(height["l"], height["r"]).max() < 1e-9, "somebody stands at every moment"
+    middles = [0.5 * (p.start_s + p.end_s) for p in truth.phases if p.kind == "hold"]
+    lifted = {side: np.interp(middles, truth.t_s, h) for side, h in height.items()}
+    assert lifted["r"][:2].max() < 1e-9
+    assert lifted["l"][:2].min() > 0.05
+    assert lifted["l"][2:].max() < 1e-9
+    assert lifted["r"][2:].min() > 0.05
+
+
+def test_on_both_feet_both_legs_do_the_same() -> None:
+    together = simulate_squats(
+        Squats(repetitions=2, other="along", valgus_rad=0.0), REFERENCE_HEIGHT_M, setup=EXACT
+    ).truth
+    for name in ("knee_flexion", "hip_flexion", "ankle_dorsiflexion"):
+        assert together.angles[f"{name}_l"] == pytest.approx(together.angles[f"{name}_r"], abs=1e-12)
+    assert all(np.ptp(together.p[foot], axis=0).max() == 0.0 for foot in ("foot_l", "foot_r"))  # type: ignore[index]
+    with pytest.raises(ParameterError) as caught:
+        Squats(other="along")
+    assert caught.value.code == "squat_valgus"
