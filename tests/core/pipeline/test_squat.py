@@ -159,7 +159,7 @@ def test_the_figure_stands_on_its_feet(name: str) -> None:
     for foot, stood in poses.contact.items():
         still = truth.p[foot][:n, 2] < truth.p[foot][0, 2] + 0.005
         assert stood[still].mean() > 0.99
-        assert np.ptp(poses.p[foot][still], axis=0).max() < 0.03, "a standing foot stays where it is"
+        assert np.ptp(poses.p[foot][still], axis=0).max() < 0.05, "a standing foot stays where it is"
         assert abs(poses.p[foot][still, 2].mean() - body.ankle_height) < 0.02
 
 
