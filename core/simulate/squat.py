@@ -259,8 +259,8 @@ def _stand_and_lift(
     lift = smoothstep((t - begin) / LIFT_S) - smoothstep((t - end) / LIFT_S)
     wobble = WOBBLE_RAD * np.sin(2.0 * np.pi * WOBBLE_HZ * (t - begin))
     bent = squats.standing_knee_rad + lift * (LIFTED_KNEE[0] + LIFTED_KNEE[1] * depth)
-    forward = squats.standing_knee_rad - squats.standing_ankle_rad
-    forward = forward + lift * (LIFTED_THIGH[0] + LIFTED_THIGH[1] * depth + wobble)
+    standing = squats.standing_knee_rad - squats.standing_ankle_rad
+    forward = standing + lift * (LIFTED_THIGH[0] + LIFTED_THIGH[1] * depth + wobble)
     thigh = multiply(Q_NEUTRAL, about(2, forward))
     shank = multiply(thigh, about(2, -bent))
     foot = multiply(shank, about(2, np.full(len(t), squats.standing_ankle_rad)))

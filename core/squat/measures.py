@@ -73,8 +73,8 @@ def measure_squats(
     repetitions = find_repetitions(known[KNEE], t_s, side, foot_rate, params, leg.stands)
     counted = [r for r in repetitions if r.excluded is None]
     if not counted:
-        own = any(r.excluded != FOOT_LIFTED for r in repetitions)
-        reason = "no_counted_repetitions" if own else "no_repetitions"
+        squatted = any(r.excluded != FOOT_LIFTED for r in repetitions)
+        reason = "no_counted_repetitions" if squatted else "no_repetitions"
         return SquatSide(side, repetitions, {}, {}, _summarise({}, side, reason))
     found = cut_curves(angles, side, [(r.start_s, r.end_s) for r in counted])
     values = _measure(counted, known, leg)

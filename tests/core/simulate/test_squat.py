@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.errors import ParameterError
-from core.frames import GRAVITY, Segment
+from core.frames import FOOT, GRAVITY, SHANK, SIDES, THIGH, Segment
 from core.rotation import rotate
 from core.simulate import RecordingSetup, SoftTissue, Squats, SquatSimulation, simulate_squats
 from core.simulate.walker import REFERENCE_HEIGHT_M, Anatomy
@@ -151,16 +151,17 @@ def both() -> SquatSimulation:
 def test_of_two_legs_one_stands_while_the_other_is_off_the_floor(both: SquatSimulation) -> None:
     truth, body = both.truth, Anatomy()
     assert len(truth.depths_rad) == 4
-    for side, sign in (("l", -1.0), ("r", 1.0)):
-        joints: tuple[tuple[str, str, list[float]], ...] = (
-            ("pelvis", f"thigh_{side}", [0.0, 0.0, sign * body.hip_width / 2.0]),
-            (f"thigh_{side}", f"shank_{side}", [0.0, -body.thigh, 0.0]),
-            (f"shank_{side}", f"foot_{side}", [0.0, -body.shank, 0.0]),
+    for side in SIDES:
+        hip = [0.0, 0.0, (1.0 if side == "right" else -1.0) * body.hip_width / 2.0]
+        joints: tuple[tuple[Segment, Segment, list[float]], ...] = (
+            ("pelvis", THIGH[side], hip),
+            (THIGH[side], SHANK[side], [0.0, -body.thigh, 0.0]),
+            (SHANK[side], FOOT[side], [0.0, -body.shank, 0.0]),
         )
         for upper, lower, joint in joints:
-            end = truth.p[upper] + rotate(truth.q[upper], np.array(joint))  # type: ignore[index]
-            assert np.abs(end - truth.p[lower]).max() <= 1e-9  # type: ignore[index]
-    height = {side: truth.p[f"foot_{side}"][:, 2] - body.ankle_height for side in "lr"}  # type: ignore[index]
+            end = truth.p[upper] + rotate(truth.q[upper], np.array(joint))
+            assert np.abs(end - truth.p[lower]).max() <= 1e-9
+    height = {side[0]: truth.p[FOOT[side]][:, 2] - body.ankle_height for side in SIDES}
     assert min(h.min() for h in height.values()) > -1e-9
     assert np.minimum(height["l"], height["r"]).max() < 1e-9, "somebody stands at every moment"
     middles = [0.5 * (p.start_s + p.end_s) for p in truth.phases if p.kind == "hold"]
@@ -177,7 +178,7 @@ def test_on_both_feet_both_legs_do_the_same() -> None:
     ).truth
     for name in ("knee_flexion", "hip_flexion", "ankle_dorsiflexion"):
         assert together.angles[f"{name}_l"] == pytest.approx(together.angles[f"{name}_r"], abs=1e-12)
-    assert all(np.ptp(together.p[foot], axis=0).max() == 0.0 for foot in ("foot_l", "foot_r"))  # type: ignore[index]
+    assert all(np.ptp(together.p[FOOT[side]], axis=0).max() == 0.0 for side in SIDES)
     with pytest.raises(ParameterError) as caught:
         Squats(other="along")
     assert caught.value.code == "squat_valgus"
