@@ -1,4 +1,4 @@
-"""Squats on one leg: a still foot and a chain of three links on it, in closed form
+"""Squats: a still foot and a chain of three links on it, in closed form
 (docs/science/simulation.md, "Squat").
 
 For estimators that build on a fixed foot (Kianifar et al.: sensors on shank, thigh and lower back) and as a

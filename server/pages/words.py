@@ -13,8 +13,9 @@ PROTOCOLS: Final = (
     ("treadmill", "Treadmill", "Walking on the belt, with a few seconds of quiet standing before or after."),
     (
         "squat",
-        "Squats on one leg",
-        "Three or more, with two seconds of quiet standing first. Sensors on shin, thigh and lower back.",
+        "Squats",
+        "Stand still for two seconds on both feet. Then three or more squats: on one leg, on each in turn, or on "
+        "both feet. Sensors on the lower back, and on shin and thigh of each leg that squats.",
     ),
     ("activity", "Daily life", "Hours to days at home with one sensor on the chest or the lower back."),
 )

@@ -68,7 +68,7 @@ def test_the_files_give_the_report_back() -> None:
     assert len(rows) == 6
     assert all(50.0 < float(row["squat_depth_deg"]) < 90.0 and not row["excluded_reason"] for row in rows)
     report = report_model(load_bundle(files))
-    assert [name for name, _ in report.groups] == ["Squat on one leg"]
+    assert [name for name, _ in report.groups] == ["Squats"]
     assert report.quality.word == "Good data"
     assert ("Squats used", "6", "right leg") in [(i.label, i.value, i.extra) for i in report.quality.items]
     assert report.problem is None
