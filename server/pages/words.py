@@ -14,8 +14,7 @@ PROTOCOLS: Final = (
     (
         "squat",
         "Squats",
-        "Stand still for two seconds on both feet. Then three or more squats: on one leg, on each in turn, or on "
-        "both feet. Sensors on the lower back, and on shin and thigh of each leg that squats.",
+        "Stand still for 2 s, then squat on one leg, on each in turn, or on both. Sensors: back, shins, thighs.",
     ),
     ("activity", "Daily life", "Hours to days at home with one sensor on the chest or the lower back."),
 )

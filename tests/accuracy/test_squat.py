@@ -147,8 +147,8 @@ def test_squats_of_both_legs() -> None:
         rows,
         "RMS errors in degrees, from standing, in the squats of both legs of a take, simulated with noise "
         "and skin: three takes, five squats of each leg, 70° deep; every one was found, and no bend of a "
-        "lifted leg was taken for one. Limits: knee and hip flexion 1.5, largest error of a depth 2, of a valgus at "
-        "the deepest point 4.",
+        "lifted leg was taken for one. Limits: knee and hip flexion 1.5, largest error of a depth 2, of a "
+        "valgus at the deepest point 4.",
     )
 
 
