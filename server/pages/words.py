@@ -14,7 +14,7 @@ PROTOCOLS: Final = (
     (
         "squat",
         "Squats",
-        "Stand still for 2 s, then squat on one leg, on each in turn, or on both. Sensors: back, shins, thighs.",
+        "Stand still for 2 s, then squat on one leg, each in turn, or both. Sensors: back, shin, thigh.",
     ),
     ("activity", "Daily life", "Hours to days at home with one sensor on the chest or the lower back."),
 )
