@@ -16,6 +16,9 @@ Estimator = Literal["erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
 Requested = Literal["auto", "erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
 """What can be asked for; auto: the best one that the working sensors allow."""
 
+SquatEstimator = Literal["squat_chain"]
+"""What follows squats; nobody asks for it, the protocol does."""
+
 LiveMethod = Estimator | Literal["none"]
 """Estimator of the live figure; none: the worn sensors allow no figure while they stream."""
 
@@ -67,7 +70,7 @@ class PoseEstimator:
     paper : None = our own. science : the page with its equations.
     """
 
-    name: Estimator
+    name: Estimator | SquatEstimator
     method: str
     label: str
     choice: str
@@ -190,6 +193,31 @@ ORIENTATIONS_ONLY: Final = PoseEstimator(
 ESTIMATORS: Final = (ERKF, L7S_3I, L7S_2I, ORIENTATIONS_ONLY)
 """All, as docs/estimators.md lists them."""
 
+SQUAT_CHAIN: Final = PoseEstimator(
+    name="squat_chain",
+    method="squat_chain",
+    label="Chain of the squatting leg",
+    choice="Chain of the squatting leg",
+    needs="the pelvis, and shank and thigh of each leg that squats",
+    sets=tuple(frozenset[Segment](("pelvis", THIGH[s], SHANK[s])) for s in SIDES),
+    sensors=("pelvis", *(x for s in SIDES for x in (THIGH[s], SHANK[s]))),
+    leg_model=False,
+    in_room=False,
+    note=(
+        "Seven hinges from a foot that stands still to the pelvis, followed by one filter per sensor "
+        "(Kianifar). The foot carries no sensor: it is taken to stand flat, and a lifted one is drawn at a "
+        "right angle to the shin."
+    ),
+    paper=PaperReference(
+        "Kianifar R, Joukov V, Lee A, Raina S, Kulić D 2019. Inertial measurement unit-based pose "
+        "estimation: analyzing and reducing sensitivity to sensor placement and body measures. J. Rehabil. "
+        "Assist. Technol. Eng. 6.",
+        "10.1177/2055668318813455",
+    ),
+    science="docs/science/squat.md",
+)
+"""Runs on squats and on nothing else, so that it is not among `ESTIMATORS`."""
+
 BY_NAME: Final[dict[str, PoseEstimator]] = {e.name: e for e in ESTIMATORS}
-BY_METHOD: Final[dict[str, PoseEstimator]] = {e.method: e for e in ESTIMATORS}
+BY_METHOD: Final[dict[str, PoseEstimator]] = {e.method: e for e in (*ESTIMATORS, SQUAT_CHAIN)}
 """`Poses.method` → its estimator; `NO_FIGURE` has none."""

@@ -95,12 +95,12 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument(
         "paths", nargs="*", type=Path, metavar="PATH", help="files of one take (default: a simulated one)"
     )
-    p.add_argument("--reference", type=Path, help="angles.parquet with the true angles of the take")
+    p.add_argument(
+        "--reference", type=Path, help="angles.parquet to hold the angles against (default: themselves)"
+    )
     p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")
     p.add_argument("--table-top", type=Path, metavar="PATH", help="take in which sensors left the table")
-    p.add_argument(
-        "--side", choices=("left", "right"), help="leg that squats (default: the one with sensors)"
-    )
+    p.add_argument("--side", choices=("left", "right"), help="leg that squats (default: all with sensors)")
     p.add_argument("--measures", type=Path, help="JSON: lengths in m (docs/science/squat.md)")
     p.add_argument("--from-standing", action="store_true", help="compare angles from standing")
     p.add_argument("--out", type=Path, metavar="CSV", help="write every figure into a file")

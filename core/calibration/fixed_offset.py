@@ -25,11 +25,10 @@ FRONT.setflags(write=False)
 BACK.setflags(write=False)
 
 
-def make_fixed_mounts(side: Side) -> dict[Segment, Floats]:
-    """Segment → (3, 3) R_segment_sensor of shank, thigh and pelvis for the squat on the leg of a side."""
-    inward = SHIN_FACE if side == "right" else -SHIN_FACE
-    return {
-        SHANK[side]: to_matrix(about(1, inward)) @ FRONT,
-        THIGH[side]: FRONT.copy(),
-        "pelvis": BACK.copy(),
-    }
+def make_fixed_mounts(*sides: Side) -> dict[Segment, Floats]:
+    """Segment → (3, 3) R_segment_sensor of the pelvis and of shank and thigh of the legs that squat."""
+    mounts: dict[Segment, Floats] = {}
+    for side in sides:
+        inward = SHIN_FACE if side == "right" else -SHIN_FACE
+        mounts |= {SHANK[side]: to_matrix(about(1, inward)) @ FRONT, THIGH[side]: FRONT.copy()}
+    return {**mounts, "pelvis": BACK.copy()}

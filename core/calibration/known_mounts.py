@@ -15,8 +15,9 @@ import numpy as np
 
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
 from core.calibration.standing import GOOD_S, LONGEST_S, find_rests, stand_all
+from core.calibration.standing_leg import find_standing_legs
 from core.errors import CalibrationError, SignalError
-from core.frames import SHANK, THIGH, Floats, Segment
+from core.frames import SHANK, SIDES, THIGH, Floats, Segment, Side
 from core.recording import UniformRecording
 from core.rest import RestParams, index_window
 
@@ -38,6 +39,8 @@ FORWARD: Final[Mapping[Segment, float]] = {
     **dict.fromkeys(THIGH.values(), 1.0),
 }
 """Sign of the tilt about the axis to the right in a squat: shins lean forward, thighs back."""
+
+SIDE_OF: Final[Mapping[Segment, Side]] = {s: side for side in SIDES for s in (SHANK[side], THIGH[side])}
 
 
 def calibrate_with_mounts(
@@ -100,8 +103,9 @@ def calibrate_with_mounts(
 
 
 def _check_mounts(calibrated: CalibratedRecording) -> None:
-    """Refuse a mounting that standing or the movement contradicts."""
+    """Refuse a mounting that standing or the movement contradicts; a lifted leg moves as it likes."""
     recording, zero = calibrated.recording, calibrated.calibration.zero
+    stands = find_standing_legs(calibrated)
     standing = index_window(zero, recording.rate_hz)
     for segment, mounted in calibrated.calibration.segments.items():
         signals, R = recording.sensors[segment], mounted.R_segment_sensor
@@ -111,7 +115,8 @@ def _check_mounts(calibrated: CalibratedRecording) -> None:
             raise _refuse(segment, f"in standing its long axis is {degrees(lean):.0f}° off the vertical")
         if segment not in FORWARD:
             continue
-        after = signals.valid.copy()
+        side = SIDE_OF[segment]
+        after = signals.valid & stands[side] if side in stands else signals.valid.copy()
         after[: standing.stop] = False
         rate, force = ((x[after] @ R.T) for x in (signals.gyr - mounted.gyro_bias, signals.acc))
         if len(rate) < 3 or float(np.sqrt(np.mean((rate**2).sum(axis=1)))) < BENDING:

@@ -80,7 +80,7 @@ def compare_filters(
     alone = analysis.fused if mounted is None else mounted.orientations
     own = analysis.orientations
     if calibrated is None or alone is None or own is None:
-        if analysis.leg is not None:
+        if analysis.legs is not None:
             raise EstimationError(
                 "no_orientations",
                 "Squats are followed by the chain of the leg; filters are compared on walks.",

@@ -21,6 +21,7 @@ from core.errors import Notice, ParameterError
 from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
 from core.events.turns import Turn
+from core.frames import Side
 from core.functional_tests.result import FunctionalTest
 from core.fusion.orientations import Orientations
 from core.measure import MeasuredGait, Tracks
@@ -89,7 +90,8 @@ class TakeAnalysis:
     measured : stage parameters.
     activity : stage activity of daily life, which has no common axis and none of the stages above but
         quality.
-    leg : stage poses of squats on one leg. squats : stage parameters of these.
+    legs : stage poses of squats, side → what its chain makes of it. squats : stage parameters of these, one
+        for each of the legs.
     functional : stage test of a functional test.
     problem : the error that stopped the chain, None when every stage ran. stopped_at : that stage's name.
     """
@@ -110,8 +112,8 @@ class TakeAnalysis:
     angles: JointAngles | None = None
     tracks: Tracks | None = None
     measured: MeasuredGait | None = None
-    leg: LegMotion | None = None
-    squats: SquatSide | None = None
+    legs: Mapping[Side, LegMotion] | None = None
+    squats: tuple[SquatSide, ...] | None = None
     functional: FunctionalTest | None = None
     activity: ActivityResult | None = None
     problem: Notice | None = None
@@ -162,7 +164,7 @@ class TakeAnalysis:
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters, those of a functional test first; empty when nothing was reached."""
         if self.squats is not None:
-            return self.squats.parameters
+            return tuple(p for of_leg in self.squats for p in of_leg.parameters)
         if self.activity is not None:
             return measure_day(self.activity)
         of_test = () if self.functional is None else self.functional.parameters

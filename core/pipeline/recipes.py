@@ -48,7 +48,7 @@ TRUNK_ONLY: Final = (*SIGNALS, TRUNK_EVENTS, TRUNK_PARAMETERS)
 """Walking with sensors on the trunk alone: steps, bouts and turns, no angles."""
 
 SQUAT: Final = (*SIGNALS, SQUAT_CALIBRATION, SQUAT_LEG, SQUAT_ANGLES, SQUAT_PARAMETERS)
-"""Squats on one leg with sensors on shank, thigh and pelvis: no walking, no strides."""
+"""Squats with sensors on the pelvis and on shank and thigh of one leg or both: no walking, no strides."""
 
 BY_TRUNK: Final = (*SIGNALS, TRUNK_TEST)
 """A functional test that one sensor on the trunk tells: no calibration, no strides."""

@@ -1,4 +1,4 @@
-"""The stages of a squat on one leg (docs/science/squat.md)."""
+"""The stages of squats, of one leg or of both (docs/science/squat.md)."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from core.angles.measure import measure_angles
+from core.body.chain.figure import draw_legs
 from core.body.chain.geometry import LegGeometry
 from core.body.chain.leg import estimate_leg
 from core.body.chain.model import leg_segments
@@ -13,14 +14,16 @@ from core.body.model import NOMINAL_HEIGHT_M
 from core.calibration.fixed_offset import make_fixed_mounts
 from core.calibration.known_mounts import FIXED_OFFSET, TABLE_TOP, calibrate_with_mounts
 from core.calibration.score import score_calibration
+from core.calibration.standing_leg import find_standing_legs
 from core.calibration.table_top import calibrate_table_top, crop, find_worn_standing
 from core.errors import Notice
+from core.frames import SUFFIX
 from core.pipeline.analysis import TakeAnalysis, require_stage
 from core.pipeline.config import PipelineConfig
 from core.pipeline.stages import PipelineStage
 from core.quality.stuck import drop_stuck_sensors
 from core.squat.measures import measure_squats
-from core.squat.side import find_squat_side
+from core.squat.side import find_squat_sides
 
 AGREED: Final = Notice(
     "mounting_agreed",
@@ -41,10 +44,10 @@ NO_HEIGHT: Final = Notice(
 def calibrate_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Mountings by the fixed offset or from the table, biases and zero from standing."""
     working = drop_stuck_sensors(analysis.recording)
-    side, rest = find_squat_side(working), config.calibration.rest
+    sides, rest = find_squat_sides(working), config.calibration.rest
     if config.squat.mounting == "table_top":
-        leg = {s: working.sensors[s] for s in leg_segments(side)}
-        taken = replace(require_stage(analysis.uniform, "timeline"), sensors=leg)
+        worn = {s: working.sensors[s] for side in sides for s in leg_segments(side)}
+        taken = replace(require_stage(analysis.uniform, "timeline"), sensors=worn)
         standing = find_worn_standing(taken, config.squat.table_top)
         found = calibrate_table_top(crop(taken, standing[1]), config.squat.table_top)
         told = found.notices
@@ -53,48 +56,65 @@ def calibrate_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
         )
     else:
         told = (AGREED,)
-        mounts = make_fixed_mounts(side)
+        mounts = make_fixed_mounts(*sides)
         calibrated = calibrate_with_mounts(working, mounts, "fixed_offset", FIXED_OFFSET, rest)
     assumed = () if analysis.recording.subject.height_m is not None else (NO_HEIGHT,)
     calibration = replace(calibrated.calibration, notices=(*told, *assumed))
     calibrated = replace(calibrated, calibration=calibration)
-    leg_alone = replace(working, sensors={s: working.sensors[s] for s in calibration.segments})
+    legs_alone = replace(working, sensors={s: working.sensors[s] for s in calibration.segments})
     score = score_calibration(
-        replace(calibrated, recording=leg_alone), config.calibration.score, analysis.agreed
+        replace(calibrated, recording=legs_alone), config.calibration.score, analysis.agreed
     )
     calibrated = replace(calibrated, recording=analysis.recording)
     return replace(analysis, calibrated=calibrated, calibration_score=score)
 
 
 def estimate_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Orientations of the leg that stands on its foot."""
+    """Orientations of the legs, each from its foot that stands still, and the figure."""
     calibrated = require_stage(analysis.calibrated, "calibration")
-    side = find_squat_side(drop_stuck_sensors(analysis.recording))
-    geometry = LegGeometry.from_height(analysis.recording.subject.height_m, side)
-    return replace(analysis, leg=estimate_leg(calibrated, geometry, config.squat.chain))
+    height, stands = analysis.recording.subject.height_m, find_standing_legs(calibrated)
+    legs = {
+        side: estimate_leg(
+            calibrated, LegGeometry.from_height(height, side), config.squat.chain, stands[side]
+        )
+        for side in find_squat_sides(drop_stuck_sensors(analysis.recording))
+    }
+    return replace(analysis, legs=legs, posed=draw_legs(legs, height))
 
 
 def compute_squat_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Joint angles of the leg, from standing; the other leg is not asked for."""
-    leg = require_stage(analysis.leg, "poses")
+    """Joint angles of each leg by its own chain, from standing; a leg without sensors is not asked for."""
+    legs, posed = require_stage(analysis.legs, "poses"), require_stage(analysis.posed, "poses")
     zero = require_stage(analysis.calibrated, "calibration").calibration.zero
     standing = analysis.recording.subject.standing_angles_deg
-    angles = measure_angles(leg.orientations, zero, standing_deg=standing)
-    told = tuple(n for n in angles.notices if n.code != "joint_missing")
-    return replace(analysis, angles=replace(angles, notices=told))
+    joined = measure_angles(posed.orientations, zero, standing_deg=standing)
+    found, offset = dict(joined.angles), dict(joined.zero_offset)
+    notices = joined.notices
+    if len(legs) > 1:
+        # the shared pelvis is a mean: hips are measured against that of their own chain
+        own = {side: measure_angles(leg.orientations, zero) for side, leg in legs.items()}
+        for side, of_leg in own.items():
+            hip = [n for n in of_leg.angles if n.startswith("hip_") and n.endswith(f"_{SUFFIX[side]}")]
+            found |= {name: of_leg.angles[name] for name in hip}
+            offset |= {name: of_leg.zero_offset[name] for name in hip}
+        notices = tuple(dict.fromkeys((*notices, *(n for a in own.values() for n in a.notices))))
+    told = tuple(n for n in notices if n.code != "joint_missing")
+    return replace(analysis, angles=replace(joined, angles=found, zero_offset=offset, notices=told))
 
 
 def measure_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Repetitions, depth, times, how the knee falls inward."""
-    leg, angles = require_stage(analysis.leg, "poses"), require_stage(analysis.angles, "angles")
+    """Repetitions of each leg, depth, times, how the knee falls inward."""
+    legs, angles = require_stage(analysis.legs, "poses"), require_stage(analysis.angles, "angles")
     recording = drop_stuck_sensors(analysis.recording)
-    squats = measure_squats(angles, leg, leg.side, recording, config.squat.repetitions)
+    squats = tuple(
+        measure_squats(angles, leg, side, recording, config.squat.repetitions) for side, leg in legs.items()
+    )
     return replace(analysis, squats=squats)
 
 
 SQUAT_CALIBRATION: Final = PipelineStage(
     "calibration", 0.3, calibrate_squat, ("calibrated",), ("calibration", "squat")
 )
-SQUAT_LEG: Final = PipelineStage("poses", 0.4, estimate_squat, ("leg",), ("squat",))
+SQUAT_LEG: Final = PipelineStage("poses", 0.4, estimate_squat, ("legs", "posed"), ("squat",))
 SQUAT_ANGLES: Final = PipelineStage("angles", 0.8, compute_squat_angles, ("angles",))
 SQUAT_PARAMETERS: Final = PipelineStage("parameters", 0.9, measure_squat, ("squats",), ("squat",))

@@ -12,7 +12,7 @@ from core.simulate.functional import FunctionalSimulation, SwingsAndBows, simula
 from core.simulate.patients import PATIENTS
 from core.simulate.scripts import ON_SKIN
 from core.simulate.squat import Squats, SquatSimulation, simulate_squats
-from core.simulate.squat_chain import measure_leg, place_sensors
+from core.simulate.squat_chain import place_as_agreed
 from core.simulate.tug import ChairSimulation, simulate_chair_rises, simulate_tug
 
 
@@ -44,6 +44,16 @@ MOVEMENTS: Mapping[str, Movement] = MappingProxyType(
         "squats_left": Movement("Five squats on the left leg", Squats(side="left")),
         "squats_agreed": Movement(
             "Six squats on the right leg, sensors put on as agreed", Squats(hinged=True, repetitions=6), True
+        ),
+        "squats_both_legs": Movement(
+            "Five squats on each leg, one after the other, sensors put on as agreed",
+            Squats(hinged=True, other="lifted"),
+            True,
+        ),
+        "squats_together": Movement(
+            "Six squats on both feet, sensors put on as agreed",
+            Squats(hinged=True, repetitions=6, valgus_rad=0.0, other="along"),
+            True,
         ),
         "swings_and_bows": Movement("Twelve swings of each leg and six bows", SwingsAndBows()),
         "tug": Movement("Timed up and go", ChairTest("healthy")),
@@ -94,7 +104,7 @@ def simulate_movement(
         )
     does, setup = MOVEMENTS[name].does, replace(ON_SKIN, rate_hz=rate_hz)
     if isinstance(does, Squats):
-        mounts = place_sensors(measure_leg(height_m, does.side), height_m) if MOVEMENTS[name].agreed else None
+        mounts = place_as_agreed(height_m, does.sides) if MOVEMENTS[name].agreed else None
         return simulate_squats(does, height_m, seed, setup, mounts)
     if isinstance(does, SwingsAndBows):
         return simulate_swings_and_bows(does, height_m, seed, setup)

@@ -1,8 +1,9 @@
-"""Squats on one leg: a still foot and a chain of three links on it, in closed form
+"""Squats: a still foot and a chain of three links on it, in closed form
 (docs/science/simulation.md, "Squat").
 
 For estimators that build on a fixed foot (Kianifar et al.: sensors on shank, thigh and lower back) and as a
-motion that breaks those made for walking. The free leg is left out.
+motion that breaks those made for walking. The other leg is left out, or lifted until its turn, or squats
+along.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import radians
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -33,6 +34,19 @@ DOWN: Final = 0.52
 ANKLE_PER_KNEE: Final = 0.42
 """Dorsiflexion that comes with knee flexion, rad per rad."""
 
+OtherLeg = Literal["left_out", "lifted", "along"]
+
+LIFT_S: Final = 1.0
+"""Time in which the other foot leaves the floor, and in which it comes back."""
+
+LIFTED_THIGH: Final = (radians(20.0), radians(25.0))
+LIFTED_KNEE: Final = (radians(60.0), radians(30.0))
+"""Forward turn of the thigh and flexion of the knee of a lifted leg: when the other stands, and what is added
+at the depth asked for, so that the foot never meets the floor."""
+
+WOBBLE_RAD, WOBBLE_HZ = radians(3.0), 0.6
+"""A lifted leg does not hold still."""
+
 
 @dataclass(frozen=True)
 class Squats:
@@ -45,6 +59,9 @@ class Squats:
     valgus_rad : knee falling inward. trunk_rad : forward lean of the pelvis.
     hinged : the knee is a hinge: it falls inward because the shank turns and leans inward, and the hip
         follows; else it opens sideways itself.
+    other : the leg of the other side has no sensors and is left out; or its foot is lifted while this leg
+        squats, then it squats as often while this one is lifted; or both squat together on both feet, which
+        needs `valgus_rad` 0: a level pelvis closes the chain.
     """
 
     side: Side = "right"
@@ -61,6 +78,7 @@ class Squats:
     standing_ankle_rad: float = radians(2.0)
     standing_tilt_rad: float = radians(8.0)
     hinged: bool = False
+    other: OtherLeg = "left_out"
 
     def __post_init__(self) -> None:
         deepest = self.standing_knee_rad + self.depth_rad * (1.0 + 2.0 * self.spread)
@@ -68,6 +86,8 @@ class Squats:
             raise ParameterError(
                 "squat_depth", f"The knee would bend to {np.degrees(deepest):.0f}°; expected up to 150°."
             )
+        if self.other == "along" and self.valgus_rad != 0.0:
+            raise ParameterError("squat_valgus", "Squats on both feet are simulated without valgus only.")
         times = (self.moving_s, self.hold_s, self.rest_s, self.lead_s)
         if self.repetitions < 1 or not all(np.isfinite(t) and t > 0.0 for t in times):
             raise ParameterError(
@@ -79,6 +99,30 @@ class Squats:
         """One squat and the rest after it."""
         return self.moving_s + self.hold_s + self.rest_s
 
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """The legs that squat, in the order in which they begin."""
+        other: Side = "left" if self.side == "right" else "right"
+        return (self.side,) if self.other == "left_out" else (self.side, other)
+
+    @property
+    def turns(self) -> int:
+        """How often `repetitions` squats are done."""
+        return 2 if self.other == "lifted" else 1
+
+    @property
+    def turn_s(self) -> float:
+        """From one turn to the next: the squats, and lifting the other foot before and after them."""
+        lifts = 2.0 * (LIFT_S + self.rest_s) if self.other == "lifted" else 0.0
+        return self.repetitions * self.cycle_s + lifts
+
+    @property
+    def starts_s(self) -> Floats:
+        """(turns, repetitions) s."""
+        first = self.lead_s + (LIFT_S + self.rest_s if self.other == "lifted" else 0.0)
+        squats = self.cycle_s * np.arange(self.repetitions, dtype=np.float64)
+        return first + squats + self.turn_s * np.arange(self.turns, dtype=np.float64)[:, None]
+
 
 @dataclass(frozen=True, eq=False)
 class SquatTruth:
@@ -89,7 +133,7 @@ class SquatTruth:
     t_s : (n,). q : segment → (n, 4), p : segment → (n, 3) m; the ankle of the foot stands over the origin.
     angles : name → (n,) rad as in core/angles, anatomical. zero_offset : name → value in standing, rad.
     phases : "stand", "down", "hold", "up" in turn over the whole take.
-    depths_rad : drawn knee flexion added in each squat.
+    depths_rad : drawn knee flexion added in each squat, in the order of time.
     """
 
     t_s: Floats
@@ -121,7 +165,7 @@ def simulate_squats(
     setup: RecordingSetup | None = None,
     mounts: Mapping[Segment, Mount] | None = None,
 ) -> SquatSimulation:
-    """Let a person of a height squat on one leg, with sensors on its foot, shank, thigh and on the pelvis.
+    """Let a person of a height squat, with sensors on foot, shank and thigh of the legs and on the pelvis.
 
     Parameters
     ----------
@@ -135,12 +179,11 @@ def simulate_squats(
     person = Walker.of_height(height_m)
     every = oversampling(setup.rate_hz)
     rate = every * setup.rate_hz
-    duration = squats.lead_s + squats.repetitions * squats.cycle_s + 1.0
+    duration = squats.lead_s + squats.turns * squats.turn_s + 1.0
     t = np.arange(round(duration * rate) + 1) / rate
-    chance = np.clip(draws.steps.standard_normal(squats.repetitions), -2.0, 2.0)
-    deep = np.asarray(1.0 + squats.spread * chance)
-    starts = squats.lead_s + squats.cycle_s * np.arange(squats.repetitions, dtype=np.float64)
-    q, p = _poses(_depth(t, squats, starts, deep), squats, person.anatomy)
+    chance = np.clip(draws.steps.standard_normal(squats.turns * squats.repetitions), -2.0, 2.0)
+    deep = np.asarray(1.0 + squats.spread * chance).reshape(squats.turns, squats.repetitions)
+    q, p = _place_body(t, squats, deep, person.anatomy)
 
     places = {segment: PLACES[segment] for segment in q}
     drawn = draw_mounts(places, person.scale, setup.mount_spread_rad, draws.mounts)
@@ -158,8 +201,8 @@ def simulate_squats(
         p=p,
         angles=angles,
         zero_offset={name: float(values[0]) for name, values in angles.items()},
-        phases=_phases(squats, starts, float(t[-1])),
-        depths_rad=tuple((squats.depth_rad * deep).tolist()),
+        phases=_phases(squats, squats.starts_s.ravel(), float(t[-1])),
+        depths_rad=tuple((squats.depth_rad * deep).ravel().tolist()),
         mounts=mounts,
     )
     return SquatSimulation(**vars(made), truth=truth)
@@ -175,11 +218,60 @@ def _depth(t: Floats, squats: Squats, starts: Floats, deep: Floats) -> Floats:
     return depth
 
 
-def _poses(
-    depth: Floats, squats: Squats, anatomy: Anatomy
+def _place_body(
+    t: Floats, squats: Squats, deep: Floats, anatomy: Anatomy
 ) -> tuple[dict[Segment, Floats], dict[Segment, Floats]]:
-    """Orientations (n, 4) and origins (n, 3) in m of foot, shank, thigh and pelvis, from the floor up."""
-    side, inward = squats.side, SIGN[squats.side] * squats.valgus_rad * depth
+    """Orientations (n, 4) and origins (n, 3) in m of all segments; deep (turns, repetitions)."""
+    depths = [_depth(t, squats, starts, shares) for starts, shares in zip(squats.starts_s, deep, strict=True)]
+    legs = [_stand_on(squats, side, depths[0], anatomy) for side in squats.sides]
+    if squats.other == "left_out":
+        return legs[0]
+    if squats.other == "along":
+        return legs[0][0] | legs[1][0], legs[0][1] | legs[1][1]
+    # the first turn up to the middle of the standing between both; until then nothing of the second moves
+    split = int(np.searchsorted(t, squats.lead_s + squats.turn_s - 0.25 * squats.rest_s))
+    first, second = squats.sides
+    parts = [
+        _stand_and_lift(t, squats, (a, b), k, depths[k], anatomy)
+        for k, (a, b) in enumerate(((first, second), (second, first)))
+    ]
+    return tuple(  # type: ignore[return-value]
+        {s: np.concatenate((parts[0][i][s][:split], parts[1][i][s][split:])) for s in parts[0][i]}
+        for i in range(2)
+    )
+
+
+def _stand_and_lift(
+    t: Floats, squats: Squats, sides: tuple[Side, Side], turn: int, depth: Floats, anatomy: Anatomy
+) -> tuple[dict[Segment, Floats], dict[Segment, Floats]]:
+    """Body that squats on the first side in a turn and lifts the foot of the second."""
+    carries, other = sides
+    q, p = _stand_on(squats, carries, depth, anatomy)
+    begin = squats.lead_s + turn * squats.turn_s
+    end = begin + squats.turn_s - squats.rest_s - LIFT_S
+    lift = smoothstep((t - begin) / LIFT_S) - smoothstep((t - end) / LIFT_S)
+    wobble = WOBBLE_RAD * np.sin(2.0 * np.pi * WOBBLE_HZ * (t - begin))
+    bent = squats.standing_knee_rad + lift * (LIFTED_KNEE[0] + LIFTED_KNEE[1] * depth)
+    standing = squats.standing_knee_rad - squats.standing_ankle_rad
+    forward = standing + lift * (LIFTED_THIGH[0] + LIFTED_THIGH[1] * depth + wobble)
+    thigh = multiply(Q_NEUTRAL, about(2, forward))
+    shank = multiply(thigh, about(2, -bent))
+    foot = multiply(shank, about(2, np.full(len(t), squats.standing_ankle_rad)))
+    hip = p["pelvis"] + rotate(q["pelvis"], np.array([0.0, 0.0, 0.5 * SIGN[other] * anatomy.hip_width]))
+    knee = hip - rotate(thigh, np.array([0.0, anatomy.thigh, 0.0]))
+    ankle = knee - rotate(shank, np.array([0.0, anatomy.shank, 0.0]))
+    q |= {THIGH[other]: thigh, SHANK[other]: shank, FOOT[other]: foot}
+    return q, p | {THIGH[other]: hip, SHANK[other]: knee, FOOT[other]: ankle}
+
+
+def _stand_on(
+    squats: Squats, side: Side, depth: Floats, anatomy: Anatomy
+) -> tuple[dict[Segment, Floats], dict[Segment, Floats]]:
+    """Orientations (n, 4) and origins (n, 3) in m of foot, shank, thigh and pelvis, from the floor up.
+
+    The ankle stands over the origin; of two legs each half a hip's width beside it.
+    """
+    inward = SIGN[side] * squats.valgus_rad * depth
     knee = squats.standing_knee_rad + squats.depth_rad * depth
     ankle = squats.standing_ankle_rad + ANKLE_PER_KNEE * squats.depth_rad * depth
     lean = squats.standing_tilt_rad + squats.trunk_rad * depth
@@ -191,10 +283,11 @@ def _poses(
         shank = multiply(multiply(Q_NEUTRAL, about(2, -ankle)), about(0, -0.5 * inward))
         thigh = multiply(multiply(shank, about(2, knee)), about(0, inward))
     trunk = multiply(Q_NEUTRAL, about(2, -lean))
-    ankle_joint = np.tile([0.0, 0.0, anatomy.ankle_height], (len(depth), 1))
+    aside = np.array([0.0, 0.0, SIGN[side] * anatomy.hip_width / 2.0])
+    beside = 0.0 if squats.other == "left_out" else -aside[2]
+    ankle_joint = np.tile([0.0, beside, anatomy.ankle_height], (len(depth), 1))
     knee_joint = ankle_joint + rotate(shank, np.array([0.0, anatomy.shank, 0.0]))
     hip_joint = knee_joint + rotate(thigh, np.array([0.0, anatomy.thigh, 0.0]))
-    aside = np.array([0.0, 0.0, SIGN[side] * anatomy.hip_width / 2.0])
     foot = np.tile(Q_NEUTRAL, (len(depth), 1))
     q: dict[Segment, Floats] = {"pelvis": trunk, THIGH[side]: thigh, SHANK[side]: shank, FOOT[side]: foot}
     middle = hip_joint - rotate(trunk, aside)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import radians
 from typing import Final
@@ -50,6 +50,14 @@ def draw_leg(height_m: float, side: Side, seed: int = 0) -> tuple[LegGeometry, d
     turns = rng.uniform(-TURNED, TURNED, (3, 3))
     worn = make_fixed_mounts(side)
     return leg, {s: to_matrix(exp(turn)) @ worn[s] for s, turn in zip(worn, turns, strict=True)}
+
+
+def place_as_agreed(height_m: float, sides: Sequence[Side]) -> dict[Segment, Mount]:
+    """Sensors on the legs of these sides as agreed, and one on the middle of the back."""
+    legs = [place_sensors(measure_leg(height_m, side), height_m) for side in sides]
+    back = np.mean([leg["pelvis"].position_m for leg in legs], axis=0)
+    placed = {segment: mount for leg in legs for segment, mount in leg.items()}
+    return placed | {"pelvis": replace(placed["pelvis"], position_m=back)}
 
 
 def place_sensors(

@@ -1,1 +1,1 @@
-"""Squats on one leg: repetitions and what is measured on them, and how sure the angles are."""
+"""Squats, leg by leg: repetitions and what is measured on them, and how sure the angles are."""

@@ -21,7 +21,7 @@ from core.parameters.result import Parameter
 from core.parameters.variability import summarise_values
 from core.recording import UniformRecording
 from core.squat.curves import CURVES, INWARD, KNEE, cut_curves
-from core.squat.repetitions import Repetition, RepetitionParams, find_repetitions
+from core.squat.repetitions import FOOT_LIFTED, Repetition, RepetitionParams, find_repetitions
 
 MEASURES: Final = list_names(SQUAT, "take")
 """Names in the order of the table; what each is: docs/science/squat.md, "Measures"."""
@@ -33,7 +33,7 @@ class SquatSide:
 
     Parameters
     ----------
-    repetitions : all that were found. values : measure → (counted,) in its unit, of those that count.
+    repetitions : every deep bend of the knee. values : measure → (counted,) in its unit, of those that count.
     curves : `CURVES` and `VALGUS` → (counted, 101) rad over the repetition, 0 start, 100 end.
     parameters : mean and spread of every measure; without repetitions a reason.
     """
@@ -69,10 +69,12 @@ def measure_squats(
     if len(known) < len(CURVES):
         return SquatSide(side, (), {}, {}, _summarise({}, side, "no_angles"))
     t_s = angles.t_s
-    repetitions = find_repetitions(known[KNEE], t_s, side, _foot_rate(recording, side), params)
+    foot_rate = _foot_rate(recording, side)
+    repetitions = find_repetitions(known[KNEE], t_s, side, foot_rate, params, leg.stands)
     counted = [r for r in repetitions if r.excluded is None]
     if not counted:
-        reason = "no_counted_repetitions" if repetitions else "no_repetitions"
+        squatted = any(r.excluded != FOOT_LIFTED for r in repetitions)
+        reason = "no_counted_repetitions" if squatted else "no_repetitions"
         return SquatSide(side, repetitions, {}, {}, _summarise({}, side, reason))
     found = cut_curves(angles, side, [(r.start_s, r.end_s) for r in counted])
     values = _measure(counted, known, leg)

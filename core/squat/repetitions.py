@@ -13,10 +13,12 @@ from typing import Final
 import numpy as np
 
 from core.errors import ParameterError
-from core.frames import Floats, Side
+from core.frames import Bools, Floats, Side
 
-CODES: Final = ("incomplete", "signal_lost", "foot_moved")
-"""Why a repetition does not count: the take cut it, a sensor was silent in it, the foot moved."""
+FOOT_LIFTED: Final = "foot_lifted"
+CODES: Final = (FOOT_LIFTED, "incomplete", "signal_lost", "foot_moved")
+"""Why a bending knee does not count: its foot was off the floor, so that the other leg may have squatted; the
+take cut it; a sensor was silent in it; the foot moved."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,7 @@ class RepetitionParams:
     least_rad : flexion of the knee beyond that of the straighter position before and after it.
     edge : share of this flexion at which a repetition begins and ends.
     level : share at which the knee has come back: a movement that does not reach it is the same repetition.
+    lifted : share of a movement in which the foot may be off the floor.
     foot_rate : mean rate of the foot's sensor in a repetition, rad/s, from which the foot moved.
 
     Raises
@@ -38,13 +41,16 @@ class RepetitionParams:
     least_rad: float = radians(20.0)
     edge: float = 0.05
     level: float = 0.5
+    lifted: float = 0.2
     foot_rate: float = radians(10.0)
 
     def __post_init__(self) -> None:
-        if not (self.least_rad > 0.0 and 0.0 < self.edge < self.level < 1.0 and self.foot_rate > 0.0):
+        shares = 0.0 < self.edge < self.level < 1.0 and 0.0 < self.lifted < 1.0
+        if not (self.least_rad > 0.0 and shares and self.foot_rate > 0.0):
             raise ParameterError(
                 "parameter_out_of_range",
-                "A repetition needs 0 < edge < level < 1 and a least flexion and foot rate above 0.",
+                "A repetition needs 0 < edge < level < 1, 0 < lifted < 1, and a least flexion and foot rate "
+                "above 0.",
             )
 
 
@@ -84,6 +90,7 @@ def find_repetitions(
     side: Side,
     foot_rate: Floats | None = None,
     params: RepetitionParams | None = None,
+    stands: Bools | None = None,
 ) -> tuple[Repetition, ...]:
     """Find the squats in the flexion of a knee.
 
@@ -91,6 +98,7 @@ def find_repetitions(
     ----------
     knee : (n,) rad, NaN where it is not known. t_s : (n,).
     foot_rate : (n,) |ω| of the sensor on the standing foot, rad/s, None without one.
+    stands : (n,) False where the foot is lifted; None = it never is.
 
     Returns
     -------
@@ -111,7 +119,9 @@ def find_repetitions(
         down, up = bridged[bottom] - bridged[first], bridged[bottom] - bridged[last]
         cut = (first <= begins or last >= ends) and min(down, up) < params.level * max(down, up)
         why = None
-        if cut:
+        if stands is not None and float(np.mean(~stands[part])) > params.lifted:
+            why = FOOT_LIFTED
+        elif cut:
             why = "incomplete"
         elif not known[part].all():
             why = "signal_lost"

@@ -17,13 +17,13 @@ import numpy as np
 from core.angles import cardan_zxy
 from core.body.chain.filter import ChainFilter, ChainFilterParams
 from core.body.chain.geometry import LegGeometry
+from core.body.chain.leg import read_leg_signals
 from core.body.chain.model import build_leg_chain, leg_segments
-from core.body.corrected import correct_signals
 from core.calibration.fixed_offset import BACK, FRONT
 from core.calibration.result import CalibratedRecording
+from core.calibration.standing_leg import find_standing_legs
 from core.errors import EstimationError, ParameterError
-from core.frames import SUFFIX, Bools, Floats, Segment
-from core.rest import index_window
+from core.frames import SUFFIX, Bools, Floats, Segment, Side
 from core.rotation import about, from_matrix, to_matrix
 from core.squat.joints import JOINTS, name_joint_angles
 
@@ -74,12 +74,13 @@ GIMBAL: Final = radians(80.0)
 
 @dataclass(frozen=True, eq=False)
 class SquatCase:
-    """A take with a reference.
+    """A leg of a take, and the angles that its own are held against.
 
     Parameters
     ----------
     gyr, acc : (n, 3, 3) rad/s, m/s² of shank, thigh and pelvis, biases taken off, from standing on.
     valid : (n, 3). rest_force : (3, 3) m/s² mean over standing.
+    counted : (n,) samples that errors are of: all sensors are there and the foot is on the floor.
     reference : `JOINTS` → (n,) rad, anatomical or from standing; NaN where there is none.
     zero : samples whose mean is subtracted from the estimate, where the reference is from standing; None.
     """
@@ -91,6 +92,7 @@ class SquatCase:
     acc: Floats
     valid: Bools
     rest_force: Floats
+    counted: Bools
     reference: Mapping[str, Floats]
     zero: slice | None = None
 
@@ -104,7 +106,7 @@ class SensitivityRow:
     name : the paper's. nominal : m or rad, None where it is not defined. unit : "m" or "rad".
     sensitivity_pct : (7,) of equation 1, mean of both directions; None where `reason` says why: of a nominal
         value of 0 "parameter_nominal_zero", near a pole of its angles "gimbal". NaN where the error itself is
-        too small to divide by.
+        too small to divide by, as it is without a reference.
     relative_rad : (7,) |change of the RMS error| at ± 5 %, mean of both directions; None like the former.
     step : m or rad, and absolute_rad : (7,) the same at ± step.
     """
@@ -128,57 +130,103 @@ class SensitivityTable:
     rows: tuple[SensitivityRow, ...]
 
 
-def make_case(
-    calibrated: CalibratedRecording,
-    geometry: LegGeometry,
-    t_s: Floats,
-    reference: Mapping[str, Floats],
-    *,
-    from_standing: bool,
-) -> SquatCase:
-    """A case from a calibrated take and reference angles on their own times.
+@dataclass(frozen=True, eq=False)
+class ReferenceAngles:
+    """Angles that somebody else measured.
 
     Parameters
     ----------
-    t_s : (m,) s on the recording's clock. reference : name with suffix → (m,) rad. from_standing : they are
-        zeroed on standing, so the estimate is too.
+    t_s : (m,) s on the recording's clock. angles : name with suffix → (m,) rad, anatomical or from standing.
+    """
+
+    t_s: Floats
+    angles: Mapping[str, Floats]
+
+    def list_missing(self, side: Side) -> list[str]:
+        """Those of the seven angles of a leg that are not there."""
+        names = (f"{joint}_{SUFFIX[side]}" for joint in JOINTS)
+        return [name for name in names if name not in self.angles]
+
+
+def make_case(
+    calibrated: CalibratedRecording,
+    geometry: LegGeometry,
+    reference: ReferenceAngles | None,
+    *,
+    from_standing: bool,
+    params: ChainFilterParams | None = None,
+) -> SquatCase:
+    """A case from a leg of a calibrated take.
+
+    Parameters
+    ----------
+    reference : None = the leg's own angles with nominal values, so that errors are changes.
+    from_standing : the angles are zeroed on standing; those of a reference are so already.
 
     Raises
     ------
-    EstimationError `segments_missing`, `no_reference`.
+    EstimationError `segments_missing`, `no_standing`, `no_reference`, `filter_diverged`.
     """
-    recording, calibration = calibrated.recording, calibrated.calibration
-    segments = leg_segments(geometry.side)
-    mounts = {s: m.R_segment_sensor for s, m in calibration.segments.items()}
-    build_leg_chain(geometry, mounts)
-    names = [f"{joint}_{SUFFIX[geometry.side]}" for joint in JOINTS]
-    missing = [name for name in names if name not in reference]
-    if missing:
+    side = geometry.side
+    signals = read_leg_signals(calibrated, side)
+    stands = find_standing_legs(calibrated)[side][signals.first :]
+    case = SquatCase(
+        rate_hz=calibrated.recording.rate_hz,
+        geometry=geometry,
+        mounts=signals.mounts,
+        gyr=signals.gyr,
+        acc=signals.acc,
+        valid=signals.valid,
+        rest_force=signals.rest_force,
+        counted=signals.valid.all(axis=1) & stands,
+        reference={},
+        zero=signals.standing if from_standing else None,
+    )
+    if reference is None:
+        return replace(case, reference=_estimate(case, geometry, case.mounts, params))
+    if missing := reference.list_missing(side):
         raise EstimationError(
             "no_reference",
             f"The reference has no {', '.join(missing)}; it needs the seven angles of the leg.",
         )
-    acc, gyr, valid = correct_signals(calibrated, segments)
-    standing = index_window(calibration.zero, recording.rate_hz)
-    first = standing.start
-    at = recording.t_s[first:]
+    at = calibrated.recording.t_s[signals.first :]
     found = {
-        joint: np.interp(at, t_s, reference[name], left=np.nan, right=np.nan)
-        for joint, name in zip(JOINTS, names, strict=True)
+        joint: np.interp(
+            at, reference.t_s, reference.angles[f"{joint}_{SUFFIX[side]}"], left=np.nan, right=np.nan
+        )
+        for joint in JOINTS
     }
-    if not all(np.isfinite(a).any() for a in found.values()):
+    if not all(np.isfinite(a[case.counted]).any() for a in found.values()):
         raise EstimationError("no_reference", "Reference and recording have no time in common.")
-    return SquatCase(
-        rate_hz=recording.rate_hz,
-        geometry=geometry,
-        mounts={s: mounts[s] for s in segments},
-        gyr=np.ascontiguousarray(gyr[first:]),
-        acc=np.ascontiguousarray(acc[first:]),
-        valid=np.ascontiguousarray(valid[first:]),
-        rest_force=acc[standing].mean(axis=0),
-        reference=found,
-        zero=slice(0, standing.stop - first) if from_standing else None,
-    )
+    return replace(case, reference=found)
+
+
+def analyse_legs(
+    calibrated: CalibratedRecording,
+    geometries: Sequence[LegGeometry],
+    reference: ReferenceAngles | None = None,
+    *,
+    from_standing: bool,
+    params: ChainFilterParams | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> dict[Side, SensitivityTable]:
+    """`analyse_sensitivity` of every leg of a take that the reference has, without one of all.
+
+    Raises
+    ------
+    As `make_case` and `analyse_sensitivity`; `no_reference` where the reference has no leg of the take.
+    """
+    legs = [g for g in geometries if reference is None or not reference.list_missing(g.side)]
+    found: dict[Side, SensitivityTable] = {}
+    for k, geometry in enumerate(legs or geometries):
+        case = make_case(calibrated, geometry, reference, from_standing=from_standing, params=params)
+
+        def say(name: str, share: float, done: int = k) -> None:
+            if progress is not None:
+                progress(name, (done + share) / len(legs))
+
+        found[geometry.side] = analyse_sensitivity(case, params=params, progress=say)
+    return found
 
 
 def analyse_sensitivity(
@@ -261,18 +309,22 @@ def _run(
     case: SquatCase, geometry: LegGeometry, mounts: Mapping[Segment, Floats], params: ChainFilterParams | None
 ) -> Floats:
     """RMS errors (7,) of the angles, rad."""
+    found = _estimate(case, geometry, mounts, params)
+    off = np.stack([found[joint] - case.reference[joint] for joint in JOINTS])[:, case.counted]
+    return np.asarray(np.sqrt(np.nanmean(off**2, axis=1)))
+
+
+def _estimate(
+    case: SquatCase, geometry: LegGeometry, mounts: Mapping[Segment, Floats], params: ChainFilterParams | None
+) -> dict[str, Floats]:
+    """`JOINTS` → angle (n,) rad, from standing where the case is."""
     chain = build_leg_chain(geometry, mounts)
     motion = ChainFilter(chain, case.rate_hz, case.rest_force, params).advance(case.gyr, case.acc, case.valid)
-    found = name_joint_angles(motion.angles, geometry.side)
-    all_there = case.valid.all(axis=1)
-    errors = []
-    for joint in JOINTS:
-        estimate = found[f"{joint}_{SUFFIX[geometry.side]}"]
-        if case.zero is not None:
-            estimate = estimate - estimate[case.zero].mean()
-        off = (estimate - case.reference[joint])[all_there]
-        errors.append(float(np.sqrt(np.nanmean(off**2))))
-    return np.array(errors)
+    named = name_joint_angles(motion.angles, geometry.side)
+    found = {joint: named[f"{joint}_{SUFFIX[geometry.side]}"] for joint in JOINTS}
+    if case.zero is None:
+        return found
+    return {joint: a - a[case.zero].mean() for joint, a in found.items()}
 
 
 def average_sensitivity(values: Sequence[Floats | None]) -> Floats:

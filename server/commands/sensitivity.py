@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
-
-import numpy as np
 
 from core.errors import InputError, SagittalError
 from server.storage import fs
@@ -19,27 +16,12 @@ if TYPE_CHECKING:
     from core.calibration.result import CalibratedRecording
     from core.frames import Floats, Segment
     from core.recording import UniformRecording
-    from core.squat.sensitivity import SensitivityRow, SensitivityTable, SquatCase
+    from core.squat.sensitivity import SensitivityTable, SquatCase
 
 Side = Literal["left", "right"]
 
 HEIGHT_M = 1.75
 """Of the simulated person."""
-
-COLUMNS = (
-    "Ankle IR/ER", "Ankle Abd/Add", "Ankle Flex/Ext", "Knee Flex/Ext", "Hip Flex/Ext", "Hip Abd/Add",
-    "Hip IR/ER",
-)  # fmt: skip
-HEADER = (
-    "parameter", "angle", "nominal", "unit", "error_deg", "sensitivity_pct", "delta_relative_deg", "step",
-    "delta_step_deg", "reason",
-)  # fmt: skip
-
-TABLES: tuple[tuple[str, tuple[int, ...], tuple[int, ...], str], ...] = (
-    ("Ankle and knee", (0, 1, 2, 3), (0, 1, 2), "Ankle average"),
-    ("Hip", (4, 5, 6), (4, 5, 6), "Hip average"),
-)
-"""Title, columns, the columns that are averaged, and what their average is called."""
 
 
 def sensitivity(
@@ -53,26 +35,33 @@ def sensitivity(
     out: Path | None,
     seed: int,
 ) -> int:
-    """Analyse a take with a reference, or a simulated one; 1 = not possible, 2 = a word is missing."""
-    from core.squat.sensitivity import analyse_sensitivity
+    """Analyse a take, against a reference where one is given, or a simulated one; 1 = not possible."""
+    from server.report.sensitivity import sensitivity_csv, summarise_sensitivity, tell_sensitivity
 
-    if paths and reference is None:
-        sys.stderr.write("A take needs --reference, the angles.parquet that it is held against.\n")
-        return 2
     try:
-        if paths and reference is not None:
-            case = _read_case(paths, reference, manifest, table_top, side, measures, from_standing)
+        if paths:
+            against = None if reference is None else str(reference)
+            tables = _analyse_take(paths, reference, manifest, table_top, side, measures, from_standing)
         else:
-            case = simulate_case(seed, side or "right")
-        table = analyse_sensitivity(case)
+            against, from_standing = "the simulation's truth", False
+            tables = analyse_simulated(seed, side or "right")
     except SagittalError as error:
         sys.stderr.write(f"No sensitivity ({error.code}): {error.message}\n")
         return 1
+    found = summarise_sensitivity(tables, against, from_standing=from_standing)
     if out is not None:
-        _write(out, table)
-    sys.stdout.write("\n".join(_tell(table)) + "\n")
+        fs.make_folder(out.parent)
+        fs.write_file(out, sensitivity_csv(found))
+    sys.stdout.write("\n".join(tell_sensitivity(found)) + "\n")
     sys.stdout.flush()
     return 0
+
+
+def analyse_simulated(seed: int, side: Side) -> dict[Side, SensitivityTable]:
+    """The sensitivity analysis of `simulate_case`."""
+    from core.squat.sensitivity import analyse_sensitivity
+
+    return {side: analyse_sensitivity(simulate_case(seed, side))}
 
 
 def simulate_case(seed: int, side: Side) -> SquatCase:
@@ -80,7 +69,7 @@ def simulate_case(seed: int, side: Side) -> SquatCase:
     from core.calibration.known_mounts import calibrate_with_mounts
     from core.simulate import RecordingSetup, SoftTissue, Squats, simulate_squats
     from core.simulate.squat_chain import draw_leg, place_sensors
-    from core.squat.sensitivity import make_case
+    from core.squat.sensitivity import ReferenceAngles, make_case
     from core.timeline import synchronise
 
     leg, mounts = draw_leg(HEIGHT_M, side, seed)
@@ -92,36 +81,34 @@ def simulate_case(seed: int, side: Side) -> SquatCase:
         place_sensors(leg, HEIGHT_M, mounts),
     )
     calibrated = calibrate_with_mounts(synchronise(made.recording), mounts, "known", 1.0)
-    return make_case(calibrated, leg, made.truth.t_s, made.truth.angles, from_standing=False)
+    truth = ReferenceAngles(made.truth.t_s, made.truth.angles)
+    return make_case(calibrated, leg, truth, from_standing=False)
 
 
-def _read_case(
+def _analyse_take(
     paths: Sequence[Path],
-    reference: Path,
+    reference: Path | None,
     manifest: Path | None,
     table_top: Path | None,
     side: Side | None,
     measures: Path | None,
     from_standing: bool,
-) -> SquatCase:
+) -> dict[Side, SensitivityTable]:
     from core.body.chain.geometry import LegGeometry
     from core.formats import read_named_file
-    from core.squat.sensitivity import make_case
-    from server.report.bundle import read_angles
+    from core.squat.sensitivity import analyse_legs
+    from core.squat.side import find_squat_sides
+    from server.services.sensitivities import read_reference
 
     take = _read_take(paths, manifest)
-    leg = side or _find_side(take)
-    geometry = _measure(LegGeometry.from_height(take.subject.height_m, leg), measures)
-    calibrated = _calibrate(take, leg, None if table_top is None else _read_take([table_top], manifest))
-    try:
-        angles = read_angles(read_named_file(reference))
-    except (KeyError, ValueError, OSError) as error:
-        raise InputError(
-            "reference_unreadable", f"{reference} is not the angles.parquet of an analysis or a simulation."
-        ) from error
-    offset: Mapping[str, float] = {} if from_standing else angles.zero_offset
-    known = {name: values + offset.get(name, 0.0) for name, values in angles.angles.items()}
-    return make_case(calibrated, geometry, angles.t_s, known, from_standing=from_standing)
+    sides = find_squat_sides(take) if side is None else (side,)
+    legs = [_measure(LegGeometry.from_height(take.subject.height_m, s), measures) for s in sides]
+    calibrated = _calibrate(take, sides, None if table_top is None else _read_take([table_top], manifest))
+    angles = None
+    if reference is not None:
+        content = read_named_file(reference)
+        angles = read_reference(content, str(reference), from_standing=from_standing)
+    return analyse_legs(calibrated, legs, angles, from_standing=from_standing)
 
 
 def _read_take(paths: Sequence[Path], manifest: Path | None) -> UniformRecording:
@@ -133,27 +120,15 @@ def _read_take(paths: Sequence[Path], manifest: Path | None) -> UniformRecording
     return synchronise(read_recording(list(list_source_files(paths)), declared))
 
 
-def _find_side(take: UniformRecording) -> Side:
-    from core.body.chain.model import leg_segments
-    from core.frames import SIDES
-
-    worn = [side for side in SIDES if set(leg_segments(side)) <= set(take.sensors)]
-    if len(worn) != 1:
-        raise InputError(
-            "side_unknown",
-            "A squat needs sensors on shank, thigh and pelvis. "
-            + ("Both legs have them; say which one squats." if worn else "No leg has all of them."),
-        )
-    return worn[0]
-
-
-def _calibrate(take: UniformRecording, side: Side, table: UniformRecording | None) -> CalibratedRecording:
+def _calibrate(
+    take: UniformRecording, sides: Sequence[Side], table: UniformRecording | None
+) -> CalibratedRecording:
     from core.calibration.fixed_offset import make_fixed_mounts
     from core.calibration.known_mounts import FIXED_OFFSET, TABLE_TOP, calibrate_with_mounts
     from core.calibration.table_top import calibrate_table_top
 
     if table is None:
-        return calibrate_with_mounts(take, make_fixed_mounts(side), "fixed_offset", FIXED_OFFSET)
+        return calibrate_with_mounts(take, make_fixed_mounts(*sides), "fixed_offset", FIXED_OFFSET)
     mounts: Mapping[Segment, Floats] = calibrate_table_top(table).R_segment_sensor
     return calibrate_with_mounts(take, mounts, "table_top", TABLE_TOP)
 
@@ -175,96 +150,3 @@ def _measure(nominal: LegGeometry, path: Path | None) -> LegGeometry:
     if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in given.values()):
         raise InputError("measures_unreadable", f"{path} holds a length that is no number.")
     return replace(nominal, **given, estimated=not given)
-
-
-def _tell(table: SensitivityTable) -> list[str]:
-    from core.squat.sensitivity import average_sensitivity
-
-    errors = ", ".join(
-        f"{name} {math.degrees(e):.2f}" for name, e in zip(COLUMNS, table.errors.tolist(), strict=True)
-    )
-    lines = [f"RMS error with nominal values, °: {errors}.", ""]
-    last = average_sensitivity([row.sensitivity_pct for row in table.rows])
-    for title, columns, averaged, name in TABLES:
-        lines.append(
-            f"{title}: sensitivity in %, mean of ± {100.0 * table.relative:g} % of the nominal value"
-        )
-        lines += _table(
-            (*(COLUMNS[i] for i in columns), name),
-            [(row.name, _values(row.sensitivity_pct, columns, averaged, 1), row.reason) for row in table.rows]
-            + [("Average", _values(last, columns, averaged, 1), None)],
-        )
-    for title, unit, pick in (
-        (f"Change of the RMS error in °, ± {100.0 * table.relative:g} %", "", _relative),
-        ("Change of the RMS error in °, by steps of", _say_steps(table), _absolute),
-    ):
-        lines.append(f"{title} {unit}".rstrip())
-        every = tuple(range(len(COLUMNS)))
-        rows = [(row.name, _values(pick(row), every, (), 3), None) for row in table.rows]
-        lines += _table(COLUMNS, rows)
-    if any(row.reason for row in table.rows):
-        lines.append("– : nominal value 0 or near a pole; nothing can be a share of it off.")
-    lines.append("Tables: docs/science/squat.md. A quotient by an error below 0.1° is not given.")
-    return lines
-
-
-def _relative(row: SensitivityRow) -> Floats | None:
-    return None if row.relative_rad is None else np.degrees(row.relative_rad)
-
-
-def _absolute(row: SensitivityRow) -> Floats | None:
-    return np.degrees(row.absolute_rad)
-
-
-def _say_steps(table: SensitivityTable) -> str:
-    steps = {row.unit: row.step for row in table.rows}
-    return f"{1000.0 * steps['m']:g} mm and {math.degrees(steps['rad']):g}°"
-
-
-def _values(
-    values: Floats | None, columns: tuple[int, ...], averaged: tuple[int, ...], digits: int
-) -> list[str]:
-    """Cells of a row, the average of some columns behind them."""
-    if values is None:
-        return ["–"] * (len(columns) + bool(averaged))
-    chosen = [float(values[i]) for i in columns]
-    if averaged:
-        known = [v for v in (float(values[i]) for i in averaged) if math.isfinite(v)]
-        chosen.append(sum(known) / len(known) if known else math.nan)
-    return [f"{v:.{digits}f}" if math.isfinite(v) else "–" for v in chosen]
-
-
-def _table(header: Sequence[str], rows: Sequence[tuple[str, list[str], str | None]]) -> list[str]:
-    lines = ["".join([f"{'':<12}", *(f"{name:>15}" for name in header)])]
-    lines += ["".join([f"{name:<12}", *(f"{cell:>15}" for cell in cells)]) for name, cells, _ in rows]
-    return [*lines, ""]
-
-
-def _write(out: Path, table: SensitivityTable) -> None:
-    from core.squat.joints import JOINTS
-    from server.report.columns import write_csv
-
-    def deg(values: Floats | None, i: int) -> float | None:
-        return None if values is None else math.degrees(float(values[i]))
-
-    def size(row: SensitivityRow, value: float | None) -> float | None:
-        return None if value is None else math.degrees(value) if row.unit == "rad" else value
-
-    rows = [
-        (
-            row.name,
-            joint,
-            size(row, row.nominal),
-            "deg" if row.unit == "rad" else "m",
-            math.degrees(float(table.errors[i])),
-            None if row.sensitivity_pct is None else float(row.sensitivity_pct[i]),
-            deg(row.relative_rad, i),
-            size(row, row.step),
-            deg(row.absolute_rad, i),
-            row.reason or "",
-        )
-        for row in table.rows
-        for i, joint in enumerate(JOINTS)
-    ]
-    fs.make_folder(out.parent)
-    fs.write_file(out, write_csv(HEADER, rows))

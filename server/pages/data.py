@@ -83,7 +83,7 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
         "results": [
             {
                 "name": name,
-                "what": FILE_WORDS.get(name, ""),
+                "what": _describe_file(name),
                 "size": size,
                 "href": f"/api/v1/analyses/{analysis_id}/files/{quote(name)}",
             }
@@ -96,6 +96,12 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
         "provenance": _provenance(shown) if shown else [],
         "mapping": _mapping(shown.manifest if shown else None),
     }
+
+
+def _describe_file(name: str) -> str:
+    if name.startswith("sensitivity-"):
+        return "How far the angles of squats move with each measure"
+    return FILE_WORDS.get(name, "")
 
 
 def _ask_again(

@@ -36,6 +36,7 @@ KIND_WORDS: Final = {
     "analyse": "Analysis",
     "compare_filters": "Comparison of filters",
     "tune": "Tuning of a filter",
+    "sensitivity": "Sensitivity of squats",
 }
 
 

@@ -13,8 +13,8 @@ PROTOCOLS: Final = (
     ("treadmill", "Treadmill", "Walking on the belt, with a few seconds of quiet standing before or after."),
     (
         "squat",
-        "Squats on one leg",
-        "Three or more, with two seconds of quiet standing first. Sensors on shin, thigh and lower back.",
+        "Squats",
+        "Stand still for 2 s, then squat on one leg, each in turn, or both. Sensors: back, shin, thigh.",
     ),
     ("activity", "Daily life", "Hours to days at home with one sensor on the chest or the lower back."),
 )

@@ -19,6 +19,8 @@ from server.report.wording import format_number, place_words
 
 KINDS: Final[Mapping[str, str]] = {"good": "ok", "warn": "warn", "bad": "bad"}
 VERDICTS: Final[Mapping[str, str]] = {"good": "consistent", "warn": "doubtful in part", "bad": "inconsistent"}
+NOT_JUDGED: Final = "does not check itself"
+"""Of an estimator that has no quantity with a limit."""
 
 REDUCED: Final[Mapping[str, str]] = {
     "sensor_failed": "reduced: a sensor failed in this take",
@@ -96,12 +98,13 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
         return None
     name, verdict, asked = str(e["name"]), str(e["verdict"]), str(e["requested"])
     reduced = e["reduced"]
+    judged = any(f["warn"] is not None or f["bad"] is not None for f in e["health"])
     return EstimatorView(
         name=method_label(name),
         meaning=_method_note(name),
         sensors=len(e["sensors"]),
         kind=KINDS[verdict],
-        verdict=VERDICTS[verdict],
+        verdict=VERDICTS[verdict] if judged else NOT_JUDGED,
         reduced=None if reduced is None else REDUCED.get(reduced, str(reduced)),
         health=_rows(e["health"]),
         choices=(

@@ -9,7 +9,7 @@ events.csv      contacts: time_s, side, kind (ic | tc), source, confidence (shar
                 uncertainty_s (standard)
 steps.csv       steps of a trunk sensor, where no foot carries one: time_s, side
 activity…        of daily life, in place of all but the first (server/report/activity_files.py)
-repetitions.csv squats on one leg with their measures and why one was left out, of takes of squats
+repetitions.csv squats of each leg with their measures and why one was left out, of takes of squats
 strides.csv     one row per stride with its temporal parameters and why it was left out
 repaired.json   the manifest that is proposed where the set-up is wrong (server/services/analyses.py)
 
@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Final
 
@@ -272,13 +272,15 @@ def steps_csv(steps: Steps) -> bytes:
     return write_csv(("time_s", "side"), ((s.time_s, s.side) for s in steps.steps))
 
 
-def repetitions_csv(squats: SquatSide) -> bytes:
-    """Every squat, counted or not; measures of those that count."""
-    rows = []
-    counted = iter(zip(*(squats.values[name].tolist() for name in squats.values), strict=True))
-    for r in squats.repetitions:
-        measured = next(counted) if r.excluded is None else ("",) * len(MEASURES)
-        rows.append((r.side, r.start_s, r.bottom_s, r.end_s, *measured, r.excluded or ""))
+def repetitions_csv(squats: Sequence[SquatSide]) -> bytes:
+    """Every squat of every leg in order of time, counted or not; measures of those that count."""
+    rows: list[tuple[object, ...]] = []
+    for leg in squats:
+        counted = iter(zip(*(leg.values[name].tolist() for name in leg.values), strict=True))
+        for r in leg.repetitions:
+            measured = next(counted) if r.excluded is None else ("",) * len(MEASURES)
+            rows.append((r.side, r.start_s, r.bottom_s, r.end_s, *measured, r.excluded or ""))
+    rows.sort(key=lambda row: row[1:2])
     return write_csv(("side", "start_s", "bottom_s", "end_s", *MEASURES, "excluded_reason"), rows)
 
 

@@ -129,7 +129,7 @@ class ReportModel:
     curve_notes : how to read the curves, in sentences: zero, offsets, confidence, what is drawn.
     since : the visit that `change` of the rows refers to, None without an earlier one walked alike.
     condition : how the take was walked, in words.
-    squats : of a take of squats on one leg, None of any other. functional : of a functional test, likewise.
+    squats : of a take of squats, None of any other. functional : of a functional test, likewise.
     daily : of a take of daily life, None of any other.
     headline : what stands out and what changed, in sentences; None where there is no walk to speak of.
     """
@@ -175,7 +175,20 @@ class ReportModel:
 
     @property
     def replay(self) -> dict[str, object]:
-        """What the clock of the page needs: duration, strides, mean curves by variable and side (deg)."""
+        """What the clock of the page needs: duration, strides, mean curves by variable and side (deg).
+
+        Of squats these take the place of strides.
+        """
+        if self.squats is not None:
+            means = self.squats.means_deg
+            return {
+                "duration_s": self.duration_s,
+                "called": "squat",
+                "strides": [asdict(span) for span in self.squats.spans],
+                "curves": {
+                    name: {side: round_curve(mean) for side, mean in of.items()} for name, of in means.items()
+                },
+            }
         return {
             "duration_s": self.duration_s,
             "strides": [

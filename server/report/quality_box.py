@@ -9,6 +9,7 @@ from typing import Any, Final, cast
 from core.parameters.result import Parameter
 from core.quality import concern_paths_alone, find_shown_level
 from core.quality.assessment import Verdict
+from core.squat.repetitions import FOOT_LIFTED
 from server.report.bundle import Bundle, is_functional
 from server.report.estimator import estimator_view
 from server.report.wording import format_number, place_words
@@ -99,7 +100,7 @@ def data_verdict(
     if "error" in severities:
         return "bad", "Analysis stopped"
     squats = _squats(parameters)
-    if squats is not None and not squats.n:
+    if squats and not any(p.n for p in squats):
         return "bad", "No squats"
     if is_test(parameters):
         total = next((p for p in parameters if is_functional(p.name) and p.mean is not None), None)
@@ -111,7 +112,7 @@ def data_verdict(
         or _trunk_steps(parameters)
     )
     daily = _daily_steps(parameters) is not None
-    if squats is None and not daily and not walked:
+    if not squats and not daily and not walked:
         return "bad", "No strides"
     if level == "poor":
         return "bad", "Poor data" if estimator is None or health != "bad" else _name_bad_estimate(estimator)
@@ -136,9 +137,9 @@ def is_test(parameters: Sequence[Parameter]) -> bool:
     return any(is_functional(p.name) for p in parameters)
 
 
-def _squats(parameters: Sequence[Parameter]) -> Parameter | None:
-    """The depth of a take of squats, with the number of those that count; None of any other take."""
-    return next((p for p in parameters if p.name == "squat_depth_deg"), None)
+def _squats(parameters: Sequence[Parameter]) -> list[Parameter]:
+    """The depth of each leg of a take of squats, with the number of those that count; none of any other."""
+    return [p for p in parameters if p.name == "squat_depth_deg"]
 
 
 def _daily_steps(parameters: Sequence[Parameter]) -> Parameter | None:
@@ -163,12 +164,28 @@ def _counted(bundle: Bundle) -> list[QualityItem]:
     if is_test(bundle.parameters) and not bundle.strides.strides:
         return []
     squats = _squats(bundle.parameters)
-    if squats is not None:
-        return [QualityItem("Squats used", str(squats.n), f"{squats.side} leg")]
+    if squats:
+        done = [p for p in squats if p.n] or squats
+        if len(done) == 1:
+            return [QualityItem("Squats used", str(done[0].n), f"{done[0].side} leg")]
+        return [_squats_of_both(bundle)]
     steps = _trunk_steps(bundle.parameters)
     if steps and not bundle.strides.strides:
         return [QualityItem("Steps", str(steps), "trunk sensor")]
     return [_strides(bundle)]
+
+
+def _squats_of_both(bundle: Bundle) -> QualityItem:
+    own = [r for r in bundle.repetitions or () if r.excluded != FOOT_LIFTED]
+    left, right = ([r for r in own if r.side == side] for side in ("left", "right"))
+    return QualityItem(
+        "Squats used",
+        sides=True,
+        left=sum(r.excluded is None for r in left),
+        left_of=len(left),
+        right=sum(r.excluded is None for r in right),
+        right_of=len(right),
+    )
 
 
 def _strides(bundle: Bundle) -> QualityItem:

@@ -1,15 +1,17 @@
-"""A take of squats on the session page: every repetition, and the courses of the leg's angles over it."""
+"""A take of squats on the session page: every repetition, and the courses of the legs' angles over it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from core.frames import Floats, Side
+from core.frames import SIDES, Floats, Side
 from core.squat.curves import VALGUS, cut_curves
+from core.squat.repetitions import FOOT_LIFTED
 from server.report.bundle import Bundle, StoredRepetition
 from server.report.curves import SQUAT, cycle_svg
 from server.report.panels import CurvePanel, SideCurve
@@ -42,9 +44,15 @@ SURE: Final = ("knee_flexion", "hip_flexion", "ankle_dorsiflexion")
 
 @dataclass(frozen=True)
 class RepetitionRow:
-    """One squat in words; `excluded` says why it does not count, and then the numbers are empty."""
+    """One squat in words; `excluded` says why it does not count, and then the numbers are empty.
+
+    Parameters
+    ----------
+    number : among the squats of its leg.
+    """
 
     number: int
+    side: Side
     start: str
     depth: str
     valgus: str
@@ -53,26 +61,97 @@ class RepetitionRow:
     excluded: str | None
 
 
-@dataclass(frozen=True, eq=False)
-class SquatView:
-    """The squats of a leg; charts : titles and drawings, empty without a squat that counts."""
+@dataclass(frozen=True)
+class SquatSpan:
+    """When a squat was, for the clock of the page, s."""
 
     side: Side
+    start_s: float
+    end_s: float
+    used: bool
+
+
+@dataclass(frozen=True, eq=False)
+class SquatView:
+    """The squats of a take.
+
+    Parameters
+    ----------
+    sides : legs that squatted. rows : in order of time. used : leg → squats that count.
+    lifted : leg → bends of its knee with the foot off the floor, which are no squats of it.
+    charts : titles and drawings, empty without a squat that counts. means_deg : variable → leg → (101,).
+    spans : of all rows.
+    """
+
+    sides: tuple[Side, ...]
     rows: tuple[RepetitionRow, ...]
+    used: Mapping[Side, int]
+    lifted: Mapping[Side, int]
     charts: tuple[dict[str, object], ...]
+    means_deg: Mapping[str, Mapping[Side, Floats]]
+    spans: tuple[SquatSpan, ...]
+
+    @property
+    def title(self) -> str:
+        """Which legs squatted."""
+        return f"{self.sides[0]} leg" if len(self.sides) == 1 else "both legs"
+
+    @property
+    def not_listed(self) -> str:
+        """What was left out of the rows, in a sentence; empty where there is nothing."""
+        legs = [f"{n} of the {side} knee" for side, n in self.lifted.items() if n]
+        if not legs:
+            return ""
+        return f"Bends with the foot off the floor are no squats: {' and '.join(legs)}."
 
     def to_json(self) -> dict[str, object]:
         """Plain values; curves lie in angles.parquet, every figure in repetitions.csv."""
-        return {"side": self.side, "repetitions": [vars(row) for row in self.rows]}
+        return {
+            "sides": self.sides,
+            "used": self.used,
+            "bends_with_lifted_foot": self.lifted,
+            "repetitions": [vars(row) for row in self.rows],
+        }
 
 
 def squat_view(bundle: Bundle) -> SquatView | None:
     """The squats of a finished analysis; None of another movement, and where nobody squatted."""
-    if not bundle.repetitions:
+    found = [r for r in bundle.repetitions or () if r.excluded != FOOT_LIFTED]
+    if not found:
         return None
-    side = bundle.repetitions[0].side
-    rows = tuple(_row(i + 1, r) for i, r in enumerate(bundle.repetitions))
-    return SquatView(side, rows, _charts(bundle, side))
+    lifted = Counter(r.side for r in bundle.repetitions or () if r.excluded == FOOT_LIFTED)
+    numbers: Counter[Side] = Counter()
+    rows = []
+    for r in found:
+        numbers[r.side] += 1
+        rows.append(_row(numbers[r.side], r))
+    curves = {
+        side: _curves(bundle, side, [r for r in found if r.side == side and r.excluded is None])
+        for side in SIDES
+        if numbers[side]
+    }
+    panels = [p for v in VARIABLES if (p := _panel(v, curves)) is not None]
+    return SquatView(
+        sides=tuple(curves),
+        rows=tuple(rows),
+        used={side: sum(r.excluded is None for r in found if r.side == side) for side in curves},
+        lifted={side: lifted[side] for side in SIDES if lifted[side]},
+        charts=tuple(
+            {
+                "title": p.title,
+                "zero": "",
+                "low": p.low_confidence,
+                "reason": p.reason,
+                "svg": cycle_svg(p, height=HEIGHT, x_unit=True, over=SQUAT),
+            }
+            for p in panels
+        ),
+        means_deg={
+            p.variable.name: {s: c.mean_deg for s, c in p.sides.items() if c.mean_deg is not None}
+            for p in panels
+        },
+        spans=tuple(SquatSpan(r.side, r.start_s, r.end_s, r.excluded is None) for r in found),
+    )
 
 
 def _row(number: int, r: StoredRepetition) -> RepetitionRow:
@@ -81,6 +160,7 @@ def _row(number: int, r: StoredRepetition) -> RepetitionRow:
 
     return RepetitionRow(
         number=number,
+        side=r.side,
         start=format_number(r.start_s, 1),
         depth=words("squat_depth_deg", 0),
         valgus=words("squat_knee_valgus_deg", 0),
@@ -90,40 +170,40 @@ def _row(number: int, r: StoredRepetition) -> RepetitionRow:
     )
 
 
-def _charts(bundle: Bundle, side: Side) -> tuple[dict[str, object], ...]:
-    counted = [r for r in bundle.repetitions or () if r.excluded is None]
+def _curves(bundle: Bundle, side: Side, counted: Sequence[StoredRepetition]) -> dict[str, Floats]:
+    """Variable → (counted, 101) degrees."""
     if bundle.angles is None or not counted:
-        return ()
-    curves = cut_curves(bundle.angles, side, [(r.start_s, r.end_s) for r in counted])
-    drawn = [(v, np.degrees(curves[v.name])) for v in VARIABLES if v.name in curves]
-    return tuple(
-        {
-            "title": v.label,
-            "low": v.name not in SURE,
-            "svg": cycle_svg(_panel(v, side, rows), height=HEIGHT, x_unit=True, over=SQUAT),
-        }
-        for v, rows in drawn
-    )
+        return {}
+    found = cut_curves(bundle.angles, side, [(r.start_s, r.end_s) for r in counted])
+    return {name: np.degrees(rows) for name, rows in found.items()}
 
 
-def _panel(variable: Variable, side: Side, rows: Floats) -> CurvePanel:
-    known: Sequence[int] = np.flatnonzero(np.isfinite(rows).all(axis=1)).tolist()
-    curve = SideCurve(
-        mean_deg=rows[known].mean(axis=0) if known else None,
-        sd_deg=rows[known].std(axis=0, ddof=1) if len(known) > 1 else None,
-        n=len(known),
-        strides={i: rows[i] for i in known},
-        foot_off_pct=None,
-        foot_off_sd=None,
-    )
+def _panel(variable: Variable, curves: Mapping[Side, Mapping[str, Floats]]) -> CurvePanel | None:
+    """The courses of a variable over the squats of every leg; None where no leg has it."""
+    legs = {side: of_leg[variable.name] for side, of_leg in curves.items() if variable.name in of_leg}
+    if not legs:
+        return None
+    sides, first = {}, 0
+    for side, rows in legs.items():
+        known: Sequence[int] = np.flatnonzero(np.isfinite(rows).all(axis=1)).tolist()
+        if known:
+            sides[side] = SideCurve(
+                mean_deg=rows[known].mean(axis=0),
+                sd_deg=rows[known].std(axis=0, ddof=1) if len(known) > 1 else None,
+                n=len(known),
+                strides={first + i: rows[i] for i in known},
+                foot_off_pct=None,
+                foot_off_sd=None,
+            )
+        first += len(rows)
     return CurvePanel(
         variable=variable,
         title=variable.label,
         zero="standing",
         added_deg={},
         low_confidence=variable.name not in SURE,
-        reason=None if known else "not known throughout any squat",
+        reason=None if sides else "not known throughout any squat",
         norm=None,
         norm_note="",
-        sides={side: curve} if known else {},
+        sides=sides,
     )

@@ -221,6 +221,7 @@ NOT_COUNTED: Final[Mapping[str, str]] = {
     "incomplete": "cut by the start or end of the take",
     "signal_lost": "a sensor was silent",
     "foot_moved": "the foot moved",
+    "foot_lifted": "the foot was off the floor",
 }
 """Why a squat does not count → words."""
 

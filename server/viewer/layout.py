@@ -14,13 +14,15 @@ import numpy as np
 
 from core import rotation
 from core.body.model import BodyModel
-from core.estimators import ESTIMATORS
+from core.estimators import BY_METHOD
 from core.frames import FOOT, R_NEUTRAL, SEGMENTS, SHANK, SIDES, THIGH, Floats, Segment, Side
 from server.viewer import shapes
 from server.viewer.colours import Tint
 from server.viewer.steps import Single
 
-_WORN: Mapping[str, tuple[Segment, ...]] = {e.method: e.sensors for e in ESTIMATORS if e.sensors is not None}
+_WORN: Mapping[str, tuple[Segment, ...]] = {
+    method: e.sensors for method, e in BY_METHOD.items() if e.sensors is not None
+}
 """Method → segments whose sensors it uses, where it gives poses of others too."""
 
 # Stature fractions of Winter (Biomechanics and Motor Control of Human Movement, fig 4.1) for the parts that

@@ -16,7 +16,7 @@ from core import rotation
 from core.body.model import BodyModel
 from core.body.poses import Poses
 from core.errors import ParameterError
-from core.estimators import ESTIMATORS
+from core.estimators import BY_METHOD
 from core.frames import FOOT, Bools, Floats, Segment, Side
 from server.viewer.layout import FigureLayout, MeshBatch
 from server.viewer.steps import FootPrints, FootTrail, Single, find_prints, lay_trail
@@ -27,7 +27,7 @@ FRAME_RATE = 50.0
 ROOT_WINDOW_S = 1.2
 """The view follows the root averaged over about one stride: sway stays visible, the walk stays in view."""
 
-FOR_THE_EYE = frozenset(e.method for e in ESTIMATORS if not e.in_room)
+FOR_THE_EYE = frozenset(e.method for e in BY_METHOD.values() if not e.in_room)
 """Methods whose positions say nothing about where the person was in the room."""
 
 

@@ -1,4 +1,7 @@
-"""The kinds of job of this version: look into a recording, analyse it, run filters on it or tune one."""
+"""The kinds of job of this version.
+
+Look into a recording, analyse it, run filters on it, tune one, see how sure the angles of squats are.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from sqlalchemy import Connection
 
 from server.jobs.attempt import Attempt
-from server.jobs.queue import COMPARE_FILTERS, TUNE, Claim
-from server.services import analyses, devices, filter_runs, recordings, tunings
+from server.jobs.queue import COMPARE_FILTERS, SENSITIVITY, TUNE, Claim
+from server.services import analyses, devices, filter_runs, recordings, sensitivities, tunings
 from server.storage.blobs import Blob
 from server.worker.task import Task, register
 
@@ -66,6 +69,18 @@ def _publish_filters(
     filter_runs.publish(c, claim, blobs)
 
 
+def _analyse_sensitivity(
+    files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
+) -> dict[str, bytes]:
+    return sensitivities.run(files, params, attempt.progress)
+
+
+def _publish_sensitivity(
+    c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
+) -> None:
+    sensitivities.publish(c, claim, blobs)
+
+
 def _warm() -> None:
     """Import readers and pipeline, compile the kernels or load them from the cache."""
     import server.report.exports  # noqa: F401
@@ -84,3 +99,4 @@ register(Task(recordings.INSPECT, _inspect, _publish_inspection, keeps_files=Fal
 register(Task(recordings.ANALYSE, _analyse, _publish_analysis, keeps_files=True, warm=_warm))
 register(Task(TUNE, _tune, _publish_tuning, keeps_files=False))
 register(Task(COMPARE_FILTERS, _compare_filters, _publish_filters, keeps_files=True))
+register(Task(SENSITIVITY, _analyse_sensitivity, _publish_sensitivity, keeps_files=True))

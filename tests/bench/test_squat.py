@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 import sys
+import time
 
 import pytest
 
-from core.squat.sensitivity import PARAMETERS, _run
+from core.squat.sensitivity import analyse_sensitivity
 from server.commands.sensitivity import simulate_case
 from tests.bench.pairs import in_pairs, plain_python
 
 pytestmark = pytest.mark.bench
 
+MOST_CPU_S = 5.0
 
-def test_24_parameters_up_and_down_in_five_seconds_of_a_quiet_core() -> None:
-    """48 runs of half a minute of squats: 1.6 s of a core that does the yardstick in 12 ms, limit 2.4 s."""
+
+def test_24_parameters_up_and_down_in_five_seconds_of_a_core() -> None:
+    """Half a minute of squats of a leg at 100 Hz, by steps and by shares: 69 runs of the chain.
+
+    2.3 s of a core that does the yardstick in 12 ms; 24 × 2 of them take two thirds.
+    """
     case = simulate_case(1, "right")
     assert len(case.gyr) > 3000
-
-    def runs() -> None:
-        for _ in range(2 * len(PARAMETERS)):
-            _run(case, case.geometry, case.mounts, None)
-
-    runs()
-    ours, yardstick, ratio = in_pairs(runs, plain_python, times=3)
+    analyse_sensitivity(case)
+    before = time.process_time()
+    analyse_sensitivity(case)
+    cpu_s = time.process_time() - before
+    ours, yardstick, ratio = in_pairs(lambda: analyse_sensitivity(case), plain_python, times=3)
     sys.stdout.write(
-        f"sensitivity {ours:.2f} s, {ratio:.0f} times {1e3 * yardstick:.0f} ms of plain Python\n"
+        f"sensitivity {cpu_s:.2f} s CPU, {ours:.2f} s, {ratio:.0f} times {1e3 * yardstick:.0f} ms of plain "
+        "Python\n"
     )
-    assert ratio < 200.0
+    assert cpu_s < MOST_CPU_S
+    assert ratio < 300.0

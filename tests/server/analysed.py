@@ -23,10 +23,12 @@ from core.pipeline import TakeAnalysis
 from core.quality import QualityReport
 from core.recording import Recording, SensorSignals, Subject, UniformRecording
 from core.rotation import about
-from server.jobs.queue import COMPARE_FILTERS
+from server.commands.sensitivity import analyse_simulated
+from server.jobs.queue import COMPARE_FILTERS, SENSITIVITY
 from server.report.exports import analysis_files
 from server.report.filter_files import filter_run_files
-from server.services import analyses, filter_runs, recordings, sessions
+from server.report.sensitivity import sensitivity_files, summarise_sensitivity
+from server.services import analyses, filter_runs, recordings, sensitivities, sessions
 from tests.server import walk
 from tests.server.clinic import Clinic
 
@@ -158,3 +160,22 @@ def compare(clinic: Clinic, patient_id: str, session_id: str) -> str:
     assert state.queue.finish(claim, lambda c: filter_runs.publish(c, claim, stored))
     with clinic.db.read() as c:
         return filter_runs.of_session(c, session_id)[0].id
+
+
+@functools.cache
+def sensitivity() -> Mapping[str, bytes]:
+    """Sensitivity analysis of a simulated squat as files."""
+    return sensitivity_files(
+        summarise_sensitivity(analyse_simulated(1, "right"), None, from_standing=True), "sensitivity"
+    )
+
+
+def put_off(clinic: Clinic, patient_id: str, session_id: str) -> str:
+    """Do what form and worker do with `sensitivity`; returns the id of the analysis, that of its job."""
+    state = clinic.app.state
+    with clinic.db.write() as c:
+        job_id = sensitivities.submit(c, state.queue, None, session_id).id
+    claim = state.queue.claim("test", [SENSITIVITY])
+    stored = {name: state.blobs.put(patient_id, content) for name, content in sensitivity().items()}
+    assert state.queue.finish(claim, lambda c: sensitivities.publish(c, claim, stored))
+    return job_id

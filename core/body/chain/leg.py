@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import radians
 from typing import Final
@@ -10,10 +11,11 @@ import numpy as np
 
 from core.body.chain.filter import ChainFilter, ChainFilterParams, ChainMotion
 from core.body.chain.geometry import LegGeometry
-from core.body.chain.model import RevoluteChain, build_leg_chain, leg_segments
+from core.body.chain.model import RevoluteChain, build_leg_chain, leg_segments, require_leg
 from core.body.corrected import correct_signals
 from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError
+from core.estimators import SQUAT_CHAIN
 from core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.rest import index_window
@@ -32,6 +34,7 @@ class LegMotion:
     side : leg that squats.
     orientations : of shank, thigh, pelvis and of the foot, which stands neutral by definition.
     chain : the model. motion : its joints from the sample `first` on.
+    stands : (n,) True where the foot is on the floor.
     """
 
     side: Side
@@ -39,30 +42,41 @@ class LegMotion:
     chain: RevoluteChain
     motion: ChainMotion
     first: int
+    stands: Bools
 
 
-def estimate_leg(
-    calibrated: CalibratedRecording, geometry: LegGeometry, params: ChainFilterParams | None = None
-) -> LegMotion:
-    """Orientations of one leg that stands on its foot from the calibration's standing to the end of the take.
+@dataclass(frozen=True, eq=False)
+class LegSignals:
+    """What the chain of a leg reads.
 
     Parameters
     ----------
-    calibrated : sensors on shank, thigh and pelvis; others are not read.
+    mounts : segment → (3, 3) R_segment_sensor of shank, thigh and pelvis.
+    gyr, acc : (n, 3, 3) rad/s, m/s² of the three, biases taken off, from the standing on. valid : (n, 3).
+    rest_force : (3, 3) m/s² mean over the standing. first : sample of the recording at which they begin.
+    standing : samples of the standing, counted from `first`.
+    """
 
-    Returns
-    -------
-    LegMotion; not valid are samples before the standing, and a segment while an angle below it is more
-    uncertain than 5°.
+    mounts: Mapping[Segment, Floats]
+    gyr: Floats
+    acc: Floats
+    valid: Bools
+    rest_force: Floats
+    first: int
+    standing: slice
+
+
+def read_leg_signals(calibrated: CalibratedRecording, side: Side) -> LegSignals:
+    """Signals of a leg's sensors as its chain takes them.
 
     Raises
     ------
-    EstimationError `segments_missing`, `no_standing`, `filter_diverged`. ParameterError `rate_out_of_range`.
+    EstimationError `segments_missing`, `no_standing`.
     """
     recording, calibration = calibrated.recording, calibrated.calibration
-    segments = leg_segments(geometry.side)
-    mounts = {s: m.R_segment_sensor for s, m in calibration.segments.items()}
-    chain = build_leg_chain(geometry, mounts)
+    segments = leg_segments(side)
+    require_leg(side, calibration.segments)
+    mounts = {s: calibration.segments[s].R_segment_sensor for s in segments}
     acc, gyr, valid = correct_signals(calibrated, segments)
     standing = index_window(calibration.zero, recording.rate_hz)
     known = valid[standing]
@@ -72,14 +86,56 @@ def estimate_leg(
             "no_standing", f"{silent} has no signal while standing; stand still before squatting.",
             sensor=silent, t_s=calibration.zero[0],
         )  # fmt: skip
-    rest = np.stack([acc[standing, i][known[:, i]].mean(axis=0) for i in range(len(segments))])
     first = standing.start
-    motion = ChainFilter(chain, recording.rate_hz, rest, params).advance(
-        gyr[first:], acc[first:], valid[first:]
+    return LegSignals(
+        mounts=mounts,
+        gyr=np.ascontiguousarray(gyr[first:]),
+        acc=np.ascontiguousarray(acc[first:]),
+        valid=np.ascontiguousarray(valid[first:]),
+        rest_force=np.stack([acc[standing, i][known[:, i]].mean(axis=0) for i in range(len(segments))]),
+        first=first,
+        standing=slice(0, standing.stop - first),
     )
-    q, usable = _write_segments(chain, motion, valid, first, geometry)
-    orientations = Orientations(recording.t_s, recording.rate_hz, q, usable, engine="squat_chain")
-    return LegMotion(geometry.side, orientations, chain, motion, first)
+
+
+def estimate_leg(
+    calibrated: CalibratedRecording,
+    geometry: LegGeometry,
+    params: ChainFilterParams | None = None,
+    stands: Bools | None = None,
+) -> LegMotion:
+    """Orientations of a leg on its foot from the calibration's standing to the end of the take.
+
+    While the foot is lifted the shank is still followed by gyroscope and gravity, the foot by nothing: with
+    the feet's own movement up to 1.5° of knee and hip (docs/science/squat.md, "Two legs").
+
+    Parameters
+    ----------
+    calibrated : sensors on shank, thigh and pelvis; others are not read.
+    stands : (n,) False where the foot is lifted; None = it never is.
+
+    Returns
+    -------
+    LegMotion; not valid are samples before the standing, a segment while an angle below it is more
+    uncertain than 5°, and a lifted foot.
+
+    Raises
+    ------
+    EstimationError `segments_missing`, `no_standing`, `filter_diverged`. ParameterError `rate_out_of_range`.
+    """
+    recording = calibrated.recording
+    signals = read_leg_signals(calibrated, geometry.side)
+    chain = build_leg_chain(geometry, signals.mounts)
+    motion = ChainFilter(chain, recording.rate_hz, signals.rest_force, params).advance(
+        signals.gyr, signals.acc, signals.valid
+    )
+    valid = np.zeros((len(recording.t_s), len(signals.valid.T)), bool)
+    valid[signals.first :] = signals.valid
+    stood = np.ones(len(valid), bool) if stands is None else stands
+    q, usable = _write_segments(chain, motion, valid, signals.first, geometry)
+    usable[FOOT[geometry.side]] = usable[FOOT[geometry.side]] & stood
+    orientations = Orientations(recording.t_s, recording.rate_hz, q, usable, engine=SQUAT_CHAIN.method)
+    return LegMotion(geometry.side, orientations, chain, motion, signals.first, stood)
 
 
 def _write_segments(

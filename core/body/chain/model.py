@@ -6,7 +6,7 @@ before: the poses are the same (docs/science/squat.md, "Chain").
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -106,6 +106,24 @@ def leg_segments(side: Side) -> tuple[Segment, Segment, Segment]:
     return SHANK[side], THIGH[side], "pelvis"
 
 
+def require_leg(side: Side, there: Collection[Segment]) -> tuple[Segment, Segment, Segment]:
+    """`leg_segments`, all of which must be there.
+
+    Raises
+    ------
+    EstimationError `segments_missing`.
+    """
+    worn = leg_segments(side)
+    missing = [s for s in worn if s not in there]
+    if missing:
+        raise EstimationError(
+            "segments_missing",
+            f"The squat needs sensors on {', '.join(worn)}; missing: {', '.join(missing)}.",
+            sensor=missing[0],
+        )
+    return worn
+
+
 def build_leg_chain(geometry: LegGeometry, mounts: Mapping[Segment, Floats]) -> RevoluteChain:
     """The leg on its foot, which stands neutral: seven hinges, three sensors.
 
@@ -117,14 +135,7 @@ def build_leg_chain(geometry: LegGeometry, mounts: Mapping[Segment, Floats]) -> 
     ------
     EstimationError `segments_missing`.
     """
-    worn = leg_segments(geometry.side)
-    missing = [s for s in worn if s not in mounts]
-    if missing:
-        raise EstimationError(
-            "segments_missing",
-            f"The squat needs sensors on {', '.join(worn)}; missing: {', '.join(missing)}.",
-            sensor=missing[0],
-        )
+    worn = require_leg(geometry.side, mounts)
     offsets = np.zeros((7, 3))
     offsets[3], offsets[4] = geometry.knee_from_ankle(), geometry.hip_from_knee()
     return RevoluteChain(

@@ -1,4 +1,4 @@
-"""Squats on one leg (core/squat/measures.py)."""
+"""Squats, by leg (core/squat/measures.py)."""
 
 from __future__ import annotations
 

@@ -11,14 +11,16 @@ import numpy as np
 import pytest
 
 from core.errors import ParameterError
-from core.frames import FOOT, Segment
+from core.frames import Segment
+from core.parameters.symmetry import compare_sides
 from core.pipeline import SQUAT, PipelineConfig, TakeAnalysis, analyse, resume
 from core.pipeline.recipes import choose_recipe
 from core.recording import ImuStream, Recording, Subject, UniformRecording
 from core.rotation import multiply
 from core.simulate import SquatSimulation, simulate_movement
+from core.squat.measures import MEASURES
 from core.squat.params import SquatParams
-from core.squat.side import find_squat_side
+from core.squat.side import find_squat_sides
 from core.timeline import synchronise
 from server.report.bundle import load_bundle
 from server.report.exports import analysis_files
@@ -51,17 +53,22 @@ def test_the_protocol_decides_the_recipe_and_the_squats_are_the_true_ones() -> N
     assert found["squat_depth_deg"].n == len(depths) == 6
     assert found["squat_depth_deg"].mean == pytest.approx(depths.mean(), abs=3.0)
     assert a.strides is None
-    assert a.poses is None
 
 
 def test_the_files_give_the_report_back() -> None:
     files = analysis_files(analysis())
-    assert set(files) == {"analysis.json", "angles.parquet", "repetitions.csv", "signals.parquet"}
+    assert set(files) == {
+        "analysis.json",
+        "angles.parquet",
+        "poses.parquet",
+        "repetitions.csv",
+        "signals.parquet",
+    }
     rows = list(csv.DictReader(io.StringIO(files["repetitions.csv"].decode())))
     assert len(rows) == 6
     assert all(50.0 < float(row["squat_depth_deg"]) < 90.0 and not row["excluded_reason"] for row in rows)
     report = report_model(load_bundle(files))
-    assert [name for name, _ in report.groups] == ["Squat on one leg"]
+    assert [name for name, _ in report.groups] == ["Squats"]
     assert report.quality.word == "Good data"
     assert ("Squats used", "6", "right leg") in [(i.label, i.value, i.extra) for i in report.quality.items]
     assert report.problem is None
@@ -97,23 +104,80 @@ def test_an_analysis_goes_on_from_any_stage() -> None:
     assert report_model(load_bundle(analysis_files(none))).quality.word == "No squats"
 
 
-def test_of_two_legs_with_sensors_the_standing_foot_tells() -> None:
-    uniform = synchronise(made().recording)
-    both = dict(uniform.sensors)
-    other: dict[Segment, Segment] = {"shank_l": "shank_r", "thigh_l": "thigh_r", "foot_l": "thigh_r"}
-    both |= {left: uniform.sensors[right] for left, right in other.items()}
-    assert find_squat_side(replace(uniform, sensors=both)) == "right"
-    del both[FOOT["right"]]
-    assert refusal(replace(uniform, sensors=both)) == "side_unknown"
-    del both["pelvis"]
-    assert refusal(replace(uniform, sensors=both)) == "segments_missing"
+@pytest.mark.parametrize("name", ["squats_both_legs", "squats_together"])
+def test_both_legs_of_a_take_are_measured_and_compared(name: str) -> None:
+    a, truth = analysis(name), made(name).truth
+    assert a.problem is None
+    assert a.legs is not None
+    assert a.squats is not None
+    assert a.angles is not None
+    found = {(p.name, p.side): p for p in a.parameters}
+    depths = np.degrees(truth.depths_rad)
+    of = {"right": depths, "left": depths}
+    if name == "squats_both_legs":
+        of = {"right": depths[:5], "left": depths[5:]}
+    for side, true in of.items():
+        depth = found["squat_depth_deg", side]  # type: ignore[index]
+        assert depth.n == len(true)
+        assert depth.mean == pytest.approx(true.mean(), abs=2.0)
+        end = side[0]
+        at = [r.bottom for leg in a.squats if leg.side == side for r in leg.repetitions if not r.excluded]
+        standing = truth.subtract_standing()
+        for joint, most in (("knee_flexion", 2.0), ("hip_flexion", 2.0), ("hip_rotation", 4.0)):
+            off = a.angles.angles[f"{joint}_{end}"][at] - standing[f"{joint}_{end}"][at]
+            assert np.degrees(np.abs(off)).max() < most, joint
+    compared = {s.name: s for s in compare_sides(a.parameters)}
+    assert set(compared) == set(MEASURES)
+    rows = list(csv.DictReader(io.StringIO(analysis_files(a)["repetitions.csv"].decode())))
+    lifted = [r["side"] for r in rows if r["excluded_reason"] == "foot_lifted"]
+    assert sorted(lifted) == (["left", "right"] if name == "squats_both_legs" else [])
+    assert [float(r["start_s"]) for r in rows] == sorted(float(r["start_s"]) for r in rows)
+
+
+def test_a_lifted_foot_has_no_ankle_and_its_knee_is_followed() -> None:
+    a, truth = analysis("squats_both_legs"), made("squats_both_legs").truth
+    assert a.angles is not None
+    height = truth.p["foot_l"][: len(a.angles.t_s), 2]
+    lifted = height > height[0] + 0.09
+    assert np.isnan(a.angles.angles["ankle_dorsiflexion_l"][lifted]).all()
+    off = a.angles.angles["knee_flexion_l"] - truth.subtract_standing()["knee_flexion_l"][: len(lifted)]
+    assert np.degrees(np.abs(off[lifted])).max() < 4.0
+
+
+@pytest.mark.parametrize("name", ["squats_agreed", "squats_both_legs", "squats_together"])
+def test_the_figure_stands_on_its_feet(name: str) -> None:
+    a, truth = analysis(name), made(name).truth
+    poses = a.poses
+    assert poses is not None
+    assert set(poses.q) == set(truth.q)
+    assert poses.valid.mean() > 0.99
+    n, body = len(poses.t_s), poses.body
+    for segment in truth.p:
+        true = truth.p[segment][:n] - truth.p["pelvis"][:n]
+        drawn = poses.p[segment] - poses.p["pelvis"]
+        assert np.linalg.norm(drawn - true, axis=1).max() < 0.06, segment
+    for foot, stood in poses.contact.items():
+        still = truth.p[foot][:n, 2] < truth.p[foot][0, 2] + 0.005
+        assert stood[still].mean() > 0.99
+        assert np.ptp(poses.p[foot][still], axis=0).max() < 0.05, "a standing foot stays where it is"
+        assert abs(poses.p[foot][still, 2].mean() - body.ankle_height) < 0.02
+
+
+def test_what_legs_need_is_said() -> None:
+    uniform = synchronise(made("squats_both_legs").recording)
+    assert find_squat_sides(uniform) == ("left", "right")
+    worn = dict(uniform.sensors)
+    del worn["thigh_l"]
+    assert find_squat_sides(replace(uniform, sensors=worn)) == ("right",)
+    del worn["pelvis"]
+    assert refusal(replace(uniform, sensors=worn)) == "segments_missing"
 
 
 def refusal(recording: UniformRecording) -> str:
     from core.errors import EstimationError
 
     with pytest.raises(EstimationError) as caught:
-        find_squat_side(recording)
+        find_squat_sides(recording)
     return caught.value.code
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.errors import ParameterError
-from core.frames import GRAVITY, Segment
+from core.frames import FOOT, GRAVITY, SHANK, SIDES, THIGH, Segment
 from core.rotation import rotate
 from core.simulate import RecordingSetup, SoftTissue, Squats, SquatSimulation, simulate_squats
 from core.simulate.walker import REFERENCE_HEIGHT_M, Anatomy
@@ -138,3 +138,47 @@ def test_impossible_squats_are_refused(wrong: dict[str, float], code: str) -> No
     with pytest.raises(ParameterError) as caught:
         Squats(**wrong)  # type: ignore[arg-type]
     assert caught.value.code == code
+
+
+BOTH = Squats(repetitions=2, other="lifted", hinged=True)
+
+
+@pytest.fixture(scope="module")
+def both() -> SquatSimulation:
+    return simulate_squats(BOTH, REFERENCE_HEIGHT_M, setup=EXACT)
+
+
+def test_of_two_legs_one_stands_while_the_other_is_off_the_floor(both: SquatSimulation) -> None:
+    truth, body = both.truth, Anatomy()
+    assert len(truth.depths_rad) == 4
+    for side in SIDES:
+        hip = [0.0, 0.0, (1.0 if side == "right" else -1.0) * body.hip_width / 2.0]
+        joints: tuple[tuple[Segment, Segment, list[float]], ...] = (
+            ("pelvis", THIGH[side], hip),
+            (THIGH[side], SHANK[side], [0.0, -body.thigh, 0.0]),
+            (SHANK[side], FOOT[side], [0.0, -body.shank, 0.0]),
+        )
+        for upper, lower, joint in joints:
+            end = truth.p[upper] + rotate(truth.q[upper], np.array(joint))
+            assert np.abs(end - truth.p[lower]).max() <= 1e-9
+    height = {side[0]: truth.p[FOOT[side]][:, 2] - body.ankle_height for side in SIDES}
+    assert min(h.min() for h in height.values()) > -1e-9
+    assert np.minimum(height["l"], height["r"]).max() < 1e-9, "somebody stands at every moment"
+    middles = [0.5 * (p.start_s + p.end_s) for p in truth.phases if p.kind == "hold"]
+    lifted = {side: np.interp(middles, truth.t_s, h) for side, h in height.items()}
+    assert lifted["r"][:2].max() < 1e-9
+    assert lifted["l"][:2].min() > 0.05
+    assert lifted["l"][2:].max() < 1e-9
+    assert lifted["r"][2:].min() > 0.05
+
+
+def test_on_both_feet_both_legs_do_the_same() -> None:
+    together = simulate_squats(
+        Squats(repetitions=2, other="along", valgus_rad=0.0), REFERENCE_HEIGHT_M, setup=EXACT
+    ).truth
+    for name in ("knee_flexion", "hip_flexion", "ankle_dorsiflexion"):
+        assert together.angles[f"{name}_l"] == pytest.approx(together.angles[f"{name}_r"], abs=1e-12)
+    assert all(np.ptp(together.p[FOOT[side]], axis=0).max() == 0.0 for side in SIDES)
+    with pytest.raises(ParameterError) as caught:
+        Squats(other="along")
+    assert caught.value.code == "squat_valgus"

@@ -148,3 +148,17 @@ def test_a_silence_and_a_moving_foot_exclude() -> None:
     assert find_repetitions(np.full(len(t), np.nan), t, "right") == ()
     with pytest.raises(ParameterError):
         RepetitionParams(edge=0.6)
+
+
+def test_a_bend_of_a_lifted_leg_is_no_squat_of_it() -> None:
+    knee, t = course(70.0, 70.0, 70.0)
+    stands = (t < 4.2) | (t > 7.8)
+    found = find_repetitions(knee, t, "right", stands=stands)
+    assert [r.excluded for r in found] == [None, "foot_lifted", None]
+    _, _, leg, angles = squatted("right")
+    hanging = replace(leg, stands=np.zeros(len(angles.t_s), bool))
+    side = measure_squats(angles, hanging, "right")
+    assert {p.reason for p in side.parameters} == {"no_repetitions"}
+    assert {r.excluded for r in side.repetitions} == {"foot_lifted"}
+    with pytest.raises(ParameterError):
+        RepetitionParams(lifted=0.0)

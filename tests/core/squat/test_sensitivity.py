@@ -12,16 +12,21 @@ import pytest
 from core.body.chain.leg import estimate_leg
 from core.calibration.fixed_offset import make_fixed_mounts
 from core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
+from core.calibration.result import CalibratedRecording
 from core.errors import EstimationError, ParameterError
+from core.frames import SIDES
 from core.rotation import about, to_matrix
-from core.simulate import RecordingSetup
-from core.simulate.squat_chain import measure_leg
+from core.simulate import RecordingSetup, Squats, simulate_squats
+from core.simulate.mems import MEMS
+from core.simulate.squat_chain import measure_leg, place_as_agreed
 from core.simulate.truth import joint_angles
 from core.squat.joints import JOINTS, name_joint_angles
 from core.squat.sensitivity import (
     PARAMETERS,
+    ReferenceAngles,
     SensitivityTable,
     SquatCase,
+    analyse_legs,
     analyse_sensitivity,
     average_sensitivity,
     make_case,
@@ -38,7 +43,8 @@ def case() -> SquatCase:
         synchronise(made.recording), make_fixed_mounts("right"), "fixed_offset", FIXED_OFFSET
     )
     leg = measure_leg(HEIGHT_M, "right")
-    return make_case(calibrated, leg, made.truth.t_s, made.truth.angles, from_standing=False)
+    truth = ReferenceAngles(made.truth.t_s, made.truth.angles)
+    return make_case(calibrated, leg, truth, from_standing=False)
 
 
 @cache
@@ -138,10 +144,56 @@ def test_a_reference_that_does_not_fit_is_refused() -> None:
     )
     leg, truth = measure_leg(HEIGHT_M, "right"), made.truth
     with pytest.raises(EstimationError) as caught:
-        make_case(calibrated, leg, truth.t_s, {"knee_flexion_r": truth.t_s}, from_standing=False)
+        make_case(
+            calibrated, leg, ReferenceAngles(truth.t_s, {"knee_flexion_r": truth.t_s}), from_standing=False
+        )
     assert caught.value.code == "no_reference"
     with pytest.raises(EstimationError) as caught:
-        make_case(calibrated, leg, truth.t_s + 1e4, truth.angles, from_standing=False)
+        make_case(calibrated, leg, ReferenceAngles(truth.t_s + 1e4, truth.angles), from_standing=False)
     assert caught.value.code == "no_reference"
     with pytest.raises(ParameterError):
         analyse_sensitivity(case(), relative=0.0)
+
+
+@cache
+def both_legs() -> CalibratedRecording:
+    squats = Squats(repetitions=1, other="lifted", hinged=True)
+    setup = RecordingSetup(rate_hz=50.0, noise=MEMS)
+    made = simulate_squats(squats, HEIGHT_M, 0, setup, place_as_agreed(HEIGHT_M, SIDES))
+    return calibrate_with_mounts(
+        synchronise(made.recording), make_fixed_mounts(*SIDES), "fixed_offset", FIXED_OFFSET
+    )
+
+
+def test_without_a_reference_errors_are_changes_of_the_legs_own_angles() -> None:
+    legs = [measure_leg(HEIGHT_M, side) for side in SIDES]
+    told: list[float] = []
+    found = analyse_legs(both_legs(), legs, from_standing=False, progress=lambda _, share: told.append(share))
+    assert set(found) == {"left", "right"}
+    assert told == sorted(told)
+    assert len(told) == 48
+    for leg in found.values():
+        rows = {row.name: row for row in leg.rows}
+        assert not leg.errors.any()
+        assert np.degrees(rows["Yaw-thi"].absolute_rad[3]) == pytest.approx(2.0, abs=0.3)
+        roll = rows["Roll-tib"]
+        assert roll.sensitivity_pct is not None
+        assert np.isnan(roll.sensitivity_pct).all()
+        assert roll.relative_rad is not None
+        assert np.degrees(roll.relative_rad.max()) > 0.3
+
+
+def test_changes_are_of_the_samples_in_which_the_foot_stands() -> None:
+    leg = make_case(both_legs(), measure_leg(HEIGHT_M, "left"), None, from_standing=True)
+    assert 0.3 < leg.counted.mean() < 0.8
+    assert not analyse_errors(leg).any()
+
+
+def test_a_reference_of_one_leg_judges_that_leg() -> None:
+    legs = [measure_leg(HEIGHT_M, side) for side in SIDES]
+    t_s = both_legs().recording.t_s
+    right = ReferenceAngles(t_s, {f"{joint}_r": np.zeros(len(t_s)) for joint in JOINTS})
+    assert set(analyse_legs(both_legs(), legs, right, from_standing=True)) == {"right"}
+    with pytest.raises(EstimationError) as caught:
+        analyse_legs(both_legs(), legs, ReferenceAngles(t_s, {}), from_standing=True)
+    assert caught.value.code == "no_reference"

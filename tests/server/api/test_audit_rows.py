@@ -86,6 +86,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     f"POST {SESSION}/analyses": {"json": {}},
     f"POST {SESSION}/tunings": {"json": {"algorithm": "mahony_2008", "validation": ["judge"]}},
     f"POST {SESSION}/filter-runs": {"json": {"filters": ["mahony_2008"]}},
+    f"POST {SESSION}/sensitivities": {"json": {"from_standing": False}},
     f"PUT {SESSION}/references/{{name:path}}": {"content": b"x"},
     f"DELETE {SESSION}/references/{{name:path}}": {},
     f"POST {SESSION}/live": {},
@@ -105,6 +106,8 @@ class Visits:
         with clinic.db.write() as c:
             patient = patients.create(c, None, code="P-1", height_m=1.75).id
             this, other = (sessions.create(c, None, patient).id for _ in range(2))
+            squats = sessions.create(c, None, patient, protocol="squat").id
+        analysed.finish(clinic, patient, squats, analysed.files())
         analysed.finish(clinic, patient, other, analysed.files())
         analysis = analysed.finish(clinic, patient, this, analysed.files())
         with clinic.db.write() as c:
@@ -114,6 +117,8 @@ class Visits:
             tunings.publish(c, claim, b"{}")
             tuning_id = c.execute(tuning.select()).one().id
         run = analysed.compare(clinic, patient, this)
+        self.squats = squats
+        sensitivity = analysed.put_off(clinic, patient, squats)
         with reference_files.receive_reference(
             clinic.db, clinic.app.state.blobs, clinic.settings, None, this, "optical.sto"
         ) as upload:
@@ -130,8 +135,9 @@ class Visits:
             "job_id": job_id,
             "tuning_id": tuning_id,
             "run_id": run,
+            "sensitivity_id": sensitivity,
         }
-        self.ids = {patient, this, other, analysis, job_id, tuning_id, run, None}
+        self.ids = {patient, this, other, analysis, job_id, tuning_id, run, squats, sensitivity, None}
 
     def address(self, route: str) -> str:
         """The route with its parameters filled; fails for one that this test does not know."""
@@ -149,6 +155,8 @@ class Visits:
 
         def value(found: re.Match[str]) -> str:
             name = found[1]
+            if name == "session_id" and path.endswith("/sensitivities"):
+                return self.squats
             return names[path[: found.start()].split("/")[-2]] if name == "name" else self.values[name]
 
         return re.sub(r"\{(\w+)(?::path)?\}", value, path) + QUERY.get(route, "")

@@ -59,7 +59,6 @@ TRUE = ("--reference", "{take}/angles.parquet")
 @pytest.mark.parametrize(
     ("call", "code", "said"),
     [
-        ((TAKE,), 2, "needs --reference"),
         ((TAKE, "--reference", "{take}/none.parquet"), 1, "file_not_found"),
         ((TAKE, "--reference", "{take}/truth.json"), 1, "reference_unreadable"),
         ((TAKE, *TRUE, "--side", "left"), 1, "segments_missing"),
@@ -73,3 +72,11 @@ def test_what_is_missing_is_said(
 ) -> None:
     assert main(["sensitivity", *(word.format(take=take) for word in call)]) == code
     assert said in capsys.readouterr().err
+
+
+def test_a_take_alone_is_held_against_itself(take: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sensitivity", str(take / "recording.parquet"), "--from-standing"]) == 0
+    said = capsys.readouterr().out
+    assert "RMS change of the angles in °" in said
+    assert "RMS error" not in said
+    assert "sensitivity in %" not in said

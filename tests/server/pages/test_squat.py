@@ -8,9 +8,11 @@ import re
 import pytest
 
 from core.pipeline import analyse
+from core.simulate import RecordingSetup, Squats, simulate_squats
 from core.simulate.mems import MEMS
+from core.simulate.squat_chain import place_as_agreed
 from server.report.exports import analysis_files
-from tests.core.body.chain.squats import squat_on
+from tests.core.body.chain.squats import HEIGHT_M, squat_on
 from tests.server import analysed
 from tests.server.clinic import Clinic
 
@@ -101,7 +103,49 @@ async def test_the_form_of_a_new_visit_offers_squats(clinic: Clinic, session: st
 async def test_the_api_tells_the_squats(clinic: Clinic, session: str) -> None:
     async with clinic.client("admin") as client:
         found = (await client.get(f"/api/v1/sessions/{session}/report")).json()
-    assert found["squats"]["side"] == "left"
+    assert found["squats"]["sides"] == ["left"]
+    assert found["squats"]["used"] == {"left": 2}
     assert [r["excluded"] for r in found["squats"]["repetitions"]] == [None, "the foot moved", None]
     assert "squat_depth_deg" in {p["name"] for p in found["parameters"]}
     assert json.dumps(found["squats"])
+
+
+@pytest.fixture(scope="module")
+async def both(clinic: Clinic) -> str:
+    """A visit with squats of both legs in one take."""
+    squats = Squats(repetitions=2, other="lifted", hinged=True)
+    setup = RecordingSetup(rate_hz=50.0, noise=MEMS)
+    made = simulate_squats(squats, HEIGHT_M, 0, setup, place_as_agreed(HEIGHT_M, squats.sides))
+    async with clinic.client("admin") as client:
+        patient = (await client.post("/api/v1/patients", json={"code": "BOTH"})).json()["id"]
+        asked = {"title": "Squats", "protocol": "squat"}
+        session = (await client.post(f"/api/v1/patients/{patient}/sessions", json=asked)).json()["id"]
+    analysed.finish(clinic, patient, session, analysis_files(analyse(made.recording)))
+    return str(session)
+
+
+async def test_both_legs_are_side_by_side(clinic: Clinic, both: str) -> None:
+    html = await page(clinic, f"/sessions/{both}")
+    card = html[html.index('id="h-squats"') :]
+    card = card[: card.index("</section>")]
+    assert "Squats, both legs" in card
+    assert len(re.findall(r"<tr>\s*<td.*?</tr>", card, re.DOTALL)) == 4
+    assert card.count("chart cycle x-unit") == 6
+    assert "left mean of 2, right mean of 2 squats" in card
+    assert "no squats: 1 of the left knee and 1 of the right knee." in card
+    assert f'replay="/sessions/{both}/replay"' in html
+    told = json.loads(re.findall(r'id="replay-data">(.*?)</script>', html, re.DOTALL)[0])
+    assert [s["side"] for s in told["strides"]] == ["right", "right", "left", "left"]
+    assert set(told["curves"]["knee_flexion"]) == {"left", "right"}
+    paper = await page(clinic, f"/sessions/{both}/print")
+    assert "Squats, both legs" in paper
+    assert "no stride" not in paper
+
+
+async def test_the_sensitivity_is_a_tab_of_squats(clinic: Clinic, both: str) -> None:
+    html = await page(clinic, f"/sessions/{both}")
+    assert f'href="/sessions/{both}/sensitivity"' in html
+    assert "/algorithms" not in html
+    form = await page(clinic, f"/sessions/{both}/sensitivity")
+    assert "How sure are these angles?" in form
+    assert "Run on this take" in form

@@ -8,6 +8,7 @@ class Clock extends EventTarget {
   constructor(data) {
     super();
     this.duration = data.duration_s;
+    this.called = data.called ?? "stride"; // what the strides are: of squats each is one squat
     this.strides = data.strides; // {side, start_s, end_s, used}
     this.curves = data.curves; // variable → {left, right}: mean at 0…100 %, degrees
     this.stride = this.strides.find((s) => s.used) ?? this.strides[0] ?? null;

@@ -124,7 +124,7 @@ class TimeBar extends HTMLElement {
     this.range.style.setProperty("--at", clock.duration ? clock.t / clock.duration : 0);
     this.out.textContent = `${clock.t.toFixed(clock.duration < 100 ? 1 : 0)} s`;
     const p = clock.percent;
-    const where = p === null ? "" : `, ${Math.round(p)} percent of a ${clock.stride.side} stride`;
+    const where = p === null ? "" : `, ${Math.round(p)} percent of a ${clock.stride.side} ${clock.called}`;
     this.range.setAttribute("aria-valuetext", `${clock.t.toFixed(1)} seconds${where}`);
     if (this.button.dataset.on === String(clock.playing)) return;
     this.button.dataset.on = clock.playing;

@@ -1,0 +1,71 @@
+"""Which leg carries a person whose legs both carry sensors: the lower ankle stands on the floor.
+
+Only inclinations to gravity go in, so that neither a heading nor a turn of a sensor about the long axis of
+its segment matters (docs/science/squat.md, "Two legs").
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from core.calibration.result import CalibratedRecording
+from core.frames import SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from core.rest import index_window
+
+LIFTED_M: Final = 0.04
+"""An ankle so far above the other one, against standing, is off the floor (our choice: inclinations from
+smoothed accelerations leave 1 to 2 cm)."""
+
+SMOOTH_S: Final = 0.4
+"""Window of the mean that is taken twice over the direction of gravity (our choice)."""
+
+USUAL_HEIGHT_M: Final = 1.70
+THIGH_AND_SHANK: Final = 0.2455
+"""Mean length of thigh and shank as a share of body height (Winter 2009, figure 4.1)."""
+HIPS: Final = 0.1
+"""Distance of the hip centres as a share of body height: about 17 cm."""
+
+
+def find_standing_legs(calibrated: CalibratedRecording) -> dict[Side, Bools]:
+    """Side → (n,) True where the foot of that leg is taken to be on the floor.
+
+    Parameters
+    ----------
+    calibrated : with its standing, in which both feet are on the floor.
+
+    Returns
+    -------
+    Legs with sensors on shank and thigh; all True where only one has them, or the pelvis has none.
+    """
+    mounted = calibrated.calibration.segments
+    legs = [side for side in SIDES if SHANK[side] in mounted and THIGH[side] in mounted]
+    n = len(calibrated.recording.t_s)
+    if len(legs) < 2 or "pelvis" not in mounted:
+        return {side: np.ones(n, bool) for side in legs}
+    height = calibrated.recording.subject.height_m or USUAL_HEIGHT_M
+    # of the left ankle above the right one: legs reach down along y, the right hip lies along z
+    legs_down = {
+        side: sum(_measure_up(calibrated, s, 1) for s in (SHANK[side], THIGH[side])) for side in legs
+    }
+    above = THIGH_AND_SHANK * height * (legs_down["right"] - legs_down["left"])
+    above = above - HIPS * height * _measure_up(calibrated, "pelvis", 2)
+    standing = index_window(calibrated.calibration.zero, calibrated.recording.rate_hz)
+    above = above - above[standing].mean()
+    return {"left": above <= LIFTED_M, "right": above >= -LIFTED_M}
+
+
+def _measure_up(calibrated: CalibratedRecording, segment: Segment, axis: int) -> Floats:
+    """Vertical part (n,) of a segment's axis as smoothed gravity shows it; bridged where it is silent."""
+    from scipy.ndimage import uniform_filter1d
+
+    recording = calibrated.recording
+    signals, R = recording.sensors[segment], calibrated.calibration.segments[segment].R_segment_sensor
+    known = np.flatnonzero(signals.valid)
+    force = signals.acc[known] @ R.T
+    force = np.stack([np.interp(np.arange(len(signals.valid)), known, x) for x in force.T], axis=1)
+    width = max(1, round(SMOOTH_S * recording.rate_hz))
+    for _ in range(2):
+        force = uniform_filter1d(force, width, axis=0, mode="nearest")
+    return np.asarray(force[:, axis] / np.linalg.norm(force, axis=1))

@@ -1,0 +1,87 @@
+"""Sensitivity analyses of squats: asked for, listed, read."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from fastapi import APIRouter
+from pydantic import Field
+
+from server.api import schemas
+from server.api.documents import refusals
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Blobs, Db, Id, OpenTrail, Queue
+from server.http.json_body import StrictJsonRoute
+from server.jobs.queue import JobView
+from server.services import analyses, sensitivities
+
+router = APIRouter(route_class=StrictJsonRoute, tags=["sensitivities"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+
+
+class SensitivityNew(schemas.Request):
+    """What the angles are held against, and which zero they have."""
+
+    reference: Annotated[
+        str | None,
+        Field(max_length=500, description="name of an uploaded angles.parquet; null: the take's own angles"),
+    ] = None
+    from_standing: Annotated[
+        bool, Field(description="angles from standing, as the session shows them; false: anatomical")
+    ] = True
+
+
+@dataclass(frozen=True)
+class SensitivityResult:
+    """A finished sensitivity analysis with its tables (schema 1, angles in degrees)."""
+
+    about: sensitivities.StoredSensitivity
+    result: dict[str, Any]
+
+
+@router.post(
+    "/sessions/{session_id}/sensitivities",
+    status_code=202,
+    response_model=JobView,
+    responses=refusals(404, 409),
+)
+def start(
+    session_id: Id,
+    body: SensitivityNew,
+    db: Db,
+    queue: Queue,
+    who: Annotated[Identity, require(Action.ANALYSE)],
+) -> JobView:
+    """Put each of 24 measures of body and sensors off, one at a time, and see how far the angles move."""
+    with db.write() as c:
+        return sensitivities.submit(
+            c, queue, who, session_id, reference=body.reference, from_standing=body.from_standing
+        )
+
+
+@router.get("/sessions/{session_id}/sensitivities", response_model=list[sensitivities.StoredSensitivity])
+def list_sensitivities(
+    session_id: Id, db: Db, trail: OpenTrail, who: Reader
+) -> list[sensitivities.StoredSensitivity]:
+    """The finished sensitivity analyses of a session, the newest first."""
+    with db.read() as c:
+        found = sensitivities.of_session(c, session_id)
+    trail.record_watched(who, "sensitivities.opened", "session", session_id)
+    return found
+
+
+@router.get("/sensitivities/{sensitivity_id}", response_model=SensitivityResult)
+def read_sensitivity(
+    sensitivity_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
+) -> SensitivityResult:
+    """One with its tables; `id` is that of the job. The CSV is among the files of the analysis."""
+    with db.read() as c:
+        found = sensitivities.get(c, sensitivity_id)
+        analysis, name = sensitivities.find_file(c, found)
+    content = analyses.file_bytes(blobs, analysis, name)
+    trail.record_opened(who, "sensitivity.opened", "sensitivity", sensitivity_id)
+    return SensitivityResult(found, json.loads(content))

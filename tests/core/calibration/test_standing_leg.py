@@ -1,0 +1,62 @@
+"""Which leg carries: against the true height of the feet."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from core.calibration.fixed_offset import make_fixed_mounts
+from core.calibration.known_mounts import FIXED_OFFSET, calibrate_with_mounts
+from core.calibration.result import CalibratedRecording
+from core.calibration.standing_leg import find_standing_legs
+from core.frames import FOOT, SIDES, Segment
+from core.rotation import about, to_matrix
+from core.simulate import SquatSimulation, simulate_movement
+from core.timeline import synchronise
+
+
+@cache
+def recorded(name: str) -> tuple[SquatSimulation, CalibratedRecording]:
+    made = simulate_movement(name, 1)
+    assert isinstance(made, SquatSimulation)
+    mounts = make_fixed_mounts(*SIDES)
+    return made, calibrate_with_mounts(synchronise(made.recording), mounts, "fixed_offset", FIXED_OFFSET)
+
+
+def test_a_lifted_foot_does_not_stand() -> None:
+    made, calibrated = recorded("squats_both_legs")
+    stands = find_standing_legs(calibrated)
+    for side in SIDES:
+        height = made.truth.p[FOOT[side]][:, 2]
+        height = height[: len(stands[side])] - height[0]
+        assert stands[side][height < 0.01].all()
+        assert not stands[side][height > 0.09].any()
+    assert (stands["left"] | stands["right"]).all()
+
+
+def test_on_both_feet_both_stand() -> None:
+    assert all(s.all() for s in find_standing_legs(recorded("squats_together")[1]).values())
+
+
+@pytest.mark.parametrize(("segment", "axis", "deg"), [("shank_l", 1, 60.0), ("pelvis", 0, 12.0)])
+def test_a_sensor_turned_about_its_bone_or_tilted_on_the_back_changes_nothing(
+    segment: Segment, axis: int, deg: float
+) -> None:
+    _, calibrated = recorded("squats_both_legs")
+    segments = dict(calibrated.calibration.segments)
+    turned = to_matrix(about(axis, np.radians(deg))) @ segments[segment].R_segment_sensor
+    segments[segment] = replace(segments[segment], R_segment_sensor=turned)
+    off = replace(calibrated, calibration=replace(calibrated.calibration, segments=segments))
+    for side, stands in find_standing_legs(off).items():
+        assert np.mean(stands == find_standing_legs(calibrated)[side]) > 0.99
+
+
+def test_a_leg_alone_is_taken_to_stand() -> None:
+    _, calibrated = recorded("squats_both_legs")
+    segments = {s: x for s, x in calibrated.calibration.segments.items() if not s.endswith("_l")}
+    alone = replace(calibrated, calibration=replace(calibrated.calibration, segments=segments))
+    assert set(find_standing_legs(alone)) == {"right"}
+    assert find_standing_legs(alone)["right"].all()
