@@ -1,4 +1,4 @@
-"""A functional test while its samples come: when it may begin, that it has begun, that it is over, its figures
+"""A functional test while its samples come: when it may begin, begins and ends, and its figures
 (docs/science/timed-tests.md, "Guided on the live page").
 
 The figures are those of a file: the same functions measure the samples so far, at fixed samples of the axis.
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import ceil
 from typing import Any, Final
 
 import numpy as np
@@ -123,16 +122,19 @@ class GuidedTest:
             self._events += events
 
     def go(self) -> None:
-        """Let quiet standing begin as soon as the person stands still; the other tests begin by themselves."""
+        """Let quiet standing begin as soon as the person stands still; other tests begin by themselves."""
         self._asked = True
+        if self._phase == "get_ready" and self.protocol in STANDING_TESTS:
+            self._phase = "ready"
+            self.view = self._show()
 
     def repeat(self) -> None:
         """Drop the trial, and begin with the next sample that is pushed."""
         self._judged = self._kept.end - self._kept.end % self._tick
+        self._asked = self.protocol not in STANDING_TESTS
         self._begin_anew(self._kept.end, None)
         self._strides.clear()
         self._events.clear()
-        self._asked = self.protocol not in STANDING_TESTS
 
     def correct(self, limits: GivenLimits) -> None:
         """Measure the trial that is done from and to the times that a person says, s of the axis."""
@@ -220,7 +222,11 @@ class GuidedTest:
             return quiet >= p.still_s
         if self.protocol == "walk_6min":
             seconds = self._seconds()
-            return test.start_s is not None and seconds is not None and now >= test.start_s + seconds + p.settle_s
+            return (
+                test.start_s is not None
+                and seconds is not None
+                and now >= test.start_s + seconds + p.settle_s
+            )
         whole = all(x.mean is not None for x in test.parameters if x.name in _WHOLE[self.protocol])
         settled = test.end_s is not None and now >= test.end_s + p.settle_s
         return (whole and settled) or (bool(_rises(test)) and quiet >= LONGEST_S)
@@ -250,7 +256,8 @@ class GuidedTest:
 
     def _begin_anew(self, at: int, problem: str | None) -> None:
         """Wait again, with the samples from this one on."""
-        self._phase, self._looked, self._limits = "get_ready", None, GivenLimits()
+        asked = self._asked and self.protocol in STANDING_TESTS
+        self._phase, self._looked, self._limits = "ready" if asked else "get_ready", None, GivenLimits()
         if problem is not None or at >= self._kept.end:
             self._from = at
             self._kept.drop_before(at)
@@ -303,9 +310,7 @@ class GuidedTest:
         strides = tuple(
             Stride(s.side, s.start_s, s.foot_off_s, s.end_s, turn_rad=s.turn_rad, flags=s.flags) for s in rows
         )
-        turns = tuple(
-            Turn(s.start_s, s.end_s, s.turn_rad or 0.0, 0.0) for s in rows if "turn" in s.flags
-        )
+        turns = tuple(Turn(s.start_s, s.end_s, s.turn_rad or 0.0, 0.0) for s in rows if "turn" in s.flags)
         columns: Mapping[str, Any] = {LENGTH: tuple(s.values.get(LENGTH) for s in rows)}
         return MeasuredGait(steps, Strides(strides), (), columns, find_bouts(steps), turns)
 

@@ -18,6 +18,7 @@ from core.feedback import Baseline, Prescription
 from core.feedback.engine import COMMANDS, FeedbackEngine
 from core.formats.live_log import Hello, LogRecord, SampleBatch, decode_batch, parse_hello, scan, scan_records
 from core.frames import SIDES, Protocol, Side
+from core.functional_tests.result import GuidedTestView
 from core.online import OnlineSession
 from core.online.frame import AngleTrail, LiveFrame
 from core.parameters.live_stride import LiveStride
@@ -80,6 +81,7 @@ class Follower:
         self._delays = _Delays()
         self._late = False
         self._last: LiveFrame | None = None
+        self._guided: GuidedTestView | None = None
         self._trail: deque[AngleTrail] = deque(maxlen=PICTURE_TRAILS)
         self._sent_at = self._slow_at = -1.0
         self._slow: Mapping[str, Any] = {}
@@ -134,7 +136,7 @@ class Follower:
         frame = self._last
         if now >= self._slow_at + SLOW_S or frame.stage != self._slow_stage:
             self._slow, self._slow_at, self._slow_stage = (
-                wire.slow_part(frame, self._battery),
+                wire.slow_part(frame, self._battery, self._guided),
                 now,
                 frame.stage,
             )
@@ -172,6 +174,7 @@ class Follower:
                 # once a second that takes milliseconds: the cue is out by now
                 for notice in self._online.compare_sensors():
                     self._item("notice", notice.t_s, wire.notice(notice))
+                self._guided = self._online.guide_test()
             self._obey()
         elif record.kind == "F":
             self._say(LogProcessed(self.take))
@@ -183,6 +186,8 @@ class Follower:
             if command.name == "redo_calibration":
                 self._online.command("redo_calibration")
                 self._stage = "waiting"
+            elif command.name == "test":
+                self._online.command("test", command.value)
             elif command.name in COMMANDS and self._engine is not None:
                 self._engine.command(command.name, command.value)
                 self._tell_standing()

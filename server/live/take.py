@@ -26,7 +26,7 @@ from server.live.sensors import sensor_rows
 from server.services.live import LiveEvent, LiveTakeRecord, is_own_notice
 from server.services.live_training import LiveTraining
 
-STEERING: Final = frozenset({"feedback", "level", "pause", "stale", "redo_calibration"})
+STEERING: Final = frozenset({"feedback", "level", "pause", "stale", "redo_calibration", "test"})
 """Commands that change what the estimator says; each holds from a batch on."""
 TOLD: Final = frozenset({"cue", "calibration", "guard", "notice"})
 """Kinds of items that become events."""
