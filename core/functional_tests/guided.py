@@ -202,7 +202,9 @@ class GuidedTest:
         if at - self._moved > longest * rate:
             self._begin_anew(at, "trial_too_long")
             return "trial_too_long"
-        if not self._is_look(at):
+        if self.protocol in WALK_TESTS:  # its strides tell; of the samples only who rests is asked
+            self._kept.drop_before(at - round(p.kept_s * rate))
+        if not self._is_look(at) or self._is_early(at):
             return None
         self._look(at)
         test = self._looked
@@ -230,6 +232,13 @@ class GuidedTest:
         whole = all(x.mean is not None for x in test.parameters if x.name in _WHOLE[self.protocol])
         settled = test.end_s is not None and now >= test.end_s + p.settle_s
         return (whole and settled) or (bool(_rises(test)) and quiet >= LONGEST_S)
+
+    def _is_early(self, at: int) -> bool:
+        """Whether the minutes of a walk that has begun are not over: nothing to measure yet."""
+        seconds, test = self._seconds(), self._looked
+        if seconds is None or test is None or test.start_s is None:
+            return False
+        return at / self._rate < test.start_s + seconds + self.params.settle_s
 
     def _stand(self, at: int) -> str | None:
         """Quiet standing: long enough, or broken off."""

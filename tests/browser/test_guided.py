@@ -95,6 +95,12 @@ def test_a_guided_up_and_go_is_timed_corrected_kept_and_analysed(
         expect(card).to_contain_text("confirmed or set by hand")
         total = float(card.locator(".kpi .v").first.evaluate("e => e.firstChild.textContent"))
         assert total == pytest.approx(true_s + 0.5, abs=0.15)
+
+        # on the session page the same correction is made again, by its form
+        card.get_by_text("Correct start and end").click()
+        card.get_by_label("Test begins at, seconds").fill(f"{start - 1.0:.2f}")
+        card.get_by_role("button", name="Measure again").click()
+        expect(card.locator(".kpi .v").first).to_contain_text(f"{total + 0.5:.1f}", timeout=90_000)
         with running.client() as client:
             events = client.get(f"/api/v1/sessions/{session}/live/events").json()
         said = [e["content"]["value"] for e in events if e["kind"] == "test"]

@@ -241,7 +241,7 @@ def strides_of_a_walk(start_s: float, end_s: float) -> tuple[list[LiveStride], l
     for side, lag in zip(SIDES, (0.0, 0.55), strict=True):
         t = start_s + lag
         while t + 1.1 <= end_s:
-            events.append(GaitEvent(side, "ic", t))
+            events.append(GaitEvent(t, side, "ic", "foot_contact", t + 0.2))
             strides.append(
                 LiveStride(
                     len(strides), side, t, t + 0.7, t + 1.1, t + 1.6, {"stride_length_m": 1.3}, {}, {}, 0.0,
@@ -249,7 +249,7 @@ def strides_of_a_walk(start_s: float, end_s: float) -> tuple[list[LiveStride], l
                 )
             )  # fmt: skip
             t += 1.1
-        events.append(GaitEvent(side, "ic", t))
+        events.append(GaitEvent(t, side, "ic", "foot_contact", t + 0.2))
     return strides, events
 
 
@@ -267,9 +267,9 @@ def test_a_walk_ends_by_itself(protocol: Protocol, seconds: float, name: str, ex
     guided = GuidedTest(protocol, ("foot_l", "foot_r"), RATE)
     phases = []
     for block, rests in blocks(take, 10):
-        now = block.t_s[-1]
-        new = [s for s in strides if block.t_s[0] <= s.detected_s < now + 0.01]
-        guided.push(block, rests, new, [e for e in events if block.t_s[0] <= e.time_s < now + 0.01])
+        here = range(block.first, block.first + len(block))
+        new = [x for x in strides if round(x.detected_s * RATE) in here]
+        guided.push(block, rests, new, [x for x in events if round(x.detected_s * RATE) in here])
         view = guided.advance()
         if not phases or phases[-1] != view.phase:
             phases.append(view.phase)

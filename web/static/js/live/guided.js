@@ -20,6 +20,12 @@ class LiveTest extends HTMLElement {
     this.show(null, 0);
   }
 
+  // No estimate yet, or none at all: nobody looks whether the person moves.
+  wait(preparing) {
+    setState(this.at("phase"), "none", preparing ? "Please wait" : "Not followed");
+    say(this.at("say"), preparing ? "Please wait and keep still. The live estimate is not ready yet." : "The test is recorded and measured afterwards. Press STOP at its end.");
+  }
+
   // found: the test of a frame; t: its time. Frames come more often than what is judged, so the clock runs on.
   show(found, t) {
     const phase = found?.phase ?? "get_ready";
@@ -27,10 +33,10 @@ class LiveTest extends HTMLElement {
     this.now = { t, at: performance.now() };
     this.dataset.phase = phase;
     setState(this.at("phase"), ...PHASES[phase]);
-    say(this.at("say"), phase === "done" ? "Done. The test is over." : this.test.says[phase]);
+    say(this.at("say"), phase === "done" ? "The test is over." : this.test.says[phase]);
     this.at("problem").hidden = !found?.problem;
     say(this.at("problem"), found?.problem ?? "");
-    this.at("hint").hidden = phase === "done";
+    this.at("hint").hidden = this.at("clock-line").hidden = phase === "done";
     this.at("result").hidden = phase !== "done";
     this.querySelector("[data-do=test-go]").hidden = !(this.test.go && phase === "get_ready");
     this.at("anew").hidden = phase !== "running";

@@ -63,7 +63,9 @@ class LivePage extends HTMLElement {
     on("stride", (stride) => { this.chart.stride(stride); this.strip.changed(); });
     on("cue", () => this.strip.changed());
     on("feedback", (state) => { this.feedback.show(state); this.top.paused(state); this.strip.state(state, this.feedback.next(state)); });
-    on("notice", (notice) => this.notes.notice(notice));
+    on("notice", (notice) => {
+      if (!this.test || notice.code !== "no_live_figure") this.notes.notice(notice); // a test shows no figure
+    });
     on("fresh", () => this.cover());
     on("line", (line) => { this.notes.line(line); this.figure.line(line); });
   }
@@ -111,6 +113,7 @@ class LivePage extends HTMLElement {
   recorded(state) {
     const sensors = inOrder(state.sensors ?? []);
     this.sensors.show(sensors, data.segments);
+    if (this.test) return this.test.wait(state.estimate === "preparing");
     this.calibration.show(state.estimate === "preparing" ? "preparing" : "unknown", null, sensors, data.segments);
   }
 
