@@ -35,6 +35,7 @@ from server.live.messages import (
     Picture,
     Report,
 )
+from server.report.guided_words import tell_person
 
 CHUNK_BYTES: Final = 1 << 14
 """Read and estimated in one turn, half a second of seven sensors: who catches up lets others through."""
@@ -142,9 +143,10 @@ class Follower:
             )
         body = wire.frame(frame, self._trail, self._slow, self._phase.at(frame.t_s))
         delay = None if self._late else self._delays.now(now)
-        self._say(
-            Picture(self.take, frame.t_s, frame.seq, frame.stage, body, delay, self._read, wire.pose(frame))
-        )
+        guided = self._guided
+        say = None if guided is None else tell_person(guided.protocol, guided.phase)
+        pose, seen = wire.pose(frame), self._read
+        self._say(Picture(self.take, frame.t_s, frame.seq, frame.stage, body, delay, seen, pose, say))
         self._last = None
         self._trail.clear()
         self._sent_at = now

@@ -21,6 +21,7 @@ from core.parameters.live_stride import LiveStride
 from core.parameters.result import Parameter
 from server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
 from server.report.functional import segment_label
+from server.report.guided_words import tell_person
 from server.report.wording import reason_words, speak_places
 
 LOST_WARN, LOST_BAD = 0.01, 0.20
@@ -90,6 +91,7 @@ def guided_test(view: GuidedTestView) -> dict[str, Any]:
     result = view.result
     return {
         "phase": view.phase,
+        "say": tell_person(view.protocol, view.phase),
         "t": _number(view.t_s, 2),
         "start_s": _number(view.start_s, 3),
         "end_s": _number(view.end_s, 3),

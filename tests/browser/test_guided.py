@@ -39,11 +39,11 @@ def _held(x: ImuStream) -> ImuStream:
     index = np.concatenate((np.arange(n), np.resize(np.arange(n - 50, n), more)))
     t_s = x.t_s[0] + np.arange(n + more) / x.rate_hz
     mag = None if x.mag is None else x.mag[index]
-    return replace(x, t_s=t_s, acc=x.acc[index], gyr=x.gyr[index], mag=mag)
+    return replace(x, t_s=t_s, acc=x.acc[index], gyr=None if x.gyr is None else x.gyr[index], mag=mag)
 
 
 @contextmanager
-def testing(running: RunningServer) -> Iterator[str]:
+def somebody_who_does_it(running: RunningServer) -> Iterator[str]:
     """The session of somebody who does the test from now on."""
     made = up_and_go()
     with running.client() as client:
@@ -51,7 +51,9 @@ def testing(running: RunningServer) -> Iterator[str]:
         patient = filling.add(client, "/patients", **who)
         session = filling.add_session(client, patient["id"], "Up and go", protocol="tug")
         code = filling.add(client, f"/sessions/{session}/live")["code"]
-        stream = threading.Thread(target=lambda: asyncio.run(demo_live.stream_walk(running.url, code, made)))
+        stream = threading.Thread(
+            target=lambda: asyncio.run(demo_live.stream_walk(running.url, code, made.recording))
+        )
         stream.start()
         try:
             yield session
@@ -66,7 +68,7 @@ def test_a_guided_up_and_go_is_timed_corrected_kept_and_analysed(
     opened: Opener, running: RunningServer
 ) -> None:
     true_s = up_and_go().truth.duration_s
-    with testing(running) as session:
+    with somebody_who_does_it(running) as session:
         page = opened(f"/sessions/{session}/live")
         test = page.locator("live-test")
         expect(page.locator("live-page")).to_have_attribute("data-view", "test", timeout=60_000)

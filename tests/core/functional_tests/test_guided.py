@@ -237,7 +237,8 @@ def test_a_step_begins_quiet_standing_anew() -> None:
 
 def strides_of_a_walk(start_s: float, end_s: float) -> tuple[list[LiveStride], list[GaitEvent]]:
     """Strides of 1.3 m and 1.1 s of both feet, told half a second late."""
-    strides, events = [], []
+    strides: list[LiveStride] = []
+    events: list[GaitEvent] = []
     for side, lag in zip(SIDES, (0.0, 0.55), strict=True):
         t = start_s + lag
         while t + 1.1 <= end_s:
@@ -265,7 +266,7 @@ def test_a_walk_ends_by_itself(protocol: Protocol, seconds: float, name: str, ex
     take = moving(take, 500, 500 + round(seconds * RATE), 2.0)
     strides, events = strides_of_a_walk(5.5, 5.0 + seconds)
     guided = GuidedTest(protocol, ("foot_l", "foot_r"), RATE)
-    phases = []
+    phases: list[str] = []
     for block, rests in blocks(take, 10):
         here = range(block.first, block.first + len(block))
         new = [x for x in strides if round(x.detected_s * RATE) in here]

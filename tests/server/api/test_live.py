@@ -177,7 +177,8 @@ async def test_commands_are_checked_kept_and_shown(clinic: Clinic, port: int) ->
         await heard(ws, "welcome")
         wrong: tuple[tuple[str, Any], ...] = (
             ("feedback", "yes"), ("pause", None), ("level", True), ("level", "1"), ("mark", 3),
-            ("start", True), ("jump", None), ("redo_calibration", 1),
+            ("start", True), ("jump", None), ("redo_calibration", 1), ("test", None), ("test", "stop"),
+            ("test", {"start_s": 5.0, "end_s": 4.0}), ("test", {"start_s": 5.0}),
         )  # fmt: skip
         for name, value in wrong:
             answer = await v.http.post(f"{v.api}/commands", json={"command": name, "value": value})

@@ -33,7 +33,7 @@ class LiveTest extends HTMLElement {
     this.now = { t, at: performance.now() };
     this.dataset.phase = phase;
     setState(this.at("phase"), ...PHASES[phase]);
-    say(this.at("say"), phase === "done" ? "The test is over." : this.test.says[phase]);
+    say(this.at("say"), found?.say ?? this.test.say);
     this.at("problem").hidden = !found?.problem;
     say(this.at("problem"), found?.problem ?? "");
     this.at("hint").hidden = this.at("clock-line").hidden = phase === "done";
