@@ -45,15 +45,13 @@ def _held(x: ImuStream) -> ImuStream:
 @contextmanager
 def somebody_who_does_it(running: RunningServer) -> Iterator[str]:
     """The session of somebody who does the test from now on."""
-    made = up_and_go()
+    take = up_and_go().recording
     with running.client() as client:
         who = {"code": f"TUG-{uuid4().hex[:4]}", "sex": "female", "birth_year": 1958, "height_m": 1.65}
         patient = filling.add(client, "/patients", **who)
         session = filling.add_session(client, patient["id"], "Up and go", protocol="tug")
         code = filling.add(client, f"/sessions/{session}/live")["code"]
-        stream = threading.Thread(
-            target=lambda: asyncio.run(demo_live.stream_walk(running.url, code, made.recording))
-        )
+        stream = threading.Thread(target=lambda: asyncio.run(demo_live.stream_walk(running.url, code, take)))
         stream.start()
         try:
             yield session
