@@ -17,7 +17,7 @@ from core.errors import EstimationError
 from core.events.bouts import find_bouts
 from core.events.result import GaitEvent, GaitEvents, Stride, Strides
 from core.events.turns import Turn, TurnParams
-from core.frames import FOOT, Bools, Floats, Protocol, Segment
+from core.frames import FOOT, Floats, Protocol, Segment
 from core.functional_tests.chair import LONGEST_S, measure_chair_rises
 from core.functional_tests.params import FunctionalTestParams
 from core.functional_tests.result import FunctionalTest, GuidedTestView, TestPhase, shift_test
@@ -29,7 +29,7 @@ from core.functional_tests.walks import LENGTH, measure_six_minutes, measure_ten
 from core.measure import MeasuredGait
 from core.parameters.live_stride import LiveStride
 from core.recording import GivenLimits, SensorSignals, Subject, UniformRecording
-from core.rest import find_rest_windows
+from core.rest import RestParams, find_rest_windows, measure_quietness
 from core.timeline.live import UniformBlock
 
 CHAIR_TESTS: Final = ("tug", "five_sit_to_stand")
@@ -37,6 +37,9 @@ STANDING_TESTS: Final = ("standing_eyes_open", "standing_eyes_closed")
 WALK_TESTS: Final = ("walk_10m", "walk_6min")
 GUIDED: Final[tuple[str, ...]] = (*CHAIR_TESTS, *WALK_TESTS, *STANDING_TESTS)
 """Protocols that the live page guides."""
+
+REST: Final = RestParams()
+"""Being quiet is the rest of a file."""
 
 
 @dataclass(frozen=True)
@@ -111,12 +114,11 @@ class GuidedTest:
     def push(
         self,
         block: UniformBlock,
-        rests: Bools,
         strides: Sequence[LiveStride] = (),
         events: Sequence[GaitEvent] = (),
     ) -> None:
-        """Keep the next samples; rests (T, columns) says which sensor is at rest."""
-        self._kept.append(block, rests, self._columns)
+        """Keep the next samples, and what the live chain says of them."""
+        self._kept.append(block, self._columns)
         if self.protocol in WALK_TESTS:
             self._strides += strides
             self._events += events
@@ -178,14 +180,12 @@ class GuidedTest:
                 self._start(at)
                 return None
             return problem
-        needed = round((p.standing_s if self.protocol in WALK_TESTS else p.quiet_s) * rate)
-        rests = self._kept.rests(self._from, at)
-        if self._phase == "ready":
-            moving = np.flatnonzero(~rests[-self._tick :])
-            if len(moving):
-                self._start(at - min(self._tick, len(rests)) + int(moving[0]))
-                return None
-        elif len(rests) >= needed and rests[-needed:].all():
+        needed = p.standing_s if self.protocol in WALK_TESTS else p.quiet_s
+        quiet = self._quiet_s(self._from, at, needed)
+        if self._phase == "ready" and quiet == 0.0:
+            self._start(at - self._tick)
+            return None
+        if quiet >= needed:
             self._phase = "ready"
         return problem
 
@@ -202,13 +202,13 @@ class GuidedTest:
         if at - self._moved > longest * rate:
             self._begin_anew(at, "trial_too_long")
             return "trial_too_long"
-        if self.protocol in WALK_TESTS:  # its strides tell; of the samples only who rests is asked
-            self._kept.drop_before(at - round(p.kept_s * rate))
+        if self.protocol in WALK_TESTS:  # its strides tell; the samples only say who is quiet
+            self._kept.drop_before(at - round((LONGEST_S + REST.window_s) * rate))
         if not self._is_look(at) or self._is_early(at):
             return None
         self._look(at)
         test = self._looked
-        quiet = self._quiet_s(at)
+        quiet = self._quiet_s(self._moved, at, LONGEST_S)
         if test is None or test.start_s is None:
             if quiet >= p.still_s:
                 self._begin_anew(self._moved, None)
@@ -329,11 +329,14 @@ class GuidedTest:
         t_s = np.arange(at - low) / self._rate
         return UniformRecording(t_s, self._rate, sensors, self._subject, self.protocol, {})
 
-    def _quiet_s(self, at: int) -> float:
-        """How long all watched sensors have been at rest, s."""
-        rests = self._kept.rests(self._moved, at)
-        moving = np.flatnonzero(~rests)
-        return (len(rests) if not len(moving) else len(rests) - 1 - int(moving[-1])) / self._rate
+    def _quiet_s(self, low: int, at: int, most_s: float) -> float:
+        """How long all watched sensors have been quiet (core/rest.py), s; looked for over so long."""
+        low = max(low, at - round((most_s + REST.window_s) * self._rate), self._kept.first)
+        quiet = np.ones(at - low, np.bool_)
+        for sensor in self._kept.cut(low, at, self._watched).values():
+            quiet &= measure_quietness(sensor, self._rate, REST).quiet
+        moving = np.flatnonzero(~quiet)
+        return (len(quiet) if not len(moving) else len(quiet) - 1 - int(moving[-1])) / self._rate
 
     def _is_look(self, at: int) -> bool:
         return (at // self._tick) % self._ticks_a_look == 0
@@ -383,9 +386,9 @@ class _KeptSamples:
         self.first = self.end = 0
         self._size = 0
         self._signals = np.zeros((1 << 10, columns, 6))
-        self._flags = np.zeros((1 << 10, columns, 3), np.bool_)
+        self._flags = np.zeros((1 << 10, columns, 2), np.bool_)
 
-    def append(self, block: UniformBlock, rests: Bools, columns: np.ndarray[Any, Any]) -> None:
+    def append(self, block: UniformBlock, columns: np.ndarray[Any, Any]) -> None:
         """Take the next samples of the axis."""
         n = len(block)
         if self._size + n > len(self._signals):
@@ -395,17 +398,12 @@ class _KeptSamples:
         self._signals[k, :, 3:] = block.gyr[:, columns]
         self._flags[k, :, 0] = block.valid[:, columns]
         self._flags[k, :, 1] = block.interpolated[:, columns]
-        self._flags[k, :, 2] = rests[:, columns]
         self._size += n
         self.end = block.first + n
 
     def drop_before(self, at: int) -> None:
         """Forget what is before a sample of the axis."""
         self.first = max(self.first, min(at, self.end))
-
-    def rests(self, low: int, at: int) -> Bools:
-        """(n,) all columns are at rest."""
-        return np.asarray(self._flags[self._span(low, at), :, 2].all(axis=1))
 
     def cut(self, low: int, at: int, segments: Sequence[Segment]) -> dict[Segment, SensorSignals]:
         """Copies of what the sensors measured."""

@@ -100,7 +100,7 @@ class OnlineSession:
         if block is None:
             return None
         block, stuck = self._stuck.push(block)
-        resting = self._still.push(block.acc, block.gyr, block.valid)[:, :, 1]
+        rests = self._still.push(block.acc, block.gyr, block.valid)[-1, :, 1]
         notices = [*self._axis.drain_notices(), *stuck]
         outcomes: list[ChainOutput] = []
         start = 0
@@ -116,13 +116,13 @@ class OnlineSession:
             outcomes.append(self.chain.push(block.acc[start:], block.gyr[start:], block.valid[start:]))
         if self._guided is not None:
             strides = [s for x in outcomes for s in x.strides]
-            self._guided.push(block, resting, strides, [e for x in outcomes for e in x.events])
+            self._guided.push(block, strides, [e for x in outcomes for e in x.events])
         frame = LiveFrame(
             t_s=float(block.t_s[-1]),
             seq=batch.seq,
             stage=self._calibrating.stage,
             health=self._health.read_health(
-                [s for s, x in zip(self.segments, resting[-1], strict=True) if x],
+                [s for s, x in zip(self.segments, rests, strict=True) if x],
                 self._stuck.now,
                 self._agreement.doubts,
             ),

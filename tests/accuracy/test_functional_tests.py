@@ -9,6 +9,7 @@ import pytest
 
 from core.events.turns import find_turns
 from core.frames import Segment
+from core.functional_tests.guided import GuidedTest
 from core.functional_tests.rising import find_changes
 from core.functional_tests.sway import SwayParams, measure_sway
 from core.functional_tests.trunk import follow_trunk
@@ -21,6 +22,7 @@ from core.timeline import synchronise
 from tests.accuracy.mobgap import turns_of, uniform
 from tests.accuracy.report import record
 from tests.accuracy.test_events_trunk_qmt import take
+from tests.core.functional_tests.test_guided import blocks, followed
 from tests.ipol import ipol_recording
 from tests.kept import keep
 from tests.walks import neura_walk
@@ -141,3 +143,53 @@ def test_real_standing_is_measured_or_withheld() -> None:
 
 def _largest(values: np.ndarray) -> float:
     return float(values[np.argmax(np.abs(values))])
+
+
+def test_guided_tests_give_the_figures_of_the_file() -> None:
+    """Twelve people live, in blocks of a tenth of a second, against the file of the whole take."""
+    names = ("tug_duration_s", *(f"tug_{part}_s" for part in PARTS))
+    apart: dict[str, list[float]] = {name: [] for name in names}
+    late = []
+    for patient in PATIENTS:
+        made = simulate_tug(patient, SEEDS[0], setup=replace(ON_SKIN, worn=("pelvis",)))
+        whole = synchronise(made.recording)
+        file = measure_tug(follow_trunk(whole))
+        *_, shown, last = followed(whole, "tug")
+        assert last.final, patient
+        assert last.result is not None
+        assert file.end_s is not None
+        late.append(shown.t_s - file.end_s)
+        got, want = ({p.name: p.mean for p in x.parameters} for x in (last.result, file))
+        for name in names:
+            live, offline = got[name], want[name]
+            assert live is not None, (patient, name)
+            assert offline is not None, (patient, name)
+            apart[name].append(live - offline)
+    rows = [(name, f"{_largest(np.array(x)):+.3f}") for name, x in apart.items()]
+    record(
+        "Guided timed up and go",
+        ("figure", "largest difference"),
+        rows,
+        "Live − file of the whole take, s, twelve virtual people, pelvis. The result was shown "
+        f"{min(late):.1f} to {max(late):.1f} s after the end.",
+    )
+    assert max(abs(x) for values in apart.values() for x in values) <= 0.02
+
+
+@pytest.mark.parametrize(("place", "segment"), [("upper_back", "chest"), ("lower_back", "chest")])
+def test_a_real_rise_starts_the_clock_and_sitting_down_does_not(place: str, segment: Segment) -> None:
+    """qmt_fullbody, guided: quiet, down, quiet, up. The clock of the rise is that of the file."""
+    real = take(((segment, place),))
+    *_, rise = find_changes(follow_trunk(real))
+    guided = GuidedTest("five_sit_to_stand", (segment,), real.rate_hz)
+    phases: list[str] = []
+    rises: set[int | None] = set()
+    for block in blocks(real, 10):
+        guided.push(block)
+        view = guided.advance()
+        rises.add(view.rises)
+        if phases[-1:] != [view.phase]:
+            phases.append(view.phase)
+    assert phases == ["get_ready", "ready", "running", "get_ready", "ready", "running"]
+    assert rises == {None, 0, 1}
+    assert guided.view.start_s == pytest.approx(rise.start_s, abs=0.1)

@@ -30,9 +30,9 @@ def test_a_push_only_keeps_samples_and_a_look_takes_milliseconds() -> None:
     for _ in range(3):
         guided = GuidedTest("tug", ("pelvis",), take.rate_hz)
         spent, seconds = [], []
-        for i, (block, rests) in enumerate(pieces):
+        for i, block in enumerate(pieces):
             began = time.process_time()
-            guided.push(block, rests)
+            guided.push(block)
             middle = time.process_time()
             guided.advance()
             spent.append(middle - began)

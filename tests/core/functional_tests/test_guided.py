@@ -9,9 +9,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.live_still import StillnessDetector
 from core.events.result import GaitEvent
-from core.frames import GRAVITY, SIDES, Bools, Protocol, Segment
+from core.frames import GRAVITY, SIDES, Protocol, Segment
 from core.functional_tests.chair import measure_chair_rises
 from core.functional_tests.guided import GuidedTest
 from core.functional_tests.result import FunctionalTest, GuidedTestView
@@ -29,22 +28,20 @@ REFINED_S = 0.02
 """What is shown live may differ by so much from the file of the whole take."""
 
 
-def blocks(take: UniformRecording, size: int) -> Iterator[tuple[UniformBlock, Bools]]:
-    """A take in blocks of one size, with what rests in them."""
+def blocks(take: UniformRecording, size: int) -> Iterator[UniformBlock]:
+    """A take in blocks of one size."""
     sensors = list(take.sensors.values())
     acc, gyr, valid = (np.stack([getattr(x, k) for x in sensors], axis=1) for k in ("acc", "gyr", "valid"))
-    still = StillnessDetector(len(sensors), take.rate_hz)
     for i in range(0, len(acc), size):
         k = slice(i, i + size)
-        block = UniformBlock(i, take.t_s[k], acc[k], gyr[k], valid[k], ~valid[k])
-        yield block, still.push(block.acc, block.gyr, block.valid)[:, :, 1]
+        yield UniformBlock(i, take.t_s[k], acc[k], gyr[k], valid[k], ~valid[k])
 
 
 def told(test: GuidedTest, take: UniformRecording, size: int) -> list[GuidedTestView]:
     """Every view that differs in phase from the one before."""
     views = [test.view]
-    for block, rests in blocks(take, size):
-        test.push(block, rests)
+    for block in blocks(take, size):
+        test.push(block)
         view = test.advance()
         if (view.phase, view.final, view.problem) != (views[-1].phase, views[-1].final, views[-1].problem):
             views.append(view)
@@ -103,8 +100,8 @@ def test_five_rises_are_counted_and_end_seated() -> None:
     take = pelvis_rises()
     guided = GuidedTest("five_sit_to_stand", ("pelvis",), take.rate_hz)
     counted = []
-    for block, rests in blocks(take, 10):
-        guided.push(block, rests)
+    for block in blocks(take, 10):
+        guided.push(block)
         view = guided.advance()
         if view.phase == "running" and view.rises not in counted:
             counted.append(view.rises)
@@ -150,8 +147,8 @@ def test_a_repetition_drops_what_was() -> None:
     guided.repeat()
     assert (guided.view.phase, guided.view.result, guided.view.start_s) == ("get_ready", None, None)
     n = len(take.t_s)
-    for block, rests in blocks(take, 10):
-        guided.push(replace(block, first=block.first + n), rests)
+    for block in blocks(take, 10):
+        guided.push(replace(block, first=block.first + n))
         guided.advance()
     again = guided.view
     assert again.final
@@ -206,11 +203,11 @@ def test_quiet_standing_waits_for_go_and_lasts_thirty_seconds() -> None:
     take = still(50.0)
     guided = GuidedTest("standing_eyes_open", ("pelvis",), RATE)
     phases: list[tuple[str, float]] = []
-    for block, rests in blocks(take, 10):
+    for block in blocks(take, 10):
         if block.first == 500:
             assert guided.view.phase == "get_ready"
             guided.go()
-        guided.push(block, rests)
+        guided.push(block)
         view = guided.advance()
         if not phases or phases[-1][0] != view.phase:
             phases.append((view.phase, view.t_s))
@@ -267,10 +264,10 @@ def test_a_walk_ends_by_itself(protocol: Protocol, seconds: float, name: str, ex
     strides, events = strides_of_a_walk(5.5, 5.0 + seconds)
     guided = GuidedTest(protocol, ("foot_l", "foot_r"), RATE)
     phases: list[str] = []
-    for block, rests in blocks(take, 10):
+    for block in blocks(take, 10):
         here = range(block.first, block.first + len(block))
         new = [x for x in strides if round(x.detected_s * RATE) in here]
-        guided.push(block, rests, new, [x for x in events if round(x.detected_s * RATE) in here])
+        guided.push(block, new, [x for x in events if round(x.detected_s * RATE) in here])
         view = guided.advance()
         if not phases or phases[-1] != view.phase:
             phases.append(view.phase)
