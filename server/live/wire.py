@@ -80,13 +80,13 @@ def slow_part(
     """What of a frame is for reading and need not be made anew for every one: calibration, sensors, test."""
     health = [_health(row, battery.get(row.id)) for row in shown.health]
     return {
-        "test": msgspec.Raw(encode(None if guided is None else guided_test(guided))),
+        "test": msgspec.Raw(encode(None if guided is None else tell_test(guided))),
         "calibration": msgspec.Raw(encode(_calibration(shown.calibration))),
         "health": msgspec.Raw(encode(health)),
     }
 
 
-def guided_test(view: GuidedTestView) -> dict[str, Any]:
+def tell_test(view: GuidedTestView) -> dict[str, Any]:
     """Where a functional test stands; its figures are those of the catalogue, in its units."""
     result = view.result
     return {

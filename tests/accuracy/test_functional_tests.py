@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.body.tree import PRESETS
 from core.events.turns import find_turns
 from core.frames import Segment
 from core.functional_tests.guided import GuidedTest
@@ -14,7 +15,9 @@ from core.functional_tests.rising import find_changes
 from core.functional_tests.sway import SwayParams, measure_sway
 from core.functional_tests.trunk import follow_trunk
 from core.functional_tests.tug import measure_tug
+from core.online import OnlineSession
 from core.pipeline import analyse
+from core.simulate import Stand, Straight, simulate
 from core.simulate.patients import PATIENTS
 from core.simulate.scripts import ON_SKIN
 from core.simulate.tug import simulate_tug
@@ -25,6 +28,7 @@ from tests.accuracy.test_events_trunk_qmt import take
 from tests.core.functional_tests.test_guided import blocks, followed
 from tests.ipol import ipol_recording
 from tests.kept import keep
+from tests.live_walks import batches, hello_of
 from tests.walks import neura_walk
 
 pytestmark = pytest.mark.accuracy
@@ -174,6 +178,38 @@ def test_guided_tests_give_the_figures_of_the_file() -> None:
         f"{min(late):.1f} to {max(late):.1f} s after the end.",
     )
     assert max(abs(x) for values in apart.values() for x in values) <= 0.02
+
+
+def test_guided_ten_metres_against_the_file() -> None:
+    """A simulated walk of 16 m calibrates the live chain and is the test at once."""
+    person, rows, worst = PATIENTS["healthy"], [], 0.0
+    script = (Stand(6.0), Straight(16.0, person.step_m, person.step_s), Stand(8.0))
+    for name in ("lower_body7", "feet_pelvis3"):
+        setup = replace(ON_SKIN, worn=PRESETS[name])
+        recording = replace(simulate(script, person.walker, 1, setup).recording, protocol="walk_10m")
+        whole = synchronise(recording)
+        online = OnlineSession(hello_of(whole), whole.subject, "walk_10m")
+        for batch in batches(whole, 10):
+            online.push(batch)
+            view = online.guide_test()
+        assert view is not None
+        assert view.final
+        assert view.result is not None
+        file = analyse(recording).functional
+        assert file is not None
+        live, offline = (x.parameters[0].mean for x in (view.result, file))
+        assert live is not None
+        assert offline is not None
+        apart = 100.0 * (live / offline - 1.0)
+        worst = max(worst, abs(apart))
+        rows.append((name, f"{live:.2f}", f"{offline:.2f}", f"{apart:+.1f}"))
+    record(
+        "Guided ten metres",
+        ("sensors", "live m/s", "file m/s", "difference %"),
+        rows,
+        "One virtual person. Live, the strides are those of the live chain, calibrated on this walk.",
+    )
+    assert worst <= 2.0
 
 
 @pytest.mark.parametrize(("place", "segment"), [("upper_back", "chest"), ("lower_back", "chest")])
