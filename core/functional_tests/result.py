@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot
+from typing import Literal
 
 from core.errors import Notice
-from core.frames import Segment
+from core.frames import Protocol, Segment
 from core.parameters.catalogue import CATALOGUE, unit_of
 from core.parameters.result import Parameter
 from core.parameters.variability import NORMAL_95
@@ -75,3 +76,42 @@ def _state(name: str, value: float | None, reason: str | None) -> Parameter:
         u_own=None if errors is None else hypot(errors.own, errors.random),
         u_common=None if errors is None else errors.common,
     )
+
+
+TestPhase = Literal["get_ready", "ready", "running", "done"]
+"""get_ready: until the person is quiet; ready: until the person moves; running: the clock runs; done: it
+has stopped."""
+
+
+@dataclass(frozen=True, eq=False)
+class GuidedTestView:
+    """Where a guided test stands after the samples so far (core/functional_tests/guided.py).
+
+    Parameters
+    ----------
+    t_s : of the last sample that was judged. start_s, end_s : of the trial, as far as known.
+    rises : from the chair, so far. seconds : how long the test lasts, None where the person ends it.
+    result : at the end. final : later samples do not change it. problem : why there is none, or why it began
+        anew: a code.
+    """
+
+    protocol: Protocol
+    phase: TestPhase
+    t_s: float
+    start_s: float | None = None
+    end_s: float | None = None
+    rises: int | None = None
+    seconds: float | None = None
+    result: FunctionalTest | None = None
+    final: bool = False
+    problem: str | None = None
+
+
+def shift_test(test: FunctionalTest, by_s: float) -> FunctionalTest:
+    """The same test on an axis that begins so much earlier, s."""
+
+    def later(t_s: float | None) -> float | None:
+        return None if t_s is None else t_s + by_s
+
+    segments = tuple(TimedSegment(s.name, s.start_s + by_s, s.end_s + by_s) for s in test.segments)
+    return replace(test, start_s=later(test.start_s), end_s=later(test.end_s), segments=segments)

@@ -2,7 +2,8 @@
 
 Timed up and go: Bohannon 2006, J Geriatr Phys Ther 29:64, doi:10.1519/00139143-200608000-00004, mean and
 upper end of its 95 % confidence interval. Five times sit to stand: Bohannon 2006, Percept Mot Skills 103:215,
-doi:10.2466/pms.103.1.215-222, the time beyond which a person is worse than average (13 papers).
+doi:10.2466/pms.103.1.215-222, the time beyond which a person is worse than average (13 papers). Comfortable
+speed: Bohannon and Andrews 2011, Physiotherapy 97:182, doi:10.1016/j.physio.2010.12.004, means of 41 papers.
 """
 
 from __future__ import annotations
@@ -50,3 +51,28 @@ def find_test_norm(name: str, age: float | None) -> TimedTestNorm | None:
     if age is None:
         return None
     return next((n for n in TEST_NORMS.get(name, ()) if n.ages[0] <= age < n.ages[1] + 1), None)
+
+
+@dataclass(frozen=True)
+class ComfortableSpeedNorm:
+    """Mean speed in m/s of healthy people of one sex who walk as they like, with the ages it holds for."""
+
+    ages: tuple[int, int]
+    mean_mps: float
+
+
+COMFORTABLE_SPEED_SOURCE: Final = "Bohannon and Andrews 2011, Physiotherapy 97:182"
+
+_DECADES: Final = ((20, 29), (30, 39), (40, 49), (50, 59), (60, 69), (70, 79), (80, 99))
+
+COMFORTABLE_SPEEDS: Final[dict[str, tuple[float, ...]]] = {
+    "male": (1.36, 1.43, 1.43, 1.43, 1.34, 1.26, 0.97),
+    "female": (1.34, 1.34, 1.39, 1.31, 1.24, 1.13, 0.94),
+}
+"""Sex → means by the ages of `_DECADES`."""
+
+
+def find_comfortable_speed(age: float, sex: str) -> ComfortableSpeedNorm | None:
+    """The reference of the ten-metre walk at an age; None where there is none."""
+    rows = zip(_DECADES, COMFORTABLE_SPEEDS.get(sex, ()), strict=False)
+    return next((ComfortableSpeedNorm(a, v) for a, v in rows if a[0] <= age < a[1] + 1), None)

@@ -17,6 +17,8 @@ from core.calibration.result import CalibratedRecording, Calibration, SegmentCal
 from core.errors import Notice, SagittalError
 from core.formats.live_log import Hello, SampleBatch
 from core.frames import GRAVITY, R_NEUTRAL, Protocol, Segment
+from core.functional_tests.guided import GUIDED, GuidedTest
+from core.functional_tests.result import GuidedTestView
 from core.fusion.orientations import Orientations
 from core.online.calibrated import LiveCalibration, compile_calibration_kernels
 from core.online.calibrating import CalibratingParams, LiveCalibrator
@@ -26,7 +28,7 @@ from core.online.health import SensorHealthMonitor
 from core.parameters.spatial import Surface
 from core.quality.live_stuck import StuckSensors
 from core.quality.stuck import compile_stuck_kernel
-from core.recording import SensorSignals, Subject, UniformRecording, check_belt
+from core.recording import GivenLimits, SensorSignals, Subject, UniformRecording, check_belt
 from core.rotation import from_matrix
 from core.timeline.live import LiveAxis, LiveAxisParams, UniformBlock, compile_axis_kernels
 
@@ -79,6 +81,9 @@ class OnlineSession:
         self._stuck = StuckSensors(self._axis.segments, self._axis.rate_hz)
         self._agreement = LiveAgreement(self._axis.segments, self._axis.rate_hz, self.params.agreement)
         self.chain: LiveChain | None = None
+        self._guided: GuidedTest | None = None
+        if protocol in GUIDED:
+            self._guided = GuidedTest(protocol, self._axis.segments, self._axis.rate_hz, subject)
 
     @property
     def segments(self) -> tuple[Segment, ...]:
@@ -109,6 +114,9 @@ class OnlineSession:
         self._agreement.push(block, self._calibrating.drain_standings())
         if self.chain is not None and start < len(block):
             outcomes.append(self.chain.push(block.acc[start:], block.gyr[start:], block.valid[start:]))
+        if self._guided is not None:
+            strides = [s for x in outcomes for s in x.strides]
+            self._guided.push(block, strides, [e for x in outcomes for e in x.events])
         frame = LiveFrame(
             t_s=float(block.t_s[-1]),
             seq=batch.seq,
@@ -127,12 +135,29 @@ class OnlineSession:
         """What the sensors say about each other of the seconds that the last push completed; takes ms."""
         return self._agreement.compare()
 
-    def command(self, name: str) -> None:
-        """Do what the therapist asks for, from the next sample on: "redo_calibration"; nothing else."""
+    def guide_test(self) -> GuidedTestView | None:
+        """Where the functional test of the take stands; None of other takes. Takes ms once a second."""
+        return None if self._guided is None else self._guided.advance()
+
+    def command(self, name: str, value: object = None) -> None:
+        """Do what the therapist asks for, from the next sample on; commands that are not known do nothing.
+
+        Parameters
+        ----------
+        name : "redo_calibration" or "test". value : of a test, "go", "repeat" or start_s and end_s.
+        """
         if name == "redo_calibration":
             self.chain = None
             self._calibrating.redo()
             self._agreement.forget()
+        elif name == "test" and self._guided is not None:
+            self._guided.advance()
+            if value == "go":
+                self._guided.go()
+            elif value == "repeat":
+                self._guided.repeat()
+            elif isinstance(value, Mapping):
+                self._guided.correct(GivenLimits(value["start_s"], value["end_s"]))
 
     def _begin(self, found: LiveCalibration, notices: list[Notice]) -> list[ChainOutput]:
         """Start the chain and catch up; a calibration that no chain can run on is begun anew."""

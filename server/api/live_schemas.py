@@ -102,12 +102,23 @@ class PairedTablet:
 
 
 class LiveCommand(Request):
-    """A command; feedback and pause take true or false, level steps (+ easier), mark and ghost a text."""
+    """A command; feedback and pause take true or false, level steps (+ easier), mark and ghost a text.
+
+    test takes "go", "repeat", or when the functional test began and ended."""
 
     command: Literal[
-        "start", "stop", "mark", "undo_mark", "feedback", "level", "pause", "redo_calibration", "ghost"
+        "start",
+        "stop",
+        "mark",
+        "undo_mark",
+        "feedback",
+        "level",
+        "pause",
+        "redo_calibration",
+        "ghost",
+        "test",
     ]
-    value: bool | int | Annotated[str, StringConstraints(max_length=200)] | None = None
+    value: bool | int | Annotated[str, StringConstraints(max_length=200)] | dict[str, float] | None = None
     t_s: float | None = Field(
         None, ge=0, description="of a mark: the moment meant, in the time of the frames; null: the newest"
     )

@@ -24,6 +24,7 @@ from server.storage.db import Database
 from server.storage.tables import now
 
 if TYPE_CHECKING:
+    from core.recording import Recording
     from core.simulate import Simulation
 
 TITLE: Final = "Gait training with feedback, live"
@@ -60,8 +61,8 @@ def open_take(settings: Settings) -> str:
         return live.open_take(c, None, session.id)[1]
 
 
-async def stream_walk(address: str, code: str, made: Simulation, speed: float = 1.0) -> None:
-    """Stream the walk until its end or until the therapist stops it."""
+async def stream_walk(address: str, code: str, recording: Recording, speed: float = 1.0) -> None:
+    """Stream a take until its end or until the therapist stops it."""
     pairing = pair(address, code)
     stopped = asyncio.Event()
 
@@ -69,8 +70,8 @@ async def stream_walk(address: str, code: str, made: Simulation, speed: float = 
         if message.get("type") == "command" and message.get("command") == "stop":
             stopped.set()
 
-    frames = _until(stopped, cut(made.recording, PER_BATCH), speed)
-    await stream(pairing.socket, pairing.token, hello_of(made.recording, pairing.take), frames, hear=hear)
+    frames = _until(stopped, cut(recording, PER_BATCH), speed)
+    await stream(pairing.socket, pairing.token, hello_of(recording, pairing.take), frames, hear=hear)
 
 
 async def _until(stopped: asyncio.Event, batches: Sequence[DueBatch], speed: float) -> AsyncIterator[bytes]:
@@ -81,4 +82,4 @@ async def _until(stopped: asyncio.Event, batches: Sequence[DueBatch], speed: flo
 
 
 if __name__ == "__main__":
-    asyncio.run(stream_walk(sys.argv[1], open_take(load_settings()), plan_training()))
+    asyncio.run(stream_walk(sys.argv[1], open_take(load_settings()), plan_training().recording))

@@ -18,6 +18,7 @@ from core.feedback import Baseline, Prescription
 from core.feedback.engine import COMMANDS, FeedbackEngine
 from core.formats.live_log import Hello, LogRecord, SampleBatch, decode_batch, parse_hello, scan, scan_records
 from core.frames import SIDES, Protocol, Side
+from core.functional_tests.result import GuidedTestView
 from core.online import OnlineSession
 from core.online.frame import AngleTrail, LiveFrame
 from core.parameters.live_stride import LiveStride
@@ -34,6 +35,7 @@ from server.live.messages import (
     Picture,
     Report,
 )
+from server.report.guided_words import tell_person
 
 CHUNK_BYTES: Final = 1 << 14
 """Read and estimated in one turn, half a second of seven sensors: who catches up lets others through."""
@@ -80,6 +82,7 @@ class Follower:
         self._delays = _Delays()
         self._late = False
         self._last: LiveFrame | None = None
+        self._guided: GuidedTestView | None = None
         self._trail: deque[AngleTrail] = deque(maxlen=PICTURE_TRAILS)
         self._sent_at = self._slow_at = -1.0
         self._slow: Mapping[str, Any] = {}
@@ -134,15 +137,16 @@ class Follower:
         frame = self._last
         if now >= self._slow_at + SLOW_S or frame.stage != self._slow_stage:
             self._slow, self._slow_at, self._slow_stage = (
-                wire.slow_part(frame, self._battery),
+                wire.slow_part(frame, self._battery, self._guided),
                 now,
                 frame.stage,
             )
         body = wire.frame(frame, self._trail, self._slow, self._phase.at(frame.t_s))
         delay = None if self._late else self._delays.now(now)
-        self._say(
-            Picture(self.take, frame.t_s, frame.seq, frame.stage, body, delay, self._read, wire.pose(frame))
-        )
+        guided = self._guided
+        say = None if guided is None else tell_person(guided.protocol, guided.phase)
+        pose, seen = wire.pose(frame), self._read
+        self._say(Picture(self.take, frame.t_s, frame.seq, frame.stage, body, delay, seen, pose, say))
         self._last = None
         self._trail.clear()
         self._sent_at = now
@@ -172,6 +176,7 @@ class Follower:
                 # once a second that takes milliseconds: the cue is out by now
                 for notice in self._online.compare_sensors():
                     self._item("notice", notice.t_s, wire.notice(notice))
+                self._guided = self._online.guide_test()
             self._obey()
         elif record.kind == "F":
             self._say(LogProcessed(self.take))
@@ -183,6 +188,8 @@ class Follower:
             if command.name == "redo_calibration":
                 self._online.command("redo_calibration")
                 self._stage = "waiting"
+            elif command.name == "test":
+                self._online.command("test", command.value)
             elif command.name in COMMANDS and self._engine is not None:
                 self._engine.command(command.name, command.value)
                 self._tell_standing()

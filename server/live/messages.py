@@ -87,6 +87,7 @@ class Picture(msgspec.Struct, frozen=True, tag=True):
     ----------
     t_s, seq, stage : as `LiveFrame`. body : JSON object for the browsers, without its closing brace.
     delay_s : from when its last sample was due to when this was said. size : bytes of the log it has seen.
+    say : what the person of a guided test does now.
     """
 
     take: str
@@ -97,6 +98,7 @@ class Picture(msgspec.Struct, frozen=True, tag=True):
     delay_s: float | None
     size: int
     pose: FigurePose | None
+    say: str | None = None
 
 
 class FeedItem(msgspec.Struct, frozen=True, tag=True):

@@ -155,9 +155,14 @@ def command(name: Literal["start", "stop"]) -> str:
     return _text("command", command=name)
 
 
-def state(stage: str) -> str:
-    """Where the estimation stands (waiting, stand, walk, running), for the tablet's instructions."""
-    return _text("state", stage=stage)
+def state(stage: str, say: str | None = None) -> str:
+    """Where the estimation stands (waiting, stand, walk, running), for the tablet's instructions.
+
+    Parameters
+    ----------
+    say : what the person of a guided test does now; it goes before the stage.
+    """
+    return _text("state", stage=stage) if say is None else _text("state", stage=stage, say=say)
 
 
 def announce_finish(recording: str, problem: str | None = None) -> str:

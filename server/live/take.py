@@ -26,7 +26,7 @@ from server.live.sensors import sensor_rows
 from server.services.live import LiveEvent, LiveTakeRecord, is_own_notice
 from server.services.live_training import LiveTraining
 
-STEERING: Final = frozenset({"feedback", "level", "pause", "stale", "redo_calibration"})
+STEERING: Final = frozenset({"feedback", "level", "pause", "stale", "redo_calibration", "test"})
 """Commands that change what the estimator says; each holds from a batch on."""
 TOLD: Final = frozenset({"cue", "calibration", "guard", "notice"})
 """Kinds of items that become events."""
@@ -138,6 +138,7 @@ class ActiveTake:
         self.estimate = "preparing"
         self.t_s: float | None = None
         self.stage: str | None = None
+        self.say: str | None = None
         self._house = house
         self._seen: Counter[str] = Counter()
         self.steered = TakeSteering()
@@ -223,8 +224,8 @@ class ActiveTake:
     def show(self, picture: Picture) -> None:
         """Pass a picture on."""
         self.t_s = picture.t_s
-        if picture.stage != self.stage:
-            self.stage = picture.stage
+        if (picture.stage, picture.say) != (self.stage, self.say):
+            self.stage, self.say = picture.stage, picture.say
             self.tell_stage()
         stale = picture.delay_s is None or picture.delay_s > STALE_S
         delay = b"null" if picture.delay_s is None else b"%d" % round(1000.0 * picture.delay_s)
@@ -237,7 +238,7 @@ class ActiveTake:
     def tell_stage(self) -> None:
         """Tell the tablet where the estimation stands."""
         if self.tablet is not None and self.stage is not None:
-            self.tablet.say(protocol.state(self.stage))
+            self.tablet.say(protocol.state(self.stage, self.say))
 
     def tell(self, item: FeedItem) -> None:
         """Pass on what happens once; what a new process says again is known already."""

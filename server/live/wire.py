@@ -15,10 +15,14 @@ import numpy as np
 from core.errors import Notice
 from core.feedback import Cue, FeedbackState
 from core.frames import SIDES, SUFFIX, Floats, Side
+from core.functional_tests.result import GuidedTestView, TimedSegment
 from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SensorHealth
 from core.parameters.live_stride import LiveStride
+from core.parameters.result import Parameter
 from server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
-from server.report.wording import speak_places
+from server.report.functional import segment_label
+from server.report.guided_words import tell_person
+from server.report.wording import reason_words, speak_places
 
 LOST_WARN, LOST_BAD = 0.01, 0.20
 """Shares of lost samples, as the report judges a whole take (core/quality/assessment.py)."""
@@ -31,6 +35,12 @@ DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
     "clocks_disagree": ("warn", "clock in doubt"),
 }
 """What the other sensors say of one (core/agreement/live.py) → its state and words."""
+TEST_PROBLEMS: Final[Mapping[str, str]] = {
+    "segments_missing": "This test needs a sensor that is not worn: pelvis or chest, or for a walk the feet.",
+    "stepped": "The person moved. Stand still again; the time begins anew.",
+    "trial_too_long": "No end was found in three minutes. Begin again.",
+}
+"""Why a guided test began anew, or cannot begin (core/functional_tests/guided.py)."""
 CURVE_POINTS: Final = 51
 """Every second of the 101 points of a cycle: a chart on a tablet shows no more."""
 
@@ -64,12 +74,51 @@ def frame(
     return encode(body)[:-1]
 
 
-def slow_part(shown: LiveFrame, battery: Mapping[str, float]) -> dict[str, Any]:
-    """What of a frame is for reading and need not be made anew for every one: calibration and sensors."""
+def slow_part(
+    shown: LiveFrame, battery: Mapping[str, float], guided: GuidedTestView | None = None
+) -> dict[str, Any]:
+    """What of a frame is for reading and need not be made anew for every one: calibration, sensors, test."""
     health = [_health(row, battery.get(row.id)) for row in shown.health]
     return {
+        "test": msgspec.Raw(encode(None if guided is None else tell_test(guided))),
         "calibration": msgspec.Raw(encode(_calibration(shown.calibration))),
         "health": msgspec.Raw(encode(health)),
+    }
+
+
+def tell_test(view: GuidedTestView) -> dict[str, Any]:
+    """Where a functional test stands; its figures are those of the catalogue, in its units."""
+    result = view.result
+    return {
+        "phase": view.phase,
+        "say": tell_person(view.protocol, view.phase),
+        "t": _number(view.t_s, 2),
+        "start_s": _number(view.start_s, 3),
+        "end_s": _number(view.end_s, 3),
+        "rises": view.rises,
+        "seconds": view.seconds,
+        "final": view.final,
+        "problem": None if view.problem is None else TEST_PROBLEMS[view.problem],
+        "corrected": result is not None and result.corrected,
+        "figures": [] if result is None else [_figure(p) for p in result.parameters],
+        "segments": [] if result is None else [_segment(s) for s in result.segments],
+    }
+
+
+def _figure(p: Parameter) -> dict[str, Any]:
+    return {
+        "name": p.name,
+        "value": _number(p.mean, 4),
+        "plus_minus": _number(p.uncertainty, 4),
+        "reason": None if p.mean is not None else reason_words(p.reason),
+    }
+
+
+def _segment(part: TimedSegment) -> dict[str, Any]:
+    return {
+        "label": segment_label(part.name),
+        "start_s": _number(part.start_s, 3),
+        "duration_s": _number(part.duration_s, 3),
     }
 
 

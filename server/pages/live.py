@@ -15,6 +15,7 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id
+from server.pages.guided_test import view_guided_test
 from server.pages.shell import record_opening, render_page
 from server.pages.words import PROTOCOL_NAMES, SEGMENT_NAMES
 from server.report.wording import VARIABLES, ZERO_WORDS, Variable
@@ -82,6 +83,7 @@ def view_live(c: Connection, session: Session, patient: Patient, *, capture: str
             "terms": list_terms(),
             "choices": UNPRESCRIBED,
             "prescription": _prescribed(c, patient.id),
+            "test": view_guided_test(session, patient),
         },
     }
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from core.norms.functional import TEST_NORMS, find_test_norm
+from core.norms.functional import COMFORTABLE_SPEED_SOURCE, TEST_NORMS, find_comfortable_speed, find_test_norm
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.result import Parameter
 from server.report.bundle import Bundle
@@ -49,7 +49,9 @@ TEST_NORM_NOTE: Final = "The norm of a test, where there is one, stands below it
 """Below the table of a test's parameters."""
 
 NO_NORM: Final = "No norm: none whose source gives figures for this test."
+NO_WEIGHT: Final = "No norm: the reference equations need the body weight, which is not kept."
 NO_AGE: Final = "No norm: enter the year of birth."
+NO_SEX: Final = "No norm: enter the sex."
 OTHER_AGE: Final = "No norm for this age."
 
 
@@ -121,7 +123,9 @@ class FunctionalView:
         return replace(self, previous=format_number(value, parameter_term(self.name).digits))
 
 
-def functional_view(bundle: Bundle, age: float | None = None) -> FunctionalView | None:
+def functional_view(
+    bundle: Bundle, age: float | None = None, sex: str | None = None
+) -> FunctionalView | None:
     """The functional test of a finished analysis; None of any other take."""
     if bundle.functional is None:
         return None
@@ -138,7 +142,7 @@ def functional_view(bundle: Bundle, age: float | None = None) -> FunctionalView 
         unit=term.unit,
         plus_minus=sure,
         reason=reason_words(total.reason) if total.mean is None else None,
-        norm=_norm_words(total.name, age),
+        norm=norm_words(total.name, age, sex),
         meant=MEANT[total.name],
         segments=tuple(_segment(row) for row in test["segments"]),
         start_s=test["start_s"],
@@ -150,13 +154,22 @@ def functional_view(bundle: Bundle, age: float | None = None) -> FunctionalView 
 
 def _segment(row: Mapping[str, Any]) -> SegmentRow:
     name, start, end = str(row["name"]), float(row["start_s"]), float(row["end_s"])
-    label = SEGMENTS.get(name, name.replace("_", " ").capitalize())
-    return SegmentRow(label, format_number(start, 1), format_number(end - start, 1), end - start)
+    return SegmentRow(
+        segment_label(name), format_number(start, 1), format_number(end - start, 1), end - start
+    )
 
 
-def _norm_words(name: str, age: float | None) -> str:
+def segment_label(name: str) -> str:
+    """Words of a segment."""
+    return SEGMENTS.get(name, name.replace("_", " ").capitalize())
+
+
+def norm_words(name: str, age: float | None, sex: str | None = None) -> str:
+    """What healthy people reach in a test, with the source; else why no norm is shown."""
+    if name == "walk_10m_speed_mps":
+        return _speed_words(age, sex)
     if name not in TEST_NORMS:
-        return NO_NORM
+        return NO_WEIGHT if name == "walk_6min_distance_m" else NO_NORM
     norm = find_test_norm(name, age)
     if norm is None:
         return NO_AGE if age is None else OTHER_AGE
@@ -164,3 +177,14 @@ def _norm_words(name: str, age: float | None) -> str:
     people = f"{norm.ages[0]} to {norm.ages[1]} years"
     mean = "" if norm.mean_s is None else f"mean {format_number(norm.mean_s, 1)} s, "
     return f"Healthy people of {people}: {mean}slower than average above {limit} s ({norm.source})."
+
+
+def _speed_words(age: float | None, sex: str | None) -> str:
+    if age is None or sex is None:
+        return NO_AGE if age is None else NO_SEX
+    norm = find_comfortable_speed(age, sex)
+    if norm is None:
+        return OTHER_AGE
+    people = f"{'Men' if sex == 'male' else 'Women'} of {norm.ages[0]} to {norm.ages[1]} years"
+    mean = format_number(norm.mean_mps, 2)
+    return f"{people} walk at {mean} m/s on average, at their own pace ({COMFORTABLE_SPEED_SOURCE})."

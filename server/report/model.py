@@ -307,7 +307,7 @@ def report_model(
         provenance=bundle.provenance,
         estimator=estimator_view(bundle.estimator),
         squats=squat_view(bundle),
-        functional=functional_view(bundle, age),
+        functional=functional_view(bundle, age, sex),
         limits=limits_view(flags) if flags else None,
         headline=None
         if bundle.repetitions is not None or bundle.activity is not None or by_trunk

@@ -19,6 +19,8 @@ from typing import Any
 
 from sqlalchemy import Connection, insert, select, update
 
+from core.errors import ParameterError
+from core.recording import GivenLimits
 from server import audit
 from server.auth.tokens import new_token, token_hash
 from server.services import devices, sessions
@@ -44,7 +46,9 @@ TOKEN_LIFE = dt.timedelta(hours=12)
 DAMAGED = "live_log_damaged"
 """Code of the notice that a part of a take's log could not be read back."""
 
-COMMANDS = ("start", "stop", "mark", "undo_mark", "feedback", "level", "pause", "redo_calibration", "ghost")
+COMMANDS = (
+    "start", "stop", "mark", "undo_mark", "feedback", "level", "pause", "redo_calibration", "ghost", "test",
+)  # fmt: skip
 """What a therapist may do in a running take; each is kept as an event."""
 
 
@@ -201,10 +205,30 @@ def check_value(name: str, value: object) -> None:
     elif name in ("mark", "ghost"):
         ok = value is None or (isinstance(value, str) and len(value) <= 200)
         expected = "a short text or nothing"
+    elif name == "test":
+        ok, expected = value in ("go", "repeat") or _are_limits(value), "go, repeat, or start_s and end_s"
     else:
         ok, expected = value is None, "nothing"
     if not ok:
         raise ServiceError("bad_value", f"The value of the command {name} is not {expected}.")
+
+
+def _are_limits(value: object) -> bool:
+    """Whether these are a start and an end of a functional test."""
+    if not isinstance(value, Mapping) or set(value) != {"start_s", "end_s"}:
+        return False
+    try:
+        limits = GivenLimits(value["start_s"], value["end_s"])
+    except (ParameterError, TypeError):
+        return False
+    return limits.start_s is not None and limits.end_s is not None
+
+
+def read_test_limits(c: Connection, take_id: str) -> dict[str, float] | None:
+    """What was said last of when the functional test of a take began and ended; a repetition drops it."""
+    said = [e.content["value"] for e in events(c, take_id) if e.kind == "test"]
+    last = said[-1] if said else None
+    return dict(last) if isinstance(last, Mapping) else None
 
 
 def note_start(c: Connection, take_id: str, source: str) -> LiveTakeRecord:

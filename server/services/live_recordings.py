@@ -162,7 +162,10 @@ def _publish(
         return take
     blobs.require(take.patient_id, blob.sha256)
     recording_id, at = new_id(), now()
-    manifest = analyses.complete_manifest(c, take.session_id, {"sensors": _sensors(hello)})
+    said: dict[str, Any] = {"sensors": _sensors(hello)}
+    if (limits := live.read_test_limits(c, take_id)) is not None:
+        said["test_limits"] = limits
+    manifest = analyses.complete_manifest(c, take.session_id, said)
     # alone in its set: files that were uploaded to this session before are another take
     c.execute(
         insert(recording).values(

@@ -62,6 +62,7 @@ LIVE_EVENT_KINDS = (
     "pause",
     "redo_calibration",
     "ghost",
+    "test",
     "prescription",
     "stale",
     "calibration",

@@ -31,7 +31,9 @@ def test_a_training_with_feedback_ends_in_a_report_of_what_was_told(tmp_path: Pa
         _made(client, f"/patients/{patient}/prescriptions", dict(content))
         session = _made(client, f"/patients/{patient}/sessions", {"title": "Training"})["id"]
         code = _made(client, f"/sessions/{session}/live", {})["code"]
-        asyncio.run(stream_walk(str(client.base_url).rstrip("/"), code, plan_training(laps=3), SPEED))
+        asyncio.run(
+            stream_walk(str(client.base_url).rstrip("/"), code, plan_training(laps=3).recording, SPEED)
+        )
         found = _result(client, session)
         page = client.get(f"/sessions/{session}").raise_for_status().text
     rows = {r["kind"]: r for r in found["rows"]}

@@ -7,13 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.body.tree import PRESETS
 from core.events.turns import find_turns
 from core.frames import Segment
+from core.functional_tests.guided import GuidedTest
 from core.functional_tests.rising import find_changes
 from core.functional_tests.sway import SwayParams, measure_sway
 from core.functional_tests.trunk import follow_trunk
 from core.functional_tests.tug import measure_tug
+from core.online import OnlineSession
 from core.pipeline import analyse
+from core.simulate import Stand, Straight, simulate
 from core.simulate.patients import PATIENTS
 from core.simulate.scripts import ON_SKIN
 from core.simulate.tug import simulate_tug
@@ -21,8 +25,10 @@ from core.timeline import synchronise
 from tests.accuracy.mobgap import turns_of, uniform
 from tests.accuracy.report import record
 from tests.accuracy.test_events_trunk_qmt import take
+from tests.core.functional_tests.test_guided import blocks, followed
 from tests.ipol import ipol_recording
 from tests.kept import keep
+from tests.live_walks import batches, hello_of
 from tests.walks import neura_walk
 
 pytestmark = pytest.mark.accuracy
@@ -141,3 +147,85 @@ def test_real_standing_is_measured_or_withheld() -> None:
 
 def _largest(values: np.ndarray) -> float:
     return float(values[np.argmax(np.abs(values))])
+
+
+def test_guided_tests_give_the_figures_of_the_file() -> None:
+    """Twelve people live, in blocks of a tenth of a second, against the file of the whole take."""
+    names = ("tug_duration_s", *(f"tug_{part}_s" for part in PARTS))
+    apart: dict[str, list[float]] = {name: [] for name in names}
+    late = []
+    for patient in PATIENTS:
+        made = simulate_tug(patient, SEEDS[0], setup=replace(ON_SKIN, worn=("pelvis",)))
+        whole = synchronise(made.recording)
+        file = measure_tug(follow_trunk(whole))
+        *_, shown, last = followed(whole, "tug")
+        assert last.final, patient
+        assert last.result is not None
+        assert file.end_s is not None
+        late.append(shown.t_s - file.end_s)
+        got, want = ({p.name: p.mean for p in x.parameters} for x in (last.result, file))
+        for name in names:
+            live, offline = got[name], want[name]
+            assert live is not None, (patient, name)
+            assert offline is not None, (patient, name)
+            apart[name].append(live - offline)
+    rows = [(name, f"{_largest(np.array(x)):+.3f}") for name, x in apart.items()]
+    record(
+        "Guided timed up and go",
+        ("figure", "largest difference"),
+        rows,
+        "Live − file of the whole take, s, twelve virtual people, pelvis. The result was shown "
+        f"{min(late):.1f} to {max(late):.1f} s after the end.",
+    )
+    assert max(abs(x) for values in apart.values() for x in values) <= 0.02
+
+
+def test_guided_ten_metres_against_the_file() -> None:
+    """A simulated walk of 16 m calibrates the live chain and is the test at once."""
+    person, rows, worst = PATIENTS["healthy"], [], 0.0
+    script = (Stand(6.0), Straight(16.0, person.step_m, person.step_s), Stand(8.0))
+    for name in ("lower_body7", "feet_pelvis3"):
+        setup = replace(ON_SKIN, worn=PRESETS[name])
+        recording = replace(simulate(script, person.walker, 1, setup).recording, protocol="walk_10m")
+        whole = synchronise(recording)
+        online = OnlineSession(hello_of(whole), whole.subject, "walk_10m")
+        for batch in batches(whole, 10):
+            online.push(batch)
+            view = online.guide_test()
+        assert view is not None
+        assert view.final
+        assert view.result is not None
+        file = analyse(recording).functional
+        assert file is not None
+        live, offline = (x.parameters[0].mean for x in (view.result, file))
+        assert live is not None
+        assert offline is not None
+        apart = 100.0 * (live / offline - 1.0)
+        worst = max(worst, abs(apart))
+        rows.append((name, f"{live:.2f}", f"{offline:.2f}", f"{apart:+.1f}"))
+    record(
+        "Guided ten metres",
+        ("sensors", "live m/s", "file m/s", "difference %"),
+        rows,
+        "One virtual person. Live, the strides are those of the live chain, calibrated on this walk.",
+    )
+    assert worst <= 2.0
+
+
+@pytest.mark.parametrize(("place", "segment"), [("upper_back", "chest"), ("lower_back", "chest")])
+def test_a_real_rise_starts_the_clock_and_sitting_down_does_not(place: str, segment: Segment) -> None:
+    """qmt_fullbody, guided: quiet, down, quiet, up. The clock of the rise is that of the file."""
+    real = take(((segment, place),))
+    *_, rise = find_changes(follow_trunk(real))
+    guided = GuidedTest("five_sit_to_stand", (segment,), real.rate_hz)
+    phases: list[str] = []
+    rises: set[int | None] = set()
+    for block in blocks(real, 10):
+        guided.push(block)
+        view = guided.advance()
+        rises.add(view.rises)
+        if phases[-1:] != [view.phase]:
+            phases.append(view.phase)
+    assert phases == ["get_ready", "ready", "running", "get_ready", "ready", "running"]
+    assert rises == {None, 0, 1}
+    assert guided.view.start_s == pytest.approx(rise.start_s, abs=0.1)

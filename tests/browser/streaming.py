@@ -46,7 +46,8 @@ def walking(running: RunningServer, prescription: Mapping[str, Any] = LONGER) ->
         filling.add(client, f"/patients/{patient['id']}/prescriptions", **prescription)
         session = filling.add_session(client, patient["id"], "Training 10, week 5")
         code = filling.add(client, f"/sessions/{session}/live")["code"]
-        stream = threading.Thread(target=lambda: asyncio.run(demo_live.stream_walk(running.url, code, made)))
+        walk = made.recording
+        stream = threading.Thread(target=lambda: asyncio.run(demo_live.stream_walk(running.url, code, walk)))
         stream.start()
         try:
             yield session

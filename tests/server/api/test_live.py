@@ -16,7 +16,7 @@ from sqlalchemy.exc import IntegrityError
 from server.auth.throttle import MAX_PER_PAIR, Throttle
 from server.services import patients, sessions
 from server.services.live import ALPHABET
-from server.storage.tables import live_event, live_take, now, prescription
+from server.storage.tables import live_event, live_take, now, prescription, recording
 from tests.live_clinic import closed, heard, new_session, open_code, visit
 from tests.live_takes import finish_text, frame
 from tests.server.clinic import Clinic, open_clinic
@@ -172,12 +172,34 @@ async def test_a_page_that_is_open_before_the_take_sees_every_state(clinic: Clin
             assert over["recording"] == made["recording_id"] is not None
 
 
+@pytest.mark.parametrize("repeated", [False, True])
+async def test_start_and_end_of_a_test_become_the_recordings_unless_it_is_repeated(
+    clinic: Clinic, port: int, repeated: bool
+) -> None:
+    limits = {"start_s": 1.5, "end_s": 12.25}
+    async with visit(clinic, port) as v:
+        async with v.tablet() as ws:
+            await heard(ws, "welcome")
+            await ws.send(frame(0))
+            await heard(ws, "ack")
+            await v.command("test", "go")
+            await v.command("test", {"start_s": 1.0, "end_s": 9.0})
+            await v.command("test", limits)
+            if repeated:
+                await v.command("test", "repeat")
+        made = (await v.http.post(f"{v.api}/close")).json()
+        with clinic.db.read() as c:
+            row = c.execute(select(recording.c.manifest).where(recording.c.id == made["recording_id"])).one()
+    assert row.manifest.get("test_limits") == (None if repeated else limits)
+
+
 async def test_commands_are_checked_kept_and_shown(clinic: Clinic, port: int) -> None:
     async with visit(clinic, port) as v, v.tablet() as ws:
         await heard(ws, "welcome")
         wrong: tuple[tuple[str, Any], ...] = (
             ("feedback", "yes"), ("pause", None), ("level", True), ("level", "1"), ("mark", 3),
-            ("start", True), ("jump", None), ("redo_calibration", 1),
+            ("start", True), ("jump", None), ("redo_calibration", 1), ("test", None), ("test", "stop"),
+            ("test", {"start_s": 5.0, "end_s": 4.0}), ("test", {"start_s": 5.0}),
         )  # fmt: skip
         for name, value in wrong:
             answer = await v.http.post(f"{v.api}/commands", json={"command": name, "value": value})

@@ -79,7 +79,7 @@ async def test_the_second_visit_stands_beside_the_first_and_tells_the_hand(
     card = card_of(html)
     before = card[card.index("Visit before") :]
     assert re.search(r'class="v">2[01]\.\d<', before)
-    assert "start or end set by hand" in card
+    assert "start and end confirmed or set by hand" in card
     assert "No strides" not in html
     said = re.search(r'name="manifest" data-type="json" value="(.*?)"', card)
     assert said is not None

@@ -173,9 +173,9 @@ class CapturePage extends HTMLElement {
 
   told(message) {
     if (message.type === "command" && message.command === "stop") this.guarded(() => this.stop());
-    if (message.type !== "state" || message.stage === this.stage) return;
-    this.stage = message.stage;
-    if (this.stage === "walk") tone();
+    if (message.type !== "state" || (message.stage === this.stage && message.say === this.toDo)) return;
+    if (message.stage === "walk" && this.stage !== "walk" && !message.say) tone();
+    [this.stage, this.toDo] = [message.stage, message.say];
     this.draw();
   }
 
@@ -248,7 +248,7 @@ class CapturePage extends HTMLElement {
   draw() {
     if (!this.view) return;
     this.view.draw({
-      state: this.dataset.state, problem: this.problem, paused: this.paused, stage: this.stage, room: this.room,
+      state: this.dataset.state, problem: this.problem, paused: this.paused, stage: this.stage, toDo: this.toDo, room: this.room,
       record: this.outbox?.record, heldS: this.outbox?.heldS ?? 0, link: this.link?.words(), linkSays: this.link?.said,
       elapsedS: this.began === undefined ? 0 : (performance.now() - this.began) / 1000,
       source: this.worn.source, rows: this.worn.rows(), ready: this.worn.ready(),
@@ -266,7 +266,7 @@ class CapturePage extends HTMLElement {
     this.dataset.state = state;
     this.worn.remembered = this.outbox?.record.remembered ?? {};
     this.entered = performance.now();
-    if (state === "running") this.stage = undefined;
+    if (state === "running") this.stage = this.toDo = undefined;
     stayAwake(state === "running" || state === "sending");
     this.draw();
     if (state === "pairing") this.$("code-form").querySelector("input").focus();

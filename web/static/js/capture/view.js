@@ -103,8 +103,8 @@ export class View {
     this.part("axes-again").hidden = !axes && !test.problem;
   }
 
-  saying({ state, stage, elapsedS, heldS, paused }) {
-    const say = state === "sending" ? words.sendingRest(heldS) : paused ? words.RELOADED : words.instruction(stage, elapsedS);
+  saying({ state, stage, toDo, elapsedS, heldS, paused }) {
+    const say = state === "sending" ? words.sendingRest(heldS) : paused ? words.RELOADED : words.instruction(stage, elapsedS, toDo);
     set(this.part("say"), say.title);
     set(this.part("say-more"), say.more);
     this.part("say-icon").setAttribute("href", `#i-${say.icon}`);

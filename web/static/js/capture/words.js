@@ -2,7 +2,9 @@
 import { STAND_S } from "../common/standing.js";
 
 // By the stage the server is at (its "state" messages); before the first one, by the time since the start.
-export function instruction(stage, elapsedS) {
+// toDo: what the person of a guided test does now, in the server's words.
+export function instruction(stage, elapsedS, toDo = null) {
+  if (toDo) return { icon: "walk", title: toDo, more: "The clock starts and stops by itself." };
   switch (stage ?? (elapsedS < STAND_S ? "stand" : "recording")) {
     case "waiting": return { icon: "info", title: "Wait a moment", more: "The server waits for all sensors." };
     case "stand":

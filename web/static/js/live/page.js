@@ -2,6 +2,7 @@
 import "../progress.js";
 import "./calibration.js";
 import "./feedback-panel.js";
+import "./guided.js";
 import "./stride-chart.js";
 import "./view.js";
 import { Feed } from "./feed.js";
@@ -39,6 +40,8 @@ class LivePage extends HTMLElement {
     this.calibration = this.querySelector("live-calibration");
     this.feedback = this.querySelector("live-feedback");
     this.figure = this.querySelector("live-view");
+    this.test = this.querySelector("live-test"); // only where the session is a functional test
+    this.test?.given(data.test, data.terms);
     this.given();
     this.pick("knee_flexion");
     this.listen();
@@ -60,7 +63,9 @@ class LivePage extends HTMLElement {
     on("stride", (stride) => { this.chart.stride(stride); this.strip.changed(); });
     on("cue", () => this.strip.changed());
     on("feedback", (state) => { this.feedback.show(state); this.top.paused(state); this.strip.state(state, this.feedback.next(state)); });
-    on("notice", (notice) => this.notes.notice(notice));
+    on("notice", (notice) => {
+      if (!this.test || notice.code !== "no_live_figure") this.notes.notice(notice); // a test shows no figure
+    });
     on("fresh", () => this.cover());
     on("line", (line) => { this.notes.line(line); this.figure.line(line); });
   }
@@ -70,7 +75,7 @@ class LivePage extends HTMLElement {
     if (this.dataset.view === name) return;
     this.dataset.view = name;
     for (const [key, part] of Object.entries(this.parts)) part.hidden = key !== name;
-    if (name === "calibrate" || name === "run") this.parts[name].querySelector("[data-slot=sensors]").append(this.sensors);
+    if (name === "calibrate" || name === "run" || name === "test") this.parts[name].querySelector("[data-slot=sensors]").append(this.sensors);
     this.querySelector("[data-bar]").hidden = name !== "run";
   }
 
@@ -90,7 +95,7 @@ class LivePage extends HTMLElement {
     this.lastState = state.state;
     this.watched = state.take;
     if (state.state === "streaming") {
-      this.view(this.feed.frame?.stage === "running" ? "run" : "calibrate");
+      this.view(this.streaming(this.feed.frame));
       if (!this.feed.frame) this.recorded(state);
     } else {
       this.view("pair");
@@ -98,20 +103,28 @@ class LivePage extends HTMLElement {
     }
   }
 
+  // The part that is shown while samples come.
+  streaming(frame) {
+    if (this.test) return "test";
+    return frame?.stage === "running" ? "run" : "calibrate";
+  }
+
   // Until the estimator speaks, the recorder does: which sensors send, and that the walk is kept.
   recorded(state) {
     const sensors = inOrder(state.sensors ?? []);
     this.sensors.show(sensors, data.segments);
+    if (this.test) return this.test.wait(state.estimate === "preparing");
     this.calibration.show(state.estimate === "preparing" ? "preparing" : "unknown", null, sensors, data.segments);
   }
 
   frame(frame) {
-    if (this.feed.state?.state === "streaming") this.view(frame.stage === "running" ? "run" : "calibrate");
+    if (this.feed.state?.state === "streaming") this.view(this.streaming(frame));
     if (this.stage === "running" && frame.stage !== "running") this.again();
     this.stage = frame.stage;
     const health = inOrder(frame.health ?? []);
     this.sensors.show(health, data.segments);
-    if (frame.stage === "running") this.chart.frame(frame);
+    if (this.test) this.test.show(frame.test, frame.t);
+    else if (frame.stage === "running") this.chart.frame(frame);
     else this.calibration.show(frame.stage, frame.calibration, health, data.segments);
     this.top.delay(this.feed.delay);
     this.screen.frame();
@@ -167,7 +180,17 @@ class LivePage extends HTMLElement {
       sound: () => this.screen.sound(),
       screen: () => this.screen.open(),
       table: (b) => this.strip.table(b),
+      "test-go": () => this.commands.send("test", "go"),
+      "test-repeat": () => this.commands.send("test", "repeat"),
+      "test-keep": () => this.keep(),
     };
+    this.test?.addEventListener("submit", (e) => {
+      e.preventDefault();
+      const limits = this.test.typed();
+      if (limits) this.commands.send("test", limits);
+      else e.target.reportValidity();
+    });
+    this.test?.addEventListener("input", () => this.test.typed());
     this.addEventListener("click", (e) => {
       const button = e.target.closest("[data-do]");
       if (button) acts[button.dataset.do](button);
@@ -195,6 +218,13 @@ class LivePage extends HTMLElement {
       this.stopping = null; // it was refused: the walk goes on
       this.state(this.feed.state);
     });
+  }
+
+  // The recording is measured with the start and end that are shown.
+  keep() {
+    const { limits } = this.test;
+    if (limits) this.commands.send("test", limits);
+    this.stop();
   }
 
   // The moment is the press, not when the words are written.

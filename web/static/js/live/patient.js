@@ -71,6 +71,7 @@ class PatientScreen extends HTMLElement {
     if (state === "finished" || state === "closed") return "over";
     if (state !== "streaming" || !frame) return "unopened";
     if (this.feed.fresh === false) return "stale";
+    if (frame.test) return "test";
     if (frame.stage !== "running") return frame.stage;
     if (feedback?.paused) return "paused";
     if (!this.given) return "none";
@@ -84,7 +85,7 @@ class PatientScreen extends HTMLElement {
     const box = this.querySelector("[data-pause]");
     box.hidden = why === null;
     if (why !== null) {
-      const [title, words] = HELD[why];
+      const [title, words] = why === "test" ? [this.feed.frame.test.say, ""] : HELD[why];
       say(box.querySelector("[data-pause-title]"), title);
       say(box.querySelector("[data-pause-words]"), words);
     } else if (this.feed.feedback?.on === false) this.alone();

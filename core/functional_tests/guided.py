@@ -1,0 +1,433 @@
+"""A functional test while its samples come: when it may begin, begins and ends, and its figures
+(docs/science/timed-tests.md, "Guided on the live page").
+
+The figures are those of a file: the same functions measure the samples so far, at fixed samples of the axis.
+So the result is a function of the samples and not of the blocks in which they came.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+
+from core.errors import EstimationError
+from core.events.bouts import find_bouts
+from core.events.result import GaitEvent, GaitEvents, Stride, Strides
+from core.events.turns import Turn, TurnParams
+from core.frames import FOOT, Floats, Protocol, Segment
+from core.functional_tests.chair import LONGEST_S, measure_chair_rises
+from core.functional_tests.params import FunctionalTestParams
+from core.functional_tests.result import FunctionalTest, GuidedTestView, TestPhase, shift_test
+from core.functional_tests.rising import SIT_TO_STAND
+from core.functional_tests.sway import STANDING_QUIETLY, measure_sway
+from core.functional_tests.trunk import TRUNK, follow_trunk
+from core.functional_tests.tug import measure_tug
+from core.functional_tests.walks import LENGTH, measure_six_minutes, measure_ten_metres
+from core.measure import MeasuredGait
+from core.parameters.live_stride import LiveStride
+from core.recording import GivenLimits, SensorSignals, Subject, UniformRecording
+from core.rest import RestParams, find_rest_windows, measure_quietness
+from core.timeline.live import UniformBlock
+
+CHAIR_TESTS: Final = ("tug", "five_sit_to_stand")
+STANDING_TESTS: Final = ("standing_eyes_open", "standing_eyes_closed")
+WALK_TESTS: Final = ("walk_10m", "walk_6min")
+GUIDED: Final[tuple[str, ...]] = (*CHAIR_TESTS, *WALK_TESTS, *STANDING_TESTS)
+"""Protocols that the live page guides."""
+
+REST: Final = RestParams()
+"""Being quiet is the rest of a file."""
+
+
+@dataclass(frozen=True)
+class GuidedTestParams:
+    """When the phases of a guided test change (our choices).
+
+    Parameters
+    ----------
+    tick_s : time between judgements; look_s : between measurements of what came so far, in whole ticks.
+    quiet_s : rest before the person may begin; standing_s : before a walk, as calibration asks for.
+    still_s : rest without a rise or a step after which a movement was none of the test, and rest that ends
+        ten metres. settle_s : after the end of a test, until it is shown. final_s : until nothing of it
+        changes any more: as far as the detectors look back. longest_s : a trial without an end.
+    kept_s : samples kept before a trial. stand_s : quiet standing that is measured.
+    """
+
+    tick_s: float = 0.25
+    look_s: float = 1.0
+    quiet_s: float = 2.0
+    standing_s: float = 3.0
+    still_s: float = 2.0
+    settle_s: float = 1.0
+    final_s: float = 3.0
+    longest_s: float = 180.0
+    kept_s: float = 10.0
+    stand_s: float = 30.0
+    functional: FunctionalTestParams = field(default_factory=FunctionalTestParams)
+    turning: TurnParams = field(default_factory=TurnParams)
+
+
+class GuidedTest:
+    """The trial of a test that is going on.
+
+    Parameters
+    ----------
+    columns : segments of the blocks' columns. subject : of the recording that is measured.
+
+    `push` only keeps the samples; `advance` judges them and takes milliseconds once a second.
+    """
+
+    def __init__(
+        self,
+        protocol: Protocol,
+        columns: Sequence[Segment],
+        rate_hz: float,
+        subject: Subject | None = None,
+        params: GuidedTestParams | None = None,
+    ) -> None:
+        self.protocol = protocol
+        self.params = params or GuidedTestParams()
+        wanted = tuple(FOOT.values()) if protocol in WALK_TESTS else TRUNK
+        watched = tuple(s for s in wanted if s in columns)
+        self._watched = watched if protocol in WALK_TESTS else watched[:1]
+        self._columns = np.array([columns.index(s) for s in self._watched], np.int64)
+        self._rate = rate_hz
+        self._subject = subject or Subject()
+        self._tick = max(1, round(self.params.tick_s * rate_hz))
+        self._ticks_a_look = max(1, round(self.params.look_s / self.params.tick_s))
+        k = len(self._watched)
+        self._kept = _KeptSamples(k)
+        self._judged = 0
+        self._strides: list[LiveStride] = []
+        self._events: list[GaitEvent] = []
+        self._asked = protocol not in STANDING_TESTS
+        self._limits = GivenLimits()
+        self._phase: TestPhase = "get_ready"
+        self._moved = 0
+        self._from = 0
+        self._looked: FunctionalTest | None = None
+        self.view = self._show()
+
+    def push(
+        self,
+        block: UniformBlock,
+        strides: Sequence[LiveStride] = (),
+        events: Sequence[GaitEvent] = (),
+    ) -> None:
+        """Keep the next samples, and what the live chain says of them."""
+        self._kept.append(block, self._columns)
+        if self.protocol in WALK_TESTS:
+            self._strides += strides
+            self._events += events
+
+    def go(self) -> None:
+        """Let quiet standing begin as soon as the person stands still; other tests begin by themselves."""
+        self._asked = True
+        if self._phase == "get_ready" and self.protocol in STANDING_TESTS:
+            self._phase = "ready"
+            self.view = self._show()
+
+    def repeat(self) -> None:
+        """Drop the trial, and begin with the next sample that is pushed."""
+        self._judged = self._kept.end - self._kept.end % self._tick
+        self._asked = self.protocol not in STANDING_TESTS
+        self._begin_anew(self._kept.end, None)
+        self._strides.clear()
+        self._events.clear()
+
+    def correct(self, limits: GivenLimits) -> None:
+        """Measure the trial that is done from and to the times that a person says, s of the axis."""
+        self._limits = limits
+        if self._phase == "done":
+            self._look(self._judged)
+            self.view = self._show(final=self.view.final)
+
+    def advance(self) -> GuidedTestView:
+        """Judge the samples that have come."""
+        while self._judged + self._tick <= self._kept.end:
+            self._judged += self._tick
+            self._judge(self._judged)
+        return self.view
+
+    def _judge(self, at: int) -> None:
+        """Decide at one sample of the axis."""
+        if not self._watched:
+            self.view = self._show("segments_missing")
+            return
+        problem = self.view.problem
+        final = self.view.final
+        if self._phase in ("get_ready", "ready"):
+            problem = self._wait(at, problem)
+        elif self._phase == "running":
+            problem = self._run(at)
+        elif not final:
+            end = self._end()
+            final = end is None or at >= (end + self.params.final_s) * self._rate
+            if final or self._is_look(at):
+                self._look(at)
+        self.view = self._show(problem, final=final)
+
+    def _wait(self, at: int, problem: str | None) -> str | None:
+        """Is the person quiet; has the person begun?"""
+        p, rate = self.params, self._rate
+        low = max(self._from, at - round(p.kept_s * rate))
+        self._kept.drop_before(low)
+        if self.protocol in STANDING_TESTS:
+            if self._asked and self._stands(at):
+                self._start(at)
+                return None
+            return problem
+        needed = p.standing_s if self.protocol in WALK_TESTS else p.quiet_s
+        quiet = self._quiet_s(self._from, at, needed)
+        if self._phase == "ready" and quiet == 0.0:
+            self._start(at - self._tick)
+            return None
+        if quiet >= needed:
+            self._phase = "ready"
+        return problem
+
+    def _start(self, at: int) -> None:
+        self._phase, self._moved, self._looked = "running", at, None
+
+    def _run(self, at: int) -> str | None:
+        """Is the test over?"""
+        p, rate = self.params, self._rate
+        if self.protocol in STANDING_TESTS:
+            return self._stand(at)
+        seconds = self._seconds()
+        longest = p.longest_s if seconds is None else seconds + p.longest_s
+        if at - self._moved > longest * rate:
+            self._begin_anew(at, "trial_too_long")
+            return "trial_too_long"
+        if self.protocol in WALK_TESTS:  # its strides tell; the samples only say who is quiet
+            self._kept.drop_before(at - round((LONGEST_S + REST.window_s) * rate))
+        if not self._is_look(at) or self._is_early(at):
+            return None
+        self._look(at)
+        test = self._looked
+        quiet = self._quiet_s(self._moved, at, LONGEST_S)
+        if test is None or test.start_s is None:
+            if quiet >= p.still_s:
+                self._begin_anew(self._moved, None)
+            return None
+        if self._is_over(test, at, quiet):
+            self._phase = "done"
+        return None
+
+    def _is_over(self, test: FunctionalTest, at: int, quiet: float) -> bool:
+        """Whether the test has ended, by its own definition or because the person rests for long."""
+        p, now = self.params, at / self._rate
+        if self.protocol == "walk_10m":
+            return quiet >= p.still_s
+        if self.protocol == "walk_6min":
+            seconds = self._seconds()
+            return (
+                test.start_s is not None
+                and seconds is not None
+                and now >= test.start_s + seconds + p.settle_s
+            )
+        whole = all(x.mean is not None for x in test.parameters if x.name in _WHOLE[self.protocol])
+        settled = test.end_s is not None and now >= test.end_s + p.settle_s
+        return (whole and settled) or (bool(_rises(test)) and quiet >= LONGEST_S)
+
+    def _is_early(self, at: int) -> bool:
+        """Whether the minutes of a walk that has begun are not over: nothing to measure yet."""
+        seconds, test = self._seconds(), self._looked
+        if seconds is None or test is None or test.start_s is None:
+            return False
+        return at / self._rate < test.start_s + seconds + self.params.settle_s
+
+    def _stand(self, at: int) -> str | None:
+        """Quiet standing: long enough, or broken off."""
+        p, rate = self.params, self._rate
+        if not self._stands(at):
+            self._begin_anew(at, "stepped")
+            return "stepped"
+        if at < self._moved + (p.stand_s + p.settle_s) * rate:
+            return None
+        self._look(at)
+        if self._looked is None or self._looked.end_s is None:
+            self._begin_anew(at, "stepped")
+            return "stepped"
+        self._phase = "done"
+        return None
+
+    def _stands(self, at: int) -> bool:
+        """Whether the person has stood quietly over the last seconds."""
+        low = max(self._from, at - round((self.params.quiet_s + 1.0) * self._rate))
+        take = self._recording(low, at)
+        windows = find_rest_windows(take, STANDING_QUIETLY, self._watched)
+        end = (at - low) / self._rate
+        return any(b > end - 0.5 and b - a >= self.params.quiet_s for a, b in windows)
+
+    def _begin_anew(self, at: int, problem: str | None) -> None:
+        """Wait again, with the samples from this one on."""
+        asked = self._asked and self.protocol in STANDING_TESTS
+        self._phase, self._looked, self._limits = "ready" if asked else "get_ready", None, GivenLimits()
+        if problem is not None or at >= self._kept.end:
+            self._from = at
+            self._kept.drop_before(at)
+        self.view = self._show(problem)
+
+    def _look(self, at: int) -> None:
+        """Measure what came so far, as a file of it would be."""
+        try:
+            self._looked = self._measure(at)
+        except EstimationError:
+            self._looked = None
+
+    def _measure(self, at: int) -> FunctionalTest:
+        p, limits = self.params.functional, self._limits
+        if self.protocol in WALK_TESTS:
+            gait = self._gait(at)
+            measure = measure_ten_metres if self.protocol == "walk_10m" else measure_six_minutes
+            return measure(gait, limits, p.walks)
+        low = max(self._from, self._moved - round(self.params.kept_s * self._rate), self._kept.first)
+        take, zero = self._recording(low, at), low / self._rate
+        if self.protocol in STANDING_TESTS:
+            begin = self._moved / self._rate
+            start = begin if limits.start_s is None else limits.start_s
+            end = begin + self.params.stand_s if limits.end_s is None else limits.end_s
+            found = measure_sway(take, GivenLimits(max(0.0, start - zero), end - zero), p.sway)
+            found = replace(found, corrected=limits != GivenLimits())
+            return shift_test(found, zero)
+        given = GivenLimits(
+            *(None if t is None else max(0.0, t - zero) for t in (limits.start_s, limits.end_s))
+        )
+        trunk = follow_trunk(take)
+        if self.protocol == "tug":
+            return shift_test(measure_tug(trunk, given, p.rising, self.params.turning), zero)
+        return shift_test(measure_chair_rises(trunk, given, p.rising), zero)
+
+    def _gait(self, at: int) -> MeasuredGait:
+        """What the live strides say of the walk since the person moved."""
+        now, since = at / self._rate, self._moved / self._rate - 1.0
+        told: dict[int, LiveStride] = {}
+        for s in self._strides:
+            if s.detected_s <= now and s.start_s >= since:
+                told[s.n] = s
+        rows = sorted(told.values(), key=lambda s: s.end_s)
+        events: dict[tuple[str, str, float], GaitEvent] = {}
+        for e in self._events:
+            if since <= e.time_s <= now:
+                key = e.time_s if e.first_s is None else e.first_s
+                events[e.side, e.kind, key] = e
+        steps = GaitEvents(tuple(sorted(events.values(), key=lambda e: e.time_s)))
+        strides = tuple(
+            Stride(s.side, s.start_s, s.foot_off_s, s.end_s, turn_rad=s.turn_rad, flags=s.flags) for s in rows
+        )
+        turns = tuple(Turn(s.start_s, s.end_s, s.turn_rad or 0.0, 0.0) for s in rows if "turn" in s.flags)
+        columns: Mapping[str, Any] = {LENGTH: tuple(s.values.get(LENGTH) for s in rows)}
+        return MeasuredGait(steps, Strides(strides), (), columns, find_bouts(steps), turns)
+
+    def _recording(self, low: int, at: int) -> UniformRecording:
+        """Samples of the axis as a take of their own."""
+        sensors = self._kept.cut(low, at, self._watched)
+        t_s = np.arange(at - low) / self._rate
+        return UniformRecording(t_s, self._rate, sensors, self._subject, self.protocol, {})
+
+    def _quiet_s(self, low: int, at: int, most_s: float) -> float:
+        """How long all watched sensors have been quiet (core/rest.py), s; looked for over so long."""
+        low = max(low, at - round((most_s + REST.window_s) * self._rate), self._kept.first)
+        quiet = np.ones(at - low, np.bool_)
+        for sensor in self._kept.cut(low, at, self._watched).values():
+            quiet &= measure_quietness(sensor, self._rate, REST).quiet
+        moving = np.flatnonzero(~quiet)
+        return (len(quiet) if not len(moving) else len(quiet) - 1 - int(moving[-1])) / self._rate
+
+    def _is_look(self, at: int) -> bool:
+        return (at // self._tick) % self._ticks_a_look == 0
+
+    def _seconds(self) -> float | None:
+        if self.protocol in STANDING_TESTS:
+            return self.params.stand_s
+        return self.params.functional.walks.seconds if self.protocol == "walk_6min" else None
+
+    def _end(self) -> float | None:
+        return None if self._looked is None else self._looked.end_s
+
+    def _show(self, problem: str | None = None, *, final: bool = False) -> GuidedTestView:
+        test = self._looked
+        going = self._phase in ("running", "done")
+        found = test.start_s if test is not None else None
+        start = found if found is not None else self._moved / self._rate
+        return GuidedTestView(
+            self.protocol,
+            self._phase,
+            self._judged / self._rate,
+            start_s=start if going else None,
+            end_s=None if self._phase != "done" else self._end(),
+            rises=_rises(test) if self.protocol == "five_sit_to_stand" and going else None,
+            seconds=self._seconds(),
+            result=test if self._phase == "done" else None,
+            final=final and self._phase == "done",
+            problem=problem,
+        )
+
+
+_WHOLE: Final[Mapping[str, tuple[str, ...]]] = {
+    "tug": ("tug_duration_s", "tug_turn_s"),
+    "five_sit_to_stand": ("five_sit_to_stand_s",),
+}
+"""Figures without which a test on a chair is not over."""
+
+
+def _rises(test: FunctionalTest | None) -> int:
+    return 0 if test is None else sum(s.name == SIT_TO_STAND for s in test.segments)
+
+
+class _KeptSamples:
+    """The last samples of some columns, at their places of the axis."""
+
+    def __init__(self, columns: int) -> None:
+        self.first = self.end = 0
+        self._size = 0
+        self._signals = np.zeros((1 << 10, columns, 6))
+        self._flags = np.zeros((1 << 10, columns, 2), np.bool_)
+
+    def append(self, block: UniformBlock, columns: np.ndarray[Any, Any]) -> None:
+        """Take the next samples of the axis."""
+        n = len(block)
+        if self._size + n > len(self._signals):
+            self._grow(n)
+        k = slice(self._size, self._size + n)
+        self._signals[k, :, :3] = block.acc[:, columns]
+        self._signals[k, :, 3:] = block.gyr[:, columns]
+        self._flags[k, :, 0] = block.valid[:, columns]
+        self._flags[k, :, 1] = block.interpolated[:, columns]
+        self._size += n
+        self.end = block.first + n
+
+    def drop_before(self, at: int) -> None:
+        """Forget what is before a sample of the axis."""
+        self.first = max(self.first, min(at, self.end))
+
+    def cut(self, low: int, at: int, segments: Sequence[Segment]) -> dict[Segment, SensorSignals]:
+        """Copies of what the sensors measured."""
+        k = self._span(low, at)
+        signals, flags = self._signals[k], self._flags[k]
+        found: dict[Segment, SensorSignals] = {}
+        for i, s in enumerate(segments):
+            acc, gyr = np.ascontiguousarray(signals[:, i, :3]), np.ascontiguousarray(signals[:, i, 3:])
+            found[s] = SensorSignals(s, acc, gyr, None, flags[:, i, 0].copy(), flags[:, i, 1].copy())
+        return found
+
+    def _span(self, low: int, at: int) -> slice:
+        zero = self.end - self._size
+        return slice(max(0, max(low, self.first) - zero), max(0, at - zero))
+
+    def _grow(self, n: int) -> None:
+        """Make room: drop what was forgotten, then double until it fits."""
+        used = self.end - self.first
+        length = len(self._signals)
+        while used + n > length // 2:
+            length *= 2
+        for name in ("_signals", "_flags"):
+            old: Floats = getattr(self, name)
+            new = np.zeros((length, *old.shape[1:]), old.dtype)
+            new[:used] = old[self._size - used : self._size]
+            setattr(self, name, new)
+        self._size = used

@@ -1,0 +1,31 @@
+"""What the live page knows of a guided functional test before it begins."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from core.parameters.catalogue import CATALOGUE
+from server.pages.words import PROTOCOL_NAMES
+from server.report.functional import MEANT, norm_words
+from server.report.guided_words import HINTS, TOTAL, tell_person
+from server.services.patients import Patient
+from server.services.sessions import Session
+
+
+def view_guided_test(session: Session, patient: Patient) -> dict[str, Any] | None:
+    """Words and norm of the session's test; None of other sessions."""
+    total = TOTAL.get(session.protocol)
+    if total is None:
+        return None
+    age = session.performed_on.year - patient.birth_year if patient.birth_year else None
+    return {
+        "title": PROTOCOL_NAMES[session.protocol],
+        "total": total,
+        "label": CATALOGUE[total].label,
+        "say": tell_person(session.protocol, "get_ready"),
+        "hint": HINTS[session.protocol],
+        "go": session.protocol.startswith("standing"),
+        "rises": session.protocol == "five_sit_to_stand",
+        "norm": norm_words(total, age, patient.sex),
+        "meant": MEANT[total],
+    }

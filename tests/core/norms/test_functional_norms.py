@@ -1,0 +1,35 @@
+"""References of timed tests: as printed in their sources, and none where none was read."""
+
+from __future__ import annotations
+
+import pytest
+
+from core.norms.functional import COMFORTABLE_SPEEDS, find_comfortable_speed, find_test_norm
+
+
+@pytest.mark.parametrize(
+    ("age", "sex", "expected"),
+    [
+        (45, "male", 1.43),
+        (60, "female", 1.24),
+        (69.5, "male", 1.34),
+        (85, "female", 0.94),
+        (99, "male", 0.97),
+    ],
+)
+def test_comfortable_speed_by_age_and_sex(age: float, sex: str, expected: float) -> None:
+    found = find_comfortable_speed(age, sex)
+    assert found is not None
+    assert found.mean_mps == expected
+
+
+def test_comfortable_speed_ranges_as_the_abstract_says() -> None:
+    means = [x for row in COMFORTABLE_SPEEDS.values() for x in row]
+    assert (min(means), max(means)) == (0.94, 1.43)
+
+
+def test_there_is_none_for_children_and_the_unknown() -> None:
+    assert find_comfortable_speed(12, "male") is None
+    assert find_comfortable_speed(40, "other") is None
+    assert find_test_norm("tug_duration_s", 40) is None
+    assert find_test_norm("tug_duration_s", None) is None
