@@ -12,7 +12,7 @@ import numpy as np
 from core.activity.day_part import DayPart, read_day
 from core.activity.params import ActivityParams
 from core.activity.postures import FixedStretch, decide_postures
-from core.activity.reduction import FRAME_HZ, Slab, reduce_stream
+from core.activity.reduction import FRAME_HZ, Slab, join_slabs, reduce_stream
 from core.activity.result import (
     ActivityBout,
     ActivityResult,
@@ -67,8 +67,9 @@ def monitor_activity(
     parts: list[DayPart] = []
     end_s = 0.0
     before: WearPeriod | None = None
-    for slabs, day in _days(reduce_stream(stream, segment, params), params):
-        part = read_day(slabs, day, before, thigh, params)
+    for slab, day in _days(reduce_stream(stream, segment, params), params):
+        part = read_day(slab, day, before, thigh, params)
+        del slab  # the next day is gathered while this loop waits
         parts.append(part)
         before = next((p for p in reversed(part.periods) if p.up is not None), before)
         end_s = day[1]
@@ -76,24 +77,29 @@ def monitor_activity(
     return _put_together(stream, segment, height, parts, end_s, _say(stream, height_m, parts), params)
 
 
-def _days(slabs: Iterator[Slab], params: ActivityParams) -> Iterator[tuple[list[Slab], Window]]:
-    """Slabs of every day with those around it, and its range."""
+def _days(slabs: Iterator[Slab], params: ActivityParams) -> Iterator[tuple[Slab, Window]]:
+    """Every day with what lies around it as one slab, and its range."""
     per_day, around = DAY_SLABS_S // params.slab_s, -(-AROUND_S // params.slab_s)
     kept: list[Slab] = []
     number, end = 0, 0.0
+
+    def take(of: list[Slab]) -> tuple[Slab, Window]:
+        """The day's slab; what the next day needs stays in `kept`."""
+        nonlocal kept, number
+        day = (number * DAY_SLABS_S, min(end, (number + 1) * DAY_SLABS_S))
+        number += 1
+        first = (number * per_day - around) * params.slab_s * FRAME_HZ
+        whole = join_slabs(of)
+        kept = [s for s in kept if s.frames.first >= first]
+        return whole, day
+
     for slab in slabs:
         kept.append(slab)
         end = (slab.frames.first + len(slab.frames.valid)) / FRAME_HZ
         if slab.frames.first >= ((number + 1) * per_day + around) * params.slab_s * FRAME_HZ:
-            yield kept[:-1], (number * DAY_SLABS_S, (number + 1) * DAY_SLABS_S)
-            number += 1
-            first = (number * per_day - around) * params.slab_s * FRAME_HZ
-            kept = [s for s in kept if s.frames.first >= first]
+            yield take(kept[:-1])
     while kept and number * DAY_SLABS_S < end:
-        yield kept, (number * DAY_SLABS_S, min(end, (number + 1) * DAY_SLABS_S))
-        number += 1
-        first = (number * per_day - around) * params.slab_s * FRAME_HZ
-        kept = [s for s in kept if s.frames.first >= first]
+        yield take(kept)
 
 
 def _put_together(
