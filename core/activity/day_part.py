@@ -21,6 +21,7 @@ from core.activity.transitions import (
     find_leans,
     find_lying,
     judge_leans,
+    mark_near,
     tell_lying,
 )
 from core.activity.wear import Wear, describe_period, find_forward, find_upright, find_wear, group_periods
@@ -196,12 +197,11 @@ def _find_forward(
 ) -> tuple[Posture, list[WearPeriod]]:
     """Signed inclination where the leans of a period show forward."""
     close, longest = round(NEAR_LYING_S * FRAME_HZ), round(params.upright.lean_s * FRAME_HZ)
+    beside = mark_near(lying, close, len(walking))
     leans = [
         x
         for x in find_leans(posture.tilt, posture.known, params.transitions)
-        if not walking[x.top]
-        and x.b - x.a <= longest
-        and not any(y.a - close <= x.top <= y.b + close for y in lying)
+        if not walking[x.top] and x.b - x.a <= longest and not beside[x.top]
     ]
     lean, signed = posture.tilt.copy(), np.zeros(len(posture.tilt), np.bool_)
     told = []

@@ -85,6 +85,14 @@ def find_lying(tilt: Floats, frames: Frames, there: Bools, params: TransitionPar
     return found
 
 
+def mark_near(lying: Sequence[Lying], close: int, n: int) -> Bools:
+    """Frames (n,) in lying or at most `close` frames away from it."""
+    mask = np.zeros(n, np.bool_)
+    for x in lying:
+        mask[max(0, x.a - close) : x.b + close + 1] = True
+    return mask
+
+
 def _count_above(tilt: Floats, there: Bools, limit: float) -> int:
     """Frames from the first one on that stay above a limit."""
     over = (tilt > limit) & there
@@ -173,6 +181,7 @@ def judge_leans(
     refused: list[TransitionCandidate] = []
     close = round(params.near_lying_s * FRAME_HZ)
     size = measure_length(frames.gravity)
+    beside = mark_near(lying, close, len(size))
     for lean in leans:
         first, last = find_calm_ends(lean, frames, params)
         part = slice(first, last + 1)
@@ -182,7 +191,7 @@ def judge_leans(
         rise = measure_rise(frames.up[part].astype(np.float64))
         direction = tell_direction(size[part])
         likely: TransitionKind = "sit_to_stand" if rise > 0.0 else "stand_to_sit"
-        near = any(x.a - close <= lean.top <= x.b + close for x in lying)
+        near = bool(beside[lean.top])
         prominent = lean.rad - max(theta[lean.a], theta[lean.b]) >= params.prominence_rad
         # from upright, or from how the person sat where that is further back
         far = lean.rad - min(0.0, theta[lean.a], theta[lean.b])

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from sqlalchemy import Connection
+from starlette.responses import RedirectResponse
 
 from server.pages.job_views import find_newest_job, view_job
 from server.services import controls, live, patients, sessions
@@ -43,3 +44,11 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
         "damages": live.list_damages(c, session_id),
         "report": None,
     }
+
+
+def lead_to_days(context: Mapping[str, Any]) -> RedirectResponse | None:
+    """Where pages of strides, curves, calibration and filters lead in a visit of daily life: to its days."""
+    session = context["session"]
+    if session.protocol != "activity":
+        return None
+    return RedirectResponse(f"/sessions/{session.id}#h-days", status_code=303)
