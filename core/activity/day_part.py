@@ -58,7 +58,8 @@ class DayPart:
     Parameters
     ----------
     no_baseline : worn, upright not known. tilted : beyond the limit of lying, not still. step_kinds : (n,) of
-        the steps, 0 level, 1 up, 2 down (core/activity/stairs.py). inclination_deg : (seconds,) NaN =
+        the steps, 0 level, 1 up, 2 down, step_rocks, step_leans : (n,) rad, what tells it
+        (core/activity/stairs.py). inclination_deg : (seconds,) NaN =
         unknown.
     """
 
@@ -72,6 +73,8 @@ class DayPart:
     candidates: tuple[TransitionCandidate, ...]
     steps_s: Floats
     step_kinds: np.ndarray
+    step_rocks: Floats
+    step_leans: Floats
     turns: tuple[Turn, ...]
     inclination_deg: Floats
 
@@ -99,7 +102,8 @@ def read_day(
     found, refused = judge_leans(leans, posture.lean, frames, lying, walking, thigh_m, params.transitions)
     found += tell_lying(lying, frames, posture.tilt)
     at = [_index(t, frames) for t in steps]
-    kinds = tell_stairs(*measure_walking(posture.lean, walking, at, params.stairs), params.stairs)
+    rocks, trunk = measure_walking(posture.lean, walking, at, params.stairs)
+    kinds = tell_stairs(rocks, trunk, params.stairs)
 
     def clip(ranges: Sequence[tuple[int, int]]) -> tuple[Window, ...]:
         windows = [
@@ -133,6 +137,8 @@ def read_day(
         candidates=tuple(c for c in refused if holds(c.time_s)),
         steps_s=steps[inside],
         step_kinds=kinds[inside],
+        step_rocks=rocks[inside],
+        step_leans=trunk[inside],
         turns=tuple(t for t in slab.turns if holds(t.start_s)),
         inclination_deg=_seconds(frames, posture, day),
     )

@@ -26,6 +26,13 @@ STAGE_NAMES: Final[Mapping[str, str]] = {
 }
 """Stages of an analysis in order → what each does, in words; core.pipeline itself takes seconds to import."""
 
+STAGES_OF_DAYS: Final[Mapping[str, str]] = {
+    "reading": "Read the files",
+    "activity": "Go through the days",
+    "quality": "Check the data",
+}
+"""The same of a recording of daily life."""
+
 
 def read_context(c: Connection, session_id: str) -> dict[str, Any]:
     """Session, patient, recording and the newest job: what every page of a session needs."""
@@ -39,7 +46,7 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
         "controls": controls.list_visits(c, patient, session),
         "recording": session.state != "empty",
         "job": None if job is None else view_job(job),
-        "stages": list(STAGE_NAMES.items()),
+        "stages": list((STAGES_OF_DAYS if session.protocol == "activity" else STAGE_NAMES).items()),
         "live_now": take.state if take is not None and take.is_open else None,
         "damages": live.list_damages(c, session_id),
         "report": None,
