@@ -65,6 +65,19 @@ def _parser() -> argparse.ArgumentParser:
         help="pose estimator; auto = the best for the sensors worn (docs/estimators.md lists them)",
     )
     p.add_argument("--config", type=Path, help='JSON: parameters by stage, {"poses": {"least_valid": 0.7}}')
+    p = add("stairs", "Measure a person's own limits of stairs in daily life (docs/science/activity.md).")
+    p.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of one take")
+    p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")
+    for name, what in (("level", "on the level"), ("up", "upstairs"), ("down", "downstairs")):
+        p.add_argument(
+            f"--{name}",
+            nargs=2,
+            type=float,
+            required=True,
+            metavar=("FROM", "TO"),
+            help=f"when they walked {what}, s from the first sample",
+        )
+    p.add_argument("--out", type=Path, required=True, help="JSON file for `analyse --config`")
     p = add("replay", "Stream a recording to a server as a tablet would (docs/live-protocol.md).")
     p.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of one take")
     p.add_argument("--to", required=True, metavar="URL", help="address of the server, http://host:port")

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.activity.params import ActivityParams
-from core.activity.reduction import FRAME_HZ, Frames, Slab
+from core.activity.reduction import FRAME_HZ, Frames, Singles, Slab, measure_length
 from core.activity.result import PosturalTransition, TransitionCandidate, WearPeriod
 from core.activity.stairs import measure_walking, tell_stairs
 from core.activity.transitions import (
@@ -21,6 +21,7 @@ from core.activity.transitions import (
     find_leans,
     find_lying,
     judge_leans,
+    mark_near,
     tell_lying,
 )
 from core.activity.wear import Wear, describe_period, find_forward, find_upright, find_wear, group_periods
@@ -57,7 +58,8 @@ class DayPart:
     Parameters
     ----------
     no_baseline : worn, upright not known. tilted : beyond the limit of lying, not still. step_kinds : (n,) of
-        the steps, 0 level, 1 up, 2 down (core/activity/stairs.py). inclination_deg : (seconds,) NaN =
+        the steps, 0 level, 1 up, 2 down, step_rocks, step_leans : (n,) rad, what tells it
+        (core/activity/stairs.py). inclination_deg : (seconds,) NaN =
         unknown.
     """
 
@@ -71,23 +73,25 @@ class DayPart:
     candidates: tuple[TransitionCandidate, ...]
     steps_s: Floats
     step_kinds: np.ndarray
+    step_rocks: Floats
+    step_leans: Floats
     turns: tuple[Turn, ...]
     inclination_deg: Floats
 
 
 def read_day(
-    slabs: Sequence[Slab], day: Window, before: WearPeriod | None, thigh_m: float, params: ActivityParams
+    slab: Slab, day: Window, before: WearPeriod | None, thigh_m: float, params: ActivityParams
 ) -> DayPart:
     """What happened from `day[0]` to `day[1]`, s.
 
     Parameters
     ----------
-    slabs : of the day and around it. before : the last period of wear before it, None without one.
+    slab : of the day and around it. before : the last period of wear before it, None without one.
     """
-    frames = _join([s.frames for s in slabs])
+    frames = slab.frames
     offset = frames.first / FRAME_HZ
     wear = find_wear(frames, params.wear)
-    steps = np.array([t for s in slabs for t in s.steps_s])
+    steps = np.array(slab.steps_s)
     walking = _mark_walking(steps, frames, params)
     posture, periods = _find_posture(frames, wear, walking, before, params)
     lying = find_lying(posture.tilt, frames, posture.known, params.transitions)
@@ -98,7 +102,8 @@ def read_day(
     found, refused = judge_leans(leans, posture.lean, frames, lying, walking, thigh_m, params.transitions)
     found += tell_lying(lying, frames, posture.tilt)
     at = [_index(t, frames) for t in steps]
-    kinds = tell_stairs(*measure_walking(posture.lean, walking, at, params.stairs), params.stairs)
+    rocks, trunk = measure_walking(posture.lean, walking, at, params.stairs)
+    kinds = tell_stairs(rocks, trunk, params.stairs)
 
     def clip(ranges: Sequence[tuple[int, int]]) -> tuple[Window, ...]:
         windows = [
@@ -132,18 +137,10 @@ def read_day(
         candidates=tuple(c for c in refused if holds(c.time_s)),
         steps_s=steps[inside],
         step_kinds=kinds[inside],
-        turns=tuple(t for s in slabs for t in s.turns if holds(t.start_s)),
+        step_rocks=rocks[inside],
+        step_leans=trunk[inside],
+        turns=tuple(t for t in slab.turns if holds(t.start_s)),
         inclination_deg=_seconds(frames, posture, day),
-    )
-
-
-def _join(parts: Sequence[Frames]) -> Frames:
-    return Frames(
-        parts[0].first,
-        *(
-            np.concatenate([getattr(p, name) for p in parts])
-            for name in ("valid", "gravity", "up", "spread", "sd", "wobble")
-        ),
     )
 
 
@@ -189,9 +186,9 @@ def _find_posture(
         periods.append(describe_period(offset + a / FRAME_HZ, offset + b / FRAME_HZ, axis, None, method, 0))
         if axis is not None:
             gravity = frames.gravity[a:b]
-            size = np.maximum(np.sqrt(np.einsum("ni,ni->n", gravity, gravity)), 1e-9)
+            size = np.maximum(measure_length(gravity), 1e-9)
             known[a:b] = worn[a:b]
-            tilt[a:b] = np.arccos(np.clip(gravity @ axis / size, -1.0, 1.0))
+            tilt[a:b] = np.arccos(np.clip(_along(gravity, axis) / size, -1.0, 1.0))
     tilt[~known] = 0.0
     return Posture(known, tilt, tilt, np.zeros(n, np.bool_)), periods
 
@@ -206,12 +203,11 @@ def _find_forward(
 ) -> tuple[Posture, list[WearPeriod]]:
     """Signed inclination where the leans of a period show forward."""
     close, longest = round(NEAR_LYING_S * FRAME_HZ), round(params.upright.lean_s * FRAME_HZ)
+    beside = mark_near(lying, close, len(walking))
     leans = [
         x
         for x in find_leans(posture.tilt, posture.known, params.transitions)
-        if not walking[x.top]
-        and x.b - x.a <= longest
-        and not any(y.a - close <= x.top <= y.b + close for y in lying)
+        if not walking[x.top] and x.b - x.a <= longest and not beside[x.top]
     ]
     lean, signed = posture.tilt.copy(), np.zeros(len(posture.tilt), np.bool_)
     told = []
@@ -227,7 +223,7 @@ def _find_forward(
         told.append(describe_period(p.start_s, p.end_s, axis, forward, p.method, count))
         if forward is not None:
             gravity = frames.gravity[a:b]
-            lean[a:b] = np.arctan2(-(gravity @ forward), gravity @ axis)
+            lean[a:b] = np.arctan2(-_along(gravity, forward), _along(gravity, axis))
             signed[a:b] = posture.known[a:b]
     lean[~posture.known] = 0.0
     return Posture(posture.known, posture.tilt, lean, signed), told
@@ -242,6 +238,11 @@ def _seconds(frames: Frames, posture: Posture, day: Window) -> Floats:
     number = there.reshape(count, FRAME_HZ).sum(axis=1)
     total = np.where(there, values, 0.0).reshape(count, FRAME_HZ).sum(axis=1)
     return np.where(number > 0, np.degrees(total / np.maximum(number, 1)), np.nan)
+
+
+def _along(gravity: Singles, axis: Floats) -> Floats:
+    """Share (n,) of directions (n, 3) along an axis (3,), summed in double precision without a copy."""
+    return np.asarray(np.einsum("ni,i->n", gravity, axis, dtype=np.float64))
 
 
 def _array(axis: tuple[float, float, float] | None) -> Floats | None:

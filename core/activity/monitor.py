@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from core.activity.day_part import DayPart, read_day
-from core.activity.params import ActivityParams
+from core.activity.params import ActivityParams, StairParams
 from core.activity.postures import FixedStretch, decide_postures
-from core.activity.reduction import FRAME_HZ, Slab, reduce_stream
+from core.activity.reduction import FRAME_HZ, Slab, join_slabs, reduce_stream
 from core.activity.result import (
     ActivityBout,
     ActivityResult,
@@ -20,8 +20,8 @@ from core.activity.result import (
     TransitionCandidate,
     WearPeriod,
 )
-from core.activity.stairs import KIND_OF, LEVEL
-from core.activity.totals import sum_days, sum_hours
+from core.activity.stairs import KIND_OF, LEVEL, StepKind, calibrate_stairs
+from core.activity.totals import HOUR_S, sum_days, sum_hours
 from core.body.model import NOMINAL_HEIGHT_M
 from core.errors import Notice, SignalError
 from core.events.bouts import Bout, walking_bouts
@@ -32,6 +32,9 @@ from core.sample_blocks import LongStream
 DAY_SLABS_S: Final = 86400
 AROUND_S: Final = 2400
 """A day is read with so much around it: more than the shortest non-wear."""
+
+LEAST_STEPS: Final = 5
+"""Steps of each kind on which a person's own limits of stairs rest, at least [our choice]."""
 
 Progress = Callable[[float], None]
 """Called with the share of the recording that was gone through, 0 to 1."""
@@ -55,6 +58,59 @@ def monitor_activity(
     SignalError : `sample_rate_too_low`, `bad_signal`, `clock_jump`.
     """
     params = params or ActivityParams()
+    height = NOMINAL_HEIGHT_M if height_m is None else height_m
+    parts, end_s = _read_days(stream, segment, height, params, progress)
+    return _put_together(stream, segment, height, parts, end_s, _say(stream, height_m, parts), params)
+
+
+def calibrate_on_walks(
+    stream: LongStream,
+    segment: Segment,
+    walks: Mapping[StepKind, Window],
+    height_m: float | None = None,
+    params: ActivityParams | None = None,
+) -> StairParams:
+    """A person's own limits of stairs from one recording in which they walked level, up and down.
+
+    Parameters
+    ----------
+    walks : "walking", "stairs_up", "stairs_down" → when, s from the recording's first sample.
+
+    Raises
+    ------
+    SignalError as `monitor_activity`, and `walk_too_short` where one of them has fewer than `LEAST_STEPS`
+    steps to judge. ParameterError : `stairs_not_told_apart`.
+    """
+    params = params or ActivityParams()
+    parts, _ = _read_days(stream, segment, NOMINAL_HEIGHT_M if height_m is None else height_m, params)
+    steps, rocks, leans = (
+        np.concatenate([getattr(p, name) for p in parts]) for name in ("steps_s", "step_rocks", "step_leans")
+    )
+
+    def measure(kind: StepKind) -> tuple[Floats, Floats]:
+        start_s, end_s = walks[kind]
+        own = (steps >= start_s) & (steps <= end_s) & np.isfinite(rocks)
+        if np.count_nonzero(own) < LEAST_STEPS:
+            raise SignalError(
+                "walk_too_short",
+                f"From {start_s:g} to {end_s:g} s only {np.count_nonzero(own)} steps can be judged for "
+                f"'{kind}'; expected {LEAST_STEPS}. Record 20 steps of each without stopping.",
+                sensor=stream.device_id,
+                t_s=start_s,
+            )
+        return rocks[own], leans[own]
+
+    return calibrate_stairs(measure("walking"), measure("stairs_up"), measure("stairs_down"), params.stairs)
+
+
+def _read_days(
+    stream: LongStream,
+    segment: Segment,
+    height_m: float,
+    params: ActivityParams,
+    progress: Progress = lambda share: None,
+) -> tuple[list[DayPart], float]:
+    """What happened on each day, and when the last one ends, s."""
     if stream.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
@@ -62,38 +118,54 @@ def monitor_activity(
             f"{params.min_rate_hz:g} Hz are needed to find steps. Record at 25 Hz or more.",
             sensor=stream.device_id,
         )
-    height = NOMINAL_HEIGHT_M if height_m is None else height_m
-    thigh = params.transitions.thigh_share * height
+    thigh = params.transitions.thigh_share * height_m
     parts: list[DayPart] = []
     end_s = 0.0
     before: WearPeriod | None = None
-    for slabs, day in _days(reduce_stream(stream, segment, params), params):
-        part = read_day(slabs, day, before, thigh, params)
+    slabs = _tell_hours(reduce_stream(stream, segment, params), stream.duration_s, progress)
+    for slab, day in _days(slabs, params):
+        part = read_day(slab, day, before, thigh, params)
+        del slab  # the next day is gathered while this loop waits
         parts.append(part)
         before = next((p for p in reversed(part.periods) if p.up is not None), before)
         end_s = day[1]
-        progress(min(1.0, end_s / stream.duration_s) if stream.duration_s > 0.0 else 1.0)
-    return _put_together(stream, segment, height, parts, end_s, _say(stream, height_m, parts), params)
+    return parts, end_s
 
 
-def _days(slabs: Iterator[Slab], params: ActivityParams) -> Iterator[tuple[list[Slab], Window]]:
-    """Slabs of every day with those around it, and its range."""
+def _tell_hours(slabs: Iterator[Slab], duration_s: float, progress: Progress) -> Iterator[Slab]:
+    """The same slabs; after each whole hour of them `progress` hears how far they are."""
+    told = 0.0
+    for slab in slabs:
+        end = (slab.frames.first + len(slab.frames.valid)) / FRAME_HZ
+        if end - told >= HOUR_S and duration_s > 0.0:
+            progress(min(1.0, end / duration_s))
+            told = end
+        yield slab
+
+
+def _days(slabs: Iterator[Slab], params: ActivityParams) -> Iterator[tuple[Slab, Window]]:
+    """Every day with what lies around it as one slab, and its range."""
     per_day, around = DAY_SLABS_S // params.slab_s, -(-AROUND_S // params.slab_s)
     kept: list[Slab] = []
     number, end = 0, 0.0
+
+    def take(of: list[Slab]) -> tuple[Slab, Window]:
+        """The day's slab; what the next day needs stays in `kept`."""
+        nonlocal kept, number
+        day = (number * DAY_SLABS_S, min(end, (number + 1) * DAY_SLABS_S))
+        number += 1
+        first = (number * per_day - around) * params.slab_s * FRAME_HZ
+        whole = join_slabs(of)
+        kept = [s for s in kept if s.frames.first >= first]
+        return whole, day
+
     for slab in slabs:
         kept.append(slab)
         end = (slab.frames.first + len(slab.frames.valid)) / FRAME_HZ
         if slab.frames.first >= ((number + 1) * per_day + around) * params.slab_s * FRAME_HZ:
-            yield kept[:-1], (number * DAY_SLABS_S, (number + 1) * DAY_SLABS_S)
-            number += 1
-            first = (number * per_day - around) * params.slab_s * FRAME_HZ
-            kept = [s for s in kept if s.frames.first >= first]
+            yield take(kept[:-1])
     while kept and number * DAY_SLABS_S < end:
-        yield kept, (number * DAY_SLABS_S, min(end, (number + 1) * DAY_SLABS_S))
-        number += 1
-        first = (number * per_day - around) * params.slab_s * FRAME_HZ
-        kept = [s for s in kept if s.frames.first >= first]
+        yield take(kept)
 
 
 def _put_together(

@@ -15,6 +15,7 @@ from typing import Final, TypeVar
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from core.activity.params import ActivityParams
 from core.errors import SignalError
@@ -26,6 +27,8 @@ from core.rest import find_runs
 from core.sample_blocks import LongStream, SampleBlock, find_complete_rows
 from core.timeline.grid import lay_signal
 from core.timeline.params import TimelineParams
+
+Singles = NDArray[np.float32]
 
 Samples = TypeVar("Samples", Floats, Bools)
 
@@ -62,7 +65,7 @@ LONGEST_S: Final = 60 * 86400.0
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Ten frames a second, f of them.
+    """Ten frames a second, f of them, in single precision: a day of them is held at a time.
 
     Parameters
     ----------
@@ -75,11 +78,11 @@ class Frames:
 
     first: int
     valid: Bools
-    gravity: Floats
-    up: Floats
-    spread: Floats
-    sd: Floats
-    wobble: Floats
+    gravity: Singles
+    up: Singles
+    spread: Singles
+    sd: Singles
+    wobble: Singles
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +92,27 @@ class Slab:
     frames: Frames
     steps_s: tuple[float, ...]
     turns: tuple[Turn, ...]
+
+
+def join_slabs(slabs: Sequence[Slab]) -> Slab:
+    """Successive slabs as one."""
+    parts = [s.frames for s in slabs]
+    return Slab(
+        Frames(
+            parts[0].first,
+            *(
+                np.concatenate([getattr(p, name) for p in parts])
+                for name in ("valid", "gravity", "up", "spread", "sd", "wobble")
+            ),
+        ),
+        tuple(t for s in slabs for t in s.steps_s),
+        tuple(t for s in slabs for t in s.turns),
+    )
+
+
+def measure_length(x: Singles) -> Floats:
+    """Length (n,) of vectors (n, 3), in double precision without a copy of them."""
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", x, x, dtype=np.float64)))
 
 
 def working_rate(rate_hz: float) -> int:
@@ -248,8 +272,8 @@ def _reduce(
     norm = np.sqrt(np.einsum("ni,ni->n", window.acc, window.acc))
     away = norm - uniform_filter1d(norm, rate, mode="nearest")
 
-    def mean(x: Floats) -> Floats:
-        return np.asarray(_cut(x[core], per).mean(axis=1))
+    def mean(x: Floats) -> Singles:
+        return np.asarray(_cut(x[core], per).mean(axis=1), np.float32)
 
     sd, wobble = _measure_minutes(window.acc[core], window.valid[core], rate)
     frames = Frames(
@@ -314,9 +338,10 @@ def follow_up(acc: Floats, gyr: Floats, coarse: Floats, rate_hz: float) -> Float
 
 def _empty_frames(first: int, count: int) -> Frames:
     """Frames of which nothing was measured."""
-    minutes = np.full((ceil(count / (60 * FRAME_HZ)), 3), np.nan)
-    nothing = np.zeros(count)
-    return Frames(first, np.zeros(count, np.bool_), np.zeros((count, 3)), nothing, nothing, minutes, minutes)
+    minutes = np.full((ceil(count / (60 * FRAME_HZ)), 3), np.nan, np.float32)
+    nothing = np.zeros(count, np.float32)
+    gravity = np.zeros((count, 3), np.float32)
+    return Frames(first, np.zeros(count, np.bool_), gravity, nothing, nothing, minutes, minutes)
 
 
 def _cut(x: Samples, per: int) -> Samples:
@@ -325,7 +350,7 @@ def _cut(x: Samples, per: int) -> Samples:
     return x[: count * per].reshape(count, per, *x.shape[1:])
 
 
-def _measure_minutes(acc: Floats, valid: Bools, rate: int) -> tuple[Floats, Floats]:
+def _measure_minutes(acc: Floats, valid: Bools, rate: int) -> tuple[Singles, Singles]:
     """Standard deviation (m, 3) of samples and of their means over 1 s in every minute begun."""
     minute = 60 * rate
     sd, wobble = [], []
@@ -337,7 +362,7 @@ def _measure_minutes(acc: Floats, valid: Bools, rate: int) -> tuple[Floats, Floa
             continue
         sd.append(part[there].std(axis=0))
         wobble.append(_cut(part, rate).mean(axis=1).std(axis=0))
-    return np.array(sd).reshape(-1, 3), np.array(wobble).reshape(-1, 3)
+    return np.array(sd, np.float32).reshape(-1, 3), np.array(wobble, np.float32).reshape(-1, 3)
 
 
 def _find_steps_and_turns(

@@ -10,7 +10,7 @@ from math import degrees
 import numpy as np
 
 from core.activity.params import TransitionParams
-from core.activity.reduction import FRAME_HZ, Frames
+from core.activity.reduction import FRAME_HZ, Frames, measure_length
 from core.activity.result import PosturalTransition, TransitionCandidate, TransitionKind, TransitionRefusal
 from core.frames import GRAVITY, Bools, Floats
 from core.rest import find_runs
@@ -85,6 +85,14 @@ def find_lying(tilt: Floats, frames: Frames, there: Bools, params: TransitionPar
     return found
 
 
+def mark_near(lying: Sequence[Lying], close: int, n: int) -> Bools:
+    """Frames (n,) in lying or at most `close` frames away from it."""
+    mask = np.zeros(n, np.bool_)
+    for x in lying:
+        mask[max(0, x.a - close) : x.b + close + 1] = True
+    return mask
+
+
 def _count_above(tilt: Floats, there: Bools, limit: float) -> int:
     """Frames from the first one on that stay above a limit."""
     over = (tilt > limit) & there
@@ -130,7 +138,7 @@ def find_calm_ends(lean: Lean, frames: Frames, params: TransitionParams) -> tupl
         a, b = max(CALM_FRAMES, a), min(n - CALM_FRAMES - 1, b)
         if b <= a:
             return int(np.clip(a, 0, n - 1))
-        run = np.cumsum(frames.spread[a - CALM_FRAMES : b + CALM_FRAMES + 1])
+        run = np.cumsum(frames.spread[a - CALM_FRAMES : b + CALM_FRAMES + 1], dtype=np.float64)
         width = 2 * CALM_FRAMES + 1
         means = run[width - 1 :] - np.concatenate(([0.0], run[:-width]))
         return a + int(np.argmin(means))
@@ -172,17 +180,18 @@ def judge_leans(
     found: list[PosturalTransition] = []
     refused: list[TransitionCandidate] = []
     close = round(params.near_lying_s * FRAME_HZ)
-    size = np.sqrt(np.einsum("ni,ni->n", frames.gravity, frames.gravity))
+    size = measure_length(frames.gravity)
+    beside = mark_near(lying, close, len(size))
     for lean in leans:
         first, last = find_calm_ends(lean, frames, params)
         part = slice(first, last + 1)
         amidst = walking[lean.a] and walking[lean.b]
         if lean.b - lean.a < 3 or not frames.valid[part].all() or amidst:
             continue
-        rise = measure_rise(frames.up[part])
+        rise = measure_rise(frames.up[part].astype(np.float64))
         direction = tell_direction(size[part])
         likely: TransitionKind = "sit_to_stand" if rise > 0.0 else "stand_to_sit"
-        near = any(x.a - close <= lean.top <= x.b + close for x in lying)
+        near = bool(beside[lean.top])
         prominent = lean.rad - max(theta[lean.a], theta[lean.b]) >= params.prominence_rad
         # from upright, or from how the person sat where that is further back
         far = lean.rad - min(0.0, theta[lean.a], theta[lean.b])

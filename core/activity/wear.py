@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.activity.params import UprightParams, WearParams
-from core.activity.reduction import FRAME_HZ, Frames
+from core.activity.reduction import FRAME_HZ, Frames, Singles, measure_length
 from core.activity.result import UprightMethod, WearPeriod
 from core.frames import Bools, Floats
 from core.rest import find_runs
@@ -89,14 +89,14 @@ def find_upright(
     return _middle(frames.gravity[first : first + length]), "first_rest"
 
 
-def _middle(gravity: Floats) -> Floats:
+def _middle(gravity: Singles) -> Floats:
     """Unit vector (3,) of the medians of directions (n, 3)."""
-    middle = np.median(gravity / np.linalg.norm(gravity, axis=1)[:, None], axis=0)
+    middle = np.median(gravity / measure_length(gravity)[:, None], axis=0)
     return np.asarray(middle / np.linalg.norm(middle))
 
 
 def find_forward(
-    gravity: Floats, up: Floats, at: Sequence[tuple[int, int, int]], params: UprightParams
+    gravity: Singles, up: Floats, at: Sequence[tuple[int, int, int]], params: UprightParams
 ) -> tuple[Floats | None, int]:
     """Unit axis (3,) of the sensor that points forward, across up, and how many leans showed it.
 
@@ -106,7 +106,7 @@ def find_forward(
     """
     directions = []
     for a, top, b in at:
-        unit = gravity[[a, top, b]] / np.linalg.norm(gravity[[a, top, b]], axis=1)[:, None]
+        unit = gravity[[a, top, b]] / measure_length(gravity[[a, top, b]])[:, None]
         lean = unit[1] - 0.5 * (unit[0] + unit[2])
         lean = lean - (lean @ up) * up
         size = float(np.linalg.norm(lean))

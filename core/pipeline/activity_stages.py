@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from core.activity.monitor import monitor_activity
+from core.activity.monitor import Progress, monitor_activity
 from core.activity.result import ActivityResult
 from core.errors import SignalError
 from core.frames import Segment
@@ -45,10 +45,10 @@ def find_trunk_stream(recording: Recording) -> tuple[Segment, LongStream]:
     )
 
 
-def watch_activity(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """What the person did from hour to hour."""
+def watch_activity(analysis: TakeAnalysis, config: PipelineConfig, tell: Progress) -> TakeAnalysis:
+    """What the person did from hour to hour; `tell` hears how far it is."""
     segment, stream = find_trunk_stream(analysis.source)
-    found = monitor_activity(stream, segment, analysis.source.subject.height_m, config.activity)
+    found = monitor_activity(stream, segment, analysis.source.subject.height_m, config.activity, tell)
     return replace(analysis, activity=found)
 
 
@@ -88,7 +88,9 @@ def list_doubts(found: ActivityResult) -> tuple[str, ...]:
     return tuple(doubts)
 
 
-ACTIVITY_MONITOR: Final = PipelineStage("activity", 0.0, watch_activity, ("activity",), ("activity",))
+ACTIVITY_MONITOR: Final = PipelineStage(
+    "activity", 0.0, watch_activity, ("activity",), ("activity",), tells_share=True
+)
 ACTIVITY_QUALITY: Final = PipelineStage(
     "quality", 0.95, judge_activity, ("report",), ("activity",), runs_after_problem=True
 )

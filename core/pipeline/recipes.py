@@ -110,13 +110,17 @@ def run_stages(analysis: TakeAnalysis, stages: Sequence[PipelineStage], progress
     ------
     SagittalError of the first stage, without whose result there is nothing to keep.
     """
-    for stage in stages:
+    for i, stage in enumerate(stages):
         if analysis.problem is not None and not stage.runs_after_problem:
             continue
         progress(stage.name, stage.share)
+        end = stages[i + 1].share if i + 1 < len(stages) else 1.0
         before = analysis.problem
         try:
-            analysis = stage.run(analysis, analysis.config)
+            if stage.tells_share:
+                analysis = stage.run(analysis, analysis.config, _tell_within(stage, end, progress))
+            else:
+                analysis = stage.run(analysis, analysis.config)
         except SagittalError as error:
             if analysis.uniform is None and analysis.report is None:
                 raise
@@ -125,6 +129,11 @@ def run_stages(analysis: TakeAnalysis, stages: Sequence[PipelineStage], progress
         if analysis.problem is not before and analysis.problem is not None:
             analysis = replace(analysis, stopped_at=stage.name)
     return analysis
+
+
+def _tell_within(stage: PipelineStage, end: float, progress: Progress) -> Callable[[float], None]:
+    """Share of a stage's own work → of the whole, which is `end` when the stage is done."""
+    return lambda own: progress(stage.name, stage.share + own * (end - stage.share))
 
 
 def resume(

@@ -65,14 +65,16 @@ class PipelineStage:
     run : (Analysis, PipelineConfig) → Analysis with `results` set; raises SagittalError.
     results : fields of Analysis that it sets. reads : fields of PipelineConfig that it takes.
     runs_after_problem : also when an earlier stage could not go on; it takes what was reached.
+    tells_share : `run` takes a third argument, a function that it tells the share of its own work, 0 to 1.
     """
 
     name: str
     share: float
-    run: Callable[[TakeAnalysis, PipelineConfig], TakeAnalysis]
+    run: Callable[..., TakeAnalysis]
     results: tuple[str, ...]
     reads: tuple[str, ...] = ()
     runs_after_problem: bool = False
+    tells_share: bool = False
 
 
 def lay_on_one_axis(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:

@@ -16,7 +16,7 @@ from server.auth.roles import Action
 from server.context import Blobs, Db, Id
 from server.jobs.queue import COMPARE_FILTERS
 from server.pages.job_views import view_job
-from server.pages.session_context import read_context
+from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import record_opening, render_page
 from server.report.filter_list import PROPOSED, list_engines
 from server.report.filter_view import NAME, view_comparison
@@ -65,6 +65,8 @@ def show_algorithms(
     """
     with db.read() as c:
         context = read_context(c, sid)
+        if elsewhere := lead_to_days(context):
+            return elsewhere
         context |= list_choices(c, sid)
         found = filter_runs.of_session(c, sid)
     shown = next((r for r in found if r.id == run), found[0] if found else None)

@@ -13,7 +13,7 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Blobs, Db, Id
-from server.pages.session_context import read_context
+from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import record_opening, render_page
 from server.report.calibration_checks import view_calibration_checks
 from server.services import analyses
@@ -28,6 +28,8 @@ def show_calibration(
     """The picture of the body, the verdict, and the checks of every sensor."""
     with db.read() as c:
         context = read_context(c, sid)
+        if elsewhere := lead_to_days(context):
+            return elsewhere
         found = analyses.latest(c, sid)
     stored = {} if found is None else json.loads(analyses.file_bytes(blobs, found, "analysis.json"))
     context["analysed"] = found is not None

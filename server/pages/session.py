@@ -16,7 +16,7 @@ from server.auth.roles import Action
 from server.context import Db, Id, Reviewed
 from server.pages import daily
 from server.pages.charts import COLUMNS, KEY_HEIGHT, PAGE_HEIGHTS, PAPER_HEIGHTS, draw_chart
-from server.pages.session_context import read_context
+from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import FRAGMENT, record_opening, render_page
 from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
 from server.report import level
@@ -183,6 +183,8 @@ def _show_report(
     if this is not None:
         context["report"] = view_report(reviewed, this, context, page=template)
         context["feedback"] = feedback.view(reviewed, trained)
+    if template == "kinematics.html" and (elsewhere := lead_to_days(context)):
+        return elsewhere
     if context["session"].protocol == "activity":
         template = daily.TEMPLATES.get(template, template)
     if template == VALUES:

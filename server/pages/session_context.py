@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from sqlalchemy import Connection
+from starlette.responses import RedirectResponse
 
 from server.pages.job_views import find_newest_job, view_job
 from server.services import controls, live, patients, sessions
@@ -25,6 +26,13 @@ STAGE_NAMES: Final[Mapping[str, str]] = {
 }
 """Stages of an analysis in order → what each does, in words; core.pipeline itself takes seconds to import."""
 
+STAGES_OF_DAYS: Final[Mapping[str, str]] = {
+    "reading": "Read the files",
+    "activity": "Go through the days",
+    "quality": "Check the data",
+}
+"""The same of a recording of daily life."""
+
 
 def read_context(c: Connection, session_id: str) -> dict[str, Any]:
     """Session, patient, recording and the newest job: what every page of a session needs."""
@@ -38,8 +46,16 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
         "controls": controls.list_visits(c, patient, session),
         "recording": session.state != "empty",
         "job": None if job is None else view_job(job),
-        "stages": list(STAGE_NAMES.items()),
+        "stages": list((STAGES_OF_DAYS if session.protocol == "activity" else STAGE_NAMES).items()),
         "live_now": take.state if take is not None and take.is_open else None,
         "damages": live.list_damages(c, session_id),
         "report": None,
     }
+
+
+def lead_to_days(context: Mapping[str, Any]) -> RedirectResponse | None:
+    """Where pages of strides, curves, calibration and filters lead in a visit of daily life: to its days."""
+    session = context["session"]
+    if session.protocol != "activity":
+        return None
+    return RedirectResponse(f"/sessions/{session.id}#h-days", status_code=303)

@@ -16,7 +16,7 @@ from server.context import Db, Id, OpenTrail, Reviewed
 from server.http.templates import TEMPLATES
 from server.pages.charts import KEY_HEIGHT, draw_chart
 from server.pages.session import explain_emptiness, select_groups
-from server.pages.session_context import read_context
+from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import FRAGMENT, record_opening, render_page
 from server.services import analyses, edit_log, reports, signals
 from server.services.reviewed import ReviewedAnalyses
@@ -35,6 +35,8 @@ def show_timeline(
     """Strides, events and signals over time, to look at and to correct."""
     with db.read() as c:
         context = read_context(c, sid)
+        if elsewhere := lead_to_days(context):
+            return elsewhere
         latest = analyses.latest(c, sid)
         edits = edit_log.EditHistory() if latest is None else edit_log.edits_of(c, latest.id)
     if latest is not None:

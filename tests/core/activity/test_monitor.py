@@ -15,7 +15,8 @@ from core.activity.params import ActivityParams
 from core.activity.result import ActivityResult
 from core.errors import SignalError
 from core.frames import GRAVITY
-from core.recording import as_long_stream
+from core.pipeline import analyse
+from core.recording import Recording, Subject, as_long_stream
 from core.sample_blocks import LongStream, SampleBlock
 from core.simulate import MOVEMENTS
 from core.simulate.chest import ChestSimulation, ChestStyle, Day, PostureHold, simulate_day
@@ -234,3 +235,16 @@ def test_other_slabs_find_the_same_transitions(
     found = monitor_activity(stream, "chest", 1.68, ActivityParams(slab_s=300))
     assert [t.kind for t in found.transitions] == [t.kind for t in lived.transitions]
     assert abs(len(found.steps_s) - len(lived.steps_s)) <= 2
+
+
+def test_every_hour_is_told_while_it_goes_on() -> None:
+    t = np.arange(4 * 3600 * 25) / 25.0
+    acc = np.tile([0.0, 0.0, GRAVITY], (len(t), 1))
+    stream = LongStream("A", "a", 25.0, False, 4 * 3600.0, lambda: iter([SampleBlock(t, acc, None)]))
+    told: list[tuple[str, float]] = []
+    source = Recording({}, {"A": "chest"}, Subject(1.7), "activity", long={"A": stream})
+    analyse(source, progress=lambda stage, share: told.append((stage, share)))
+    shares = [share for stage, share in told if stage == "activity"]
+    # the fourth hour ends with the recording, a sample early: the next stage tells that
+    assert shares == pytest.approx([0.0, 0.2375, 0.475, 0.7125])
+    assert told[-2:] == [("quality", 0.95), ("done", 1.0)]

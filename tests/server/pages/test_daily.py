@@ -76,14 +76,21 @@ async def test_the_report_for_paper_has_a_sheet_a_week(clinic: Clinic, visits: d
     assert "Gait report" not in html
 
 
-@pytest.mark.parametrize(
-    "part", ["data", "kinematics", "timeline", "algorithms", "parameters/daily_step_count"]
-)
+@pytest.mark.parametrize("part", ["data", "parameters/daily_step_count"])
 async def test_the_other_pages_of_the_session_open(clinic: Clinic, visits: dict[str, str], part: str) -> None:
     html = await page(clinic, f"/sessions/{visits['week']}/{part}")
     assert "HOME" in html
     if part == "data":
         assert "activity_spans.csv" in html
+
+
+@pytest.mark.parametrize("part", ["kinematics", "timeline", "calibration", "algorithms"])
+async def test_pages_of_a_walk_lead_to_the_days(clinic: Clinic, visits: dict[str, str], part: str) -> None:
+    async with clinic.client("admin") as client:
+        answer = await client.get(f"/sessions/{visits['week']}/{part}", follow_redirects=False)
+    assert answer.status_code == 303
+    assert answer.headers["location"] == f"/sessions/{visits['week']}#h-days"
+    assert 'id="h-days"' in await page(clinic, f"/sessions/{visits['week']}")
 
 
 async def test_the_api_tells_the_days(clinic: Clinic, visits: dict[str, str]) -> None:

@@ -8,8 +8,9 @@ import re
 import pytest
 
 from core.pipeline import WALK
+from core.pipeline.recipes import ACTIVITY
 from server.pages.data import FILE_WORDS
-from server.pages.session_context import STAGE_NAMES
+from server.pages.session_context import STAGE_NAMES, STAGES_OF_DAYS
 from server.report import activity_files, exports
 from web.words import day, filesize, moment, number, pattern, seconds
 
@@ -55,3 +56,4 @@ def test_every_result_file_has_words_on_the_data_page() -> None:
 
 def test_every_stage_of_the_pipeline_has_words_in_its_order() -> None:
     assert list(STAGE_NAMES) == ["reading", *(stage.name for stage in WALK)]
+    assert list(STAGES_OF_DAYS) == ["reading", *(stage.name for stage in ACTIVITY)]

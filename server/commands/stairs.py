@@ -1,0 +1,49 @@
+"""`sagittal stairs`: a person's own limits of stairs, as overrides that `sagittal analyse --config` takes."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from core.errors import SagittalError
+from server.storage import fs
+
+
+def stairs(
+    paths: Sequence[Path],
+    manifest: Path | None,
+    level: tuple[float, float],
+    up: tuple[float, float],
+    down: tuple[float, float],
+    out: Path,
+) -> int:
+    """Measure the limits on walks of one recording and write them into `out`.
+
+    Parameters
+    ----------
+    level, up, down : when each was walked, s from the recording's first sample.
+
+    Returns
+    -------
+    0, or 1 when the recording does not give them.
+    """
+    from core.activity.monitor import calibrate_on_walks
+    from core.formats import list_source_files, read_named_file, read_recording
+    from core.formats.manifest import parse_manifest
+    from core.pipeline.activity_stages import find_trunk_stream
+
+    try:
+        declared = parse_manifest(read_named_file(manifest)) if manifest else None
+        take = read_recording(list(list_source_files(paths)), declared)
+        segment, stream = find_trunk_stream(take)
+        walks = {"walking": level, "stairs_up": up, "stairs_down": down}
+        own = calibrate_on_walks(stream, segment, walks, take.subject.height_m)  # type: ignore[arg-type]
+    except SagittalError as error:
+        sys.stderr.write(f"No limits of stairs ({error.code}): {error.message}\n")
+        return 1
+    fs.write_file(out, json.dumps({"activity": {"stairs": asdict(own)}}, indent=1).encode())
+    sys.stdout.write(f"Limits of stairs in {out}; give it to `sagittal analyse --config`.\n")
+    return 0

@@ -1,0 +1,58 @@
+"""`sagittal stairs`: from a walk on stairs to an analysis with the person's own limits."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from core.formats import write_recording
+from core.simulate.chest import Day, PostureHold, simulate_day
+from core.simulate.setup import RecordingSetup
+from server.commands.analyse import analyse
+from server.commands.stairs import stairs
+
+WALKED: Day = (
+    PostureHold("stand", 10.0),
+    PostureHold("walk", 40.0),
+    PostureHold("stand", 10.0),
+    PostureHold("stairs_up", 30.0),
+    PostureHold("stand", 10.0),
+    PostureHold("stairs_down", 30.0),
+    PostureHold("stand", 10.0),
+    PostureHold("bow", 3.0),
+    PostureHold("stand", 6.0),
+    PostureHold("bow", 3.0),
+    PostureHold("stand", 6.0),
+    PostureHold("bow", 3.0),
+    PostureHold("stand", 6.0),
+)
+
+
+def steps_down(out: Path) -> int:
+    found = json.loads((out / "activity.json").read_bytes())
+    return sum(bout["stairs_down_steps"] for bout in found["bouts"])
+
+
+@pytest.mark.slow
+def test_own_limits_find_the_stairs_that_the_common_ones_miss(tmp_path: Path) -> None:
+    made = simulate_day(WALKED, 1.7, 3, RecordingSetup(rate_hz=50.0))
+    file = tmp_path / "walk.parquet"
+    file.write_bytes(write_recording(made.recording))
+    walks = {p.kind: (p.start_s, p.end_s) for p in made.truth.phases}
+    own = tmp_path / "own.json"
+    assert stairs([file], None, walks["walk"], walks["stairs_up"], walks["stairs_down"], own) == 0
+    analyse([file], None, tmp_path / "common")
+    analyse([file], None, tmp_path / "own", config=own)
+    true = sum(walks["stairs_down"][0] <= t <= walks["stairs_down"][1] for t in made.truth.steps_s)
+    assert steps_down(tmp_path / "common") <= 0.2 * true
+    assert steps_down(tmp_path / "own") >= 0.7 * true
+
+
+def test_too_few_steps_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = simulate_day(WALKED[:3], 1.7, 3, RecordingSetup(rate_hz=50.0))
+    file = tmp_path / "walk.parquet"
+    file.write_bytes(write_recording(made.recording))
+    assert stairs([file], None, (10.0, 50.0), (0.0, 5.0), (0.0, 5.0), tmp_path / "own.json") == 1
+    assert "walk_too_short" in capsys.readouterr().err
