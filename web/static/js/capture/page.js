@@ -173,8 +173,13 @@ class CapturePage extends HTMLElement {
 
   told(message) {
     if (message.type === "command" && message.command === "stop") this.guarded(() => this.stop());
+    if (message.type === "calibration") {
+      this.verdict = message;
+      return this.draw();
+    }
     if (message.type !== "state" || message.stage === this.stage) return;
     this.stage = message.stage;
+    if (this.stage !== "running") this.verdict = null;
     if (this.stage === "walk") tone();
     this.draw();
   }
@@ -248,7 +253,7 @@ class CapturePage extends HTMLElement {
   draw() {
     if (!this.view) return;
     this.view.draw({
-      state: this.dataset.state, problem: this.problem, paused: this.paused, stage: this.stage, room: this.room,
+      state: this.dataset.state, problem: this.problem, paused: this.paused, stage: this.stage, verdict: this.verdict, room: this.room,
       record: this.outbox?.record, heldS: this.outbox?.heldS ?? 0, link: this.link?.words(), linkSays: this.link?.said,
       elapsedS: this.began === undefined ? 0 : (performance.now() - this.began) / 1000,
       source: this.worn.source, rows: this.worn.rows(), ready: this.worn.ready(),
@@ -266,7 +271,7 @@ class CapturePage extends HTMLElement {
     this.dataset.state = state;
     this.worn.remembered = this.outbox?.record.remembered ?? {};
     this.entered = performance.now();
-    if (state === "running") this.stage = undefined;
+    if (state === "running") this.stage = this.verdict = undefined;
     stayAwake(state === "running" || state === "sending");
     this.draw();
     if (state === "pairing") this.$("code-form").querySelector("input").focus();

@@ -111,6 +111,7 @@ class LivePage extends HTMLElement {
     this.stage = frame.stage;
     const health = inOrder(frame.health ?? []);
     this.sensors.show(health, data.segments);
+    this.notes.calibration(frame.stage === "running" ? frame.calibration?.verdict : null);
     if (frame.stage === "running") this.chart.frame(frame);
     else this.calibration.show(frame.stage, frame.calibration, health, data.segments);
     this.top.delay(this.feed.delay);
