@@ -132,7 +132,7 @@ def _charts(d: KnownDevice) -> list[dict[str, str]]:
         values = [None if b is None else float(b[i]) for b in biases]
         add(f"Gyroscope bias, {axis}", "°/s", values, 2, 2.0 * degrees(BIAS_MOVED))
     scale = [_times(100.0, k.gravity_scale) for k in checks]
-    add("Gravity at rest", "% of 9.81 m/s²", scale, 1, 0.0, _find_scale_band(course))
+    add("Gravity at rest", "% of 9.81 m/s²", scale, 1, 200.0 * SCALE_MOVED, _find_scale_band(course))
     add("Gyroscope noise", "°/s/√Hz", [_times(degrees(1.0), k.gyro_noise) for k in checks], 3, 0.01)
     add("Accelerometer noise", "µg/√Hz", [_times(1e6 / GRAVITY, k.acc_noise) for k in checks], 0, 100.0)
     return charts

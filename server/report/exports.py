@@ -265,9 +265,9 @@ def _body(analysis: TakeAnalysis) -> dict[str, object] | None:
     """Lengths in m and whether each was measured; None where no body was placed."""
     if analysis.mounted is None:
         return None
-    body, height_m = analysis.mounted.body, analysis.recording.subject.height_m
+    body, subject = analysis.mounted.body, analysis.recording.subject
     said = {name: {"m": float(getattr(body, name)), "measured": name in body.measured} for name in LENGTHS}
-    return {"height_m": height_m, "lengths": said}
+    return {"height_m": subject.height_m, "leg_m": subject.measures.leg_m, "lengths": said}
 
 
 def events_csv(events: GaitEvents) -> bytes:

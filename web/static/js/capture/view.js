@@ -127,8 +127,8 @@ export class View {
     box.replaceChildren(
       this.list.shape(kind || "none"),
       h("b", {}, shown.headline),
-      h("div", {}, ...shown.redo.slice(0, MOST_REASONS).map(({ place, title, why, todo }) =>
-        h("p", {}, h("b", {}, place ? `${capitalise(place)}, ${title.toLowerCase()}: ` : `${title}: `), `${why} ${todo}`))),
+      ...byTodo(shown.redo).slice(0, MOST_REASONS).map(({ places, title, why, todo }) =>
+        h("p", {}, h("b", {}, capitalise(`${places.join(" and ")}: `)), `${title}. ${why} ${todo}`)),
       shown.verdict === "redo" ? h("p", {}, words.REDO) : "",
     );
   }
@@ -177,4 +177,15 @@ const wanted = (record) => record.hello.streams.reduce((sum, stream) => sum + st
 
 function set(element, text) {
   if (element.textContent !== text) element.textContent = text;
+}
+
+// What several sensors are to do for one reason is said once.
+function byTodo(redo) {
+  const said = new Map();
+  for (const { place, title, why, todo } of redo) {
+    const key = title + why;
+    if (!said.has(key)) said.set(key, { places: [], title, why, todo });
+    said.get(key).places.push(place || "walk");
+  }
+  return [...said.values()];
 }
