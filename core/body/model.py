@@ -52,6 +52,10 @@ class BodyModel:
     sole_tip_up: float | None = None
     measured: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        # stored results have it as a list
+        object.__setattr__(self, "measured", tuple(self.measured))
+
     @classmethod
     def from_height(cls, height_m: float, measures: BodyMeasures | None = None) -> BodyModel:
         """Lengths as measured, the others by fractions of body height in m (Winter 2009, fig 4.1).
