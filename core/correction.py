@@ -6,17 +6,30 @@ as they came.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import degrees, isclose, radians
 from typing import Final
 
 import numpy as np
 
 from core.errors import ParameterError
-from core.frames import Floats
+from core.frames import GRAVITY, Floats
 
 AXES: Final = ("x", "y", "z")
 AS_READ: Final[tuple[str, ...]] = AXES
+AGAINST: Final = ("-x", "-y", "-z")
+"""All signs turned round."""
+
+UNIT_FACTORS: Final[Mapping[str, Mapping[str, float]]] = {
+    "acceleration": {
+        "multiples of g": GRAVITY,
+        "thousandths of g": 1e-3 * GRAVITY,
+        "already in m/s²": 1.0 / GRAVITY,
+    },
+    "rates": {"degrees per second": radians(1.0), "already in rad/s": degrees(1.0)},
+}
+"""What values as read are taken for, and the factor that says so."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +101,30 @@ class SensorCorrection:
         return said | {
             name: getattr(self, name) for name in ("acc_times", "gyr_times") if getattr(self, name) != 1.0
         }
+
+    def say(self) -> str:
+        """What it does, in words, "nothing" where it changes nothing.
+
+        >>> SensorCorrection(gyr_times=0.017453292519943295).say()
+        'its rates are taken as degrees per second'
+        """
+        said = []
+        for whose, times, axes in (
+            ("acceleration", self.acc_times, self.acc_axes),
+            ("rates", self.gyr_times, self.gyr_axes),
+        ):
+            be = "is" if whose == "acceleration" else "are"
+            unit = next((u for u, x in UNIT_FACTORS[whose].items() if isclose(x, times, rel_tol=1e-3)), None)
+            if unit is not None:
+                said.append(f"its {whose} {be} taken as {unit}")
+            elif times != 1.0:
+                said.append(f"its {whose} {be} multiplied by {times:.4g}")
+            if axes == AGAINST:
+                said.append(f"its {whose} {be} taken with all signs turned round")
+            elif axes != AS_READ:
+                named = ", ".join(axes).replace("-", "\N{MINUS SIGN}")
+                said.append(f"the axes of its {whose} are taken as {named} for x, y, z")
+        return " and ".join(said) or "nothing"
 
 
 def to_axes_matrix(axes: Sequence[str]) -> Floats:

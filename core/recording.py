@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from core.anthropometry import BodyMeasures
 from core.errors import Notice, ParameterError, SignalError
 from core.frames import PROTOCOLS, SEGMENTS, Bools, Floats, Protocol, Segment
 from core.sample_blocks import LongStream, SampleBlock
@@ -67,13 +68,14 @@ class Subject:
     height_m : body height, 0.5 to 2.5 m.
     standing_width_m : between the middles of the ankles while standing at the beginning, 0 to 0.8 m.
     standing_angles_deg : joint angles in that standing by goniometer, names as `core.standing_angles.NAMES`.
-    shoe : the shape of its sole.
+    shoe : the shape of its sole. measures : lengths of the body by tape.
     """
 
     height_m: float | None = None
     standing_width_m: float | None = None
     standing_angles_deg: Mapping[str, float] = field(default_factory=dict, hash=False)
     shoe: Shoe | None = None
+    measures: BodyMeasures = field(default_factory=BodyMeasures)
 
     def __post_init__(self) -> None:
         if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:
@@ -98,6 +100,7 @@ class Subject:
             other.standing_width_m if width is None else width,
             {**other.standing_angles_deg, **self.standing_angles_deg},
             self.shoe or other.shoe,
+            self.measures.complete_from(other.measures),
         )
 
     def to_json(self) -> dict[str, object]:
@@ -107,6 +110,7 @@ class Subject:
             "standing_width_m": self.standing_width_m,
             "standing_angles_deg": dict(self.standing_angles_deg),
             "shoe": None if self.shoe is None else asdict(self.shoe),
+            "measures": self.measures.to_json(),
         }
 
 

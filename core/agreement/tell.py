@@ -13,7 +13,7 @@ from core.agreement.params import ExchangeParams, LagParams, SlipParams
 from core.agreement.slips import SensorSlip
 from core.errors import Notice
 
-UNDO: Final = "Set agreement.lags.repair to false to analyse them as they are."
+KEPT: Final = "The recording itself keeps its own times."
 
 
 def say_lag(lag: SensorLag) -> str:
@@ -42,13 +42,13 @@ def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
     if abs(lag.lag_s) <= params.warn_s:
         return Notice(
             "sensor_late",
-            f"{said}; its samples were shifted by that. " + UNDO,
+            f"{said}; its samples were shifted by that. " + KEPT,
             lag.sensors[0],
             severity="info",
         )
     return Notice(
         "sensor_late",
-        f"{said}; its samples were shifted by that. Synchronise the sensors before the next take. " + UNDO,
+        f"{said}; its samples were shifted by that. Synchronise the sensors before the next take. " + KEPT,
         lag.sensors[0],
     )
 
@@ -61,7 +61,7 @@ def tell_drift(drift: SensorDrift, params: LagParams) -> Notice:
     return Notice(
         "clock_drifts",
         f"The clock of {drift.sensor} runs {which}, by {ms:.0f} ± {sd:.0f} ms over the walk; {done}"
-        "Synchronise the sensors before the next take. " + UNDO,
+        "Synchronise the sensors before the next take. " + KEPT,
         drift.sensor,
     )
 
@@ -75,7 +75,7 @@ def say_exchange(exchange: SensorExchange) -> str:
 def tell_exchange(exchange: SensorExchange, params: ExchangeParams) -> Notice:
     """Say which sensors were put on each other's segments."""
     done = (
-        "The take was analysed so. Correct who wears what; agreement.exchange.repair = false undoes this."
+        "The take was analysed with them the right way round. Look who wears what and correct it."
         if params.repair
         else "Nothing was changed, as this analysis was told to. Correct who wears what."
     )
@@ -106,7 +106,7 @@ def tell_slip(slip: SensorSlip, params: SlipParams) -> Notice:
     elif slip.is_repaired:
         done = (
             f"Angles beside it are left out within {slip.within_s:.0f} s of that; what came after was turned "
-            "back. Set agreement.slips.repair to false to undo that."
+            "back. Fasten it before the next take."
         )
     else:
         done = (

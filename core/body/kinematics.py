@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from core.body.model import NOMINAL_HEIGHT_M, BodyModel
+from core.anthropometry import BodyMeasures
+from core.body.model import LEG_FRACTION, NOMINAL_HEIGHT_M, BodyModel
 from core.body.places import FOOT as SENSOR_ON_FOOT
 from core.body.poses import Poses
 from core.errors import Notice
@@ -49,10 +50,18 @@ class AnchorParams:
 
 
 def nominal_body(
-    height_m: float | None, standing_width_m: float | None = None, shoe: Shoe | None = None
+    height_m: float | None,
+    standing_width_m: float | None = None,
+    shoe: Shoe | None = None,
+    measures: BodyMeasures | None = None,
 ) -> tuple[BodyModel, tuple[Notice, ...]]:
-    """Body model from height in m, or from 1.70 m with a notice `height_assumed` when nobody gave one."""
-    body = replace(BodyModel.from_height(height_m or NOMINAL_HEIGHT_M), standing_width=standing_width_m)
+    """Body model from height in m and what was measured, with a notice `height_assumed` without a height.
+
+    Without a height that of a measured leg is taken, else 1.70 m.
+    """
+    leg_m = None if measures is None else measures.leg_m
+    assumed_m = NOMINAL_HEIGHT_M if leg_m is None else leg_m / LEG_FRACTION
+    body = replace(BodyModel.from_height(height_m or assumed_m, measures), standing_width=standing_width_m)
     if shoe is not None:
         # what the nominal place of the sensor is wrong by is wrong in the ankle's path, too, and cancels
         back, front = shoe.back_m - SENSOR_ON_FOOT[0], shoe.front_m + SENSOR_ON_FOOT[0]
@@ -60,7 +69,7 @@ def nominal_body(
     if height_m is not None:
         return body, ()
     message = (
-        f"Body height is not given; the figure is drawn with {NOMINAL_HEIGHT_M:.2f} m. Enter the height "
+        f"Body height is not given; the figure is drawn with {assumed_m:.2f} m. Enter the height "
         "to see true proportions and distances; joint angles do not depend on it."
     )
     return body, (Notice("height_assumed", message, severity="info"),)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from core.anthropometry import BodyMeasures, locate_hips_across
+
 NOMINAL_HEIGHT_M = 1.70
 """Body height assumed when nobody gave one (±5 cm change joint angles by ±0.2°:
 docs/science/body-model.md, "Lengths")."""
@@ -11,8 +13,15 @@ docs/science/body-model.md, "Lengths")."""
 THIGH_FRACTION, SHANK_FRACTION, ANKLE_FRACTION, FOOT_FRACTION = 0.245, 0.246, 0.039, 0.152
 """Segment lengths as fractions of body height: Winter 2009, fig 4.1."""
 
+LEG_FRACTION = 0.53
+"""Leg length as a fraction of body height (Winter 2009, table 4.1)."""
+
 HIP_FRACTION = 0.11
 """Distance of the hip centres as a fraction of body height (docs/science/body-model.md, "Lengths")."""
+
+
+LENGTHS = ("hip_width", "thigh", "shank", "ankle_height", "foot")
+"""What a body model has of everybody."""
 
 
 @dataclass(frozen=True)
@@ -23,11 +32,12 @@ class BodyModel:
     ----------
     hip_width : between hip centres. thigh : hip to knee centre. shank : knee to ankle centre.
     ankle_height : ankle centre above the sole. foot : heel to toe.
-    estimated : True when taken from body height by Winter's fractions, False when measured.
+    estimated : True when a length is taken from body height by Winter's fractions, False when none is.
     standing_width : between the ankle centres while standing for calibration, None = not measured.
     sole_back, sole_front : rear end and tip of the shoe's sole behind and in front of the ankle centre, by
         the nominal place of the sensor; sole_tip_up : how far the tip stands off the floor when the foot is
         flat. None = not measured.
+    measured : names of the lengths that a tape gave; of `hip_width` by the measured pelvis.
     """
 
     hip_width: float
@@ -40,15 +50,37 @@ class BodyModel:
     sole_back: float | None = None
     sole_front: float | None = None
     sole_tip_up: float | None = None
+    measured: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        # stored results have it as a list
+        object.__setattr__(self, "measured", tuple(self.measured))
 
     @classmethod
-    def from_height(cls, height_m: float) -> BodyModel:
-        """Lengths by fractions of body height in m (Winter 2009, fig 4.1), marked estimated."""
+    def from_height(cls, height_m: float, measures: BodyMeasures | None = None) -> BodyModel:
+        """Lengths as measured, the others by fractions of body height in m (Winter 2009, fig 4.1).
+
+        Of a measured leg thigh, shank and ankle have the same shares as of a leg of the height's length.
+        """
+        tape = measures or BodyMeasures()
+        leg_height = height_m if tape.leg_m is None else tape.leg_m / LEG_FRACTION
+        lengths = {
+            "hip_width": None
+            if tape.pelvis_width_m is None
+            else locate_hips_across(tape.pelvis_width_m, tape.pelvis_depth_m),
+            "thigh": tape.thigh_m,
+            "shank": tape.shank_m,
+            "ankle_height": tape.ankle_height_m,
+            "foot": tape.foot_m,
+        }
+        measured = {name: x for name, x in lengths.items() if x is not None}
+        guessed = {
+            "hip_width": HIP_FRACTION * height_m,
+            "thigh": THIGH_FRACTION * leg_height,
+            "shank": SHANK_FRACTION * leg_height,
+            "ankle_height": ANKLE_FRACTION * leg_height,
+            "foot": FOOT_FRACTION * height_m,
+        }
         return cls(
-            hip_width=HIP_FRACTION * height_m,
-            thigh=THIGH_FRACTION * height_m,
-            shank=SHANK_FRACTION * height_m,
-            ankle_height=ANKLE_FRACTION * height_m,
-            foot=FOOT_FRACTION * height_m,
-            estimated=True,
+            **guessed | measured, estimated=len(measured) < len(guessed), measured=tuple(sorted(measured))
         )

@@ -63,7 +63,7 @@ def mount_sensors(
     # how far apart the feet stood leans legs that stand
     stood = calibrated.calibration.posture == "standing"
     width_m = subject.standing_width_m if stood else None
-    body, assumed = nominal_body(subject.height_m, width_m, subject.shoe)
+    body, assumed = nominal_body(subject.height_m, width_m, subject.shoe, subject.measures)
     calibrated, orientations = lean_legs_apart(calibrated, orientations, body)
     choice = choose(calibrated, orientations, params.estimator, params.least_valid)
     mounted = MountedSensors(calibrated, orientations, body, assumed, choice)

@@ -14,7 +14,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from core.body.model import BodyModel
+from core.body.model import LENGTHS, BodyModel
 from core.body.places import joint_places, sensor_place, standing_origin
 from core.errors import EstimationError, ParameterError
 from core.frames import Floats, Segment
@@ -247,7 +247,7 @@ def walker3(leg_m: float = 0.92, hip_width_m: float = 0.39, pelvis_sensor_m: flo
 
 
 def _check_lengths(body: BodyModel) -> None:
-    for name in ("hip_width", "thigh", "shank", "ankle_height", "foot"):
+    for name in LENGTHS:
         length = getattr(body, name)
         if not (np.isfinite(length) and 0.0 < length < LONGEST_M):
             raise EstimationError(

@@ -33,6 +33,10 @@ CalibrationVerdict = Literal["pass", "redo", "not_judged"]
 TURNED_ALL: Final = 1.0
 """Seconds of straight walking below which no axis is looked for."""
 
+KNEE_SEEN: Final = 6.0
+"""Seconds of it below which skin decides where a knee's axis comes out
+(docs/science/calibration.md, "Score")."""
+
 
 @dataclass(frozen=True)
 class ScoreParams:
@@ -304,7 +308,7 @@ class _Evidence:
         if thigh not in self.rates or shank not in self.rates:
             return None
         seen = self._seen(thigh, shank)
-        if np.count_nonzero(seen) < TURNED_ALL * self.recording.rate_hz:
+        if np.count_nonzero(seen) < KNEE_SEEN * self.recording.rate_hz:
             return None
         found = find_knee_axes(self.rates[thigh][seen], self.rates[shank][seen])
         return found.apart, found.steepest
@@ -388,7 +392,9 @@ class _Evidence:
             return self._leave("knee_axis", segment, "It is not beside a knee.")
         found = self.knees[side]
         if found is None:
-            return self._leave("knee_axis", segment, "Thigh and shank were not both seen in walking.")
+            return self._leave(
+                "knee_axis", segment, f"Thigh and shank were not both seen in {KNEE_SEEN:.0f} s of walking."
+            )
         apart = degrees(abs(float(wrap_angle(found[0]))))
         if found[1] > STEEPEST:
             return self._leave("knee_axis", segment, "Skin moves too much to see the knee's axis.", apart)

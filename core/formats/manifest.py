@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
+from core.anthropometry import LIMITS, BodyMeasures
 from core.correction import AS_READ, SensorCorrection
 from core.errors import ManifestError, ParameterError
 from core.formats.aliases import segment_named
@@ -163,16 +164,25 @@ def _correction(node: JsonNode) -> SensorCorrection:
 
 
 def _subject(node: JsonNode) -> Subject:
-    node.only("height_m", "standing_width_m", "standing_angles_deg", "shoe")
+    node.only("height_m", "standing_width_m", "standing_angles_deg", "shoe", "measures")
     standing = node.child("standing_angles_deg")
     angles = {name: value for name in standing.keys if (value := standing.number(name)) is not None}
     try:
         return Subject(
-            node.number("height_m"), node.number("standing_width_m"), angles, _shoe(node.child("shoe"))
+            node.number("height_m"),
+            node.number("standing_width_m"),
+            angles,
+            _shoe(node.child("shoe")),
+            _measures(node.child("measures")),
         )
     except ParameterError as error:
         key = _SUBJECT_KEYS[error.code]
         raise ManifestError(error.code, f"subject.{key}: {error.message}") from error
+
+
+def _measures(node: JsonNode) -> BodyMeasures:
+    node.only(*LIMITS)
+    return BodyMeasures(**{name: node.number(name) for name in LIMITS})
 
 
 def _shoe(node: JsonNode) -> Shoe | None:
@@ -191,6 +201,7 @@ _SUBJECT_KEYS: Final = {
     "unknown_angle": "standing_angles_deg",
     "standing_angle_implausible": "standing_angles_deg",
     "shoe_implausible": "shoe",
+    "length_implausible": "measures",
 }
 """What `Subject` refuses → where the manifest says it."""
 

@@ -18,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from core.anthropometry import BodyMeasures
 from core.errors import FormatError, Notice
 from core.formats.draft import signal_digest
 from core.formats.json_tree import read_json
@@ -234,6 +235,7 @@ def _read_subject(info: Mapping[str, object]) -> Subject:
         subject.get("standing_width_m"),
         subject.get("standing_angles_deg") or {},
         None if (shoe := subject.get("shoe")) is None else Shoe(**shoe),
+        BodyMeasures(**subject.get("measures") or {}),
     )
 
 

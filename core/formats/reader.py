@@ -267,8 +267,7 @@ def correct_streams(
             # the vendor made it from what was wrong
             quat=None if correction.turns_axes else stream.quat,
         )
-        what = ", ".join(f"{key} {value}" for key, value in correction.to_json().items())
-        message = f"Sensor {device} is read with a correction, as was declared: {what or 'none'}."
+        message = f"Sensor {device} is read with a correction, as was declared: {correction.say()}."
         notices.append(Notice("sensor_corrected", message, device, severity="info"))
     return out, notices
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from core.agreement import Agreement
+from core.agreement.agree import compare_sensors, measure_misfits
+from core.agreement.params import JointParams
 from core.body.erkf.headings import report_turned_axes
 from core.body.erkf.params import ErkfParams
 from core.body.estimate import compile_pose_kernels
@@ -13,6 +16,7 @@ from core.body.mounting import mount_sensors
 from core.body.pose_params import PoseParams
 from core.calibration import CalibrationParams
 from core.calibration.result import CalibratedRecording
+from core.calibration.score import CalibrationScore, score_calibration
 from core.errors import Notice
 from core.frames import Segment
 from core.fusion.attitude import compile_attitude_kernel
@@ -29,11 +33,13 @@ class MountingParams:
     Parameters
     ----------
     erkf : of the filter that the forward axes are made to agree with, as `PoseParams.erkf`.
+    joints : of the comparison beside the joints, as `AgreementParams.joints`.
     """
 
     calibration: CalibrationParams = field(default_factory=CalibrationParams)
     fusion: MahonyParams = field(default_factory=MahonyParams)
     erkf: ErkfParams = field(default_factory=ErkfParams.people)
+    joints: JointParams = field(default_factory=JointParams)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +56,7 @@ class LiveCalibration:
     body : lengths, with the standing width.
     turned : segment → rad its forward axis was turned to agree with the joints; empty without ErKF.
     checks : one per worn segment, also of those that could not be calibrated. ok : none of them is doubtful.
+    score : of these samples, as of any take.
     """
 
     calibrated: CalibratedRecording
@@ -61,6 +68,7 @@ class LiveCalibration:
     checks: tuple[SegmentCheck, ...]
     notices: tuple[Notice, ...]
     ok: bool
+    score: CalibrationScore
 
 
 def finish_calibration(
@@ -91,6 +99,8 @@ def finish_calibration(
         notices.append(Notice(failure.code, failure.message, failure.sensor))
     notices += _missing(recording, [s for s in worn if s not in out])
     checks = tuple(_check(s, calibrated, notices) for s in worn)
+    joints, _ = compare_sensors(recording, params.joints)
+    agreed = Agreement(recording, misfits=measure_misfits(joints))
     return LiveCalibration(
         calibrated=calibrated,
         orientations=mounted.orientations,
@@ -101,6 +111,7 @@ def finish_calibration(
         checks=checks,
         notices=tuple(notices),
         ok=all(c.method is not None and all(n.severity == "info" for n in c.notices) for c in checks),
+        score=score_calibration(calibrated, params.calibration.score, agreed, mounted.turned_rad),
     )
 
 

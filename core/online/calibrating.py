@@ -254,7 +254,7 @@ class LiveCalibrator:
             return None
         self.stage = "running"
         self._attempt = CalibrationSamples(self.wearer, self._length)
-        self.view = replace(self.view, checks=made.checks, ok=made.ok, problem=None)
+        self.view = replace(self.view, checks=made.checks, ok=made.ok, problem=None, score=made.score)
         return made
 
     def _checks(self, seen: StandingNow) -> tuple[SegmentCheck, ...]:

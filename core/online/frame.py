@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from core.estimators import NO_FIGURE, LiveMethod
 from core.events.result import GaitEvent
 from core.frames import Floats, Segment, Side
 from core.parameters.live_stride import LiveStride
+
+if TYPE_CHECKING:
+    from core.calibration.score import CalibrationScore
 
 Stage = Literal["waiting", "stand", "walk", "running"]
 """waiting: samples of some sensor are missing; stand, walk: calibration; running: everything there is."""
@@ -46,6 +49,7 @@ class CalibrationView:
     ----------
     stood_s, walked_s, steps : so far, of the attempt that is going on.
     ok : True once it holds; False after an attempt that failed, `problem` says why.
+    score : pass or redo, why and what to do, once it holds; None before.
     """
 
     stood_s: float
@@ -54,6 +58,7 @@ class CalibrationView:
     checks: tuple[SegmentCheck, ...]
     ok: bool | None = None
     problem: Notice | None = None
+    score: CalibrationScore | None = None
 
 
 @dataclass(frozen=True)

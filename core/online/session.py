@@ -14,6 +14,7 @@ from core.body.model import NOMINAL_HEIGHT_M, BodyModel
 from core.body.tree import PRESETS
 from core.calibration.live_attempt import WornSensors
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
+from core.calibration.score import CalibrationScore
 from core.errors import Notice, SagittalError
 from core.formats.live_log import Hello, SampleBatch
 from core.frames import GRAVITY, R_NEUTRAL, Protocol, Segment
@@ -232,4 +233,5 @@ def _standing(worn: tuple[Segment, ...], samples: int = 150, rate_hz: float = 10
         checks=(),
         notices=(),
         ok=True,
+        score=CalibrationScore(()),
     )

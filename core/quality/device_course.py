@@ -13,6 +13,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from core.frames import Floats
 from core.quality.devices import DeviceCheck
 
 Quantity = Literal["gyro_bias", "scale", "scale_off", "gyro_noise", "acc_noise"]
@@ -59,7 +60,7 @@ class DeviceFinding:
     since: int | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DeviceCourse:
     """What can be said of a device by all its checks.
 
@@ -67,11 +68,16 @@ class DeviceCourse:
     ----------
     compared : earlier checks the newest was held against; 0 = there is nothing to compare with.
     newest : index of the newest check in which it could be measured, None where there is none.
+    usual_bias : (3,) median of the earlier biases, rad/s; bias_limit : distance from it that is told.
+    usual_scale : median of the earlier scales in the posture of the newest. None = nothing to compare with.
     """
 
     newest: int | None
     compared: int
     findings: tuple[DeviceFinding, ...] = ()
+    usual_bias: Floats | None = None
+    bias_limit: float = BIAS_MOVED
+    usual_scale: float | None = None
 
 
 def follow_device(checks: Sequence[DeviceCheck]) -> DeviceCourse:
@@ -99,12 +105,14 @@ def follow_device(checks: Sequence[DeviceCheck]) -> DeviceCourse:
         findings.append(DeviceFinding("scale_off", new.gravity_scale - 1.0, SCALE_OFF, None))
     before = [checks[i] for i in earlier]
     biases = [c.gyro_bias for c in before if c.gyro_bias is not None]
+    usual, middle, limit = None, None, BIAS_MOVED
     if biases:
         usual = np.median(biases, axis=0)
         unsure = 2.0 * ((new.bias_error or 0.0) + float(np.median([c.bias_error or 0.0 for c in before])))
         away = [float(np.linalg.norm(b - usual)) for b in (*biases, new.gyro_bias)]
         scatter = SCATTER * float(np.median(away[:-1]))
-        findings += _beyond("gyro_bias", away, max(BIAS_MOVED, unsure, scatter), earlier)
+        limit = max(BIAS_MOVED, unsure, scatter)
+        findings += _beyond("gyro_bias", away, limit, earlier)
     lying = [i for i in earlier if _in_same_posture(checks[i], new)]
     scales = [checks[i].gravity_scale or 1.0 for i in lying]
     if scales:
@@ -114,7 +122,7 @@ def follow_device(checks: Sequence[DeviceCheck]) -> DeviceCourse:
     alike = [i for i in earlier if abs(checks[i].rate_hz / new.rate_hz - 1.0) < SAME_RATE]
     findings += _louder("gyro_noise", GYRO_NOISE_ROSE, checks, alike, new)
     findings += _louder("acc_noise", ACC_NOISE_ROSE, checks, alike, new)
-    return DeviceCourse(last, len(earlier), tuple(findings))
+    return DeviceCourse(last, len(earlier), tuple(findings), usual, limit, middle)
 
 
 def _louder(

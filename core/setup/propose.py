@@ -17,7 +17,7 @@ import numpy as np
 from core.agreement import Agreement, AgreementParams
 from core.agreement.agree import compare_sensors
 from core.agreement.exchange import find_exchange
-from core.correction import AS_READ, SensorCorrection, name_axes
+from core.correction import AGAINST, AS_READ, SensorCorrection, name_axes
 from core.frames import FOOT, GRAVITY, SHANK, SIDES, THIGH, Floats, Segment
 from core.quality.sides import find_left_leg
 from core.quality.signals import measure_signal
@@ -29,8 +29,6 @@ from core.setup.repair import SetupRepair
 
 ACC_FACTORS: Final = (1.0, GRAVITY, 1e-3 * GRAVITY, 1.0 / GRAVITY)
 GYR_FACTORS: Final = (1.0, radians(1.0), degrees(1.0))
-AGAINST: Final = ("-x", "-y", "-z")
-"""All signs turned round."""
 
 
 def propose_repair(

@@ -165,6 +165,11 @@ def state(stage: str, say: str | None = None) -> str:
     return _text("state", stage=stage) if say is None else _text("state", stage=stage, say=say)
 
 
+def judge_calibration(verdict: Mapping[str, Any]) -> str:
+    """Whether the calibration passes, why not, and what to do (`wire.judge_calibration`)."""
+    return _text("calibration", **verdict)
+
+
 def announce_finish(recording: str, problem: str | None = None) -> str:
     """The take is a recording now; `problem` (finish_mismatch): it was kept although the end did not fit."""
     return _text("finished", recording=recording, **({"problem": problem} if problem else {}))

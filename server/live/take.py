@@ -149,6 +149,7 @@ class ActiveTake:
         self.grown_at = time.monotonic()
         self._size = 0
         self._battery: dict[str, float] = {}
+        self._verdict: Mapping[str, Any] | None = None
 
     # the socket
 
@@ -239,6 +240,8 @@ class ActiveTake:
         """Tell the tablet where the estimation stands."""
         if self.tablet is not None and self.stage is not None:
             self.tablet.say(protocol.state(self.stage, self.say))
+            if self.stage == "running" and self._verdict is not None:
+                self.tablet.say(protocol.judge_calibration(self._verdict))
 
     def tell(self, item: FeedItem) -> None:
         """Pass on what happens once; what a new process says again is known already."""
@@ -246,6 +249,8 @@ class ActiveTake:
             self.room.keep_stride(item.k, item.body)
         elif item.kind == "cue":
             self.room.keep_cue(item.k, item.body)
+        elif item.kind == "calibration":
+            self._judge(msgspec.json.decode(item.body)["calibration"]["verdict"])
         if item.k < self._seen[item.kind]:
             return
         self._seen[item.kind] = item.k + 1
@@ -256,6 +261,12 @@ class ActiveTake:
             for name in ("type", "late"):
                 content.pop(name, None)
             self._house.journal.add(self.id, item.kind, item.t_s, content)
+
+    def _judge(self, verdict: Mapping[str, Any] | None) -> None:
+        """Keep the verdict of a calibration and tell the tablet."""
+        self._verdict = verdict
+        if verdict is not None and self.tablet is not None:
+            self.tablet.say(protocol.judge_calibration(verdict))
 
     def look(self, now: float) -> None:
         """Notice that the tablet has fallen silent."""

@@ -12,6 +12,7 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
+from core.calibration.score import CalibrationScore
 from core.errors import Notice
 from core.feedback import Cue, FeedbackState
 from core.frames import SIDES, SUFFIX, Floats, Side
@@ -20,9 +21,10 @@ from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SensorHeal
 from core.parameters.live_stride import LiveStride
 from core.parameters.result import Parameter
 from server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
+from server.report.calibration_checks import say_verdict
 from server.report.functional import segment_label
 from server.report.guided_words import tell_person
-from server.report.wording import reason_words, speak_places
+from server.report.wording import place_words, reason_words, speak_places
 
 LOST_WARN, LOST_BAD = 0.01, 0.20
 """Shares of lost samples, as the report judges a whole take (core/quality/assessment.py)."""
@@ -189,6 +191,22 @@ def _notice(given: Notice) -> dict[str, Any]:
     }
 
 
+def judge_calibration(score: CalibrationScore) -> dict[str, Any]:
+    """The verdict in words: of every failed check where, why and what to do."""
+    said = [c.to_json() for c in score.checks]
+    redo = [
+        {
+            "place": "" if c.segment is None else place_words(c.segment),
+            "title": c.rule.title,
+            "why": speak_places(c.why),
+            "todo": c.todo,
+        }
+        for c in score.checks
+        if c.verdict == "redo"
+    ]
+    return {"verdict": score.verdict, "headline": say_verdict(score.verdict, said), "redo": redo}
+
+
 def _calibration(view: CalibrationView | None) -> dict[str, Any] | None:
     if view is None:
         return None
@@ -198,6 +216,7 @@ def _calibration(view: CalibrationView | None) -> dict[str, Any] | None:
         "steps": view.steps,
         "ok": view.ok,
         "problem": None if view.problem is None else _notice(view.problem),
+        "verdict": None if view.score is None else judge_calibration(view.score),
         "checks": [
             {
                 "segment": check.segment,

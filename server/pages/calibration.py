@@ -15,6 +15,7 @@ from server.auth.roles import Action
 from server.context import Blobs, Db, Id
 from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import record_opening, render_page
+from server.report.body_lengths import view_lengths
 from server.report.calibration_checks import view_calibration_checks
 from server.services import analyses
 
@@ -34,5 +35,6 @@ def show_calibration(
     stored = {} if found is None else json.loads(analyses.file_bytes(blobs, found, "analysis.json"))
     context["analysed"] = found is not None
     context["view"] = view_calibration_checks(stored.get("calibration_score"), stored.get("calibration"))
+    context["lengths"] = view_lengths(stored.get("body"))
     record_opening(request, who, "session", sid)
     return render_page(request, db, who, "calibration.html", "patients", **context)

@@ -18,6 +18,7 @@ from core.quality.device_course import (
     GYRO_NOISE_ROSE,
     SCALE_MOVED,
     SCALE_OFF,
+    DeviceCourse,
 )
 from core.quality.devices import DeviceCheck
 from server.auth.access import require
@@ -106,29 +107,45 @@ def _takes(d: KnownDevice) -> list[dict[str, Any]]:
 
 
 def _charts(d: KnownDevice) -> list[dict[str, str]]:
-    """Bias of each axis and gravity with the bands of no change, and both noises."""
-    checks, days = [x.check for x in d.checks], [x.day for x in d.checks]
+    """Bias and gravity, with the bands that the verdict is made by, and both noises."""
+    checks, days, course = [x.check for x in d.checks], [x.day for x in d.checks], d.course
     charts: list[dict[str, str]] = []
 
     def add(
-        title: str, unit: str, values: list[float | None], digits: int, least: float, reach: float = 0.0
+        title: str,
+        unit: str,
+        values: list[float | None],
+        digits: int,
+        least: float,
+        band: tuple[float, float] | None = None,
     ) -> None:
-        known = [v for v in values if v is not None]
-        usual = float(np.median(known)) if known else 0.0
-        band = (usual - reach, usual + reach) if reach else None
         svg = draw_device(title, days, values, digits=digits, least=least, band=band)
         if svg is not None:
             charts.append({"title": title, "unit": unit, "svg": svg})
 
     biases = [None if k.gyro_bias is None else np.degrees(k.gyro_bias) for k in checks]
+    if course.usual_bias is not None:
+        usual = np.degrees(course.usual_bias)
+        moved = [None if b is None else float(np.linalg.norm(b - usual)) for b in biases]
+        add("Gyroscope bias, distance from usual", "°/s", moved, 2, 0.0, (0.0, degrees(course.bias_limit)))
     for i, axis in enumerate("xyz"):
         values = [None if b is None else float(b[i]) for b in biases]
-        add(f"Gyroscope bias, {axis}", "°/s", values, 2, 0.0, degrees(BIAS_MOVED))
+        add(f"Gyroscope bias, {axis}", "°/s", values, 2, 2.0 * degrees(BIAS_MOVED))
     scale = [_times(100.0, k.gravity_scale) for k in checks]
-    add("Gravity at rest", "% of 9.81 m/s²", scale, 1, 0.0, 100.0 * SCALE_MOVED)
+    add("Gravity at rest", "% of 9.81 m/s²", scale, 1, 200.0 * SCALE_MOVED, _find_scale_band(course))
     add("Gyroscope noise", "°/s/√Hz", [_times(degrees(1.0), k.gyro_noise) for k in checks], 3, 0.01)
     add("Accelerometer noise", "µg/√Hz", [_times(1e6 / GRAVITY, k.acc_noise) for k in checks], 0, 100.0)
     return charts
+
+
+def _find_scale_band(course: DeviceCourse) -> tuple[float, float] | None:
+    """Gravity in percent where the newest check is not told; None where nothing can be compared."""
+    if course.usual_scale is None:
+        return None
+    usual = 100.0 * course.usual_scale
+    low = max(usual * (1.0 - SCALE_MOVED), 100.0 * (1.0 - SCALE_OFF))
+    high = min(usual * (1.0 + SCALE_MOVED), 100.0 * (1.0 + SCALE_OFF))
+    return (low, high) if low < high else None
 
 
 def _times(factor: float, value: float | None) -> float | None:

@@ -177,7 +177,9 @@ def _show_report(
                 context["repair"] = repair
                 if this.session.protocol in TEST_NAMES:
                     context["test_manifest"] = repairs.read_without_limits(c, this.found)
-                context["repair_says"] = [speak_places(s) for s in repair.evidence] if repair else []
+                if repair is not None:
+                    context["repair_says"] = [speak_places(s) for s in repair.evidence]
+                    context["repair_changes"] = [speak_places(s) for s in repair.changes]
     if this is None and paper:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
     if this is not None:

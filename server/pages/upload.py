@@ -6,11 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Final
 from urllib.parse import quote
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
+from core.anthropometry import LIMITS
 from core.frames import SEGMENTS
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -18,7 +19,7 @@ from server.auth.roles import Action
 from server.context import Db, Id
 from server.pages.job_views import view_job
 from server.pages.shell import record_opening, render_page
-from server.pages.words import SEGMENT_NAMES
+from server.pages.words import PROTOCOLS, SEGMENT_NAMES, TEST_PROTOCOLS
 from server.report.bundle import ABOUT_FILES
 from server.services import histories, patients, recordings, sessions
 from server.services.devices import NO_PLACES, LastPlaces, recall_places
@@ -60,18 +61,36 @@ GONIOMETER: Final = (
 )
 """Standing angles that the page asks for; the manifest takes the others too (core/standing_angles.py)."""
 
+TAPE: Final = (
+    ("leg_m", "Leg", "Front upper iliac spine to inner ankle, standing."),
+    ("thigh_m", "Thigh", "Greater trochanter to the outer knee joint line."),
+    ("shank_m", "Shank", "Outer knee joint line to outer ankle."),
+    ("ankle_height_m", "Ankle over the floor", "Outer ankle to the sole."),
+    ("foot_m", "Foot", "Heel to longest toe."),
+    ("pelvis_width_m", "Pelvis, width", "Between the front upper iliac spines."),
+    ("pelvis_depth_m", "Pelvis, depth", "Their middle to that of the back ones; used with the width."),
+)
+"""Lengths of `subject.measures` that the page asks for, and how they are taken."""
+
+LENGTHS: Final = tuple((name, label, *LIMITS[name], how) for name, label, how in TAPE)
+
 DUPLICATE: Final = "duplicate_stream"
 
 
 @router.get("/sessions/{sid}/upload")
 def show_upload(
-    request: Request, db: Db, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+    request: Request,
+    db: Db,
+    sid: Id,
+    who: Annotated[Identity, require(Action.READ_SESSION)],
+    lengths: Annotated[bool, Query(description="show the lengths of the body at once")] = False,
 ) -> Response:
     """Upload files, see what was found in them, say which sensor is where."""
     with db.read() as c:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
         view = view_upload(c, recordings.current(c, sid), session, patient)
+    view["lengths_open"] = lengths or view["lengths_said"]
     record_opening(request, who, "session", sid)
     return render_page(request, db, who, "upload.html", "patients", session=session, patient=patient, **view)
 
@@ -100,6 +119,9 @@ def view_upload(c: Connection, this: StoredRecording | None, s: Session, p: Pati
         "segments": SEGMENT_CHOICES,
         "said": _said({"subject": found.get("subject") or {}}) | _said({**manifest, "subject": measured}),
         "goniometer": GONIOMETER,
+        "lengths": LENGTHS,
+        "lengths_said": bool((manifest.get("subject") or {}).get("measures")),
+        "protocols": [(value, title) for value, title, _ in (*PROTOCOLS, *TEST_PROTOCOLS)],
     }
 
 

@@ -85,11 +85,11 @@ def view_calibration_checks(
         rows = tuple(_view_check(c) for c in whole)
         segments.insert(0, CheckedSegment(WHOLE, "Whole take", kind, word, "", "", rows))
     return CalibrationChecks(
-        VERDICT_WORDS[score["verdict"]][0], _say(score["verdict"], checks), tuple(segments)
+        VERDICT_WORDS[score["verdict"]][0], say_verdict(score["verdict"], checks), tuple(segments)
     )
 
 
-def _say(verdict: str, checks: Sequence[Mapping[str, Any]]) -> str:
+def say_verdict(verdict: str, checks: Sequence[Mapping[str, Any]]) -> str:
     """The overall verdict in one sentence."""
     judged = [c for c in checks if c["verdict"] != "not_judged"]
     if verdict == "pass":
@@ -100,7 +100,7 @@ def _say(verdict: str, checks: Sequence[Mapping[str, Any]]) -> str:
     places = list(dict.fromkeys(place_words(c["segment"]) if c["segment"] else "walk" for c in failed))
     shown = places if len(places) <= 3 else [*places[:2], f"{len(places) - 2} more"]
     listed = " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))
-    which = "check fails" if len(failed) == 1 else "checks fail"
+    which = "checks fails" if len(failed) == 1 else "checks fail"
     return f"Calibrate again: {len(failed)} of {len(judged)} {which}, at the {listed}."
 
 

@@ -28,6 +28,7 @@ import numpy as np
 
 from core.angles import JointAngles
 from core.body.health import find_worst_verdict
+from core.body.model import LENGTHS
 from core.body.poses import Poses
 from core.events.result import GaitEvents, Strides
 from core.events.steps import Steps
@@ -92,6 +93,7 @@ def summarise_analysis(analysis: TakeAnalysis) -> dict[str, object]:
         "agreement": _agreement(analysis),
         "calibration": _calibration(analysis.calibration, analysis.angles),
         "calibration_score": _score_calibration(analysis),
+        "body": _body(analysis),
         "estimator": _estimator(analysis),
         "parameters": [parameter_row(p) for p in analysis.parameters],
         "functional": _functional(analysis),
@@ -257,6 +259,15 @@ def poses_parquet(poses: Poses) -> bytes:
     body = {name: getattr(poses.body, name) for name in poses.body.__dataclass_fields__}
     meta = {"schema": SCHEMA, "rate_hz": poses.rate_hz, "method": poses.method, "body": body}
     return parquet_file(poses.t_s, columns, meta)
+
+
+def _body(analysis: TakeAnalysis) -> dict[str, object] | None:
+    """Lengths in m and whether each was measured; None where no body was placed."""
+    if analysis.mounted is None:
+        return None
+    body, subject = analysis.mounted.body, analysis.recording.subject
+    said = {name: {"m": float(getattr(body, name)), "measured": name in body.measured} for name in LENGTHS}
+    return {"height_m": subject.height_m, "leg_m": subject.measures.leg_m, "lengths": said}
 
 
 def events_csv(events: GaitEvents) -> bytes:

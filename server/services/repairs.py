@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from sqlalchemy import Connection
 
+from core.formats.manifest import manifest_of
 from server.services import recordings
 from server.services.analyses import REPAIRED, AnalysisRecord, file_bytes
 from server.storage.blobs import BlobStore
@@ -19,10 +20,16 @@ SETUP_KEYS: Final = ("sensors", "corrections")
 
 @dataclass(frozen=True)
 class ProposedRepair:
-    """What is wrong, in sentences, and the manifest that would put it right."""
+    """What is wrong, in sentences, and the manifest that would put it right.
+
+    Parameters
+    ----------
+    changes : what each sensor would be taken for, in sentences.
+    """
 
     evidence: tuple[str, ...]
     manifest: Mapping[str, Any]
+    changes: tuple[str, ...]
 
 
 def read_proposal(c: Connection, blobs: BlobStore, found: AnalysisRecord) -> ProposedRepair | None:
@@ -34,7 +41,30 @@ def read_proposal(c: Connection, blobs: BlobStore, found: AnalysisRecord) -> Pro
         return None
     said = json.loads(file_bytes(blobs, found, "analysis.json"))["setup"]
     repaired = json.loads(file_bytes(blobs, found, REPAIRED))
-    return ProposedRepair(tuple(said["evidence"]), take_setup(this.manifest, repaired))
+    changes = _list_changes(repaired, found.manifest)
+    return ProposedRepair(tuple(said["evidence"]), take_setup(this.manifest, repaired), changes)
+
+
+def _list_changes(repaired: Mapping[str, Any], before: Mapping[str, Any] | None) -> tuple[str, ...]:
+    """Sensors that would be taken as worn elsewhere or read otherwise.
+
+    Parameters
+    ----------
+    repaired : the manifest that is proposed. before : that of the analysis that proposes it.
+    """
+    said = manifest_of(before or {})
+    wanted = manifest_of({key: repaired.get(key) for key in SETUP_KEYS})
+    worn = {d.lower(): s for d, s in said.sensors.items()}
+    known = {d.lower(): x for d, x in said.corrections.items()}
+    changes = []
+    for device, segment in sorted(wanted.sensors.items()):
+        was = worn.get(device.lower())
+        if segment is not None and was != segment:
+            changes.append(f"Sensor {device} goes {'' if was is None else f'from {was} '}to {segment}.")
+    for device, correction in sorted(wanted.corrections.items()):
+        if correction != known.get(device.lower()):
+            changes.append(f"Of sensor {device} {correction.say()}.")
+    return tuple(changes)
 
 
 def read_without_limits(c: Connection, found: AnalysisRecord) -> dict[str, Any] | None:

@@ -234,7 +234,15 @@ def test_write_down_the_matrix(group: str) -> None:
     assert len(wrong) <= (0 if group == "real" else MOST_WRONG * sum(c.total() for c in counts.values())), (
         wrong
     )
+    for kind in PROMISED:
+        assert counts[kind]["right"] >= LEAST_RIGHT * counts[kind].total(), kind
+    harmless = [counts[kind] for kind in HARMLESS]
+    assert sum(c["wrong"] for c in harmless) <= MOST_ACCUSED * sum(c.total() for c in harmless)
 
+
+PROMISED = (*HARMLESS[1:], "sensors exchanged as a clinic does", "sensors mixed up in any way")
+LEAST_RIGHT, MOST_ACCUSED = 0.98, 0.01
+"""Shares of swaps and turns that are put right or do no harm, and of right set-ups that are accused."""
 
 MOST_WRONG = 0.03
 """Share of simulated mistakes that may be put right wrongly; a right set-up never."""

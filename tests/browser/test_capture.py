@@ -123,6 +123,22 @@ def test_a_walk_played_on_the_tablet_is_the_recording_though_network_and_page_we
     np.testing.assert_array_equal(starts, counts * 10_000)
 
 
+def test_the_tablet_says_whether_the_calibration_passes_and_takes_it_back_at_a_redo(
+    flat: Browser, running: RunningServer, clinic: Clinic
+) -> None:
+    with tablet(flat, running.url) as page:
+        pair(page, clinic.code)
+        choose(page, walk_files())
+        place(page, SEGMENTS)
+        start(page)
+        verdict = page.locator("[data-verdict]")
+        expect(verdict).to_be_hidden()
+        expect(verdict).to_contain_text("alibrat", timeout=90_000)
+        assert not layout_faults(page) | text_faults(page)
+        clinic.post("/live/commands", command="redo_calibration")
+        expect(verdict).to_be_hidden(timeout=20_000)
+
+
 def test_a_server_that_dies_in_the_middle_has_everything_in_the_end(flat: Browser, tmp_path: Path) -> None:
     upgrade(tmp_path / "sagittal.db")
     db = Database(tmp_path / "sagittal.db")

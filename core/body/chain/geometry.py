@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from core.body.model import NOMINAL_HEIGHT_M, SHANK_FRACTION, THIGH_FRACTION
+from core.body.model import LEG_FRACTION, NOMINAL_HEIGHT_M, SHANK_FRACTION, THIGH_FRACTION
 from core.calibration.fixed_offset import SHIN_FACE
 from core.errors import ParameterError
 from core.frames import Floats, Side
@@ -16,9 +16,6 @@ from core.frames import Floats, Side
 PELVIS_WIDTH_FRACTION: Final = 0.137
 """Between the anterior superior iliac spines as a fraction of body height: own estimate, 24 cm at 1.75 m.
 Winter's 0.191 is the breadth of the hips."""
-
-LEG_FRACTION: Final = 0.53
-"""Leg length as a fraction of body height (Winter 2009, table 4.1)."""
 
 LONGEST_M: Final = 2.0
 

@@ -9,7 +9,7 @@ import pytest
 from core.calibration.gyro_pca import about_vertical, flexion_axis, gait_margin, sagittal_angle
 from core.calibration.standing import vertical_frame
 from core.errors import CalibrationError
-from core.frames import Floats
+from core.frames import Floats, Segment
 from core.rotation import exp, from_matrix, log, normalise, to_matrix
 
 
@@ -74,3 +74,40 @@ def test_gait_margin_wants_thigh_forward_and_the_others_back(segment: str, sign:
     everywhere = np.ones(2000, bool)
     assert gait_margin(angle, everywhere, segment) == pytest.approx(np.radians(20.0), abs=0.02)  # type: ignore[arg-type]
     assert gait_margin(-angle, everywhere, segment) < 0  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("aside", "together"), [(0.3, 0.0), (0.3, 0.4), (0.6, 0.2)])
+def test_motion_aside_bends_the_axis_by_its_correlation_and_the_share_hardly_tells(
+    aside: float, together: float
+) -> None:
+    """The principal axis lies ½ atan(2cσ / (1 − σ²)) off, σ and c of the motion aside: inherent, and ρ is a
+    weak alarm."""
+    rng = np.random.default_rng(2)
+    z = rng.standard_normal(40_000)
+    x = aside * (together * z + np.sqrt(1 - together**2) * rng.standard_normal(len(z)))
+    found = flexion_axis(np.column_stack([x, 0.3 * rng.standard_normal(len(z)), z]), np.eye(3), "shank_l")
+    bend = 0.5 * np.arctan2(2 * together * aside, 1 - aside**2)
+    off = (found.gamma + bend + np.pi / 2) % np.pi - np.pi / 2
+    assert abs(np.degrees(off)) < 1.0 if aside < 0.5 else abs(np.degrees(off)) < 2.5
+    assert found.rho > (0.9 if aside < 0.5 else 0.6)
+
+
+@pytest.mark.parametrize("segment", ["thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r"])
+@pytest.mark.parametrize("amplitude", [15.0, 25.0, 40.0])
+def test_the_sign_of_a_gait_is_right_in_every_mounting(segment: Segment, amplitude: float) -> None:
+    """18 cells of 60 mountings each: the right one of two axes half a turn apart has the greater margin."""
+    phase = np.linspace(0.0, 8 * 2 * np.pi, 1000)
+    ahead = 1.0 if segment.startswith("thigh") else -1.0
+    lean = np.radians(amplitude * (np.sin(phase) + 0.25 * ahead * (1.0 - np.cos(2 * phase))))
+    up = np.column_stack([np.sin(lean), np.cos(lean), np.zeros_like(lean)])
+    rng = np.random.default_rng(3)
+    everywhere = np.ones(len(lean), np.bool_)
+    for _ in range(60):
+        R = to_matrix(normalise(rng.standard_normal(4)))
+        seen = up @ R
+        right, turned = (
+            gait_margin(sagittal_angle(seen, about_vertical(turn) @ R), everywhere, segment)
+            for turn in (0.0, np.pi)
+        )
+        assert right > np.radians(5.0)
+        assert turned < 0.0

@@ -109,6 +109,17 @@ def test_stand_walk_and_it_runs() -> None:
     assert all(c.method == "walking_direction" and c.score and c.score > 0.5 for c in found.checks)
 
 
+def test_its_score_judges_the_joints_too_and_is_gone_when_it_begins_anew() -> None:
+    done = walked()
+    (found,) = done.found
+    score = found.score
+    assert score.verdict == "pass"
+    judged = {c.segment for c in score.checks if c.name == "joint_misfit" and c.verdict == "pass"}
+    assert judged == set(WHOLE)
+    assert done.seen[-1][2].score == score
+    assert all(view.score is None for _, stage, view in done.seen if stage != "running")
+
+
 def test_it_is_the_offline_calibration_of_the_same_samples() -> None:
     found = walked().found[0]
     part = cut(walk(), 0.0, found.past / 100.0)

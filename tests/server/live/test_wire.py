@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from core.calibration.score import CalibrationCheck, CalibrationScore
 from core.errors import Notice
 from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SegmentCheck, SensorHealth
 from core.parameters.live_stride import LiveStride
@@ -90,6 +91,27 @@ def test_a_failed_calibration_says_why() -> None:
     assert said["problem"]["message"] == "The left foot moved."
     assert said["checks"][0]["notices"][0]["severity"] == "warn"
     assert (said["ok"], said["checks"][0]["score"]) == (False, None)
+
+
+def test_a_calibration_that_does_not_pass_says_where_why_and_what_to_do() -> None:
+    good = CalibrationCheck("stillness", "foot_l", 1.0, 4.0, "pass")
+    bad = replace(good, segment="shank_r", value=6.0, verdict="redo", why="shank_r tilted.")
+    view = CalibrationView(3.0, 9.0, 8, (), True, score=CalibrationScore((good, bad)))
+    said = told(LiveFrame(2.0, 1, "running", calibration=view))["calibration"]["verdict"]
+    assert said["verdict"] == "redo"
+    assert said["headline"] == "Calibrate again: 1 of 2 checks fails, at the right shank."
+    assert said["redo"] == [
+        {
+            "place": "right shank",
+            "title": "Standing still",
+            "why": "right shank tilted.",
+            "todo": bad.todo,
+        }
+    ]
+    assert (
+        told(LiveFrame(2.0, 1, "walk", calibration=replace(view, score=None)))["calibration"]["verdict"]
+        is None
+    )
 
 
 def test_a_stride_has_51_points_and_the_reason_of_every_null() -> None:

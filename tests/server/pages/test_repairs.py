@@ -58,6 +58,7 @@ async def test_the_proposal_is_shown_and_holds_the_set_up_alone(clinic: Clinic) 
     session = await walk(clinic)
     page = await read(clinic, f"/sessions/{session}")
     assert "The gyroscope of left foot is turned." in page
+    assert "Of sensor A its rates are taken with all signs turned round." in page
     # height and protocol stay those of the session
     assert find_hidden(page, "manifest") == {**STATED, "corrections": CORRECTED}
     assert find_hidden(await read(clinic, f"/sessions/{session}", "viewer"), "manifest") is None

@@ -46,6 +46,7 @@ def test_analysis_json_is_strict_json_of_schema_1(files: Mapping[str, bytes]) ->
         "setup",
         "agreement",
         "calibration",
+        "body",
         "calibration_score",
         "functional",
         "estimator",

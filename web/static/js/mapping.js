@@ -19,6 +19,11 @@ class SensorMap extends HTMLElement {
       row.addEventListener("focusin", () => this.select(row));
     }
     this.measures = [...this.querySelectorAll("[data-measure]")];
+    this.protocol = this.querySelector("select[name=protocol]");
+    this.protocol?.addEventListener("change", () => {
+      this.querySelector("[data-belt]").hidden = this.protocol.value !== "treadmill";
+      this.draw();
+    });
     this.ask = this.querySelector("[data-ask]");
     // the page comes with its buttons off: a tap before the script is there would be lost
     const swap = this.querySelector("[data-swap]");
@@ -129,9 +134,12 @@ class SensorMap extends HTMLElement {
     );
   }
 
+  // The protocol of the visit, as chosen here.
+  done() { return this.protocol?.value ?? this.getAttribute("protocol"); }
+
   // What the movement needs and nobody wears.
   lacks(worn) {
-    if (this.getAttribute("protocol") === "squat") {
+    if (this.done() === "squat") {
       const leg = ["l", "r"].some((side) => worn.has(`thigh_${side}`) && worn.has(`shank_${side}`));
       return leg && worn.has("pelvis") ? "" : "; a squat needs shank, thigh and pelvis";
     }
@@ -165,6 +173,8 @@ class SensorMap extends HTMLElement {
     const manifest = JSON.parse(this.getAttribute("manifest") || "{}") || {};
     manifest.sensors = Object.fromEntries(this.rows.map((r) => [r.dataset.device, this.segment(r) || null]));
     for (const input of this.measures) put(manifest, input.name.split("."), parseFloat(input.value.replace(",", ".")));
+    if (this.protocol) delete manifest.protocol; // the visit's counts
+    if (this.done() !== "treadmill") delete manifest.belt_speed_mps;
     return manifest;
   }
 
@@ -173,6 +183,7 @@ class SensorMap extends HTMLElement {
     if (!this.measures.every((input) => input.reportValidity())) return;
     button.disabled = true;
     try {
+      if (this.done() !== this.getAttribute("protocol")) await request("PATCH", `/api/v1/sessions/${session}`, { protocol: this.done() });
       await request("POST", `/api/v1/sessions/${session}/analyses`, { manifest: this.manifest() });
       location.assign(`/sessions/${session}`);
     } catch (problem) {

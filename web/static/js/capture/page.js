@@ -173,9 +173,14 @@ class CapturePage extends HTMLElement {
 
   told(message) {
     if (message.type === "command" && message.command === "stop") this.guarded(() => this.stop());
+    if (message.type === "calibration") {
+      this.verdict = message;
+      return this.draw();
+    }
     if (message.type !== "state" || (message.stage === this.stage && message.say === this.toDo)) return;
     if (message.stage === "walk" && this.stage !== "walk" && !message.say) tone();
     [this.stage, this.toDo] = [message.stage, message.say];
+    if (this.stage !== "running") this.verdict = null;
     this.draw();
   }
 
@@ -248,7 +253,8 @@ class CapturePage extends HTMLElement {
   draw() {
     if (!this.view) return;
     this.view.draw({
-      state: this.dataset.state, problem: this.problem, paused: this.paused, stage: this.stage, toDo: this.toDo, room: this.room,
+      state: this.dataset.state, problem: this.problem, paused: this.paused, stage: this.stage, toDo: this.toDo,
+      verdict: this.verdict, room: this.room,
       record: this.outbox?.record, heldS: this.outbox?.heldS ?? 0, link: this.link?.words(), linkSays: this.link?.said,
       elapsedS: this.began === undefined ? 0 : (performance.now() - this.began) / 1000,
       source: this.worn.source, rows: this.worn.rows(), ready: this.worn.ready(),
@@ -266,7 +272,7 @@ class CapturePage extends HTMLElement {
     this.dataset.state = state;
     this.worn.remembered = this.outbox?.record.remembered ?? {};
     this.entered = performance.now();
-    if (state === "running") this.stage = this.toDo = undefined;
+    if (state === "running") this.stage = this.toDo = this.verdict = undefined;
     stayAwake(state === "running" || state === "sending");
     this.draw();
     if (state === "pairing") this.$("code-form").querySelector("input").focus();

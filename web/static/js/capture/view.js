@@ -3,9 +3,12 @@ import { grouped } from "./pairing.js";
 import { POSES } from "./sources/axes.js";
 import { SensorList } from "./sensors.js";
 import { STAND_S } from "../common/standing.js";
-import { formatClock } from "../common/words.js";
+import { h } from "../common/elements.js";
+import { capitalise, formatClock } from "../common/words.js";
 import * as words from "./words.js";
 
+const VERDICTS = { pass: "ok", redo: "bad", not_judged: "" }; // the look of a note
+const MOST_REASONS = 3;
 const ADD = { dot: "Add sensor", replay: "Other files" };
 
 export class View {
@@ -39,6 +42,7 @@ export class View {
     this.pairing(m);
     this.sensors(m);
     this.saying(m);
+    this.verdict(m);
     this.note(m.problem ?? this.trouble(m));
     this.button(m);
   }
@@ -111,6 +115,24 @@ export class View {
     set(this.part("elapsed"), state === "running" && !paused ? formatClock(elapsedS, 1) : "");
   }
 
+  // Whether the calibration passes; where not, what to do first.
+  verdict({ state, verdict }) {
+    const shown = state === "running" ? verdict : null;
+    const box = this.part("verdict");
+    box.hidden = !shown;
+    if (!shown || box.dataset.said === JSON.stringify(shown)) return;
+    box.dataset.said = JSON.stringify(shown);
+    const kind = VERDICTS[shown.verdict];
+    box.className = `note ${kind}`;
+    box.replaceChildren(
+      this.list.shape(kind || "none"),
+      h("b", {}, shown.headline),
+      ...byTodo(shown.redo).slice(0, MOST_REASONS).map(({ places, title, why, todo }) =>
+        h("p", {}, h("b", {}, capitalise(`${places.join(" and ")}: `)), `${title}. ${why} ${todo}`)),
+      shown.verdict === "redo" ? h("p", {}, words.REDO) : "",
+    );
+  }
+
   // The first thing that is wrong, where nothing else was said.
   trouble({ state, rows, link, linkSays, source }) {
     if (state !== "prepare" && state !== "running") return null;
@@ -155,4 +177,15 @@ const wanted = (record) => record.hello.streams.reduce((sum, stream) => sum + st
 
 function set(element, text) {
   if (element.textContent !== text) element.textContent = text;
+}
+
+// What several sensors are to do for one reason is said once.
+function byTodo(redo) {
+  const said = new Map();
+  for (const { place, title, why, todo } of redo) {
+    const key = title + why;
+    if (!said.has(key)) said.set(key, { places: [], title, why, todo });
+    said.get(key).places.push(place || "walk");
+  }
+  return [...said.values()];
 }

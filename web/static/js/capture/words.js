@@ -16,6 +16,8 @@ export function instruction(stage, elapsedS, toDo = null) {
   }
 }
 
+export const REDO = "The clinic's screen has Redo: stand still again, then walk. Or go on; the analysis judges the whole take.";
+
 export const RELOADED = {
   icon: "info", title: "This page was loaded again",
   more: "Everything up to then is safe. Connect the same sensors again to go on, or stop here.",

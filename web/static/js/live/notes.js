@@ -3,6 +3,7 @@ import { h } from "../common/elements.js";
 import { shape } from "./shapes.js";
 
 const NOTICE_MS = 12000;
+const REDO_MS = 45000;
 const PREPARED_MS = 3000;
 
 export class Notes {
@@ -63,6 +64,20 @@ export class Notes {
   problem(problem) {
     const note = this.put("problem", "bad", problem.title || "That did not work", problem.detail);
     setTimeout(() => this.shown.get("problem") === note && this.take("problem"), NOTICE_MS);
+  }
+
+  // Pass is said for a while, redo for longer.
+  calibration(verdict) {
+    const said = verdict ? JSON.stringify(verdict) : "";
+    if (said === this.judged) return;
+    this.judged = said;
+    this.take("calibration");
+    if (!verdict || verdict.verdict === "not_judged") return;
+    const [first] = verdict.redo;
+    const text = first ? `${first.title}: ${first.why} ${first.todo}` : "";
+    const redo = first ? { do: "redo", word: "Redo" } : undefined;
+    const note = this.put("calibration", first ? "bad" : "ok", verdict.headline, text, redo);
+    setTimeout(() => this.shown.get("calibration") === note && this.take("calibration"), first ? REDO_MS : NOTICE_MS);
   }
 
   notice({ severity, text, code, sensor }) {

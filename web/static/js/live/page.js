@@ -123,6 +123,7 @@ class LivePage extends HTMLElement {
     this.stage = frame.stage;
     const health = inOrder(frame.health ?? []);
     this.sensors.show(health, data.segments);
+    this.notes.calibration(frame.stage === "running" ? frame.calibration?.verdict : null);
     if (this.test) this.test.show(frame.test, frame.t);
     else if (frame.stage === "running") this.chart.frame(frame);
     else this.calibration.show(frame.stage, frame.calibration, health, data.segments);
