@@ -16,9 +16,6 @@ Estimator = Literal["erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
 Requested = Literal["auto", "erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
 """What can be asked for; auto: the best one that the working sensors allow."""
 
-SquatEstimator = Literal["squat_chain"]
-"""What follows squats; nobody asks for it, the protocol does."""
-
 LiveMethod = Estimator | Literal["none"]
 """Estimator of the live figure; none: the worn sensors allow no figure while they stream."""
 
@@ -53,14 +50,13 @@ class PaperReference:
         return f"{self.citation}. doi:{self.doi}" if self.doi else f"{self.citation}. No DOI found."
 
 
-@dataclass(frozen=True)
-class PoseEstimator:
-    """One estimator.
+@dataclass(frozen=True, kw_only=True)
+class PoseMethod:
+    """How a figure is found.
 
     Parameters
     ----------
-    name : as it is asked for in configuration, API and command line.
-    method : `Poses.method` of its figure. label : of that method. choice : what a form offers.
+    method : `Poses.method` of its figure. label : of that method.
     needs : in words, after "sensors on". sets : segments whose sensors it needs, any one of these sets.
     sensors : all that it reads when it is asked for by name; None = every sensor there is.
     leg_model : thighs and shanks carry no sensor, a model of the leg gives them. fixed : variables that this
@@ -70,10 +66,8 @@ class PoseEstimator:
     paper : None = our own. science : the page with its equations.
     """
 
-    name: Estimator | SquatEstimator
     method: str
     label: str
-    choice: str
     needs: str
     sets: tuple[frozenset[Segment], ...]
     sensors: tuple[Segment, ...] | None
@@ -88,6 +82,19 @@ class PoseEstimator:
         """Whether sensors on these segments are enough."""
         worn = set(segments)
         return any(needed <= worn for needed in self.sets)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseEstimator(PoseMethod):
+    """One estimator of a walk.
+
+    Parameters
+    ----------
+    name : as it is asked for in configuration, API and command line. choice : what a form offers.
+    """
+
+    name: Estimator
+    choice: str
 
 
 ONE_LEG: Final[tuple[frozenset[Segment], ...]] = tuple(
@@ -193,11 +200,9 @@ ORIENTATIONS_ONLY: Final = PoseEstimator(
 ESTIMATORS: Final = (ERKF, L7S_3I, L7S_2I, ORIENTATIONS_ONLY)
 """All, as docs/estimators.md lists them."""
 
-SQUAT_CHAIN: Final = PoseEstimator(
-    name="squat_chain",
+SQUAT_CHAIN: Final = PoseMethod(
     method="squat_chain",
     label="Chain of the squatting leg",
-    choice="Chain of the squatting leg",
     needs="the pelvis, and shank and thigh of each leg that squats",
     sets=tuple(frozenset[Segment](("pelvis", THIGH[s], SHANK[s])) for s in SIDES),
     sensors=("pelvis", *(x for s in SIDES for x in (THIGH[s], SHANK[s]))),
@@ -216,8 +221,8 @@ SQUAT_CHAIN: Final = PoseEstimator(
     ),
     science="docs/science/squat.md",
 )
-"""Runs on squats and on nothing else, so that it is not among `ESTIMATORS`."""
+"""Runs on squats and on nothing else: nobody asks for it, the protocol does."""
 
 BY_NAME: Final[dict[str, PoseEstimator]] = {e.name: e for e in ESTIMATORS}
-BY_METHOD: Final[dict[str, PoseEstimator]] = {e.method: e for e in (*ESTIMATORS, SQUAT_CHAIN)}
-"""`Poses.method` → its estimator; `NO_FIGURE` has none."""
+BY_METHOD: Final[dict[str, PoseMethod]] = {e.method: e for e in (*ESTIMATORS, SQUAT_CHAIN)}
+"""`Poses.method` → what is known of it; `NO_FIGURE` has none."""

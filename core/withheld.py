@@ -20,7 +20,7 @@ from core.body.estimate import PoseEstimate
 from core.body.health import HealthFinding
 from core.body.poses import Poses
 from core.errors import Notice
-from core.estimators import BY_METHOD, PoseEstimator
+from core.estimators import BY_METHOD, PoseMethod
 from core.frames import FOOT, SIDES, SUFFIX, Oriented, Segment, Side
 from core.rest import Window, find_runs
 from core.rotation import wrap_angle
@@ -174,7 +174,7 @@ def _concerned(f: HealthFinding, estimated: frozenset[str]) -> Iterator[str]:
         yield from estimated
 
 
-def _is_fixed(name: str, estimator: PoseEstimator | None) -> bool:
+def _is_fixed(name: str, estimator: PoseMethod | None) -> bool:
     """An angle that no two sensors measure and the estimator's model of the leg holds fixed."""
     variable = name.removesuffix("_l").removesuffix("_r")
     return estimator is not None and variable in estimator.fixed

@@ -18,7 +18,7 @@ import pytest
 
 from core.events.edits import Edit
 from core.measure import Tracks, measure_gait
-from server.pages.timeline import FRAGMENT
+from server.pages.shell import FRAGMENT
 from server.services import patients, sessions
 from tests.bench.pairs import cpu_s, in_pairs, plain_python
 from tests.server import analysed, walk

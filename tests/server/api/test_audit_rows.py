@@ -16,7 +16,7 @@ from server.auth.roles import Action
 from server.auth.routes import list_declared_actions
 from server.auth.tokens import token_hash
 from server.jobs.queue import Claim
-from server.pages.timeline import FRAGMENT
+from server.pages.shell import FRAGMENT
 from server.services import patients, reference_files, sessions, tunings
 from server.storage.tables import job, tuning
 from server.trail import MOST_REFUSED, QUIET_S, AuditTrail

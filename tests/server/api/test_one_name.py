@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import pytest
 
-from server.pages.timeline import FRAGMENT
+from server.pages.shell import FRAGMENT
 from server.report.exports import angles_parquet
 from server.services import patients, sessions
 from server.storage.tables import new_id
