@@ -63,11 +63,8 @@ class Scene:
         """Positions of the copies in the room, m; see-through nodes stand outside it."""
         node = self[name]
         inside = node.name.startswith("/room")
-        origin = (
-            np.zeros(3)
-            if inside
-            else np.array(node.position) - self.server.scene._handle_from_node_name["/room"].position
-        )
+        room = self.server.scene._handle_from_node_name["/room"]
+        origin = np.zeros(3) if inside else np.array(node.position) - np.array(room.position)
         return np.asarray(node.batched_positions) + origin
 
     def play(self, poses: Poses, until_s: float, since_s: float = 0.0) -> int:
