@@ -4,7 +4,7 @@
             sends {"t": seconds}, true|false for one of "dark", "follow" (the person, else the whole walk
             is in the picture) and "ground" (footprints and trails), {"look": "right" or another of VIEWS in
             room.py} or {"ghost": "norm" or another of GhostName in motion.py, null for none}, answered by
-            {"ghost": what is shown}
+            {"ghost": what is shown}, null where there is no such walk
             first answer {"view": id, "src": "/views/<id>/", "start_s", "duration_s",
             "placed": positions are where the person was, "measured": sensors support all of the figure,
             "hidden": segments without a pose}, which are not drawn,
@@ -24,7 +24,7 @@ import math
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, cast
 
 import viser
 from fastapi import APIRouter, FastAPI, Query, Request, WebSocket
@@ -46,7 +46,7 @@ from server.services.histories import AnalysedSession
 from server.services.patients import Patient
 from server.storage.blobs import BlobStore
 from server.viewer.ghost import match_ghost
-from server.viewer.motion import ReplayMotion, prepare_motion
+from server.viewer.motion import GhostName, ReplayMotion, prepare_motion
 from server.viewer.pipe import (
     ViewActivity,
     carry_messages,
@@ -56,7 +56,7 @@ from server.viewer.pipe import (
 )
 from server.viewer.replay_figure import ReplayFigure
 from server.viewer.replay_reference import find_references
-from server.viewer.room import VIEWS
+from server.viewer.room import VIEWS, ViewName
 from server.viewer.views import FigureView, FigureViews
 
 CONTENT_POLICY = (
@@ -262,23 +262,27 @@ def _act(view: FigureView[ReplayFigure], text: str) -> dict[str, Any]:
         message = read_json(text)
     except ValueError:
         message = None
+    motion = view.figure.motion
     if isinstance(message, dict) and len(message) == 1:
         ((name, value),) = message.items()
         if name == "t" and type(value) in (int, float) and math.isfinite(value):
             shown = view.figure.pose(float(value))
             return {"t": shown, "valid": view.figure.is_valid(shown)}
-        if name == "look" and value in VIEWS:
-            view.figure.look_from(value)
+        if name == "look" and isinstance(value, str) and value in VIEWS:
+            view.figure.look_from(cast("ViewName", value))
             return {"look": value}
-        if name == "ghost" and (value is None or value in view.figure.motion.ghosts):
-            return {"ghost": value if view.figure.set_ghost(value) else None}
+        if name == "ghost" and (value is None or (isinstance(value, str) and value in motion.ghosts)):
+            try:
+                return {"ghost": value if view.figure.set_ghost(cast("GhostName | None", value)) else None}
+            except SagittalError as error:
+                return {"ghost": None, "why": str(error)}
         switch = _SWITCHES.get(name)
         if switch and isinstance(value, bool):
             switch(view.figure, value)
             return {name: value}
     detail = (
         f'Expected {{"t": seconds}}, true or false for one of {", ".join(_SWITCHES)}, "look": one of '
-        f'{", ".join(VIEWS)}, or "ghost": null or one of {", ".join(view.figure.motion.ghosts)}.'
+        f'{", ".join(VIEWS)}, or "ghost": null or one of {", ".join(motion.ghosts)}.'
     )
     return {"error": {"code": "bad_message", "detail": detail}}
 
