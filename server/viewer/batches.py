@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -10,7 +10,6 @@ import viser
 from numpy.typing import NDArray
 from viser._messages import SceneNodeUpdateMessage
 
-from core.frames import Floats
 from server.viewer.body_parts import PartName
 from server.viewer.colours import GHOST, TINTS, to_linear_rgb
 from server.viewer.layout import MeshBatch
@@ -27,66 +26,79 @@ ARMS: Final = 0.2
 """Opacity of the arms, which nothing measures; fainter, since seen from the side they cross a thigh."""
 
 RAISED_M: Final = 1.0
-"""Height of the origins of see-through nodes. The browser draws such nodes from far to near by their origins,
-and each hides what is drawn later behind it: at the floor's height they would cut holes into its lines."""
+"""Height of the origins of see-through nodes over that of the floor. The browser draws such nodes from far
+to near by their origins, and each hides what is drawn later behind it: at the floor's height they would cut
+holes into its lines."""
 
 
 class DrawnBatch:
-    """Copies of one mesh in a scene.
+    """Copies of one mesh in the room of a scene.
 
-    A node that can be seen through stays where the camera looks (`RAISED_M`) instead of moving with the room.
+    Parameters
+    ----------
+    name : of the node in the room. opacity : of all copies; None = 1, and `FAINT` for those not measured.
+    middle : (2,) m, of the floor.
     """
 
-    def __init__(self, scene: viser.SceneApi, name: str, batch: MeshBatch, opacity: float | None) -> None:
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        batch: MeshBatch,
+        opacity: float | None,
+        middle: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
         self.batch = batch
         faint = np.where(batch.measured, 1.0, FAINT).astype(np.float32)
-        self.see_through = opacity is not None or bool((faint < 1.0).any())
+        see_through = opacity is not None or bool((faint < 1.0).any())
+        self._origin = np.array((*middle, RAISED_M) if see_through else (0.0, 0.0, 0.0), np.float32)
         self.handle = scene.add_batched_meshes_simple(
-            f"/{name}" if self.see_through else f"{ROOM}/{name}",
+            f"{ROOM}/{name}",
             *batch.mesh,
             batch.wxyz[0],
-            batch.position[0],
+            batch.position[0] - self._origin,
             batched_colors=colour_copies(batch, dark=False),
-            batched_opacities=faint if opacity is None and self.see_through else None,
+            batched_opacities=faint if opacity is None and see_through else None,
             opacity=opacity,
             lod="off",
             cast_shadow=opacity is None,
             receive_shadow=False,
-            position=(0.0, 0.0, RAISED_M if self.see_through else 0.0),
+            position=tuple(self._origin.tolist()),
         )
 
-    def move(self, wxyz: Single, position: Single, middle: Single) -> None:
-        """Turn (k, 4) and place (k, 3) all copies; `middle` (3,) is what the view follows, `RAISED_M` up."""
-        move_copies(self.handle, wxyz, position - middle if self.see_through else position)
+    def move(self, wxyz: Single, position: Single) -> None:
+        """Turn (k, 4) and place (k, 3) m all copies in the room."""
+        move_copies(self.handle, wxyz, position - self._origin)
 
 
 def draw_figure(
-    scene: viser.SceneApi, batches: Iterable[tuple[PartName, MeshBatch]], suffix: str = ""
-) -> list[tuple[PartName, DrawnBatch]]:
+    scene: viser.SceneApi,
+    batches: Mapping[PartName, MeshBatch],
+    suffix: str = "",
+    middle: tuple[float, float] = (0.0, 0.0),
+) -> dict[PartName, DrawnBatch]:
     """Draw the first frame of a figure; arms are always faint."""
-    return [
-        (name, DrawnBatch(scene, f"{name}{suffix}", batch, ARMS if name == "arms" else None))
-        for name, batch in batches
-    ]
+    return {
+        name: DrawnBatch(scene, f"{name}{suffix}", batch, ARMS if name == "arms" else None, middle)
+        for name, batch in batches.items()
+    }
 
 
 def draw_ghost(
-    scene: viser.SceneApi, batches: Iterable[tuple[PartName, MeshBatch]], suffix: str = ""
-) -> list[tuple[PartName, DrawnBatch]]:
+    scene: viser.SceneApi,
+    batches: Mapping[PartName, MeshBatch],
+    suffix: str = "",
+    middle: tuple[float, float] = (0.0, 0.0),
+) -> dict[PartName, DrawnBatch]:
     """Draw another walk: its legs and pelvis, pale and without a shadow, on nodes of their own.
 
     Trunk and arms of both would be in the same place, and which leg is which says where it is.
     """
-    return [
-        (name, DrawnBatch(scene, f"ghost/{name}{suffix}", batch, PALE))
-        for name, batch in batches
+    return {
+        name: DrawnBatch(scene, f"ghost_{name}{suffix}", batch, PALE, middle)
+        for name, batch in batches.items()
         if batch.ghostly
-    ]
-
-
-def find_middle(place: Floats | Single) -> Single:
-    """The origin (3,) of see-through nodes over a place (2,) m of the floor."""
-    return np.array([place[0], place[1], RAISED_M], np.float32)
+    }
 
 
 def colour_copies(

@@ -7,17 +7,21 @@ made of curves is shown at the phases of both legs. Where the figure is in no su
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from core import rotation
 from core.events.result import Stride, Strides
 from core.frames import SIDES, Floats, Side
-from server.viewer.layout import FigureLayout
+from server.viewer.body_parts import PartName
+from server.viewer.layout import FigureLayout, MeshBatch
 from server.viewer.motion import GhostMotion, ReplayMotion
 from server.viewer.reference import SEGMENTS, ReferenceWalk
+from server.viewer.steps import Single
 
 SPAN_S: Final = 1.0
 """The way of the person over this time says where the walk goes: about a stride, so that sway does not."""
@@ -47,7 +51,7 @@ def match_ghost(
     if not (frames >= 0).any():
         return None
     turn = find_heading(figure) - find_heading(other)[there]
-    return GhostMotion(other.batches, other.root, frames, turn)
+    return _lay_over(figure, other.batches, other.root, frames, turn)
 
 
 def match_reference(figure: ReplayMotion, strides: Strides, walk: ReferenceWalk) -> GhostMotion | None:
@@ -71,7 +75,32 @@ def match_reference(figure: ReplayMotion, strides: Strides, walk: ReferenceWalk)
     placed = FigureLayout(SEGMENTS, figure.body, "").place(
         {s: q[:, k] for k, s in enumerate(SEGMENTS)}, {s: p[:, k] for k, s in enumerate(SEGMENTS)}
     )
-    return GhostMotion(placed.batches, np.zeros((len(pairs), 2), np.float32), frames, find_heading(figure))
+    still = np.zeros((len(pairs), 2), np.float32)
+    return _lay_over(figure, placed.batches, still, frames, find_heading(figure))
+
+
+def _lay_over(
+    figure: ReplayMotion,
+    batches: Mapping[PartName, MeshBatch],
+    root: Single,
+    frames: NDArray[np.int64],
+    turn: Floats,
+) -> GhostMotion:
+    """Turn a walk of n frames by `turn` (m,) rad about its root (n, 2) and put that on the figure's root."""
+    there = np.maximum(frames, 0)
+    about = rotation.about(2, turn)[:, None]
+    flat = [np.column_stack((x, np.zeros(len(x)))) for x in (root[there], figure.root)]
+    was, place = (x[:, None] for x in flat)
+    laid = {
+        name: replace(
+            batch,
+            wxyz=rotation.multiply(about, batch.wxyz[there]).astype(np.float32),
+            position=(rotation.rotate(about, batch.position[there] - was) + place).astype(np.float32),
+        )
+        for name, batch in batches.items()
+        if batch.ghostly
+    }
+    return GhostMotion(laid, frames)
 
 
 def find_heading(motion: ReplayMotion) -> Floats:

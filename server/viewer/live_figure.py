@@ -11,7 +11,7 @@ import viser
 
 from core.body.model import BodyModel
 from core.frames import FOOT, SIDES, Floats, Segment
-from server.viewer.batches import DrawnBatch, colour_copies, draw_figure, draw_ghost, find_middle
+from server.viewer.batches import DrawnBatch, colour_copies, draw_figure, draw_ghost
 from server.viewer.body_parts import PartName
 from server.viewer.layout import FigureLayout, PlacedFigure
 from server.viewer.live_floor import LiveFloor
@@ -40,8 +40,8 @@ class LiveFigure:
         self._reference: ReferenceWalk | None = None
         self._layout: FigureLayout | None = None
         self._key: tuple[object, ...] = ()
-        self._drawn: list[tuple[PartName, DrawnBatch]] = []
-        self._ghost: list[tuple[PartName, DrawnBatch]] = []
+        self._drawn: dict[PartName, DrawnBatch] = {}
+        self._ghost: dict[PartName, DrawnBatch] = {}
         self._times = 0
         self._grey = True
         self._t_s: float | None = None
@@ -63,9 +63,7 @@ class LiveFigure:
         q, p = ({s: x[k : k + 1] for k, s in enumerate(SEGMENTS)} for x in stand_upright(self._body))
         self._floor.clear()
         self._path, self._t_s = LivePath(), None
-        placed = self._draw(FigureLayout(SEGMENTS, self._body, ""), q, p, ("standing",))
-        for name, part in self._drawn:
-            part.move(placed.batches[name].wxyz[0], placed.batches[name].position[0], find_middle((0.0, 0.0)))
+        self._draw(FigureLayout(SEGMENTS, self._body, ""), q, p, ("standing",))
         self._room.bring(0.0, 0.0)
         self._set_grey(True)
         self._server.flush()
@@ -122,11 +120,9 @@ class LiveFigure:
             placed = self._draw(layout, q, p, key, ghost=ghost)
         else:
             placed = self._layout.place(q, p)
-        middle = find_middle((root_x, root_y))
         for frame, drawn in enumerate((self._drawn, self._ghost)):
-            for name, part in drawn:
-                batch = placed.batches[name]
-                part.move(batch.wxyz[frame], batch.position[frame], middle)
+            for name, part in drawn.items():
+                part.move(placed.batches[name].wxyz[frame], placed.batches[name].position[frame])
         for side in SIDES:
             if side in placed.soles:
                 sole, foot = placed.soles[side][0], moment.q[FOOT[side]]
@@ -144,7 +140,7 @@ class LiveFigure:
         ghost: bool = False,
     ) -> PlacedFigure:
         """Draw other parts than before."""
-        for _, part in (*self._drawn, *self._ghost):
+        for part in (*self._drawn.values(), *self._ghost.values()):
             part.handle.remove()
         placed = layout.place(q, p)
         self._layout, self._key = layout, key
@@ -152,8 +148,8 @@ class LiveFigure:
         # have opacities now (GL_INVALID_OPERATION, and nothing is drawn)
         self._times += 1
         scene, suffix = self._server.scene, f"_{self._times}"
-        self._drawn = draw_figure(scene, placed.batches.items(), suffix)
-        self._ghost = draw_ghost(scene, placed.batches.items(), suffix) if ghost else []
+        self._drawn = draw_figure(scene, placed.batches, suffix)
+        self._ghost = draw_ghost(scene, placed.batches, suffix) if ghost else {}
         self._paint()
         return placed
 
@@ -163,9 +159,9 @@ class LiveFigure:
             self._paint()
 
     def _paint(self) -> None:
-        for _, part in self._drawn:
+        for part in self._drawn.values():
             part.handle.batched_colors = colour_copies(part.batch, self._dark, grey=self._grey)
-        for _, part in self._ghost:
+        for part in self._ghost.values():
             part.handle.batched_colors = colour_copies(part.batch, self._dark, ghost=True)
 
 

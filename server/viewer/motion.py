@@ -101,19 +101,16 @@ class ReplayMotion:
 
 @dataclass(frozen=True, eq=False)
 class GhostMotion:
-    """Another walk, matched frame by frame to a figure whose root its own is put on.
+    """Another walk laid over a figure, frame by frame in the same place and direction.
 
     Parameters
     ----------
-    batches : name → copies of one mesh in n frames. root : (n, 2) m, its path on the floor.
-    frames : (m,) which of them is shown at each frame of the figure, −1 for none.
-    turn : (m,) rad about the vertical that brings it into the figure's direction.
+    batches : name → copies of one mesh in the m frames of the figure, those that a ghost shows.
+    frames : (m,) frame of the other walk that is shown, −1 where there is none.
     """
 
     batches: Mapping[PartName, MeshBatch]
-    root: Single
     frames: NDArray[np.int64]
-    turn: Floats
 
 
 def prepare_motion(poses: Poses) -> ReplayMotion:

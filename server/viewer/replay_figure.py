@@ -6,13 +6,7 @@ import numpy as np
 import viser
 
 from core.frames import Floats
-from server.viewer.batches import (
-    DrawnBatch,
-    colour_copies,
-    draw_figure,
-    draw_ghost,
-    find_middle,
-)
+from server.viewer.batches import DrawnBatch, colour_copies, draw_figure, draw_ghost
 from server.viewer.body_parts import PartName
 from server.viewer.ghost import find_heading
 from server.viewer.motion import GhostMotion, GhostName, ReplayMotion
@@ -45,11 +39,10 @@ class ReplayFigure:
         scene = server.scene
         x, y = self._middle.tolist()
         self._room = SceneRoom(server, FLOOR_M + 6.0 * float(np.ptp(motion.root, axis=0).max()), (x, y))
-        self._drawn = draw_figure(scene, motion.batches.items())
-        self._ghost_node = scene.add_frame("/ghost", show_axes=False)
+        self._drawn = draw_figure(scene, motion.batches, middle=(x, y))
         self._headings: Floats | None = None
         self._matched: GhostMotion | None = None
-        self._ghost: list[tuple[PartName, DrawnBatch]] = []
+        self._ghost: dict[PartName, DrawnBatch] = {}
         self._ground = ReplayFloor(scene, ROOM, motion)
         self.set_dark(dark)
         self.set_follow(True)
@@ -69,15 +62,14 @@ class ReplayFigure:
         i = m.index(t_s)
         self._t_s = float(m.t_s[i])
         valid = bool(m.valid[i])
-        place = m.root[i] if self._follow else self._middle
-        middle = find_middle(place)
+        ghost = valid and self._matched is not None and self._matched.frames[i] >= 0
         with self._server.atomic():
-            for _, part in self._drawn:
-                part.handle.visible = valid
-                if valid:
-                    part.move(part.batch.wxyz[i], part.batch.position[i], middle)
-            self._pose_ghost(i, (m.root[i] - place).tolist(), valid=valid)
-            self._room.bring(*place.tolist())
+            for drawn, visible in ((self._drawn, valid), (self._ghost, ghost)):
+                for part in drawn.values():
+                    part.handle.visible = bool(visible)
+                    if visible:
+                        part.move(part.batch.wxyz[i], part.batch.position[i])
+            self._room.bring(*(m.root[i] if self._follow else self._middle).tolist())
             self._ground.show(self._t_s, recent=self._follow)
         self._server.flush()
         return self._t_s
@@ -85,9 +77,9 @@ class ReplayFigure:
     def set_dark(self, dark: bool) -> None:
         """Change all colours to the theme of the page around."""
         self._dark = dark
-        for _, part in self._drawn:
+        for part in self._drawn.values():
             part.handle.batched_colors = colour_copies(part.batch, dark)
-        for _, part in self._ghost:
+        for part in self._ghost.values():
             part.handle.batched_colors = colour_copies(part.batch, dark, ghost=True)
         self._ground.set_dark(dark)
         self._room.set_dark(dark)
@@ -114,32 +106,17 @@ class ReplayFigure:
     def set_ghost(self, name: GhostName | None) -> bool:
         """Lay another walk over the figure, None = none; tell whether there is such a walk."""
         found = self._motion.ghosts.get(name, lambda: None)() if name is not None else None
-        for _, part in self._ghost:
+        for part in self._ghost.values():
             part.handle.remove()
-        self._matched, self._ghost = found, []
+        self._matched, self._ghost = found, {}
         if found is not None:
             # each has names of its own: under a name in use the client may keep an older shader
-            self._ghost = draw_ghost(self._server.scene, found.batches.items(), f"_{name}")
-            for _, part in self._ghost:
+            x, y = self._middle.tolist()
+            self._ghost = draw_ghost(self._server.scene, found.batches, f"_{name}", (x, y))
+            for part in self._ghost.values():
                 part.handle.batched_colors = colour_copies(part.batch, self._dark, ghost=True)
         self.pose(self._t_s)
         return found is not None
-
-    def _pose_ghost(self, i: int, place: list[float], *, valid: bool) -> None:
-        ghost = self._matched
-        if ghost is None:
-            return
-        j = int(ghost.frames[i])
-        visible = valid and j >= 0
-        middle = find_middle(ghost.root[j])
-        for _, part in self._ghost:
-            part.handle.visible = visible
-            if visible:
-                part.move(part.batch.wxyz[j], part.batch.position[j], middle)
-        if visible:
-            half = float(ghost.turn[i]) / 2
-            self._ghost_node.wxyz = (float(np.cos(half)), 0.0, 0.0, float(np.sin(half)))
-            self._ghost_node.position = (place[0], place[1], 0.0)
 
     def set_ground(self, visible: bool) -> None:
         """Show or hide footprints and trails."""

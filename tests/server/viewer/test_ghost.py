@@ -76,11 +76,7 @@ def test_the_same_walk_elsewhere_falls_onto_the_figure(motion: ReplayMotion, gho
     shanks, theirs = motion.batches["shanks"], ghost.batches["shanks"]
     start, end = counted(12.0)[2]
     for i in np.flatnonzero((motion.t_s >= start) & (motion.t_s < end))[::5]:
-        about = rotation.about(2, ghost.turn[i])
-        root = np.append(ghost.root[ghost.frames[i]], 0.0)
-        place = np.append(motion.root[i], 0.0)
-        moved = rotation.rotate(about, theirs.position[ghost.frames[i]] - root) + place
-        np.testing.assert_allclose(moved, shanks.position[i], atol=0.03)
+        np.testing.assert_allclose(theirs.position[i], shanks.position[i], atol=0.03)
 
 
 def test_the_direction_is_that_of_the_way_and_on_the_spot_of_the_beginning(motion: ReplayMotion) -> None:
@@ -105,10 +101,10 @@ def test_the_figure_shows_it_pale_in_strides_and_hides_it_when_told(
     server: viser.ViserServer, motion: ReplayMotion, ghost: GhostMotion
 ) -> None:
     figure = ReplayFigure(server, replace(motion, ghosts={"visit": lambda: ghost, "norm": lambda: None}))
-    assert figure._ghost == []
+    assert figure._ghost == {}
     assert figure.set_ghost("visit")
-    handles = [part.handle for _, part in figure._ghost]
-    assert {name for name, _ in figure._ghost} == {
+    handles = [part.handle for part in figure._ghost.values()]
+    assert set(figure._ghost) == {
         "thighs", "shanks", "foot_l", "foot_r", "toes_l", "toes_r", "pelvis"
     }  # fmt: skip
     assert {h.opacity for h in handles} == {PALE}
@@ -119,16 +115,17 @@ def test_the_figure_shows_it_pale_in_strides_and_hides_it_when_told(
     figure.pose(0.0)
     assert not any(h.visible for h in handles)
     figure.pose((start + end) / 2)
-    # see-through nodes stand where the camera looks, whatever the way walked so far
-    assert {tuple(h.position) for h in handles} == {(0.0, 0.0, RAISED_M)}
-    assert np.abs(handles[0].batched_positions).max() < 1.5
+    # over the middle of the floor, whose lines they may not hide
+    middle = (motion.root.min(axis=0) + motion.root.max(axis=0)) / 2
+    for handle in handles:
+        np.testing.assert_allclose(handle.position, (*middle, RAISED_M), atol=1e-5)
     figure.set_dark(True)
     assert {tuple(c) for c in np.asarray(handles[0].batched_colors).tolist()} == {to_linear_rgb(GHOST[True])}
     assert not figure.set_ghost("norm")
-    assert figure._ghost == []
+    assert figure._ghost == {}
     assert figure.set_ghost("visit")
     assert not figure.set_ghost(None)
-    assert not any("ghost/" in name for name in server.scene._handle_from_node_name)
+    assert not any("ghost" in name for name in server.scene._handle_from_node_name)
 
 
 def test_the_norm_over_a_replay_has_its_angles_at_the_phases_of_both_legs(motion: ReplayMotion) -> None:
@@ -139,11 +136,12 @@ def test_the_norm_over_a_replay_has_its_angles_at_the_phases_of_both_legs(motion
     for start, end in counted(12.0)[2:5]:
         for i in np.flatnonzero((motion.t_s >= start) & (motion.t_s < end))[::7]:
             row = round(PHASES * (motion.t_s[i] - start) / (end - start))
-            j = ghost.frames[i]
-            knee = -cardan_zxy(rotation.multiply(rotation.conjugate(thighs[j, 0]), shanks[j, 0]))[0]
+            knee = -cardan_zxy(rotation.multiply(rotation.conjugate(thighs[i, 0]), shanks[i, 0]))[0]
             assert knee == pytest.approx(norm["knee_flexion"][row], abs=1e-4)
-    assert len(ghost.batches["pelvis"].wxyz) < 0.5 * len(motion.t_s)  # a pair of phases is posed once
-    assert np.degrees(np.ptp(ghost.turn)) < 3.0
+    seen = ghost.frames >= 0
+    assert len(np.unique(ghost.frames[seen])) < 0.5 * seen.sum()  # a pair of phases is posed once
+    pelvis = ghost.batches["pelvis"].position[:, 0, :2]
+    np.testing.assert_allclose(pelvis[seen], motion.root[seen], atol=1e-4)
     assert (
         match_reference(motion, replace(walk.strides(), strides=()), ReferenceWalk(norm, walk.BODY)) is None
     )

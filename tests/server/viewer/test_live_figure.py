@@ -54,18 +54,13 @@ class Scene:
     def __getitem__(self, name: str) -> viser.SceneNodeHandle:
         nodes = self.server.scene._handle_from_node_name
         # batches have the number of the drawing behind their name
-        for at in (f"/room{name}", name):
-            if at in nodes:
-                return nodes[at]
-        return nodes[next(n for n in reversed(nodes) if re.fullmatch(rf"(/room)?{name}_\d+", n))]
+        if f"/room{name}" in nodes:
+            return nodes[f"/room{name}"]
+        return nodes[next(n for n in reversed(nodes) if re.fullmatch(rf"/room{name}_\d+", n))]
 
     def place_of(self, name: str) -> np.ndarray:
-        """Positions of the copies in the room, m; see-through nodes stand outside it."""
-        node = self[name]
-        inside = node.name.startswith("/room")
-        room = self.server.scene._handle_from_node_name["/room"]
-        origin = np.zeros(3) if inside else np.array(node.position) - np.array(room.position)
-        return np.asarray(node.batched_positions) + origin
+        """Positions of the copies in the room, m."""
+        return np.asarray(self[name].batched_positions) + np.array(self[name].position)
 
     def play(self, poses: Poses, until_s: float, since_s: float = 0.0) -> int:
         """Show all moments of a time; the index of the last."""
@@ -218,13 +213,13 @@ FEET = ("foot_l", "foot_r")
 
 def ghosts_of(scene: Scene) -> set[str]:
     """Parts of the ghost that is in the scene."""
-    names = (re.fullmatch(r"/ghost/(\w+)_\d+", n) for n in scene.server.scene._handle_from_node_name)
+    names = (re.fullmatch(r"/room/ghost_(\w+)_\d+", n) for n in scene.server.scene._handle_from_node_name)
     return {found[1] for found in names if found}
 
 
 def ghost_of(scene: Scene, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Positions in the room and orientations of a part of the ghost."""
-    return scene.place_of(f"/ghost/{name}"), np.asarray(scene[f"/ghost/{name}"].batched_wxyzs, float)
+    return scene.place_of(f"/ghost_{name}"), np.asarray(scene[f"/ghost_{name}"].batched_wxyzs, float)
 
 
 def test_the_ghost_of_the_norm_has_the_angles_of_the_norm_beside_the_person(
@@ -263,7 +258,7 @@ def test_the_ghost_is_pale_and_goes_when_it_is_switched_off_or_no_phase_is_known
     scene.figure.set_reference(ReferenceWalk(NORM, walk.BODY))
     scene.figure.show(moment(poses, 60))
     for name in ("thighs", "pelvis", "foot_l"):
-        node = scene[f"/ghost/{name}"]
+        node = scene[f"/ghost_{name}"]
         assert {tuple(c) for c in np.asarray(node.batched_colors).tolist()} == {to_linear_rgb(GHOST[False])}
         assert node.opacity == PALE
     assert ghosts_of(scene) == {"thighs", "shanks", *FEET, "toes_l", "toes_r", "pelvis"}  # no second trunk

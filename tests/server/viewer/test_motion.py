@@ -41,10 +41,11 @@ def test_limbs_reach_from_joint_to_joint(motion: ReplayMotion) -> None:
     for i in (0, 133, 400):
         frame = 2 * i  # thinned from 100 to 50 frames a second
         assert motion.t_s[i] == poses.t_s[frame]
-        for name, length, start, end in (
+        limbs: tuple[tuple[PartName, float, Mapping[Side, Segment], Mapping[Side, Segment]], ...] = (
             ("thighs", walk.BODY.thigh, THIGH, SHANK),
             ("shanks", walk.BODY.shank, SHANK, FOOT),
-        ):
+        )
+        for name, length, start, end in limbs:
             for k, side in enumerate(SIDES):
                 upper = transformed(motion, name, k, i, (0, 0, 0))
                 lower = transformed(motion, name, k, i, (0, -length, 0))
@@ -84,7 +85,7 @@ TOES_AND_FOOT: Mapping[Side, tuple[PartName, PartName]] = {
 def toe_bend(motion: ReplayMotion, side: Side) -> np.ndarray:
     """Angle of the toes against the foot in each frame, degrees."""
     toes, foot = (motion.batches[name].wxyz[:, 0].astype(float) for name in TOES_AND_FOOT[side])
-    return np.degrees(2 * np.arccos(np.clip(np.einsum("ij,ij->i", toes, foot), -1.0, 1.0)))
+    return np.asarray(np.degrees(2 * np.arccos(np.clip(np.einsum("ij,ij->i", toes, foot), -1.0, 1.0))))
 
 
 def test_soles_stand_on_the_floor(motion: ReplayMotion) -> None:
@@ -136,7 +137,8 @@ def test_positions_that_are_for_the_eye_only_leave_no_trail() -> None:
 def test_what_no_sensor_supports_is_marked(method: str, measured: set[str]) -> None:
     seen = prepare_motion(replace(walk.poses(3.0), method=method))
     thigh, shank, foot, pelvis = (x in measured for x in ("thigh", "shank", "foot", "pelvis"))
-    for name, worn in (("thighs", thigh), ("shanks", shank), ("foot_l", foot), ("toes_r", foot)):
+    expected: dict[PartName, bool] = {"thighs": thigh, "shanks": shank, "foot_l": foot, "toes_r": foot}
+    for name, worn in expected.items():
         assert set(seen.batches[name].measured) == {worn}, name
     assert seen.batches["pelvis"].measured == seen.batches["trunk"].measured == (pelvis,)
     assert seen.measured == (thigh and pelvis)
