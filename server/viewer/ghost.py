@@ -88,14 +88,19 @@ def _lay_over(
 ) -> GhostMotion:
     """Turn a walk of n frames by `turn` (m,) rad about its root (n, 2) and put that on the figure's root."""
     there = np.maximum(frames, 0)
-    about = rotation.about(2, turn)[:, None]
-    flat = [np.column_stack((x, np.zeros(len(x)))) for x in (root[there], figure.root)]
-    was, place = (x[:, None] for x in flat)
+    about = rotation.about(2, turn)
+    moved = rotation.rotate(about, _lift(root[there]))
+    way = (_lift(figure.root) - moved)[:, None]
+    about = about[:, None]
+
+    def turned(points: Single) -> Floats:
+        return rotation.rotate(about, points.astype(np.float64))
+
     laid = {
         name: replace(
             batch,
-            wxyz=rotation.multiply(about, batch.wxyz[there]).astype(np.float32),
-            position=(rotation.rotate(about, batch.position[there] - was) + place).astype(np.float32),
+            wxyz=rotation.multiply(about, batch.wxyz[there].astype(np.float64)).astype(np.float32),
+            position=(turned(batch.position[there]) + way).astype(np.float32),
         )
         for name, batch in batches.items()
         if batch.ghostly
@@ -137,3 +142,8 @@ def _count_steps(t_s: Floats, strides: Strides, side: Side) -> NDArray[np.int64]
             phase = (t_s[inside] - stride.start_s) / (stride.end_s - stride.start_s)
             found[inside] = np.rint(PHASES * phase)
     return found
+
+
+def _lift(place: Single) -> Floats:
+    """Points (n, 3) of the floor from places (n, 2) on it, m."""
+    return np.column_stack((place, np.zeros(len(place)))).astype(np.float64)

@@ -60,7 +60,7 @@ class Scene:
 
     def place_of(self, name: str) -> np.ndarray:
         """Positions of the copies in the room, m."""
-        return np.asarray(self[name].batched_positions) + np.array(self[name].position)
+        return np.asarray(np.asarray(self[name].batched_positions) + np.array(self[name].position))
 
     def play(self, poses: Poses, until_s: float, since_s: float = 0.0) -> int:
         """Show all moments of a time; the index of the last."""
