@@ -144,7 +144,7 @@ def test_a_video_of_the_walking_figure_can_be_saved(opened: Opener, solid: Brows
     page = _open(opened, solid, filled.done)
     with page.expect_download(timeout=60_000) as waiting:
         page.get_by_role("button", name="Record video").click()
-        page.wait_for_function("document.querySelector('time-bar [data-play]').ariaLabel === 'Pause'")
+        expect(page.locator("time-bar [data-play]")).to_have_attribute("aria-label", "Pause")
         page.wait_for_timeout(2500)
         page.get_by_role("button", name="Stop and save").click()
     assert re.fullmatch(r"figure-[\d.]+s\.webm", waiting.value.suggested_filename)

@@ -130,8 +130,8 @@ def test_the_visit_before_walks_as_a_ghost_with_the_figure(
     page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
     page.frame_locator("gait-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
     assert any(f"/sessions/{filled.done}/replay" in a and f"ghost={filled.earlier}" in a for a in asked)
-    menu = page.get_by_label("Laid over it")
-    expect(menu.locator("option:checked")).to_have_text("Visit of 21 Oct 2026")
+    menu = page.get_by_label("Ghost")
+    expect(menu.locator("option:checked")).to_have_text("21 Oct 2026")
     expect(page.locator("gait-view")).to_have_attribute("data-ghost-shown", "visit")
     for chosen, shown in (("norm", "norm"), ("left", "left"), ("", "")):
         menu.select_option(chosen)

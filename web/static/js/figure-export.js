@@ -12,7 +12,8 @@ function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-// What is on a WebGL canvas is gone after it was shown, so a frame is taken from its stream; `redraw` brings one.
+// What is on a WebGL canvas is gone after it was shown, so a frame is taken from its stream. viser draws only when
+// something changed: `redraw` shows the same moment again.
 export async function savePicture(canvas, redraw, name) {
   const stream = canvas.captureStream();
   const video = document.createElement("video");

@@ -103,7 +103,7 @@ class GaitView extends HTMLElement {
     } else if (message.ghost !== undefined) {
       this.dataset.ghostShown = message.ghost ?? "";
       const wanted = this.ghosts.value && this.ghosts.selectedOptions[0].text.trim();
-      this.lacking = wanted && !message.ghost ? (message.why ?? `None for this walk: ${wanted}`) : "";
+      this.lacking = wanted && !message.ghost ? (message.why ?? `This walk has no such ghost: ${wanted}`) : "";
       this.say(this.lacking);
     } else if (message.t !== undefined) {
       this.waiting = false;
@@ -122,9 +122,9 @@ class GaitView extends HTMLElement {
     if (el && el.textContent !== text) el.textContent = text;
   }
 
-  // viser draws only when something changed: the same moment again makes it draw
+  // The one that the figure is drawn on; viser has others.
   canvas() {
-    return this.frame.contentDocument.querySelector("canvas");
+    return this.frame.contentDocument.querySelector("canvas[data-engine]");
   }
 
   async savePicture() {
