@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import viser
+from viser._messages import SceneNodeUpdateMessage
 
 from core import rotation
 from core.angles import cardan_zxy
@@ -304,3 +305,23 @@ def test_who_turns_back_stays_in_the_picture() -> None:
         x = 1.2 * (t if t < 4 else 8 - t)
         seen_x, seen_y, _ = path.push(t, x, 0.0, 0.0)
         assert np.hypot(seen_x - x, seen_y) < 0.31
+
+
+@pytest.mark.parametrize(("ghost", "messages", "floats"), [(False, 13, 250), (True, 20, 330)])
+def test_a_frame_is_a_few_small_messages(
+    server: viser.ViserServer, poses: Poses, ghost: bool, messages: int, floats: int
+) -> None:
+    """Poses, floor and room; trails, which are of fixed size, are sent at every third frame only."""
+    scene = Scene(server)
+    scene.figure.set_reference(ReferenceWalk(NORM, walk.BODY) if ghost else None)
+    scene.play(poses, 2.0)
+    sent = server._websock_server._broadcast_buffer.message_from_id
+    before = set(sent)
+    scene.figure.show(moment(poses, 61))
+    new = [m for k, m in sent.items() if k not in before]
+    poses_sent = [
+        m.updates for m in new if isinstance(m, SceneNodeUpdateMessage) and "batched_wxyzs" in m.updates
+    ]
+    assert len(poses_sent) >= 10
+    assert len(new) <= messages
+    assert sum(np.size(x) for updates in poses_sent for x in updates.values()) <= floats
