@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -9,52 +10,105 @@ import viser
 from numpy.typing import NDArray
 from viser._messages import SceneNodeUpdateMessage
 
+from server.viewer.body_parts import PartName
 from server.viewer.colours import GHOST, TINTS, to_linear_rgb
 from server.viewer.layout import MeshBatch
+from server.viewer.room import ROOM
 from server.viewer.steps import Single
 
 PALE: Final = 0.5
-"""Opacity of another visit and of a reference."""
+"""Opacity of another walk laid over the figure."""
 
 FAINT: Final = 0.35
 """Opacity of a part that no sensor supports."""
 
+ARMS: Final = 0.2
+"""Opacity of the arms, which nothing measures; fainter, since seen from the side they cross a thigh."""
 
-def add_batch(
-    scene: viser.SceneApi, name: str, batch: MeshBatch, *, ghost: bool = False
-) -> viser.BatchedMeshHandle:
-    """Draw the first frame of a batch; with `ghost` the legs of the second too, pale, in the same node."""
-    frames = 2 if ghost else 1
-    opacity, scale = np.where(batch.measured, 1.0, FAINT).astype(np.float32), batch.scale
-    if ghost:
-        opacity = np.append(opacity, np.full(len(opacity), PALE, np.float32))
-        # trunk and head of both are in the same place
-        legs = np.array([[tint != "body"] for tint in batch.tint], np.float32)
-        legs *= np.array(batch.ghostly, np.float32)[:, None]
-        scale = np.concatenate((scale, legs * scale))
-    return scene.add_batched_meshes_simple(
-        name,
-        *batch.mesh,
-        batch.wxyz[:frames].reshape(-1, 4),
-        batch.position[:frames].reshape(-1, 3),
-        batched_scales=scale,
-        batched_colors=colour_copies(batch, dark=False, ghost=ghost),
-        batched_opacities=None if (opacity == 1.0).all() else opacity,
-        lod="off",
-        receive_shadow=False,
-    )
+RAISED_M: Final = 1.0
+"""Height of the origins of see-through nodes over that of the floor. The browser draws such nodes from far
+to near by their origins, and each hides what is drawn later behind it: at the floor's height they would cut
+holes into its lines."""
+
+
+class DrawnBatch:
+    """Copies of one mesh in the room of a scene.
+
+    Parameters
+    ----------
+    name : of the node in the room. opacity : of all copies; None = 1, and `FAINT` for those not measured.
+    middle : (2,) m, of the floor.
+    """
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        batch: MeshBatch,
+        opacity: float | None,
+        middle: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
+        self.batch = batch
+        faint = np.where(batch.measured, 1.0, FAINT).astype(np.float32)
+        see_through = opacity is not None or bool((faint < 1.0).any())
+        self._origin = np.array((*middle, RAISED_M) if see_through else (0.0, 0.0, 0.0), np.float32)
+        self.handle = scene.add_batched_meshes_simple(
+            f"{ROOM}/{name}",
+            *batch.mesh,
+            batch.wxyz[0],
+            batch.position[0] - self._origin,
+            batched_colors=colour_copies(batch, dark=False),
+            batched_opacities=faint if opacity is None and see_through else None,
+            opacity=opacity,
+            lod="off",
+            cast_shadow=opacity is None,
+            receive_shadow=False,
+            position=tuple(self._origin.tolist()),
+        )
+
+    def move(self, wxyz: Single, position: Single) -> None:
+        """Turn (k, 4) and place (k, 3) m all copies in the room."""
+        move_copies(self.handle, wxyz, position - self._origin)
+
+
+def draw_figure(
+    scene: viser.SceneApi,
+    batches: Mapping[PartName, MeshBatch],
+    suffix: str = "",
+    middle: tuple[float, float] = (0.0, 0.0),
+) -> dict[PartName, DrawnBatch]:
+    """Draw the first frame of a figure; arms are always faint."""
+    return {
+        name: DrawnBatch(scene, f"{name}{suffix}", batch, ARMS if name == "arms" else None, middle)
+        for name, batch in batches.items()
+    }
+
+
+def draw_ghost(
+    scene: viser.SceneApi,
+    batches: Mapping[PartName, MeshBatch],
+    suffix: str = "",
+    middle: tuple[float, float] = (0.0, 0.0),
+) -> dict[PartName, DrawnBatch]:
+    """Draw another walk: its legs and pelvis, pale and without a shadow, on nodes of their own.
+
+    Trunk and arms of both would be in the same place, and which leg is which says where it is.
+    """
+    return {
+        name: DrawnBatch(scene, f"ghost_{name}{suffix}", batch, PALE, middle)
+        for name, batch in batches.items()
+        if batch.ghostly
+    }
 
 
 def colour_copies(
-    batch: MeshBatch, dark: bool, *, ghost: bool = False, grey: bool = False
+    batch: MeshBatch, dark: bool, *, grey: bool = False, ghost: bool = False
 ) -> NDArray[np.uint8]:
-    """Return the colours of all copies, (k, 3) and with a ghost (2k, 3), as viser takes them.
-
-    `grey` draws the sides in the colour of the body.
-    """
+    """Return the colours of all copies, (k, 3), as viser takes them; `grey` draws the sides as the body."""
+    if ghost:
+        return np.array([to_linear_rgb(GHOST[dark])] * len(batch.tint), np.uint8)
     tints = ["body" if grey and tint in ("left", "right") else tint for tint in batch.tint]
-    own = [to_linear_rgb(TINTS[dark][tint]) for tint in tints]
-    return np.array(own + [to_linear_rgb(GHOST[dark])] * (len(own) * ghost), np.uint8)
+    return np.array([to_linear_rgb(TINTS[dark][tint]) for tint in tints], np.uint8)
 
 
 def move_copies(handle: viser.BatchedMeshHandle, wxyz: Single, position: Single) -> None:

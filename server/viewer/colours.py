@@ -8,27 +8,25 @@ from typing import Final, Literal
 import numpy as np
 
 Rgb = tuple[int, int, int]
-Tint = Literal["left", "right", "body", "joint", "band"]
+Tint = Literal["left", "right", "body", "ring"]
 
 TINTS: Final[Mapping[bool, Mapping[Tint, Rgb]]] = {
     False: {
         "left": (0xD5, 0x5E, 0x00),
         "right": (0x00, 0x72, 0xB2),
-        "body": (0x6B, 0x76, 0x82),
-        "joint": (0xEC, 0xEE, 0xF1),
-        "band": (0xF4, 0xF6, 0xF8),
+        "body": (0x9A, 0xA4, 0xAE),
+        "ring": (0xA9, 0xD6, 0xF2),
     },
     True: {
         "left": (0xF5, 0x87, 0x3A),
         "right": (0x56, 0xB4, 0xE9),
-        "body": (0x6B, 0x76, 0x82),
-        "joint": (0xEC, 0xEE, 0xF1),
-        "band": (0x12, 0x17, 0x1C),
+        "body": (0x8C, 0x97, 0xA3),
+        "ring": (0x0E, 0x3A, 0x57),
     },
 }
 """Dark → colours of the parts; the leg pairs are --left and --right of the page's tokens.css.
 
-The band is what a letter in the colour of its leg stands on.
+Two rings around the right shank tell the sides where colours do not.
 """
 
 GHOST: Final[Mapping[bool, Rgb]] = {False: (0x5B, 0x7C, 0x99), True: (0x8F, 0xAE, 0xC8)}

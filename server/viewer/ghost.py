@@ -1,24 +1,33 @@
-"""The same person at another visit, laid over the figure: at the same phase of a stride, in the same place.
+"""Another walk laid over the figure: at the same phase of a stride, in the same place.
 
 Two walks share no time. Each stride of the figure that counts gets a stride of the other visit, in their
-order and from the beginning again when they run out; between its contacts time runs with the phase. Where the
-figure is in no such stride there is no ghost.
+order and from the beginning again when they run out; between its contacts time runs with the phase. A walk
+made of curves is shown at the phases of both legs. Where the figure is in no such stride there is no ghost.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from core import rotation
 from core.events.result import Stride, Strides
-from core.frames import SIDES, Floats
+from core.frames import SIDES, Floats, Side
+from server.viewer.body_parts import PartName
+from server.viewer.layout import FigureLayout, MeshBatch
 from server.viewer.motion import GhostMotion, ReplayMotion
+from server.viewer.reference import SEGMENTS, ReferenceWalk
+from server.viewer.steps import Single
 
 SPAN_S: Final = 1.0
 """The way of the person over this time says where the walk goes: about a stride, so that sway does not."""
+
+PHASES: Final = 100
+"""Steps of phase in which a walk made of curves is shown, as many as its curves have."""
 
 STANDS_M: Final = 0.15
 """A shorter way in that time has no direction; on a treadmill the facing of the beginning stands for it."""
@@ -42,10 +51,61 @@ def match_ghost(
     if not (frames >= 0).any():
         return None
     turn = find_heading(figure) - find_heading(other)[there]
-    root = other.root[there].astype(np.float64)
-    c, s = np.cos(turn), np.sin(turn)
-    moved = np.stack((c * root[:, 0] - s * root[:, 1], s * root[:, 0] + c * root[:, 1]), axis=1)
-    return GhostMotion(other, frames, turn, figure.root - moved)
+    return _lay_over(figure, other.batches, other.root, frames, turn)
+
+
+def match_reference(figure: ReplayMotion, strides: Strides, walk: ReferenceWalk) -> GhostMotion | None:
+    """Match a walk made of curves to a figure; None when it has no stride that counts."""
+    steps = np.stack([_count_steps(figure.t_s, strides, side) for side in SIDES], axis=1)
+    pairs, frames = np.unique(steps, axis=0, return_inverse=True)
+    frames = np.where((steps >= 0).any(axis=1), frames.reshape(-1), -1)
+    if not (frames >= 0).any():
+        return None
+    # each pair of phases is posed once, whatever the length of the take
+    posed = [
+        walk.at(
+            {side: k / PHASES if k >= 0 else None for side, k in zip(SIDES, pair, strict=True)},
+            (0.0, 0.0),
+            0.0,
+        )
+        or walk.pose(0, 0, (0.0, 0.0), 0.0)
+        for pair in pairs.tolist()
+    ]
+    q, p = (np.array(x) for x in zip(*posed, strict=True))
+    placed = FigureLayout(SEGMENTS, figure.body, "").place(
+        {s: q[:, k] for k, s in enumerate(SEGMENTS)}, {s: p[:, k] for k, s in enumerate(SEGMENTS)}
+    )
+    still = np.zeros((len(pairs), 2), np.float32)
+    return _lay_over(figure, placed.batches, still, frames, find_heading(figure))
+
+
+def _lay_over(
+    figure: ReplayMotion,
+    batches: Mapping[PartName, MeshBatch],
+    root: Single,
+    frames: NDArray[np.int64],
+    turn: Floats,
+) -> GhostMotion:
+    """Turn a walk of n frames by `turn` (m,) rad about its root (n, 2) and put that on the figure's root."""
+    there = np.maximum(frames, 0)
+    about = rotation.about(2, turn)
+    moved = rotation.rotate(about, _lift(root[there]))
+    way = (_lift(figure.root) - moved)[:, None]
+    about = about[:, None]
+
+    def turned(points: Single) -> Floats:
+        return rotation.rotate(about, points.astype(np.float64))
+
+    laid = {
+        name: replace(
+            batch,
+            wxyz=rotation.multiply(about, batch.wxyz[there].astype(np.float64)).astype(np.float32),
+            position=(turned(batch.position[there]) + way).astype(np.float32),
+        )
+        for name, batch in batches.items()
+        if batch.ghostly
+    }
+    return GhostMotion(laid, frames)
 
 
 def find_heading(motion: ReplayMotion) -> Floats:
@@ -71,3 +131,19 @@ def _frames(
         nearer = wanted - other_t_s[after - 1] < other_t_s[after] - wanted
         frames[inside] = after - nearer
     return frames
+
+
+def _count_steps(t_s: Floats, strides: Strides, side: Side) -> NDArray[np.int64]:
+    """Phase of a side in steps of 1 / `PHASES` at each time, −1 outside its strides that count."""
+    found = np.full(len(t_s), -1, np.int64)
+    for stride in strides.strides:
+        if stride.side == side and stride.excluded_reason is None:
+            inside = (t_s >= stride.start_s) & (t_s < stride.end_s)
+            phase = (t_s[inside] - stride.start_s) / (stride.end_s - stride.start_s)
+            found[inside] = np.rint(PHASES * phase)
+    return found
+
+
+def _lift(place: Single) -> Floats:
+    """Points (n, 3) of the floor from places (n, 2) on it, m."""
+    return np.column_stack((place, np.zeros(len(place)))).astype(np.float64)

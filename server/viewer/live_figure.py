@@ -11,13 +11,14 @@ import viser
 
 from core.body.model import BodyModel
 from core.frames import FOOT, SIDES, Floats, Segment
-from server.viewer.batches import add_batch, colour_copies, move_copies
-from server.viewer.layout import FigureLayout, MeshBatch, PlacedFigure
+from server.viewer.batches import DrawnBatch, colour_copies, draw_figure, draw_ghost
+from server.viewer.body_parts import PartName
+from server.viewer.layout import FigureLayout, PlacedFigure
 from server.viewer.live_floor import LiveFloor
 from server.viewer.live_path import GAP_S, LivePath
 from server.viewer.moment import FigureMoment
 from server.viewer.reference import SEGMENTS, ReferenceWalk, stand_upright
-from server.viewer.room import ROOM, SceneRoom, frame_person
+from server.viewer.room import SceneRoom, frame_person
 
 _BURIED: Final = np.array([0.0, 0.0, -100.0])
 """Where a ghost is that has no phase."""
@@ -39,7 +40,8 @@ class LiveFigure:
         self._reference: ReferenceWalk | None = None
         self._layout: FigureLayout | None = None
         self._key: tuple[object, ...] = ()
-        self._drawn: list[tuple[str, MeshBatch, viser.BatchedMeshHandle]] = []
+        self._drawn: dict[PartName, DrawnBatch] = {}
+        self._ghost: dict[PartName, DrawnBatch] = {}
         self._times = 0
         self._grey = True
         self._t_s: float | None = None
@@ -115,12 +117,12 @@ class LiveFigure:
         key = (tuple(moment.q), moment.method, ghost)
         if key != self._key or self._layout is None:
             layout = FigureLayout(tuple(moment.q), self._body, moment.method)
-            placed = self._draw(layout, q, p, key)
+            placed = self._draw(layout, q, p, key, ghost=ghost)
         else:
             placed = self._layout.place(q, p)
-            for name, _, handle in self._drawn:
-                batch = placed.batches[name]
-                move_copies(handle, batch.wxyz.reshape(-1, 4), batch.position.reshape(-1, 3))
+        for frame, drawn in enumerate((self._drawn, self._ghost)):
+            for name, part in drawn.items():
+                part.move(placed.batches[name].wxyz[frame], placed.batches[name].position[frame])
         for side in SIDES:
             if side in placed.soles:
                 sole, foot = placed.soles[side][0], moment.q[FOOT[side]]
@@ -134,24 +136,22 @@ class LiveFigure:
         q: Mapping[Segment, Floats],
         p: Mapping[Segment, Floats],
         key: tuple[object, ...],
+        *,
+        ghost: bool = False,
     ) -> PlacedFigure:
         """Draw other parts than before."""
-        for _, _, handle in self._drawn:
-            handle.remove()
+        for part in (*self._drawn.values(), *self._ghost.values()):
+            part.handle.remove()
         placed = layout.place(q, p)
         self._layout, self._key = layout, key
         # a new name each time: under the old one the client keeps its shader, which does not fit copies that
         # have opacities now (GL_INVALID_OPERATION, and nothing is drawn)
         self._times += 1
-        self._drawn = [
-            (name, batch, self._add(name, batch)) for name, batch in placed.batches.items() if batch.tint
-        ]
+        scene, suffix = self._server.scene, f"_{self._times}"
+        self._drawn = draw_figure(scene, placed.batches, suffix)
+        self._ghost = draw_ghost(scene, placed.batches, suffix) if ghost else {}
         self._paint()
         return placed
-
-    def _add(self, name: str, batch: MeshBatch) -> viser.BatchedMeshHandle:
-        path = f"{ROOM}/{name}_{self._times}"
-        return add_batch(self._server.scene, path, batch, ghost=len(batch.wxyz) > 1)
 
     def _set_grey(self, grey: bool) -> None:
         if grey != self._grey:
@@ -159,10 +159,10 @@ class LiveFigure:
             self._paint()
 
     def _paint(self) -> None:
-        for _, batch, handle in self._drawn:
-            handle.batched_colors = colour_copies(
-                batch, self._dark, ghost=len(batch.wxyz) > 1, grey=self._grey
-            )
+        for part in self._drawn.values():
+            part.handle.batched_colors = colour_copies(part.batch, self._dark, grey=self._grey)
+        for part in self._ghost.values():
+            part.handle.batched_colors = colour_copies(part.batch, self._dark, ghost=True)
 
 
 def _yaw(w: float, x: float, y: float, z: float) -> float:

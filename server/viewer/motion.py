@@ -6,8 +6,9 @@ room; the smoothed path of its root is kept apart, so that the viewer can follow
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,8 @@ from core.body.model import BodyModel
 from core.body.poses import Poses
 from core.errors import ParameterError
 from core.estimators import BY_METHOD
-from core.frames import FOOT, Bools, Floats, Segment, Side
+from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from server.viewer.body_parts import PartName
 from server.viewer.layout import FigureLayout, MeshBatch
 from server.viewer.steps import FootPrints, FootTrail, Single, find_prints, lay_trail
 
@@ -26,6 +28,15 @@ FRAME_RATE = 50.0
 
 ROOT_WINDOW_S = 1.2
 """The view follows the root averaged over about one stride: sway stays visible, the walk stays in view."""
+
+GhostName = Literal["visit", "norm", "left", "right"]
+"""Another visit, the norm at this speed, or the mean of one side for both legs."""
+
+LOWER_BODY: Final[tuple[Segment, ...]] = (
+    "pelvis",
+    *(s[side] for side in SIDES for s in (THIGH, SHANK, FOOT)),
+)
+"""What a whole figure is made of."""
 
 FOR_THE_EYE = frozenset(e.method for e in BY_METHOD.values() if not e.in_room)
 """Methods whose positions say nothing about where the person was in the room."""
@@ -38,22 +49,25 @@ class ReplayMotion:
     Parameters
     ----------
     t_s : (m,) s. valid : (m,) False where a sensor was lost: nothing is drawn.
-    batches : name → copies of one mesh. root : (m, 2) m, smoothed path on the floor.
+    batches : name → copies of one mesh. segments : those with a pose.
+    root : (m, 2) m, smoothed path on the floor.
     prints, trails : side → where that foot rested, and its way; no trails unless `placed`.
     placed : positions are estimates of where the person was in the room, not only for the eye.
-    facing : heading in rad at the first valid frame. ghost : another visit laid over it, None without.
+    facing : heading in rad at the first valid frame. ghosts : name → finds a walk that can be laid
+        over it, None where there is none; slow the first time.
     """
 
     t_s: Floats
     valid: Bools
-    batches: Mapping[str, MeshBatch]
+    batches: Mapping[PartName, MeshBatch]
+    segments: tuple[Segment, ...]
     root: Single
     prints: dict[Side, FootPrints]
     trails: dict[Side, FootTrail]
     placed: bool
     facing: float
     body: BodyModel
-    ghost: GhostMotion | None = None
+    ghosts: Mapping[GhostName, Callable[[], GhostMotion | None]] = field(default_factory=dict)
 
     @property
     def duration_s(self) -> float:
@@ -64,6 +78,11 @@ class ReplayMotion:
     def size(self) -> float:
         """Leg length relative to 0.9 m."""
         return (self.body.thigh + self.body.shank + self.body.ankle_height) / 0.9
+
+    @property
+    def hidden(self) -> tuple[Segment, ...]:
+        """Segments of the lower body that have no pose and are not drawn."""
+        return tuple(s for s in LOWER_BODY if s not in self.segments)
 
     @property
     def measured(self) -> bool:
@@ -82,18 +101,16 @@ class ReplayMotion:
 
 @dataclass(frozen=True, eq=False)
 class GhostMotion:
-    """Another motion, matched frame by frame.
+    """Another walk laid over a figure, frame by frame in the same place and direction.
 
     Parameters
     ----------
-    frames : (m,) frame of `motion` for each frame of the figure, −1 where there is none.
-    turn : (m,) rad about the vertical, and place : (m, 2) m, that bring it to where the figure is.
+    batches : name → copies of one mesh in the m frames of the figure, those that a ghost shows.
+    frames : (m,) frame of the other walk that is shown, −1 where there is none.
     """
 
-    motion: ReplayMotion
+    batches: Mapping[PartName, MeshBatch]
     frames: NDArray[np.int64]
-    turn: Floats
-    place: Floats
 
 
 def prepare_motion(poses: Poses) -> ReplayMotion:
@@ -128,6 +145,7 @@ def prepare_motion(poses: Poses) -> ReplayMotion:
         t_s=t_s,
         valid=valid,
         batches=placed.batches,
+        segments=tuple(q),
         root=_smooth(root[:, :2], max(1, round(ROOT_WINDOW_S * rate))).astype(np.float32),
         prints={
             side: find_prints(t_s, valid, poses.contact[FOOT[side]][keep], path, q[FOOT[side]])

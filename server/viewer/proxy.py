@@ -1,10 +1,13 @@
 """The routes of the 3D replay: the viewer page, the pipe to its viser server, and the time cursor.
 
     WS  /sessions/{sid}/replay?tab=…&dark=…   the time cursor; the page around owns the clock
-            sends {"t": seconds}, or true|false for one of "dark", "follow" (the person, else the whole walk
-            is in the picture) and "ground" (footprints and trails)
+            sends {"t": seconds}, true|false for one of "dark", "follow" (the person, else the whole walk
+            is in the picture) and "ground" (footprints and trails), {"look": "right" or another of VIEWS in
+            room.py} or {"ghost": "norm" or another of GhostName in motion.py, null for none}, answered by
+            {"ghost": what is shown}, null where there is no such walk
             first answer {"view": id, "src": "/views/<id>/", "start_s", "duration_s",
-            "placed": positions are where the person was, "measured": sensors support all of the figure},
+            "placed": positions are where the person was, "measured": sensors support all of the figure,
+            "hidden": segments without a pose}, which are not drawn,
             then {"t": shown, "valid": bool} for every {"t"}
     GET /views/{view}/   viser's own client page, for an iframe
     WS  /views/{view}    the pipe; the client finds it from its own address
@@ -21,7 +24,7 @@ import math
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, cast
 
 import viser
 from fastapi import APIRouter, FastAPI, Query, Request, WebSocket
@@ -38,11 +41,12 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.http.problems import Problem, as_problem
 from server.report.bundle import read_poses
-from server.services import analyses, comparisons, edit_log, sessions
+from server.services import analyses, comparisons, edit_log, patients, sessions
 from server.services.histories import AnalysedSession
+from server.services.patients import Patient
 from server.storage.blobs import BlobStore
 from server.viewer.ghost import match_ghost
-from server.viewer.motion import ReplayMotion, prepare_motion
+from server.viewer.motion import GhostName, ReplayMotion, prepare_motion
 from server.viewer.pipe import (
     ViewActivity,
     carry_messages,
@@ -51,6 +55,8 @@ from server.viewer.pipe import (
     wait_for_sign_out,
 )
 from server.viewer.replay_figure import ReplayFigure
+from server.viewer.replay_reference import find_references
+from server.viewer.room import VIEWS, ViewName
 from server.viewer.views import FigureView, FigureViews
 
 CONTENT_POLICY = (
@@ -72,7 +78,6 @@ _SWITCHES: Mapping[str, Callable[[ReplayFigure, bool], None]] = {
     "dark": ReplayFigure.set_dark,
     "follow": ReplayFigure.set_follow,
     "ground": ReplayFigure.set_ground,
-    "ghost": ReplayFigure.set_ghost,
 }
 
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -166,6 +171,7 @@ async def replay(
                 "duration_s": motion.duration_s,
                 "placed": motion.placed,
                 "measured": motion.measured,
+                "hidden": motion.hidden,
             }
         )
         cursor = asyncio.create_task(_follow(ws, view, ViewActivity(lambda: logins.touch(who.login_id))))
@@ -185,20 +191,21 @@ async def _open(
 ) -> FigureView[ReplayFigure]:
     db, reviewed = ws.app.state.db, ws.app.state.reviewed
 
-    def latest() -> tuple[AnalysedSession | None, AnalysedSession | None]:
+    def latest() -> tuple[AnalysedSession | None, AnalysedSession | None, Patient]:
         with db.read() as c:
+            patient = patients.get(c, sessions.get(c, sid).patient_id)
             this = _replayable(c, sid)
             if this is None or other is None:
-                return this, None
+                return this, None, patient
             comparisons.pair(c, sid, other)  # refuses a visit of somebody else
-            return this, _replayable(c, other)
+            return this, _replayable(c, other), patient
 
     def why_nothing() -> str:
         with db.read() as c:
             done = analyses.latest(c, sid) is not None
         return NO_FIGURE if done else "There is nothing to replay: nothing is analysed yet."
 
-    this, before = await asyncio.to_thread(latest)
+    this, before, patient = await asyncio.to_thread(latest)
     for seen in (this, before):
         if seen is not None:
             await asyncio.to_thread(
@@ -209,12 +216,14 @@ async def _open(
 
     def load() -> ReplayMotion:
         motion = _motion(reviewed.blobs, this)
-        if before is None:
-            return motion
-        mine, theirs = (reviewed.read_bundle(a.found, a.edits).strides for a in (this, before))
-        return replace(motion, ghost=match_ghost(motion, mine, _motion(reviewed.blobs, before), theirs))
+        ghosts = find_references(reviewed, this, patient, motion)
+        if before is not None:
+            mine, theirs = (reviewed.read_bundle(a.found, a.edits).strides for a in (this, before))
+            visit = match_ghost(motion, mine, _motion(reviewed.blobs, before), theirs)
+            ghosts["visit"] = lambda: visit
+        return replace(motion, ghosts=ghosts)
 
-    shown = this.found.id if before is None else f"{_state(this)} over {_state(before)}"
+    shown = _state(this) if before is None else f"{_state(this)} over {_state(before)}"
     return await _views(ws).open(who.login_id, tab, shown, load, dark)
 
 
@@ -241,7 +250,10 @@ async def _follow(ws: WebSocket, view: FigureView[ReplayFigure], activity: ViewA
             message = await ws.receive_text()
         except WebSocketDisconnect:
             return
-        await ws.send_json(_act(view, message))
+        # a ghost may have to be computed first
+        await ws.send_json(
+            await asyncio.to_thread(_act, view, message) if '"ghost"' in message else _act(view, message)
+        )
         await activity.note_activity()
 
 
@@ -250,16 +262,28 @@ def _act(view: FigureView[ReplayFigure], text: str) -> dict[str, Any]:
         message = read_json(text)
     except ValueError:
         message = None
+    motion = view.figure.motion
     if isinstance(message, dict) and len(message) == 1:
         ((name, value),) = message.items()
         if name == "t" and type(value) in (int, float) and math.isfinite(value):
             shown = view.figure.pose(float(value))
             return {"t": shown, "valid": view.figure.is_valid(shown)}
+        if name == "look" and isinstance(value, str) and value in VIEWS:
+            view.figure.look_from(cast("ViewName", value))
+            return {"look": value}
+        if name == "ghost" and (value is None or (isinstance(value, str) and value in motion.ghosts)):
+            try:
+                return {"ghost": value if view.figure.set_ghost(cast("GhostName | None", value)) else None}
+            except SagittalError as error:
+                return {"ghost": None, "why": str(error)}
         switch = _SWITCHES.get(name)
         if switch and isinstance(value, bool):
             switch(view.figure, value)
             return {name: value}
-    detail = f'Expected {{"t": seconds}}, or true or false for one of {", ".join(_SWITCHES)}.'
+    detail = (
+        f'Expected {{"t": seconds}}, true or false for one of {", ".join(_SWITCHES)}, "look": one of '
+        f'{", ".join(VIEWS)}, or "ghost": null or one of {", ".join(motion.ghosts)}.'
+    )
     return {"error": {"code": "bad_message", "detail": detail}}
 
 

@@ -17,14 +17,12 @@ from core.angles.inverse import leg_orientations, pelvis_orientation
 from core.body.kinematics import leg_points, sole_points
 from core.body.model import BodyModel
 from core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Floats, Segment, Side
+from server.viewer.motion import LOWER_BODY
 
 SAGITTAL: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 """Without these there is no walk to show."""
 
-SEGMENTS: Final[tuple[Segment, ...]] = (
-    "pelvis",
-    *(s for side in SIDES for s in (THIGH[side], SHANK[side], FOOT[side])),
-)
+SEGMENTS: Final = LOWER_BODY
 _POINTS: Final = 5
 """Of a leg: hip, knee, ankle, heel, ball."""
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from server.viewer.batches import PALE, add_batch, colour_copies, move_copies
-from server.viewer.colours import GHOST, to_linear_rgb
-from server.viewer.layout import MeshBatch
-from server.viewer.motion import GhostMotion, ReplayMotion
+from core.frames import Floats
+from server.viewer.batches import DrawnBatch, colour_copies, draw_figure, draw_ghost
+from server.viewer.body_parts import PartName
+from server.viewer.ghost import find_heading
+from server.viewer.motion import GhostMotion, GhostName, ReplayMotion
 from server.viewer.replay_floor import ReplayFloor
 from server.viewer.room import (
     FLOOR_M,
@@ -16,13 +17,14 @@ from server.viewer.room import (
     ROOM,
     CameraShot,
     SceneRoom,
+    ViewName,
     frame_person,
     turn_about_vertical,
 )
 
 
 class ReplayFigure:
-    """A recorded walk in one viser server, posed at any time, with another visit laid over it.
+    """A recorded walk in one viser server, posed at any time, with another walk laid over it.
 
     Parameters
     ----------
@@ -37,14 +39,10 @@ class ReplayFigure:
         scene = server.scene
         x, y = self._middle.tolist()
         self._room = SceneRoom(server, FLOOR_M + 6.0 * float(np.ptp(motion.root, axis=0).max()), (x, y))
-        self._batches = [
-            (b, add_batch(scene, f"{ROOM}/{name}", b)) for name, b in motion.batches.items() if b.tint
-        ]
-        self._ghost_batches: list[tuple[MeshBatch, viser.BatchedMeshHandle]] = []
-        if motion.ghost is not None:
-            self._ghost_node = scene.add_frame(f"{ROOM}/ghost", show_axes=False)
-            self._ghost_batches = _add_ghost(scene, motion.ghost)
-        self._ghost_shown = True
+        self._drawn = draw_figure(scene, motion.batches, middle=(x, y))
+        self._headings: Floats | None = None
+        self._matched: GhostMotion | None = None
+        self._ghost: dict[PartName, DrawnBatch] = {}
         self._ground = ReplayFloor(scene, ROOM, motion)
         self.set_dark(dark)
         self.set_follow(True)
@@ -64,12 +62,13 @@ class ReplayFigure:
         i = m.index(t_s)
         self._t_s = float(m.t_s[i])
         valid = bool(m.valid[i])
+        ghost = valid and self._matched is not None and self._matched.frames[i] >= 0
         with self._server.atomic():
-            for batch, handle in self._batches:
-                handle.visible = valid
-                if valid:
-                    move_copies(handle, batch.wxyz[i], batch.position[i])
-            self._pose_ghost(i, valid=valid)
+            for drawn, visible in ((self._drawn, valid), (self._ghost, ghost)):
+                for part in drawn.values():
+                    part.handle.visible = bool(visible)
+                    if visible:
+                        part.move(part.batch.wxyz[i], part.batch.position[i])
             self._room.bring(*(m.root[i] if self._follow else self._middle).tolist())
             self._ground.show(self._t_s, recent=self._follow)
         self._server.flush()
@@ -77,10 +76,11 @@ class ReplayFigure:
 
     def set_dark(self, dark: bool) -> None:
         """Change all colours to the theme of the page around."""
-        for batch, handle in self._batches:
-            handle.batched_colors = colour_copies(batch, dark)
-        for _, handle in self._ghost_batches:
-            handle.batched_colors = np.array(to_linear_rgb(GHOST[dark]), np.uint8)
+        self._dark = dark
+        for part in self._drawn.values():
+            part.handle.batched_colors = colour_copies(part.batch, dark)
+        for part in self._ghost.values():
+            part.handle.batched_colors = colour_copies(part.batch, dark, ghost=True)
         self._ground.set_dark(dark)
         self._room.set_dark(dark)
         self._server.flush()
@@ -92,25 +92,31 @@ class ReplayFigure:
         self._room.look(frame_person(m.size, m.facing) if follow else _whole(m))
         self.pose(self._t_s)
 
-    def set_ghost(self, visible: bool) -> None:
-        """Show or hide the other visit, where there is one."""
-        self._ghost_shown = visible
-        self.pose(self._t_s)
+    def look_from(self, view: ViewName) -> None:
+        """Look at the person from a side, in the direction of the walk at this moment."""
+        m = self._motion
+        if self._headings is None:
+            self._headings = find_heading(m)
+        self._room.look(frame_person(m.size, float(self._headings[m.index(self._t_s)]), view))
+        if not self._follow:
+            self._follow = True
+            self.pose(self._t_s)
+        self._server.flush()
 
-    def _pose_ghost(self, i: int, *, valid: bool) -> None:
-        ghost = self._motion.ghost
-        if ghost is None:
-            return
-        j = int(ghost.frames[i])
-        visible = valid and self._ghost_shown and j >= 0
-        for batch, handle in self._ghost_batches:
-            handle.visible = visible
-            if visible:
-                move_copies(handle, batch.wxyz[j], batch.position[j])
-        if visible:
-            half = float(ghost.turn[i]) / 2
-            self._ghost_node.wxyz = (float(np.cos(half)), 0.0, 0.0, float(np.sin(half)))
-            self._ghost_node.position = (float(ghost.place[i, 0]), float(ghost.place[i, 1]), 0.0)
+    def set_ghost(self, name: GhostName | None) -> bool:
+        """Lay another walk over the figure, None = none; tell whether there is such a walk."""
+        found = self._motion.ghosts.get(name, lambda: None)() if name is not None else None
+        for part in self._ghost.values():
+            part.handle.remove()
+        self._matched, self._ghost = found, {}
+        if found is not None:
+            # each has names of its own: under a name in use the client may keep an older shader
+            x, y = self._middle.tolist()
+            self._ghost = draw_ghost(self._server.scene, found.batches, f"_{name}", (x, y))
+            for part in self._ghost.values():
+                part.handle.batched_colors = colour_copies(part.batch, self._dark, ghost=True)
+        self.pose(self._t_s)
+        return found is not None
 
     def set_ground(self, visible: bool) -> None:
         """Show or hide footprints and trails."""
@@ -133,27 +139,3 @@ def _whole(motion: ReplayMotion) -> CameraShot:
     return CameraShot(
         (0.0, 0.0, at[2]), (float(x), float(y), float(z)), fade=2.5 * float(back.max()), section=5.0
     )
-
-
-def _add_ghost(scene: viser.SceneApi, ghost: GhostMotion) -> list[tuple[MeshBatch, viser.BatchedMeshHandle]]:
-    """The other visit, pale and without a shadow or letters, on a node of its own."""
-    return [
-        (
-            batch,
-            scene.add_batched_meshes_simple(
-                f"{ROOM}/ghost/{name}",
-                *batch.mesh,
-                batch.wxyz[0],
-                batch.position[0],
-                batched_scales=batch.scale * np.array(batch.ghostly, np.float32)[:, None],
-                batched_colors=to_linear_rgb(GHOST[False]),
-                opacity=PALE,
-                lod="off",
-                cast_shadow=False,
-                receive_shadow=False,
-                visible=False,
-            ),
-        )
-        for name, batch in ghost.motion.batches.items()
-        if any(batch.ghostly)
-    ]

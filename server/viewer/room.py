@@ -6,8 +6,9 @@ camera, so that the hand on the camera and the view that follows never fight.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 import viser
@@ -20,10 +21,22 @@ ROOM: Final = "/room"
 SKY: Final = "/sky"
 """Name of the light that comes from everywhere."""
 
-FOV_RAD: Final = float(np.deg2rad(31.0))
-FLOOR_M: Final = 60.0
+ViewName = Literal["near", "right", "left", "front", "top"]
 
 Vector = tuple[float, float, float]
+
+VIEWS: Final[Mapping[ViewName, Vector]] = {
+    "near": (1.9, -3.4, 1.75),
+    "right": (0.0, -4.0, 0.92),
+    "left": (0.0, 4.0, 0.92),
+    "front": (4.0, 0.0, 1.0),
+    # straight from above there is no upwards in the picture; behind, so that the walk goes up in it
+    "top": (-0.6, 0.0, 5.0),
+}
+"""From where a person who faces x is looked at, m; "near" is from the right and slightly from ahead."""
+
+FOV_RAD: Final = float(np.deg2rad(31.0))
+FLOOR_M: Final = 60.0
 
 
 @dataclass(frozen=True)
@@ -84,14 +97,14 @@ class SceneRoom:
         self._server.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
 
 
-def frame_person(size: float, facing: float) -> CameraShot:
-    """Return the shot that has the whole person in the picture, from the right and slightly from ahead.
+def frame_person(size: float, facing: float, view: ViewName = "near") -> CameraShot:
+    """Return the shot that has the whole person in the picture.
 
     Parameters
     ----------
     size : leg length relative to 0.9 m. facing : heading, rad.
     """
-    x, y, z = size * (turn_about_vertical(facing) @ np.array([1.9, -3.4, 1.75]))
+    x, y, z = size * (turn_about_vertical(facing) @ np.array(VIEWS[view]))
     return CameraShot((0.0, 0.0, 0.86 * size), (float(x), float(y), float(z)), fade=12.0, section=1.0)
 
 

@@ -1,81 +1,94 @@
-"""The few meshes the figure is made of, each drawn many times: bone, letter, ball, shoe, footprint.
+"""Closed smooth surfaces through cross-sections, and the print of a foot.
 
-All are (vertices (n, 3) float32, faces (m, 3) uint32), outward facing, made once at import of the viewer.
+A mesh is (vertices (n, 3) float32, faces (m, 3) uint32), faces counter-clockwise from outside, vertices
+shared between faces so that shading is smooth.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import Side
+from core.frames import Floats, Side
 
 Mesh = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
 
-TIP = 0.74
-"""Radius of a bone at its end, relative to its base."""
-
-_STROKE = 0.16
-_STROKES: dict[Side, list[list[tuple[float, float]]]] = {
-    "left": [[(-0.16, 0.92), (-0.16, 0.08), (0.18, 0.08)]],
-    "right": [
-        [(-0.17, 0.08), (-0.17, 0.92), (0.03, 0.92), (0.13, 0.87), (0.17, 0.7), (0.13, 0.54), (0.03, 0.48)],
-        [(-0.17, 0.48), (0.03, 0.48)],
-        [(0.0, 0.48), (0.17, 0.08)],
-    ],
-}
-"""The letters L and R as lines, 1 high with the stroke, their feet at 0."""
-
-
-def make_bone(sides: int = 28, tip: float = TIP, cap: float = 0.09) -> Mesh:
-    """Return a rounded cone along +z from 0 to 1: radius 1 at the base, `tip` at the end, caps `cap` long."""
-    u = np.linspace(0.0, np.pi / 2, 7)
-    base = [(np.sin(a), -cap * np.cos(a)) for a in u]
-    end = [(tip * np.cos(a), 1.0 + cap * tip * np.sin(a)) for a in u]
-    return _turned(base + end, sides)
-
-
-def make_letter(
-    side: Side, radius: float, length: float, height: float, turn: float = 0.0, copies: int = 4
+def loft_sections(
+    rows: Floats,
+    sides: int,
+    caps: tuple[float, float] = (0.0, 0.0),
+    power: tuple[float, float] = (2.0, 2.0),
 ) -> Mesh:
-    """Return the letter L or R, several times around a bone of `radius` and `length` m, its feet at the end.
+    """Return the closed surface through cross-sections along y, with a dome or a flat end.
 
-    One of the copies faces whoever looks at the bone, the first one where it is looked at from `turn` rad
-    about its axis, 0 along x.
+    Parameters
+    ----------
+    rows : (n, 5 or 6) m: place in y, rising, middle in x, reach forward, back, right and left; without the
+        last column as far to the left as to the right. sides : vertices of a section, four quarters of
+        superellipses. caps : height of the dome on the lower and on the upper end, m, 0 = flat.
+    power : of the front and of the back half, 2 = ellipse.
     """
-    quads = np.concatenate([_stroke(line) for line in _STROKES[side]]) * height
-    along = 0.5 * (length - height) + height - quads[..., 1]
-    r = radius * (1.0 - (1.0 - TIP) * along / length)
-    vertices = []
-    for k in range(copies):
-        a = turn + 2 * np.pi * k / copies - quads[..., 0] / r
-        vertices.append(np.stack((r * np.cos(a), r * np.sin(a), along), axis=-1).reshape(-1, 3))
-    first = 4 * np.arange(copies * len(quads))[:, None]
-    faces = (first + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
-    return np.concatenate(vertices).astype(np.float32), faces.astype(np.uint32)
+    rows = np.column_stack((rows, rows[:, 4])) if rows.shape[1] == 5 else rows
+    u = np.linspace(0.0, np.pi / 2, 5)[1:-1]
+    low, high = (np.repeat(rows[k][None], len(u), 0) for k in (0, -1))
+    for dome, tall in ((low, -caps[0]), (high, caps[1])):
+        dome[:, 0] += tall * np.sin(u)
+        dome[:, 2:] *= np.cos(u)[:, None]
+    tips = rows[[0, -1], :2] + np.array([[-caps[0], 0.0], [caps[1], 0.0]])
+    rows = np.concatenate((low[::-1] if caps[0] else low[:0], rows, high if caps[1] else high[:0]))
+    a = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)
+    e = 2.0 / np.where(np.cos(a) >= 0, *power)
+    c, s = (np.sign(g) * np.abs(g) ** e for g in (np.cos(a), np.sin(a)))
+    y, x, front, back, right, left = (col[:, None] for col in rows.T)
+    across = x + np.where(c >= 0, front, back) * c, np.where(s >= 0, right, left) * s
+    v = np.stack((across[0], np.broadcast_to(y, across[1].shape), across[1]), axis=-1).reshape(-1, 3)
+    v = np.concatenate((v, np.column_stack((tips[:, ::-1], np.zeros(2)))))
+    j, i = np.arange(sides), np.arange(len(rows) - 1)[:, None] * sides
+    p, q, top = (i + j).ravel(), (i + (j + 1) % sides).ravel(), (len(rows) - 1) * sides
+    faces = (
+        np.stack((p, p + sides, q), axis=1),
+        np.stack((q, p + sides, q + sides), axis=1),
+        np.stack((j, (j + 1) % sides, np.full(sides, len(v) - 2)), axis=1),
+        np.stack((top + (j + 1) % sides, top + j, np.full(sides, len(v) - 1)), axis=1),
+    )
+    return v.astype(np.float32), np.concatenate(faces).astype(np.uint32)
 
 
-def _stroke(line: Sequence[tuple[float, float]], step: float = 0.1) -> NDArray[np.float64]:
-    """Quads (n, 4, 2) along a line, counter-clockwise, short enough to be bent around a bone."""
-    quads = []
-    for start, end in pairwise(np.array(line)):
-        way = (end - start) / np.linalg.norm(end - start)
-        across = 0.5 * _STROKE * np.array([way[1], -way[0]])
-        over = 0.5 * _STROKE * way  # square ends close the corners
-        count = max(1, round(float(np.linalg.norm(end - start)) / step)) + 1
-        points = np.linspace(start - over, end + over, count + 1)
-        quads += [np.stack((a + across, b + across, b - across, a - across)) for a, b in pairwise(points)]
-    return np.array(quads)
+def interpolate_rows(
+    table: Floats, count: int, between: tuple[float, float] | None = None, *, dense_ends: bool = False
+) -> Floats:
+    """Return a table (n, k) at `count` places of its first column by monotone cubics: no bulge it has not.
+
+    Source: Fritsch and Butland 1984, doi:10.1137/0905021.
+
+    Parameters
+    ----------
+    between : first and last place, None = all of the table. dense_ends : more places towards both ends.
+    """
+    x, y = table[:, 0], table[:, 1:]
+    h = np.diff(x)[:, None]
+    d = np.diff(y, axis=0) / h
+    m = np.concatenate((d[:1], np.zeros_like(d[1:]), d[-1:]))
+    rising = d[:-1] * d[1:] > 0
+    w1, w2 = 2 * h[1:] + h[:-1], h[1:] + 2 * h[:-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        m[1:-1][rising] = ((w1 + w2) / (w1 / d[:-1] + w2 / d[1:]))[rising]
+    u = np.linspace(0.0, 1.0, count)
+    low, high = between or (x[0], x[-1])
+    at = low + (high - low) * ((1 - np.cos(np.pi * u)) / 2 if dense_ends else u)
+    i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(h) - 1)
+    s, span = ((at - x[i]) / h[i, 0])[:, None], h[i]
+    value = (1 + 2 * s) * (1 - s) ** 2 * y[i] + s * (1 - s) ** 2 * span * m[i]
+    value += s * s * (3 - 2 * s) * y[i + 1] - s * s * (1 - s) * span * m[i + 1]
+    return np.column_stack((at, value))
 
 
-def make_ball(rings: int = 14, sides: int = 28) -> Mesh:
-    """Return a sphere of radius 1; scaled per axis it is the pelvis."""
-    u = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)
-    return _turned([(np.cos(a), np.sin(a)) for a in u], sides)
+def join_meshes(*meshes: tuple[NDArray[np.floating], NDArray[np.integer]]) -> Mesh:
+    """Return several closed surfaces as one mesh; where they overlap, the nearer one is seen."""
+    start = np.cumsum([0, *(len(v) for v, _ in meshes)])
+    faces = [f + k for (_, f), k in zip(meshes, start, strict=False)]
+    return np.concatenate([v for v, _ in meshes]).astype(np.float32), np.concatenate(faces).astype(np.uint32)
 
 
 def make_footprint(length: float, side: Side, points: int = 48) -> Mesh:
@@ -96,58 +109,3 @@ def make_footprint(length: float, side: Side, points: int = 48) -> Mesh:
         (np.stack((i, points + i, points + i + 1), axis=1), np.stack((i, points + i + 1, i + 1), axis=1))
     )
     return vertices.astype(np.float32), faces.astype(np.uint32)
-
-
-def make_shoe(length: float, ankle_height: float, sides: int = 24) -> Mesh:
-    """Return a shoe in foot axes (x forward, y up, z right), origin at the ankle, sole at −`ankle_height`.
-
-    The heel lies a quarter of the length behind the ankle; the ratio is for the eye only.
-    """
-    x = np.array([-0.25, -0.245, -0.22, -0.15, -0.02, 0.15, 0.35, 0.52, 0.65, 0.725, 0.75]) * length
-    half_width = np.array([0.02, 0.07, 0.105, 0.13, 0.135, 0.14, 0.17, 0.17, 0.13, 0.07, 0.02]) * length
-    top = np.array([-0.35, -0.15, 0.05, 0.18, 0.2, 0.0, -0.3, -0.5, -0.62, -0.72, -0.85]) * ankle_height
-    bottom = np.full_like(x, -ankle_height)
-    bottom[[0, -1]] += 0.12 * ankle_height
-    a = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)
-    # a superellipse keeps the sole flat and the instep round
-    round_y, round_z = (
-        np.sign(np.sin(a)) * np.abs(np.sin(a)) ** 0.6,
-        np.sign(np.cos(a)) * np.abs(np.cos(a)) ** 0.8,
-    )
-    middle, half_height = (top + bottom) / 2, (top - bottom) / 2
-    vertices = np.stack(
-        (
-            np.repeat(x[:, None], sides, 1),
-            middle[:, None] + half_height[:, None] * round_y,
-            half_width[:, None] * round_z,
-        ),
-        axis=-1,
-    ).reshape(-1, 3)
-    ends = np.stack(([x[0], middle[0], 0.0], [x[-1], middle[-1], 0.0]))
-    faces = _grid_faces(len(x), sides)
-    n, last = len(vertices), len(vertices) - sides
-    j = np.arange(sides)
-    heel = np.stack((np.full(sides, n), (j + 1) % sides, j), axis=1)
-    toe = np.stack((np.full(sides, n + 1), last + j, last + (j + 1) % sides), axis=1)
-    return np.concatenate((vertices, ends)).astype(np.float32), np.concatenate((faces, heel, toe)).astype(
-        np.uint32
-    )
-
-
-def _turned(profile: Sequence[tuple[float, float]], sides: int) -> Mesh:
-    """Surface of revolution about z of (radius, z) points given from bottom to top."""
-    r, z = np.array(profile, dtype=np.float64).T
-    a = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)
-    vertices = np.stack(
-        (r[:, None] * np.cos(a), r[:, None] * np.sin(a), np.repeat(z[:, None], sides, 1)), axis=-1
-    )
-    faces = _grid_faces(len(r), sides)[:, ::-1]
-    return vertices.reshape(-1, 3).astype(np.float32), faces.astype(np.uint32)
-
-
-def _grid_faces(rings: int, sides: int) -> NDArray[np.int64]:
-    i, j = (g.ravel() for g in np.meshgrid(np.arange(rings - 1), np.arange(sides), indexing="ij"))
-    a, b = i * sides + j, i * sides + (j + 1) % sides
-    lower = np.stack((a, a + sides, b), axis=1)
-    upper = np.stack((b, a + sides, b + sides), axis=1)
-    return np.concatenate((lower, upper))

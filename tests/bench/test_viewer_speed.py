@@ -108,7 +108,8 @@ def replay(server: viser.ViserServer) -> Callable[[int], object]:
     """The same walk replayed with another one over it."""
     motion = prepare_motion(replace(walk.poses(12.0, 60.0), method="erkf_smoothed"))
     ghost = match_ghost(motion, walk.strides(), motion, walk.strides())
-    figure = ReplayFigure(server, replace(motion, ghost=ghost))
+    figure = ReplayFigure(server, replace(motion, ghosts={"visit": lambda: ghost}))
+    figure.set_ghost("visit")
     return lambda i: figure.pose(i / RATE_HZ)
 
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from pathlib import Path
 from uuid import uuid4
 
+import numpy as np
+from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 
+from core.frames import SIDES
+from server.viewer.colours import TINTS
 from tests.browser import filling
 from tests.browser.conftest import Filled, Opener, RunningServer
 from tests.browser.picture import wait_for_picture, wait_until_still
 from tests.data import data_folder
+from tests.server.viewer.seeing import pixels_of
 from tests.walks import NEURA
 
 
@@ -106,6 +113,45 @@ def test_a_take_of_two_feet_says_which_parts_are_estimated(
     full, faint = seen
     for colour in ("orange", "blue"):
         assert 30 < faint[colour] < 0.6 * full[colour]
+
+
+def test_the_figure_is_looked_at_from_every_side(opened: Opener, solid: Browser, filled: Filled) -> None:
+    page = _open(opened, solid, filled.done)
+    _switch(page, "ground")
+    _seek(page, 12)
+    seen = [wait_until_still(page)]
+    for view in ("right", "front", "top"):
+        page.get_by_label("Look from").select_option(view)
+        seen.append(wait_for_picture(page, lambda now: now != seen[-1]))
+    assert all(0.35 < x["x"] < 0.65 for x in seen)
+    # of legs seen from above less is seen than from the side
+    assert seen[3]["orange"] + seen[3]["blue"] < 0.7 * (seen[0]["orange"] + seen[0]["blue"])
+
+
+def test_a_picture_of_the_figure_can_be_saved(opened: Opener, solid: Browser, filled: Filled) -> None:
+    page = _open(opened, solid, filled.done)
+    _seek(page, 12)
+    wait_until_still(page)
+    with page.expect_download(timeout=30_000) as waiting:
+        page.get_by_role("button", name="Save picture").click()
+    assert re.fullmatch(r"figure-[\d.]+s\.png", waiting.value.suggested_filename)
+    found = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
+    for side in SIDES:
+        assert pixels_of(found, TINTS[False][side]).sum() > 200, side
+
+
+def test_a_video_of_the_walking_figure_can_be_saved(opened: Opener, solid: Browser, filled: Filled) -> None:
+    page = _open(opened, solid, filled.done)
+    with page.expect_download(timeout=60_000) as waiting:
+        page.get_by_role("button", name="Record video").click()
+        expect(page.locator("time-bar [data-play]")).to_have_attribute("aria-label", "Pause")
+        page.wait_for_timeout(2500)
+        page.get_by_role("button", name="Stop and save").click()
+    assert re.fullmatch(r"figure-[\d.]+s\.webm", waiting.value.suggested_filename)
+    film = Path(waiting.value.path()).read_bytes()
+    assert film[:4] == b"\x1a\x45\xdf\xa3"  # EBML
+    assert len(film) > 5_000
+    expect(page.get_by_role("button", name="Record video")).to_be_visible()
 
 
 def test_positions_for_the_eye_only_offer_no_view_of_the_whole_walk(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import json
 import re
 
 import pytest
@@ -129,11 +130,14 @@ def test_the_visit_before_walks_as_a_ghost_with_the_figure(
     page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
     page.frame_locator("gait-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
     assert any(f"/sessions/{filled.done}/replay" in a and f"ghost={filled.earlier}" in a for a in asked)
-    switch = page.get_by_role("button", name="Visit of 21 Oct 2026")
-    expect(switch).to_have_attribute("aria-pressed", "true")
-    switch.click()
-    expect(switch).to_have_attribute("aria-pressed", "false")
-    assert [t for t in told if "ghost" in t] == ['{"ghost":true}', '{"ghost":false}']
+    menu = page.get_by_label("Ghost")
+    expect(menu.locator("option:checked")).to_have_text("21 Oct 2026")
+    expect(page.locator("gait-view")).to_have_attribute("data-ghost-shown", "visit")
+    for chosen, shown in (("norm", "norm"), ("left", "left"), ("", "")):
+        menu.select_option(chosen)
+        expect(page.locator("gait-view")).to_have_attribute("data-ghost-shown", shown)
+    sent = [json.loads(t)["ghost"] for t in told if "ghost" in t]
+    assert sent == ["visit", "norm", "left", None]
     # one cursor for the figure and all charts
     chart = page.locator("[data-variable=knee_flexion]")
     chart.hover()

@@ -10,11 +10,15 @@ import pytest
 import viser
 
 from core import rotation
+from core.angles import cardan_zxy
 from core.body.poses import Poses
 from core.frames import SIDES, Side
+from core.norms import adult_kinematics
+from server.viewer.batches import PALE, RAISED_M
 from server.viewer.colours import GHOST, to_linear_rgb
-from server.viewer.ghost import find_heading, match_ghost
+from server.viewer.ghost import PHASES, find_heading, match_ghost, match_reference
 from server.viewer.motion import GhostMotion, ReplayMotion, prepare_motion
+from server.viewer.reference import ReferenceWalk
 from server.viewer.replay_figure import ReplayFigure
 from tests.server import walk
 
@@ -31,9 +35,12 @@ def turned(poses: Poses) -> Poses:
     )
 
 
+OTHER = prepare_motion(turned(walk.poses(8.0)))
+
+
 @pytest.fixture(scope="module")
 def ghost(motion: ReplayMotion) -> GhostMotion:
-    made = match_ghost(motion, walk.strides(), prepare_motion(turned(walk.poses(8.0))), walk.strides(8.0))
+    made = match_ghost(motion, walk.strides(), OTHER, walk.strides(8.0))
     assert made is not None
     return made
 
@@ -52,7 +59,7 @@ def test_both_are_at_the_same_phase_in_every_stride_that_counts(
         a, b = theirs[k % len(theirs)]
         for i in np.flatnonzero((motion.t_s >= start) & (motion.t_s < end)):
             phase = (motion.t_s[i] - start) / (end - start)
-            shown = (ghost.motion.t_s[ghost.frames[i]] - a) / (b - a)
+            shown = (OTHER.t_s[ghost.frames[i]] - a) / (b - a)
             assert abs(phase - shown) <= 0.011 / (b - a)
             seen += 1
     assert seen > 300
@@ -66,13 +73,10 @@ def test_outside_the_strides_that_count_there_is_no_ghost(motion: ReplayMotion, 
 
 
 def test_the_same_walk_elsewhere_falls_onto_the_figure(motion: ReplayMotion, ghost: GhostMotion) -> None:
-    bones, theirs = motion.batches["bones"], ghost.motion.batches["bones"]
+    shanks, theirs = motion.batches["shanks"], ghost.batches["shanks"]
     start, end = counted(12.0)[2]
     for i in np.flatnonzero((motion.t_s >= start) & (motion.t_s < end))[::5]:
-        about = rotation.about(2, ghost.turn[i])
-        place = np.append(ghost.place[i], 0.0)
-        moved = rotation.rotate(about, theirs.position[ghost.frames[i]].astype(float)) + place
-        np.testing.assert_allclose(moved, bones.position[i], atol=0.03)
+        np.testing.assert_allclose(theirs.position[i], shanks.position[i], atol=0.03)
 
 
 def test_the_direction_is_that_of_the_way_and_on_the_spot_of_the_beginning(motion: ReplayMotion) -> None:
@@ -96,20 +100,51 @@ def server() -> Iterator[viser.ViserServer]:
 def test_the_figure_shows_it_pale_in_strides_and_hides_it_when_told(
     server: viser.ViserServer, motion: ReplayMotion, ghost: GhostMotion
 ) -> None:
-    figure = ReplayFigure(server, replace(motion, ghost=ghost))
-    handles = [handle for _, handle in figure._ghost_batches]
-    assert len(handles) == 3
+    figure = ReplayFigure(server, replace(motion, ghosts={"visit": lambda: ghost, "norm": lambda: None}))
+    assert figure._ghost == {}
+    assert figure.set_ghost("visit")
+    handles = [part.handle for part in figure._ghost.values()]
+    assert set(figure._ghost) == {
+        "thighs", "shanks", "foot_l", "foot_r", "toes_l", "toes_r", "pelvis"
+    }  # fmt: skip
+    assert {h.opacity for h in handles} == {PALE}
     start, end = counted(12.0)[1]
     figure.pose((start + end) / 2)
     assert all(h.visible for h in handles)
-    assert tuple(handles[0].batched_colors) == to_linear_rgb(GHOST[False])
+    assert {tuple(c) for c in np.asarray(handles[0].batched_colors).tolist()} == {to_linear_rgb(GHOST[False])}
     figure.pose(0.0)
     assert not any(h.visible for h in handles)
     figure.pose((start + end) / 2)
-    figure.set_ghost(False)
-    assert not any(h.visible for h in handles)
+    # over the middle of the floor, whose lines they may not hide
+    middle = (motion.root.min(axis=0) + motion.root.max(axis=0)) / 2
+    for handle in handles:
+        np.testing.assert_allclose(handle.position, (*middle, RAISED_M), atol=1e-5)
     figure.set_dark(True)
-    assert tuple(handles[0].batched_colors) == to_linear_rgb(GHOST[True])
+    assert {tuple(c) for c in np.asarray(handles[0].batched_colors).tolist()} == {to_linear_rgb(GHOST[True])}
+    assert not figure.set_ghost("norm")
+    assert figure._ghost == {}
+    assert figure.set_ghost("visit")
+    assert not figure.set_ghost(None)
+    assert not any("ghost" in name for name in server.scene._handle_from_node_name)
+
+
+def test_the_norm_over_a_replay_has_its_angles_at_the_phases_of_both_legs(motion: ReplayMotion) -> None:
+    norm = {name: np.radians(band.mean_deg) for name, band in adult_kinematics(None).bands.items()}
+    ghost = match_reference(motion, walk.strides(), ReferenceWalk(norm, walk.BODY))
+    assert ghost is not None
+    thighs, shanks = ghost.batches["thighs"].wxyz, ghost.batches["shanks"].wxyz
+    for start, end in counted(12.0)[2:5]:
+        for i in np.flatnonzero((motion.t_s >= start) & (motion.t_s < end))[::7]:
+            row = round(PHASES * (motion.t_s[i] - start) / (end - start))
+            knee = -cardan_zxy(rotation.multiply(rotation.conjugate(thighs[i, 0]), shanks[i, 0]))[0]
+            assert knee == pytest.approx(norm["knee_flexion"][row], abs=1e-4)
+    seen = ghost.frames >= 0
+    assert len(np.unique(ghost.frames[seen])) < 0.5 * seen.sum()  # a pair of phases is posed once
+    pelvis = ghost.batches["pelvis"].position[:, 0, :2]
+    np.testing.assert_allclose(pelvis[seen], motion.root[seen], atol=1e-4)
+    assert (
+        match_reference(motion, replace(walk.strides(), strides=()), ReferenceWalk(norm, walk.BODY)) is None
+    )
 
 
 def test_every_side_can_carry_the_match() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,11 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import viser
+from viser._messages import SceneNodeUpdateMessage
 
 from core import rotation
 from core.angles import cardan_zxy
 from core.body.poses import Poses
-from core.frames import FOOT, SHANK, SIDES, Segment
+from core.frames import FOOT, SIDES, Segment
 from core.norms import adult_kinematics
 from server.viewer.batches import PALE
 from server.viewer.colours import GHOST, TINTS, to_linear_rgb
@@ -53,8 +55,13 @@ class Scene:
     def __getitem__(self, name: str) -> viser.SceneNodeHandle:
         nodes = self.server.scene._handle_from_node_name
         # batches have the number of the drawing behind their name
-        drawn = [node for node in nodes if node.startswith(f"/room{name}_")]
-        return nodes[f"/room{name}" if f"/room{name}" in nodes else drawn[-1]]
+        if f"/room{name}" in nodes:
+            return nodes[f"/room{name}"]
+        return nodes[next(n for n in reversed(nodes) if re.fullmatch(rf"/room{name}_\d+", n))]
+
+    def place_of(self, name: str) -> np.ndarray:
+        """Positions of the copies in the room, m."""
+        return np.asarray(np.asarray(self[name].batched_positions) + np.array(self[name].position))
 
     def play(self, poses: Poses, until_s: float, since_s: float = 0.0) -> int:
         """Show all moments of a time; the index of the last."""
@@ -98,10 +105,8 @@ def test_a_moment_is_drawn_as_the_replay_draws_it(
     for i in (0, 37, 200):
         scene.figure.show(moment(part, i))
         for name, batch in replay.batches.items():
-            if batch.tint:
-                np.testing.assert_allclose(scene[f"/{name}"].batched_positions, batch.position[i], atol=1e-6)
-                np.testing.assert_allclose(scene[f"/{name}"].batched_wxyzs, batch.wxyz[i], atol=1e-6)
-                np.testing.assert_array_equal(scene[f"/{name}"].batched_scales, batch.scale)
+            np.testing.assert_allclose(scene.place_of(f"/{name}"), batch.position[i], atol=1e-6)
+            np.testing.assert_allclose(scene[f"/{name}"].batched_wxyzs, batch.wxyz[i], atol=1e-6)
 
 
 def test_before_the_first_pose_somebody_stands_in_grey_and_then_the_sides_have_their_colours(
@@ -109,28 +114,26 @@ def test_before_the_first_pose_somebody_stands_in_grey_and_then_the_sides_have_t
 ) -> None:
     scene = Scene(server)
     assert scene.figure.is_grey
-    bones = np.asarray(scene["/bones"].batched_colors)
-    assert len(bones) == 8
-    # but for the bands of the letters
-    assert {tuple(c) for c in np.delete(bones, [4, 5], axis=0).tolist()} == {
-        to_linear_rgb(TINTS[False]["body"])
-    }
-    shoes = np.asarray(scene["/shoes"].batched_positions)
-    np.testing.assert_allclose(shoes[:, 2], walk.BODY.ankle_height, atol=1e-6)
+    for name in ("thighs", "shanks", "foot_l", "toes_r", "trunk"):
+        colours = np.asarray(scene[f"/{name}"].batched_colors)
+        assert {tuple(c) for c in colours.tolist()} == {to_linear_rgb(TINTS[False]["body"])}
+    for name in ("foot_l", "foot_r"):
+        ankle = np.asarray(scene[f"/{name}"].batched_positions)
+        np.testing.assert_allclose(ankle[:, 2], walk.BODY.ankle_height, atol=1e-6)
     scene.play(poses, 0.2)
     assert not scene.figure.is_grey
-    colours = np.asarray(scene["/bones"].batched_colors)
+    colours = np.asarray(scene["/thighs"].batched_colors)
     assert tuple(colours[0]) == to_linear_rgb(TINTS[False]["left"])
-    assert tuple(colours[2]) == to_linear_rgb(TINTS[False]["right"])
+    assert tuple(colours[1]) == to_linear_rgb(TINTS[False]["right"])
 
 
 def test_what_is_stale_or_lost_stays_where_it_was_in_grey(server: viser.ViserServer, poses: Poses) -> None:
     scene = Scene(server)
     i = scene.play(poses, 3.0)
-    held = np.asarray(scene["/bones"].batched_positions).copy()
+    held = np.asarray(scene["/thighs"].batched_positions).copy()
     scene.figure.show(moment(poses, i + 1, valid=False))
     assert scene.figure.is_grey
-    np.testing.assert_array_equal(scene["/bones"].batched_positions, held)
+    np.testing.assert_array_equal(scene["/thighs"].batched_positions, held)
     scene.figure.show(moment(poses, i + 2))
     assert not scene.figure.is_grey
     scene.figure.set_stale()
@@ -138,7 +141,7 @@ def test_what_is_stale_or_lost_stays_where_it_was_in_grey(server: viser.ViserSer
     scene.figure.show(moment(poses, i + 3), late=True)
     assert scene.figure.is_grey
     scene.figure.wait()
-    assert np.ptp(np.asarray(scene["/shoes"].batched_positions)[:, 0]) == 0.0
+    assert scene["/foot_l"].batched_positions[0][0] == scene["/foot_r"].batched_positions[0][0]
 
 
 def test_the_trails_are_the_last_seconds_of_the_soles_way(server: viser.ViserServer, poses: Poses) -> None:
@@ -178,18 +181,6 @@ def test_prints_lie_where_the_replay_has_them(server: viser.ViserServer, poses: 
         assert len(set(apart.argmin(axis=1))) == PRINTS
 
 
-def test_a_letter_is_on_its_shank_and_none_on_the_floor(server: viser.ViserServer, poses: Poses) -> None:
-    scene = Scene(server)
-    for i in range(60, 200, 5):
-        scene.figure.show(moment(poses, i))
-        for side in SIDES:
-            at = np.asarray(scene[f"/letters_{side}"].batched_positions)[0]
-            knee, ankle = poses.p[SHANK[side]][i], poses.p[FOOT[side]][i]
-            detour = np.linalg.norm(at - knee) + np.linalg.norm(at - ankle)
-            assert detour < np.linalg.norm(knee - ankle) + 0.01
-            assert f"/letter_{side}" not in server.scene._handle_from_node_name
-
-
 def test_another_take_starts_with_an_empty_floor(server: viser.ViserServer, poses: Poses) -> None:
     scene = Scene(server)
     scene.play(poses, 8.0)
@@ -218,13 +209,18 @@ def test_a_heading_may_turn_through_the_back() -> None:
     assert found[-1][2] == pytest.approx(3.89, abs=0.02)
 
 
+FEET = ("foot_l", "foot_r")
+
+
+def ghosts_of(scene: Scene) -> set[str]:
+    """Parts of the ghost that is in the scene."""
+    names = (re.fullmatch(r"/room/ghost_(\w+)_\d+", n) for n in scene.server.scene._handle_from_node_name)
+    return {found[1] for found in names if found}
+
+
 def ghost_of(scene: Scene, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and orientations of the second half of a batch."""
-    node = scene[f"/{name}"]
-    return (
-        np.split(np.asarray(node.batched_positions), 2)[1].astype(float),
-        np.split(np.asarray(node.batched_wxyzs), 2)[1].astype(float),
-    )
+    """Positions in the room and orientations of a part of the ghost."""
+    return scene.place_of(f"/ghost_{name}"), np.asarray(scene[f"/ghost_{name}"].batched_wxyzs, float)
 
 
 def test_the_ghost_of_the_norm_has_the_angles_of_the_norm_beside_the_person(
@@ -235,22 +231,22 @@ def test_the_ghost_of_the_norm_has_the_angles_of_the_norm_beside_the_person(
     for i in range(120, 150, 4):
         now = moment(poses, i)
         scene.figure.show(now)
-        at, turn = ghost_of(scene, "balls")  # three joints per leg and the pelvis carry their segments' axes
-        thighs, shanks, feet = ((turn[k], turn[k + 3]) for k in range(3))
-        np.testing.assert_allclose(at[6, :2], now.p["pelvis"][:2], atol=1e-5)
+        at, (pelvis,) = ghost_of(scene, "pelvis")
+        thighs, shanks = (ghost_of(scene, name)[1] for name in ("thighs", "shanks"))
+        soles, feet = (np.concatenate(x) for x in zip(*(ghost_of(scene, n) for n in FEET), strict=True))
+        np.testing.assert_allclose(at[0, :2], now.p["pelvis"][:2], atol=1e-5)
         for k, side in enumerate(SIDES):
             row = round(100 * float(now.phase[side] or 0.0))
             for name, proximal, distal, sign in (
-                ("hip_flexion", turn[6], thighs[k], 1.0),
+                ("hip_flexion", pelvis, thighs[k], 1.0),
                 ("knee_flexion", thighs[k], shanks[k], -1.0),
                 ("ankle_dorsiflexion", shanks[k], feet[k], 1.0),
             ):
                 angle = sign * cardan_zxy(rotation.multiply(rotation.conjugate(proximal), distal))[0]
                 assert angle == pytest.approx(NORM[name][row], abs=1e-5), (side, name)
-        soles, q = ghost_of(scene, "shoes")
         lowest = min(
             (p + rotation.rotate(r, np.array([x * walk.BODY.foot, -walk.BODY.ankle_height, 0.0])))[2]
-            for p, r in zip(soles, q, strict=True)
+            for p, r in zip(soles, feet, strict=True)
             for x in (-0.21, 0.53)
         )
         assert lowest == pytest.approx(0.0, abs=1e-5)
@@ -262,21 +258,18 @@ def test_the_ghost_is_pale_and_goes_when_it_is_switched_off_or_no_phase_is_known
     scene = Scene(server)
     scene.figure.set_reference(ReferenceWalk(NORM, walk.BODY))
     scene.figure.show(moment(poses, 60))
-    colours = np.asarray(scene["/bones"].batched_colors)
-    assert len(colours) == 16
-    assert {tuple(c) for c in colours[8:].tolist()} == {to_linear_rgb(GHOST[False])}
-    np.testing.assert_allclose(np.asarray(scene["/bones"].batched_opacities)[8:], PALE)
-    own, ghost = np.split(np.asarray(scene["/bones"].batched_scales), 2)
-    np.testing.assert_array_equal(ghost[:4], own[:4])
-    assert not ghost[4:].any()  # no second trunk, no bands
-    assert not np.asarray(scene["/letters_left"].batched_scales)[1].any()
+    for name in ("thighs", "pelvis", "foot_l"):
+        node = scene[f"/ghost_{name}"]
+        assert {tuple(c) for c in np.asarray(node.batched_colors).tolist()} == {to_linear_rgb(GHOST[False])}
+        assert node.opacity == PALE
+    assert ghosts_of(scene) == {"thighs", "shanks", *FEET, "toes_l", "toes_r", "pelvis"}  # no second trunk
     scene.figure.show(replace(moment(poses, 61), phase={}))
-    assert (ghost_of(scene, "bones")[0][:, 2] < -50.0).all()
+    assert (ghost_of(scene, "thighs")[0][:, 2] < -50.0).all()
     scene.figure.show(replace(moment(poses, 62), phase={"right": 0.25, "left": None}))
-    assert (ghost_of(scene, "bones")[0][:, 2] > -0.2).all()
+    assert (ghost_of(scene, "thighs")[0][:, 2] > -0.2).all()
     scene.figure.set_reference(None)
     scene.figure.show(moment(poses, 63))
-    assert len(np.asarray(scene["/bones"].batched_positions)) == 8
+    assert ghosts_of(scene) == set()
 
 
 def test_the_ghost_walks_where_the_person_walks(server: viser.ViserServer, poses: Poses) -> None:
@@ -289,7 +282,7 @@ def test_the_ghost_walks_where_the_person_walks(server: viser.ViserServer, poses
     scene = Scene(server)
     scene.figure.set_reference(ReferenceWalk(NORM, walk.BODY))
     scene.play(turned, 5.0)
-    pelvis = ghost_of(scene, "balls")[1][6]
+    pelvis = ghost_of(scene, "pelvis")[1][0]
     assert rotation.yaw(pelvis) == pytest.approx(2.0, abs=0.12)  # the norm's own pelvis turns by ±4°
 
 
@@ -312,3 +305,23 @@ def test_who_turns_back_stays_in_the_picture() -> None:
         x = 1.2 * (t if t < 4 else 8 - t)
         seen_x, seen_y, _ = path.push(t, x, 0.0, 0.0)
         assert np.hypot(seen_x - x, seen_y) < 0.31
+
+
+@pytest.mark.parametrize(("ghost", "messages", "floats"), [(False, 13, 250), (True, 20, 330)])
+def test_a_frame_is_a_few_small_messages(
+    server: viser.ViserServer, poses: Poses, ghost: bool, messages: int, floats: int
+) -> None:
+    """Poses, floor and room; trails, which are of fixed size, are sent at every third frame only."""
+    scene = Scene(server)
+    scene.figure.set_reference(ReferenceWalk(NORM, walk.BODY) if ghost else None)
+    scene.play(poses, 2.0)
+    sent = server._websock_server._broadcast_buffer.message_from_id
+    before = set(sent)
+    scene.figure.show(moment(poses, 61))
+    new = [m for k, m in sent.items() if k not in before]
+    poses_sent = [
+        m.updates for m in new if isinstance(m, SceneNodeUpdateMessage) and "batched_wxyzs" in m.updates
+    ]
+    assert len(poses_sent) >= 10
+    assert len(new) <= messages
+    assert sum(np.size(x) for updates in poses_sent for x in updates.values()) <= floats

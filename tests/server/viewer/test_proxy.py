@@ -18,6 +18,7 @@ from server.auth.identity import Identity
 from server.auth.roles import Role
 from server.viewer import pipe
 from server.viewer.proxy import NO_FIGURE
+from server.viewer.room import VIEWS
 from server.viewer.views import FigureView, FigureViews
 from tests.server.viewer.conftest import Ward
 
@@ -56,6 +57,22 @@ async def test_replay_poses_the_figure_at_the_time_of_the_page(ward: Ward) -> No
         for switch in ("dark", "follow", "ground"):
             assert await ask(ws, {switch: True}) == {switch: True}
             assert await ask(ws, {switch: False}) == {switch: False}
+
+
+async def test_the_view_can_be_from_any_side_and_says_what_is_laid_over(ward: Ward) -> None:
+    async with replaying(ward, ward.cookie(), tab="looks") as (ws, opened):
+        assert opened["hidden"] == []
+        for view in VIEWS:
+            assert await ask(ws, {"look": view}) == {"look": view}
+        # of this analysis there are poses only, no stride: nothing can be laid over, and it says why
+        for ghost in ("norm", "left", "right"):
+            answer = await ask(ws, {"ghost": ghost})
+            assert answer["ghost"] is None
+            assert "analysis.json" in str(answer["why"])
+        assert await ask(ws, {"ghost": None}) == {"ghost": None}
+        for wrong in ({"look": "below"}, {"ghost": "visit"}, {"ghost": True}, {"look": ["near"]}):
+            answer = await ask(ws, wrong)
+            assert answer["error"]["code"] == "bad_message"  # type: ignore[index]
 
 
 @pytest.mark.parametrize(

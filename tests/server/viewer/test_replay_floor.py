@@ -121,7 +121,7 @@ def test_following_keeps_the_person_in_the_middle_and_letting_go_keeps_the_room_
 
     def places() -> tuple[np.ndarray, np.ndarray]:
         room = np.asarray(scene["/room"].position)
-        shoe = np.asarray(scene["/room/shoes"].batched_positions)[0]
+        shoe = np.asarray(scene["/room/foot_l"].batched_positions)[0]
         return room, room + shoe
 
     for t_s in (10.0, 60.0, 110.0):

@@ -124,8 +124,9 @@ def test_a_trail_ends_where_the_foot_is(motion: ReplayMotion) -> None:
         found = motion.trails[side]
         for t_s in (2.0, 5.5, 9.0):
             last = found.pieces[np.searchsorted(found.t_s, t_s, side="right") - 1, 1]
-            shoe = motion.batches["shoes"].position[motion.index(t_s), 0 if side == "left" else 1]
-            assert np.hypot(*(last - shoe)[:2]) < 0.25 * walk.BODY.foot + PIECE_M + 0.1
+            foot = motion.batches["foot_l" if side == "left" else "foot_r"]
+            ankle = foot.position[motion.index(t_s), 0]
+            assert np.hypot(*(last - ankle)[:2]) < 0.25 * walk.BODY.foot + PIECE_M + 0.1
 
 
 def test_a_standing_foot_adds_nothing_to_its_trail() -> None:

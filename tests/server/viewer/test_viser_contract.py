@@ -14,7 +14,7 @@ from viser import _messages
 from viser.infra import _infra
 
 from server.viewer import pipe
-from server.viewer.batches import add_batch, move_copies
+from server.viewer.batches import DrawnBatch, move_copies
 from server.viewer.motion import ReplayMotion, prepare_motion
 from server.viewer.proxy import client_page
 from server.viewer.views import FigureViews
@@ -58,25 +58,27 @@ def test_viser_asks_websockets_for_nothing_but_what_we_hand_it() -> None:
 def test_one_message_turns_and_places_a_batch_as_the_public_setters_would() -> None:
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
-        drawn = prepare_motion(walk.poses(1.0)).batches["bones"]
-        handle = add_batch(server.scene, "/bones", drawn)
+        drawn = prepare_motion(walk.poses(1.0)).batches["thighs"]
+        handle = DrawnBatch(server.scene, "thighs", drawn, None).handle
         kept = server._websock_server._broadcast_buffer.message_from_id
         before = set(kept)
         move_copies(handle, drawn.wxyz[5], drawn.position[5])
         (sent,) = [kept[k] for k in set(kept) - before]
         assert isinstance(sent, _messages.SceneNodeUpdateMessage)
-        assert (sent.name, set(sent.updates)) == ("/bones", {"batched_wxyzs", "batched_positions"})
+        assert (sent.name, set(sent.updates)) == ("/room/thighs", {"batched_wxyzs", "batched_positions"})
         np.testing.assert_array_equal(handle.batched_positions, drawn.position[5])
         # who comes later gets the newest message of a kind only, and these two always come together
         move_copies(handle, drawn.wxyz[6], drawn.position[6])
         later = [
-            m for m in kept.values() if isinstance(m, _messages.SceneNodeUpdateMessage) and m.name == "/bones"
+            m
+            for m in kept.values()
+            if isinstance(m, _messages.SceneNodeUpdateMessage) and m.name == "/room/thighs"
         ]
         assert len(later) == 1
         np.testing.assert_array_equal(later[0].updates["batched_wxyzs"], drawn.wxyz[6])
         handle.batched_positions = drawn.position[7]
         np.testing.assert_array_equal(
-            drawn.position[6], prepare_motion(walk.poses(1.0)).batches["bones"].position[6]
+            drawn.position[6], prepare_motion(walk.poses(1.0)).batches["thighs"].position[6]
         )
     finally:
         server.stop()

@@ -16,6 +16,15 @@ function tabId() {
   }
 }
 
+const SEGMENTS = { pelvis: "pelvis", thigh: "thigh", shank: "lower leg", foot: "foot" };
+const SIDES = { l: "left ", r: "right " };
+
+// "thigh_l" → "left thigh"
+const words = (segment) => {
+  const [part, side] = segment.split("_");
+  return (SIDES[side] ?? "") + SEGMENTS[part];
+};
+
 const setting = (button) => ({ [button.dataset.switch]: button.ariaPressed === "true" });
 
 class GaitView extends HTMLElement {
@@ -33,8 +42,18 @@ class GaitView extends HTMLElement {
       b.addEventListener("click", () => {
         b.ariaPressed = b.ariaPressed !== "true";
         this.tell(setting(b));
+        if (b.dataset.switch === "follow") this.look.value = "near"; // the camera goes back there
       });
     }
+    this.look = this.options.querySelector("[data-look]");
+    this.look.addEventListener("change", () => {
+      this.tell({ look: this.look.value });
+      this.options.querySelector("[data-switch=follow]").ariaPressed = "true";
+    });
+    this.ghosts = this.options.querySelector("[data-ghosts]");
+    this.ghosts.addEventListener("change", () => this.tell({ ghost: this.ghosts.value || null }));
+    this.options.querySelector("[data-picture]").addEventListener("click", () => this.savePicture());
+    this.options.querySelector("[data-video]").addEventListener("click", (e) => this.record(e.currentTarget));
     this.connect();
   }
 
@@ -74,12 +93,22 @@ class GaitView extends HTMLElement {
       this.options.hidden = false;
       this.options.querySelector("[data-switch=follow]").hidden = !message.placed;
       this.options.querySelector("[data-estimated]").hidden = message.measured;
+      const unseen = this.options.querySelector("[data-unseen]");
+      unseen.hidden = !message.hidden.length;
+      unseen.textContent = `Not shown, no sensors there: ${message.hidden.map(words).join(", ")}.`;
       for (const b of this.switches) this.tell(setting(b));
+      if (this.look.value !== "near") this.tell({ look: this.look.value });
+      this.tell({ ghost: this.ghosts.value || null });
       this.send();
+    } else if (message.ghost !== undefined) {
+      this.dataset.ghostShown = message.ghost ?? "";
+      const wanted = this.ghosts.value && this.ghosts.selectedOptions[0].text.trim();
+      this.lacking = wanted && !message.ghost ? (message.why ?? `This walk has no such ghost: ${wanted}`) : "";
+      this.say(this.lacking);
     } else if (message.t !== undefined) {
       this.waiting = false;
       this.dataset.shown = message.t;
-      this.say(message.valid === false ? "No data at this moment" : "");
+      this.say(message.valid === false ? "No data at this moment" : (this.lacking ?? ""));
       if (this.sent !== clock.t) this.request();
     }
   }
@@ -91,6 +120,34 @@ class GaitView extends HTMLElement {
   say(text) {
     const el = this.querySelector("[data-say]");
     if (el && el.textContent !== text) el.textContent = text;
+  }
+
+  // The one that the figure is drawn on; viser has others.
+  canvas() {
+    return this.frame.contentDocument.querySelector("canvas[data-engine]");
+  }
+
+  async savePicture() {
+    const { savePicture } = await import("./figure-export.js");
+    await savePicture(this.canvas(), () => this.tell({ t: clock.t }), `figure-${clock.t.toFixed(2)}s.png`);
+  }
+
+  // From the press on, while the walk plays, until the next press.
+  async record(button) {
+    if (this.recording) {
+      this.recording.stop();
+      return;
+    }
+    const { recordVideo } = await import("./figure-export.js");
+    this.recording = recordVideo(this.canvas(), `figure-${clock.t.toFixed(2)}s`, () => {
+      this.recording = null;
+      button.ariaPressed = "false";
+      button.textContent = "Record video";
+      if (clock.playing) clock.toggle();
+    });
+    button.ariaPressed = "true";
+    button.textContent = "Stop and save";
+    if (!clock.playing) clock.toggle();
   }
 
   request() {

@@ -1,0 +1,55 @@
+"""Walks made of curves that can be laid over a replay: the norm at this speed, and one side for both legs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+
+import numpy as np
+
+from core.frames import SIDES, Floats, Side
+from core.parameters.kinematic import cycle_curves, mean_curve
+from server.services.comparisons import find_norms
+from server.services.histories import AnalysedSession
+from server.services.patients import Patient
+from server.services.reviewed import ReviewedAnalyses
+from server.viewer.ghost import match_reference
+from server.viewer.motion import GhostMotion, GhostName, ReplayMotion
+from server.viewer.reference import SAGITTAL, ReferenceWalk, add_standing_angles
+
+Curves = Mapping[str, Floats]
+
+
+def find_references(
+    reviewed: ReviewedAnalyses, this: AnalysedSession, patient: Patient, motion: ReplayMotion
+) -> dict[GhostName, Callable[[], GhostMotion | None]]:
+    """Return name → finds the walk when it is first asked for; None where curves or strides are missing."""
+
+    def match(curves: Curves, lead: Side) -> GhostMotion | None:
+        if not all(name in curves for name in SAGITTAL):
+            return None
+        strides = reviewed.read_bundle(this.found, this.edits).strides
+        return match_reference(motion, strides, ReferenceWalk(curves, motion.body, lead))
+
+    @cache
+    def find_norm() -> GhostMotion | None:
+        known = find_norms(patient, this.session, reviewed.read_numbers(this.found, this.edits))
+        return match({name: np.radians(band.mean_deg) for name, band in known.bands.items()}, "left")
+
+    @cache
+    def find_side(side: Side) -> GhostMotion | None:
+        return match(_average_side(reviewed, this, side), side)
+
+    left, right = SIDES
+    return {"norm": find_norm, "left": lambda: find_side(left), "right": lambda: find_side(right)}
+
+
+def _average_side(reviewed: ReviewedAnalyses, this: AnalysedSession, side: Side) -> Curves:
+    """Mean curves of the strides of a side that count, rad, with its standing angles put back."""
+    bundle = reviewed.read_bundle(this.found, this.edits)
+    if bundle.angles is None:
+        return {}
+    cycles = cycle_curves(bundle.angles, bundle.strides)
+    means = {name: mean_curve(cycles, name, side).mean for name in cycles.curves}
+    known = {name: x for name, x in means.items() if x is not None and np.isfinite(x).all()}
+    return add_standing_angles(known, bundle.angles.zero_offset, side)
