@@ -152,6 +152,7 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--session", metavar="ADDRESS", help="the session's page, or its id")
     _data_option(add("accept", "Go on with this database, though it was emptied, put back or exchanged."))
     _data_option(add("migrate", "Bring the database to the schema of this version (after a backup)."))
+    add("warm", "Compile the filters now, so that the first analysis does not wait for it.")
     p = add("user", "Add a user, or give one a new password, on the command line.")
     _data_option(p)
     p.add_argument("name")

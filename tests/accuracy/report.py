@@ -1,6 +1,7 @@
 """docs/accuracy.md: every accuracy test compares its section with what it has measured, or writes it anew.
 
-`pytest -m accuracy` compares, `pytest -m accuracy --write-figures` writes.
+`pytest -m accuracy` compares, `pytest -m accuracy --write-figures` writes. docs/performance.md is only
+written.
 """
 
 from __future__ import annotations
@@ -23,6 +24,13 @@ HEAD: Final = """# Accuracy
 Measured by `tests/accuracy` on real recordings (`SAGITTAL_DATA`) and on simulated people. Do not edit: run
 `pytest -m accuracy --write-figures`. Each section names its limits; the tests fail beyond them, and when a
 figure is not the one printed here."""
+
+PERFORMANCE: Final = ROOT / "docs" / "performance.md"
+PERFORMANCE_HEAD: Final = """# Performance
+
+Measured by `tests/bench` on two cores that others use, too, as CPU time. Do not edit: run
+`pytest -n 0 -m bench --write-figures tests/bench/test_growth.py`. Figures of another machine are others:
+nothing is compared with this page; what the tests ask for are ratios and limits."""
 
 IN_SHORT: Final = "In short"
 """The first section: one row a figure."""
@@ -54,8 +62,7 @@ def record(section: str, header: Sequence[str], rows: Sequence[Sequence[str]], n
     AssertionError
         a word differs, or a number by more than one unit of its last printed digit.
     """
-    lines = [_line(header), _line(["---"] * len(header)), *(_line(row) for row in rows)]
-    text = "\n".join(lines) + (f"\n\n{note}" if note else "")
+    text = _table(header, rows, note)
     if os.environ.get(WRITE):
         _replace(section, lambda _: text)
         return
@@ -63,6 +70,18 @@ def record(section: str, header: Sequence[str], rows: Sequence[Sequence[str]], n
     assert printed is not None, f"docs/accuracy.md has no section '{section}': {_HOW}"
     differences = find_differences(printed, text)
     assert not differences, f"docs/accuracy.md, '{section}': {_HOW}\n" + "\n".join(differences)
+
+
+def record_speed(section: str, header: Sequence[str], rows: Sequence[Sequence[str]], note: str = "") -> None:
+    """Replace one section of docs/performance.md, where figures are written; nothing is compared with it."""
+    if os.environ.get(WRITE):
+        text = _table(header, rows, note)
+        _replace(section, lambda _: text, PERFORMANCE, PERFORMANCE_HEAD)
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]], note: str) -> str:
+    lines = [_line(header), _line(["---"] * len(header)), *(_line(row) for row in rows)]
+    return "\n".join(lines) + (f"\n\n{note}" if note else "")
 
 
 def record_in_short(figure: str, peer: str, ours: str, on: str) -> None:
@@ -113,16 +132,16 @@ def read_sections(path: Path = PATH) -> dict[str, str]:
     return {title.strip(): body.strip() for title, _, body in (part.partition("\n") for part in parts)}
 
 
-def _replace(section: str, change: Callable[[str], str]) -> None:
+def _replace(section: str, change: Callable[[str], str], path: Path = PATH, head: str = HEAD) -> None:
     # several test processes may write at once
     with (ROOT / "pyproject.toml").open() as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        sections = read_sections()
+        sections = read_sections(path)
         sections[section] = change(sections.get(section, ""))
         names = sorted(sections, key=lambda name: (name != IN_SHORT, name))
-        whole = "\n\n".join([HEAD, *(f"## {name}\n\n{sections[name]}" for name in names)]) + "\n"
-        if not PATH.exists() or PATH.read_text(encoding="utf-8") != whole:
-            PATH.write_text(whole, encoding="utf-8")
+        whole = "\n\n".join([head, *(f"## {name}\n\n{sections[name]}" for name in names)]) + "\n"
+        if not path.exists() or path.read_text(encoding="utf-8") != whole:
+            path.write_text(whole, encoding="utf-8")
 
 
 def _agree(old: str, new: str) -> bool:

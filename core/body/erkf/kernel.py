@@ -13,12 +13,16 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.erkf.predict import move, propagate, propagate_back, reset_before
+from core.body.erkf.predict import FUSED, move, propagate, propagate_back, propagate_error, reset_before
 from core.body.erkf.updates import (
+    POSITION,
+    VELOCITY,
     back_correct,
+    complete_rows,
     heading_rows,
     joint_rows,
     second_order_variance,
+    subtract_blocks,
     take_block,
     tilt_rows,
     velocity_rows,
@@ -33,8 +37,8 @@ INVALID, CONTACT, STILL, PATCHED = 1, 2, 4, 8
 class SmootherRecord(NamedTuple):
     """What one segment of the forward pass leaves for the backward pass; K samples or 1.
 
-    F (K, n, 5, 3, 3) · V (K, B, 3, N) · E (K, B, 9) · H (K, B, 2, 3, 3) · place (K, B, 4) · blocks (K,) ·
-    P (K, N, N) after the updates, on and below the diagonal · dx (K, N) injected.
+    F (K, n, 5, 3, 3) · V (K, B, 3, as P) · E (K, B, 9) · H (K, B, 2, 3, 3) · place (K, B, 4) · blocks (K,) ·
+    Q (K, N) diagonal of what was added to the covariance before the blocks · dx (K, N) injected.
     """
 
     F: Floats
@@ -43,14 +47,14 @@ class SmootherRecord(NamedTuple):
     H: Floats
     place: NDArray[np.int64]
     blocks: NDArray[np.int64]
-    P: Floats
+    Q: Floats
     dx: Floats
 
 
 class ErkfMemory(NamedTuple):
     """What passes from one sample to the next, advanced in place: `ErkfState` as the kernels take it.
 
-    x (n, 16) · P (N, N) · before (n, 6) · dx (N,) injected last · refused (n,).
+    x (n, 16) · P (N, ≥ N), the rest of each row 0 · before (n, 6) · dx (N,) injected last · refused (n,).
     """
 
     x: Floats
@@ -135,7 +139,7 @@ class Links(NamedTuple):
     sd: Floats
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     """vᵀ S⁻¹ v ≤ gate for the zero velocity of the IMU whose errors begin at b."""
     S = P[b + 3 : b + 6, b + 3 : b + 6]
@@ -149,7 +153,7 @@ def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     return s <= gate * det
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
 def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-def]
     """Move every IMU and the covariance over the time before sample k; F (n, 5, 3, 3) is kept."""
     x, before, dx, acc, gyr = memory.x, memory.before, memory.dx, samples.acc, samples.gyr
@@ -160,9 +164,9 @@ def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-d
     propagate(memory.P, F, m, dt)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
-def add_noise(memory, samples, k, links, noise):  # type: ignore[no-untyped-def]
-    """Add the process noise of sample k, and make that the last sample."""
+@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
+def add_noise(memory, samples, k, links, noise, Q):  # type: ignore[no-untyped-def]
+    """Add the process noise of sample k, its diagonal into Q (N,), and make that the last sample."""
     P, before, dt = memory.P, memory.before, samples.step[k]
     acc, gyr, flags, sd = samples.acc, samples.gyr, samples.flags, links.sd
     for i in range(before.shape[0]):
@@ -177,17 +181,17 @@ def add_noise(memory, samples, k, links, noise):  # type: ignore[no-untyped-def]
         elif flags[k, i] & PATCHED:
             va, vw = va + noise.patch_acc**2, vw + noise.patch_gyr**2
         for c in range(3):
-            P[b + 3 + c, b + 3 + c] += va * dt * dt
-            P[b + 6 + c, b + 6 + c] += vw * dt * dt
+            Q[b + c], Q[b + 3 + c], Q[b + 6 + c] = 0.0, va * dt * dt, vw * dt * dt
             if noise.m == 15:
-                P[b + 9 + c, b + 9 + c] += noise.gyr_walk**2 * dt
-                P[b + 12 + c, b + 12 + c] += noise.acc_walk**2 * dt
+                Q[b + 9 + c], Q[b + 12 + c] = noise.gyr_walk**2 * dt, noise.acc_walk**2 * dt
             before[i, c] = acc[k, i, c]
             before[i, 3 + c] = gyr[k, i, c]
+    for r in range(P.shape[0]):
+        P[r, r] += Q[r]
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
-def judge_contacts(memory, samples, k, noise, scratch, refused):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
+def judge_contacts(memory, samples, k, noise, scratch, Q, refused):  # type: ignore[no-untyped-def]
     """Write for sample k how far each zero velocity is believed, which are taken and which the gate refuses.
 
     All are judged from the predicted state, before any block, so that the order does not matter.
@@ -213,9 +217,11 @@ def judge_contacts(memory, samples, k, noise, scratch, refused):  # type: ignore
             for c in range(3):
                 P[b + c, b + c] += noise.reaccept_m**2
                 P[b + 3 + c, b + 3 + c] += speed2
+                Q[b + c] += noise.reaccept_m**2
+                Q[b + 3 + c] += speed2
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
 def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: ignore[no-untyped-def]
     """Take all blocks of sample k into the covariance and the correction; False if one is not positive."""
     x, P, dx, R, y, U = memory.x, memory.P, memory.dx, scratch.R, scratch.y, scratch.U
@@ -228,6 +234,12 @@ def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: i
             max(noise.centre, 0.0) ** 2
             + second_order_variance(P, R, m, a, c, links.lever[j, 0], links.lever[j, 1])
         )
+    for i in range(x.shape[0]):
+        complete_rows(P, i * m + 6)
+        if links.ends.shape[0] > 0:
+            complete_rows(P, i * m + POSITION)
+        if scratch.taken[i]:
+            complete_rows(P, i * m + VELOCITY)
     dx[:] = 0.0
     B = 0
     good = True
@@ -239,28 +251,29 @@ def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: i
             sd = noise.axis if axis else scratch.slack[j]
             on = links.axis[j] if axis else links.lever[j]
             joint_rows(x, R, m, a, c, on[0], on[1], axis == 0, place[B], H[B], y)
-            good &= take_block(P, dx, place[B], H[B], y, sd, V[B], E[B], U)
+            good &= take_block(P, dx, place[B], H[B], y, sd, V, B, E[B], U)
             B += 1
     for i in range(x.shape[0]):
         rests = samples.flags[k, i] & STILL
         if scratch.taken[i]:
             velocity_rows(x[i, 3:6], m, i, place[B], y)
-            good &= take_block(P, dx, place[B], H[B], y, scratch.zero_velocity[i], V[B], E[B], U)
+            good &= take_block(P, dx, place[B], H[B], y, scratch.zero_velocity[i], V, B, E[B], U)
             B += 1
         if noise.tilt > 0.0 and (scratch.taken[i] or rests):
             tilt_rows(R[i], samples.acc[k, i], m, i, place[B], H[B], y)
-            good &= take_block(P, dx, place[B], H[B], y, noise.tilt, V[B], E[B], U)
+            good &= take_block(P, dx, place[B], H[B], y, noise.tilt, V, B, E[B], U)
             B += 1
         # nested: heading_rows writes the block and may only run where a heading was measured
         if samples.heading.shape[0] > 0 and np.isfinite(samples.heading[k, i]):  # noqa: SIM102
             if heading_rows(R[i], links.forward[i], samples.heading[k, i], m, i, place[B], H[B], y):
-                good &= take_block(P, dx, place[B], H[B], y, noise.heading, V[B], E[B], U)
+                good &= take_block(P, dx, place[B], H[B], y, noise.heading, V, B, E[B], U)
                 B += 1
+    subtract_blocks(P, V, B)
     record.blocks[slot] = B
     return good
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
 def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-untyped-def]
     """Move the correction into the state, and write that (n, 16) and its headings' deviations (n,)."""
     x, P, dx, R = memory.x, memory.P, memory.dx, scratch.R
@@ -282,7 +295,7 @@ def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-unty
         nominal[i] = x[i]
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
 def measure_joints(memory, links, noise, scratch, residual):  # type: ignore[no-untyped-def]
     """Write how far the two ends of each joint are apart (J,), m."""
     y = scratch.y
@@ -295,12 +308,12 @@ def measure_joints(memory, links, noise, scratch, residual):  # type: ignore[no-
         residual[j] = np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
 def advance(memory, samples, k, links, noise, scratch, record, slot, output):  # type: ignore[no-untyped-def]
     """Filter sample k of a block: the one rule of a file and a stream; False if the covariance broke."""
     predict(memory, samples, k, noise, scratch, record.F[slot])
-    add_noise(memory, samples, k, links, noise)
-    judge_contacts(memory, samples, k, noise, scratch, output.refused[k])
+    add_noise(memory, samples, k, links, noise, record.Q[slot])
+    judge_contacts(memory, samples, k, noise, scratch, record.Q[slot], output.refused[k])
     good = correct(memory, samples, k, links, noise, scratch, record, slot)
     inject(memory, noise, scratch, output.nominal[k], output.heading_sd[k])
     for r in range(memory.dx.shape[0]):
@@ -310,7 +323,7 @@ def advance(memory, samples, k, links, noise, scratch, record, slot, output):  #
     return good
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def filter_forward(memory, samples, links, noise, record, output):  # type: ignore[no-untyped-def]
     """Filter a block, `memory` in place; sample at which the covariance broke, or −1.
 
@@ -333,8 +346,6 @@ def filter_forward(memory, samples, links, noise, record, output):  # type: igno
         if not advance(memory, samples, k, links, noise, scratch, record, slot, output):
             return k
         if keeps:
-            for r in range(memory.P.shape[0]):
-                record.P[slot, r, : r + 1] = memory.P[r, : r + 1]
             record.dx[slot] = memory.dx
     for r in range(memory.P.shape[0]):
         for c in range(r):
@@ -343,27 +354,117 @@ def filter_forward(memory, samples, links, noise, record, output):  # type: igno
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def smooth_backward(lam, step, record, m, out):  # type: ignore[no-untyped-def]
-    """Sweep λ (N,) back over a recorded segment and turn its filtered states `out` into smoothed ones."""
-    T, n = out.shape[0], out.shape[1]
-    d = np.empty(len(lam))
-    for k in range(T - 1, -1, -1):
-        P, dx = record.P[k], record.dx[k]
-        d[:] = 0.0
-        for r in range(len(lam)):
-            # four sums, as one would wait for itself
-            s0, s1, s2, s3, own, past = P[r, r] * lam[r], 0.0, 0.0, 0.0, lam[r], r - r % 4
-            for c in range(0, past, 4):
-                s0 += P[r, c] * lam[c]
-                s1 += P[r, c + 1] * lam[c + 1]
-                s2 += P[r, c + 2] * lam[c + 2]
-                s3 += P[r, c + 3] * lam[c + 3]
-            for c in range(past, r):
-                s0 += P[r, c] * lam[c]
-            for c in range(r):
-                d[c] -= P[r, c] * own
-            d[r] -= s0 + s1 + s2 + s3
-        for i in range(n):
+def keep_state(memory, row):  # type: ignore[no-untyped-def]
+    """Write the state into one row (`row_length`,), of P what is on and below the diagonal."""
+    at = 0
+    for part in (memory.x.ravel(), memory.before.ravel(), memory.dx):
+        row[at : at + len(part)] = part
+        at += len(part)
+    for count in memory.refused:
+        row[at] = count
+        at += 1
+    for r in range(memory.P.shape[0]):
+        row[at : at + r + 1] = memory.P[r, : r + 1]
+        at += r + 1
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def restore_state(memory, row):  # type: ignore[no-untyped-def]
+    """The way back of `keep_state`; above the diagonal P stays as it is."""
+    at = 0
+    for part in (memory.x.ravel(), memory.before.ravel(), memory.dx):
+        part[:] = row[at : at + len(part)]
+        at += len(part)
+    for i in range(len(memory.refused)):
+        memory.refused[i] = int(row[at])
+        at += 1
+    for r in range(memory.P.shape[0]):
+        memory.P[r, : r + 1] = row[at : at + r + 1]
+        at += r + 1
+
+
+def row_length(n: int, N: int) -> int:
+    """Numbers in which `keep_state` writes a state of n IMUs and N errors."""
+    return n * (16 + 6 + 1) + N + N * (N + 1) // 2
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def filter_segments(memory, samples, links, noise, record, output, kept, segment):  # type: ignore[no-untyped-def]
+    """`filter_forward` over a whole take, the state before each segment into a row of `kept`."""
+    step, acc, gyr, flags, heading, rolling = samples
+    nominal, sd, residual, refused = output
+    for s in range(kept.shape[0]):
+        a, b = s * segment, min((s + 1) * segment, len(step))
+        keep_state(ErkfMemory(*memory), kept[s])
+        part = (step[a:b], acc[a:b], gyr[a:b], flags[a:b], heading[a:b], rolling[a:b])
+        out = (nominal[a:b], sd[a:b], residual[a:b], refused[a:b])
+        broke = filter_forward(memory, part, links, noise, record, out)
+        if broke >= 0:
+            return a + broke
+    return -1
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def smooth_segments(memory, samples, links, noise, record, output, kept, segment):  # type: ignore[no-untyped-def]
+    """Filter each segment again from its row, the last first, and smooth it; `memory` is overwritten.
+
+    Parameters
+    ----------
+    record : room for a segment. kept : of `filter_segments`.
+    """
+    step, acc, gyr, flags, heading, rolling = samples
+    nominal, sd, residual, refused = output
+    N, m = memory[1].shape[0], Noise(*noise).m
+    lam, d = np.zeros(N), np.empty(N)
+    swept = np.empty((segment, N))
+    for s in range(kept.shape[0] - 1, -1, -1):
+        a, b = s * segment, min((s + 1) * segment, len(step))
+        restore_state(ErkfMemory(*memory), kept[s])
+        part = (step[a:b], acc[a:b], gyr[a:b], flags[a:b], heading[a:b], rolling[a:b])
+        out = (nominal[a:b], sd[a:b], residual[a:b], refused[a:b])
+        filter_forward(memory, part, links, noise, record, out)
+        sweep_back(lam, step[a:b], SmootherRecord(*record), m, swept)
+        # the covariance is again that before the segment
+        restore_state(ErkfMemory(*memory), kept[s])
+        multiply_lower(memory[1], lam, d)
+        move_smoothed(d, step[a:b], SmootherRecord(*record), m, swept, nominal[a:b])
+        measure_smoothed(nominal[a:b], Links(*links), residual[a:b])
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+def sweep_back(lam, step, record, m, swept):  # type: ignore[no-untyped-def]
+    """Sweep λ (N,) back over a recorded segment; `swept` (K, N): λ of each sample before its blocks."""
+    for k in range(len(step) - 1, -1, -1):
+        for B in range(record.blocks[k] - 1, -1, -1):
+            back_correct(lam, record.place[k, B], record.H[k, B], record.V[k, B], record.E[k, B])
+        swept[k] = lam
+        propagate_back(lam, record.F[k], m, step[k])
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def multiply_lower(P, lam, d):  # type: ignore[no-untyped-def]
+    """d ← −P λ, of P only what is on and below the diagonal."""
+    d[:] = 0.0
+    for r in range(len(lam)):
+        for c in range(r):
+            d[r] -= P[r, c] * lam[c]
+            d[c] -= P[r, c] * lam[r]
+        d[r] -= P[r, r] * lam[r]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+def move_smoothed(d, step, record, m, swept, out):  # type: ignore[no-untyped-def]
+    """Turn a segment's filtered states `out` (K, n, 16) into smoothed ones.
+
+    d (N,) is −P λ before the segment. From sample to sample d ← F d − Q λ − d̂x, which is −P λ again without a
+    P (the forward form of the disturbance smoother: Koopman 1993; docs/science/erkf.md, "Smoother").
+    """
+    for k in range(len(step)):
+        dx, Q = record.dx[k], record.Q[k]
+        propagate_error(d, record.F[k], m, step[k])
+        for r in range(len(d)):
+            d[r] -= Q[r] * swept[k, r] + dx[r]
+        for i in range(out.shape[1]):
             b, x = i * m, out[k, i]
             for c in range(3):
                 x[c] += d[b + c]
@@ -375,6 +476,18 @@ def smooth_backward(lam, step, record, m, out):  # type: ignore[no-untyped-def]
             a0, a1, a2 = 0.5 * dx[b + 6], 0.5 * dx[b + 7], 0.5 * dx[b + 8]
             t0, t1, t2 = d[b + 6], d[b + 7], d[b + 8]
             turn(x[6:10], t0 - (a1 * t2 - a2 * t1), t1 - (a2 * t0 - a0 * t2), t2 - (a0 * t1 - a1 * t0))
-        for B in range(record.blocks[k] - 1, -1, -1):
-            back_correct(lam, record.place[k, B], record.H[k, B], record.V[k, B], record.E[k, B])
-        propagate_back(lam, record.F[k], m, step[k])
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def measure_smoothed(states, links, residual):  # type: ignore[no-untyped-def]
+    """Write how far the two ends of each joint are apart in states (K, n, 16), (K, J), m."""
+    n = states.shape[1]
+    R, H = np.empty((n, 3, 3)), np.empty((2, 3, 3))
+    y, place = np.empty(3), np.empty(4, np.int64)
+    for k in range(states.shape[0]):
+        for i in range(n):
+            to_matrix(states[k, i, 6:10], R[i])
+        for j in range(residual.shape[1]):
+            a, c = links.ends[j, 0], links.ends[j, 1]
+            joint_rows(states[k], R, 0, a, c, links.lever[j, 0], links.lever[j, 1], True, place, H, y)
+            residual[k, j] = np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2)

@@ -32,7 +32,13 @@ NEAR_START_S = 1.0
 
 @dataclass(frozen=True, eq=False)
 class ErkfRun:
-    """One smoothed run. rest : samples of the standing start, None = the take starts mid-walk."""
+    """One smoothed run.
+
+    Parameters
+    ----------
+    inputs : without their signals, which nobody reads after the filter. rest : samples of the standing start,
+        None = the take starts mid-walk.
+    """
 
     tree: ImuTree
     inputs: ErkfInputs
@@ -79,6 +85,8 @@ def run_erkf(
     age_s = calibrated.calibration.zero[0] if calibrated.calibration.posture == "standing" else None
     start = start_state(tree, inputs, params, rest, q=first, bias_age_s=age_s)
     track, final = smooth(start, inputs, tree, params)
+    none = np.empty((0, len(tree.imus), 3))
+    inputs = replace(inputs, acc=none, gyr=none)
     return ErkfRun(tree, inputs, start, rest, track, final)
 
 

@@ -8,6 +8,8 @@ column pass is not symmetric in floating point, and the asymmetry grows without 
 
 from __future__ import annotations
 
+from typing import Final
+
 import numba
 
 from core.frames import GRAVITY
@@ -20,11 +22,14 @@ from core.rotation.compiled import (
     turn,
 )
 
+FUSED: Final = {"contract"}
+"""Products and sums may be one instruction; nothing else about the order of arithmetic is given away."""
+
 A, S, D, GAMMA, C = range(5)
 """Blocks of F per IMU, δv'=δv+A δθ+D δb_g+C δb_a, δp'=δp+Δt δv+½Δt(δv'−δv), δθ'=S δθ+Γ δb_g."""
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-untyped-def]
     """Advance one IMU's nominal state x (16,) and write its blocks F (5, 3, 3) and new matrix R (3, 3).
 
@@ -63,7 +68,7 @@ def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-unty
             F[C, i, j] = -dt * (first * start[i, j] + last * R[i, j])
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def reset_before(F, d):  # type: ignore[no-untyped-def]
     """Fold the reset Jacobian G = 1 − ½[δθ̂]× of the last correction (eq 27) into A and S: F ← F G."""
     a, b, c = 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]
@@ -75,7 +80,7 @@ def reset_before(F, d):  # type: ignore[no-untyped-def]
             F[k, i, 2] = z - (x * b - y * a)
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
     """P ← F P Fᵀ, on and below the diagonal, for the blocks F (n, 5, 3, 3) of n IMUs with m errors each."""
     N = P.shape[0]
@@ -134,7 +139,26 @@ def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
                 P[r, b + 3 + i] += dv
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+def propagate_error(d, F, m, dt):  # type: ignore[no-untyped-def]
+    """δ ← F δ, the same step for one error (N,)."""
+    for j in range(len(d) // m):
+        x = d[j * m : (j + 1) * m]
+        f = F[j]
+        t0, t1, t2 = x[6], x[7], x[8]
+        for i in range(3):
+            dv = f[A, i, 0] * t0 + f[A, i, 1] * t1 + f[A, i, 2] * t2
+            turned = f[S, i, 0] * t0 + f[S, i, 1] * t1 + f[S, i, 2] * t2
+            if m == 15:
+                dv += f[D, i, 0] * x[9] + f[D, i, 1] * x[10] + f[D, i, 2] * x[11]
+                dv += f[C, i, 0] * x[12] + f[C, i, 1] * x[13] + f[C, i, 2] * x[14]
+                turned += f[GAMMA, i, 0] * x[9] + f[GAMMA, i, 1] * x[10] + f[GAMMA, i, 2] * x[11]
+            x[i] += dt * x[3 + i] + 0.5 * dt * dv
+            x[3 + i] += dv
+            x[6 + i] = turned
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def propagate_back(lam, F, m, dt):  # type: ignore[no-untyped-def]
     """λ ← Fᵀ λ, the same step for the smoother."""
     for j in range(len(lam) // m):

@@ -12,6 +12,7 @@ from math import atan2, sqrt
 
 import numba
 
+from core.body.erkf.predict import FUSED
 from core.rotation.compiled import skew, times_cross, wrap_angle
 
 FIRST, SECOND, UNIT, TURNS = range(4)
@@ -22,7 +23,7 @@ POSITION, VELOCITY = 0, 3
 """Offsets in an IMU's errors."""
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-untyped-def]
     """Joint centre p_i + R_i r_i = p_j + R_j r_j, or with centre False joint axis R_i e_i = R_j e_j."""
     place[FIRST], place[SECOND] = i * m, j * m
@@ -36,7 +37,7 @@ def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-u
             y[k] += x[j, k] - x[i, k]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
     """Variance of the joint centre's second-order term, ½ σ⁴ |r_xy|² of both levers, in m².
 
@@ -60,7 +61,7 @@ def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def
     return min(0.5 * var * var, 1.5) * reach
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def velocity_rows(v, m, i, place, y):  # type: ignore[no-untyped-def]
     """Zero velocity: the error of v (3,) itself is observed."""
     place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, VELOCITY, 0
@@ -68,7 +69,7 @@ def velocity_rows(v, m, i, place, y):  # type: ignore[no-untyped-def]
         y[k] = -v[k]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def tilt_rows(R, f, m, i, place, H, y):  # type: ignore[no-untyped-def]
     """Tilt: Rᵀẑ is the direction of the specific force at rest; δθ: [Rᵀẑ]×."""
     place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, -1, 1
@@ -78,7 +79,7 @@ def tilt_rows(R, f, m, i, place, H, y):  # type: ignore[no-untyped-def]
         y[k] = f[k] * norm - R[2, k]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-untyped-def]
     """Heading of the axis t = R f; two empty rows make it a block of three. False when t is near vertical."""
     tx = R[0, 0] * forward[0] + R[0, 1] * forward[1] + R[0, 2] * forward[2]
@@ -96,7 +97,7 @@ def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-un
     return True
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def complete_rows(P, first):  # type: ignore[no-untyped-def]
     """Copy what is below the diagonal of P into its rows first … first + 2, so that they are whole."""
     for q in range(3):
@@ -106,55 +107,77 @@ def complete_rows(P, first):  # type: ignore[no-untyped-def]
         P[first, c], P[first + 1, c], P[first + 2, c] = P[c, first], P[c, first + 1], P[c, first + 2]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def take_block(P, dx, place, H, y, sd, V, E, U):  # type: ignore[no-untyped-def]
-    """Take one block, P on and below the diagonal; False if S is not positive.
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyped-def]
+    """Take one block into dx, but not yet into P; False if S is not positive.
 
-    V (3, N) and E (9,) = (e, L) are kept for the smoother.
+    What the blocks before it did to P is taken off H P: H (P − Σ VᵀV). So P goes through the processor's
+    cache once per sample (`subtract_blocks`) and not once per block.
+
+    Parameters
+    ----------
+    P : before all blocks, the rows that H asks for whole (`complete_rows`). taken : blocks before this.
+    V (blocks, 3, as P) and E (9,) = (e, L) of this one are kept for the smoother.
     """
-    N = P.shape[0]
+    wide = P.shape[1]
     b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
     both, turns = b2 >= 0, place[TURNS] == 1
-    if turns:
-        complete_rows(P, b + 6)
-        if both:
-            complete_rows(P, b2 + 6)
-    if unit >= 0:
-        complete_rows(P, b + unit)
-        if both:
-            complete_rows(P, b2 + unit)
+    new = V[taken]
     for r in range(3):
         if turns:
             h0, h1, h2 = H[0, r, 0], H[0, r, 1], H[0, r, 2]
             if both:
                 g0, g1, g2 = H[1, r, 0], H[1, r, 1], H[1, r, 2]
-                for c in range(N):
-                    V[r, c] = (
+                for c in range(wide):
+                    new[r, c] = (
                         h0 * P[b + 6, c] + h1 * P[b + 7, c] + h2 * P[b + 8, c]
                         + g0 * P[b2 + 6, c] + g1 * P[b2 + 7, c] + g2 * P[b2 + 8, c]
                     )  # fmt: skip
                 if unit >= 0:
-                    for c in range(N):
-                        V[r, c] += P[b + unit + r, c] - P[b2 + unit + r, c]
+                    for c in range(wide):
+                        new[r, c] += P[b + unit + r, c] - P[b2 + unit + r, c]
             else:
-                for c in range(N):
-                    V[r, c] = h0 * P[b + 6, c] + h1 * P[b + 7, c] + h2 * P[b + 8, c]
+                for c in range(wide):
+                    new[r, c] = h0 * P[b + 6, c] + h1 * P[b + 7, c] + h2 * P[b + 8, c]
         else:
-            for c in range(N):
-                V[r, c] = P[b + unit + r, c]
+            for c in range(wide):
+                new[r, c] = P[b + unit + r, c]
+    for a in range(taken):
+        old = V[a]
+        for k in range(3):
+            for r in range(3):
+                seen = 0.0
+                if turns:
+                    for i in range(3):
+                        seen += H[0, r, i] * old[k, b + 6 + i]
+                        if both:
+                            seen += H[1, r, i] * old[k, b2 + 6 + i]
+                if unit >= 0:
+                    seen += old[k, b + unit + r]
+                    if both:
+                        seen -= old[k, b2 + unit + r]
+                U[r, k] = seen
+        u00, u01, u02 = U[0, 0], U[0, 1], U[0, 2]
+        u10, u11, u12 = U[1, 0], U[1, 1], U[1, 2]
+        u20, u21, u22 = U[2, 0], U[2, 1], U[2, 2]
+        for c in range(wide):
+            v0, v1, v2 = old[0, c], old[1, c], old[2, c]
+            new[0, c] -= u00 * v0 + u01 * v1 + u02 * v2
+            new[1, c] -= u10 * v0 + u11 * v1 + u12 * v2
+            new[2, c] -= u20 * v0 + u21 * v1 + u22 * v2
     for r in range(3):
         U[3, r] = y[r]
         for k in range(3):
             U[r, k] = 0.0
             if turns:
                 for i in range(3):
-                    U[r, k] += H[0, k, i] * V[r, b + 6 + i]
+                    U[r, k] += H[0, k, i] * new[r, b + 6 + i]
                     if both:
-                        U[r, k] += H[1, k, i] * V[r, b2 + 6 + i]
+                        U[r, k] += H[1, k, i] * new[r, b2 + 6 + i]
             if unit >= 0:
-                U[r, k] += V[r, b + unit + k]
+                U[r, k] += new[r, b + unit + k]
                 if both:
-                    U[r, k] -= V[r, b2 + unit + k]
+                    U[r, k] -= new[r, b2 + unit + k]
         if turns:
             for i in range(3):
                 U[3, r] -= H[0, r, i] * dx[b + 6 + i]
@@ -181,24 +204,46 @@ def take_block(P, dx, place, H, y, sd, V, E, U):  # type: ignore[no-untyped-def]
     e0 = U[3, 0] * i0
     e1 = (U[3, 1] - l10 * e0) * i1
     e2 = (U[3, 2] - l20 * e0 - l21 * e1) * i2
-    for c in range(N):
-        v0 = V[0, c] * i0
-        v1 = (V[1, c] - l10 * v0) * i1
-        v2 = (V[2, c] - l20 * v0 - l21 * v1) * i2
-        V[0, c] = v0
-        V[1, c] = v1
-        V[2, c] = v2
-        dx[c] += v0 * e0 + v1 * e1 + v2 * e2
+    for c in range(wide):
+        v0 = new[0, c] * i0
+        v1 = (new[1, c] - l10 * v0) * i1
+        new[0, c] = v0
+        new[1, c] = v1
+        new[2, c] = (new[2, c] - l20 * v0 - l21 * v1) * i2
+    for c in range(P.shape[0]):
+        dx[c] += new[0, c] * e0 + new[1, c] * e1 + new[2, c] * e2
     E[0], E[1], E[2] = e0, e1, e2
     E[3], E[4], E[5], E[6], E[7], E[8] = i0, l10, l20, i1, l21, i2
-    for r in range(N):
-        v0, v1, v2 = V[0, r], V[1, r], V[2, r]
-        for c in range(r + 1):
-            P[r, c] -= v0 * V[0, c] + v1 * V[1, c] + v2 * V[2, c]
     return True
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+def subtract_blocks(P, V, blocks):  # type: ignore[no-untyped-def]
+    """P ← P − Σ VᵀV on and below the diagonal, two rows at a time; V (≥ blocks, 3, as P).
+
+    A row is run through up to a whole line of the cache; what is above the diagonal means nothing.
+    """
+    N, wide = P.shape
+    for r in range(0, N - 1, 2):
+        p0, p1 = P[r], P[r + 1]
+        for a in range(blocks):
+            x, y, z = V[a, 0], V[a, 1], V[a, 2]
+            x0, y0, z0 = x[r], y[r], z[r]
+            x1, y1, z1 = x[r + 1], y[r + 1], z[r + 1]
+            for c in range(min(wide, (r + 9) // 8 * 8)):
+                p0[c] -= x0 * x[c] + y0 * y[c] + z0 * z[c]
+                p1[c] -= x1 * x[c] + y1 * y[c] + z1 * z[c]
+    if N % 2:
+        r = N - 1
+        p0 = P[r]
+        for a in range(blocks):
+            x, y, z = V[a, 0], V[a, 1], V[a, 2]
+            x0, y0, z0 = x[r], y[r], z[r]
+            for c in range(wide):
+                p0[c] -= x0 * x[c] + y0 * y[c] + z0 * z[c]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
 def back_correct(lam, place, H, V, E):  # type: ignore[no-untyped-def]
     """λ ← λ − Hᵀ L⁻ᵀ (V λ + e): one block of the modified Bryson–Frazier smoother
     (docs/science/erkf.md, "Smoother")."""

@@ -9,12 +9,14 @@ import pytest
 
 from core.body.erkf.filter import filter_block
 from core.body.erkf.params import ErkfParams
-from core.body.erkf.predict import GAMMA, A, C, D, S, move, propagate, propagate_back
+from core.body.erkf.predict import GAMMA, A, C, D, S, move, propagate, propagate_back, propagate_error
 from core.body.erkf.smoother import smooth
 from core.body.erkf.start import start_state
 from core.body.erkf.updates import (
+    complete_rows,
     heading_rows,
     joint_rows,
+    subtract_blocks,
     take_block,
     tilt_rows,
     velocity_rows,
@@ -147,19 +149,35 @@ def test_propagation_and_correction_equal_the_textbook() -> None:
     swept = lam.copy()
     propagate_back(swept, blocks, m, dt)
     np.testing.assert_allclose(swept, full.T @ lam, atol=1e-12)
+    moved = lam.copy()
+    propagate_error(moved, blocks, m, dt)
+    np.testing.assert_allclose(moved, full @ lam, atol=1e-12)
 
     x = np.stack([random_nominal(rng) for _ in range(n)])
     R = np.stack([to_matrix(q) for q in x[:, 6:10]])
     place, H, y, sd = np.zeros(4, np.int64), np.zeros((2, 3, 3)), np.zeros(3), 0.03
-    joint_rows(x, R, m, 0, 2, rng.normal(0, 0.2, 3), rng.normal(0, 0.2, 3), True, place, H, y)
-    dense = np.zeros((3, n * m))
-    dense[:, 0:3], dense[:, 6:9] = np.eye(3), H[0]
-    dense[:, 30:33], dense[:, 36:39] = -np.eye(3), H[1]
-    gain = P @ dense.T @ np.linalg.inv(dense @ P @ dense.T + sd**2 * np.eye(3))
-    updated, dx = np.tril(P), np.zeros(n * m)
-    assert take_block(updated, dx, place, H, y, sd, np.empty((3, n * m)), np.empty(9), np.empty((4, 3)))
-    np.testing.assert_allclose(dx, gain @ y, atol=1e-12)
-    np.testing.assert_allclose(np.tril(updated), np.tril((np.eye(n * m) - gain @ dense) @ P), atol=1e-12)
+    updated, dx, V = P.copy(), np.zeros(n * m), np.empty((2, 3, n * m))
+    expected, expected_dx = P, np.zeros(n * m)
+    # the second block must see what the first did to P, which is not in P yet
+    for taken, (i, j) in enumerate(((0, 2), (1, 2))):
+        joint_rows(x, R, m, i, j, rng.normal(0, 0.2, 3), rng.normal(0, 0.2, 3), True, place, H, y)
+        dense = np.zeros((3, n * m))
+        for sign, at, turned in ((1.0, i * m, H[0]), (-1.0, j * m, H[1])):
+            dense[:, at : at + 3], dense[:, at + 6 : at + 9] = sign * np.eye(3), turned
+        gain = expected @ dense.T @ np.linalg.inv(dense @ expected @ dense.T + sd**2 * np.eye(3))
+        expected_dx = expected_dx + gain @ (y - dense @ expected_dx)
+        expected = expected - gain @ dense @ expected
+        assert take_block(updated, dx, place, H, y, sd, V, taken, np.empty(9), np.empty((4, 3)))
+    subtract_blocks(updated, V, 2)
+    np.testing.assert_allclose(dx, expected_dx, atol=1e-11)
+    np.testing.assert_allclose(np.tril(updated), np.tril(expected), atol=1e-11)
+
+
+def test_rows_are_completed_from_below_the_diagonal() -> None:
+    P = random_covariance(np.random.default_rng(4), 12)
+    below = np.tril(P)
+    complete_rows(below, 3)
+    np.testing.assert_array_equal(below[3:6], P[3:6])
 
 
 @pytest.mark.parametrize("params", [LIVE, OFFLINE], ids=["live", "offline"])
@@ -178,14 +196,15 @@ def test_any_split_into_blocks_gives_the_same_bits(params: ErkfParams) -> None:
     assert np.array_equal(end.injected, state.injected)
 
 
-def test_the_smoother_gives_the_same_bits_for_any_segment() -> None:
+def test_the_smoother_gives_the_same_for_any_segment() -> None:
+    """To rounding: a segment begins with −P λ, which within one is carried on."""
     take = mixed_walk()
     inputs = take.inputs.part(400, 1100)
     first = start_state(take.tree, inputs, OFFLINE)
     one = smooth(first, inputs, take.tree, OFFLINE, 700)[0]
     for segment in (2, 97, 128):
         other = smooth(first, inputs, take.tree, OFFLINE, segment)[0]
-        assert np.array_equal(one.nominal, other.nominal), segment
+        np.testing.assert_allclose(one.nominal, other.nominal, rtol=0.0, atol=1e-10, err_msg=str(segment))
 
 
 def test_the_smoother_equals_the_best_estimate_on_a_linear_problem() -> None:

@@ -1,0 +1,50 @@
+"""`sagittal warm`: compile the filters before anybody waits for them, at installation or in an image."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+
+from server.commands.serve import say
+from server.processes.compile_cache import VARIABLE
+
+
+def warm() -> int:
+    """Compile every filter of walks, offline and live, into the folder of compiled filters; 0 when done.
+
+    What is in the folder already is only loaded. Processors differ: run it on the machine that will analyse.
+    """
+    steps: tuple[tuple[str, Callable[[], None]], ...] = (
+        ("live sessions", _compile_live),
+        ("pose estimators", _compile_poses),
+        ("a whole analysis of a simulated walk", _analyse_walk),
+    )
+    say(f"Compiling into {os.environ[VARIABLE]}")
+    for k, (name, compile_step) in enumerate(steps, 1):
+        began = time.monotonic()
+        compile_step()
+        say(f"{k} of {len(steps)}: {name}, {time.monotonic() - began:.0f} s")
+    return 0
+
+
+def _compile_live() -> None:
+    from core.online import compile_live_kernels
+
+    compile_live_kernels()
+
+
+def _compile_poses() -> None:
+    from core.body.estimate import compile_pose_kernels
+
+    compile_pose_kernels()
+
+
+def _analyse_walk() -> None:
+    """By the real chain: which filters a walk asks for, only that knows."""
+    from core.pipeline import analyse
+    from core.simulate import simulate_scenario
+
+    made = analyse(simulate_scenario("comfortable", 1).recording)
+    if made.problem is not None:
+        raise RuntimeError(f"The simulated walk was not analysed: {made.problem.message}")
