@@ -50,8 +50,8 @@ class GaitView extends HTMLElement {
       this.tell({ look: this.look.value });
       this.options.querySelector("[data-switch=follow]").ariaPressed = "true";
     });
-    this.ghosts = this.options.querySelector("[data-ghosts]");
-    this.ghosts.addEventListener("change", () => this.tell({ ghost: this.ghosts.value || null }));
+    this.ghosts = this.options.querySelector("[data-ghosts]"); // a take without strides has none
+    this.ghosts?.addEventListener("change", () => this.tell({ ghost: this.ghosts.value || null }));
     this.options.querySelector("[data-picture]").addEventListener("click", () => this.savePicture());
     this.options.querySelector("[data-video]").addEventListener("click", (e) => this.record(e.currentTarget));
     this.connect();
@@ -98,11 +98,11 @@ class GaitView extends HTMLElement {
       unseen.textContent = `Not shown, no sensors there: ${message.hidden.map(words).join(", ")}.`;
       for (const b of this.switches) this.tell(setting(b));
       if (this.look.value !== "near") this.tell({ look: this.look.value });
-      this.tell({ ghost: this.ghosts.value || null });
+      if (this.ghosts) this.tell({ ghost: this.ghosts.value || null });
       this.send();
     } else if (message.ghost !== undefined) {
       this.dataset.ghostShown = message.ghost ?? "";
-      const wanted = this.ghosts.value && this.ghosts.selectedOptions[0].text.trim();
+      const wanted = this.ghosts?.value && this.ghosts.selectedOptions[0].text.trim();
       this.lacking = wanted && !message.ghost ? (message.why ?? `This walk has no such ghost: ${wanted}`) : "";
       this.say(this.lacking);
     } else if (message.t !== undefined) {
