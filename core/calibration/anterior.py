@@ -256,13 +256,14 @@ def _by_walking(
         # a velocity gained since a standing that swayed can point backwards, a walking trunk cannot
         facts |= {"source": "acceleration", "sign": "pendulum"}
         chosen = WalkingDirection(nearest_sign(axis.angle, chosen.angle + np.pi), axis.score)
+        velocity = start = None
     notices = _sign_notices(segment, chosen.angle, R_vertical, q, walk)
     heard, mirror = list_axis_measures(segment, chosen.angle, axis, pca, forward)
     if strides is not None:
         heard = (ForwardMeasure("strides", strides.angle, forward.strides_sd, forward.strides_doubt),)
         if abs(off) > DISAGREEMENT:
             message = (
-                f"{segment}: strides and acceleration show walking directions {abs(degrees(off)):.0f}° apart, "
+                f"{segment}: strides and acceleration show ways {abs(degrees(off)):.0f}° apart, "
                 f"{degrees(DISAGREEMENT):.0f}° are expected at most; the strides were used. Frontal and "
                 "transverse angles of this segment are doubtful; look at the mounting."
             )

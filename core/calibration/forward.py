@@ -127,8 +127,9 @@ class WeighedForward:
 
     Parameters
     ----------
-    angle : the most probable one in the sensor's rest world, rad. sd : so far from it 68 % of the probability
-    lies, rad: the standard deviation of a normal one, and not blown up by a small chance of anything.
+    angle : the most probable one in the sensor's rest world, rad. sd : within so much of it lies 68 % of the
+    probability of its half circle, rad: the standard deviation of a normal one, and not blown up by a small
+    chance of anything.
     """
 
     angle: float
@@ -233,8 +234,10 @@ def _locate(density: Floats) -> tuple[float, float]:
     near = np.abs(wrap_angle(ANGLES - peak)) <= PEAK
     angle = float(np.angle((p[near] * np.exp(1j * ANGLES[near])).sum()))
     off = np.abs(wrap_angle(ANGLES - angle))
-    order = np.argsort(off)
-    return angle, float(np.interp(ONE_SD, np.cumsum(p[order]), off[order]))
+    # which end of an axis is ahead is decided before: only this half circle counts
+    order = np.argsort(off)[: CELLS // 2]
+    held = np.cumsum(p[order])
+    return angle, float(np.interp(ONE_SD, held / held[-1], off[order]))
 
 
 def _hear(
