@@ -63,11 +63,11 @@ class ForwardParams:
     velocity_doubt: float = 0.1
     start_sd: float = radians(15.0)
     start_doubt: float = 0.3
-    axis_sd: float = radians(4.0)
+    axis_sd: float = radians(6.0)
     axis_doubt: float = 0.05
     pca_sd: float = radians(10.0)
     pca_doubt: float = 0.3
-    mirror_sd: float = radians(8.0)
+    mirror_sd: float = radians(10.0)
     movement_sd: float = radians(5.0)
     movement_doubt: float = 0.05
     declared_sd: float = radians(20.0)
@@ -237,7 +237,9 @@ def _locate(density: Floats) -> tuple[float, float]:
     # which end of an axis is ahead is decided before: only this half circle counts
     order = np.argsort(off)[: CELLS // 2]
     held = np.cumsum(p[order])
-    return angle, float(np.interp(ONE_SD, held / held[-1], off[order]))
+    # so many cells lie to either side of it as one
+    reach = np.arange(1, len(order) + 1) * (pi / CELLS)
+    return angle, float(np.interp(ONE_SD, held / held[-1], reach))
 
 
 def _hear(
