@@ -27,7 +27,7 @@ MeasureName = Literal[
 CELLS: Final = 360
 """Cells of the circle. Densities of 1.5° and wider are summed over them as if they were integrated."""
 
-ANGLES: Final[Floats] = np.arange(CELLS) * (2.0 * pi / CELLS) - pi
+ANGLES: Final[Floats] = np.asarray(np.arange(CELLS) * (2.0 * pi / CELLS) - pi, np.float64)
 
 NARROWEST: Final = radians(1.5)
 """No measure is taken to be surer (cells of 1°)."""
@@ -265,7 +265,7 @@ def _hear(
         elif segment == j.distal:
             yield vote("proximal_joint", found[j.proximal][0] - j.turn, j.sd, j.doubt)
     other = next((p[o] for p in LEVELS for s, o in SIDE_PAIRS if p[s] == segment), None)
-    if other in found and segment in mirrors and other in mirrors:
+    if other is not None and other in found and segment in mirrors and other in mirrors:
         own, theirs = mirrors[segment], mirrors[other]
         says = own.angle + theirs.angle - found[other][0]
         yield vote("mirror", says, max(own.sd, theirs.sd), max(own.doubt, theirs.doubt))

@@ -15,6 +15,7 @@ from core.calibration.forward import (
     MeasureName,
     weigh_forward_axes,
 )
+from core.frames import THIGH, Segment
 from core.rotation import wrap_angle
 
 P = ForwardParams()
@@ -63,17 +64,19 @@ def test_neighbours_decide_between_two() -> None:
 
 def test_the_pelvis_hears_both_legs() -> None:
     """As a normal product has it: each leg's measures at the end of a chain of spreads."""
-    legs: dict[str, Sequence[ForwardMeasure]] = {
+    measures: dict[Segment, Sequence[ForwardMeasure]] = {
+        "pelvis": (),
         "thigh_l": (says("velocity", 4.0, 3.0, 0.0),), "thigh_r": (says("velocity", -2.0, 3.0, 0.0),),
     }  # fmt: skip
-    joints = [JointMeasure("pelvis", s, 0.0, radians(4.0), 0.0) for s in ("thigh_l", "thigh_r")]
-    found = weigh_forward_axes({"pelvis": (), **legs}, joints, {})
+    joints = [JointMeasure("pelvis", s, 0.0, radians(4.0), 0.0) for s in THIGH.values()]
+    found = weigh_forward_axes(measures, joints, {})
     assert np.degrees(found["pelvis"].angle) == pytest.approx(1.0, abs=0.05)
     assert np.degrees(found["pelvis"].sd) == pytest.approx(5.0 / np.sqrt(2.0), rel=0.03)
 
 
 def test_left_mirrors_right() -> None:
-    axes = {s: says("mirror", a, 5.0) for s, a in (("shank_l", -12.0), ("shank_r", 12.0))}
+    sides: tuple[tuple[Segment, float], ...] = (("shank_l", -12.0), ("shank_r", 12.0))
+    axes = {s: says("mirror", a, 5.0) for s, a in sides}
     sure, open_ = (says("velocity", 0.0, 2.0, 0.0),), (says("velocity", -20.0, 20.0, 0.0),)
     found = weigh_forward_axes({"shank_l": open_, "shank_r": sure}, [], axes)
     assert np.degrees(found["shank_l"].angle) == pytest.approx(0.0, abs=2.5)
