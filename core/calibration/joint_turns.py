@@ -98,14 +98,13 @@ def _measure(
     n = chunks * chunk
     sums = JointSums.empty(chunks, 0)
     sums.add(slice(None), terms[first][:n], terms[second][:n], usable[first][:n], usable[second][:n], chunk)
-    at = np.flatnonzero(sums.ok)
     whole = replace(params.joints, window_chunks=chunks, least_chunks=LEAST_CHUNKS)
     found = sums.solve(np.zeros(1, np.int64), chunk, whole)
     if not len(found) or found[0, 3] > params.worst_misfit:
         return None
     turn = float(found[0, 10])
     width = params.joints.window_chunks
-    starts = np.arange(int(at[0]), max(int(at[0]), int(at[-1]) + 1 - width) + 1, max(1, width // 2))
+    starts = np.arange(0, max(0, chunks - width + 1), max(1, width // 2))
     # a heading that drifts while somebody walks had drifted before, since the standing, by as much
     apart = wrap_angle(sums.solve(starts, chunk, params.joints)[:, 10] - turn)
     drift = float(np.sqrt(np.mean(apart**2))) if len(apart) else 0.0
