@@ -63,8 +63,11 @@ def fit_turns(name: str, side: Side, free: tuple[int, ...]) -> Floats:
         off = (flexion(name, side, turns) - true + 180.0) % 360.0 - 180.0
         return np.asarray(off - off.mean())
 
-    # the turn a constant offset leaves free is held by a weak pull to nothing
-    found = least_squares(lambda x: np.concatenate((error(x), 1e-2 * x)), np.zeros(len(free)))
+    def residual(x: Floats) -> Floats:
+        # the turn that a constant offset leaves free is held by a weak pull to nothing
+        return np.concatenate((error(x), 1e-2 * x))
+
+    found = least_squares(residual, np.zeros(len(free)))
     return error(found.x) if len(free) else error(np.zeros(0))
 
 
