@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from math import degrees, radians
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import degrees, hypot, radians
 from typing import Literal
 
 import numpy as np
 
+from core.calibration.forward import (
+    ForwardMeasure,
+    ForwardParams,
+    JointMeasure,
+    weigh_forward_axes,
+)
 from core.calibration.gyro_pca import (
     GOOD_AXIS,
+    SINGLE_AXIS,
     WEAK_MARGIN,
+    FlexionAxis,
     about_vertical,
     flexion_axis,
     gait_margin,
+    measure_flexion,
     sagittal_angle,
 )
 from core.calibration.heading import (
@@ -88,13 +97,24 @@ class CalibrationWalk:
 
 @dataclass(frozen=True, eq=False)
 class AnteriorAxis:
-    """Angle in rad of the anterior axis in the sensor's rest world, how it was found and what to tell."""
+    """The anterior axis of one sensor: first by rule, then as all sensors together have it.
+
+    Parameters
+    ----------
+    angle : in the sensor's rest world, rad. notices : what to tell. measures : all that speaks of it.
+    mirror : the axis it turns about, as the other side's would be mirrored; None where that is not clear.
+    kept : the rule's angle stands, whatever the others say. sd : of the angle, rad.
+    """
 
     angle: float
     method: str
     score: float
     notices: tuple[Notice, ...] = ()
     facts: Mapping[str, object] = field(default_factory=dict)
+    measures: tuple[ForwardMeasure, ...] = ()
+    mirror: ForwardMeasure | None = None
+    kept: bool = False
+    sd: float | None = None
 
 
 def find_anterior_axis(
@@ -106,8 +126,9 @@ def find_anterior_axis(
     declared: str,
     method: Method,
     params: HeadingParams,
+    forward: ForwardParams,
 ) -> AnteriorAxis:
-    """Find the anterior axis of one segment.
+    """Find the anterior axis of one segment by itself, and all that speaks of it.
 
     Parameters
     ----------
@@ -127,11 +148,12 @@ def find_anterior_axis(
                 "Record at least 8 steps straight ahead, or declare the mounting: “lateral, face right”.",
                 sensor=segment,
             )
-        return AnteriorAxis(written, "declared", 0.5)
+        said = ForwardMeasure("declared", written, forward.declared_sd, forward.declared_doubt)
+        return AnteriorAxis(written, "declared", 0.5, measures=(said,), kept=True)
     if method == "gyro_pca" and segment not in TRUNK:
-        found = _by_gyro(segment, signals, standing, R_vertical, q, walk, written)
+        found = _by_gyro(segment, signals, standing, R_vertical, q, walk, written, forward)
     else:
-        found = _by_walking(segment, signals, standing, R_vertical, q, walk, written, params)
+        found = _by_walking(segment, signals, standing, R_vertical, q, walk, written, params, forward)
     if written is not None and abs(subtract_angles(found.angle, written)) > CONFLICT:
         raise CalibrationError(
             "calibration_sign_conflict",
@@ -170,8 +192,10 @@ def _by_walking(
     walk: CalibrationWalk,
     written: float | None,
     params: HeadingParams,
+    forward: ForwardParams,
 ) -> AnteriorAxis:
     """Direction of the rest-to-rest velocity, or the axis of the acceleration with a sign from elsewhere."""
+    pca = measure_flexion(signals.gyr[walk.mask] - standing.gyro_bias, R_vertical)
     a = horizontal_acceleration(q, signals.acc)
     steps_s = walk.steps_s if segment in TRUNK else None
     axis = acceleration_axis(a, walk.parts, walk.bearing, walk.rate_hz, params, steps_s)
@@ -184,7 +208,7 @@ def _by_walking(
         ]
         velocity = velocity_direction(v, first, [p for p, _ in inside], [b for _, b in inside], params)
     facts: dict[str, object] = {"axis_share": axis.score}
-    allowed = DISAGREEMENT
+    start = None
     strides = _by_strides(segment, signals, standing, a, walk, params)
     if strides is not None:
         off = subtract_angles(nearest_sign(axis.angle, strides.angle), strides.angle)
@@ -209,15 +233,20 @@ def _by_walking(
             if written is None and abs(agrees) >= params.pendulum:
                 facts |= {"source": "acceleration", "sign": "pendulum", "pendulum": agrees}
                 angle = nearest_sign(axis.angle, axis.angle + (0.0 if agrees > 0.0 else np.pi))
-                return AnteriorAxis(angle, "walking_direction", axis.score, (), facts)
+                heard, mirror = list_axis_measures(segment, angle, axis, pca, forward)
+                return AnteriorAxis(
+                    angle, "walking_direction", axis.score, (), facts, measures=heard, mirror=mirror
+                )
             angle, notices = _signed(segment, axis.angle, written, R_vertical, q, walk)
             facts |= {"source": "acceleration", "sign": "declared" if written is not None else "gait"}
-            return AnteriorAxis(angle, "walking_direction", axis.score, notices, facts)
+            heard, mirror = list_axis_measures(segment, angle, axis, pca, forward)
+            return AnteriorAxis(
+                angle, "walking_direction", axis.score, notices, facts, measures=heard, mirror=mirror
+            )
         off = subtract_angles(nearest_sign(axis.angle, start.angle), start.angle)
         facts |= {"source": "acceleration", "sign": "velocity", "disagreement_rad": off}
         chosen = WalkingDirection(nearest_sign(axis.angle, start.angle), axis.score)
-        allowed = COARSE
-        if abs(off) > allowed and axis.score <= STRONG_AXIS:
+        if abs(off) > COARSE and axis.score <= STRONG_AXIS:
             facts["source"] = "velocity"
             chosen = WalkingDirection(start.angle, 0.5)
     agrees = _vaulting(segment, signals, q, a, chosen.angle, walk)
@@ -227,15 +256,89 @@ def _by_walking(
         # a velocity gained since a standing that swayed can point backwards, a walking trunk cannot
         facts |= {"source": "acceleration", "sign": "pendulum"}
         chosen = WalkingDirection(nearest_sign(axis.angle, chosen.angle + np.pi), axis.score)
+        velocity = start = None
     notices = _sign_notices(segment, chosen.angle, R_vertical, q, walk)
-    if abs(off) > allowed:
-        message = (
-            f"{segment}: velocity and acceleration show walking directions {abs(degrees(off)):.0f}° apart, "
-            f"{degrees(allowed):.0f}° are expected at most; {facts['source']} was used. Frontal and "
-            "transverse angles of this segment are doubtful; look at the mounting."
+    heard, mirror = list_axis_measures(segment, chosen.angle, axis, pca, forward)
+    if strides is not None:
+        heard = (ForwardMeasure("strides", strides.angle, forward.strides_sd, forward.strides_doubt),)
+        if abs(off) > DISAGREEMENT:
+            message = (
+                f"{segment}: strides and acceleration show ways {abs(degrees(off)):.0f}° apart, "
+                f"{degrees(DISAGREEMENT):.0f}° are expected at most; the strides were used. Frontal and "
+                "transverse angles of this segment are doubtful; look at the mounting."
+            )
+            notices += (Notice("heading_disagreement", message, sensor=segment),)
+    elif velocity is not None:
+        sd = hypot(forward.velocity_sd, forward.velocity_error_mps / velocity.speed_mps)
+        heard = (*heard, ForwardMeasure("velocity", velocity.angle, sd, forward.velocity_doubt))
+    elif start is not None:
+        heard = (
+            *heard,
+            ForwardMeasure("start_velocity", start.angle, forward.start_sd, forward.start_doubt),
         )
-        notices += (Notice("heading_disagreement", message, sensor=segment),)
-    return AnteriorAxis(chosen.angle, "walking_direction", chosen.score, notices, facts)
+    return AnteriorAxis(
+        chosen.angle,
+        "walking_direction",
+        chosen.score,
+        notices,
+        facts,
+        measures=heard,
+        mirror=mirror,
+        kept=strides is not None,
+    )
+
+
+def list_axis_measures(
+    segment: Segment, angle: float, axis: WalkingDirection, pca: FlexionAxis, params: ForwardParams
+) -> tuple[tuple[ForwardMeasure, ...], ForwardMeasure | None]:
+    """What the axes of acceleration and of turning say of the forward axis, and what the other side may use.
+
+    Parameters
+    ----------
+    angle : of the forward axis, to within the half circle that gives both axes their sign, rad.
+    """
+    doubt = max(params.axis_doubt, 1.0 - axis.score)
+    heard = [ForwardMeasure("acceleration", nearest_sign(axis.angle, angle), params.axis_sd, doubt)]
+    # walking gives a trunk no sagittal axis of turning
+    if segment in TRUNK or pca.rho < SINGLE_AXIS:
+        return tuple(heard), None
+    across = nearest_sign(-pca.gamma, angle)
+    heard.append(ForwardMeasure("gyro_pca", across, params.pca_sd, params.pca_doubt))
+    clear = pca.rho >= GOOD_AXIS
+    return tuple(heard), (
+        ForwardMeasure("mirror", across, params.mirror_sd, params.pca_doubt) if clear else None
+    )
+
+
+def weigh_axes(
+    found: Mapping[Segment, AnteriorAxis], joints: Sequence[JointMeasure], params: ForwardParams
+) -> dict[Segment, AnteriorAxis]:
+    """The forward axes as all sensors together have them, with their uncertainty, told where it is large."""
+    mirrors = {s: f.mirror for s, f in found.items() if f.mirror is not None}
+    weighed = weigh_forward_axes({s: f.measures for s, f in found.items()}, joints, mirrors)
+    better = {}
+    for s, f in found.items():
+        w = weighed[s]
+        angle = f.angle if f.kept else w.angle
+        votes = [
+            {"source": v.source, "off_rad": subtract_angles(v.angle, angle), "share": v.share}
+            for v in w.votes
+        ]
+        told = (_tell_uncertain(s, w.sd, params.tell_sd),) if w.sd > params.tell_sd else ()
+        better[s] = replace(
+            f, angle=angle, sd=w.sd, notices=f.notices + told, facts={**f.facts, "votes": votes}
+        )
+    return better
+
+
+def _tell_uncertain(segment: Segment, sd: float, limit: float) -> Notice:
+    return Notice(
+        "forward_uncertain",
+        f"{segment}: its way forward is known to ± {degrees(sd):.0f}° only; ± {degrees(limit):.0f}° is good. "
+        "Frontal and transverse angles there are doubtful. Start straight ahead from standing and walk "
+        "further.",
+        sensor=segment,
+    )
 
 
 def _vaulting(
@@ -256,6 +359,7 @@ def _by_gyro(
     q: Floats,
     walk: CalibrationWalk,
     written: float | None,
+    forward: ForwardParams,
 ) -> AnteriorAxis:
     """Flexion axis by gyro PCA, sign by declared mounting or the gait rules."""
     axis = flexion_axis(signals.gyr[walk.mask] - standing.gyro_bias, R_vertical, segment)
@@ -269,7 +373,8 @@ def _by_gyro(
                 sensor=segment,
             ),
         )
-    return AnteriorAxis(angle, "gyro_pca", axis.rho, notices, {"rho": axis.rho})
+    said = ForwardMeasure("gyro_pca", angle, forward.pca_sd, forward.pca_doubt)
+    return AnteriorAxis(angle, "gyro_pca", axis.rho, notices, {"rho": axis.rho}, measures=(said,), kept=True)
 
 
 def _signed(

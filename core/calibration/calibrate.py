@@ -8,7 +8,8 @@ from math import degrees, radians
 
 import numpy as np
 
-from core.calibration.anterior import AnteriorAxis, CalibrationWalk, Method, find_anterior_axis
+from core.calibration.anterior import AnteriorAxis, CalibrationWalk, Method, find_anterior_axis, weigh_axes
+from core.calibration.forward import ForwardParams
 from core.calibration.from_walking import calibrate_from_walking
 from core.calibration.functional import (
     FunctionalMovements,
@@ -18,6 +19,7 @@ from core.calibration.functional import (
 )
 from core.calibration.gyro_pca import about_vertical, count_steps, sagittal_angle
 from core.calibration.heading import HeadingParams, Part, step_time
+from core.calibration.joint_turns import JointTurnParams, measure_joint_turns
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
 from core.calibration.score import ScoreParams
 from core.calibration.sensor_in_walk import WalkRungParams
@@ -69,7 +71,7 @@ class CalibrationParams:
         declared mounting, because walking gives it no sagittal axis
         (docs/science/calibration.md, "Flexion axis by gyro PCA").
     from_walking : where nobody stands still. functional : swings and bows done for the calibration.
-    score : limits of the checks.
+    forward, joint_turns : how forward axes are weighed. score : limits of the checks.
     """
 
     method: Method = "walking_direction"
@@ -79,6 +81,8 @@ class CalibrationParams:
     attitude: AttitudeParams = field(default_factory=AttitudeParams)
     from_walking: WalkRungParams = field(default_factory=WalkRungParams)
     functional: FunctionalParams = field(default_factory=FunctionalParams)
+    forward: ForwardParams = field(default_factory=ForwardParams)
+    joint_turns: JointTurnParams = field(default_factory=JointTurnParams)
     score: ScoreParams = field(default_factory=ScoreParams)
 
 
@@ -141,6 +145,8 @@ def _from_walking(
         params.method,
         why,
         rests,
+        params.forward,
+        params.joint_turns,
     )
 
 
@@ -166,14 +172,17 @@ def _calibrate_at(
         declared = recording.mounting.get(s, "")
         try:
             found[s] = find_anterior_axis(
-                s, signals, standing[s], q[s], walk, declared, params.method, params.heading
+                s, signals, standing[s], q[s], walk, declared, params.method, params.heading, params.forward
             )
         except CalibrationError as error:
             failed.append(error)
-    found |= find_functional_axes(recording, movements, standing, q, params.functional)
+    found |= find_functional_axes(recording, movements, standing, q, params.functional, params.forward)
     failed = [error for error in failed if error.sensor not in found]
     if not found and failed:
         raise failed[0]
+    worn = {s: q[s] for s in found}
+    joints = measure_joint_turns(recording, biases, worn, walk.parts, params.joint_turns)
+    found = weigh_axes(found, joints, params.forward)
     notices = [Notice(error.code, error.message, sensor=error.sensor) for error in failed]
     for f in found.values():
         notices += f.notices
@@ -279,6 +288,7 @@ def _mounted(standing: SensorAtRest, found: AnteriorAxis) -> SegmentCalibration:
         rest_norm=standing.rest_norm,
         method=found.method,
         score=min(1.0, max(0.0, found.score)),
+        forward_sd=found.sd,
     )
 
 

@@ -13,13 +13,15 @@ from typing import Final
 
 import numpy as np
 
-from core.calibration.anterior import AnteriorAxis, Method
+from core.calibration.anterior import AnteriorAxis, Method, list_axis_measures, weigh_axes
+from core.calibration.forward import ForwardMeasure, ForwardParams
 from core.calibration.gyro_pca import (
     WEAK_MARGIN,
     about_vertical,
     count_steps,
     flexion_axis,
     gait_margin,
+    measure_flexion,
     sagittal_angle,
 )
 from core.calibration.heading import (
@@ -33,6 +35,7 @@ from core.calibration.heading import (
     step_time,
     stride_direction,
 )
+from core.calibration.joint_turns import JointTurnParams, measure_joint_turns
 from core.calibration.mounting import read_declared_angle
 from core.calibration.result import CalibratedRecording, Calibration, SegmentCalibration
 from core.calibration.sensor_in_walk import UP, SensorInWalk, WalkRungParams, follow_sensor
@@ -101,7 +104,9 @@ def calibrate_from_walking(
     params: WalkRungParams,
     method: Method,
     why: SignalError,
-    rests: tuple[Window, ...] = (),
+    rests: tuple[Window, ...],
+    forward: ForwardParams,
+    joint_turns: JointTurnParams,
 ) -> CalibratedRecording:
     """Calibrate without a standing.
 
@@ -146,7 +151,16 @@ def calibrate_from_walking(
     near = [p for p in parts if abs(0.5 * (p[0] + p[1] - home[0] - home[1])) <= reach]
     bearing = _bearings(recording, sensors, near, home)
     neutral = {s: _find_neutral(s, x, near, home) for s, x in sensors.items()}
-    found, notices = _find_forward(recording, neutral, near, bearing, heading, method)
+    found, notices = _find_forward(recording, neutral, near, bearing, heading, method, forward)
+    joints = measure_joint_turns(
+        recording,
+        {s: neutral[s].sensor.gyro_bias for s in found},
+        {s: neutral[s].q for s in found},
+        near,
+        joint_turns,
+    )
+    found = weigh_axes(found, joints, forward)
+    notices += [n for f in found.values() for n in f.notices]
     notices.append(Notice("from_walking", FROM_PAUSES if rests else FROM_WALKING))
     zero = (home[0] / rate, home[1] / rate)
     at = round(0.5 * (zero[0] + zero[1]) * rate)
@@ -208,8 +222,9 @@ def _find_forward(
     bearing: list[float],
     params: HeadingParams,
     method: Method,
+    weights: ForwardParams,
 ) -> tuple[dict[Segment, AnteriorAxis], list[Notice]]:
-    """Anterior axis of every sensor whose sign can be told, and what is to be said of the others."""
+    """Anterior axis of every sensor whose sign can be told, by itself, and what is to be said of others."""
     found: dict[Segment, AnteriorAxis] = {}
     notices: list[Notice] = []
     pushed: dict[Segment, Floats] = {}
@@ -221,7 +236,7 @@ def _find_forward(
         vaulting = 0.0
         R = vertical_frame(x.up)
         try:
-            strides = None
+            strides, seen = None, None
             if method == "gyro_pca" and segment not in TRUNK:
                 pca = flexion_axis(signals.gyr[mask] - x.sensor.gyro_bias, R, segment)
                 axis, share = -pca.gamma, pca.rho
@@ -248,10 +263,24 @@ def _find_forward(
             failed = failed or error
             notices.append(Notice(error.code, error.message, sensor=segment))
             continue
-        notices += own
         pushed[segment] = forward if np.cos(angle - axis) > 0.0 else -forward
+        heard: tuple[ForwardMeasure, ...]
+        if seen is None:
+            heard, mirror = (ForwardMeasure("gyro_pca", angle, weights.pca_sd, weights.pca_doubt),), None
+        else:
+            pca = measure_flexion(signals.gyr[mask] - x.sensor.gyro_bias, R)
+            heard, mirror = list_axis_measures(segment, angle, seen, pca, weights)
+        if strides is not None:
+            heard = (ForwardMeasure("strides", angle, weights.strides_sd, weights.strides_doubt),)
         found[segment] = AnteriorAxis(
-            angle, method if segment not in TRUNK else "walking_direction", share, own, {"sign": how}
+            angle,
+            method if segment not in TRUNK else "walking_direction",
+            share,
+            own,
+            {"sign": how},
+            measures=heard,
+            mirror=mirror,
+            kept=seen is None or strides is not None,
         )
     if not found and failed is not None:
         raise failed
@@ -360,6 +389,7 @@ def _mounted(x: _Neutral, found: AnteriorAxis, at: int) -> SegmentCalibration:
         method=found.method,
         score=min(1.0, max(0.0, found.score)),
         start_q=multiply(about(2, -found.angle), x.q[at]),
+        forward_sd=found.sd,
     )
 
 

@@ -13,6 +13,7 @@ from typing import Final, Literal
 import numpy as np
 
 from core.calibration.anterior import AnteriorAxis
+from core.calibration.forward import ForwardMeasure, ForwardParams
 from core.calibration.gyro_pca import (
     GOOD_AXIS,
     WEAK_MARGIN,
@@ -127,6 +128,7 @@ def find_functional_axes(
     standing: Mapping[Segment, SensorAtRest],
     q: Mapping[Segment, Floats],
     params: FunctionalParams,
+    forward: ForwardParams,
 ) -> dict[Segment, AnteriorAxis]:
     """Anterior axis of every sensor whose segment was swung or bowed often enough.
 
@@ -157,7 +159,8 @@ def find_functional_axes(
             continue
         told = tuple(_tell(segment, how, done, asked, axis.rho, margin))
         facts = {"source": how, "rho": axis.rho, "repetitions": done, "asked": asked}
-        found[segment] = AnteriorAxis(angle, how, axis.rho, told, facts)
+        said = ForwardMeasure(how, angle, forward.movement_sd, forward.movement_doubt)
+        found[segment] = AnteriorAxis(angle, how, axis.rho, told, facts, measures=(said,), kept=True)
     return found
 
 

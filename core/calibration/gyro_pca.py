@@ -66,8 +66,8 @@ def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionA
     ------
     CalibrationError `not_single_axis` when the movement has no main axis (ρ < 0.70).
     """
-    found = measure_main_axis((rate @ R_vertical.T)[:, [0, 2]])
-    rho = found.share
+    found = measure_flexion(rate, R_vertical)
+    rho = found.rho
     if rho < SINGLE_AXIS:
         raise CalibrationError(
             "not_single_axis",
@@ -76,7 +76,13 @@ def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionA
             "walking direction.",
             sensor=segment,
         )
-    return FlexionAxis(float(np.arctan2(-found.x, found.z)), rho)
+    return found
+
+
+def measure_flexion(rate: Floats, R_vertical: Floats) -> FlexionAxis:
+    """The same for rates (n, 3) in sensor coordinates, however many axes they have."""
+    found = measure_main_axis((rate @ R_vertical.T)[:, [0, 2]])
+    return FlexionAxis(float(np.arctan2(-found.x, found.z)), found.share)
 
 
 def about_vertical(gamma: float) -> Floats:

@@ -73,11 +73,12 @@ class WalkingDirection:
     Parameters
     ----------
     angle : rad from x towards y. score : 0 to 1; velocity: agreement of the parts, |Σ v| / Σ |v|; axis: share
-    of the larger principal component less the smaller.
+    of the larger principal component less the smaller. speed_mps : of a velocity, 0 of an axis.
     """
 
     angle: float
     score: float
+    speed_mps: float = 0.0
 
 
 def horizontal_acceleration(q: Floats, acc: Floats) -> Complexes:
@@ -117,7 +118,7 @@ def velocity_direction(
     coherence = float(np.abs(total) / path)
     if not params.speed[0] <= np.abs(total) <= params.speed[1] or coherence < params.coherence:
         return None
-    return WalkingDirection(float(np.angle(total)), coherence)
+    return WalkingDirection(float(np.angle(total)), coherence, float(np.abs(total)))
 
 
 def stride_direction(

@@ -22,6 +22,7 @@ class SegmentCalibration:
     rest_norm : |acc| at rest, m/s²; without rest the mean specific force of the walk.
     method : how the heading was found: "walking_direction", "gyro_pca", "declared", "neighbour".
     score : 0 (guess) to 1 (certain); the method's own quality measure, documented there.
+    forward_sd : standard deviation of the anterior axis about the vertical, rad; None where not measured.
     start_q : (4,) sensor to W in the middle of `Calibration.zero`; None = neutral, as who stands is.
     """
 
@@ -31,6 +32,7 @@ class SegmentCalibration:
     method: str
     score: float
     start_q: Floats | None = None
+    forward_sd: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

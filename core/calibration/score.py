@@ -14,7 +14,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from core.agreement import Agreement
-from core.calibration.anterior import STRONG_AXIS
+from core.calibration.forward import MeasureName
 from core.calibration.functional import FUNCTIONAL
 from core.calibration.gyro_pca import GOOD_AXIS, measure_main_axis
 from core.calibration.knee_axis import STEEPEST, find_knee_axes
@@ -36,6 +36,15 @@ TURNED_ALL: Final = 1.0
 KNEE_SEEN: Final = 6.0
 """Seconds of it below which skin decides where a knee's axis comes out
 (docs/science/calibration.md, "Score")."""
+
+
+HEARD: Final = 0.2
+"""Share from which a measure of forward counts: below, it is wrong altogether and was not followed."""
+
+OF_FORWARD: Final[tuple[MeasureName, ...]] = (
+    "velocity", "start_velocity", "acceleration", "proximal_joint", "distal_joint",
+)  # fmt: skip
+"""Measures of the way forward itself; an axis of turning lies where anatomy has it."""
 
 
 @dataclass(frozen=True)
@@ -409,14 +418,19 @@ class _Evidence:
         return self._judge("joint_misfit", segment, min(own))
 
     def check_heading_spread(self, segment: Segment) -> CalibrationCheck:
+        """The axis that is used against every measure of forward that is believed, and the calibration's."""
         said = self._facts(segment)
-        off, share = said.get("disagreement_rad"), said.get("axis_share", 1.0)
         back = float(self.turned.get(segment, 0.0))
         measures = [back] if segment in self.turned else []
-        # where sway is as large as progress, velocity alone shows the way
-        if isinstance(off, float | int) and (said.get("source") != "velocity" or share > STRONG_AXIS):
-            other = -off if said.get("source") == "acceleration" else off
-            measures += [back, float(wrap_angle(float(other) + back))]
+        off = said.get("disagreement_rad")
+        if said.get("source") == "strides" and isinstance(off, float | int):
+            # a foot keeps the way of its strides, whatever speaks against it
+            measures += [back, float(wrap_angle(float(off) + back))]
+        measures += [
+            float(wrap_angle(v["off_rad"] + back))
+            for v in said.get("votes", ())
+            if v["source"] in OF_FORWARD and v["share"] >= HEARD
+        ]
         if not measures:
             return self._leave("heading_spread", segment, "Only one measure shows its way forward.")
         return self._judge("heading_spread", segment, degrees(max(map(abs, measures))))

@@ -328,7 +328,7 @@ def _calibration(calibration: Calibration | None, angles: JointAngles | None) ->
         name: {
             "method": s.method,
             "score": s.score,
-            "forward_sd_deg": None if (sd := getattr(s, "forward_sd", None)) is None else math.degrees(sd),
+            "forward_sd_deg": None if s.forward_sd is None else math.degrees(s.forward_sd),
             "rest_norm_mps2": s.rest_norm,
             "gyro_bias_dps": np.degrees(s.gyro_bias),
             "R_segment_sensor": s.R_segment_sensor,

@@ -44,7 +44,9 @@ def analysis(*, duration_s: float = 12.0, reached: bool = True) -> TakeAnalysis:
         turning = np.stack((zeros[:, 0], zeros[:, 0], np.gradient(pitch, tracks.t_s)), axis=1)
         sensors[FOOT[side]] = _sensor(f"F-{side}", turning)
     problem = None if reached else Notice("no_rest", "No rest found.", severity="error")
-    mounted = SegmentCalibration(np.eye(3), np.array([0.01, 0.0, np.nan]), 9.8, "walking_direction", 0.9)
+    mounted = SegmentCalibration(
+        np.eye(3), np.array([0.01, 0.0, np.nan]), 9.8, "walking_direction", 0.9, forward_sd=0.05
+    )
     lost = Notice("gap", "0.3 s lost.", "pelvis", 1.0)
     uniform = UniformRecording(tracks.t_s, 100.0, sensors, Subject(1.75), "walk", {}, notices=(lost,))
     calibration = Calibration(

@@ -57,6 +57,7 @@ def test_analysis_json_is_strict_json_of_schema_1(files: Mapping[str, bytes]) ->
         "provenance",
     }
     assert data["calibration"]["segments"]["pelvis"]["gyro_bias_dps"][2] is None
+    assert data["calibration"]["segments"]["pelvis"]["forward_sd_deg"] == pytest.approx(np.degrees(0.05))
     assert data["warnings"][0] | {"code": "gap", "sensor": "pelvis", "t_s": 1.0} == data["warnings"][0]
     row = next(p for p in data["parameters"] if p["name"] == "stride_time_s" and p["side"] == "left")
     assert row["mean"] == pytest.approx(walk.STRIDE_S)

@@ -1,0 +1,112 @@
+"""How the two sensors beside a joint are turned against each other about the vertical, as the joint shows it.
+
+Both see the acceleration of one point, each in its own rest world; the turn that lays one upon the other is
+the difference of their forward axes, because who stands has both segments ahead
+(docs/science/calibration.md, "Forward by likelihood").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import hypot, radians
+from typing import Final
+
+import numpy as np
+
+from core.agreement.joints import LEG_JOINTS, JointKind, list_worn_joints
+from core.agreement.params import JointParams
+from core.agreement.terms import find_thinning, find_usable, low_pass_terms, take_mean_out
+from core.agreement.windows import JointSums
+from core.calibration.forward import JointMeasure
+from core.calibration.heading import Part
+from core.frames import Bools, Floats, Segment
+from core.recording import UniformRecording
+from core.rotation import wrap_angle
+
+LEAST_CHUNKS: Final = 3
+"""Seconds of walking with both sensors from which a joint is asked."""
+
+
+@dataclass(frozen=True)
+class JointTurnParams:
+    """How sure a joint is of a turn (docs/science/calibration.md, "Forward by likelihood").
+
+    Parameters
+    ----------
+    sd : rad, where nothing drifts. doubt : probability that it is wrong altogether. worst_misfit : of a
+    joint's acceleration over its size, above which it says nothing. joints : how accelerations are compared.
+    """
+
+    sd: Mapping[JointKind, float] = field(
+        default_factory=lambda: {"ankle": radians(3.0), "knee": radians(4.0), "hip": radians(8.0)}
+    )
+    doubt: float = 0.05
+    worst_misfit: float = 0.9
+    joints: JointParams = field(default_factory=JointParams)
+
+
+def measure_joint_turns(
+    recording: UniformRecording,
+    biases: Mapping[Segment, Floats],
+    q: Mapping[Segment, Floats],
+    parts: Sequence[Part],
+    params: JointTurnParams,
+) -> list[JointMeasure]:
+    """Turn of every joint both of whose sensors were calibrated, over the straight parts.
+
+    Parameters
+    ----------
+    biases : segment → (3,) rad/s. q : segment → (n, 4) sensor to its rest world.
+    """
+    worn = list_worn_joints(q)
+    if not worn or not parts:
+        return []
+    rate, thin = recording.rate_hz, find_thinning(recording.rate_hz, params.joints)
+    start, stop = min(a for a, _ in parts), max(b for _, b in parts)
+    walked = np.zeros(len(recording.t_s), np.bool_)
+    for a, b in parts:
+        walked[a:b] = True
+    terms: dict[Segment, Floats] = {}
+    usable: dict[Segment, Bools] = {}
+    for segment in {s for joint in worn for s in joint}:
+        x = recording.sensors[segment]
+        gyr = x.gyr[start:stop] - biases[segment]
+        slow, _ = low_pass_terms(
+            q[segment][None, start:stop], x.acc[None, start:stop], gyr[None], rate, params.joints
+        )
+        terms[segment] = take_mean_out(slow, rate / thin, params.joints)[0]
+        seen = find_usable(x.valid[start:stop, None], rate)[0] & walked[start:stop]
+        usable[segment] = seen[::thin]
+    chunk = round(params.joints.chunk_s * rate / thin)
+    found = (_measure(joint, terms, usable, chunk, params) for joint in worn)
+    return [x for x in found if x is not None]
+
+
+def _measure(
+    joint: tuple[Segment, Segment],
+    terms: Mapping[Segment, Floats],
+    usable: Mapping[Segment, Bools],
+    chunk: int,
+    params: JointTurnParams,
+) -> JointMeasure | None:
+    """One joint; None where it fits badly or hardly moved."""
+    first, second = joint
+    chunks = len(terms[first]) // chunk
+    if not chunks:
+        return None
+    n = chunks * chunk
+    sums = JointSums.empty(chunks, 0)
+    sums.add(slice(None), terms[first][:n], terms[second][:n], usable[first][:n], usable[second][:n], chunk)
+    whole = replace(params.joints, window_chunks=chunks, least_chunks=LEAST_CHUNKS)
+    found = sums.solve(np.zeros(1, np.int64), chunk, whole)
+    if not len(found) or found[0, 3] > params.worst_misfit:
+        return None
+    turn = float(found[0, 10])
+    width = params.joints.window_chunks
+    starts = np.arange(0, max(0, chunks - width + 1), max(1, width // 2))
+    # a heading that drifts while somebody walks had drifted before, since the standing, by as much
+    apart = wrap_angle(sums.solve(starts, chunk, params.joints)[:, 10] - turn)
+    drift = float(np.sqrt(np.mean(apart**2))) if len(apart) else 0.0
+    sd = hypot(params.sd[LEG_JOINTS[joint]], drift)
+    return JointMeasure(first, second, float(wrap_angle(turn)), sd, params.doubt)
