@@ -43,7 +43,7 @@ REST: Final = RestParams()
 
 
 @dataclass(frozen=True)
-class GuidedTestParams:
+class LiveTestParams:
     """When the phases of a guided test change (our choices).
 
     Parameters
@@ -86,10 +86,10 @@ class GuidedTest:
         columns: Sequence[Segment],
         rate_hz: float,
         subject: Subject | None = None,
-        params: GuidedTestParams | None = None,
+        params: LiveTestParams | None = None,
     ) -> None:
         self.protocol = protocol
-        self.params = params or GuidedTestParams()
+        self.params = params or LiveTestParams()
         wanted = tuple(FOOT.values()) if protocol in WALK_TESTS else TRUNK
         watched = tuple(s for s in wanted if s in columns)
         self._watched = watched if protocol in WALK_TESTS else watched[:1]

@@ -23,6 +23,7 @@ from core.estimators import (
     SQUAT_CHAIN,
     Estimator,
     PoseEstimator,
+    PoseMethod,
     Requested,
 )
 from tests.data import ROOT
@@ -77,12 +78,15 @@ def test_what_can_run_is_what_the_list_says_of_every_set_of_sensors() -> None:
         assert set(list_possible_estimators(worn)) == {e.name for e in ESTIMATORS if e.runs_on(worn)}
 
 
-@pytest.mark.parametrize("estimator", [*ESTIMATORS, SQUAT_CHAIN], ids=lambda e: e.name)
-def test_the_documents_have_its_names_its_equations_and_its_paper(estimator: PoseEstimator) -> None:
+@pytest.mark.parametrize("method", [*ESTIMATORS, SQUAT_CHAIN], ids=lambda m: m.method)
+def test_the_documents_have_its_names_its_equations_and_its_paper(method: PoseMethod) -> None:
     overview = (ROOT / "docs" / "estimators.md").read_text("utf-8")
-    assert f"`{estimator.name}`" in overview
-    assert estimator.choice in overview
-    science = (ROOT / estimator.science).read_text("utf-8")
-    if estimator.paper is not None:
-        assert estimator.paper.doi in science
-        assert estimator.paper.doi in overview
+    names = (
+        (method.name, method.choice) if isinstance(method, PoseEstimator) else (method.method, method.label)
+    )
+    assert f"`{names[0]}`" in overview
+    assert names[1] in overview
+    science = (ROOT / method.science).read_text("utf-8")
+    if method.paper is not None:
+        assert method.paper.doi in science
+        assert method.paper.doi in overview

@@ -59,20 +59,26 @@ def align_forward_axes(
     segments: Sequence[Segment],
     params: ErkfParams,
 ) -> tuple[CalibratedRecording, Orientations, dict[Segment, float]]:
-    """Turn forward axes until they agree with the joints; what each was turned by in all, rad.
+    """Turn forward axes until they agree with the joints; what each was off by in all, rad.
+
+    Where one is off by more than any mounting is, the joints are those of other segments: calibration's own
+    axes stay.
 
     Raises
     ------
     EstimationError as `heading_errors`.
     """
     total: dict[Segment, float] = {}
+    turned = calibrated, orientations
     for _ in range(ROUNDS):
-        errors = heading_errors(calibrated, orientations, body, segments, params)
-        calibrated, orientations = turn_forward_axes(calibrated, orientations, errors)
+        errors = heading_errors(*turned, body, segments, params)
+        turned = turn_forward_axes(*turned, errors)
         total = {s: wrap_angle(total.get(s, 0.0) + error) for s, error in errors.items()}
         if all(abs(error) <= SETTLED for error in errors.values()):
             break
-    return calibrated, orientations, total
+    if any(abs(x) > BAD for x in total.values()):
+        turned = calibrated, orientations
+    return (*turned, total)
 
 
 def judge_turned_axes(total: Mapping[Segment, float]) -> tuple[HealthFinding, ...]:
@@ -89,9 +95,16 @@ def report_turned_axes(total: Mapping[Segment, float]) -> tuple[Notice, ...]:
     if not off:
         return ()
     worst = max(off, key=lambda s: abs(total[s]))
+    by = f"{degrees(abs(total[worst])):.0f}°"
+    if abs(total[worst]) > BAD:
+        message = (
+            f"At {worst} the joints show another way for forward than calibration, by {by}. No mounting is "
+            "taken so wrongly: two sensors may be exchanged, or one was turned. Check the mapping."
+        )
+        return (Notice("heading_corrected", message, sensor=worst, severity="warning"),)
     message = (
         f"The joints show that calibration took the wrong way for forward at {', '.join(off)}, by up to "
-        f"{degrees(abs(total[worst])):.0f}° ({worst}); it was turned. Frontal and transverse angles there "
+        f"{by} ({worst}); it was turned. Frontal and transverse angles there "
         "are less certain."
     )
     severity: Severity = "warning" if abs(total[worst]) > WARN else "info"

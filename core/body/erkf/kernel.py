@@ -13,7 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from core.body.erkf.predict import FUSED, move, propagate, propagate_back, propagate_error, reset_before
+from core.body.erkf.predict import move, propagate, propagate_back, propagate_error, reset_before
 from core.body.erkf.updates import (
     POSITION,
     VELOCITY,
@@ -139,7 +139,7 @@ class Links(NamedTuple):
     sd: Floats
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     """vᵀ S⁻¹ v ≤ gate for the zero velocity of the IMU whose errors begin at b."""
     S = P[b + 3 : b + 6, b + 3 : b + 6]
@@ -153,7 +153,7 @@ def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
     return s <= gate * det
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
 def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-def]
     """Move every IMU and the covariance over the time before sample k; F (n, 5, 3, 3) is kept."""
     x, before, dx, acc, gyr = memory.x, memory.before, memory.dx, samples.acc, samples.gyr
@@ -164,7 +164,7 @@ def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-d
     propagate(memory.P, F, m, dt)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
 def add_noise(memory, samples, k, links, noise, Q):  # type: ignore[no-untyped-def]
     """Add the process noise of sample k, its diagonal into Q (N,), and make that the last sample."""
     P, before, dt = memory.P, memory.before, samples.step[k]
@@ -190,7 +190,7 @@ def add_noise(memory, samples, k, links, noise, Q):  # type: ignore[no-untyped-d
         P[r, r] += Q[r]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
 def judge_contacts(memory, samples, k, noise, scratch, Q, refused):  # type: ignore[no-untyped-def]
     """Write for sample k how far each zero velocity is believed, which are taken and which the gate refuses.
 
@@ -221,7 +221,7 @@ def judge_contacts(memory, samples, k, noise, scratch, Q, refused):  # type: ign
                 Q[b + 3 + c] += speed2
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
 def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: ignore[no-untyped-def]
     """Take all blocks of sample k into the covariance and the correction; False if one is not positive."""
     x, P, dx, R, y, U = memory.x, memory.P, memory.dx, scratch.R, scratch.y, scratch.U
@@ -273,7 +273,7 @@ def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: i
     return good
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
 def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-untyped-def]
     """Move the correction into the state, and write that (n, 16) and its headings' deviations (n,)."""
     x, P, dx, R = memory.x, memory.P, memory.dx, scratch.R
@@ -295,7 +295,7 @@ def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-unty
         nominal[i] = x[i]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
 def measure_joints(memory, links, noise, scratch, residual):  # type: ignore[no-untyped-def]
     """Write how far the two ends of each joint are apart (J,), m."""
     y = scratch.y
@@ -308,7 +308,7 @@ def measure_joints(memory, links, noise, scratch, residual):  # type: ignore[no-
         residual[j] = np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED, inline="always")  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
 def advance(memory, samples, k, links, noise, scratch, record, slot, output):  # type: ignore[no-untyped-def]
     """Filter sample k of a block: the one rule of a file and a stream; False if the covariance broke."""
     predict(memory, samples, k, noise, scratch, record.F[slot])
@@ -323,7 +323,7 @@ def advance(memory, samples, k, links, noise, scratch, record, slot, output):  #
     return good
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def filter_forward(memory, samples, links, noise, record, output):  # type: ignore[no-untyped-def]
     """Filter a block, `memory` in place; sample at which the covariance broke, or −1.
 
@@ -431,7 +431,7 @@ def smooth_segments(memory, samples, links, noise, record, output, kept, segment
         measure_smoothed(nominal[a:b], Links(*links), residual[a:b])
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def sweep_back(lam, step, record, m, swept):  # type: ignore[no-untyped-def]
     """Sweep λ (N,) back over a recorded segment; `swept` (K, N): λ of each sample before its blocks."""
     for k in range(len(step) - 1, -1, -1):
@@ -452,7 +452,7 @@ def multiply_lower(P, lam, d):  # type: ignore[no-untyped-def]
         d[r] -= P[r, r] * lam[r]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def move_smoothed(d, step, record, m, swept, out):  # type: ignore[no-untyped-def]
     """Turn a segment's filtered states `out` (K, n, 16) into smoothed ones.
 

@@ -8,8 +8,6 @@ column pass is not symmetric in floating point, and the asymmetry grows without 
 
 from __future__ import annotations
 
-from typing import Final
-
 import numba
 
 from core.frames import GRAVITY
@@ -22,14 +20,11 @@ from core.rotation.compiled import (
     turn,
 )
 
-FUSED: Final = {"contract"}
-"""Products and sums may be one instruction; nothing else about the order of arithmetic is given away."""
-
 A, S, D, GAMMA, C = range(5)
 """Blocks of F per IMU, δv'=δv+A δθ+D δb_g+C δb_a, δp'=δp+Δt δv+½Δt(δv'−δv), δθ'=S δθ+Γ δb_g."""
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-untyped-def]
     """Advance one IMU's nominal state x (16,) and write its blocks F (5, 3, 3) and new matrix R (3, 3).
 
@@ -68,7 +63,7 @@ def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-unty
             F[C, i, j] = -dt * (first * start[i, j] + last * R[i, j])
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def reset_before(F, d):  # type: ignore[no-untyped-def]
     """Fold the reset Jacobian G = 1 − ½[δθ̂]× of the last correction (eq 27) into A and S: F ← F G."""
     a, b, c = 0.5 * d[0], 0.5 * d[1], 0.5 * d[2]
@@ -80,7 +75,7 @@ def reset_before(F, d):  # type: ignore[no-untyped-def]
             F[k, i, 2] = z - (x * b - y * a)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
     """P ← F P Fᵀ, on and below the diagonal, for the blocks F (n, 5, 3, 3) of n IMUs with m errors each."""
     N = P.shape[0]
@@ -139,7 +134,7 @@ def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
                 P[r, b + 3 + i] += dv
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def propagate_error(d, F, m, dt):  # type: ignore[no-untyped-def]
     """δ ← F δ, the same step for one error (N,)."""
     for j in range(len(d) // m):
@@ -158,7 +153,7 @@ def propagate_error(d, F, m, dt):  # type: ignore[no-untyped-def]
             x[6 + i] = turned
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def propagate_back(lam, F, m, dt):  # type: ignore[no-untyped-def]
     """λ ← Fᵀ λ, the same step for the smoother."""
     for j in range(len(lam) // m):

@@ -12,7 +12,6 @@ from math import atan2, sqrt
 
 import numba
 
-from core.body.erkf.predict import FUSED
 from core.rotation.compiled import skew, times_cross, wrap_angle
 
 FIRST, SECOND, UNIT, TURNS = range(4)
@@ -23,7 +22,7 @@ POSITION, VELOCITY = 0, 3
 """Offsets in an IMU's errors."""
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-untyped-def]
     """Joint centre p_i + R_i r_i = p_j + R_j r_j, or with centre False joint axis R_i e_i = R_j e_j."""
     place[FIRST], place[SECOND] = i * m, j * m
@@ -37,7 +36,7 @@ def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-u
             y[k] += x[j, k] - x[i, k]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
     """Variance of the joint centre's second-order term, ½ σ⁴ |r_xy|² of both levers, in m².
 
@@ -61,7 +60,7 @@ def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def
     return min(0.5 * var * var, 1.5) * reach
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def velocity_rows(v, m, i, place, y):  # type: ignore[no-untyped-def]
     """Zero velocity: the error of v (3,) itself is observed."""
     place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, VELOCITY, 0
@@ -69,7 +68,7 @@ def velocity_rows(v, m, i, place, y):  # type: ignore[no-untyped-def]
         y[k] = -v[k]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def tilt_rows(R, f, m, i, place, H, y):  # type: ignore[no-untyped-def]
     """Tilt: Rᵀẑ is the direction of the specific force at rest; δθ: [Rᵀẑ]×."""
     place[FIRST], place[SECOND], place[UNIT], place[TURNS] = i * m, -1, -1, 1
@@ -79,7 +78,7 @@ def tilt_rows(R, f, m, i, place, H, y):  # type: ignore[no-untyped-def]
         y[k] = f[k] * norm - R[2, k]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-untyped-def]
     """Heading of the axis t = R f; two empty rows make it a block of three. False when t is near vertical."""
     tx = R[0, 0] * forward[0] + R[0, 1] * forward[1] + R[0, 2] * forward[2]
@@ -97,7 +96,7 @@ def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-un
     return True
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def complete_rows(P, first):  # type: ignore[no-untyped-def]
     """Copy what is below the diagonal of P into its rows first … first + 2, so that they are whole."""
     for q in range(3):
@@ -107,7 +106,7 @@ def complete_rows(P, first):  # type: ignore[no-untyped-def]
         P[first, c], P[first + 1, c], P[first + 2, c] = P[c, first], P[c, first + 1], P[c, first + 2]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyped-def]
     """Take one block into dx, but not yet into P; False if S is not positive.
 
@@ -217,7 +216,7 @@ def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyp
     return True
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def subtract_blocks(P, V, blocks):  # type: ignore[no-untyped-def]
     """P ← P − Σ VᵀV on and below the diagonal, two rows at a time; V (≥ blocks, 3, as P).
 
@@ -243,7 +242,7 @@ def subtract_blocks(P, V, blocks):  # type: ignore[no-untyped-def]
                 p0[c] -= x0 * x[c] + y0 * y[c] + z0 * z[c]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FUSED)  # type: ignore[misc, unused-ignore]
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def back_correct(lam, place, H, V, E):  # type: ignore[no-untyped-def]
     """λ ← λ − Hᵀ L⁻ᵀ (V λ + e): one block of the modified Bryson–Frazier smoother
     (docs/science/erkf.md, "Smoother")."""

@@ -103,7 +103,9 @@ def test_the_foot_pitch_events_keep_their_times_with_confidence() -> None:
     assert [(e.time_s, e.kind, e.side) for e in told.events] == [
         (e.time_s, e.kind, e.side) for e in lead.events
     ]
-    assert {e.confidence for e in told.events} == {1.0}
+    # out of standing a foot leaves the floor as not every other detector sees it
+    unsure = [e for e in told.events if e.confidence != 1.0]
+    assert [(e.kind, e.confidence) for e in unsure] == [("tc", 0.75)]
 
 
 def test_where_the_foot_pitch_rule_abstains_the_others_are_pointed_to() -> None:
