@@ -52,3 +52,15 @@ def test_every_estimator_has_its_visit(script: str, method: str, reduced: str | 
     assert made.problem is None
     assert made.poses is not None
     assert (made.poses.method, made.poses.reduced) == (method, reduced)
+
+
+@pytest.mark.slow
+def test_the_newest_walks_have_good_data_but_for_the_sensor_that_stopped() -> None:
+    """People who walk unlike others are not mistaken for sensors that sit wrongly."""
+    newest = {v.person.code: v for v in reversed(VISITS)}
+    warned = {
+        code
+        for code, visit in newest.items()
+        if any(n.severity != "info" for n in analyse(record(visit).recording).notices)
+    }
+    assert warned == {"PD-0412"}
