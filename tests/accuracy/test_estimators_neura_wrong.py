@@ -21,7 +21,8 @@ import pytest
 
 from core import events
 from core.body import contact_mask, forward_kinematics
-from core.body.erkf.filter import filter_block
+from core.body.corrected import correct_signals
+from core.body.erkf.filter import erkf_inputs, filter_block
 from core.body.erkf.headings import turn_forward_axes
 from core.body.erkf.health import REFUSED_PCT, RESIDUAL_MM
 from core.body.erkf.params import ErkfParams
@@ -161,7 +162,10 @@ LEFT_SO = ("right thigh reversed", "right foot reversed", "pelvis by gyro PCA", 
 def result(name: str, agree: bool = True) -> Result:
     make, _ = CASES[name]
     made = chain(*make(), agree=agree)
-    track, inputs = made.run.track, made.run.inputs
+    track, rate = made.run.track, made.calibrated.recording.rate_hz
+    # a run keeps no signals
+    inputs = erkf_inputs(made.run.tree, *correct_signals(made.calibrated, made.run.segments), rate)
+    inputs = replace(inputs, patched=made.run.inputs.patched)
     start = start_state(made.run.tree, inputs, LIVE, made.run.rest, q=made.run.start.nominal[:, 6:10])
     live, _ = filter_block(start, inputs, made.run.tree, LIVE)
     _, found = scores(made.angles_deg)

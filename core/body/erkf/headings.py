@@ -61,14 +61,15 @@ def align_forward_axes(
 ) -> tuple[CalibratedRecording, Orientations, dict[Segment, float]]:
     """Turn forward axes until they agree with the joints; what each was off by in all, rad.
 
-    Where one is off by more than any mounting is, the joints are those of other segments: calibration's own
-    axes stay.
+    Where the last pass still turns one by more than any mounting is off, the joints are of other segments:
+    calibration's own axes stay.
 
     Raises
     ------
     EstimationError as `heading_errors`.
     """
     total: dict[Segment, float] = {}
+    errors: Mapping[Segment, float] = {}
     turned = calibrated, orientations
     for _ in range(ROUNDS):
         errors = heading_errors(*turned, body, segments, params)
@@ -76,7 +77,7 @@ def align_forward_axes(
         total = {s: wrap_angle(total.get(s, 0.0) + error) for s, error in errors.items()}
         if all(abs(error) <= SETTLED for error in errors.values()):
             break
-    if any(abs(x) > BAD for x in total.values()):
+    if any(abs(error) > BAD for error in errors.values()):
         turned = calibrated, orientations
     return (*turned, total)
 
@@ -95,16 +96,9 @@ def report_turned_axes(total: Mapping[Segment, float]) -> tuple[Notice, ...]:
     if not off:
         return ()
     worst = max(off, key=lambda s: abs(total[s]))
-    by = f"{degrees(abs(total[worst])):.0f}°"
-    if abs(total[worst]) > BAD:
-        message = (
-            f"At {worst} the joints show another way for forward than calibration, by {by}. No mounting is "
-            "taken so wrongly: two sensors may be exchanged, or one was turned. Check the mapping."
-        )
-        return (Notice("heading_corrected", message, sensor=worst, severity="warning"),)
     message = (
         f"The joints show that calibration took the wrong way for forward at {', '.join(off)}, by up to "
-        f"{by} ({worst}); it was turned. Frontal and transverse angles there "
+        f"{degrees(abs(total[worst])):.0f}° ({worst}); it was turned. Frontal and transverse angles there "
         "are less certain."
     )
     severity: Severity = "warning" if abs(total[worst]) > WARN else "info"
