@@ -33,6 +33,7 @@ def recorded(side: Side) -> tuple[SquatSimulation, CalibratedRecording]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_squats_from_a_recording_with_noise_and_biases(side: Side) -> None:
     made, calibrated = recorded(side)
