@@ -14,9 +14,10 @@ from sqlalchemy import Connection, insert, select
 from core.fusion.algorithms.choice import require_filters
 from server import audit
 from server.jobs.queue import COMPARE_FILTERS, Claim, JobQueue, JobView
-from server.services import analyses, edit_log, recordings, reference_files
+from server.services import analyses, edit_log, reference_files
 from server.services.errors import NotFound
 from server.services.provenance import CODE_VERSION
+from server.services.shown_take import submit_on_shown
 from server.storage.blobs import Blob, BlobStore
 from server.storage.tables import analysis, filter_run, filter_run_file, new_id, now, recording, session
 
@@ -111,29 +112,19 @@ def submit(
     """
     require_filters(filters)
     found = analyses.get_shown(c, session_id)
-    inputs = recordings.job_inputs(recordings.get(c, found.recording_id))
     against = None if reference is None else reference_files.get(c, session_id, reference)
-    if against is not None:
-        inputs["files"].append({"name": against.name, "size": against.size, "sha256": against.sha256})
-    params = {
-        **inputs,
-        "manifest": found.manifest or {},
-        "config": dict(found.config),
-        "analysis_id": found.id,
-        "edits": [e.to_json() for e in edit_log.edits_of(c, found.id).edits],
-        "settings": {"filters": list(dict.fromkeys(filters)), "magnetometer": magnetometer},
-        "reference": None if against is None else {"name": against.name, "sha256": against.sha256},
-    }
-    view = queue.submit(
+    return submit_on_shown(
         c,
-        key=f"{found.id}:{COMPARE_FILTERS}:{analyses.digest_json(params)}:{CODE_VERSION}",
-        kind=COMPARE_FILTERS,
-        params=params,
-        recording_id=found.recording_id,
-        requested_by=actor.user_id if actor else None,
+        queue,
+        actor,
+        found,
+        COMPARE_FILTERS,
+        "filters.requested",
+        against=against,
+        edits=[e.to_json() for e in edit_log.edits_of(c, found.id).edits],
+        settings={"filters": list(dict.fromkeys(filters)), "magnetometer": magnetometer},
+        reference=None if against is None else {"name": against.name, "sha256": against.sha256},
     )
-    audit.record(c, actor, "filters.requested", "session", session_id, {"job_id": view.id})
-    return view
 
 
 def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob]) -> None:

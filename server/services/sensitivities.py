@@ -18,9 +18,9 @@ from server import audit
 from server.jobs.queue import SENSITIVITY, Claim, JobQueue, JobView
 from server.report.bundle import read_angles
 from server.report.sensitivity import sensitivity_files, summarise_sensitivity
-from server.services import analyses, recordings, reference_files, sessions
+from server.services import analyses, reference_files, sessions
 from server.services.errors import Conflict, NotFound
-from server.services.provenance import CODE_VERSION
+from server.services.shown_take import submit_on_shown
 from server.storage.blobs import Blob
 from server.storage.tables import analysis_file, job, recording
 
@@ -138,27 +138,11 @@ def submit(
     if sessions.get(c, session_id).protocol != "squat":
         raise Conflict("not_squats", "This is analysed for squats; the visit has another protocol.")
     found = analyses.get_shown(c, session_id)
-    inputs = recordings.job_inputs(recordings.get(c, found.recording_id))
     against = None if reference is None else reference_files.get(c, session_id, reference)
-    if against is not None:
-        inputs["files"].append({"name": against.name, "size": against.size, "sha256": against.sha256})
-    params = {
-        **inputs,
-        "manifest": found.manifest or {},
-        "config": dict(found.config),
-        "analysis_id": found.id,
-        "settings": {"reference": reference, "from_standing": from_standing},
-    }
-    view = queue.submit(
-        c,
-        key=f"{found.id}:{SENSITIVITY}:{analyses.digest_json(params)}:{CODE_VERSION}",
-        kind=SENSITIVITY,
-        params=params,
-        recording_id=found.recording_id,
-        requested_by=actor.user_id if actor else None,
+    settings = {"reference": reference, "from_standing": from_standing}
+    return submit_on_shown(
+        c, queue, actor, found, SENSITIVITY, "sensitivity.requested", against=against, settings=settings
     )
-    audit.record(c, actor, "sensitivity.requested", "session", session_id, {"job_id": view.id})
-    return view
 
 
 def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob]) -> None:

@@ -1,0 +1,52 @@
+"""Jobs on the analysis that a session shows: its recording, mapping, settings, and a reference."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import Connection
+
+from server import audit
+from server.jobs.queue import JobQueue, JobView
+from server.services import analyses, recordings
+from server.services.provenance import CODE_VERSION
+
+
+def submit_on_shown(
+    c: Connection,
+    queue: JobQueue,
+    actor: audit.Actor | None,
+    found: analyses.AnalysisRecord,
+    kind: str,
+    action: str,
+    *,
+    against: recordings.RecordedFile | None,
+    **own: Any,
+) -> JobView:
+    """Ask for a job; the same one is done once.
+
+    Parameters
+    ----------
+    found : the analysis that is shown. action : in the audit log. against : a reference, last of the job's
+        files. own : parameters of this kind of job.
+    """
+    inputs = recordings.job_inputs(recordings.get(c, found.recording_id))
+    if against is not None:
+        inputs["files"].append({"name": against.name, "size": against.size, "sha256": against.sha256})
+    params = {
+        **inputs,
+        "manifest": found.manifest or {},
+        "config": dict(found.config),
+        "analysis_id": found.id,
+        **own,
+    }
+    view = queue.submit(
+        c,
+        key=f"{found.id}:{kind}:{analyses.digest_json(params)}:{CODE_VERSION}",
+        kind=kind,
+        params=params,
+        recording_id=found.recording_id,
+        requested_by=actor.user_id if actor else None,
+    )
+    audit.record(c, actor, action, "session", found.session_id, {"job_id": view.id})
+    return view
