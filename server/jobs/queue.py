@@ -11,7 +11,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, IntEnum
 from typing import Any, Final, Literal, Protocol
 
 from sqlalchemy import Connection, Row
@@ -91,12 +91,22 @@ class Claim:
     checkpoint: str | None = None
 
 
+class Priority(IntEnum):
+    """Which job is claimed first; the smaller."""
+
+    IN_FRONT = -1
+    """Somebody waits in front of the screen."""
+    USUAL = 0
+    BEHIND = 10
+    """Runs for long and leaves checkpoints: it makes way for every other job."""
+
+
 class LeaseState(Enum):
     """What a heartbeat found: the job is still ours, makes way, is to be stopped, or is somebody else's."""
 
     OURS = "ours"
     YIELD = "yield"
-    """A more urgent job waits: give this one back, it goes on from its checkpoint."""
+    """This job is behind and another one waits: give it back, it goes on from its checkpoint."""
     CANCEL = "cancel"
     LOST = "lost"
 
@@ -113,7 +123,7 @@ class JobQueue(Protocol):
         params: Mapping[str, Any],
         recording_id: str | None = None,
         requested_by: str | None = None,
-        priority: int = 0,
+        priority: Priority = Priority.USUAL,
     ) -> JobView:
         """Queue a job in the caller's transaction, or return the live or successful one of the same key."""
 

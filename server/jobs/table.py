@@ -12,7 +12,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, and_, insert, or_, select, update
 
-from server.jobs.queue import VIEW_COLUMNS, Claim, JobView, LeaseState, Publish, job_view
+from server.jobs.queue import VIEW_COLUMNS, Claim, JobView, LeaseState, Priority, Publish, job_view
 from server.storage.db import Database
 from server.storage.tables import ACTIVE_STATES, job, new_id, now
 
@@ -52,7 +52,7 @@ class TableQueue:
         params: Mapping[str, Any],
         recording_id: str | None = None,
         requested_by: str | None = None,
-        priority: int = 0,
+        priority: Priority = Priority.USUAL,
     ) -> JobView:
         """See JobQueue."""
         same = and_(job.c.key == key, job.c.state.in_((*ACTIVE_STATES, "done")), ~job.c.cancel_requested)
@@ -153,6 +153,8 @@ class TableQueue:
                 return LeaseState.LOST
             if row.cancel_requested:
                 return LeaseState.CANCEL
+            if row.priority < Priority.BEHIND:
+                return LeaseState.OURS  # it leaves no checkpoints: what is done of it would be lost
             urgent = select(job.c.seq).where(job.c.state == "queued", job.c.priority < row.priority).limit(1)
             return LeaseState.OURS if c.execute(urgent).first() is None else LeaseState.YIELD
 

@@ -21,7 +21,7 @@ from sqlalchemy import Connection, delete, func, insert, literal, select, update
 
 from core.errors import InputError
 from server import audit
-from server.jobs.queue import TUNE, VIEW_COLUMNS, JobQueue, JobView, job_view
+from server.jobs.queue import TUNE, VIEW_COLUMNS, JobQueue, JobView, Priority, job_view
 from server.services.errors import Conflict, NotFound, ServiceError, TooLarge
 from server.services.provenance import CODE_VERSION
 from server.settings import Settings
@@ -144,7 +144,7 @@ def inspect(c: Connection, queue: JobQueue, actor: audit.Actor | None, session_i
         params={**job_inputs(this), "manifest": this.manifest},
         recording_id=this.id,
         requested_by=actor.user_id if actor else None,
-        priority=-1,  # somebody waits in front of the screen
+        priority=Priority.IN_FRONT,
     )
     audit.record(c, actor, "recording.inspected", "recording", this.id, {"job_id": view.id})
     return view

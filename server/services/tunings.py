@@ -23,7 +23,7 @@ from core.fusion.algorithms.choice import require_tunable
 from core.fusion.algorithms.schemes import Scheme as Scheme
 from core.fusion.algorithms.swarm import MOST_OF_SWARM as MOST_OF_SWARM
 from server import audit
-from server.jobs.queue import TUNE, Claim, JobQueue, JobView
+from server.jobs.queue import TUNE, Claim, JobQueue, JobView, Priority
 from server.services import recordings, sessions
 from server.services.analyses import digest_json
 from server.services.errors import Conflict, NotFound
@@ -41,8 +41,6 @@ TRIAL: Final = ".npz"
 BEHIND: Final = 10
 """Added to the niceness of each thread that searches (a thread's own on Linux)."""
 SWARM: Final = ("particles", "iterations", "rounds", "random_rounds")
-PRIORITY: Final = 10
-"""Behind every analysis; a tuning that runs makes way for one."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +152,7 @@ def submit(
         params=params,
         recording_id=this.id,
         requested_by=actor.user_id if actor else None,
-        priority=PRIORITY,
+        priority=Priority.BEHIND,
     )
     audit.record(c, actor, "tuning.requested", "session", session_id, {"job_id": view.id})
     return view

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 from sqlalchemy import select
 
-from server.jobs.queue import Claim, JobView, LeaseState
+from server.jobs.queue import Claim, JobView, LeaseState, Priority
 from server.jobs.table import MAX_DEATHS, TableQueue
 from server.storage.db import Database
 from server.storage.migrate import upgrade
@@ -102,7 +102,7 @@ def test_a_job_that_is_being_cancelled_does_not_answer_for_a_new_wish(bench: Ben
 
 
 def test_the_important_one_first_then_the_oldest(bench: Bench) -> None:
-    ids = [bench.submit("a").id, bench.submit("b").id, bench.submit("c", priority=-1).id]
+    ids = [bench.submit("a").id, bench.submit("b").id, bench.submit("c", priority=Priority.IN_FRONT).id]
     assert [bench.claim().job_id for _ in ids] == [ids[2], ids[0], ids[1]]
     assert bench.queue.claim("w", ("k",)) is None
 
@@ -131,10 +131,10 @@ def test_a_checkpoint_goes_to_the_next_attempt_and_forgives_deaths(bench: Bench)
         assert c.execute(select(job.c.checkpoint).where(job.c.id == view.id)).scalar_one() is None
 
 
-def test_a_job_makes_way_for_a_more_urgent_one_only(bench: Bench) -> None:
-    bench.submit("long", priority=10)
+def test_a_job_behind_makes_way_for_any_other(bench: Bench) -> None:
+    bench.submit("long", priority=Priority.BEHIND)
     claim = bench.claim()
-    bench.submit("as long", priority=10)
+    bench.submit("as long", priority=Priority.BEHIND)
     assert bench.queue.look(claim) is LeaseState.OURS
     urgent = bench.submit("urgent")
     assert bench.queue.look(claim) is LeaseState.YIELD
@@ -142,6 +142,14 @@ def test_a_job_makes_way_for_a_more_urgent_one_only(bench: Bench) -> None:
     bench.cancel(claim.job_id)
     assert bench.queue.look(claim) is LeaseState.CANCEL
     assert bench.claim().job_id == urgent.id
+
+
+def test_a_job_without_checkpoints_is_worked_to_its_end(bench: Bench) -> None:
+    bench.submit("analysis")
+    claim = bench.claim()
+    bench.submit("somebody waits", priority=Priority.IN_FRONT)
+    assert bench.queue.look(claim) is LeaseState.OURS
+    assert bench.queue.heartbeat(claim) is LeaseState.OURS
 
 
 def test_a_renewed_lease_is_not_taken_an_expired_one_is(bench: Bench) -> None:
