@@ -124,6 +124,14 @@ class Account:
     actions: list[str]
 
 
+@dataclass(frozen=True)
+class SignInState:
+    """Who is signed in, and seconds until that ends if nobody does anything."""
+
+    name: str
+    left_s: float
+
+
 class UserNew(Request):
     """A new account."""
 

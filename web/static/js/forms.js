@@ -1,6 +1,8 @@
 // Forms that speak to the API, dialogs, whole-row links and back buttons: behaviour by data attributes, for every page.
 import { request, showProblem } from "./common/api.js";
 
+const LATER_MS = 20_000;
+
 const TYPES = { int: (v) => parseInt(v, 10), float: (v) => parseFloat(v.replace(",", ".")), bool: (v) => v === "true", json: JSON.parse };
 
 function values(form) {
@@ -71,3 +73,13 @@ document.addEventListener("click", (e) => {
   const row = e.target.closest("tr[data-href]");
   if (row && !e.target.closest("a,button,select,input,label") && !String(getSelection())) location.assign(row.dataset.href);
 });
+
+// Whoever is away for long is signed out: the watch over that comes once the page stands.
+const watch = () => import("./sign-out.js");
+if (document.getElementById("signed-out")) {
+  setTimeout(watch, LATER_MS);
+  document.addEventListener("signed-out", (e) => {
+    e.preventDefault();
+    watch().then(({ cover }) => cover());
+  });
+}
