@@ -18,6 +18,7 @@ from server.api import (
     jobs,
     live,
     live_feed,
+    notes,
     patients,
     prescriptions,
     programmes,
@@ -46,6 +47,7 @@ def build_api(app: FastAPI) -> APIRouter:
     for part in (
         sign_in,
         patients,
+        notes,
         prescriptions,
         programmes,
         sessions,

@@ -14,6 +14,7 @@ from server.auth.passwords import MAX_LENGTH, MIN_LENGTH
 from server.auth.roles import Role
 from server.jobs.queue import JobView
 from server.report.behind import StrideValue
+from server.services.notes import MOST_CHARACTERS
 from server.services.recordings import RecordedFile, RecordingState
 from server.services.tunings import MOST_OF_SWARM, Scheme
 
@@ -166,6 +167,13 @@ class PatientChange(PatientNew):
     """What to change of a patient; members left out stay as they are."""
 
     code: Code = ""
+
+
+class NoteNew(Request):
+    """A note about a patient, of today unless said otherwise."""
+
+    content: Annotated[str, StringConstraints(min_length=1, max_length=MOST_CHARACTERS, pattern=r"\S")]
+    written_on: dt.date = dt.date.min
 
 
 class SessionNew(Request):

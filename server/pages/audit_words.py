@@ -25,6 +25,9 @@ DEEDS: Final[Mapping[str, str]] = {
     "patient.created": "added the patient",
     "patient.changed": "changed what is said of the patient",
     "patient.erased": "deleted the patient with all recordings",
+    "note.added": "wrote a note",
+    "note.removed": "removed a note",
+    "notes.opened": "read the notes",
     "sessions.opened": "listed the visits",
     "trends.opened": "looked at the trends",
     "session.opened": "opened the visit",
@@ -120,7 +123,8 @@ class AuditSentence:
 def describe_rows(c: Connection, rows: Sequence[Row[Any]]) -> list[AuditSentence]:
     """Say rows in words, with the patients and visits they are about as far as these still exist."""
     ids = {row.resource_id for row in rows if row.resource in {"patient", "session"}}
-    codes = {i: code for i, code in c.execute(select(patient.c.id, patient.c.code).where(patient.c.id.in_(ids)))}
+    people = c.execute(select(patient.c.id, patient.c.code).where(patient.c.id.in_(ids)))
+    codes = {row.id: row.code for row in people}
     query = select(session.c.id, session.c.performed_on, patient.c.code).join(patient)
     visits = {r.id: r for r in c.execute(query.where(session.c.id.in_(ids)))}
     found = []

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
+from core.frames import SIDES
 from core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
 from server.auth.access import require
 from server.auth.identity import Identity
@@ -20,11 +21,12 @@ from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import FRAGMENT, record_opening, render_page
 from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
 from server.report import level
+from server.report.change_words import NO_LIMIT, ChangeWords, find_term, format_difference
 from server.report.curves import GLANCE_STRIDES, strip_svg
-from server.report.headline import BEYOND_SD
 from server.report.model import ReportModel
-from server.report.table import ParameterRow
-from server.report.wording import speak_places
+from server.report.profile import ProfileBar, bar_svg
+from server.report.table import BEYOND_SD, ParameterRow
+from server.report.wording import format_number, speak_places
 from server.services import comparisons, feedback, histories, repairs, reports
 from server.services.controls import ControlVisit
 from server.services.histories import AnalysedSession
@@ -225,6 +227,7 @@ def _draw_report(
         reviewed, found, this.edits, patient, session, context.get("before"), context["controls"]
     )
     used, total = sum(model.used.values()), len(model.strides)
+    score, bars = view_profile(reviewed, model, context) if overview else (None, [])
     return {
         **{name: getattr(model, name) for name in SHOWN},
         "daily": daily.draw_daily(model.daily),
@@ -232,7 +235,9 @@ def _draw_report(
         "groups": select_groups(model, paper=paper),
         "since": None if paper else model.since,
         "not_compared": _not_compared(session, model),
-        "first": (first := select_first(model)),
+        "first": (first := select_first(model)[: FIRST_ROWS - (score is not None)]),
+        "score": score,
+        "bars": bars,
         "folds": fold_groups(model, first),
         "ranks": {} if model.headline is None else model.headline.ranks,
         "missing": [
@@ -258,6 +263,49 @@ def _draw_report(
         f"input {found.input_sha256[:8]} · {day(found.created_at)}",
         "has_poses": "poses.parquet" in found.files,
     }
+
+
+def view_profile(
+    reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any]
+) -> tuple[dict[str, Any] | None, list[dict[str, Any]]]:
+    """The sagittal score and the bars of its curves, both with the visit before; None, [] without curves."""
+    if model.profile is None or model.quality.kind == "bad":
+        return None, []
+    earlier, before = None, context.get("before")
+    if before is not None and model.since is not None:
+        _, old = reports.read(reviewed, before.found, before.edits, context["patient"], before.session)
+        earlier = old.profile
+    found = {} if earlier is None else {b.title: b for b in earlier.bars}
+    bars = [
+        {"title": b.title, "svg": bar_svg(b, found.get(b.title)), **_print_sides(b)}
+        for b in model.profile.bars
+    ]
+    score = model.profile.score
+    if score is None:
+        return None, bars
+    was = None if earlier is None else earlier.score
+    return {
+        **_print_sides(score),
+        "healthy": None if score.p95 is None else format_number(score.p95, 1),
+        "before": None if was is None else tuple(_print_sides(was).values()),
+        "change": () if was is None else _change_score(was, score),
+    }, bars
+
+
+def _print_sides(bar: ProfileBar) -> dict[str, str]:
+    return {side: format_number(bar.values[side], 1) if side in bar.values else "–" for side in SIDES}
+
+
+def _change_score(before: ProfileBar, now: ProfileBar) -> tuple[ChangeWords, ...]:
+    """Of each side with both values; no source has a limit for it, so there is no verdict."""
+    term = find_term("gps_sagittal_deg")
+    return tuple(
+        ChangeWords(
+            side, format_difference(now.values[side] - before.values[side], term), "none", NO_LIMIT, ()
+        )
+        for side in SIDES
+        if side in now.values and side in before.values
+    )
 
 
 def _draw_panels(model: ReportModel, heights: Mapping[bool, int]) -> list[dict[str, Any]]:

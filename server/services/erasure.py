@@ -40,6 +40,7 @@ from server.storage.tables import (
     live_take,
     new_id,
     patient,
+    patient_note,
     planned_visit,
     prescription,
     programme,
@@ -84,6 +85,7 @@ def erase_patient(
         c.execute(delete(planned_visit).where(planned_visit.c.programme_id.in_(plans)))
         c.execute(delete(programme).where(programme.c.patient_id == patient_id))
         c.execute(delete(prescription).where(prescription.c.patient_id == patient_id))
+        c.execute(delete(patient_note).where(patient_note.c.patient_id == patient_id))
         c.execute(delete(patient).where(patient.c.id == patient_id))
         audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": found.sessions})
         _note(settings, spaces=[patient_id], takes=takes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from sqlalchemy import Connection, case, exists, func, insert, select, update
 
@@ -25,6 +25,9 @@ from server.storage.tables import (
     recording_file,
     session,
 )
+
+WALKS: Final = ("walk", "treadmill")
+"""Protocols whose speed is somebody's walking speed."""
 
 CHANGEABLE = frozenset({"title", "performed_on", "protocol", "height_m", *CHOICES, "feedback", "note"})
 
@@ -69,6 +72,15 @@ class Session:
             self.protocol,
             belt_speed_mps if self.protocol == "treadmill" else None,
         )
+
+
+@dataclass(frozen=True)
+class WalkedSession:
+    """What a list needs of an analysed walk to find the one that it is compared with."""
+
+    id: str
+    performed_on: dt.date
+    condition: WalkingCondition
 
 
 def create(
@@ -142,6 +154,23 @@ def newest_of(c: Connection, patient_ids: Collection[str]) -> dict[str, Session]
     newest = select(ranked.c.id).where(ranked.c.place == 1)
     found = (Session(**row._asdict()) for row in c.execute(_QUERY.where(session.c.id.in_(newest))))
     return {s.patient_id: s for s in found}
+
+
+def list_walks(c: Connection, patient_ids: Collection[str]) -> dict[str, list[WalkedSession]]:
+    """Analysed walks without feedback by patient, the newest first; the speed of a belt is not looked up."""
+    done = exists().where(analysis.c.recording_id == recording.c.id, _MINE).correlate(session)
+    columns = [session.c[name] for name in ("id", "patient_id", "performed_on", "protocol", *CHOICES)]
+    query = (
+        select(*columns)
+        .where(session.c.patient_id.in_(patient_ids), session.c.protocol.in_(WALKS), done)
+        .where(session.c.feedback.is_(False))
+        .order_by(*_NEWEST)
+    )
+    found: dict[str, list[WalkedSession]] = {}
+    for row in c.execute(query):
+        condition = WalkingCondition(**{n: getattr(row, n) for n in CHOICES}, protocol=row.protocol)
+        found.setdefault(row.patient_id, []).append(WalkedSession(row.id, row.performed_on, condition))
+    return found
 
 
 _NEWEST = (session.c.performed_on.desc(), session.c.created_at.desc(), session.c.id)

@@ -8,6 +8,7 @@ patient ─< session ─< recording ─< recording_file          user ─< login
         │          │      │               └──< filter_run ─< filter_run_file
         │          │      └──< device_check (of the session's last published analysis)
         │          └──< reference_file
+        ├──< patient_note
         ├──< programme ─< planned_visit ─── session (at most one each)
         └──< prescription ─< live_take >── session, recording (the one it became)
                                  └──< live_event (append-only)
@@ -148,6 +149,17 @@ patient = Table(
     _one_of("affected_side", SIDES),
     CheckConstraint("birth_year BETWEEN 1850 AND 2200", name="birth_year"),
     CheckConstraint("height_m BETWEEN 0.5 AND 2.5", name="height_m"),
+)
+
+patient_note = Table(
+    "patient_note",
+    metadata,
+    _id(),
+    _ref("patient_id", "patient"),
+    Column("written_on", Date, nullable=False),
+    Column("content", Text, nullable=False),
+    Column("created_at", Utc, nullable=False),
+    _ref("created_by", "user", nullable=True, index=False),
 )
 
 session = Table(

@@ -35,6 +35,7 @@ OF_NO_PATIENT = {
     Action.CHECK_HEALTH,
     Action.LOAD_ASSET,
     Action.USE_ACCOUNT,
+    Action.WATCH_SIGN_IN,
     Action.READ_API,
     Action.READ_DEVICE,  # serial numbers and days, nobody who wore them
     Action.MANAGE_USERS,
@@ -69,6 +70,8 @@ PATIENT, SESSION = f"{API}/patients/{{patient_id}}", f"{API}/sessions/{{session_
 CHANGES: dict[str, dict[str, Any]] = {
     f"POST {API}/patients": {"json": {"code": "P-2"}},
     f"PATCH {PATIENT}": {"json": {"note": "uses a stick"}},
+    f"POST {PATIENT}/notes": {"json": {"content": "Walks to the bakery."}},
+    f"DELETE {API}/notes/{{note_id}}": {},
     f"POST {PATIENT}/sessions": {"json": {"title": "Walk"}},
     f"POST {PATIENT}/programmes": {"json": {"starts_on": "2026-03-02"}},
     f"PATCH {API}/planned-visits/{{visit_id}}": {"json": {"planned_on": "2026-03-05"}},
@@ -229,7 +232,7 @@ async def test_every_route_that_changes_patient_data_leaves_an_audit_row(tmp_pat
                 if "visits" in made:
                     v.values |= {"programme_id": made["id"], "visit_id": made["visits"][0]["id"]}
                 if "content" in made:
-                    v.values["prescription_id"] = made["id"]
+                    v.values |= {"prescription_id": made["id"], "note_id": made["id"]}
                 if not [r for r in v.rows() if r.seq > before and r.user_name == "admin"]:
                     silent.append(route)
         assert silent == []
