@@ -2,6 +2,7 @@
 import { request, showProblem } from "./common/api.js";
 
 const LATER_MS = 20_000;
+const NOW = "#now"; // of the address of a report that is printed at once
 
 const TYPES = { int: (v) => parseInt(v, 10), float: (v) => parseFloat(v.replace(",", ".")), bool: (v) => v === "true", json: JSON.parse };
 
@@ -82,4 +83,16 @@ if (document.getElementById("signed-out")) {
     e.preventDefault();
     watch().then(({ cover }) => cover());
   });
+}
+
+// Ctrl+P on a session prints its report; everywhere else the page itself, without what only a screen needs.
+document.addEventListener("keydown", (e) => {
+  const report = document.querySelector("a[data-report]");
+  if (!report || e.key !== "p" || !(e.ctrlKey || e.metaKey) || e.altKey || e.shiftKey) return;
+  e.preventDefault();
+  location.assign(`${report.href}${NOW}`);
+});
+if (location.hash === NOW && document.querySelector("[data-print]")) {
+  history.replaceState(null, "", location.pathname);
+  window.print();
 }
