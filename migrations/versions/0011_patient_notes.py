@@ -17,7 +17,10 @@ def upgrade() -> None:
         sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
         sa.Column("created_by", sa.String(length=32), nullable=True),
         sa.ForeignKeyConstraint(
-            ["patient_id"], ["patient.id"], name=op.f("fk_patient_note_patient_id_patient"), ondelete="RESTRICT"
+            ["patient_id"],
+            ["patient.id"],
+            name=op.f("fk_patient_note_patient_id_patient"),
+            ondelete="RESTRICT",
         ),
         sa.ForeignKeyConstraint(
             ["created_by"], ["user.id"], name=op.f("fk_patient_note_created_by_user"), ondelete="RESTRICT"

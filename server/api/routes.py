@@ -30,6 +30,7 @@ from server.api import (
     trends,
     tunings,
     users,
+    videos,
 )
 from server.api.documents import openapi
 from server.auth.access import require
@@ -52,6 +53,7 @@ def build_api(app: FastAPI) -> APIRouter:
         programmes,
         sessions,
         files,
+        videos,
         analyses,
         sensitivities,
         tunings,

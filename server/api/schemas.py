@@ -215,6 +215,12 @@ class PlannedVisitChange(Request):
     session_id: HexId | None = None
 
 
+class VideoAlignment(Request):
+    """Time in the video at the take's time 0, in seconds; null takes the alignment back."""
+
+    offset_s: Annotated[float, Field(allow_inf_nan=False)] | None
+
+
 @dataclass(frozen=True)
 class RecordingAnswer:
     """The upload set of a session; `inspection` is what was found in it, before any mapping."""

@@ -27,7 +27,7 @@ from server.report.model import ReportModel
 from server.report.profile import ProfileBar, bar_svg
 from server.report.table import BEYOND_SD, ParameterRow
 from server.report.wording import format_number, speak_places
-from server.services import comparisons, feedback, histories, repairs, reports
+from server.services import comparisons, feedback, histories, repairs, reports, videos
 from server.services.controls import ControlVisit
 from server.services.histories import AnalysedSession
 from server.services.patients import Patient
@@ -174,6 +174,7 @@ def _show_report(
         if this is not None:
             context["before"] = comparisons.find_previous(c, this.session, done)
             trained = feedback.gather(c, patient, sid, done)
+            context["video"] = videos.find(c, sid)
             if not paper and who.may(Action.ANALYSE):
                 repair = repairs.read_proposal(c, reviewed.blobs, this.found)
                 context["repair"] = repair

@@ -141,9 +141,9 @@ def bar_svg(bar: ProfileBar, before: ProfileBar | None) -> str:
         if earlier is not None:
             at = x(earlier)
             shapes.append(f'<line class="mapb" x1="{at}" x2="{at}" y1="{y - 2}" y2="{y + 11}"/>')
-    for css, at in (("mapm", bar.median), ("map95", bar.p95)):
-        if at is not None:
-            shapes.append(f'<line class="{css}" x1="{x(at)}" x2="{x(at)}" y1="0" y2="31"/>')
+    for css, end in (("mapm", bar.median), ("map95", bar.p95)):
+        if end is not None:
+            shapes.append(f'<line class="{css}" x1="{x(end)}" x2="{x(end)}" y1="0" y2="31"/>')
     return f'<svg class="chart mapbar" width="100%" height="31" aria-hidden="true">{"".join(shapes)}</svg>'
 
 

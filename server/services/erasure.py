@@ -48,6 +48,7 @@ from server.storage.tables import (
     recording_file,
     reference_file,
     session,
+    session_video,
     tuning,
 )
 from server.storage.tables import audit as audit_table
@@ -118,6 +119,7 @@ def _erase_session_rows(c: Connection, session_id: str) -> list[str]:
     c.execute(delete(filter_run_file).where(filter_run_file.c.filter_run_id.in_(runs)))
     c.execute(delete(filter_run).where(filter_run.c.analysis_id.in_(analyses)))
     c.execute(delete(reference_file).where(reference_file.c.session_id == session_id))
+    c.execute(delete(session_video).where(session_video.c.session_id == session_id))
     c.execute(delete(edit).where(edit.c.analysis_id.in_(analyses)))
     c.execute(delete(analysis_file).where(analysis_file.c.analysis_id.in_(analyses)))
     c.execute(delete(analysis).where(analysis.c.recording_id.in_(recordings)))
@@ -178,7 +180,7 @@ def list_unfinished(settings: Settings) -> tuple[set[str], set[str]]:
 def _files_of(c: Connection, session_id: str, patient_id: str) -> set[tuple[str, str]]:
     """Every file of a session, also those that were taken out of it and may lie in the trash."""
     added = select(audit_table.c.detail["sha256"].as_string()).where(
-        audit_table.c.action.in_(("recording.file_added", "reference.added")),
+        audit_table.c.action.in_(("recording.file_added", "reference.added", "video.added")),
         audit_table.c.detail["session_id"].as_string() == session_id,
     )
     earlier = {(patient_id, sha256) for sha256 in c.execute(added).scalars() if sha256}

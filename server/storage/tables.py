@@ -7,7 +7,7 @@ patient ─< session ─< recording ─< recording_file          user ─< login
         │          │      ├──< job ─── analysis ─< edit (append-only, undo is a row too)
         │          │      │               └──< filter_run ─< filter_run_file
         │          │      └──< device_check (of the session's last published analysis)
-        │          └──< reference_file
+        │          └──< reference_file, session_video (at most one)
         ├──< patient_note
         ├──< programme ─< planned_visit ─── session (at most one each)
         └──< prescription ─< live_take >── session, recording (the one it became)
@@ -323,6 +323,20 @@ reference_file = Table(
     Column("size", Integer, nullable=False),
     Column("sha256", String(64), nullable=False, index=True),
     Column("added_at", Utc, nullable=False),
+    CheckConstraint("size >= 0", name="size"),
+)
+
+session_video = Table(
+    "session_video",
+    metadata,
+    Column("session_id", ForeignKey("session.id", ondelete="RESTRICT"), primary_key=True),
+    Column("name", String(500), nullable=False),
+    Column("media_type", String(32), nullable=False),
+    Column("size", Integer, nullable=False),
+    Column("sha256", String(64), nullable=False, index=True),
+    Column("offset_s", Float),  # time in the video at the take's time 0; None: nobody has aligned it
+    Column("consent_by", String(64)),  # who said that the person agreed; no key, as accounts may go
+    Column("consent_at", Utc, nullable=False),
     CheckConstraint("size >= 0", name="size"),
 )
 

@@ -17,7 +17,7 @@ from server.auth.routes import list_declared_actions
 from server.auth.tokens import token_hash
 from server.jobs.queue import Claim
 from server.pages.shell import FRAGMENT
-from server.services import patients, reference_files, sessions, tunings
+from server.services import patients, reference_files, sessions, tunings, videos
 from server.storage.tables import job, tuning
 from server.trail import MOST_REFUSED, QUIET_S, AuditTrail
 from tests.server import analysed, walk
@@ -58,6 +58,7 @@ WITHOUT_A_ROW = {
 QUERY = {
     "GET /api/v1/patients/{patient_id}/targets": "?parameter=stance_pct",
     "DELETE /api/v1/patients/{patient_id}": "?confirm=P-1",
+    "PUT /api/v1/sessions/{session_id}/video": "?name=walk.webm&consent=true",
 }
 
 TRAINING = {
@@ -92,6 +93,9 @@ CHANGES: dict[str, dict[str, Any]] = {
     f"POST {SESSION}/sensitivities": {"json": {"from_standing": False}},
     f"PUT {SESSION}/references/{{name:path}}": {"content": b"x"},
     f"DELETE {SESSION}/references/{{name:path}}": {},
+    f"PUT {SESSION}/video": {"content": b"\x1a\x45\xdf\xa3 and pictures"},
+    f"PATCH {SESSION}/video": {"json": {"offset_s": 1.5}},
+    f"DELETE {SESSION}/video": {},
     f"POST {SESSION}/live": {},
     f"POST {SESSION}/live/code": {},
     f"POST {SESSION}/live/close": {},
@@ -127,6 +131,11 @@ class Visits:
         ) as upload:
             upload.write(b"x")
             upload.keep()
+        with videos.receive_video(
+            clinic.db, clinic.app.state.blobs, clinic.settings, None, this, "walk.webm", consent=True
+        ) as film:
+            film.write(b"\x1a\x45\xdf\xa3 and pictures")
+            film.keep()
         self.values = {
             "patient_id": patient,
             "pid": patient,
