@@ -318,7 +318,9 @@ def _draw_panels(model: ReportModel, heights: Mapping[bool, int]) -> list[dict[s
 def _list_for_clock(model: ReportModel, variables: Sequence[str]) -> dict[str, Any]:
     """What the page's clock needs, with the curves of some variables only."""
     curves: Mapping[str, Any] = model.replay["curves"]  # type: ignore[assignment]
-    return {**model.replay, "curves": {v: curves[v] for v in variables if v in curves}}
+    spans: Sequence[Mapping[str, Any]] = model.replay["strides"]  # type: ignore[assignment]
+    strides = [[s["side"], s["start_s"], s["end_s"], int(s.get("used", True))] for s in spans]
+    return {**model.replay, "strides": strides, "curves": {v: curves[v] for v in variables if v in curves}}
 
 
 def select_first(model: ReportModel) -> tuple[ParameterRow, ...]:

@@ -44,6 +44,8 @@ def _assert_light(page: Page) -> None:
         "() => ['navigation', 'resource'].flatMap((kind) => performance.getEntriesByType(kind))"
         ".map((e) => [new URL(e.name).pathname, e.transferSize])"
     )
+    html = page.evaluate("() => performance.getEntriesByType('navigation')[0].decodedBodySize")
+    assert html <= 80_000
     assert len(loaded) <= 14, loaded
     figure = sum(size for path, size in loaded if path.startswith("/views/"))
     assert figure > 500_000, "viser's own page is one of them"
