@@ -147,13 +147,13 @@ def _stride_mark(index: int, s: Stride, duration_s: float) -> str:
     if s.excluded_reason is not None:
         title = f"{s.side} stride, {s.start_s:.2f} to {s.end_s:.2f} s, left out: "
         said = f"<title>{escape(title + explain_exclusion(s.excluded_reason))}</title>"
-        a, b = f"{start:.1f}", f"{end:.1f}"
+        a, b = f"{start:.0f}", f"{end:.0f}"
         cross = f'<path class="xx" d="M{a} {top + 60}L{b} {top + 360}M{a} {top + 360}L{b} {top + 60}"/>'
     faded = " x" if out else ""
     return (
         f'<g data-stride="{index}">{said}'
-        f'<path class="st{k}{faded}" d="M{start:.1f} {top}H{off:.1f}v420H{start:.1f}"/>'
-        f'<path class="sw{k}{faded}" d="M{off:.1f} {top}H{end:.1f}v420H{off:.1f}"/>'
+        f'<path class="st{k}{faded}" d="M{start:.0f} {top}H{off:.0f}v420H{start:.0f}"/>'
+        f'<path class="sw{k}{faded}" d="M{off:.0f} {top}H{end:.0f}v420H{off:.0f}"/>'
         f"{cross}</g>"
     )
 

@@ -72,7 +72,7 @@ document.addEventListener("click", (e) => {
   if (e.target.closest("[data-back]")) return history.back();
   if (e.target.closest("[data-print]")) return window.print();
   const row = e.target.closest("tr[data-href]");
-  if (row && !e.target.closest("a,button,select,input,label") && !String(getSelection())) location.assign(row.dataset.href);
+  if (row && !e.target.closest("a,button,select,input,label") && !String(getSelection())) location.assign(row.dataset.href || row.querySelector("a").href); // without an address that of its link
 });
 
 // Whoever is away for long is signed out: the watch over that comes once the page stands.
