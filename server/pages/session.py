@@ -11,6 +11,7 @@ from starlette.responses import Response
 
 from core.frames import SIDES
 from core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
+from core.parameters.result import Parameter
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -27,7 +28,7 @@ from server.report.model import ReportModel
 from server.report.profile import ProfileBar, bar_svg
 from server.report.table import BEYOND_SD, ParameterRow
 from server.report.wording import format_number, speak_places
-from server.services import comparisons, feedback, histories, repairs, reports, videos
+from server.services import comparisons, feedback, histories, repairs, reports, videos, visits
 from server.services.controls import ControlVisit
 from server.services.histories import AnalysedSession
 from server.services.patients import Patient
@@ -187,6 +188,8 @@ def _show_report(
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
     if this is not None:
         context["report"] = view_report(reviewed, this, context, page=template)
+        if template == OVERVIEW:
+            context["takes"] = view_takes(reviewed, done, sid, context["report"]["first"])
         context["feedback"] = feedback.view(reviewed, trained)
     if template == "kinematics.html" and (elsewhere := lead_to_days(context)):
         return elsewhere
@@ -266,6 +269,49 @@ def _draw_report(
     }
 
 
+def view_takes(
+    reviewed: ReviewedAnalyses,
+    done: Sequence[AnalysedSession],
+    session_id: str,
+    first: Sequence[ParameterRow],
+) -> dict[str, Any] | None:
+    """The first values of every take of this visit and their mean; None where it has only this one."""
+    visit = visits.find_visit_of(done, session_id)
+    if visit is None or len(visit.takes) < 2:
+        return None
+    measured = visits.measure_visit(reviewed, visit)
+    ids = [t.session.id for t in visit.takes]
+    rows = []
+    for row in first:
+        name = level.from_standing(row.name) or row.name  # levels are read from standing in every take
+        for side in (None, *SIDES):
+            found = measured.get((name, side))
+            if found is None or found.mean.mean is None:
+                continue
+            digits = find_term(name).digits
+            rows.append(
+                {
+                    "title": find_term(name).label,
+                    "unit": find_term(name).unit,
+                    "side": side,
+                    "cells": [_print_take(found.by_take.get(sid), digits) for sid in ids],
+                    "mean": format_number(found.mean.mean, digits),
+                }
+            )
+    columns = [
+        {"id": t.session.id, "title": t.session.title, "this": t.session.id == session_id}
+        for t in visit.takes
+    ]
+    return {"columns": columns, "rows": rows}
+
+
+def _print_take(p: Parameter | None, digits: int) -> str:
+    if p is None or p.mean is None:
+        return "–"
+    spread = "" if p.sd is None else f" ± {format_number(p.sd, digits)}"
+    return format_number(p.mean, digits) + spread
+
+
 def view_profile(
     reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any]
 ) -> tuple[dict[str, Any] | None, list[dict[str, Any]]]:
@@ -319,7 +365,7 @@ def _list_for_clock(model: ReportModel, variables: Sequence[str]) -> dict[str, A
     """What the page's clock needs, with the curves of some variables only."""
     curves: Mapping[str, Any] = model.replay["curves"]  # type: ignore[assignment]
     spans: Sequence[Mapping[str, Any]] = model.replay["strides"]  # type: ignore[assignment]
-    strides = [[s["side"], s["start_s"], s["end_s"], int(s.get("used", True))] for s in spans]
+    strides = [[s["side"], s["start_s"], s["end_s"], int(s["used"])] for s in spans]
     return {**model.replay, "strides": strides, "curves": {v: curves[v] for v in variables if v in curves}}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import re
 
-from playwright.sync_api import expect
+from playwright.sync_api import FilePayload, expect
 
 from tests.browser.conftest import Filled, Opener, RunningServer
 
@@ -39,9 +39,8 @@ def test_a_film_is_aligned_by_one_contact_and_follows_the_clock(
     expect(add).to_be_disabled()
     page.get_by_label("The person agreed to be filmed").check()
     expect(add).to_be_enabled()
-    page.locator("video-upload [data-file]").set_input_files(
-        files=[{"name": "walk.webm", "mimeType": "video/webm", "buffer": film}]
-    )
+    payload: FilePayload = {"name": "walk.webm", "mimeType": "video/webm", "buffer": film}
+    page.locator("video-upload [data-file]").set_input_files(payload)
     expect(page.get_by_text("Not aligned yet")).to_be_visible()
     expect(page.get_by_text(re.compile("anna said on .* agreed"))).to_be_visible()
     page.goto(f"/sessions/{filled.done}")

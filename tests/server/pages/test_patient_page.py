@@ -81,6 +81,13 @@ async def test_a_take_is_compared_with_the_day_before_and_not_with_the_take_befo
         clinic, "V-2", [("2026-03-02", 0.60, {}), ("2026-04-06", 0.90, {}), ("2026-04-06", 1.00, {})]
     )
     html = await text_of(clinic, f"/sessions/{last}")
+    takes = html[html.index("2 takes of this visit") :]
+    takes = takes[: takes.index("</details>")]
+    row = next(r for r in re.findall(r"<tr>.*?</tr>", takes, re.DOTALL) if "Gait speed" in r)
+    assert re.findall(r"0\.\d\d ± 0\.02|1\.00 ± 0\.02|<b>0\.95</b>", row) == [
+        "0.90 ± 0.02", "1.00 ± 0.02", "<b>0.95</b>",
+    ]  # fmt: skip
+    assert "takes of this visit" not in await text_of(clinic, f"/sessions/{first}")
     assert f"/sessions/{last}/compare/{first}" in html
     assert "Changed since 2 Mar 2026" in html
 
