@@ -54,23 +54,9 @@ VISIT_KINDS = ("assessment", "training")
 TAKE_STATES = ("pairing", "open", "streaming", "finished", "closed")
 OPEN_TAKE_STATES = ("pairing", "open", "streaming")
 LIVE_EVENT_KINDS = (
-    "start",
-    "stop",
-    "mark",
-    "undo_mark",
-    "feedback",
-    "level",
-    "pause",
-    "redo_calibration",
-    "ghost",
-    "test",
-    "prescription",
-    "stale",
-    "calibration",
-    "cue",
-    "guard",
-    "notice",
-)
+    "start", "stop", "mark", "undo_mark", "feedback", "level", "pause", "redo_calibration",
+    "ghost", "test", "prescription", "stale", "calibration", "cue", "guard", "notice",
+)  # fmt: skip
 EDIT_KINDS = ("move_event", "add_event", "delete_event", "exclude_stride", "include_stride", "undo")
 
 

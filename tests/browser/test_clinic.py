@@ -190,7 +190,7 @@ def test_a_form_is_kept_when_the_sign_in_ends_and_its_end_is_told_before(
     page.get_by_role("button", name="Sign in").click()
     page.wait_for_url(re.compile(r"/patients$"))
     page.wait_for_load_state()
-    page.get_by_role("button", name="New patient").click()
+    page.get_by_role("button", name="New patient").first.click()
     page.get_by_label("Code", exact=True).fill("KEPT-1")
     page.get_by_label("Note", exact=True).fill("Long and carefully written.")
     # two minutes before the end it is told; whoever stays is asked of the server, which counts it
