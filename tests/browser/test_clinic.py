@@ -188,7 +188,7 @@ def test_a_form_is_kept_when_the_sign_in_ends_and_its_end_is_told_before(
     page.get_by_label("User name").fill(NAME)
     page.get_by_label("Password").fill(PASSWORD)
     page.get_by_role("button", name="Sign in").click()
-    page.wait_for_url(re.compile(r"/patients$"))
+    page.wait_for_url(re.compile(r":\d+/patients$"))
     page.wait_for_load_state()
     page.get_by_role("button", name="New patient").first.click()
     page.get_by_label("Code", exact=True).fill("KEPT-1")
