@@ -175,7 +175,8 @@ def _show_report(
         if this is not None:
             context["before"] = comparisons.find_previous(c, this.session, done)
             trained = feedback.gather(c, patient, sid, done)
-            context["video"] = videos.find(c, sid)
+            if template == OVERVIEW and context["session"].has_video:
+                context["video"] = videos.find(c, sid)
             if not paper and who.may(Action.ANALYSE):
                 repair = repairs.read_proposal(c, reviewed.blobs, this.found)
                 context["repair"] = repair

@@ -89,8 +89,7 @@ def find_previous(c: Connection, session: Session, done: Sequence[AnalysedSessio
     this = next((a for a in done if a.session.id == session.id), None)
     if this is None:
         return None
-    plans = programmes.of_patient(c, session.patient_id)
-    planned = {v.session_id: v.kind for plan in plans for v in plan.visits}
+    planned = programmes.list_kinds(c, [session.patient_id])
     kind = classify_visit(session, planned.get(session.id))
     for a in reversed(done):
         s = a.session

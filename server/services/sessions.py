@@ -24,6 +24,7 @@ from server.storage.tables import (
     recording,
     recording_file,
     session,
+    session_video,
 )
 
 WALKS: Final = ("walk", "treadmill")
@@ -43,6 +44,7 @@ class Session:
     height_m : measured at this visit, None = use the patient's.
     pace, aid, orthosis, shoes : how it was walked (core/condition.py), None = not stated.
     feedback : biofeedback was given; a live take sets it by itself.
+    has_video : a video was set beside its take.
     """
 
     id: str
@@ -59,6 +61,7 @@ class Session:
     feedback: bool
     note: str
     created_at: dt.datetime
+    has_video: bool
     state: str
 
     def walked(self, belt_speed_mps: float | None = None) -> WalkingCondition:
@@ -190,9 +193,11 @@ _STATE = case(
 )
 """State of a session, in the statement that reads it: as many sessions as one likes cost no further one."""
 
-_QUERY = select(session, patient.c.code.label("patient_code"), _STATE.label("state")).join(
-    patient, patient.c.id == session.c.patient_id
-)
+_HAS_VIDEO = exists().where(session_video.c.session_id == session.c.id).correlate(session)
+
+_QUERY = select(
+    session, patient.c.code.label("patient_code"), _HAS_VIDEO.label("has_video"), _STATE.label("state")
+).join(patient, patient.c.id == session.c.patient_id)
 
 
 def _checked(values: Mapping[str, object]) -> dict[str, Any]:

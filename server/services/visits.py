@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection
 
 from core.change import Change, parameter_changes
 from core.condition import WalkingCondition, is_alike, is_comparable
@@ -16,11 +16,10 @@ from core.frames import Side
 from core.parameters.result import Parameter
 from core.parameters.takes import join_takes
 from server.report.trends import VisitKind
-from server.services import analyses, edit_log, sessions
+from server.services import analyses, edit_log, programmes, sessions
 from server.services.histories import AnalysedSession, classify_visit
 from server.services.reviewed import ReviewedAnalyses
 from server.storage.blobs import IntegrityError
-from server.storage.tables import planned_visit, programme
 
 SPEED: Final = "gait_speed_mps"
 
@@ -141,12 +140,7 @@ def read_newest_speeds(
     What cannot be read is left out.
     """
     rows = sessions.list_walks(c, patient_ids)
-    query = (
-        select(planned_visit.c.session_id, planned_visit.c.kind)
-        .join(programme)
-        .where(programme.c.patient_id.in_(patient_ids), planned_visit.c.session_id.is_not(None))
-    )
-    planned = {row.session_id: row.kind for row in c.execute(query)}
+    planned = programmes.list_kinds(c, patient_ids)
     chosen: dict[str, list[sessions.WalkedSession]] = {}
     for pid in patient_ids:
         mine = rows.get(pid, [])

@@ -10,6 +10,7 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, Locator, Page, Route, expect
 
+from core.online.frame import Stage
 from tests.browser import feed, filling
 from tests.browser.conftest import RunningServer, is_ours
 from tests.browser.design import layout_faults, text_faults
@@ -337,7 +338,8 @@ def test_the_patient_sees_no_number_and_reads_the_way_to_the_zone(
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= 820
     # what to do is said at every stage
-    for stage, words in (("stand", "Stand still"), ("walk", "Walk on")):
+    stages: tuple[tuple[Stage, str], ...] = (("stand", "Stand still"), ("walk", "Walk on"))
+    for stage, words in stages:
         this.say(feed.frame(101.0, stage))
         expect(this.page.locator("[data-pause-title]")).to_have_text(words)
     this.say(feed.frame(102.0), feed.feedback(on=False))
