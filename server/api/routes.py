@@ -18,6 +18,7 @@ from server.api import (
     jobs,
     live,
     live_feed,
+    notes,
     patients,
     prescriptions,
     programmes,
@@ -29,6 +30,7 @@ from server.api import (
     trends,
     tunings,
     users,
+    videos,
 )
 from server.api.documents import openapi
 from server.auth.access import require
@@ -46,10 +48,12 @@ def build_api(app: FastAPI) -> APIRouter:
     for part in (
         sign_in,
         patients,
+        notes,
         prescriptions,
         programmes,
         sessions,
         files,
+        videos,
         analyses,
         sensitivities,
         tunings,

@@ -14,6 +14,7 @@ from server.auth.passwords import MAX_LENGTH, MIN_LENGTH
 from server.auth.roles import Role
 from server.jobs.queue import JobView
 from server.report.behind import StrideValue
+from server.services.notes import MOST_CHARACTERS
 from server.services.recordings import RecordedFile, RecordingState
 from server.services.tunings import MOST_OF_SWARM, Scheme
 
@@ -124,6 +125,14 @@ class Account:
     actions: list[str]
 
 
+@dataclass(frozen=True)
+class SignInState:
+    """Who is signed in, and seconds until that ends if nobody does anything."""
+
+    name: str
+    left_s: float
+
+
 class UserNew(Request):
     """A new account."""
 
@@ -158,6 +167,13 @@ class PatientChange(PatientNew):
     """What to change of a patient; members left out stay as they are."""
 
     code: Code = ""
+
+
+class NoteNew(Request):
+    """A note about a patient, of today unless said otherwise."""
+
+    content: Annotated[str, StringConstraints(min_length=1, max_length=MOST_CHARACTERS, pattern=r"\S")]
+    written_on: dt.date = dt.date.min
 
 
 class SessionNew(Request):
@@ -197,6 +213,12 @@ class PlannedVisitChange(Request):
 
     planned_on: dt.date = dt.date.min
     session_id: HexId | None = None
+
+
+class VideoAlignment(Request):
+    """Time in the video at the take's time 0, in seconds; null takes the alignment back."""
+
+    offset_s: Annotated[float, Field(allow_inf_nan=False)] | None
 
 
 @dataclass(frozen=True)

@@ -137,6 +137,14 @@ def set_up(
     return response
 
 
+@router.get("/sign-in", response_model=schemas.SignInState)
+def read_sign_in(
+    logins: OpenLogins, who: Annotated[Identity, require(Action.WATCH_SIGN_IN)]
+) -> schemas.SignInState:
+    """Tell how long this sign-in still lasts; asking does not prolong it."""
+    return schemas.SignInState(name=who.name, left_s=round(logins.seconds_left(who.login_id), 1))
+
+
 @router.get("/account", response_model=schemas.Account)
 def read_account(who: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> schemas.Account:
     """Tell who is signed in and what this person may do."""

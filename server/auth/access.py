@@ -10,6 +10,7 @@ from starlette.requests import HTTPConnection
 from server.auth.cookie import read_token
 from server.auth.identity import Identity
 from server.auth.roles import PUBLIC, Action
+from server.auth.sessions import Logins
 from server.http.problems import SENTENCES, Problem
 
 
@@ -21,7 +22,7 @@ class RouteAccess:
 
     def __call__(self, connection: HTTPConnection) -> Identity | None:
         """Return who is asking; raise Problem 401 without a sign-in and 403 without the right."""
-        identity = identify(connection)
+        identity = identify(connection, counts=self.action is not Action.WATCH_SIGN_IN)
         if self.action in PUBLIC:
             return identity
         if identity is None:
@@ -36,10 +37,10 @@ def require(action: Action) -> Any:
     return Depends(RouteAccess(action))
 
 
-def identify(connection: HTTPConnection) -> Identity | None:
-    """Return who is signed in on this connection, None when nobody is."""
+def identify(connection: HTTPConnection, *, counts: bool = True) -> Identity | None:
+    """Return who is signed in on this connection, None when nobody is; `counts` = as activity."""
     token = read_token(connection)
     if token is None:
         return None
-    identity: Identity | None = connection.app.state.logins.find(token)
-    return identity
+    logins: Logins = connection.app.state.logins
+    return logins.find(token) if counts else logins.look(token)

@@ -23,6 +23,8 @@ class Action(StrEnum):
     CHECK_HEALTH = "check_health"
     LOAD_ASSET = "load_asset"
     USE_ACCOUNT = "use_account"
+    WATCH_SIGN_IN = "watch_sign_in"
+    """Asks how long the sign-in still lasts; the only action that does not prolong it."""
     READ_API = "read_api"
     READ_PATIENT = "read_patient"
     WRITE_PATIENT = "write_patient"
@@ -69,6 +71,7 @@ _ADMIN = frozenset({Role.ADMIN})
 
 POLICY: dict[Action, frozenset[Role]] = {
     Action.USE_ACCOUNT: _ALL,
+    Action.WATCH_SIGN_IN: _ALL,
     Action.READ_API: _ALL,
     Action.READ_PATIENT: _ALL,
     Action.WRITE_PATIENT: _CLINICAL,

@@ -97,6 +97,20 @@ class Logins:
         """Return who holds this token and count the visit as activity; None when it is unknown or over."""
         return self.touch(token_hash(token))
 
+    def look(self, token: str) -> Identity | None:
+        """Return who holds this token without counting it as activity; None when it is unknown or over."""
+        found = self._open(token_hash(token), self._clock())
+        return None if found is None else found[1]
+
+    def seconds_left(self, login_id: str) -> float:
+        """Seconds until a sign-in ends if nobody does anything; 0 when it is over. Not activity itself."""
+        at = self._clock()
+        found = self._open(login_id, at)
+        if found is None:
+            return 0.0
+        login, _ = found
+        return (min(login.expires_at, login.last_seen_at + self._idle) - at).total_seconds()
+
     def touch(self, login_id: str) -> Identity | None:
         """Count a running view or replay as activity; None when the sign-in is over, so the view must end."""
         at = self._clock()

@@ -116,14 +116,14 @@ VISITS = (
 PRESCRIBED: tuple[DemoPerson, Mapping[str, object]] = (
     STROKE,
     {
-        "parameter": "stride_length_m",
+        "parameter": "step_length_m",
         "side": "left",
-        "target": {"source": "manual", "mean": 1.2, "sd": 0.05},
+        "target": {"source": "manual", "mean": 0.6, "sd": 0.03},
         "modes": ["bar", "tone", "tick"],
         "schedule": {"kind": "fading", "strides_per_share": 60, "probe_every": 30, "probe_strides": 6},
     },
 )
-"""Who is trained in live walks, and how: longer strides (server/demo/live.py)."""
+"""Who is trained in live walks, and how: longer steps (server/demo/live.py)."""
 
 
 def record(visit: DemoVisit) -> Simulation:

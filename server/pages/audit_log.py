@@ -13,6 +13,7 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db
+from server.pages.audit_words import describe_rows
 from server.pages.shell import render_page
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -30,5 +31,6 @@ def show_audit_log(
     """Who opened or changed what, the newest first."""
     with db.read() as c:
         rows = audit.list_entries(c, before=before, limit=AUDIT_ROWS)
+        said = describe_rows(c, rows)
     older = rows[-1].seq if len(rows) == AUDIT_ROWS else None
-    return render_page(request, db, who, "audit.html", "audit", rows=rows, older=older)
+    return render_page(request, db, who, "audit.html", "audit", rows=said, older=older)

@@ -21,7 +21,7 @@ from server.pages.shell import record_opening, render_page
 from server.pages.words import SEGMENT_NAMES
 from server.report.estimator import choice_label, estimator_view
 from server.report.sensor_checks import sensor_checks
-from server.services import analyses, recordings, repairs
+from server.services import analyses, recordings, repairs, videos
 from server.storage.blobs import BlobStore
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -56,6 +56,7 @@ def show_data(
     with db.read() as c:
         context = read_context(c, sid)
         context |= list_downloads(c, blobs, sid, results=who.may(Action.READ_RESULT))
+        context["video"] = videos.find(c, sid) if who.may(Action.READ_RESULT) else None
     record_opening(request, who, "session", sid)
     return render_page(request, db, who, "data.html", "patients", **context)
 

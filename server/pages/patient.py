@@ -1,16 +1,19 @@
-"""One patient: programme, the trend of one figure, results by visit."""
+"""One patient: who, the programme, how it goes in five figures, visits with their takes, notes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
+from core.change import parameter_changes
+from core.errors import FormatError
 from core.parameters.catalogue import CATALOGUE
+from core.parameters.result import Parameter
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -20,22 +23,21 @@ from server.pages.patients import view_patient
 from server.pages.prescription import make_card
 from server.pages.programme import view_programme
 from server.pages.shell import record_opening, render_page
-from server.pages.trends import draw_teaser
+from server.pages.trends import draw_figures
 from server.pages.visit_state import judge_visit
-from server.report.exports import parameter_row
-from server.services import analyses, edit_log, histories, live, patients, prescriptions, sessions
+from server.report.change_words import change_words
+from server.report.takes_chart import find_scale, takes_svg
+from server.report.trends import VisitKind
+from server.services import edit_log, histories, live, notes, patients, prescriptions, sessions, visits
+from server.services.histories import AnalysedSession
+from server.services.programmes import PlannedVisit
 from server.services.reviewed import ReviewedAnalyses
+from server.services.visits import SPEED, ClinicVisit, TakesFigure
+from server.storage.blobs import IntegrityError
 from server.storage.tables import now
 from web.words import number
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
-
-KEY_PARAMETERS: Final = tuple(
-    {"name": e.name, "label": e.label, "unit": e.printed_unit, "digits": e.digits}
-    for name in ("cadence_spm", "stride_time_s", "stance_pct", "knee_flexion_rom_deg")
-    for e in (CATALOGUE[name],)
-)
-"""Columns of the results by visit."""
 
 
 @router.get("/patients/{pid}")
@@ -46,53 +48,156 @@ def show_patient(
     pid: Id,
     who: Annotated[Identity, require(Action.READ_PATIENT)],
 ) -> Response:
-    """One patient: programme, the trend of one figure, results by visit."""
+    """One patient: who, the programme, how it goes in five figures, visits with their takes, notes."""
+    results = who.may(Action.READ_RESULT)
     with db.read() as c:
         patient = patients.get(c, pid)
-        visits = list_visits(c, reviewed, pid, results=who.may(Action.READ_RESULT))
         done, plans = histories.read(c, patient)
-        written = prescriptions.of_patient(c, pid) if who.may(Action.READ_RESULT) else []
+        planned = {v.session_id: v for plan in plans for v in plan.visits if v.session_id is not None}
+        rows = list_visits(c, reviewed, pid, done if results else [], planned)
+        written_down = notes.of_patient(c, pid)
+        written = prescriptions.of_patient(c, pid) if results else []
     record_opening(request, who, "patient", pid)
     trend = None
-    if who.may(Action.READ_RESULT):
-        trend = draw_teaser(histories.read_history(reviewed, patient, done, plans))
+    if results:
+        trained = next((w.content for w in written if w.ended_at is None), None)
+        history = histories.read_history(reviewed, patient, done, plans)
+        trend = draw_figures(history, None if trained is None else trained.parameter)
+    walked = histories.baseline(done)
     return render_page(
         request, db, who, "patient.html", "patients",
-        patient=view_patient(patient), visits=visits, keys=KEY_PARAMETERS,
+        patient=view_patient(patient), visits=rows, today=now().date(),
+        facts=list_facts(patient, None if walked is None else walked.condition.words),
+        notes=list_notes(written_down, rows),
         programme=view_programme(plans[0], now().date()) if plans else None,
-        planned={v.session_id: v.label for plan in plans for v in plan.visits if v.session_id},
-        trend=trend, comparable=len(done) > 1, feedback=make_card(written),
+        trend=trend, comparable=len(done) > 1 and results, feedback=make_card(written),
     )  # fmt: skip
 
 
-def list_visits(
-    c: Connection, reviewed: ReviewedAnalyses, patient_id: str, *, results: bool
+def list_facts(patient: patients.Patient, walks: str | None) -> list[tuple[str, str]]:
+    """Who it is and how the person walks, in a line."""
+    facts = [
+        ("Condition", patient.note),
+        ("Affected side", patient.affected_side or ""),
+        ("Walks", walks or ""),
+        ("Height", "" if patient.height_m is None else f"{patient.height_m:.2f}\u202fm"),
+        ("Serves as", "reference of this clinic" if patient.is_control else ""),
+    ]
+    return [(label, text) for label, text in facts if text]
+
+
+def list_notes(
+    written: Sequence[notes.PatientNote], rows: Sequence[Mapping[str, Any]]
 ) -> list[dict[str, Any]]:
-    """The visits of a patient, newest first, with the key parameters of each visit's latest analysis."""
-    rows = []
+    """Notes about the patient and those of visits, the latest day first."""
+    found = [{"id": n.id, "day": n.written_on, "by": n.by, "text": n.content} for n in written]
+    found += [
+        {"id": None, "day": row["day"], "visit": take["title"], "href": take["href"], "text": take["note"]}
+        for row in rows
+        for take in row["takes"]
+        if take["note"]
+    ]
+    return sorted(found, key=lambda n: n["day"], reverse=True)
+
+
+def list_visits(
+    c: Connection,
+    reviewed: ReviewedAnalyses,
+    patient_id: str,
+    done: Sequence[AnalysedSession],
+    planned: Mapping[str, PlannedVisit],
+) -> list[dict[str, Any]]:
+    """The visits of a patient, newest first, each with its takes; what is not analysed is a visit of its own.
+
+    Parameters
+    ----------
+    done : what is analysed, oldest first; empty for who may not see results. planned : session → the visit
+        of a programme that it was.
+    """
     streaming = {take.session_id for take in live.list_streaming(c)}
     running = find_active_jobs(c, lambda j: j.session_id)
-    there = sessions.of_patient(c, patient_id)
-    shown = analyses.latest_of(c, [s.id for s in there]) if results else {}
-    edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
-    for s in there:
-        latest = shown.get(s.id)
-        numbers = reviewed.read_numbers(latest, edits[latest.id]).parameters if latest else ()
-        cells, strides = list_key_cells([parameter_row(p) for p in numbers])
-        rows.append(
+    found = {a.session.id: a for a in done}
+    kinds = {key: v.kind for key, v in planned.items()}
+    edits = edit_log.edits_of_all(c, [a.found.id for a in done])
+    grouped = visits.group_takes(done)
+    measured = {id(v): _measure(reviewed, v) for v in grouped}
+    scale = find_scale([p for speeds in measured.values() if speeds for p in speeds.takes])
+    rows: list[dict[str, Any]] = []
+    shown: set[str] = set()
+    for s in sessions.of_patient(c, patient_id):
+        if s.id in shown:
+            continue
+        visit = next((v for v in grouped if s.id in {t.session.id for t in v.takes}), None)
+        mine = [s] if visit is None else [t.session for t in reversed(visit.takes)]
+        shown.update(m.id for m in mine)
+        takes = [
             {
-                **vars(s),
-                "href": f"/sessions/{s.id}{_find_page(s, live=s.id in streaming)}",
-                "live": s.id in streaming,
-                "condition": s.walked().words,
-                "cells": cells,
-                "strides": strides,
-                "job": running.get(s.id),
-                "status": judge_visit(reviewed, s, latest, edits),
+                **vars(m),
+                "href": f"/sessions/{m.id}{_find_page(m, live=m.id in streaming)}",
+                "live": m.id in streaming,
+                "analysed": m.id in found,
+                "job": running.get(m.id),
+                "status": judge_visit(reviewed, m, found[m.id].found if m.id in found else None, edits),
+                "speed": None,
             }
-        )
-    follow_few([row["job"] for row in rows])
+            for m in mine
+        ]
+        row: dict[str, Any] = {
+            "day": s.performed_on,
+            "condition": s.walked().words,
+            "takes": takes,
+            "figure": None,
+            "label": next((planned[m.id].label for m in mine if m.id in planned), None),
+        }
+        if visit is not None:
+            row["condition"] = visit.condition.words
+            row |= _view_speed(visit, grouped, measured, kinds, scale)
+            for take, alone in zip(takes, reversed(row["speeds"]), strict=True):
+                take["speed"] = alone
+        rows.append(row)
+    follow_few([take["job"] for row in rows for take in row["takes"]])
     return rows
+
+
+def _measure(reviewed: ReviewedAnalyses, visit: ClinicVisit) -> TakesFigure | None:
+    """The walking speed of every take and their mean; None where it cannot be read or was not measured."""
+    try:
+        return visits.measure_visit(reviewed, visit).get((SPEED, None))
+    except (IntegrityError, FormatError):  # its own page says what is wrong; the others stay in reach
+        return None
+
+
+def _view_speed(
+    visit: ClinicVisit,
+    grouped: Sequence[ClinicVisit],
+    measured: Mapping[int, TakesFigure | None],
+    planned: Mapping[str, VisitKind],
+    scale: tuple[float, float] | None,
+) -> dict[str, Any]:
+    """Speed of a visit with that of its takes, and its change since the visit it is compared with."""
+    own = measured[id(visit)]
+    by_take = {} if own is None else own.by_take
+    view: dict[str, Any] = {
+        "speeds": [_print(by_take.get(t.session.id)) for t in visit.takes],
+        "speed": None if own is None else _print(own.mean),
+        "change": None,
+        "compared": "not compared" if visit.condition.feedback else "first in this condition",
+    }
+    if own is not None and scale is not None and own.mean.mean is not None:
+        said = ", ".join(text for text in view["speeds"] if text)
+        view["figure"] = takes_svg(own.takes, own.mean, scale, f"Takes {said}, mean {view['speed']} m/s")
+    before = visits.find_before(grouped, visit, planned)
+    if before is not None:
+        earlier = measured[id(before)]
+        view["compared"] = "speed not measured in both"
+        if own is not None and earlier is not None:
+            change = parameter_changes([earlier.mean], [own.mean])[0]
+            view |= {"change": change_words(change), "compared": None, "since": before.day}
+    return view
+
+
+def _print(p: Parameter | None) -> str | None:
+    return None if p is None or p.mean is None else number(p.mean, CATALOGUE[SPEED].digits)
 
 
 def _find_page(s: sessions.Session, *, live: bool) -> str:
@@ -100,20 +205,3 @@ def _find_page(s: sessions.Session, *, live: bool) -> str:
     if live:
         return "/live"
     return "/upload" if s.state in {"empty", "uploaded"} else ""
-
-
-def list_key_cells(
-    parameters: Sequence[Mapping[str, Any]],
-) -> tuple[list[dict[str, Any]], dict[str, int] | None]:
-    """Cells of KEY_PARAMETERS and the strides of each side behind them."""
-    by = {(p["name"], p["side"]): p for p in parameters}
-    cells: list[dict[str, Any]] = []
-    for key in KEY_PARAMETERS:
-        left, right, both = (by.get((key["name"], side)) for side in ("left", "right", None))
-        text = [number(p["mean"] if p else None, int(str(key["digits"]))) for p in (left, right, both)]
-        has_sides = any(p and p["mean"] is not None for p in (left, right))
-        one = text[2] if both and both["mean"] is not None else None
-        cells.append({"both": has_sides, "left": text[0], "right": text[1], "one": one})
-    times = [by.get(("stride_time_s", side)) for side in ("left", "right")]
-    found = {side: p["n"] for side, p in zip(("left", "right"), times, strict=True) if p}
-    return cells, {"left": found.get("left", 0), "right": found.get("right", 0)} if found else None

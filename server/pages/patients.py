@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
+from core.parameters.catalogue import CATALOGUE
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -18,13 +19,24 @@ from server.pages.job_views import find_active_jobs, follow_few
 from server.pages.shell import record_listing, render_page
 from server.pages.visit_state import judge_visit
 from server.pages.words import describe_person
-from server.services import analyses, edit_log, live, patients, sessions
+from server.report.change_words import change_words
+from server.services import analyses, edit_log, live, patients, programmes, sessions, visits
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
+from server.storage.tables import now
+from web.words import number
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 PATIENTS_SHOWN = 200
+
+FILTERS: Final = (
+    ("", "All"),
+    ("programme", "In a programme"),
+    ("today", "Here today"),
+    ("check", "To check"),
+)
+"""Which rows of the list are looked at: key and words."""
 
 
 @router.get("/patients")
@@ -41,7 +53,12 @@ def show_patients(
         rows = list_patients(c, reviewed, found, results=who.may(Action.READ_RESULT))
         total = patients.count(c)
     record_listing(request, who, "patient")
-    return render_page(request, db, who, "patients.html", "patients", patients=rows, query=q, total=total)
+    return render_page(
+        request, db, who, "patients.html", "patients",
+        patients=rows, query=q, total=total,
+        filters=[(key, words, sum(not key or key in r["kinds"] for r in rows)) for key, words in FILTERS],
+        results=who.may(Action.READ_RESULT),
+    )  # fmt: skip
 
 
 def view_patient(p: Patient) -> dict[str, Any]:
@@ -59,12 +76,29 @@ def list_patients(
     running = find_active_jobs(c, lambda j: j.patient_id)
     shown = analyses.latest_of(c, [s.id for s in newest.values()]) if results else {}
     edits = edit_log.edits_of_all(c, [a.id for a in shown.values()])
+    speeds = visits.read_newest_speeds(c, reviewed, [p.id for p in found]) if results else {}
+    today = now().date()
+    planned = programmes.list_running(c, [p.id for p in found], today)
     for p in found:
         if p.id in newest:
             last = judge_visit(reviewed, newest[p.id], shown.get(newest[p.id].id), edits)
         else:
             last = {"kind": "none", "text": "No session yet"}
-        row = {"visits": p.sessions, "last": p.last_visit, "job": running.get(p.id), "status": last}
+        row: dict[str, Any] = {
+            "visits": p.sessions,
+            "last": p.last_visit,
+            "job": running.get(p.id),
+            "status": last,
+        }
+        speed = speeds.get(p.id)
+        row["speed"] = None if speed is None else number(speed.mean.mean, CATALOGUE[visits.SPEED].digits)
+        row["change"] = None if speed is None or speed.change is None else change_words(speed.change)
+        kinds = {
+            "programme": p.id in planned,
+            "today": p.last_visit == today,
+            "check": last["kind"] in {"warn", "bad"},
+        }
+        row["kinds"] = [kind for kind, holds in kinds.items() if holds]
         rows.append(view_patient(p) | row | {"live": streaming.get(p.id)})
     follow_few([row["job"] for row in rows])
     return rows

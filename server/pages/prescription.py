@@ -45,6 +45,40 @@ SOURCES: Final = (
 
 
 @dataclass(frozen=True)
+class PrescriptionPreset:
+    """What is prescribed most often, in one choice.
+
+    Parameters
+    ----------
+    parameter, modes : of the prescription. sources : of the target, the first that gives numbers is taken.
+    """
+
+    key: str
+    title: str
+    words: str
+    parameter: str
+    modes: tuple[str, ...]
+    sources: tuple[str, ...]
+
+
+PRESETS: Final = (
+    PrescriptionPreset(
+        "longer", "Longer steps", "of the shorter side, as stepping stones", "step_length_m", ("zone",),
+        ("own_better_side", "norm", "own_baseline"),
+    ),
+    PrescriptionPreset(
+        "carry", "Longer on this leg", "time on one leg as on the other, a bar", "single_support_pct",
+        ("bar",), ("own_better_side", "norm", "own_baseline"),
+    ),
+    PrescriptionPreset(
+        "heel", "Heel first", "toes higher when the foot lands, a bar and a tone", "foot_pitch_ic_deg",
+        ("bar", "tone"), ("own_better_side", "norm", "own_baseline"),
+    ),
+)  # fmt: skip
+"""Of this one is chosen; everything else has its default and stands behind "More"."""
+
+
+@dataclass(frozen=True)
 class PrescriptionCard:
     """The prescription in force, in words, and the ones that ended, newest first."""
 
@@ -62,6 +96,7 @@ class TrainableParameter:
     label: str
     unit: str
     digits: int
+    shared: bool
 
 
 @router.get("/patients/{pid}/prescription")
@@ -76,7 +111,7 @@ def show_prescription(
     return render_page(
         request, db, who, "prescription.html", "patients",
         patient=patient, now=now, f=fill_form(now, patient.affected_side),
-        groups=group_trainable(), modes=MODES, sources=SOURCES,
+        groups=group_trainable(), modes=MODES, sources=SOURCES, presets=PRESETS,
     )  # fmt: skip
 
 
@@ -97,7 +132,9 @@ def group_trainable() -> list[tuple[str, list[TrainableParameter]]]:
     groups: dict[str, list[TrainableParameter]] = {}
     for name in list_trainable():
         e = CATALOGUE[name]
-        groups.setdefault(e.group, []).append(TrainableParameter(name, e.label, e.printed_unit, e.digits))
+        groups.setdefault(e.group, []).append(
+            TrainableParameter(name, e.label, e.printed_unit, e.digits, e.shared)
+        )
     return list(groups.items())
 
 

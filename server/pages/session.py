@@ -9,7 +9,9 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
+from core.frames import SIDES
 from core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
+from core.parameters.result import Parameter
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -20,12 +22,13 @@ from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import FRAGMENT, record_opening, render_page
 from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
 from server.report import level
+from server.report.change_words import NO_LIMIT, ChangeWords, find_term, format_difference
 from server.report.curves import GLANCE_STRIDES, strip_svg
-from server.report.headline import BEYOND_SD
 from server.report.model import ReportModel
-from server.report.table import ParameterRow
-from server.report.wording import speak_places
-from server.services import comparisons, feedback, histories, repairs, reports
+from server.report.profile import ProfileBar, bar_svg
+from server.report.table import BEYOND_SD, ParameterRow
+from server.report.wording import format_number, speak_places
+from server.services import comparisons, feedback, histories, repairs, reports, videos, visits
 from server.services.controls import ControlVisit
 from server.services.histories import AnalysedSession
 from server.services.patients import Patient
@@ -172,6 +175,8 @@ def _show_report(
         if this is not None:
             context["before"] = comparisons.find_previous(c, this.session, done)
             trained = feedback.gather(c, patient, sid, done)
+            if template == OVERVIEW and context["session"].has_video:
+                context["video"] = videos.find(c, sid)
             if not paper and who.may(Action.ANALYSE):
                 repair = repairs.read_proposal(c, reviewed.blobs, this.found)
                 context["repair"] = repair
@@ -184,6 +189,8 @@ def _show_report(
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
     if this is not None:
         context["report"] = view_report(reviewed, this, context, page=template)
+        if template == OVERVIEW:
+            context["takes"] = view_takes(reviewed, done, sid, context["report"]["first"])
         context["feedback"] = feedback.view(reviewed, trained)
     if template == "kinematics.html" and (elsewhere := lead_to_days(context)):
         return elsewhere
@@ -225,6 +232,7 @@ def _draw_report(
         reviewed, found, this.edits, patient, session, context.get("before"), context["controls"]
     )
     used, total = sum(model.used.values()), len(model.strides)
+    score, bars = view_profile(reviewed, model, context) if overview else (None, [])
     return {
         **{name: getattr(model, name) for name in SHOWN},
         "daily": daily.draw_daily(model.daily),
@@ -232,7 +240,9 @@ def _draw_report(
         "groups": select_groups(model, paper=paper),
         "since": None if paper else model.since,
         "not_compared": _not_compared(session, model),
-        "first": (first := select_first(model)),
+        "first": (first := select_first(model)[: FIRST_ROWS - (score is not None)]),
+        "score": score,
+        "bars": bars,
         "folds": fold_groups(model, first),
         "ranks": {} if model.headline is None else model.headline.ranks,
         "missing": [
@@ -260,6 +270,92 @@ def _draw_report(
     }
 
 
+def view_takes(
+    reviewed: ReviewedAnalyses,
+    done: Sequence[AnalysedSession],
+    session_id: str,
+    first: Sequence[ParameterRow],
+) -> dict[str, Any] | None:
+    """The first values of every take of this visit and their mean; None where it has only this one."""
+    visit = visits.find_visit_of(done, session_id)
+    if visit is None or len(visit.takes) < 2:
+        return None
+    measured = visits.measure_visit(reviewed, visit)
+    ids = [t.session.id for t in visit.takes]
+    rows = []
+    for row in first:
+        name = level.from_standing(row.name) or row.name  # levels are read from standing in every take
+        for side in (None, *SIDES):
+            found = measured.get((name, side))
+            if found is None or found.mean.mean is None:
+                continue
+            digits = find_term(name).digits
+            rows.append(
+                {
+                    "title": find_term(name).label,
+                    "unit": find_term(name).unit,
+                    "side": side,
+                    "cells": [_print_take(found.by_take.get(sid), digits) for sid in ids],
+                    "mean": format_number(found.mean.mean, digits),
+                }
+            )
+    columns = [
+        {"id": t.session.id, "title": t.session.title, "this": t.session.id == session_id}
+        for t in visit.takes
+    ]
+    return {"columns": columns, "rows": rows}
+
+
+def _print_take(p: Parameter | None, digits: int) -> str:
+    if p is None or p.mean is None:
+        return "–"
+    spread = "" if p.sd is None else f" ± {format_number(p.sd, digits)}"
+    return format_number(p.mean, digits) + spread
+
+
+def view_profile(
+    reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any]
+) -> tuple[dict[str, Any] | None, list[dict[str, Any]]]:
+    """The sagittal score and the bars of its curves, both with the visit before; None, [] without curves."""
+    if model.profile is None or model.quality.kind == "bad":
+        return None, []
+    earlier, before = None, context.get("before")
+    if before is not None and model.since is not None:
+        _, old = reports.read(reviewed, before.found, before.edits, context["patient"], before.session)
+        earlier = old.profile
+    found = {} if earlier is None else {b.title: b for b in earlier.bars}
+    bars = [
+        {"title": b.title, "svg": bar_svg(b, found.get(b.title)), **_print_sides(b)}
+        for b in model.profile.bars
+    ]
+    score = model.profile.score
+    if score is None:
+        return None, bars
+    was = None if earlier is None else earlier.score
+    return {
+        **_print_sides(score),
+        "healthy": None if score.p95 is None else format_number(score.p95, 1),
+        "before": None if was is None else tuple(_print_sides(was).values()),
+        "change": () if was is None else _change_score(was, score),
+    }, bars
+
+
+def _print_sides(bar: ProfileBar) -> dict[str, str]:
+    return {side: format_number(bar.values[side], 1) if side in bar.values else "–" for side in SIDES}
+
+
+def _change_score(before: ProfileBar, now: ProfileBar) -> tuple[ChangeWords, ...]:
+    """Of each side with both values; no source has a limit for it, so there is no verdict."""
+    term = find_term("gps_sagittal_deg")
+    return tuple(
+        ChangeWords(
+            side, format_difference(now.values[side] - before.values[side], term), "none", NO_LIMIT, ()
+        )
+        for side in SIDES
+        if side in now.values and side in before.values
+    )
+
+
 def _draw_panels(model: ReportModel, heights: Mapping[bool, int]) -> list[dict[str, Any]]:
     """All cycle charts; those of the last row also say the unit of the x axis."""
     last_row = len(model.panels) - COLUMNS
@@ -269,7 +365,9 @@ def _draw_panels(model: ReportModel, heights: Mapping[bool, int]) -> list[dict[s
 def _list_for_clock(model: ReportModel, variables: Sequence[str]) -> dict[str, Any]:
     """What the page's clock needs, with the curves of some variables only."""
     curves: Mapping[str, Any] = model.replay["curves"]  # type: ignore[assignment]
-    return {**model.replay, "curves": {v: curves[v] for v in variables if v in curves}}
+    spans: Sequence[Mapping[str, Any]] = model.replay["strides"]  # type: ignore[assignment]
+    strides = [[s["side"], s["start_s"], s["end_s"], int(s["used"])] for s in spans]
+    return {**model.replay, "strides": strides, "curves": {v: curves[v] for v in variables if v in curves}}
 
 
 def select_first(model: ReportModel) -> tuple[ParameterRow, ...]:

@@ -49,6 +49,7 @@ def render_page(
         "nav": NAVIGATION,
         "here": here,
         "running": running,
+        "signed_in": who.name,
         "version": CODE_VERSION,
         "may": lambda action: who.may(Action(action)),
     }

@@ -15,7 +15,7 @@ from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail, Reviewed
 from server.http.templates import TEMPLATES
 from server.pages.charts import KEY_HEIGHT, draw_chart
-from server.pages.session import explain_emptiness, select_groups
+from server.pages.session import explain_emptiness, select_first
 from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import FRAGMENT, record_opening, render_page
 from server.services import analyses, edit_log, reports, signals
@@ -80,8 +80,7 @@ def view_numbers(
         reviewed, found, edits, context["patient"], context["session"], None, context["controls"]
     )
     return {
-        "groups": select_groups(model, paper=False),
-        "norm_note": model.norm_note,
+        "first": select_first(model),
         "key_curve": draw_chart(model.key_curve, KEY_HEIGHT, x_unit=True),
         "used": model.used,
         "norm_source": model.norm_source,

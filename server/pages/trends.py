@@ -10,7 +10,7 @@ from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
 from core.activity.parameters import WORN_H
-from core.frames import Protocol
+from core.frames import Protocol, Side
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -32,8 +32,21 @@ Shown = Annotated[
     list[Annotated[str, Query(max_length=64)]], Query(alias="show", max_length=100, default_factory=list)
 ]
 
-TEASERS: Final = ("gait_speed_mps", "step_length_m", "knee_flexion_rom_deg", "stride_time_s")
-"""On the patient's page: the first of these that was measured."""
+FIGURES: Final = (
+    "gait_speed_mps",
+    "step_length_m",
+    "stance_pct",
+    "knee_flexion_max_swing_deg",
+    "gps_sagittal_deg",
+    "knee_flexion_rom_deg",
+    "cadence_spm",
+    "foot_pitch_ic_deg",
+    "stride_time_s",
+    "double_support_pct",
+)
+"""On the patient's page: what is trained, then the first of these that were measured."""
+FIGURES_SHOWN: Final = 5
+FIGURE_HEIGHT: Final = 128
 
 
 @router.get("/patients/{pid}/trends")
@@ -114,16 +127,46 @@ def view_daily_trend(walked: PatientHistory | None, performance: Sequence[Perfor
     }
 
 
-def draw_teaser(history: PatientHistory) -> dict[str, Any] | None:
-    """The first figure of the trends, once there is something to compare."""
-    there = [n for n in names_in(history.visits) if n in TEASERS]
-    if len(history.visits) < 2 or not there:
+def draw_figures(history: PatientHistory, trained: str | None) -> dict[str, Any] | None:
+    """Five figures over the visits of one condition, each of one side; None without a visit.
+
+    Parameters
+    ----------
+    trained : parameter of the prescription in force, None = none.
+    """
+    there = set(names_in(history.visits))
+    names = [n for n in dict.fromkeys((trained, *FIGURES)) if n in there][:FIGURES_SHOWN]
+    affected = history.patient.affected_side
+    found = follow_figures(history.visits, names, history.norms, history.usual, affected)
+    if not found:
         return None
-    name = min(there, key=TEASERS.index)
-    found = follow_figures(
-        history.visits, [name], history.norms, history.usual, history.patient.affected_side
-    )
-    return _shown(history, found, height=168)
+    coming = list_ahead(history)
+    figures = []
+    for t in found:
+        line = _pick_side(t, affected)
+        last = line.points[-1 if line.latest is None else line.latest]
+        drawn = _figure(t, line, history.visits, coming, FIGURE_HEIGHT, small=True)
+        figures.append({**drawn, "value": format_number(last.value, t.term.digits)})
+    kept = [(t, line) for t in found for line in (_pick_side(t, affected),)]
+    return {
+        "figures": figures,
+        "condition": None if history.condition is None else history.condition.words,
+        "others": len(history.others),
+        "has_mdc": any(line.mdc is not None for _, line in kept),
+        "has_mcid": False,
+        "has_estimated": any(p.estimated for _, line in kept for p in line.points),
+        "has_training": any(v.kind == "training" for v in history.visits),
+        "norms": any(t.norm is not None for t in found),
+    }
+
+
+def _pick_side(trend: Trend, affected: Side | None) -> TrendSeries:
+    """The line that stands for a figure: of the affected side, else of the side further from the norm."""
+    mine = next((line for line in trend.lines if line.side == affected), None)
+    if mine is not None or trend.norm is None:
+        return mine or trend.lines[0]
+    norm = trend.norm
+    return max(trend.lines, key=lambda line: abs(line.points[-1].value - norm.mean))
 
 
 def view_trends(history: PatientHistory, chosen: Sequence[str]) -> dict[str, Any]:
@@ -181,6 +224,8 @@ def _figure(
     visits: Sequence[AnalysedVisit],
     coming: Sequence[PlannedAssessment],
     height: int,
+    *,
+    small: bool = False,
 ) -> dict[str, Any]:
     change = line.change
     base = None if line.base is None else visits[line.points[line.base].visit]
@@ -188,7 +233,7 @@ def _figure(
         "title": trend.term.label,
         "unit": trend.term.unit,
         "side": line.side,
-        "svg": trend_svg(trend, line, visits, coming, height),
+        "svg": trend_svg(trend, line, visits, coming, height, small=small),
         "words": None if change is None else change_words(change),
         "since": None if base is None else base.label or day(base.performed_on),
         "waiting": _waiting(line),

@@ -19,6 +19,7 @@ VERDICTS: Final[Mapping[str, str]] = {
 """Verdict → words (docs/science/change.md, "Verdict")."""
 
 NO_LIMIT: Final = "no measurement error known"
+SHORT: Final[Mapping[str, str]] = {NO_LIMIT: "no limit known"}
 TOO_FEW_WORDS: Final = "too few strides to compare"
 NOT_ALIKE_WORDS: Final = "not compared: one is measured, the other estimated"
 UNLIKE_WORDS: Final = "not judged, the conditions differ"
@@ -50,6 +51,13 @@ class ChangeWords:
     mark: str
     verdict: str
     limits: tuple[str, ...]
+
+    @property
+    def short(self) -> str:
+        """The verdict in two words where there are such."""
+        if self.mark in {"up", "down"}:
+            return "changed"
+        return "within error" if not self.mark else SHORT.get(self.verdict, self.verdict)
 
 
 def find_term(name: str, unit: str = "") -> Term:

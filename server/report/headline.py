@@ -29,13 +29,10 @@ from server.report.headline_phrases import (
     Phrases,
 )
 from server.report.level import from_standing
-from server.report.table import ParameterRow, TableCell
+from server.report.table import BEYOND_SD, ParameterRow, TableCell
 from server.report.wording import format_number, parameter_term
 
 Kind = Literal["norm", "limit", "sides", "change"]
-
-BEYOND_SD: Final = 2.0
-"""A value further from the norm's mean is beyond what healthy people vary by."""
 
 NEARLY: Final = 0.8
 """A difference of the sides is told before one from the norm unless that is larger by more than this."""

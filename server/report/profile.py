@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, cast
 
 from core.frames import SIDES, Side
 from core.norms.profile import Mode
 from core.scores import Score, Scores
-from server.report.svg import draw_bar
+from server.report.svg import draw_bar, format_coordinate
 from server.report.wording import VARIABLES, format_number, reason_words
 
 SCALE_DEG: Final = 24.0
 """Right end of the bars; a GVS of 24° is beyond any pathology in the tables."""
 
 WIDTH: Final = 150
+
+BARS_DEG: Final = 16.0
+"""Right end of the bars on the session page."""
 
 LABELS: Final = {v.name: v.label for v in VARIABLES} | {"foot_progression": "Foot progression"}
 PLANES: Final = {v.name: v.plane for v in VARIABLES}
@@ -55,18 +59,32 @@ class ProfileRow:
 
 
 @dataclass(frozen=True)
+class ProfileBar:
+    """A row in numbers, degrees: of each side with a value, and of healthy people where known."""
+
+    title: str
+    values: Mapping[Side, float]
+    median: float | None
+    p95: float | None
+
+
+@dataclass(frozen=True)
 class ProfileView:
     """Rows of the profile, GDI* in words, what it leaves out, and who the reference people are.
 
     Parameters
     ----------
     at_speed : the reference people were asked to walk at the person's speed.
+    bars : of the curves with high confidence. score : the sagittal profile score over them, levels removed;
+        None where too many curves miss.
     """
 
     rows: tuple[ProfileRow, ...]
     index: str
     note: str
     at_speed: bool = False
+    bars: tuple[ProfileBar, ...] = ()
+    score: ProfileBar | None = None
 
 
 def profile_view(comfortable: Scores, matched: Scores | None = None) -> ProfileView | None:
@@ -78,13 +96,15 @@ def profile_view(comfortable: Scores, matched: Scores | None = None) -> ProfileV
         person's own; None where nobody walked so.
     """
     scores = comfortable if matched is None else matched
-    rows = []
+    rows, bars = [], []
     for variable in dict.fromkeys(s.variable for s in scores.scores if s.variable is not None):
         found = {side: scores.find("gvs_deg", MODE, side, variable) for side in SIDES}
         if any(s.value is not None for s in found.values()):
             label, plane = LABELS.get(variable, variable), PLANES.get(variable)
             row = _row(label, found, low=plane != "sagittal", total=False)
             rows.append(_beside(row, comfortable, scores, "gvs_deg", MODE, variable))
+            if plane == "sagittal":
+                bars.append(_numbers(label, found))
     if not rows:
         return None
     for name, mode, title in TOTALS:
@@ -92,7 +112,49 @@ def profile_view(comfortable: Scores, matched: Scores | None = None) -> ProfileV
         if any(s.value is not None for s in both.values()):
             row = _row(title, both, low=name == "gps_deg", total=True)
             rows.append(_beside(row, comfortable, scores, name, mode))
-    return ProfileView(tuple(rows), _index(scores), _note(scores), scores.speed_matched)
+    total = _numbers("Sagittal score", {side: scores.find("gps_sagittal_deg", MODE, side) for side in SIDES})
+    return ProfileView(
+        tuple(rows),
+        _index(scores),
+        _note(scores),
+        scores.speed_matched,
+        tuple(bars),
+        total if total.values else None,
+    )
+
+
+def bar_svg(bar: ProfileBar, before: ProfileBar | None) -> str:
+    """Draw both sides of a bar over each other, left filled, right outlined; a tick at the visit before.
+
+    Solid line: the middle of healthy people; dashed: 95 of 100 are below. A longer bar is cut at BARS_DEG.
+    """
+
+    def x(value: float) -> str:
+        return f"{format_coordinate(100 * min(value, BARS_DEG) / BARS_DEG)}%"
+
+    shapes = []
+    for side, css, y in (("left", "mapl", 4), ("right", "mapr", 18)):
+        value = bar.values.get(cast("Side", side))
+        if value is not None:
+            shapes.append(f'<rect class="{css}" x="0" y="{y}" width="{x(value)}" height="9"/>')
+        earlier = None if before is None else before.values.get(cast("Side", side))
+        if earlier is not None:
+            at = x(earlier)
+            shapes.append(f'<line class="mapb" x1="{at}" x2="{at}" y1="{y - 2}" y2="{y + 11}"/>')
+    for css, end in (("mapm", bar.median), ("map95", bar.p95)):
+        if end is not None:
+            shapes.append(f'<line class="{css}" x1="{x(end)}" x2="{x(end)}" y1="0" y2="31"/>')
+    return f'<svg class="chart mapbar" width="100%" height="31" aria-hidden="true">{"".join(shapes)}</svg>'
+
+
+def _numbers(title: str, found: Mapping[Side, Score]) -> ProfileBar:
+    healthy = next((s.healthy for s in found.values() if s.healthy is not None), None)
+    return ProfileBar(
+        title,
+        {side: s.value for side, s in found.items() if s.value is not None},
+        None if healthy is None else healthy.median_deg,
+        None if healthy is None else healthy.p95_deg,
+    )
 
 
 def _beside(

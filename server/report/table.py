@@ -38,6 +38,10 @@ FEW_NOTE: Final = f"No norm: fewer than {COMPARED} strides of a side are compare
 """What stands in place of a norm where no side has enough strides."""
 
 
+BEYOND_SD: Final = 2.0
+"""A value further from the norm's mean is beyond what healthy people vary by."""
+
+
 @dataclass(frozen=True)
 class TableCell:
     """One number with what is behind it; `title` says it in full.
@@ -124,6 +128,17 @@ class ParameterRow:
         if all(c is None or c.z is None for c in cells):
             return ""
         return "z " + " | ".join("–" if c is None or c.z is None else format_number(c.z, 1) for c in cells)
+
+    @property
+    def z_marks(self) -> tuple[tuple[str, bool], ...]:
+        """Standard deviations from the norm's mean as text and whether beyond what healthy people vary by."""
+        cells = (self.both,) if self.both is not None else (self.left, self.right)
+        if all(c is None or c.z is None for c in cells):
+            return ()
+        return tuple(
+            ("–", False) if c is None or c.z is None else (format_number(c.z, 1), abs(c.z) > BEYOND_SD)
+            for c in cells
+        )
 
     @property
     def plot(self) -> str:

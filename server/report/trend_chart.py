@@ -28,6 +28,8 @@ LABEL_PX: Final = 46
 
 WIDTH_PX: Final = 420
 """Narrowest width a chart is read at; labels that would touch there are left out."""
+SMALL_PX: Final = 170
+"""The same of five charts beside each other."""
 
 
 @dataclass(frozen=True)
@@ -58,21 +60,26 @@ def trend_svg(
     visits: Sequence[AnalysedVisit],
     ahead: Sequence[PlannedAssessment] = (),
     height: int = 196,
+    *,
+    small: bool = False,
 ) -> str:
     """Draw one side of a trend over the days of all visits, so that all charts of a person share their axis.
 
     Parameters
     ----------
     ahead : planned assessments to come, hairlines with their label. height : px with margins.
+    small : beside others: without grid and without words on band and limit.
     """
-    plot = _TrendPlot(value_range(trend), visits, ahead, height - TOP - BOTTOM)
+    plot = _TrendPlot(
+        value_range(trend), visits, ahead, height - TOP - BOTTOM, SMALL_PX if small else WIDTH_PX
+    )
     base = line.start
     if trend.norm is not None:
         plot.add_band("band", trend.norm.mean - trend.norm.sd, trend.norm.mean + trend.norm.sd)
     if line.mdc is not None:
         plot.add_band("mdc", base - line.mdc, base + line.mdc)
     ticks, digits = find_round_ticks(plot.low, plot.high)
-    for tick in ticks:
+    for tick in () if small else ticks:
         plot.add_tick("g", tick, format_number(tick, digits))
     if trend.norm is not None:
         plot.add_level("nm", trend.norm.mean)
@@ -83,10 +90,14 @@ def trend_svg(
         plot.add_level("mcid", base - line.mcid)
         plot.add_level("mcid", base + line.mcid)
     plot.days()
-    plot.labels(line)
+    if not small:
+        plot.labels(line)
     plot.points(line, trend.term.digits)
     title = f"{trend.term.label}{'' if line.side is None else f', {line.side}'}"
-    return plot.draw("chart trend-plot", f"{title} over the visits; the table has the numbers")
+    return plot.draw(
+        "chart trend-plot small" if small else "chart trend-plot",
+        f"{title} over the visits; the table has the numbers",
+    )
 
 
 class _TrendPlot(PlotArea):
@@ -98,8 +109,10 @@ class _TrendPlot(PlotArea):
         visits: Sequence[AnalysedVisit],
         ahead: Sequence[PlannedAssessment],
         height: int,
+        width: int,
     ) -> None:
         super().__init__(y_range, height)
+        self._width = width
         self._visits, self._ahead = visits, ahead
         days = [v.performed_on for v in visits] + [a.day for a in ahead]
         self._first = min(days)
@@ -116,7 +129,7 @@ class _TrendPlot(PlotArea):
         taken: list[float] = []
         for day, label, css in wanted:
             x = self._x(day)
-            if all(abs(x - other) * WIDTH_PX / 1000 >= LABEL_PX for other in taken):
+            if all(abs(x - other) * self._width / 1000 >= LABEL_PX for other in taken):
                 taken.append(x)
                 self.add_text(_pct(x), self.height, label, css, "middle", dy=15)
         for planned in self._ahead:

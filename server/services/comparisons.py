@@ -78,8 +78,9 @@ def pair(c: Connection, session_id: str, other_id: str) -> SessionPair:
 def find_previous(c: Connection, session: Session, done: Sequence[AnalysedSession]) -> AnalysedSession | None:
     """The analysed session walked under the same condition that a session's own table is compared with.
 
-    It is the one that came last before it; for an assessment the assessment that did, so that a single
-    training does not stand for the course. None for a session with feedback, and none has feedback itself.
+    It is the one of the last day before; for an assessment the assessment that was, so that a single training
+    does not stand for the course. Takes of one day walked alike are one visit, not a change of each other.
+    None for a session with feedback, and none has feedback itself.
 
     Parameters
     ----------
@@ -88,12 +89,11 @@ def find_previous(c: Connection, session: Session, done: Sequence[AnalysedSessio
     this = next((a for a in done if a.session.id == session.id), None)
     if this is None:
         return None
-    plans = programmes.of_patient(c, session.patient_id)
-    planned = {v.session_id: v.kind for plan in plans for v in plan.visits}
+    planned = programmes.list_kinds(c, [session.patient_id])
     kind = classify_visit(session, planned.get(session.id))
     for a in reversed(done):
         s = a.session
-        if not is_comparable(a.condition, this.condition) or _moment(s) >= _moment(session):
+        if not is_comparable(a.condition, this.condition) or s.performed_on >= session.performed_on:
             continue
         if kind == "assessment" and classify_visit(s, planned.get(s.id)) == "training":
             continue

@@ -40,6 +40,7 @@ from server.storage.tables import (
     live_take,
     new_id,
     patient,
+    patient_note,
     planned_visit,
     prescription,
     programme,
@@ -47,6 +48,7 @@ from server.storage.tables import (
     recording_file,
     reference_file,
     session,
+    session_video,
     tuning,
 )
 from server.storage.tables import audit as audit_table
@@ -84,6 +86,7 @@ def erase_patient(
         c.execute(delete(planned_visit).where(planned_visit.c.programme_id.in_(plans)))
         c.execute(delete(programme).where(programme.c.patient_id == patient_id))
         c.execute(delete(prescription).where(prescription.c.patient_id == patient_id))
+        c.execute(delete(patient_note).where(patient_note.c.patient_id == patient_id))
         c.execute(delete(patient).where(patient.c.id == patient_id))
         audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": found.sessions})
         _note(settings, spaces=[patient_id], takes=takes)
@@ -116,6 +119,7 @@ def _erase_session_rows(c: Connection, session_id: str) -> list[str]:
     c.execute(delete(filter_run_file).where(filter_run_file.c.filter_run_id.in_(runs)))
     c.execute(delete(filter_run).where(filter_run.c.analysis_id.in_(analyses)))
     c.execute(delete(reference_file).where(reference_file.c.session_id == session_id))
+    c.execute(delete(session_video).where(session_video.c.session_id == session_id))
     c.execute(delete(edit).where(edit.c.analysis_id.in_(analyses)))
     c.execute(delete(analysis_file).where(analysis_file.c.analysis_id.in_(analyses)))
     c.execute(delete(analysis).where(analysis.c.recording_id.in_(recordings)))
@@ -176,7 +180,7 @@ def list_unfinished(settings: Settings) -> tuple[set[str], set[str]]:
 def _files_of(c: Connection, session_id: str, patient_id: str) -> set[tuple[str, str]]:
     """Every file of a session, also those that were taken out of it and may lie in the trash."""
     added = select(audit_table.c.detail["sha256"].as_string()).where(
-        audit_table.c.action.in_(("recording.file_added", "reference.added")),
+        audit_table.c.action.in_(("recording.file_added", "reference.added", "video.added")),
         audit_table.c.detail["session_id"].as_string() == session_id,
     )
     earlier = {(patient_id, sha256) for sha256 in c.execute(added).scalars() if sha256}

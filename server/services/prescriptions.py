@@ -17,6 +17,7 @@ from core.change import ChangeLimit, find_detectable_change
 from core.change.limits import Limb
 from core.feedback import Baseline, Cue, Prescription
 from core.frames import Side
+from core.parameters.catalogue import CATALOGUE
 from server import audit
 from server.services import patients, sessions, targets
 from server.services.errors import Conflict, NotFound, ServiceError
@@ -56,10 +57,18 @@ def write(
     Raises
     ------
     NotFound: the patient. ParameterError bad_prescription: a field is not as expected. ServiceError
-    no_target: its source gives no numbers for this person; the sentence says why.
+    no_target: its source gives no numbers for this person; the sentence says why. both_sides: a side is named
+    of what both share.
     """
     patient = patients.get(c, patient_id)
     asked = Prescription.from_json(content)
+    entry = CATALOGUE[asked.parameter]
+    if entry.shared and asked.side is not None:
+        raise ServiceError(
+            "both_sides",
+            f"{entry.label} is the same for both sides of a walk, so the {asked.side} side is not trained "
+            "alone. Expected both sides, or another parameter.",
+        )
     made = _with_target(c, reviewed, patient, asked)
     before = in_force(c, patient_id)
     if before is not None:

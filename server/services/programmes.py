@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import itertools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -126,6 +126,26 @@ def get(c: Connection, programme_id: str) -> Programme:
 def of_patient(c: Connection, patient_id: str) -> list[Programme]:
     """All programmes of a patient, the newest first."""
     return _programmes(c, programme.c.patient_id == patient_id)
+
+
+def list_kinds(c: Connection, patient_ids: Collection[str]) -> dict[str, VisitKind]:
+    """What was planned of the sessions of these patients that are a visit of a programme, by session."""
+    query = (
+        select(planned_visit.c.session_id, planned_visit.c.kind)
+        .join(programme)
+        .where(programme.c.patient_id.in_(patient_ids), planned_visit.c.session_id.is_not(None))
+    )
+    return {row.session_id: row.kind for row in c.execute(query)}
+
+
+def list_running(c: Connection, patient_ids: Collection[str], today: dt.date) -> set[str]:
+    """Who of these patients is on a programme that has a visit to come."""
+    query = (
+        select(programme.c.patient_id)
+        .join(planned_visit)
+        .where(programme.c.patient_id.in_(patient_ids), planned_visit.c.planned_on >= today)
+    )
+    return set(c.execute(query.distinct()).scalars())
 
 
 def change_visit(

@@ -15,6 +15,7 @@ from server.storage.tables import (
     recording_file,
     reference_file,
     session,
+    session_video,
 )
 
 
@@ -28,6 +29,7 @@ def list_referenced(c: Connection, session_id: str | None = None) -> set[tuple[s
         (recording_file.c.sha256, of_take.join(recording_file)),
         (analysis_file.c.sha256, of_analysis.join(analysis_file)),
         (reference_file.c.sha256, of_session.join(reference_file)),
+        (session_video.c.sha256, of_session.join(session_video)),
         (filter_run_file.c.sha256, of_run.join(filter_run_file)),
         # what a run was held against stays, also when the file was replaced
         (filter_run.c.reference_sha256, of_run),

@@ -15,6 +15,7 @@ from typing import Any, Final, Generic, TypeVar, cast
 from core.events.edits import Edit
 from core.measure import MeasuredGait, Tracks, measure_gait
 from core.norms.controls import ControlSession
+from core.parameters.result import Parameter
 from core.parameters.rows import Column
 from server.report import signals, tracks
 from server.report.bundle import Bundle, apply_review, load_bundle, read_columns
@@ -34,7 +35,7 @@ ANALYSES_KEPT, RESULTS_KEPT, PARTS_KEPT, PAGES_KEPT = 3, 12, 24, 24
 NUMBERS_KEPT, CONTROLS_KEPT, VERDICTS_KEPT = 240, 500, 5000
 """Finished analyses, results of edits, signals of one sensor and numbers kept in memory: those at work. Ten
 minutes are some 20 MB, 1 MB, 2 MB and 50 kB; a page that was put into words and drawn is 1 MB, a verdict two
-words."""
+words, a speed one row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,7 @@ class ReviewedAnalyses:
         self._numbers: RecentValues[Numbers] = RecentValues(NUMBERS_KEPT)
         self._controls: RecentValues[ControlSession] = RecentValues(CONTROLS_KEPT)
         self._verdicts: RecentValues[tuple[str, str]] = RecentValues(VERDICTS_KEPT)
+        self._speeds: RecentValues[Parameter | None] = RecentValues(VERDICTS_KEPT)
         self._parts: RecentValues[Any] = RecentValues(PARTS_KEPT)
         self._pages: RecentValues[Any] = RecentValues(PAGES_KEPT)
 
@@ -151,6 +153,15 @@ class ReviewedAnalyses:
         """Return shape and word for the data of an analysis, as lists show it; raises IntegrityError."""
         return self._verdicts.get((found.id, edits.key), lambda: self.read_numbers(found, edits).verdict)
 
+    def read_speed(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Parameter | None:
+        """Return the walking speed of an analysis, as lists show it; raises IntegrityError."""
+
+        def read() -> Parameter | None:
+            numbers = self.read_numbers(found, edits)
+            return next((p for p in numbers.parameters if p.name == "gait_speed_mps"), None)
+
+        return self._speeds.get((found.id, edits.key), read)
+
     def keep_part(self, key: tuple[str, ...], make_value: Callable[[], _Value]) -> _Value:
         """Return a part that is looked at again and again, by a key that begins with the analysis's id."""
         return cast("_Value", self._parts.get(key, make_value))
@@ -174,6 +185,7 @@ class ReviewedAnalyses:
             self._controls,
             self._parts,
             self._verdicts,
+            self._speeds,
             self._pages,
         ):
             memory.clear()

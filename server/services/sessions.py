@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from sqlalchemy import Connection, case, exists, func, insert, select, update
 
@@ -24,7 +24,11 @@ from server.storage.tables import (
     recording,
     recording_file,
     session,
+    session_video,
 )
+
+WALKS: Final = ("walk", "treadmill")
+"""Protocols whose speed is somebody's walking speed."""
 
 CHANGEABLE = frozenset({"title", "performed_on", "protocol", "height_m", *CHOICES, "feedback", "note"})
 
@@ -40,6 +44,7 @@ class Session:
     height_m : measured at this visit, None = use the patient's.
     pace, aid, orthosis, shoes : how it was walked (core/condition.py), None = not stated.
     feedback : biofeedback was given; a live take sets it by itself.
+    has_video : a video was set beside its take.
     """
 
     id: str
@@ -56,6 +61,7 @@ class Session:
     feedback: bool
     note: str
     created_at: dt.datetime
+    has_video: bool
     state: str
 
     def walked(self, belt_speed_mps: float | None = None) -> WalkingCondition:
@@ -69,6 +75,15 @@ class Session:
             self.protocol,
             belt_speed_mps if self.protocol == "treadmill" else None,
         )
+
+
+@dataclass(frozen=True)
+class WalkedSession:
+    """What a list needs of an analysed walk to find the one that it is compared with."""
+
+    id: str
+    performed_on: dt.date
+    condition: WalkingCondition
 
 
 def create(
@@ -144,6 +159,23 @@ def newest_of(c: Connection, patient_ids: Collection[str]) -> dict[str, Session]
     return {s.patient_id: s for s in found}
 
 
+def list_walks(c: Connection, patient_ids: Collection[str]) -> dict[str, list[WalkedSession]]:
+    """Analysed walks without feedback by patient, the newest first; the speed of a belt is not looked up."""
+    done = exists().where(analysis.c.recording_id == recording.c.id, _MINE).correlate(session)
+    columns = [session.c[name] for name in ("id", "patient_id", "performed_on", "protocol", *CHOICES)]
+    query = (
+        select(*columns)
+        .where(session.c.patient_id.in_(patient_ids), session.c.protocol.in_(WALKS), done)
+        .where(session.c.feedback.is_(False))
+        .order_by(*_NEWEST)
+    )
+    found: dict[str, list[WalkedSession]] = {}
+    for row in c.execute(query):
+        condition = WalkingCondition(**{n: getattr(row, n) for n in CHOICES}, protocol=row.protocol)
+        found.setdefault(row.patient_id, []).append(WalkedSession(row.id, row.performed_on, condition))
+    return found
+
+
 _NEWEST = (session.c.performed_on.desc(), session.c.created_at.desc(), session.c.id)
 
 _MINE = recording.c.session_id == session.c.id
@@ -161,9 +193,11 @@ _STATE = case(
 )
 """State of a session, in the statement that reads it: as many sessions as one likes cost no further one."""
 
-_QUERY = select(session, patient.c.code.label("patient_code"), _STATE.label("state")).join(
-    patient, patient.c.id == session.c.patient_id
-)
+_HAS_VIDEO = exists().where(session_video.c.session_id == session.c.id).correlate(session)
+
+_QUERY = select(
+    session, patient.c.code.label("patient_code"), _HAS_VIDEO.label("has_video"), _STATE.label("state")
+).join(patient, patient.c.id == session.c.patient_id)
 
 
 def _checked(values: Mapping[str, object]) -> dict[str, Any]:

@@ -7,7 +7,8 @@ patient ─< session ─< recording ─< recording_file          user ─< login
         │          │      ├──< job ─── analysis ─< edit (append-only, undo is a row too)
         │          │      │               └──< filter_run ─< filter_run_file
         │          │      └──< device_check (of the session's last published analysis)
-        │          └──< reference_file
+        │          └──< reference_file, session_video (at most one)
+        ├──< patient_note
         ├──< programme ─< planned_visit ─── session (at most one each)
         └──< prescription ─< live_take >── session, recording (the one it became)
                                  └──< live_event (append-only)
@@ -53,23 +54,9 @@ VISIT_KINDS = ("assessment", "training")
 TAKE_STATES = ("pairing", "open", "streaming", "finished", "closed")
 OPEN_TAKE_STATES = ("pairing", "open", "streaming")
 LIVE_EVENT_KINDS = (
-    "start",
-    "stop",
-    "mark",
-    "undo_mark",
-    "feedback",
-    "level",
-    "pause",
-    "redo_calibration",
-    "ghost",
-    "test",
-    "prescription",
-    "stale",
-    "calibration",
-    "cue",
-    "guard",
-    "notice",
-)
+    "start", "stop", "mark", "undo_mark", "feedback", "level", "pause", "redo_calibration",
+    "ghost", "test", "prescription", "stale", "calibration", "cue", "guard", "notice",
+)  # fmt: skip
 EDIT_KINDS = ("move_event", "add_event", "delete_event", "exclude_stride", "include_stride", "undo")
 
 
@@ -148,6 +135,17 @@ patient = Table(
     _one_of("affected_side", SIDES),
     CheckConstraint("birth_year BETWEEN 1850 AND 2200", name="birth_year"),
     CheckConstraint("height_m BETWEEN 0.5 AND 2.5", name="height_m"),
+)
+
+patient_note = Table(
+    "patient_note",
+    metadata,
+    _id(),
+    _ref("patient_id", "patient"),
+    Column("written_on", Date, nullable=False),
+    Column("content", Text, nullable=False),
+    Column("created_at", Utc, nullable=False),
+    _ref("created_by", "user", nullable=True, index=False),
 )
 
 session = Table(
@@ -311,6 +309,20 @@ reference_file = Table(
     Column("size", Integer, nullable=False),
     Column("sha256", String(64), nullable=False, index=True),
     Column("added_at", Utc, nullable=False),
+    CheckConstraint("size >= 0", name="size"),
+)
+
+session_video = Table(
+    "session_video",
+    metadata,
+    Column("session_id", ForeignKey("session.id", ondelete="RESTRICT"), primary_key=True),
+    Column("name", String(500), nullable=False),
+    Column("media_type", String(32), nullable=False),
+    Column("size", Integer, nullable=False),
+    Column("sha256", String(64), nullable=False, index=True),
+    Column("offset_s", Float),  # time in the video at the take's time 0; None: nobody has aligned it
+    Column("consent_by", String(64)),  # who said that the person agreed; no key, as accounts may go
+    Column("consent_at", Utc, nullable=False),
     CheckConstraint("size >= 0", name="size"),
 )
 

@@ -3,7 +3,7 @@
   // Targets under 44 px, what sticks out of the page or of its card; tables may scroll inside a card.
   layout: () => {
   const small = [], over = [], clip = [];
-  for (const e of document.querySelectorAll('a.btn,button,select,input,summary,.item,.tabs a,[role=button],a.tap')) {
+  for (const e of document.querySelectorAll('a.btn,button,select,input,summary,.item,.tabs a,[role=button],[role=slider],a.tap')) {
     const r = e.getBoundingClientRect();
     if (!r.width || e.closest('label.check, svg, [hidden]') || e.type === 'file') continue;
     let [w, h] = [r.width, r.height];

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from playwright.sync_api import Page
+
+from tests.data import ROOT
+
+AXE: Final = Path(os.environ.get("SAGITTAL_AXE") or ROOT / "node_modules" / "axe-core" / "axe.min.js")
+"""The checker of WCAG rules, `npm install axe-core` in this folder or elsewhere; only the CI must have it."""
+
+TAGS: Final = ("wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa")
+
+RUN_AXE = """async (tags) => (await axe.run(document, { runOnly: { type: 'tag', values: tags } })).violations
+  .map((v) => `${v.id} (${v.impact}): ${v.nodes.map((n) => n.target.join(' ')).slice(0, 3).join('; ')}`)"""
 
 CHECKS = (Path(__file__).parent / "design.js").read_text()
 
@@ -22,8 +33,19 @@ def text_faults(page: Page) -> dict[str, str]:
     return faults
 
 
+def axe_faults(page: Page) -> list[str]:
+    """What axe finds against WCAG 2.2 AA on the page as it stands; nothing where axe is not installed."""
+    if not AXE.exists():
+        return []
+    if not page.evaluate("() => 'axe' in window"):
+        page.evaluate(AXE.read_text())
+    found: list[str] = page.evaluate(RUN_AXE, list(TAGS))
+    return found
+
+
 SIZES = ((1280, 800), (1024, 768), (810, 1080), (360, 740))
 """Desk, laptop, tablet, phone."""
+DESK_PX, UPRIGHT_PX = SIZES[0][0], SIZES[2][0]
 
 
 def all_faults(page: Page) -> list[str]:
@@ -37,4 +59,7 @@ def all_faults(page: Page) -> list[str]:
             page.wait_for_timeout(30)
             found = layout_faults(page) | text_faults(page)
             faults += [f"{width} {scheme}: {found}"] if found else []
+            # axe looks at both themes, once wide and once narrow: it takes longer than all else here
+            if (width, scheme) in ((DESK_PX, "light"), (UPRIGHT_PX, "dark")):
+                faults += [f"{width} {scheme}: axe {fault}" for fault in axe_faults(page)]
     return faults

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 
 import pytest
 from playwright.sync_api import Page, expect
+from sqlalchemy import delete
 
+from server.auth.tokens import token_hash
+from server.storage.db import Database
+from server.storage.tables import login_session
 from tests.browser import filling
-from tests.browser.conftest import PASSWORD, Filled, Opener, RunningServer
+from tests.browser.conftest import NAME, PASSWORD, Filled, Opener, RunningServer
 
 pytestmark = pytest.mark.usefixtures("unknown_sensors")
 
@@ -174,3 +179,50 @@ def _delete(page: Page, typed: str) -> None:
     page.get_by_role("button", name="Delete patient").first.click()
     page.locator("dialog[open] input").fill(typed)
     page.locator("dialog[open]").get_by_role("button", name="Delete patient").click()
+
+
+def test_a_form_is_kept_when_the_sign_in_ends_and_its_end_is_told_before(
+    opened: Opener, running: RunningServer
+) -> None:
+    page = opened("/sign-in?next=/patients", signed_in=False)
+    page.get_by_label("User name").fill(NAME)
+    page.get_by_label("Password").fill(PASSWORD)
+    page.get_by_role("button", name="Sign in").click()
+    page.wait_for_url(re.compile(r":\d+/patients$"))
+    page.wait_for_load_state()
+    page.get_by_role("button", name="New patient").first.click()
+    page.get_by_label("Code", exact=True).fill("KEPT-1")
+    page.get_by_label("Note", exact=True).fill("Long and carefully written.")
+    # two minutes before the end it is told; whoever stays is asked of the server, which counts it
+    soon = page.locator("#sign-out-soon")
+    page.route("**/api/v1/sign-in", lambda r: r.fulfill(json={"name": NAME, "left_s": 100}), times=1)
+    page.evaluate("() => import('/static/js/sign-out.js')")
+    expect(soon).to_be_visible()
+    expect(soon).to_contain_text(re.compile(r"covered in 1:\d\d"))
+    soon.get_by_role("button", name="Stay signed in").click()
+    expect(soon).to_be_hidden()
+    # the end: the server forgets this sign-in
+    token = next(c["value"] for c in page.context.cookies() if c["name"] == "sid")
+    with contextlib.closing(Database(running.folder / "sagittal.db")) as db, db.write() as c:
+        c.execute(delete(login_session).where(login_session.c.token_sha256 == token_hash(token)))
+    page.get_by_role("button", name="Add patient").click()
+    out = page.locator("#signed-out")
+    expect(out).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(out).to_be_visible()
+    out.get_by_label(f"Password of {NAME}").fill("wrong by intention")
+    out.get_by_role("button", name="Sign in").click()
+    expect(out.get_by_role("alert")).to_be_visible()
+    out.get_by_label(f"Password of {NAME}").fill(PASSWORD)
+    out.get_by_role("button", name="Sign in").click()
+    expect(out).to_be_hidden()
+    expect(page.get_by_label("Note", exact=True)).to_have_value("Long and carefully written.")
+    page.get_by_role("button", name="Add patient").click()
+    page.wait_for_url(re.compile(r"/patients/[0-9a-f]{32}$"))
+    expect(page.locator("h1")).to_contain_text("KEPT-1")
+    # notes have their day
+    page.wait_for_load_state()
+    page.get_by_role("button", name="Add", exact=True).click()
+    page.get_by_label("Note", exact=True).last.fill("Wants to walk to the bakery.")
+    page.get_by_role("button", name="Add note").click()
+    expect(page.locator(".notes")).to_contain_text("Wants to walk to the bakery.")

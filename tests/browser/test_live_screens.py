@@ -10,6 +10,7 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, Locator, Page, Route, expect
 
+from core.online.frame import Stage
 from tests.browser import feed, filling
 from tests.browser.conftest import RunningServer, is_ours
 from tests.browser.design import layout_faults, text_faults
@@ -327,6 +328,24 @@ def test_the_patient_sees_no_number_and_reads_the_way_to_the_zone(
         ".map(e => parseFloat(getComputedStyle(e).fontSize))"
     )
     assert min(sizes) >= 32
+    # held upright the picture takes the width, and nothing of it is cut off
+    this.page.set_viewport_size({"width": 820, "height": 1180})
+    track, feet = (this.page.locator(f"[data-scene=bar] {part}") for part in (".track", "[data-feet]"))
+    this.page.wait_for_function("() => document.querySelector('.track').getBoundingClientRect().height > 600")
+    for part in (track, feet):
+        box = part.bounding_box()
+        assert box is not None
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 820
+    # what to do is said at every stage
+    stages: tuple[tuple[Stage, str], ...] = (("stand", "Stand still"), ("walk", "Walk on"))
+    for stage, words in stages:
+        this.say(feed.frame(101.0, stage))
+        expect(this.page.locator("[data-pause-title]")).to_have_text(words)
+    this.say(feed.frame(102.0), feed.feedback(on=False))
+    expect(message).to_have_text("On your own")
+    this.say(feed.state("finished"))
+    expect(this.page.locator("[data-pause-title]")).to_have_text("Well done")
 
 
 def test_sound_follows_the_error_and_the_contacts_after_one_tap(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.conftest import Filled, Opener, RunningServer
-from tests.browser.design import all_faults, layout_faults, text_faults
+from tests.browser.design import AXE, all_faults, axe_faults, layout_faults, text_faults
 from tests.browser.picture import wait_for_picture, wait_until_still
 from tests.browser.streaming import until_strides, walking
 from tests.data import ROOT
@@ -90,6 +91,13 @@ def test_the_checks_can_fail(opened: Opener) -> None:
     assert any("size 9" in k for k in text_faults(page))
 
 
+@pytest.mark.skipif(not AXE.exists(), reason=f"no axe at {AXE}: npm install axe-core, or set SAGITTAL_AXE")
+def test_axe_can_fail(opened: Opener) -> None:
+    page = opened("/patients")
+    page.evaluate("() => document.querySelector('main').insertAdjacentHTML('beforeend', `<input><img src=>`)")
+    assert {fault.split()[0] for fault in axe_faults(page)} >= {"label", "image-alt"}
+
+
 def test_dialogs_obey_the_design_system(opened: Opener, filled: Filled) -> None:
     for path, button in (
         ("/patients", "new-patient"),
@@ -109,10 +117,28 @@ def test_dialogs_obey_the_design_system(opened: Opener, filled: Filled) -> None:
             page.close()
 
 
-def test_the_print_view_is_two_sheets_of_paper(opened: Opener, filled: Filled) -> None:
-    page = opened(PAGES["print"](filled))
+def sheets(page: Page) -> int:
+    """Sheets of paper that a page takes when it is printed."""
     pdf = page.pdf(prefer_css_page_size=True)
-    assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ") == 2
+    return pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ")
+
+
+def test_ctrl_p_prints_the_report_of_two_sheets_and_elsewhere_a_clean_page(
+    opened: Opener, filled: Filled
+) -> None:
+    page = opened("/patients")
+    assert sheets(page) <= 2
+    page.emulate_media(media="print")
+    expect(page.locator(".rail")).to_be_hidden()
+    expect(page.get_by_role("button", name="New patient")).to_be_hidden()
+    page.emulate_media(media="null")  # as it is: a sheet is printed as print
+    page.context.add_init_script("window.print = () => { window.printed = true; }")
+    page.goto(PAGES["session"](filled))
+    page.wait_for_load_state()  # the script that listens is there
+    page.keyboard.press("Control+p")
+    page.wait_for_url(re.compile(r"/print$"))
+    page.wait_for_function("() => window.printed")
+    assert sheets(page) == 2
 
 
 @pictures

@@ -30,7 +30,22 @@ def walker(running: RunningServer) -> str:
 def test_a_prescription_is_written_changed_and_ended(opened: Opener, walker: str) -> None:
     page = opened(f"/patients/{walker}")
     page.get_by_role("link", name="Prescribe").click()
-    expect(page.get_by_label("Left affected")).to_be_checked()
+    # one choice says it all; the rest waits behind "More"
+    expect(page.locator("[data-summary]")).to_have_text(
+        re.compile(r"Step length, left; target 0\.\d+ ± 0\.\d+\s?m \(own better side\); zone\.")
+    )
+    expect(page.get_by_label("Probe after")).to_be_hidden()
+    page.get_by_role("radio", name="Heel first").check()
+    expect(page.locator("[data-summary]")).to_contain_text("Foot pitch at contact, left; target")
+    expect(page.locator("[data-summary]")).to_contain_text("bar and tone")
+    page.get_by_text("More: side, target").click()
+    page.get_by_label("Parameter", exact=True).select_option("stride_length_m")
+    expect(page.get_by_label("Left affected")).to_be_disabled()
+    expect(page.get_by_role("radio", name="Both")).to_be_checked()
+    expect(page.get_by_text("Both sides of a walk share it")).to_be_visible()
+    page.get_by_label("Parameter", exact=True).select_option("step_length_m")
+    page.get_by_label("Left affected").check()
+    page.get_by_role("checkbox", name="Tone").uncheck()
     better = page.locator("[data-source=own_better_side]")
     expect(better.locator("[data-value]")).to_have_text(re.compile(r"0\.\d+ ± 0\.\d+\s?m"))
     expect(better.locator("[data-words]")).to_contain_text("right side")
@@ -48,7 +63,7 @@ def test_a_prescription_is_written_changed_and_ended(opened: Opener, walker: str
     card.get_by_role("link", name="Change").click()
     expect(page.get_by_role("checkbox", name="Tone")).to_be_checked()
     expect(page.get_by_label("Ends after")).to_have_value("")
-    page.get_by_label("Parameter").select_option("stance_pct")
+    page.get_by_label("Parameter", exact=True).select_option("stance_pct")
     expect(page.locator("[data-source=norm]").get_by_role("radio")).to_be_enabled()
     page.get_by_role("radio", name="Entered").check()
     page.get_by_label("Mean, %").fill("63.5")
@@ -71,6 +86,7 @@ def test_without_a_walk_only_an_entered_target_can_be_chosen(opened: Opener, fil
     with_nothing.get_by_role("link", name="P-0043").click()
     patient = with_nothing.url.rsplit("/", 1)[1]
     page = opened(f"/patients/{patient}/prescription")
+    page.get_by_text("More: side, target").click()
     expect(page.get_by_role("radio", name="Entered")).to_be_checked()
     for source in ("norm", "own_better_side", "own_baseline"):
         expect(page.locator(f"[data-source={source}]").get_by_role("radio")).to_be_disabled()
@@ -80,7 +96,9 @@ def test_without_a_walk_only_an_entered_target_can_be_chosen(opened: Opener, fil
 def test_the_form_is_filled_with_the_keyboard_alone(opened: Opener, walker: str) -> None:
     page = opened(f"/patients/{walker}/prescription")
     expect(page.locator("[data-source=own_baseline] [data-value]")).not_to_be_empty()
-    page.get_by_label("Parameter").focus()
+    page.locator("[data-more] > summary").focus()
+    page.keyboard.press("Enter")
+    page.get_by_label("Parameter", exact=True).focus()
     page.keyboard.press("Tab")
     page.keyboard.press("ArrowRight")
     expect(page.get_by_role("radio", name="Right", exact=True)).to_be_checked()

@@ -25,6 +25,7 @@ def test_the_figure_has_two_legs_and_follows_the_clock(
     opened: Opener, solid: Browser, filled: Filled
 ) -> None:
     page = _open(opened, solid, filled.done)
+    _assert_light(page)
     before = wait_until_still(page)
     assert before["orange"] > 200
     assert before["blue"] > 200
@@ -35,6 +36,23 @@ def test_the_figure_has_two_legs_and_follows_the_clock(
     )
     after = wait_for_picture(page, lambda now: now != before)
     assert after["orange"] > 100, "the figure is gone"
+
+
+def _assert_light(page: Page) -> None:
+    """What the overview takes to load with its figure, and that it answers on two screens."""
+    loaded = page.evaluate(
+        "() => ['navigation', 'resource'].flatMap((kind) => performance.getEntriesByType(kind))"
+        ".map((e) => [new URL(e.name).pathname, e.transferSize])"
+    )
+    html = page.evaluate("() => performance.getEntriesByType('navigation')[0].decodedBodySize")
+    assert html <= 80_000
+    assert len(loaded) <= 14, loaded
+    figure = sum(size for path, size in loaded if path.startswith("/views/"))
+    assert figure > 500_000, "viser's own page is one of them"
+    assert sum(size for _, size in loaded) - figure <= 65_000, loaded
+    folds = page.locator("all-values").bounding_box()
+    assert folds is not None
+    assert folds["y"] <= 2 * 800, "what stands in front of the folds is longer than two screens"
 
 
 def test_a_lost_line_comes_back_by_itself(opened: Opener, solid: Browser, filled: Filled) -> None:

@@ -93,6 +93,9 @@ def test_a_dragged_foot_off_changes_the_numbers_within_a_second_and_undo_brings_
     done(timeline, "left foot-off moved")
     (edit,) = review(running, walked)["edits"]
     assert (edit["kind"], edit["side"], edit["event"]) == ("move_event", "left", "tc")
+    box = event.bounding_box()
+    assert box is not None
+    assert min(box["width"], box["height"]) >= 44
     assert edit["time_s"] == pytest.approx(was, abs=0.001)
     assert 0.05 < edit["to_s"] - was < 0.4
     after = numbers(timeline)
@@ -148,9 +151,18 @@ def test_keys_alone_delete_an_event_and_bring_it_back(
     timeline.keyboard.press("Delete")
     done(timeline, "left foot-off deleted")
     assert len(review(running, walked)["events"]) == count - 1
+    # with an event focused, and while one is held: what is held goes back first, and nothing else is undone
+    timeline.keyboard.press("ArrowRight")
+    timeline.keyboard.press("Control+z")
+    expect(timeline.locator(".ev.held")).to_have_count(0)
+    assert len(review(running, walked)["edits"]) == 1
     timeline.keyboard.press("Control+z")
     done(timeline, "undone")
     assert len(review(running, walked)["events"]) == count
+    timeline.keyboard.press("x")
+    dialog = timeline.locator("dialog[open]")
+    expect(dialog).to_contain_text("no longer counts")
+    dialog.get_by_role("button", name="Cancel").click()
 
 
 def test_an_event_is_added_where_the_cursor_is(timeline: Page, running: RunningServer, walked: str) -> None:
@@ -189,6 +201,12 @@ def test_a_second_click_leaves_a_stride_out_with_its_reason_and_the_overview_fol
     assert "1 stride left out" in overview.locator("#warnings").inner_text()
     timeline.locator("[data-count]").click()
     done(timeline, "counts")
+    # the stride is picked: a second click, on why, leaves it out
+    timeline.get_by_role("button", name="Turn or obstacle").click()
+    done(timeline, "left out")
+    expect(timeline.locator("[data-list] tr.on")).to_contain_text("no: Turn or obstacle")
+    timeline.locator("[data-undo]").click()
+    done(timeline, "undone")
     expect(timeline.locator("[data-counts=left]")).to_have_text(words)
     assert [e["kind"] for e in review(running, walked)["edits"]] == ["exclude_stride", "include_stride"]
 
@@ -292,10 +310,13 @@ def test_what_somebody_else_changed_meanwhile_is_said_and_shown(
 def test_a_drag_on_a_lane_moves_all_of_them_and_picks_nothing(timeline: Page) -> None:
     lane = timeline.locator("[data-side=left] .tl-blocks")
     box = lane.bounding_box()
+    free = timeline.locator("[data-side=left] g[data-stride]:not(:has(.x))").nth(3).bounding_box()
     assert box is not None
+    assert free is not None
     start = float(re.findall(r"\d+\.\d", timeline.locator("[data-span]").inner_text())[0])
     heading = timeline.locator("#h-stride").inner_text()
-    x, y = box["x"] + 0.7 * box["width"], box["y"] + box["height"] / 2
+    # between the handles of a contact and its foot-off
+    x, y = free["x"] + 0.35 * free["width"], box["y"] + box["height"] / 2
     timeline.mouse.move(x, y)
     timeline.mouse.down()
     timeline.mouse.move(x - box["width"] / 3, y, steps=6)

@@ -123,6 +123,7 @@ class ParameterEntry:
     counted : what it is the mean of.
     curve : how it is read from a cycle curve; such a parameter needs no code of its own.
     trainable : a prescription may train it. everyday : what a patient reads in place of the label.
+    shared : both sides of a steady walk have the same value, so neither is trained alone.
     is_length : the patient's screen may show it as a way on the floor.
     plausible : least and greatest value that a person can have; beyond, it is an error of detection.
     norm : its reference, None without one. change : its limits of change (core/change/limits.py), None
@@ -145,6 +146,7 @@ class ParameterEntry:
     curve: CurveFigure | None = None
     trainable: bool = False
     everyday: str = ""
+    shared: bool = False
     is_length: bool = False
     plausible: tuple[float, float] = (-inf, inf)
     norm: NormKey | None = None

@@ -48,6 +48,7 @@ ENTRIES: Final = (
         definition="Both feet on the floor, as a share of the stride.",
         needs=("other_foot", "foot_off"),
         trainable=True,
+        shared=True,
         norm=NormKey("walkway", "double_support_pct"),
         change="share",
         errors=errors.DOUBLE,

@@ -18,6 +18,7 @@ ENTRIES: Final = (
         definition="Time with both feet on the floor in a stride.",
         needs=("other_foot", "foot_off"),
         trainable=True,
+        shared=True,
         errors=errors.DOUBLE,
     ),
     ParameterEntry(

@@ -47,6 +47,7 @@ ENTRIES: Final = (
         comparison=DURATION,
         definition="From a contact of the foot to its next.",
         trainable=True,
+        shared=True,
         everyday="rhythm",
         norm=NormKey("walkway", "stride_time_s"),
         errors=errors.STRIDE,

@@ -17,7 +17,7 @@ from server.auth.routes import list_declared_actions
 from server.auth.tokens import token_hash
 from server.jobs.queue import Claim
 from server.pages.shell import FRAGMENT
-from server.services import patients, reference_files, sessions, tunings
+from server.services import patients, reference_files, sessions, tunings, videos
 from server.storage.tables import job, tuning
 from server.trail import MOST_REFUSED, QUIET_S, AuditTrail
 from tests.server import analysed, walk
@@ -35,6 +35,7 @@ OF_NO_PATIENT = {
     Action.CHECK_HEALTH,
     Action.LOAD_ASSET,
     Action.USE_ACCOUNT,
+    Action.WATCH_SIGN_IN,
     Action.READ_API,
     Action.READ_DEVICE,  # serial numbers and days, nobody who wore them
     Action.MANAGE_USERS,
@@ -57,6 +58,7 @@ WITHOUT_A_ROW = {
 QUERY = {
     "GET /api/v1/patients/{patient_id}/targets": "?parameter=stance_pct",
     "DELETE /api/v1/patients/{patient_id}": "?confirm=P-1",
+    "PUT /api/v1/sessions/{session_id}/video": "?name=walk.webm&consent=true",
 }
 
 TRAINING = {
@@ -69,6 +71,8 @@ PATIENT, SESSION = f"{API}/patients/{{patient_id}}", f"{API}/sessions/{{session_
 CHANGES: dict[str, dict[str, Any]] = {
     f"POST {API}/patients": {"json": {"code": "P-2"}},
     f"PATCH {PATIENT}": {"json": {"note": "uses a stick"}},
+    f"POST {PATIENT}/notes": {"json": {"content": "Walks to the bakery."}},
+    f"DELETE {API}/notes/{{note_id}}": {},
     f"POST {PATIENT}/sessions": {"json": {"title": "Walk"}},
     f"POST {PATIENT}/programmes": {"json": {"starts_on": "2026-03-02"}},
     f"PATCH {API}/planned-visits/{{visit_id}}": {"json": {"planned_on": "2026-03-05"}},
@@ -89,6 +93,9 @@ CHANGES: dict[str, dict[str, Any]] = {
     f"POST {SESSION}/sensitivities": {"json": {"from_standing": False}},
     f"PUT {SESSION}/references/{{name:path}}": {"content": b"x"},
     f"DELETE {SESSION}/references/{{name:path}}": {},
+    f"PUT {SESSION}/video": {"content": b"\x1a\x45\xdf\xa3 and pictures"},
+    f"PATCH {SESSION}/video": {"json": {"offset_s": 1.5}},
+    f"DELETE {SESSION}/video": {},
     f"POST {SESSION}/live": {},
     f"POST {SESSION}/live/code": {},
     f"POST {SESSION}/live/close": {},
@@ -124,6 +131,11 @@ class Visits:
         ) as upload:
             upload.write(b"x")
             upload.keep()
+        with videos.receive_video(
+            clinic.db, clinic.app.state.blobs, clinic.settings, None, this, "walk.webm", consent=True
+        ) as film:
+            film.write(b"\x1a\x45\xdf\xa3 and pictures")
+            film.keep()
         self.values = {
             "patient_id": patient,
             "pid": patient,
@@ -229,7 +241,7 @@ async def test_every_route_that_changes_patient_data_leaves_an_audit_row(tmp_pat
                 if "visits" in made:
                     v.values |= {"programme_id": made["id"], "visit_id": made["visits"][0]["id"]}
                 if "content" in made:
-                    v.values["prescription_id"] = made["id"]
+                    v.values |= {"prescription_id": made["id"], "note_id": made["id"]}
                 if not [r for r in v.rows() if r.seq > before and r.user_name == "admin"]:
                     silent.append(route)
         assert silent == []

@@ -89,6 +89,7 @@ async def test_a_prescription_is_ended_once(clinic: Clinic) -> None:
         ({"target": {"source": "norm"}}, "No walk of this person without feedback is analysed yet"),
         ({"schedule": {"shares_pct": [0, 100]}}, "Expected no share above the one before"),
         ({"schedule": {"speed": 1}}, "schedule.speed"),
+        ({"parameter": "stride_length_m"}, "is the same for both sides of a walk"),
         ({"band_sd": 0}, "band_sd is 0.0. Expected a number from 0.1 to 5"),
     ],
 )

@@ -60,6 +60,25 @@ async def test_a_running_view_counts_as_activity_until_the_absolute_end(clinic: 
     assert minutes == 12 * 60
 
 
+async def test_asking_how_long_a_sign_in_lasts_does_not_prolong_it(clinic: Clinic) -> None:
+    clock = Clock()
+    logins, token = open_login(clinic, clock)
+    identity = logins.find(token)
+    assert identity is not None
+    clock.passes(minutes=10)
+    assert logins.look(token) == identity
+    assert logins.seconds_left(identity.login_id) == 5 * 60
+    clock.passes(minutes=4)
+    assert logins.seconds_left(identity.login_id) == 60
+    clock.passes(minutes=1)
+    assert logins.look(token) is None
+    assert logins.seconds_left(identity.login_id) == 0.0
+    async with clinic.client("viewer") as client:
+        found = (await client.get("/api/v1/sign-in")).json()
+        assert found["name"] == "viewer"
+        assert 0 < found["left_s"] <= IDLE.total_seconds()
+
+
 async def test_activity_is_written_at_most_every_half_minute(clinic: Clinic) -> None:
     clock = Clock()
     logins, token = open_login(clinic, clock)

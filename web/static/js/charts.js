@@ -49,7 +49,15 @@ class CycleCharts extends HTMLElement {
 class StrideStrip extends HTMLElement {
   connectedCallback() {
     this.marks = [...this.querySelectorAll("g[data-stride]")];
-    for (const mark of this.marks) mark.addEventListener("click", () => clock.pick(clock.strides[mark.dataset.stride]));
+    for (const mark of this.marks) {
+      const stride = clock.strides[mark.dataset.stride];
+      if (!mark.querySelector("title")) {
+        const title = document.createElementNS("http://www.w3.org/2000/svg", "title");
+        title.textContent = `${stride.side} stride, ${stride.start_s.toFixed(2)} to ${stride.end_s.toFixed(2)} s`;
+        mark.prepend(title);
+      }
+      mark.addEventListener("click", () => clock.pick(stride));
+    }
     clock.addEventListener("tick", () => this.show());
     this.show();
   }

@@ -9,7 +9,8 @@ class Clock extends EventTarget {
     super();
     this.duration = data.duration_s;
     this.called = data.called ?? "stride"; // what the strides are: of squats each is one squat
-    this.strides = data.strides; // {side, start_s, end_s, used}
+    // {side, start_s, end_s, used}; on the overview, which must be light, a row of the four
+    this.strides = data.strides.map((s) => (Array.isArray(s) ? { side: s[0], start_s: s[1], end_s: s[2], used: Boolean(s[3]) } : s));
     this.curves = data.curves; // variable → {left, right}: mean at 0…100 %, degrees
     this.stride = this.strides.find((s) => s.used) ?? this.strides[0] ?? null;
     this.t = this.stride ? this.stride.start_s : 0;

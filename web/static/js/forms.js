@@ -1,6 +1,9 @@
 // Forms that speak to the API, dialogs, whole-row links and back buttons: behaviour by data attributes, for every page.
 import { request, showProblem } from "./common/api.js";
 
+const LATER_MS = 20_000;
+const NOW = "#now"; // of the address of a report that is printed at once
+
 const TYPES = { int: (v) => parseInt(v, 10), float: (v) => parseFloat(v.replace(",", ".")), bool: (v) => v === "true", json: JSON.parse };
 
 function values(form) {
@@ -69,5 +72,27 @@ document.addEventListener("click", (e) => {
   if (e.target.closest("[data-back]")) return history.back();
   if (e.target.closest("[data-print]")) return window.print();
   const row = e.target.closest("tr[data-href]");
-  if (row && !e.target.closest("a,button,select,input,label") && !String(getSelection())) location.assign(row.dataset.href);
+  if (row && !e.target.closest("a,button,select,input,label") && !String(getSelection())) location.assign(row.dataset.href || row.querySelector("a").href); // without an address that of its link
 });
+
+// Whoever is away for long is signed out: the watch over that comes once the page stands.
+const watch = () => import("./sign-out.js");
+if (document.getElementById("signed-out")) {
+  setTimeout(watch, LATER_MS);
+  document.addEventListener("signed-out", (e) => {
+    e.preventDefault();
+    watch().then(({ cover }) => cover());
+  });
+}
+
+// Ctrl+P on a session prints its report; everywhere else the page itself, without what only a screen needs.
+document.addEventListener("keydown", (e) => {
+  const report = document.querySelector("a[data-report]");
+  if (!report || e.key !== "p" || !(e.ctrlKey || e.metaKey) || e.altKey || e.shiftKey) return;
+  e.preventDefault();
+  location.assign(`${report.href}${NOW}`);
+});
+if (location.hash === NOW && document.querySelector("[data-print]")) {
+  history.replaceState(null, "", location.pathname);
+  window.print();
+}

@@ -16,7 +16,7 @@ const READ = {
 function record() {
   const body = { modes: [] };
   for (const el of form.elements) {
-    if (!el.name || el.disabled || el.name === "told" || (el.type === "radio" && !el.checked)) continue;
+    if (!el.name || el.disabled || el.name === "told" || "skip" in el.dataset || (el.type === "radio" && !el.checked)) continue;
     if (el.name === "modes") {
       if (el.checked) body.modes.push(el.value);
       continue;
@@ -39,7 +39,34 @@ function arrange() {
   show("[data-manual]", checked("target.source")?.value === "manual");
   show("[data-fading]", form.elements["schedule.kind"].value === "fading");
   show("[data-rule]", form.elements["progression.automatic"].checked);
+  const shared = "shared" in option().dataset;
+  for (const el of form.querySelectorAll('input[name="side"]')) {
+    el.disabled = shared && el.value !== "";
+    if (shared) el.checked = el.value === "";
+  }
+  form.querySelector("[data-both]").hidden = !shared;
   show("[data-other]", checked("side").value !== "");
+  summarise();
+}
+
+// What will be prescribed, in a sentence: nobody has to open "More" to know it.
+function summarise() {
+  const side = checked("side").value;
+  const target = checked("target.source");
+  const value = target?.value === "manual" ? (form.elements["target.mean"].value ? "as entered" : "to be entered under More") : target?.closest("[data-source]").querySelector("[data-value]").textContent;
+  const source = target?.closest("[data-source]").querySelector("b").textContent.toLowerCase();
+  const told = [...form.querySelectorAll('input[name="modes"]:checked')].map((m) => m.parentElement.querySelector("b").textContent.toLowerCase());
+  const what = option().textContent.trim().split(",")[0];
+  form.querySelector("[data-summary]").textContent = `${what}, ${side || "both sides"}; target ${value || "not known yet"}${source && value ? ` (${source})` : ""}; ${told.join(" and ")}.`;
+}
+
+// A preset fills what decides; the target is the first of its sources that gives numbers for this person.
+let wanted = [];
+function preset(chosen) {
+  const { parameter, modes, sources } = chosen.dataset;
+  form.elements.parameter.value = parameter;
+  for (const m of form.querySelectorAll('input[name="modes"]')) m.checked = modes.split(" ").includes(m.value);
+  wanted = sources.split(" ");
 }
 
 function show(selector, on) {
@@ -61,6 +88,9 @@ async function offer() {
   }
   if (turn !== asked) return; // something else was chosen meanwhile
   for (const found of offers) fill(found);
+  const first = wanted.find((source) => offers.some((o) => o.source === source && o.mean !== null));
+  if (first) form.querySelector(`input[name="target.source"][value="${first}"]`).checked = true;
+  wanted = [];
   const chosen = checked("target.source");
   if (!chosen || chosen.disabled) form.querySelector('input[name="target.source"]:not(:disabled)').checked = true;
   arrange();
@@ -82,7 +112,10 @@ function quantity(mean, sd) {
 }
 
 form.addEventListener("change", (e) => {
-  if (e.target.matches("[name=parameter], [name=side]")) offer();
+  if (e.target.matches("[name=preset]")) preset(e.target);
+  else if (e.target.matches("[name=parameter], [name=modes]")) for (const p of form.querySelectorAll("[name=preset]")) p.checked = false;
+  if (e.target.matches("[name=parameter]")) arrange(); // another parameter may belong to both sides
+  if (e.target.matches("[name=parameter], [name=side], [name=preset]")) offer();
   arrange();
 });
 
@@ -92,6 +125,7 @@ form.addEventListener("submit", async (e) => {
   modes[0].setCustomValidity([...modes].some((m) => m.checked) ? "" : "Choose at least one.");
   const hiddenRule = form.querySelector("[data-rule]");
   if (!form.checkValidity() && hiddenRule.querySelector(":invalid")) hiddenRule.open = true;
+  if (!form.checkValidity() || form.querySelector('[name="target.source"][value="manual"]').checked) form.querySelector("[data-more]").open = true;
   if (!form.reportValidity()) return;
   const button = form.querySelector("button.primary");
   button.disabled = true;
@@ -104,5 +138,6 @@ form.addEventListener("submit", async (e) => {
   }
 });
 
+if (checked("preset")) preset(checked("preset"));
 arrange();
 offer();

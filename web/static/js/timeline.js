@@ -192,7 +192,7 @@ class TakeTimeline extends HTMLElement {
       editable: this.editable, review: this.review,
       onMove: (event, to) => this.move(event, to),
       onDelete: (event) => this.remove(event),
-      onLeaveOut: (s) => this.askReason(s),
+      onLeaveOut: (s, reason) => (reason ? this.leaveOut(s, reason) : this.askReason(s)),
       onCount: (s) => this.count(s),
     };
     const field = this.find("stride-box").contains(document.activeElement) ? document.activeElement.id : "";
@@ -233,7 +233,11 @@ class TakeTimeline extends HTMLElement {
   }
 
   askReason(stride) {
-    askReason(stride, (reason) => this.change({ kind: "exclude_stride", side: stride.side, time_s: middle(stride), reason }, `The ${stride.side} stride is left out.`));
+    askReason(stride, (reason) => this.leaveOut(stride, reason));
+  }
+
+  leaveOut(stride, reason) {
+    return this.change({ kind: "exclude_stride", side: stride.side, time_s: middle(stride), reason }, `The ${stride.side} stride is left out.`);
   }
 
   count(stride) {
@@ -255,8 +259,11 @@ class TakeTimeline extends HTMLElement {
     this.change({ kind: "delete_event", side: event.side, event: event.kind, time_s: event.time_s }, `${event.side} ${WORD[event.kind]} deleted.`);
   }
 
+  // What is held is not changed yet: it goes back where it was.
   undo() {
-    if (this.review.edits.length) this.done(() => this.review.undo(), "The last change is undone.");
+    const moving = this.feet.find(({ handles }) => handles.held)?.handles;
+    if (moving) moving.drop(moving.held);
+    else if (this.review.edits.length) this.done(() => this.review.undo(), "The last change is undone.");
   }
 
   change(edit, said) {

@@ -54,7 +54,10 @@ class CapturePage extends HTMLElement {
     } catch (error) {
       return this.say(words.storageProblem(error));
     }
-    if (!this.outbox) return this.enter("pairing");
+    if (!this.outbox) {
+      this.enter("pairing");
+      return this.takeOffered();
+    }
     const { hello, stopped, kind, source } = this.outbox.record;
     this.watchStorage();
     if (!hello) return this.enter("prepare");
@@ -66,6 +69,16 @@ class CapturePage extends HTMLElement {
     if (!this.outbox || this.dataset.state === "stuck" || this.dataset.state === "done") return; // refused meanwhile
     this.worn.restore(hello);
     this.run();
+  }
+
+  // The therapist's page on this very device leads here with its code, which nobody has to type then.
+  takeOffered() {
+    const code = location.hash.slice(1);
+    if (!code) return;
+    history.replaceState(null, "", location.pathname);
+    const input = this.$("code-form").querySelector("input");
+    input.value = code;
+    input.dispatchEvent(new Event("input"));
   }
 
   // A page needs a tap before it may use Bluetooth or motion again.

@@ -29,7 +29,8 @@ export async function request(method, path, body) {
     throw new Problem(0, { title: "No connection to the server", detail: "Nothing was changed. Check the network and try again." });
   }
   if (answer.status === 401 && !location.pathname.startsWith("/sign-in")) {
-    location.assign(`/sign-in?next=${encodeURIComponent(location.pathname)}`);
+    // a page that keeps what was typed asks to sign in on itself
+    if (document.dispatchEvent(new CustomEvent("signed-out", { cancelable: true }))) location.assign(`/sign-in?next=${encodeURIComponent(location.pathname)}`);
   }
   const text = await answer.text();
   const isJson = (answer.headers.get("Content-Type") || "").includes("json");

@@ -47,6 +47,9 @@ export class Pairing {
     const out = this.root.querySelector("[data-code]");
     say(out, code ? grouped(code) : "––– –––");
     if (code) out.setAttribute("aria-label", [...code].join(" "));
+    const here = this.root.querySelector("[data-here]");
+    here.hidden = !code;
+    if (code) here.href = `/capture#${code}`;
     this.ends = expires ? Date.parse(expires) : null;
     this.#tick();
   }

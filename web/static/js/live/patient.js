@@ -12,6 +12,8 @@ const LAST = 8;
 const KIND = { in: "in", near_low: "near", near_high: "near", low: "away", high: "away" };
 const KEY = "sagittal.patient-screen";
 const ALIVE_MS = 1000;
+// What of a drawing a screen held upright shows: the bar without the room at its left, the road's nearer part.
+const UPRIGHT = { bar: "330 0 560 480", path: "232 0 636 560" };
 
 class PatientScreen extends HTMLElement {
   connectedCallback() {
@@ -19,6 +21,9 @@ class PatientScreen extends HTMLElement {
     this.contacts = { l: null, r: null };
     this.picture();
     this.settings();
+    const upright = matchMedia("(orientation: portrait)");
+    upright.addEventListener("change", () => this.turn(upright.matches));
+    this.turn(upright.matches);
     this.channel = new BroadcastChannel(`sagittal.live.${data.session}`);
     this.channel.onmessage = (e) => this.told(e.data);
     setInterval(() => this.tell(), ALIVE_MS);
@@ -40,6 +45,13 @@ class PatientScreen extends HTMLElement {
     this.picture();
     this.message("", "");
     this.querySelector("[data-last]").replaceChildren();
+  }
+
+  turn(upright) {
+    for (const scene of this.querySelectorAll("[data-scene]")) {
+      scene.dataset.wide ??= scene.getAttribute("viewBox");
+      scene.setAttribute("viewBox", upright ? UPRIGHT[scene.dataset.scene] : scene.dataset.wide);
+    }
   }
 
   picture() {

@@ -1,6 +1,9 @@
 // The two questions of the timeline: why a stride is left out, and which event is added where.
 import { seconds } from "./words.js";
 
+// What strides are left out for, as the question offers it.
+export const reasons = () => [...document.querySelectorAll("#why option")].map((o) => o.value).filter(Boolean);
+
 export function askReason(stride, answer) {
   const dialog = document.getElementById("leave-out");
   const form = dialog.querySelector("form");

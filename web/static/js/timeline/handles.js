@@ -4,7 +4,7 @@ import { SIDE_KEY } from "../common/words.js";
 import { h, s } from "../common/elements.js";
 import { WORD, seconds } from "./words.js";
 
-const CLOSE_PX_PER_S = 42; // below it handles would lie on each other; the blocks alone are shown
+const CLOSE_PX_PER_S = 44; // below it handles of one kind would lie on each other; the blocks alone are shown
 const APART_S = 0.051; // the server refuses less than 50 ms between two events of a foot
 const STEP_S = 0.01;
 const WAIT_MS = 900;

@@ -1,5 +1,6 @@
 // What stands beside and below the drawing: the picked stride, the changes, and the table of strides in view.
 import { chip, h, icon } from "../common/elements.js";
+import { reasons } from "./dialogs.js";
 import { WORD, seconds } from "./words.js";
 
 const LISTED = 40;
@@ -19,9 +20,15 @@ export function strideBox(stride, { editable, review, onMove, onDelete, onLeaveO
     ? stride.flags.length ? `Counts, although a rule says: ${stride.flags.join(", ").replaceAll("_", " ")}.` : ""
     : `Left out ${stride.excluded_by === "person" ? "by hand" : "by rule"}: ${stride.excluded}.`;
   const act = stride.used
-    ? h("button", { class: "btn", type: "button", "data-out": true, onclick: () => onLeaveOut(stride) }, "Leave out…")
+    ? whyOut((reason) => onLeaveOut(stride, reason))
     : h("button", { class: "btn", type: "button", "data-count": true, onclick: () => onCount(stride) }, "Count it");
   return [facts, said ? h("p", { class: "small" }, said) : null, h("div", { class: "tl-fields" }, ...rows.flat()), editable ? act : null].filter(Boolean);
+}
+
+// One tap says why and leaves the stride out; words of one's own are asked for.
+function whyOut(answer) {
+  const button = (words, reason, marks = {}) => h("button", { class: "btn", type: "button", ...marks, onclick: () => answer(reason) }, words);
+  return h("fieldset", { class: "tl-why" }, h("legend", { class: "small mut" }, "Leave it out, because"), ...reasons().map((reason) => button(reason, reason, { "data-why": reason })), button("Other…", "", { "data-out": true }));
 }
 
 function eventRow(stride, kind, label, time, { editable, review, onMove, onDelete }) {

@@ -1,0 +1,44 @@
+"""Dated notes about a patient."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter
+
+from server.api import schemas
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db, Id, OpenTrail
+from server.http.json_body import StrictJsonRoute
+from server.services import notes, patients
+
+router = APIRouter(route_class=StrictJsonRoute, tags=["patients"])
+Writer = Annotated[Identity, require(Action.WRITE_PATIENT)]
+
+
+@router.get("/patients/{patient_id}/notes", response_model=list[notes.PatientNote])
+def list_notes(
+    patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_PATIENT)]
+) -> list[notes.PatientNote]:
+    """The notes about a patient, of the latest day first."""
+    with db.read() as c:
+        patients.get(c, patient_id)
+        found = notes.of_patient(c, patient_id)
+    trail.record_opened(who, "notes.opened", "patient", patient_id)
+    return found
+
+
+@router.post("/patients/{patient_id}/notes", status_code=201, response_model=notes.PatientNote)
+def add_note(patient_id: Id, body: schemas.NoteNew, db: Db, who: Writer) -> notes.PatientNote:
+    """Add a note about a patient."""
+    with db.write() as c:
+        return notes.add(c, who, patient_id, **body.values())
+
+
+@router.delete("/notes/{note_id}", status_code=204)
+def remove_note(note_id: Id, db: Db, who: Writer) -> None:
+    """Remove a note for good; the audit log keeps that there was one."""
+    with db.write() as c:
+        notes.remove(c, who, note_id)

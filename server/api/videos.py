@@ -1,0 +1,88 @@
+"""The video beside a take."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import FileResponse
+
+from server.api import schemas
+from server.api.documents import refusals
+from server.api.downloads import BINARY
+from server.api.files import RAW_BODY, read_size, receive_body
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Blobs, Config, Db, Id, OpenTrail
+from server.http.json_body import StrictJsonRoute
+from server.services import recordings, videos
+
+router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}/video", tags=["sessions"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+Writer = Annotated[Identity, require(Action.WRITE_SESSION)]
+
+
+@router.get("", response_model=videos.SessionVideo)
+def read_video(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> videos.SessionVideo:
+    """What is known of the video, and who said that the person agreed to be filmed."""
+    with db.read() as c:
+        found = videos.get(c, session_id)
+    trail.record_watched(who, "video.opened", "session", session_id)
+    return found
+
+
+@router.put(
+    "",
+    status_code=201,
+    response_model=recordings.RecordedFile,
+    responses=refusals(413),
+    openapi_extra={"requestBody": {"required": True, **RAW_BODY}},
+)
+async def put_video(
+    session_id: Id,
+    name: Annotated[str, Query(min_length=1, max_length=200)],
+    consent: Annotated[bool, Query(description="the person agreed to be filmed; it is kept who said so")],
+    request: Request,
+    settings: Config,
+    db: Db,
+    blobs: Blobs,
+    who: Writer,
+) -> recordings.RecordedFile:
+    """Set a video beside the take, MP4, QuickTime or WebM; it replaces the one before."""
+    size = read_size(request, settings.max_file_bytes)
+
+    def begin() -> videos.receive_video:
+        return videos.receive_video(db, blobs, settings, who, session_id, name, size, consent=consent)
+
+    return await receive_body(request, await run_in_threadpool(begin))
+
+
+@router.patch("", response_model=videos.SessionVideo)
+def align_video(session_id: Id, body: schemas.VideoAlignment, db: Db, who: Writer) -> videos.SessionVideo:
+    """Say which moment of the video is the take's time 0."""
+    with db.write() as c:
+        return videos.align(c, who, session_id, body.offset_s)
+
+
+@router.delete("", status_code=204)
+def remove_video(session_id: Id, db: Db, who: Writer) -> None:
+    """Take the video away."""
+    with db.write() as c:
+        videos.remove(c, who, session_id)
+
+
+@router.get(
+    "/content",
+    response_class=FileResponse,
+    responses={
+        200: {"description": "The video, or the range of it", "content": {"video/*": {"schema": BINARY}}}
+    },
+)
+def play_video(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> FileResponse:
+    """The video's bytes; players ask for ranges of it."""
+    with db.read() as c:
+        found, path = videos.find_path(c, blobs, session_id)
+    trail.record_watched(who, "video.opened", "session", session_id)
+    return FileResponse(path, media_type=found.media_type)

@@ -1,0 +1,153 @@
+"""Rows of the audit trail as sentences: who did what with whom."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from sqlalchemy import Connection, Row, select
+
+from server.storage.tables import patient, session
+from web.words import day
+
+DEEDS: Final[Mapping[str, str]] = {
+    "sign_in": "signed in",
+    "sign_in.one_time": "signed in by a one-time address",
+    "sign_in.failed": "could not sign in",
+    "sign_out": "signed out",
+    "user.set_up": "made the first account",
+    "user.created": "made an account",
+    "user.changed": "changed an account",
+    "user.password_changed": "changed the password",
+    "patient.listed": "looked at the list of patients",
+    "patient.opened": "opened the patient",
+    "patient.created": "added the patient",
+    "patient.changed": "changed what is said of the patient",
+    "patient.erased": "deleted the patient with all recordings",
+    "note.added": "wrote a note",
+    "note.removed": "removed a note",
+    "notes.opened": "read the notes",
+    "sessions.opened": "listed the visits",
+    "trends.opened": "looked at the trends",
+    "session.opened": "opened the visit",
+    "session.created": "added the visit",
+    "session.changed": "changed what is said of the visit",
+    "session.erased": "deleted the visit with its recording",
+    "comparison.opened": "compared the visit with another",
+    "recording.opened": "looked at what was recorded",
+    "recording.file_opened": "downloaded a recorded file",
+    "recording.file_added": "added a recorded file",
+    "recording.file_removed": "removed a recorded file",
+    "recording.inspected": "had the recorded files read",
+    "recording.mapped": "said which sensor is worn where",
+    "analyses.opened": "listed the analyses",
+    "analysis.opened": "opened an analysis",
+    "analysis.file_opened": "downloaded a file of an analysis",
+    "analysis.requested": "asked for an analysis",
+    "report.opened": "read the report",
+    "numbers.opened": "looked at the values",
+    "parameter.opened": "looked at the strides behind a value",
+    "signals.opened": "looked at the signals",
+    "replay.opened": "looked at the figure",
+    "review.opened": "looked at the changes by hand",
+    "events.opened": "looked at the events",
+    "strides.opened": "looked at the strides",
+    "event.moved": "moved an event",
+    "event.added": "added an event",
+    "event.deleted": "deleted an event",
+    "stride.left_out": "left a stride out",
+    "stride.counted": "let a stride count",
+    "edit.undone": "undid the last change by hand",
+    "filters.requested": "asked for a comparison of filters",
+    "filter_runs.opened": "listed the comparisons of filters",
+    "filter_run.opened": "opened a comparison of filters",
+    "filter_run.file_opened": "downloaded a file of a comparison of filters",
+    "references.opened": "listed the reference files",
+    "reference.opened": "downloaded a reference file",
+    "reference.added": "added a reference file",
+    "reference.removed": "removed a reference file",
+    "video.added": "set a video beside the take, and said that the person agreed",
+    "video.aligned": "aligned the video with the take",
+    "video.removed": "removed the video",
+    "video.opened": "looked at the video",
+    "sensitivity.requested": "asked how angles depend on the set-up",
+    "sensitivities.opened": "listed the studies of the set-up",
+    "sensitivity.opened": "opened a study of the set-up",
+    "tuning.requested": "asked for a filter to be tuned",
+    "tunings.opened": "listed the tunings of filters",
+    "tuning.opened": "opened the tuning of a filter",
+    "prescription.written": "prescribed feedback",
+    "prescription.ended": "ended the prescription of feedback",
+    "prescriptions.opened": "listed the prescriptions",
+    "targets.opened": "looked at targets for feedback",
+    "feedback.opened": "looked at what feedback did",
+    "programme.started": "planned a programme",
+    "programme.ended": "ended the programme",
+    "programme.visit_changed": "changed a visit of the programme",
+    "programmes.opened": "looked at the programme",
+    "live.opened": "opened a live take",
+    "live.code_given": "asked for a new code for the tablet",
+    "live.paired": "paired a tablet",
+    "live.watched": "watched the live take",
+    "live.events_opened": "looked at the marks of the live take",
+    "live.adopted": "found a live take again after a restart",
+    "live.finished": "ended a live take",
+    "live.closed": "closed a live take",
+    "job.listed": "looked at the list of jobs",
+    "job.opened": "looked at a job",
+    "job.cancelled": "cancelled a job",
+    "database.accepted": "accepted this database as the clinic's own",
+}
+"""Action → what was done, to follow the name of who did it."""
+
+NOBODY: Final = "The system"
+STRANGER: Final = "Somebody"
+
+
+@dataclass(frozen=True)
+class AuditSentence:
+    """A row of the trail in words.
+
+    Parameters
+    ----------
+    who, deed : "anna", "opened the visit". whom : code of the patient, None where it is about nobody or the
+        patient is deleted. of : the visit's day. href : where it is now, None where it is no more.
+    row : the row itself.
+    """
+
+    who: str
+    deed: str
+    whom: str | None
+    of: str | None
+    href: str | None
+    row: Row[Any]
+
+
+def describe_rows(c: Connection, rows: Sequence[Row[Any]]) -> list[AuditSentence]:
+    """Say rows in words, with the patients and visits they are about as far as these still exist."""
+    ids = {row.resource_id for row in rows if row.resource in {"patient", "session"}}
+    people = c.execute(select(patient.c.id, patient.c.code).where(patient.c.id.in_(ids)))
+    codes = {row.id: row.code for row in people}
+    query = select(session.c.id, session.c.performed_on, patient.c.code).join(patient)
+    visits = {r.id: r for r in c.execute(query.where(session.c.id.in_(ids)))}
+    found = []
+    for row in rows:
+        visit = visits.get(row.resource_id)
+        code = codes.get(row.resource_id)
+        whom, of, href = code, None, None if code is None else f"/patients/{row.resource_id}"
+        if visit is not None:
+            whom, of, href = visit.code, day(visit.performed_on), f"/sessions/{visit.id}"
+        found.append(AuditSentence(_name(row), describe_deed(row.action), whom, of, href, row))
+    return found
+
+
+def describe_deed(action: str) -> str:
+    """What an action is in words; of one without words its own name."""
+    return DEEDS.get(action, action.replace("_", " ").replace(".", ": "))
+
+
+def _name(row: Row[Any]) -> str:
+    if row.user_name:
+        return str(row.user_name)
+    return STRANGER if row.action == "sign_in.failed" else NOBODY

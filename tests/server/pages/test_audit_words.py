@@ -1,0 +1,45 @@
+"""The audit page says in words what the server writes down."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from server.pages.audit_words import DEEDS, describe_deed
+from server.services.reviews import ACTIONS
+from tests.data import ROOT
+from tests.server.clinic import Clinic
+
+pytestmark = pytest.mark.anyio
+
+
+def test_whatever_is_written_down_has_words() -> None:
+    verbs = "|".join(sorted({action.partition(".")[2] for action in DEEDS} - {""}))
+    source = "\n".join(p.read_text() for p in (ROOT / "server").rglob("*.py") if p.name != "audit_words.py")
+    written = set(re.findall(rf'"([a-z_]+\.(?:{verbs}))"', source)) | set(ACTIONS.values())
+    written |= {f"{r}.opened" for r in re.findall(r'record_opening\(request, who, "(\w+)"', source)}
+    written |= {f"{r}.listed" for r in re.findall(r'record_listing\(request, who, "(\w+)"', source)}
+    assert len(written) > 60
+    assert written <= set(DEEDS)
+
+
+def test_what_has_no_words_shows_its_own_name() -> None:
+    assert describe_deed("tea_pot.filled") == "tea pot: filled"
+
+
+async def test_rows_name_the_patient_and_the_visit_while_they_exist(clinic: Clinic) -> None:
+    async with clinic.client("admin") as client:
+        patient = (await client.post("/api/v1/patients", json={"code": "AU-1"})).json()["id"]
+        made = await client.post(
+            f"/api/v1/patients/{patient}/sessions", json={"title": "Walk", "performed_on": "2026-03-02"}
+        )
+        html = (await client.get("/audit")).text
+        said = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", "", html))
+        assert "admin added the visit: AU-1, 2 Mar 2026" in said
+        assert "admin added the patient: AU-1" in said
+        assert f'href="/sessions/{made.json()["id"]}"' in html
+        (await client.delete(f"/api/v1/patients/{patient}?confirm=AU-1")).raise_for_status()
+        html = (await client.get("/audit")).text
+    assert "AU-1" not in html
+    assert "deleted the patient with all recordings" in html

@@ -1,0 +1,34 @@
+// <video-upload>: sets a video beside a take, once somebody has said that the person agreed.
+import { Problem, request, showProblem } from "./common/api.js";
+
+class VideoUpload extends HTMLElement {
+  connectedCallback() {
+    const [consent, input, pick] = ["consent", "file", "pick"].map((name) => this.querySelector(`[data-${name}]`));
+    if (!consent) return;
+    consent.addEventListener("change", () => { pick.disabled = !consent.checked; });
+    pick.addEventListener("click", () => input.click());
+    input.addEventListener("change", () => input.files[0] && this.change(() => this.send(input.files[0])));
+    this.querySelector("[data-remove]")?.addEventListener("click", () => this.change(() => request("DELETE", this.path())));
+  }
+
+  path() { return `/api/v1/sessions/${this.getAttribute("session")}/video`; }
+
+  async change(action) {
+    try {
+      await action();
+      location.reload();
+    } catch (problem) {
+      this.querySelector("[data-say]").textContent = "";
+      showProblem(this.querySelector(".form-error"), problem);
+    }
+  }
+
+  async send(file) {
+    this.querySelector("[data-say]").textContent = `Uploading ${file.name}…`;
+    const query = new URLSearchParams({ name: file.name, consent: "true" });
+    const answer = await fetch(`${this.path()}?${query}`, { method: "PUT", headers: { "Content-Type": "application/octet-stream" }, body: file });
+    if (!answer.ok) throw new Problem(answer.status, await answer.json().catch(() => ({})));
+  }
+}
+
+customElements.define("video-upload", VideoUpload);
