@@ -40,6 +40,7 @@ from core.fusion.self_calibrating.layout import (
     PAUSE,
     PLACE,
     PLACE_SUMS,
+    REGION,
     RING,
     S_ACC,
     S_ACC_SQUARE,
@@ -57,6 +58,7 @@ from core.fusion.self_calibrating.layout import (
     S_SPEED_SQUARE,
     SHIFT,
     SPEED,
+    START_R,
     TILT,
     WITH_MAG,
 )
@@ -221,7 +223,7 @@ def correct(x, P, sums, counters, dt, p, F, d, decay, before, after, work):  # t
     if len(after):
         after[:] = P
     d[:] = 0.0
-    at, h, K = np.zeros(6, np.int64), np.zeros(6), work[0]
+    at, h, K = np.zeros(7, np.int64), np.zeros(7), work[0]
     h[0] = 1.0
     # what is left of the velocity is as large as the motion, less where that swings fast, and soon new
     bounding = p.velocity_gain**2 * min(speed_square, sqrt(speed_square * slow_square)) + LEAST_SPEED**2
@@ -234,12 +236,13 @@ def correct(x, P, sums, counters, dt, p, F, d, decay, before, after, work):  # t
         for j in range(3):
             for i in range(3):
                 at[i] = IRON + i
-                h[i] = sums[S_MAG_R + 3 * j + i] * k
+                h[i] = _turned_since_start(x, sums, counters, j, i)
             at[3], h[3] = FIELD + j, 1.0
-            at[4], h[4] = MAG_DELAY, sums[S_MAG_CROSS + j] * k
-            at[5], h[5] = TILT + 2, x[NORTH + 1]
+            at[4], h[4] = REGION + j, 1.0
+            at[5], h[5] = MAG_DELAY, sums[S_MAG_CROSS + j] * k
+            at[6], h[6] = TILT + 2, x[NORTH + 1]
             # of the tilt a field says nothing that gravity does not say better: heading alone is taken
-            take_scalar(P, d, K, at, h, 6 if j == 0 else 5, off[j], field_variance)
+            take_scalar(P, d, K, at, h, 7 if j == 0 else 6, off[j], field_variance)
     if counters[C_REST] < n:
         x[PLACE_SUMS] = 0.0
     elif m == WITH_MAG and _is_back(x, P, sums, counters, duration):
@@ -287,6 +290,12 @@ def _is_back(x, P, sums, counters, duration):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _turned_since_start(x, sums, counters, j, i):  # type: ignore[no-untyped-def]
+    """Element j, i of the interval's mean orientation less that of the start: what iron adds to the field."""
+    return sums[S_MAG_R + 3 * j + i] / counters[C_MAG] - x[START_R + 3 * j + i]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _expect_field(x, P, sums, counters, dt, duration, p, rate_square, decay, off):  # type: ignore[no-untyped-def]
     """Let the field's deviation change, judge whether a magnet came or went; write off (3,) and its noise."""
     for j in range(3):
@@ -296,18 +305,19 @@ def _expect_field(x, P, sums, counters, dt, duration, p, rate_square, decay, off
         return 0.0
     k = 1.0 / counters[C_MAG]
     variance = (MAG_NOISE**2 + MAG_RATE_NOISE**2 * rate_square) / (counters[C_MAG] * dt)
-    worst = 0.0
+    worst, h = 0.0, np.empty(3)
     for j in range(3):
-        e = sums[S_MAG + j] * k - x[NORTH + j] - x[FIELD + SHIFT + j]
-        v = variance + P[FIELD + j, FIELD + j] + (sums[S_MAG_CROSS + j] * k) ** 2 * P[MAG_DELAY, MAG_DELAY]
+        e = sums[S_MAG + j] * k - x[NORTH + j] - x[FIELD + SHIFT + j] - x[REGION + SHIFT + j]
+        v = variance + (sums[S_MAG_CROSS + j] * k) ** 2 * P[MAG_DELAY, MAG_DELAY]
+        v += P[FIELD + j, FIELD + j] + P[REGION + j, REGION + j] + 2.0 * P[FIELD + j, REGION + j]
         if j == 0:
             v += x[NORTH + 1] ** 2 * P[TILT + 2, TILT + 2]
         for i in range(3):
-            a = sums[S_MAG_R + 3 * j + i] * k
-            e -= a * x[IRON + SHIFT + i]
-            v += 2.0 * a * P[IRON + i, FIELD + j]
-            for c in range(3):
-                v += a * sums[S_MAG_R + 3 * j + c] * k * P[IRON + i, IRON + c]
+            h[i] = _turned_since_start(x, sums, counters, j, i)
+            e -= h[i] * x[IRON + SHIFT + i]
+            v += 2.0 * h[i] * (P[IRON + i, FIELD + j] + P[IRON + i, REGION + j])
+            for c in range(i + 1):
+                v += (1.0 if c == i else 2.0) * h[i] * h[c] * P[IRON + i, IRON + c]
         off[j] = e
         worst = max(worst, e * e / v)
     x[JUMPING] = x[JUMPING] + duration if worst > JUMP_SQUARE else 0.0
@@ -316,8 +326,19 @@ def _expect_field(x, P, sums, counters, dt, duration, p, rate_square, decay, off
         for j in range(3):
             P[IRON + j, IRON + j] += JUMP_IRON**2
             P[FIELD + j, FIELD + j] += JUMP_FIELD**2
+        _part_from_start(x, P, p)
         x[JUMPING], x[PAUSE] = 0.0, JUMP_PAUSE_S
     return variance
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def _part_from_start(x, P, p):  # type: ignore[no-untyped-def]
+    """Count the iron that was in the start's reading to the region: a new magnet was not in it."""
+    for j in range(3):
+        for i in range(3):
+            x[REGION + SHIFT + j] -= x[START_R + 3 * j + i] * x[IRON + SHIFT + i]
+            P[REGION + j, REGION + j] += x[START_R + 3 * j + i] ** 2 * p.hard_iron_sd**2
+    x[START_R : START_R + 9] = 0.0
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

@@ -10,24 +10,26 @@ MATRIX = 13  # 9, gyroscope's scale and misalignment, row by row, sensor axes
 ACC_DELAY = 22  # 1, s
 SHAKEN = 23  # 3, bias of the gyroscope per g² of shaking, sensor axes, rad/s
 IRON = 26  # 3, hard iron, sensor axes, norms of the field
-FIELD = 29  # 3, local field less that of the start
+FIELD = 29  # 3, field of this place less that of the region
 MAG_DELAY = 32  # 1, s
-WITHOUT_MAG, WITH_MAG = 26, 33
+REGION = 33  # 3, field of the region that the sensor moves in less that of the start
+WITHOUT_MAG, WITH_MAG = 26, 36
 
 # The nominal state: q 0-3, and then in the order of the errors, each `SHIFT` further on from BIAS.
 SHIFT = 1
-NORTH = 34  # 3, field at the start, its norm 37
-NORM = 37
-JUMPING = 38  # time for which the field has been off, time to wait after a jump
-PAUSE = 39
-SUM_ACC = 40  # 3, sums over the start
-SUM_MAG = 43  # 3
-TURNED = 46  # 4, quaternion since the first sample
-MOVED = 50
-FIRST_ACC = 51  # 3
-PLACE = 54  # 3, the level field over a rest, a sum and then its mean
-PLACE_SUMS = 57  # intervals in it, -1 when the rest has been judged
-STATE = 58
+NORTH = 37  # 3, field at the start, its norm 40
+NORM = 40
+JUMPING = 41  # time for which the field has been off, time to wait after a jump
+PAUSE = 42
+SUM_ACC = 43  # 3, sums over the start
+SUM_MAG = 46  # 3
+TURNED = 49  # 4, quaternion since the first sample
+MOVED = 53
+FIRST_ACC = 54  # 3
+PLACE = 57  # 3, the level field over a rest, a sum and then its mean
+PLACE_SUMS = 60  # intervals in it, -1 when the rest has been judged
+START_R = 61  # 9, orientation in which the field of the start was read, zero where iron is not in it
+STATE = 70
 
 # Sums over an interval.
 S_R = 0  # 9, R dt

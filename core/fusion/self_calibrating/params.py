@@ -20,8 +20,9 @@ class SelfCalibratingParams:
     gyro_noise : rad/√s. gyro_rate_noise : √s, orientation noise per angular rate: what the gyroscope's matrix
         cannot describe. gyro_matrix_sd : of scale and misalignment.
     gyro_bias_sd : rad/s at the start. gyro_bias_walk : rad/s/√s. acc_bias_sd : m/s².
-    field_sd : the local magnetic field less that of the start, in norms of the field. field_length_m : way
-        over which that changes. hard_iron_sd : in norms of the field.
+    field_sd : the magnetic field of a place less that of its region, and of the region less that of the
+        start, in norms of the field. field_length_m : way over which the place's changes. hard_iron_sd : in
+        norms of the field.
     mag_delay_s, mag_delay_sd_s : the magnetometer is late by, and how surely; the delay is estimated.
     """
 
@@ -70,7 +71,8 @@ def make_weights(params: SelfCalibratingParams) -> KernelWeights:
 
 
 # Halving or doubling one of those below moves the mean error on the eight BROAD trials by at most 0.05° in
-# total and 0.01° in inclination ("Parameters" of the page above); all are our choice.
+# total and 0.01° in inclination, of REGION_ACROSS_SD by 0.3° live ("Parameters" of the page above); all are
+# our choice.
 
 INTERVAL_S: Final = 0.1
 """Time between corrections; the gyroscope is integrated sample by sample."""
@@ -107,6 +109,9 @@ GRAVITY_MPS2: Final = GRAVITY
 GRAVITY_SD: Final = 0.03
 """m/s²; the scale of the accelerometer is in it."""
 
+REGION_ACROSS_SD: Final = 0.008
+"""How far the field of a region points to the east or west of that of the start, in norms of the field; along
+and upright it is `field_sd`."""
 FIELD_RATE: Final = 0.001
 """1/s at which the field changes while nothing moves."""
 PLACE_S: Final = 1.0
@@ -131,7 +136,11 @@ START_TILT: Final = 0.05
 """rad, and so many times it and all that follows when moving: `START_MOVING`."""
 START_MOVING: Final = 4.0
 START_HEADING: Final = 0.0087
-"""rad: the field of the start is north, by definition."""
+"""rad: a field that is read in motion is north, by definition."""
+LEAST_FIELD: Final = 1e-4
+"""Norms of the field that it is another by while nothing moved."""
+LEAST_FLAT: Final = 0.05
+"""Level field, in norms, below which a heading from it is known no less."""
 START_SPEED: Final = 0.3
 MOVING_RATE: Final = 0.2
 MOVING_FORCE: Final = 0.5

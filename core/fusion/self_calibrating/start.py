@@ -25,9 +25,11 @@ from core.fusion.self_calibrating.layout import (
     MOVED,
     NORM,
     NORTH,
+    REGION,
     SHAKEN,
     SHIFT,
     SPEED,
+    START_R,
     SUM_ACC,
     SUM_MAG,
     TILT,
@@ -39,8 +41,12 @@ from core.fusion.self_calibrating.params import (
     ACC_DELAY_SD_S,
     GRAVITY_MPS2,
     GRAVITY_SD,
+    LEAST_FIELD,
+    LEAST_FLAT,
+    MAG_NOISE,
     MOVING_FORCE,
     MOVING_RATE,
+    REGION_ACROSS_SD,
     SHAKEN_BIAS_SD,
     START_HEADING,
     START_MOVING,
@@ -120,10 +126,34 @@ def expect_start(x, P, p, moving):  # type: ignore[no-untyped-def]
     P[ACC_DELAY, ACC_DELAY] = ACC_DELAY_SD_S**2
     if P.shape[0] == WITH_MAG:
         x[MAG_DELAY + SHIFT] = p.mag_delay_s
-        for j in range(3):
-            P[IRON + j, IRON + j] = p.hard_iron_sd**2
-            P[FIELD + j, FIELD + j] = p.field_sd**2 if moving else 1e-6
         P[MAG_DELAY, MAG_DELAY] = p.mag_delay_sd_s**2
+        expect_field(x, P, p, moving)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def expect_field(x, P, p, moving):  # type: ignore[no-untyped-def]
+    """Set the first covariance of iron, place and region, and of the heading that was read from the field.
+
+    At rest place and region together are what was read, up to the noise of its mean, with the iron as it lay.
+    """
+    north = x[NORTH + 1]
+    noise = MAG_NOISE**2 / (START_MOVING_S if moving else START_S)
+    for j in range(3):
+        region = REGION_ACROSS_SD**2 if j == 0 else p.field_sd**2
+        P[IRON + j, IRON + j] = p.hard_iron_sd**2
+        P[REGION + j, REGION + j] = region + (0.0 if j == 0 else noise)
+        P[FIELD + j, FIELD + j] = p.field_sd**2 if moving else region + LEAST_FIELD**2
+        if not moving:
+            P[FIELD + j, REGION + j] = P[REGION + j, FIELD + j] = -region
+    if north > 0.0:
+        heading = noise / max(north, LEAST_FLAT) ** 2
+        P[TILT + 2, TILT + 2] = heading if not moving else P[TILT + 2, TILT + 2] + heading
+        if not moving:
+            R = np.empty((3, 3))
+            compiled.to_matrix(x[0:4], R)
+            for j in range(3):
+                for i in range(3):
+                    x[START_R + 3 * j + i] = R[j, i]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

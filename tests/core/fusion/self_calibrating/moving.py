@@ -50,6 +50,7 @@ def move_sensor(
     rest_s: float = 3.0,
     last_rest_s: float = 0.0,
     field_sd: float = 0.0,
+    region: Floats | None = None,
     last_field: Floats = NORTH,
     turning: float = 2.0,
     shaking_m: float = 0.05,
@@ -58,8 +59,8 @@ def move_sensor(
     """Simulate sines of turning (rad/s) and of place (m) after a rest; motion fades in over two seconds.
 
     Rates are the mean over each interval, so that integrating them gives the truth. `last_rest_s`: rest at
-    the end, into which motion fades, with `last_field`; until then the field strays by `field_sd`, another
-    one every 0.4 s.
+    the end, into which motion fades, with `last_field`; until then the field is that of the start, while
+    moving with `region` (3,) on top, and strays by `field_sd`, another one every 0.4 s.
     """
     faults = faults or SensorFaults()
     rng = np.random.default_rng(seed)
@@ -96,6 +97,8 @@ def move_sensor(
         for k in range(n):
             stray = keep * stray + field_sd * np.sqrt(1.0 - keep**2) * rng.normal(size=3)
             north[k] += np.sqrt(fade[late[k]]) * stray
+    if region is not None:
+        north += np.sqrt(fade[late])[:, None] * region
     north[t[late] > seconds - last_rest_s] = last_field
     mag = rotate(conjugate(q[late]), north) + faults.hard_iron
     shaken = np.sum((world - np.array([0.0, 0.0, GRAVITY])) ** 2, axis=1) / GRAVITY**2

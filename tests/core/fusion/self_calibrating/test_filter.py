@@ -11,6 +11,7 @@ from core.errors import EstimationError, ParameterError
 from core.frames import Floats
 from core.fusion.self_calibrating import SelfCalibratingFilter, SelfCalibratingParams, smooth_orientations
 from core.fusion.self_calibrating import layout as at
+from core.fusion.self_calibrating.params import GRAVITY_MPS2, MAG_NOISE
 from core.rotation import conjugate, exp, log, multiply, rotate
 from tests.core.fusion.self_calibrating.moving import (
     NORTH,
@@ -113,6 +114,38 @@ def test_a_bias_that_comes_with_shaking_is_found_and_not_taken_for_tilt() -> Non
         assert off @ np.linalg.solve(run._P[0, part, part], off) < 11.3  # 99 % of three
         assert rms_deg(find_errors(sensor, q))[:2].max() < 0.6
     assert np.linalg.norm(np.mean(found, axis=0) - true) < 0.5 * np.linalg.norm(true)
+
+
+def test_the_field_of_another_region_is_not_taken_for_iron_or_heading() -> None:
+    """Carried about and hardly turned, a sensor reads a field that is another than its table's for good."""
+    region, faults = np.array([0.01, 0.06, -0.05]), SensorFaults(mag_noise=0.002)
+    for seed in range(2):
+        sensor = move_sensor(
+            60.0, seed=seed, turning=0.4, shaking_m=0.1, field_sd=0.015, region=region, faults=faults
+        )
+        q, run = run_live(sensor)
+        assert run.estimates.hard_iron is not None
+        # read in norms of the field: 40 units a norm
+        off, part = run.estimates.hard_iron[0] / 40.0 - faults.hard_iron, slice(at.IRON, at.IRON + 3)
+        assert off @ np.linalg.solve(run._P[0, part, part], off) < 11.3  # 99 % of three
+        sd = np.sqrt(run.estimates.orientation_covariance[0, 2, 2])
+        assert abs(find_errors(sensor, q)[-1, 2]) < 3.0 * sd
+        off = run._x[0, at.REGION + at.SHIFT : at.REGION + at.SHIFT + 3] - region
+        part = slice(at.REGION, at.REGION + 3)
+        assert off @ np.linalg.solve(run._P[0, part, part], off) < 11.3
+
+
+def test_the_heading_of_the_start_is_as_sure_as_its_noisy_field_and_a_rest_averages_it() -> None:
+    sensors, rng, level = 40, np.random.default_rng(0), np.zeros((2000, 40, 3))
+    mag = NORTH + MAG_NOISE * np.sqrt(100.0) * rng.normal(size=level.shape)
+    run = SelfCalibratingFilter(100.0, sensors, magnetometer=True)
+    found = []
+    for part in (slice(0, 60), slice(60, 2000)):
+        q = run.advance(level[part], level[part] + [0.0, 0.0, GRAVITY_MPS2], mag[part])[-1]
+        sd = np.sqrt(run.estimates.orientation_covariance[:, 2, 2])
+        found.append((np.sqrt(np.mean(log(q)[:, 2] ** 2)), np.mean(sd)))
+    assert found[0][0] == pytest.approx(found[0][1], rel=0.4)
+    assert found[1][0] < min(found[1][1], 0.6 * found[0][0])
 
 
 @pytest.mark.parametrize("back", [True, False])
