@@ -90,7 +90,7 @@ def test_what_the_device_taught_elsewhere_helps_live() -> None:
         ["trial", "alone", "with the others' matrix"],
         rows,
         "Self-calibrating filter, live; RMS in degrees, total / heading / inclination. All trials are of one "
-        "device; the matrix of a trial's own is left out.",
+        "make of sensor; the matrix of a trial's own is left out.",
     )
     assert np.mean(taught, axis=0)[0] <= ours("live").mean(axis=0)[0]
 
