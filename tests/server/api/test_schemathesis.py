@@ -20,8 +20,9 @@ from tests.server.clinic import Clinic
 
 EXAMPLES = 12
 # beyond a schema, so 422 for what it allows: rules between the parts of a manifest (two sensors on one
-# segment) or of an edit (only a move says where to), names that lead elsewhere, and filters that nobody has
-BEYOND_SCHEMA = ("manifest", "analyses", "edits", "{name}", "prescriptions", "targets", "tunings")
+# segment) or of an edit (only a move says where to), names that lead elsewhere, filters that nobody has, and
+# films that are none or that nobody agreed to
+BEYOND_SCHEMA = ("manifest", "analyses", "edits", "{name}", "prescriptions", "targets", "tunings", "video")
 BEYOND = [schemathesis.checks.positive_data_acceptance]
 PARTS = 24
 """The operations are dealt out to so many tests: their names are known when the application is there."""
