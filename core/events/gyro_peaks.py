@@ -251,5 +251,6 @@ def _minima(x: Floats) -> np.ndarray:
 
 def _vertex(x: Floats, i: int) -> float:
     """Where between the samples the extremum at i is, within ±0.5: a parabola through three of them."""
-    bend = x[i - 1] - 2.0 * x[i] + x[i + 1]
-    return 0.0 if bend == 0.0 else float(np.clip(0.5 * (x[i - 1] - x[i + 1]) / bend, -0.5, 0.5))
+    before, at, after = x[i - 1 : i + 2].tolist()
+    bend = before - 2.0 * at + after
+    return 0.0 if bend == 0.0 else float(min(max(0.5 * (before - after) / bend, -0.5), 0.5))
