@@ -39,9 +39,6 @@ ALL: Final[tuple[Order, Order]] = (
 )
 """The same with those of few sensors and of live takes, which read from the folder what is done meanwhile."""
 
-LOCK: Final = "compiling.lock"
-"""File beside the filters; who holds it compiles."""
-
 
 def compile_filters(orders: tuple[Order, Order] = ALL) -> None:
     """Fill the folder of compiled filters that `server.processes.compile_cache` names.
@@ -76,7 +73,11 @@ def compile_filters_once(orders: tuple[Order, Order] = ALL) -> None:
     folder = Path(os.environ[VARIABLE])
     with suppress(OSError, subprocess.CalledProcessError):
         folder.mkdir(parents=True, exist_ok=True)
-        with (folder / LOCK).open("w") as lock:
+        # who holds the folder compiles; it is free again when that process ends, however it ends
+        lock = os.open(folder, os.O_RDONLY)
+        try:
             fcntl.flock(lock, fcntl.LOCK_EX)
             if not has_compiled_filters():
                 compile_filters(orders)
+        finally:
+            os.close(lock)
