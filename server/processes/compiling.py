@@ -58,9 +58,10 @@ def compile_filters(orders: tuple[Order, Order] = ALL) -> None:
         )
         for order in orders
     ]
-    for process in running:
-        if process.wait():
-            raise subprocess.CalledProcessError(process.returncode, process.args)
+    ended = [process.wait() for process in running]
+    for process, code in zip(running, ended, strict=True):
+        if code:
+            raise subprocess.CalledProcessError(code, process.args)
 
 
 def compile_filters_once(orders: tuple[Order, Order] = ALL) -> None:
