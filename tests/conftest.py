@@ -15,9 +15,9 @@ import hypothesis
 import pytest
 
 from server.processes.compile_cache import has_compiled_filters, share_compile_cache
+from server.processes.compiling import compile_filters
 from server.processes.environment import ONE_THREAD
 from tests.accuracy.report import WRITE
-from tests.compiling import compile_filters
 from tests.passed import Passed
 
 # before anything imports numba: every process that a test starts inherits it

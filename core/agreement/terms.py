@@ -17,7 +17,7 @@ from core.filtering import low_pass
 from core.frames import GRAVITY, Bools, Floats
 from core.fusion.attitude import AttitudeState, advance
 from core.recording import SensorSignals
-from core.rest import measure_quietness
+from core.rest import Quietness, measure_quietness
 from core.rotation import compiled, from_matrix
 
 TERMS: Final = 4
@@ -128,9 +128,14 @@ def cut_terms(terms: SensorTerms, start_s: float, end_s: float) -> SensorTerms:
     )
 
 
-def find_bias(signals: SensorSignals, rate_hz: float) -> Floats:
-    """Mean rate (3,) rad/s around the quietest moment where the sensor is at rest, else zero."""
-    quiet = measure_quietness(signals, rate_hz)
+def find_bias(signals: SensorSignals, rate_hz: float, quiet: Quietness | None = None) -> Floats:
+    """Mean rate (3,) rad/s around the quietest moment where the sensor is at rest, else zero.
+
+    Parameters
+    ----------
+    quiet : of the sensor, None = it is measured.
+    """
+    quiet = quiet or measure_quietness(signals, rate_hz)
     calmest = int(np.argmin(np.where(quiet.quiet, quiet.gyro, np.inf)))
     if not quiet.quiet[calmest]:
         return np.zeros(3)

@@ -304,7 +304,8 @@ def _solve_windows(AA, BB, AB, ok, starts, width, least, chunk, least_power, rid
         found[used, 1] = at - mid + shift
         found[used, 2] = inside
         found[used, 3] = np.sqrt(max(cost[at], 0.0)) / size
-        found[used, 4:10] = places[at]
+        for i in range(6):
+            found[used, 4 + i] = places[at, i]
         found[used, 10] = start
         used += 1
     return used

@@ -24,9 +24,11 @@ def contact_mask(t_s: Floats, ic_s: Sequence[float], tc_s: Sequence[float]) -> B
     if not events:
         return np.ones(len(t_s), bool)
     contact = np.full(len(t_s), not events[0][1])
-    for i, (start, down) in enumerate(events):
-        after = t_s >= start
-        contact[after] = down
-        if not down and i + 1 < len(events) and not events[i + 1][1]:
-            contact[after & (t_s >= 0.5 * (start + events[i + 1][0]))] = True
+    starts = np.searchsorted(t_s, [t for t, _ in events])
+    for (start, down), first, (after, landed), past in zip(
+        events, starts, [*events[1:], (np.inf, True)], [*starts[1:], len(t_s)], strict=True
+    ):
+        contact[first:past] = down
+        if not down and not landed:
+            contact[max(first, np.searchsorted(t_s, 0.5 * (start + after))) : past] = True
     return contact

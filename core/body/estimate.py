@@ -215,9 +215,14 @@ def _without(orientations: Orientations, failed: Collection[Segment]) -> Orienta
 
 
 def compile_pose_kernels() -> None:
-    """Compile the filter's kernels or load them, so that the first take does not wait for it."""
+    """Compile all kernels of poses or load them, so that the first take does not wait for it."""
+    compile_erkf_kernels()
+    compile_l7s_kernel()
+
+
+def compile_erkf_kernels() -> None:
+    """The same of the ErKF and its smoother."""
     tree = person_tree(BodyModel.from_height(NOMINAL_HEIGHT_M), {"foot_r": np.eye(3)}, ("foot_r",))
     acc, gyr = np.tile([0.0, GRAVITY, 0.0], (2, 1, 1)), np.zeros((2, 1, 3))
     inputs = erkf_inputs(tree, acc, gyr, np.ones((2, 1), bool), 100.0)
     smooth(start_state(tree, inputs, ErkfParams()), inputs, tree, ErkfParams())
-    compile_l7s_kernel()

@@ -214,15 +214,19 @@ def _votes(name: str, events: GaitEvents, side: Side, kind: EventKind) -> list[_
 
 
 def _moved(votes: list[_Vote], lead: Sequence[float], params: ConsensusParams) -> list[_Vote]:
-    """Votes without the median distance of their detector from the lead."""
+    """Votes without the median distance of their detector from the lead's contacts, which are in order."""
     if not lead or not votes:
         return votes
-    reference = np.array(lead)
-    off = np.array([v.time_s - reference[np.argmin(np.abs(reference - v.time_s))] for v in votes])
+    reference, times = np.array(lead), np.array([v.time_s for v in votes])
+    after = np.clip(np.searchsorted(reference, times), 0, len(reference) - 1)
+    before = np.maximum(after - 1, 0)
+    nearer = np.abs(reference[before] - times) <= np.abs(reference[after] - times)
+    off = times - reference[np.where(nearer, before, after)]
     off = off[np.abs(off) <= params.pair_s]
     if len(off) < params.pairs:
         return votes
-    return [replace(v, time_s=v.time_s - float(np.median(off))) for v in votes]
+    apart = float(np.median(off))
+    return [replace(v, time_s=v.time_s - apart) for v in votes]
 
 
 def _others(side: Side, voters: Mapping[str, GaitEvents]) -> Notice:

@@ -332,7 +332,8 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
         if valid[i]:
             pitch[k % size] = asin(min(1.0, max(-1.0, s[0])))
             if moves:
-                accs[k % size] = acc[i]
+                for c in range(3):
+                    accs[k % size, c] = acc[i, c]
             counters[MEASURED] += 1
         measured = k if valid[i] else k - 1
         reach = max(measured - counters[MEASURED] + 1, measured - size + 1 + rule.apart)

@@ -65,21 +65,22 @@ def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
     a = acc[good]
     norm = np.linalg.norm(a, axis=1)
     width = int(min(len(a), max(2, round(rate_hz))))
-    mean = _moving_mean(a, width)
-    away = a - a.mean(axis=0)
+    rows = np.ascontiguousarray(a.T)
+    mean = _moving_mean(rows, width)
+    away = rows - a.mean(axis=0)[:, None]
     spread = np.sqrt(
-        np.maximum((_moving_mean(away**2, width) - _moving_mean(away, width) ** 2).sum(axis=1), 0.0)
+        np.maximum((_moving_mean(away**2, width) - _moving_mean(away, width) ** 2).sum(axis=0), 0.0)
     )
     k = int(np.argmin(spread))
     at = slice(k, k + width)
     still_norm = float(norm[at].mean())
     speed = None if gyr is None else np.linalg.norm(gyr, axis=1)
-    calm = np.union1d([k], np.flatnonzero(spread < STILL * np.linalg.norm(mean, axis=1)))
+    calm = np.union1d([k], np.flatnonzero(spread < STILL * np.sqrt((mean**2).sum(axis=0))))
     if gyr is not None:
         calm = _without_turns(gyr[good], calm, width)
     known = None if speed is None else speed[np.isfinite(speed)]
     return Facts(
-        still=bool(spread[k] < STILL * np.linalg.norm(mean[k])),
+        still=bool(spread[k] < STILL * np.linalg.norm(mean[:, k])),
         still_norm=still_norm,
         still_gyro=None if speed is None else _least(speed[good], calm, width),
         still_slice=slice(int(good[at][0]), int(good[at][-1]) + 1),
@@ -163,7 +164,8 @@ def magnetic_share(mag: Floats, still: slice, limit: float) -> float | None:
 
 
 def _moving_mean(x: Floats, width: int) -> Floats:
-    """Means (n − width + 1, c) of every full window of x (n, c)."""
-    centre = x.mean(axis=0)
-    total = np.concatenate((np.zeros((1, x.shape[1])), np.cumsum(x - centre, axis=0)))
-    return np.asarray((total[width:] - total[:-width]) / width + centre)
+    """Means (c, n − width + 1) of every full window of x (c, n)."""
+    centre = np.cumsum(x, axis=1)[:, -1:] / x.shape[1]
+    total = np.zeros((len(x), x.shape[1] + 1))
+    np.cumsum(x - centre, axis=1, out=total[:, 1:])
+    return np.asarray((total[:, width:] - total[:, :-width]) / width + centre)

@@ -64,28 +64,30 @@ class AxesFit:
 
 def fit_axes(signals: SensorSignals, rate_hz: float, params: SetupParams) -> AxesFit | None:
     """Compare the stated axes of a gyroscope, where they do not fit all others; None = nothing is said."""
-    windows = _list_windows(signals, rate_hz, params)
+    quiet = measure_quietness(signals, rate_hz)
+    windows = _list_windows(signals, quiet.quiet, rate_hz, params)
     if len(windows) < params.least_windows:
         return None
-    gyr = signals.gyr - find_bias(signals, rate_hz)
+    gyr = signals.gyr - find_bias(signals, rate_hz, quiet)
     stated = _measure(signals.acc, gyr, windows, rate_hz)
     if stated <= params.misfit_mps2:
         return AxesFit(len(windows), stated)
     limit = stated / params.misfit_ratio
-    if all(_measure(signals.acc, gyr @ C.T, windows, rate_hz, limit) >= limit for C in CHOICES[1:]):
+    if all(_measure(signals.acc, gyr, windows, rate_hz, C, limit) >= limit for C in CHOICES[1:]):
         return AxesFit(len(windows), stated)
-    others = [_measure(signals.acc, gyr @ C.T, windows, rate_hz) for C in CHOICES[1:]]
+    others = [_measure(signals.acc, gyr, windows, rate_hz, C) for C in CHOICES[1:]]
     return AxesFit(len(windows), stated, np.array([stated, *others]))
 
 
 def refuses_choice(signals: SensorSignals, rate_hz: float, choice: Floats, params: SetupParams) -> bool:
     """Whether a sensor speaks against one of `CHOICES` that others of its export need."""
-    windows = _list_windows(signals, rate_hz, params)
+    quiet = measure_quietness(signals, rate_hz)
+    windows = _list_windows(signals, quiet.quiet, rate_hz, params)
     if len(windows) < params.least_windows:
         return False
-    gyr = signals.gyr - find_bias(signals, rate_hz)
+    gyr = signals.gyr - find_bias(signals, rate_hz, quiet)
     stated = _measure(signals.acc, gyr, windows, rate_hz)
-    chosen = _measure(signals.acc, gyr @ choice.T, windows, rate_hz)
+    chosen = _measure(signals.acc, gyr, windows, rate_hz, choice)
     return chosen > params.misfit_mps2 and chosen > params.distinct * stated
 
 
@@ -104,9 +106,8 @@ class _Window:
     part: slice
 
 
-def _list_windows(signals: SensorSignals, rate_hz: float, params: SetupParams) -> list[_Window]:
+def _list_windows(signals: SensorSignals, quiet: Bools, rate_hz: float, params: SetupParams) -> list[_Window]:
     """Averages of walking that can be carried back to a rest without a lost sample."""
-    quiet: Bools = measure_quietness(signals, rate_hz).quiet
     length, rest = round(params.sample_s * rate_hz), round(REST_S * rate_hz)
     found = []
     for a, b in (r for r in find_runs(quiet) if r[1] - r[0] >= rest):
@@ -129,13 +130,18 @@ def _moves(signals: SensorSignals, window: _Window, params: SetupParams) -> bool
 
 
 def _measure(
-    acc: Floats, gyr: Floats, windows: list[_Window], rate_hz: float, limit: float = np.inf
+    acc: Floats,
+    gyr: Floats,
+    windows: list[_Window],
+    rate_hz: float,
+    choice: Floats = CHOICES[0],
+    limit: float = np.inf,
 ) -> float:
     """RMS difference of a rest and the mean force carried back to it, m/s²; inf where above a limit."""
     total = 0.0
     for window in windows:
         step = -1.0 if window.order.step else 1.0
-        force, rate = np.ascontiguousarray(acc[window.order]), step * gyr[window.order]
+        force, rate = np.ascontiguousarray(acc[window.order]), step * (gyr[window.order] @ choice.T)
         level = AttitudeState(np.array([1.0, 0.0, 0.0, 0.0]), rate[0])
         q, _ = advance(level, rate, force, np.ones(len(force), np.bool_), rate_hz, 1.0, RIGID)
         carried = rotate(q[window.part], force[window.part])

@@ -91,7 +91,8 @@ def lay_points(  # type: ignore[no-untyped-def]
                 out[c // 3, k, s, c % 3] = value
         for k in range(b, n):
             t[s, k - b] = t[s, k]
-            x[s, k - b] = x[s, k]
+            for c in range(x.shape[2]):  # a row at once takes two seconds to compile
+                x[s, k - b, c] = x[s, k, c]
         count[s] = n - b
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from server.commands.serve import say
 from server.processes.compile_cache import VARIABLE
+from server.processes.compiling import compile_filters
 
 
 def warm() -> int:
@@ -16,8 +17,7 @@ def warm() -> int:
     What is in the folder already is only loaded. Processors differ: run it on the machine that will analyse.
     """
     steps: tuple[tuple[str, Callable[[], None]], ...] = (
-        ("live sessions", _compile_live),
-        ("pose estimators", _compile_poses),
+        ("filters of takes and of live sessions, two at a time", compile_filters),
         ("a whole analysis of a simulated walk", _analyse_walk),
     )
     say(f"Compiling into {os.environ[VARIABLE]}")
@@ -26,18 +26,6 @@ def warm() -> int:
         compile_step()
         say(f"{k} of {len(steps)}: {name}, {time.monotonic() - began:.0f} s")
     return 0
-
-
-def _compile_live() -> None:
-    from core.online import compile_live_kernels
-
-    compile_live_kernels()
-
-
-def _compile_poses() -> None:
-    from core.body.estimate import compile_pose_kernels
-
-    compile_pose_kernels()
 
 
 def _analyse_walk() -> None:

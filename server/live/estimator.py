@@ -135,7 +135,9 @@ def follow(line: Channel) -> None:
 def compile_kernels() -> None:
     """Compile the kernels or load them from the cache, before a patient stands there."""
     from core.online import compile_live_kernels
+    from server.processes.compiling import compile_filters_once
 
+    compile_filters_once()
     compile_live_kernels()
 
 

@@ -88,7 +88,9 @@ def _warm() -> None:
     from core.body import estimate
     from core.events import foot_contact
     from core.fusion import attitude
+    from server.processes.compiling import compile_filters_once
 
+    compile_filters_once()
     attitude.compile_attitude_kernel()
     compile_agreement_kernels()
     foot_contact.compile_foot_contact_kernel()

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import sagittal
 from server.demo.clinic import VISITS, DemoVisit, record
-from tests.compiling import compile_filters
+from server.processes.compiling import compile_filters
 from tests.data import ROOT
 
 LIMIT = 1.6

@@ -24,6 +24,7 @@ from core.body.erkf.gaps import bridge_gaps
 from core.body.erkf.kernel import (
     CONTACT,
     INVALID,
+    NONE_KEPT,
     PATCHED,
     STILL,
     ErkfMemory,
@@ -32,7 +33,7 @@ from core.body.erkf.kernel import (
     Links,
     Noise,
     SmootherRecord,
-    filter_forward,
+    filter_segments,
 )
 from core.body.erkf.params import ErkfParams
 from core.body.still import AT_REST, contact_samples, still_samples
@@ -172,7 +173,8 @@ def filter_block(
     EstimationError `filter_diverged` when the covariance is or becomes not positive definite.
     """
     run = prepare_run(state, inputs, tree, params)
-    broke = filter_forward(*run.arguments(), tuple(new_record(tree, params, 1)), tuple(run.output))
+    record = tuple(new_record(tree, params, 1))
+    broke = filter_segments(*run.arguments(), record, tuple(run.output), NONE_KEPT, 0, False)
     return ErkfTrack(*run.output), run.end(broke)
 
 

@@ -7,7 +7,7 @@ recordings and the smoother's second pass, so all give the same bits. What the s
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numba
 import numpy as np
@@ -25,6 +25,7 @@ from core.body.erkf.updates import (
     subtract_blocks,
     take_block,
     tilt_rows,
+    turn_apart,
     velocity_rows,
 )
 from core.frames import Bools, Floats
@@ -32,6 +33,9 @@ from core.rotation.compiled import to_matrix, turn
 
 INVALID, CONTACT, STILL, PATCHED = 1, 2, 4, 8
 """Bits of a sample's flags."""
+
+NONE_KEPT: Final[Floats] = np.empty((0, 0))
+"""`kept` of a block of which no states are kept."""
 
 
 class SmootherRecord(NamedTuple):
@@ -241,7 +245,7 @@ def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: i
         if scratch.taken[i]:
             complete_rows(P, i * m + VELOCITY)
     dx[:] = 0.0
-    B = 0
+    B = np.int64(0)  # of that type: for a literal all that takes it is compiled once more
     good = True
     for j in range(links.ends.shape[0]):
         a, c = links.ends[j, 0], links.ends[j, 1]
@@ -292,19 +296,18 @@ def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-unty
             for e in range(3):
                 var += R[i, 2, c] * P[b + 6 + max(c, e), b + 6 + min(c, e)] * R[i, 2, e]
         heading_sd[i] = np.sqrt(max(var, 0.0))
-        nominal[i] = x[i]
+        copy_row(x[i], nominal[i])
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
-def measure_joints(memory, links, noise, scratch, residual):  # type: ignore[no-untyped-def]
-    """Write how far the two ends of each joint are apart (J,), m."""
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def measure_joints(x, links, scratch, residual):  # type: ignore[no-untyped-def]
+    """Write how far both ends of each joint are apart (J,), m, in states x (n, 16) turned by `scratch.R`."""
     y = scratch.y
     for j in range(residual.shape[0]):
         a, c = links.ends[j, 0], links.ends[j, 1]
-        joint_rows(
-            memory.x, scratch.R, noise.m, a, c, links.lever[j, 0], links.lever[j, 1], True, scratch.place,
-            scratch.H, y,
-        )  # fmt: skip
+        turn_apart(scratch.R, a, c, links.lever[j, 0], links.lever[j, 1], y)
+        for r in range(3):
+            y[r] += x[c, r] - x[a, r]
         residual[j] = np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2)
 
 
@@ -319,68 +322,53 @@ def advance(memory, samples, k, links, noise, scratch, record, slot, output):  #
     for r in range(memory.dx.shape[0]):
         good &= memory.P[r, r] > 0.0 and abs(memory.dx[r]) < 1e9
     if good:
-        measure_joints(memory, links, noise, scratch, output.residual[k])
+        measure_joints(memory.x, links, scratch, output.residual[k])
     return good
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def filter_forward(memory, samples, links, noise, record, output):  # type: ignore[no-untyped-def]
-    """Filter a block, `memory` in place; sample at which the covariance broke, or −1.
-
-    All are given as plain tuples: numba looks at the fields of a named one anew in every call, 0.3 µs each.
-    """
-    memory = ErkfMemory(*memory)
-    samples = ErkfSamples(*samples)
-    links = Links(*links)
-    noise = Noise(*noise)
-    record = SmootherRecord(*record)
-    output = ErkfOutput(*output)
-    n, J = memory.x.shape[0], links.ends.shape[0]
-    scratch = ErkfScratch(
-        np.empty((n, 3, 3)), np.empty((4, 3)), np.empty(3), np.empty((10, 3)),
-        np.zeros(n, np.bool_), np.empty(n), np.empty(J), np.empty(4, np.int64), np.empty((2, 3, 3)),
-    )  # fmt: skip
-    keeps = record.V.shape[0] > 1
-    for k in range(samples.step.shape[0]):
-        slot = k if keeps else 0
-        if not advance(memory, samples, k, links, noise, scratch, record, slot, output):
-            return k
-        if keeps:
-            record.dx[slot] = memory.dx
-    for r in range(memory.P.shape[0]):
-        for c in range(r):
-            memory.P[c, r] = memory.P[r, c]
-    return -1
+def copy_row(source, target):  # type: ignore[no-untyped-def]
+    """Write one row (k,) over another; numba compiles this in a tenth of the time of `target[:] = source`."""
+    for c in range(len(target)):
+        target[c] = source[c]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def keep_state(memory, row):  # type: ignore[no-untyped-def]
     """Write the state into one row (`row_length`,), of P what is on and below the diagonal."""
+    x, before, P = memory.x, memory.before, memory.P
     at = 0
-    for part in (memory.x.ravel(), memory.before.ravel(), memory.dx):
-        row[at : at + len(part)] = part
-        at += len(part)
-    for count in memory.refused:
-        row[at] = count
-        at += 1
-    for r in range(memory.P.shape[0]):
-        row[at : at + r + 1] = memory.P[r, : r + 1]
-        at += r + 1
+    for i in range(x.shape[0]):
+        for c in range(16):
+            row[at + c] = x[i, c]
+        for c in range(6):
+            row[at + 16 + c] = before[i, c]
+        row[at + 22] = memory.refused[i]
+        at += 23
+    for r in range(P.shape[0]):
+        row[at] = memory.dx[r]
+        for c in range(r + 1):
+            row[at + 1 + c] = P[r, c]
+        at += r + 2
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def restore_state(memory, row):  # type: ignore[no-untyped-def]
     """The way back of `keep_state`; above the diagonal P stays as it is."""
+    x, before, P = memory.x, memory.before, memory.P
     at = 0
-    for part in (memory.x.ravel(), memory.before.ravel(), memory.dx):
-        part[:] = row[at : at + len(part)]
-        at += len(part)
-    for i in range(len(memory.refused)):
-        memory.refused[i] = int(row[at])
-        at += 1
-    for r in range(memory.P.shape[0]):
-        memory.P[r, : r + 1] = row[at : at + r + 1]
-        at += r + 1
+    for i in range(x.shape[0]):
+        for c in range(16):
+            x[i, c] = row[at + c]
+        for c in range(6):
+            before[i, c] = row[at + 16 + c]
+        memory.refused[i] = int(row[at + 22])
+        at += 23
+    for r in range(P.shape[0]):
+        memory.dx[r] = row[at]
+        for c in range(r + 1):
+            P[r, c] = row[at + 1 + c]
+        at += r + 2
 
 
 def row_length(n: int, N: int) -> int:
@@ -389,46 +377,62 @@ def row_length(n: int, N: int) -> int:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def filter_segments(memory, samples, links, noise, record, output, kept, segment):  # type: ignore[no-untyped-def]
-    """`filter_forward` over a whole take, the state before each segment into a row of `kept`."""
-    step, acc, gyr, flags, heading, rolling = samples
-    nominal, sd, residual, refused = output
-    for s in range(kept.shape[0]):
-        a, b = s * segment, min((s + 1) * segment, len(step))
-        keep_state(ErkfMemory(*memory), kept[s])
-        part = (step[a:b], acc[a:b], gyr[a:b], flags[a:b], heading[a:b], rolling[a:b])
-        out = (nominal[a:b], sd[a:b], residual[a:b], refused[a:b])
-        broke = filter_forward(memory, part, links, noise, record, out)
-        if broke >= 0:
-            return a + broke
-    return -1
+def filter_segments(  # type: ignore[no-untyped-def]
+    memory, samples, links, noise, record, output, kept, segment, smoothing,
+):  # fmt: skip
+    """Filter a block, `memory` in place; sample at which the covariance broke, or −1.
 
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def smooth_segments(memory, samples, links, noise, record, output, kept, segment):  # type: ignore[no-untyped-def]
-    """Filter each segment again from its row, the last first, and smooth it; `memory` is overwritten.
+    The one entry for live blocks, whole takes and the smoother, because `advance` takes a quarter of a minute
+    to compile. All are given as plain tuples: numba looks at the fields of a named one anew in every call,
+    0.3 µs each.
 
     Parameters
     ----------
-    record : room for a segment. kept : of `filter_segments`.
+    kept : (S, `row_length`) the state before each segment of so many samples, written, or with smoothing
+        read. No rows: the block is one segment, and no state is kept.
+    record : room for one sample, or with smoothing for a segment.
+    smoothing : filter each segment again from its row, the last first, and smooth it.
     """
-    step, acc, gyr, flags, heading, rolling = samples
-    nominal, sd, residual, refused = output
-    N, m = memory[1].shape[0], Noise(*noise).m
+    memory = ErkfMemory(*memory)
+    samples = ErkfSamples(*samples)
+    links = Links(*links)
+    noise = Noise(*noise)
+    record = SmootherRecord(*record)
+    output = ErkfOutput(*output)
+    n, J, N, T = memory.x.shape[0], links.ends.shape[0], memory.P.shape[0], samples.step.shape[0]
+    scratch = ErkfScratch(
+        np.empty((n, 3, 3)), np.empty((4, 3)), np.empty(3), np.empty((10, 3)),
+        np.zeros(n, np.bool_), np.empty(n), np.empty(J), np.empty(4, np.int64), np.empty((2, 3, 3)),
+    )  # fmt: skip
+    keeps = kept.shape[0] > 0
+    segments, length = (kept.shape[0], segment) if keeps else (1, T)
     lam, d = np.zeros(N), np.empty(N)
-    swept = np.empty((segment, N))
-    for s in range(kept.shape[0] - 1, -1, -1):
-        a, b = s * segment, min((s + 1) * segment, len(step))
-        restore_state(ErkfMemory(*memory), kept[s])
-        part = (step[a:b], acc[a:b], gyr[a:b], flags[a:b], heading[a:b], rolling[a:b])
-        out = (nominal[a:b], sd[a:b], residual[a:b], refused[a:b])
-        filter_forward(memory, part, links, noise, record, out)
-        sweep_back(lam, step[a:b], SmootherRecord(*record), m, swept)
-        # the covariance is again that before the segment
-        restore_state(ErkfMemory(*memory), kept[s])
-        multiply_lower(memory[1], lam, d)
-        move_smoothed(d, step[a:b], SmootherRecord(*record), m, swept, nominal[a:b])
-        measure_smoothed(nominal[a:b], Links(*links), residual[a:b])
+    swept = np.empty((length if smoothing else 0, N))
+    for i in range(segments):
+        s = segments - 1 - i if smoothing else i
+        a, b = s * length, min((s + 1) * length, T)
+        if smoothing:
+            restore_state(memory, kept[s])
+        elif keeps:
+            keep_state(memory, kept[s])
+        for k in range(a, b):
+            slot = k - a if smoothing else 0
+            if not advance(memory, samples, k, links, noise, scratch, record, slot, output):
+                return k
+            if smoothing:
+                copy_row(memory.dx, record.dx[slot])
+        if smoothing:
+            step, nominal = samples.step[a:b], output.nominal[a:b]
+            sweep_back(lam, step, record, noise.m, swept)
+            # the covariance is again that before the segment
+            restore_state(memory, kept[s])
+            multiply_lower(memory.P, lam, d)
+            move_smoothed(d, step, record, noise.m, swept, nominal)
+            measure_smoothed(nominal, links, scratch, output.residual[a:b])
+    for r in range(N):
+        for c in range(r):
+            memory.P[c, r] = memory.P[r, c]
+    return -1
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
@@ -437,7 +441,7 @@ def sweep_back(lam, step, record, m, swept):  # type: ignore[no-untyped-def]
     for k in range(len(step) - 1, -1, -1):
         for B in range(record.blocks[k] - 1, -1, -1):
             back_correct(lam, record.place[k, B], record.H[k, B], record.V[k, B], record.E[k, B])
-        swept[k] = lam
+        copy_row(lam, swept[k])
         propagate_back(lam, record.F[k], m, step[k])
 
 
@@ -479,15 +483,9 @@ def move_smoothed(d, step, record, m, swept, out):  # type: ignore[no-untyped-de
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def measure_smoothed(states, links, residual):  # type: ignore[no-untyped-def]
+def measure_smoothed(states, links, scratch, residual):  # type: ignore[no-untyped-def]
     """Write how far the two ends of each joint are apart in states (K, n, 16), (K, J), m."""
-    n = states.shape[1]
-    R, H = np.empty((n, 3, 3)), np.empty((2, 3, 3))
-    y, place = np.empty(3), np.empty(4, np.int64)
     for k in range(states.shape[0]):
-        for i in range(n):
-            to_matrix(states[k, i, 6:10], R[i])
-        for j in range(residual.shape[1]):
-            a, c = links.ends[j, 0], links.ends[j, 1]
-            joint_rows(states[k], R, 0, a, c, links.lever[j, 0], links.lever[j, 1], True, place, H, y)
-            residual[k, j] = np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2)
+        for i in range(states.shape[1]):
+            to_matrix(states[k, i, 6:10], scratch.R[i])
+        measure_joints(states[k], links, scratch, residual[k])

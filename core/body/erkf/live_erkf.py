@@ -18,7 +18,7 @@ import numpy as np
 
 from core.body.erkf.filter import ErkfInputs, links_of, memory_of, new_output, new_record, noise_of
 from core.body.erkf.gaps import HOLD_S
-from core.body.erkf.kernel import CONTACT, INVALID, STILL, ErkfSamples, filter_forward
+from core.body.erkf.kernel import CONTACT, INVALID, NONE_KEPT, STILL, ErkfSamples, filter_segments
 from core.body.erkf.params import ErkfParams
 from core.body.erkf.start import start_state
 from core.body.live_still import ROLLING_MPS
@@ -137,9 +137,8 @@ class LiveErkf:
                 step[k], signals.acc[k], signals.gyr[k], flags[k], self._heading, self._rolling
             )
             part = output.part(first, past)
-            broke = filter_forward(
-                *map(tuple, (self._memory, samples, self._links, self._noise, self._record, part))
-            )
+            given = map(tuple, (self._memory, samples, self._links, self._noise, self._record, part))
+            broke = filter_segments(*given, NONE_KEPT, 0, False)
             if broke >= 0:
                 states[first + broke :], residual[first + broke :], self.broken = np.nan, np.nan, True
                 break

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, memory_of, new_record, prepare_run
-from core.body.erkf.kernel import filter_segments, row_length, smooth_segments
+from core.body.erkf.kernel import filter_segments, row_length
 from core.body.erkf.params import ErkfParams
 from core.body.tree import ImuTree
 from core.errors import ParameterError
@@ -52,8 +52,10 @@ def smooth(
     run = prepare_run(state, inputs, tree, params)
     kept = np.empty((-(-T // segment), row_length(n, n * params.states)))
     output = tuple(run.output)
-    broke = filter_segments(*run.arguments(), tuple(new_record(tree, params, 1)), output, kept, segment)
+    record = tuple(new_record(tree, params, 1))
+    broke = filter_segments(*run.arguments(), record, output, kept, segment, False)
     final = run.end(broke)
     again = replace(run, memory=memory_of(final))
-    smooth_segments(*again.arguments(), tuple(new_record(tree, params, segment)), output, kept, segment)
+    record = tuple(new_record(tree, params, segment))
+    filter_segments(*again.arguments(), record, output, kept, segment, True)
     return ErkfTrack(*run.output), final

@@ -23,16 +23,23 @@ POSITION, VELOCITY = 0, 3
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
+def turn_apart(R, i, j, ri, rj, y):  # type: ignore[no-untyped-def]
+    """Write R_j r_j − R_i r_i (3,)."""
+    for k in range(3):
+        y[k] = R[j, k, 0] * rj[0] + R[j, k, 1] * rj[1] + R[j, k, 2] * rj[2]
+        y[k] -= R[i, k, 0] * ri[0] + R[i, k, 1] * ri[1] + R[i, k, 2] * ri[2]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-untyped-def]
     """Joint centre p_i + R_i r_i = p_j + R_j r_j, or with centre False joint axis R_i e_i = R_j e_j."""
     place[FIRST], place[SECOND] = i * m, j * m
     place[UNIT], place[TURNS] = (POSITION if centre else -1), 1
     times_cross(R[i], ri, -1.0, H[0])
     times_cross(R[j], rj, 1.0, H[1])
-    for k in range(3):
-        y[k] = R[j, k, 0] * rj[0] + R[j, k, 1] * rj[1] + R[j, k, 2] * rj[2]
-        y[k] -= R[i, k, 0] * ri[0] + R[i, k, 1] * ri[1] + R[i, k, 2] * ri[2]
-        if centre:
+    turn_apart(R, i, j, ri, rj, y)
+    if centre:
+        for k in range(3):
             y[k] += x[j, k] - x[i, k]
 
 
@@ -218,22 +225,27 @@ def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyp
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def subtract_blocks(P, V, blocks):  # type: ignore[no-untyped-def]
-    """P ← P − Σ VᵀV on and below the diagonal, two rows at a time; V (≥ blocks, 3, as P).
+    """P ← P − Σ VᵀV on and below the diagonal, four rows at a time; V (≥ blocks, 3, as P).
 
-    A row is run through up to a whole line of the cache; what is above the diagonal means nothing.
+    A row is run through up to a whole line of the cache; what is above the diagonal means nothing. Two rows
+    at a time take 1.4 times as long, eight no less.
     """
     N, wide = P.shape
-    for r in range(0, N - 1, 2):
-        p0, p1 = P[r], P[r + 1]
+    for r in range(0, N - 3, 4):
+        p0, p1, p2, p3 = P[r], P[r + 1], P[r + 2], P[r + 3]
         for a in range(blocks):
             x, y, z = V[a, 0], V[a, 1], V[a, 2]
             x0, y0, z0 = x[r], y[r], z[r]
             x1, y1, z1 = x[r + 1], y[r + 1], z[r + 1]
-            for c in range(min(wide, (r + 9) // 8 * 8)):
-                p0[c] -= x0 * x[c] + y0 * y[c] + z0 * z[c]
-                p1[c] -= x1 * x[c] + y1 * y[c] + z1 * z[c]
-    if N % 2:
-        r = N - 1
+            x2, y2, z2 = x[r + 2], y[r + 2], z[r + 2]
+            x3, y3, z3 = x[r + 3], y[r + 3], z[r + 3]
+            for c in range(min(wide, (r + 11) // 8 * 8)):
+                u, v, w = x[c], y[c], z[c]
+                p0[c] -= x0 * u + y0 * v + z0 * w
+                p1[c] -= x1 * u + y1 * v + z1 * w
+                p2[c] -= x2 * u + y2 * v + z2 * w
+                p3[c] -= x3 * u + y3 * v + z3 * w
+    for r in range(N // 4 * 4, N):
         p0 = P[r]
         for a in range(blocks):
             x, y, z = V[a, 0], V[a, 1], V[a, 2]

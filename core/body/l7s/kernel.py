@@ -101,7 +101,7 @@ def apply_measurement(R, p, v, P, measured, three, step, z_variance, heights, r,
         log_so3(work[0], phi)
         for i in range(3):
             index[0], value[0] = 6 * b + 3 + i, 1.0
-            apply_row(P, dx, index, value, 1, phi[i], r[0], gain)
+            apply_row(P, dx, index[:1], value[:1], phi[i], r[0], gain)
     for axis in range(2):
         for b in range(3):
             share = 1.0 if b == 0 else -0.5
@@ -109,17 +109,17 @@ def apply_measurement(R, p, v, P, measured, three, step, z_variance, heights, r,
                 index[3 * b + i] = 6 * b + i
                 value[3 * b + i] = share * R[b, axis, i]
         residual = -(p[0, axis] - 0.5 * p[1, axis] - 0.5 * p[2, axis])
-        apply_row(P, dx, index, value, 9, residual, r[1], gain)
+        apply_row(P, dx, index[:9], value[:9], residual, r[1], gain)
     for b in range(3):
         for i in range(3):
             index[i], value[i] = 6 * b + i, R[b, 2, i]
         height, variance = (heights[0], r[2]) if b == 0 else (heights[1], z_variance[b - 1])
-        apply_row(P, dx, index, value, 3, height - p[b, 2], variance, gain)
+        apply_row(P, dx, index[:3], value[:3], height - p[b, 2], variance, gain)
     for leg in range(2):
         if step[leg]:
             for i in range(3):
                 index[0], value[0] = VELOCITY + 3 * (1 + leg) + i, 1.0
-                apply_row(P, dx, index, value, 1, -v[1 + leg, i], r[4], gain)
+                apply_row(P, dx, index[:1], value[:1], -v[1 + leg, i], r[4], gain)
     if not three:
         theta = np.arctan2(R[1, 1, 2] + R[2, 1, 2], R[1, 0, 2] + R[2, 0, 2])
         c, s = np.cos(theta), np.sin(theta)
@@ -136,7 +136,7 @@ def apply_measurement(R, p, v, P, measured, three, step, z_variance, heights, r,
                 for k in range(3):
                     index[1 + 3 * leg + k] = 6 * (1 + leg) + 3 + k
                     value[1 + 3 * leg + k] = -R[0, 2, i] * rows[leg, k]
-            apply_row(P, dx, index, value, 7, phi[i], r[3], gain)
+            apply_row(P, dx, index[:7], value[:7], phi[i], r[3], gain)
     inject(R, p, v, dx, work)
 
 

@@ -194,12 +194,12 @@ def _interpolate(slow: Floats, at: np.ndarray, n: int) -> Floats:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _add(band, slope, index, value, count, residual, weight):  # type: ignore[no-untyped-def]
+def _add(band, slope, index, value, residual, weight):  # type: ignore[no-untyped-def]
     """Add one row, `value` at `index`, to the normal equations: lower band and right side."""
-    for a in range(count):
+    for a in range(len(index)):
         w = weight * value[a]
         slope[index[a]] += w * residual
-        for b in range(count):
+        for b in range(len(index)):
             if index[a] >= index[b]:
                 band[index[a] - index[b], index[b]] += w * value[b]
 
@@ -234,30 +234,30 @@ def write_equations(  # type: ignore[no-untyped-def]
         o = 9 * k
         for j in range(9):
             index[0], value[0] = o + j, 1.0
-            _add(band, slope, index, value, 1, x[k, j] - start[k, j], hop / ANYWHERE)
+            _add(band, slope, index[:1], value[:1], x[k, j] - start[k, j], hop / ANYWHERE)
             if 0 < k < T - 1:
                 index[0], index[1], index[2] = o + j - 9, o + j, o + j + 9
                 value[0], value[1], value[2] = 1.0, -2.0, 1.0
                 residual = x[k - 1, j] - 2.0 * x[k, j] + x[k + 1, j] - bent[k, j]
                 most = max(density[k - 1, j // 3], density[k, j // 3])
-                _add(band, slope, index, value, 3, residual, 1.0 / (most * hop**3))
+                _add(band, slope, index[:3], value[:3], residual, 1.0 / (most * hop**3))
         for i in range(2):
             index[0], index[1], index[2] = o + i, o + 3 + i, o + 6 + i
             value[0], value[1], value[2] = 1.0, -0.5, -0.5
             residual = x[k, i] - 0.5 * x[k, 3 + i] - 0.5 * x[k, 6 + i]
-            _add(band, slope, index, value, 3, residual, hop / MID_PELVIS)
+            _add(band, slope, index[:3], value[:3], residual, hop / MID_PELVIS)
         index[0], value[0] = o + 2, 1.0
-        _add(band, slope, index, value, 1, x[k, 2] - heights[0], hop / PELVIS_HEIGHT)
+        _add(band, slope, index[:1], value[:1], x[k, 2] - heights[0], hop / PELVIS_HEIGHT)
         for leg in range(2):
             f = 3 * (1 + leg)
             index[0], value[0] = o + f + 2, 1.0
             spread = FOOT_HEIGHT[0] if still[k, leg] else FOOT_HEIGHT[1]
-            _add(band, slope, index, value, 1, x[k, f + 2] - heights[1], hop / spread)
+            _add(band, slope, index[:1], value[:1], x[k, f + 2] - heights[1], hop / spread)
             if still[k, leg] and k < T - 1:
                 for i in range(3):
                     index[0], index[1] = o + f + i, o + f + i + 9
                     value[0], value[1] = -1.0, 1.0
-                    _add(band, slope, index, value, 2, x[k + 1, f + i] - x[k, f + i], 1.0 / REST_M**2)
+                    _add(band, slope, index[:2], value[:2], x[k + 1, f + i] - x[k, f + i], 1.0 / REST_M**2)
             reach = _reach(R[k], x[k].reshape(3, 3), leg, lengths, tau)
             across = 0.0
             for i in range(3):
@@ -265,13 +265,13 @@ def write_equations(  # type: ignore[no-untyped-def]
                 across += y * tau[i]
                 index[i], value[i] = o + i, y
                 index[3 + i], value[3 + i] = o + f + i, -y
-            _add(band, slope, index, value, 6, across, hop / HINGE)
+            _add(band, slope, index[:6], value[:6], across, hop / HINGE)
             for i in range(3):
                 value[i], value[3 + i] = tau[i] / reach, -tau[i] / reach
             if still[k, leg] and not still[k, 1 - leg]:
-                _add(band, slope, index, value, 6, reach - lengths[3], hop / CARRIES)
+                _add(band, slope, index[:6], value[:6], reach - lengths[3], hop / CARRIES)
             if reach > lengths[2]:
-                _add(band, slope, index, value, 6, reach - lengths[2], hop / LONGER)
+                _add(band, slope, index[:6], value[:6], reach - lengths[2], hop / LONGER)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

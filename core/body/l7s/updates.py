@@ -21,9 +21,9 @@ VELOCITY = 18
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def apply_row(P, dx, index, value, count, residual, variance, gain):  # type: ignore[no-untyped-def]
-    """One row of the stacked update: H has `count` entries `value` at `index`; gain (27,) is scratch."""
-    total = variance
+def apply_row(P, dx, index, value, residual, variance, gain):  # type: ignore[no-untyped-def]
+    """One row of the stacked update: H is `value` (k,) at `index` (k,), else 0; gain (27,) is scratch."""
+    total, count = variance, len(index)
     for j in range(N):
         s = 0.0
         for k in range(count):

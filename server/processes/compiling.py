@@ -1,0 +1,84 @@
+"""All filters compiled by two processes at a time, once for a user and version of them."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+import core
+from server.processes.compile_cache import VARIABLE, has_compiled_filters
+
+Order = tuple[tuple[str, str], ...]
+"""Modules and their functions that compile something, in order."""
+
+OFFLINE: Final[tuple[Order, Order]] = (
+    (("core.body.estimate", "compile_erkf_kernels"),),
+    (
+        ("core.fusion.attitude", "compile_attitude_kernel"),
+        ("core.events", "compile_foot_contact_kernel"),
+        ("core.agreement.slips", "compile_agreement_kernels"),
+        ("core.quality.stuck", "compile_stuck_kernel"),
+        ("core.filtering", "compile_low_pass"),
+        ("core.peaks", "compile_peak_kernels"),
+    ),
+)
+"""What each of two processes compiles for the analysis of a walk: the ErKF takes as long as all others."""
+
+ALL: Final[tuple[Order, Order]] = (
+    (*OFFLINE[0], ("core.online.session", "compile_live_kernels")),
+    (
+        *OFFLINE[1],
+        ("core.body.l7s.poses", "compile_l7s_kernel"),
+        ("core.timeline.live", "compile_axis_kernels"),
+    ),
+)
+"""The same with those of few sensors and of live takes, which read from the folder what is done meanwhile."""
+
+
+def compile_filters(orders: tuple[Order, Order] = ALL) -> None:
+    """Fill the folder of compiled filters that `server.processes.compile_cache` names.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        a filter does not compile.
+    """
+    # where the package lies, whether it is installed or not
+    root = str(Path(core.__file__ or "").parent.parent)
+    searched = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
+    running = [
+        subprocess.Popen(  # noqa: S603 - our own modules, named above
+            [sys.executable, "-c", "\n".join(f"from {room} import {name}; {name}()" for room, name in order)],
+            env={**os.environ, "PYTHONPATH": searched},
+        )
+        for order in orders
+    ]
+    ended = [process.wait() for process in running]
+    for process, code in zip(running, ended, strict=True):
+        if code:
+            raise subprocess.CalledProcessError(code, process.args)
+
+
+def compile_filters_once(orders: tuple[Order, Order] = ALL) -> None:
+    """The same where the folder holds none; processes that ask at once wait for the one that compiles.
+
+    What fails here is compiled where it is first called, and fails there.
+    """
+    if has_compiled_filters():
+        return
+    folder = Path(os.environ[VARIABLE])
+    with suppress(OSError, subprocess.CalledProcessError):
+        folder.mkdir(parents=True, exist_ok=True)
+        # who holds the folder compiles; it is free again when that process ends, however it ends
+        lock = os.open(folder, os.O_RDONLY)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not has_compiled_filters():
+                compile_filters(orders)
+        finally:
+            os.close(lock)

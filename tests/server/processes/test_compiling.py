@@ -1,0 +1,42 @@
+"""Whoever needs the filters first compiles them; others wait and find them."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from server.processes import compiling
+from server.processes.compile_cache import VARIABLE
+
+
+def test_of_many_that_ask_at_once_one_compiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, asked = tmp_path / "filters", []
+
+    def compile_slowly(orders: object) -> None:
+        asked.append(orders)
+        time.sleep(0.05)
+        (folder / "kernel.nbi").touch()
+
+    monkeypatch.setenv(VARIABLE, str(folder))
+    monkeypatch.setattr(compiling, "compile_filters", compile_slowly)
+    with ThreadPoolExecutor(4) as pool:
+        for done in [pool.submit(compiling.compile_filters_once, compiling.OFFLINE) for _ in range(4)]:
+            done.result()
+    assert asked == [compiling.OFFLINE]
+
+
+def test_a_filter_that_does_not_compile_is_left_to_its_caller(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    compiling.compile_filters_once(((("core.nowhere", "compile_nothing"),), (("math", "nothing"),)))
+
+
+@pytest.mark.parametrize("order", [*compiling.ALL])
+def test_every_order_names_what_there_is(order: compiling.Order) -> None:
+    for room, name in order:
+        assert callable(getattr(importlib.import_module(room), name))
