@@ -18,13 +18,11 @@ from core.calibration import CalibrationParams
 from core.calibration.result import CalibratedRecording
 from core.calibration.score import CalibrationScore, score_calibration
 from core.errors import Notice
-from core.filtering import compile_low_pass
 from core.frames import Segment
 from core.fusion.attitude import compile_attitude_kernel
 from core.fusion.mahony import MahonyParams, estimate_orientations
 from core.fusion.orientations import Orientations
 from core.online.frame import SegmentCheck
-from core.peaks import compile_peak_kernels
 from core.recording import UniformRecording
 
 
@@ -140,9 +138,8 @@ def _check(segment: Segment, calibrated: CalibratedRecording, notices: Sequence[
 
 def compile_calibration_kernels() -> None:
     """Load and compile all that a calibration needs, so that the first one does not take a second longer."""
-    import scipy.ndimage  # noqa: F401
+    import scipy.ndimage
+    import scipy.signal  # noqa: F401
 
-    compile_low_pass()
-    compile_peak_kernels()
     compile_attitude_kernel()
     compile_pose_kernels()

@@ -23,8 +23,6 @@ OFFLINE: Final[tuple[Order, Order]] = (
         ("core.events", "compile_foot_contact_kernel"),
         ("core.agreement.slips", "compile_agreement_kernels"),
         ("core.quality.stuck", "compile_stuck_kernel"),
-        ("core.filtering", "compile_low_pass"),
-        ("core.peaks", "compile_peak_kernels"),
     ),
 )
 """What each of two processes compiles for the analysis of a walk: the ErKF takes as long as all others."""
