@@ -21,9 +21,10 @@ from core.agreement.terms import find_thinning, find_usable, low_pass_terms, tak
 from core.body.corrected import correct_signals
 from core.body.model import BodyModel
 from core.body.places import joint_places, sensor_place
+from core.calibration.knee_axis import KneeAxes, measure_knees
 from core.calibration.result import CalibratedRecording
 from core.filtering import low_pass
-from core.frames import Bools, Floats, Segment
+from core.frames import Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.rest import index_window
 from core.rotation import conjugate, from_matrix, multiply, to_matrix
@@ -122,10 +123,16 @@ class JointCentre:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredArms:
-    """Places of the sensors and centres of the joints of one take."""
+    """Places of the sensors and centres of the joints of one take.
+
+    Parameters
+    ----------
+    knees : hinges of the knees from rates alone; the filter does not use them.
+    """
 
     sensors: Mapping[Segment, SensorPlace]
     joints: Mapping[LegJoint, JointCentre]
+    knees: Mapping[Side, KneeAxes]
 
     @property
     def places(self) -> dict[Segment, Floats]:
@@ -220,7 +227,7 @@ def measure_arms(
         joints[joint] = JointCentre(
             guess, fitted[part], fitted_sd[part], misfits.get(joint), asked=joint in heard
         )
-    return MeasuredArms(sensors, joints)
+    return MeasuredArms(sensors, joints, measure_knees(calibrated))
 
 
 def _kind(segment: Segment) -> str:
