@@ -83,9 +83,7 @@ def _view_place(title: str, left: bool, stored: Mapping[str, Any], measured: Seq
     out = (1.0, 1.0, -1.0 if left else 1.0)
     found, guess = ([a * b for a, b in zip(stored[k], out, strict=True)] for k in ("cm", "guess_cm"))
     spread = stored["sd_cm"]
-    a, b, c = (
-        f"{format_number(x, 1)} ± {format_number(sd, 1)}" for x, sd in zip(found, spread, strict=True)
-    )
+    a, b, c = (f"{format_number(x, 1)} ± {format_number(sd, 1)}" for x, sd in zip(found, spread, strict=True))
     off = [
         f"{format_number(abs(x - y), 1)} cm {axis if x > y else OPPOSITE[axis]}"
         for axis, x, y, sd, heard in zip(AXES, found, guess, spread, measured, strict=True)

@@ -153,9 +153,6 @@ def place_figure(
 def foot_tracks(run: ErkfRun, orientations: Orientations, body: BodyModel) -> FootTracks:
     """Paths of the run's feet; linked when both hang on the same pelvis.
 
-    A path is that of the ankle as it lies from the sensor by its nominal place: a shoe's sole is measured
-    from the sensor, too, so what that place is wrong by cancels.
-
     Parameters
     ----------
     orientations : refined by this run.
@@ -163,19 +160,18 @@ def foot_tracks(run: ErkfRun, orientations: Orientations, body: BodyModel) -> Fo
     origin = run.tree.segment_origin(run.track.p, run.track.q)
     at: dict[Side, int] = {s: run.segments.index(FOOT[s]) for s in SIDES if FOOT[s] in run.segments}
     patched = run.inputs.patched
-    # from the ankle by the place that was used to the ankle by the nominal one
-    shift = {FOOT[s]: run.tree.place[i] - sensor_place(FOOT[s], body) for s, i in at.items()}
     linked = len(at) == 2 and not ({FOOT[s] for s in at} & {run.segments[i] for i in run.tree.roots()})
     return FootTracks(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
-        p={s: origin[:, i] + rotate(orientations.q[FOOT[s]], shift[FOOT[s]]) for s, i in at.items()},
+        p={s: np.ascontiguousarray(origin[:, i]) for s, i in at.items()},
         q={s: orientations.q[FOOT[s]] for s in at},
         still={s: run.inputs.contact[:, i] for s, i in at.items()},
         valid={s: orientations.valid[FOOT[s]] for s in at},
         patched={}
         if patched is None
         else {s: patched[:, i] & ~run.inputs.contact[:, i] for s, i in at.items()},
+        sensor_ahead={s: float(run.tree.place[i, 0] - sensor_place(FOOT[s], body)[0]) for s, i in at.items()},
         linked=linked,
         source=LINKED_PATHS if linked else SINGLE_PATHS,
         body=body,
