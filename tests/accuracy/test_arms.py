@@ -16,7 +16,7 @@ from core.body.arms import MeasuredArms
 from core.body.erkf.poses import ErkfRun, foot_tracks, replace_orientations, run_erkf
 from core.body.mounting import MountedSensors
 from core.body.tree import PRESETS
-from core.frames import FOOT, SIDES, Bools, Floats
+from core.frames import FOOT, SHANK, SIDES, Bools, Floats
 from core.pipeline import TakeAnalysis, analyse
 from core.rest import index_window
 from core.rotation import wrap_angle
@@ -29,7 +29,7 @@ from tests.walks import analysed
 
 pytestmark = pytest.mark.accuracy
 
-PEOPLE = (("comfortable", 0), ("slow", 1), ("hemiparetic", 7), ("parkinson", 7), ("crouch", 7))
+PEOPLE = (("slow", 1), ("hemiparetic", 7), ("crouch", 7))
 ANGLES = (
     "hip_flexion", "knee_flexion", "ankle_dorsiflexion", "hip_adduction", "knee_adduction", "ankle_inversion",
 )  # fmt: skip
@@ -99,18 +99,18 @@ def test_write_down_what_arms_from_motion_gain() -> None:
     both = [scores(x.angles_deg)[1] for x in real_chains()]
     cells = []
     for name in ANGLES:
-        a, b = ("/".join(f"{x[f'{name}_{s}'].offset_removed:.1f}" for s in "rl") for x in both)
-        cells.append(f"{a} → {b}")
+        pair = ["/".join(f"{x[f'{name}_{s}'].offset_removed:.1f}" for s in "rl") for x in both]
+        cells.append(" → ".join(pair))
     ways = ["/".join(f"{x.strides_cm()[s].mean():+.1f}" for s in reversed(SIDES)) for x in real_chains()]
     rows.append(["neura_walk, right/left", *cells, " → ".join(ways)])
     record(
         "Places and centres from motion",
         ["person", *(n.replace("_", " ") + " °" for n in ANGLES), "bias of strides cm"],
         rows,
-        "ErKF and smoother with nominal places → with those from motion. Simulated people on skin with sensors "
-        "off their nominal places: RMS while walking, both sides; neura_walk: offset removed, against Vicon. "
-        f"{_say_joints()} Limits: no flexion of simulated people worse by 0.05°, no other angle by 0.15°, bias of "
-        "strides within 1.5 cm; no angle of neura_walk worse by 0.15°.",
+        "ErKF and smoother with nominal places → with those from motion. Simulated people on skin with "
+        "sensors off their nominal places: RMS while walking, both sides; neura_walk: offset removed, "
+        f"against Vicon. {_say_joints()} Limits: no flexion of simulated people worse by 0.05°, no other "
+        "angle by 0.15°, bias of strides within 1.5 cm; no angle of neura_walk worse by 0.15°.",
     )
     for usual, ours in simulated_scores().values():
         worse = np.array(ours[0]) - np.array(usual[0])
@@ -119,10 +119,8 @@ def test_write_down_what_arms_from_motion_gain() -> None:
         assert abs(ours[1]) < 1.5
     bias = [float(np.sqrt(np.mean([x[k][1] ** 2 for x in simulated_scores().values()]))) for k in (0, 1)]
     assert bias[1] < 0.7 * bias[0]
-    for name in ANGLES:
-        for s in "rl":
-            a, b = (x[f"{name}_{s}"].offset_removed for x in both)
-            assert b < a + 0.15, name
+    for key in (f"{name}_{s}" for name in ANGLES for s in "rl"):
+        assert both[1][key].offset_removed < both[0][key].offset_removed + 0.15, key
 
 
 @cache
@@ -148,12 +146,10 @@ def _say_joints() -> str:
 
 def test_left_and_right_sit_alike_on_real_people() -> None:
     """Nothing ties both legs together: who was fitted alike on both sides must come out alike."""
-    made = real_chains()[1]
-    assert made.run.tree.place.shape == (7, 3)
     mounted = other_person().mounted
     assert mounted is not None
     assert mounted.arms is not None
-    for kind in ("shank", "foot"):
-        a, b = (mounted.arms.sensors[f"{kind}_{s}"] for s in "rl")
+    for pair in (SHANK, FOOT):
+        a, b = (mounted.arms.sensors[pair[s]] for s in ("right", "left"))
         apart = np.abs((a.place - b.place * [1, 1, -1])[:2])
-        assert (apart < 3.0 * np.hypot(a.sd, b.sd)[:2]).all(), kind
+        assert (apart < 3.0 * np.hypot(a.sd, b.sd)[:2]).all(), pair
