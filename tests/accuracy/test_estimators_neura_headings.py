@@ -114,8 +114,9 @@ def test_write_down_the_figures() -> None:
         rows,
         "Largest move of any sensor against the pelvis', and of any forward axis against the median, when "
         "starts are turned about the vertical and the whole chain runs from there. Limit 2° for one of ±30°, "
-        "2.5° for all; larger starts are reported only. Alternately turned starts move the median itself, which no joint can see. "
-        "Against the acceleration of Vicon's markers, thigh, shank, foot relative to the pelvis, °: "
+        "2.5° for all; larger starts are reported only. Alternately turned starts move the median itself, "
+        "which no joint can see. Against the acceleration of Vicon's markers, thigh, shank, foot relative to "
+        "the pelvis, °: "
         f"{told}; limit 3° on the right. On the left this reference and the joints contradict each other; "
         "which is right is undecided.",
     )
