@@ -157,7 +157,9 @@ class _Take:
         """Run the ErKF and its smoother."""
         if self.mounted.failure is not None:
             raise self.mounted.failure
-        run = run_erkf(self.calibrated, self.orientations, self.body, segments, self.params.erkf)
+        run = run_erkf(
+            self.calibrated, self.orientations, self.body, segments, self.params.erkf, self.mounted.arms
+        )
         orientations = replace_orientations(run, self.orientations)
         poses = place_figure(run, orientations, self.contacts, self.body)
         health, turned = erkf_health(run), self.mounted.turned_rad

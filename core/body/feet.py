@@ -23,6 +23,8 @@ class FootTracks:
     source : `core.estimators.LINKED_PATHS` or `SINGLE_PATHS`; live their live twins.
     patched : side → (n,) packets were lost while the foot moved, and a straight line says too little of it.
     posture : what the feet's neutral posture and direction are of; toe-out is told from standing alone.
+    sensor_ahead : side → how far ahead of its nominal place the sensor was found to sit, m, 0 where not
+        given; a shoe's sole is measured from the sensor.
     withheld : side → reason why no distance of this foot is told (core/withheld.py).
     """
 
@@ -37,4 +39,5 @@ class FootTracks:
     body: BodyModel
     withheld: Mapping[Side, str] = field(default_factory=dict)
     patched: Mapping[Side, Bools] = field(default_factory=dict)
+    sensor_ahead: Mapping[Side, float] = field(default_factory=dict)
     posture: Posture = "standing"

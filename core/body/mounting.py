@@ -1,8 +1,9 @@
 """How the sensors sit, once more, as the whole body shows it: standing width, and joints that must meet.
 
-Calibration finds each sensor's mounting on its own. Two things only the body as a whole tells: how far legs
-lean that stand wider or closer than the hips (apart.py), and which forward axes do not fit the joints
-(headings.py). Live and from a file it is the same function.
+Calibration finds each sensor's mounting on its own. Three things only the body as a whole tells: how far legs
+lean that stand wider or closer than the hips (apart.py), which forward axes do not fit the joints
+(headings.py), and where on its segment a sensor sits (arms.py). Live and from a file it is the same
+function.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from core.body.apart import lean_legs_apart
+from core.body.arms import MeasuredArms, measure_arms
 from core.body.choice import Choice, choose
 from core.body.erkf.headings import align_forward_axes
 from core.body.kinematics import nominal_body
@@ -33,6 +35,8 @@ class MountedSensors:
     body : lengths and standing width. assumed : notices of lengths that nobody gave.
     choice : the sensors that work and what they allow.
     turned_rad : segment → how far its forward axis was turned; empty where the ErKF is not the estimator.
+    arms : where its sensors sit and its joints lie, as motion shows it; None where the ErKF is not the
+        estimator.
     failure : the joints could not be asked, so the ErKF cannot run either.
     """
 
@@ -42,13 +46,14 @@ class MountedSensors:
     assumed: tuple[Notice, ...]
     choice: Choice
     turned_rad: Mapping[Segment, float] = field(default_factory=dict)
+    arms: MeasuredArms | None = None
     failure: EstimationError | None = None
 
 
 def mount_sensors(
     calibrated: CalibratedRecording, orientations: Orientations, params: PoseParams
 ) -> MountedSensors:
-    """Lean the legs by the standing width, and turn forward axes until the joints agree.
+    """Lean the legs by the standing width, turn forward axes until the joints agree, and measure the arms.
 
     Parameters
     ----------
@@ -77,4 +82,5 @@ def mount_sensors(
         if choice.order == (ERKF.name,):
             raise
         return replace(mounted, failure=error)
-    return replace(mounted, calibrated=calibrated, orientations=orientations, turned_rad=turned)
+    arms = measure_arms(calibrated, orientations, body, choice.segments, params.arms)
+    return replace(mounted, calibrated=calibrated, orientations=orientations, turned_rad=turned, arms=arms)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import get_args
 
+from core.body.arms import ArmParams
 from core.body.erkf.params import ErkfParams
 from core.body.kinematics import AnchorParams
 from core.body.l7s.filter import L7sParams
@@ -20,7 +21,7 @@ class PoseParams:
     ----------
     estimator : "auto" picks by what is worn.
     least_valid : share of the take a sensor must be there for (our choice).
-    anchor : of the figure without a filter.
+    arms : of the places of sensors and joints. anchor : of the figure without a filter.
 
     Raises
     ------
@@ -29,6 +30,7 @@ class PoseParams:
 
     estimator: Requested = AUTO
     erkf: ErkfParams = field(default_factory=ErkfParams.people)
+    arms: ArmParams = field(default_factory=ArmParams)
     l7s: L7sParams = field(default_factory=L7sParams)
     anchor: AnchorParams = field(default_factory=AnchorParams)
     least_valid: float = 0.5

@@ -172,6 +172,7 @@ def person_tree(
     mounts: Mapping[Segment, Floats],
     segments: Sequence[Segment],
     places: Mapping[Segment, Floats] | None = None,
+    centres: Mapping[tuple[Segment, Segment], Floats] | None = None,
 ) -> ImuTree:
     """The tree of the worn sensors; neighbours on the body are joined, knees are hinges.
 
@@ -180,6 +181,8 @@ def person_tree(
     mounts : segment → (3, 3) R_segment_sensor (`SegmentCalibration.R_segment_sensor`).
     segments : in this order, a `PRESETS` entry or any other set.
     places : segment → (3,) sensor in segment axes, m; nominal where not given.
+    centres : (proximal, distal) → (3,) the joint's centre in the axes of the proximal segment, m; by the body
+        model where not given.
 
     Raises
     ------
@@ -202,6 +205,7 @@ def person_tree(
     for (proximal, distal), (above, below) in joint_places(body).items():
         if proximal not in index or distal not in index:
             continue
+        above = (centres or {}).get((proximal, distal), above)
         i, j = index[proximal], index[distal]
         to_i, to_j = to_matrix(conjugate(q_mount[i])), to_matrix(conjugate(q_mount[j]))
         hinge = distal.startswith(HINGED)

@@ -12,13 +12,26 @@ from typing import Final
 
 import numpy as np
 
-from core.frames import Floats
+from core.calibration.result import CalibratedRecording
+from core.frames import SHANK, SIDES, THIGH, Floats, Side
+from core.rest import index_window
 
 MOST_SAMPLES: Final = 2000
 """More are thinned: a step has some fifty of its own."""
 
 STEEPEST: Final = radians(45.0)
 """A hinge found further out of the horizontal plane of its segment is no knee, but skin (our choice)."""
+
+KNEE_SEEN: Final = 6.0
+"""Seconds of straight walking below which skin decides where a knee's axis comes out
+(docs/science/calibration.md, "Score")."""
+
+INDEPENDENT: Final = 13.0
+"""The whole walk counts as so many independent samples, those of one stride below 6 Hz: skin moves with every
+stride alike."""
+
+SKIN_SD: Final = radians(1.5)
+"""What skin turns the axis by that no misfit shows, on simulated people."""
 
 ROUNDS: Final = 20
 SETTLED: Final = 1e-4
@@ -34,16 +47,41 @@ class KneeAxes:
     ----------
     thigh, shank : its turn about the long axis of the segment from the medio-lateral axis, rad.
     steepest : the larger angle of the two out of the segment's horizontal plane, rad.
+    thigh_sd, shank_sd : standard deviations of the turns, rad.
     """
 
     thigh: float
     shank: float
     steepest: float
+    thigh_sd: float
+    shank_sd: float
 
     @property
     def apart(self) -> float:
         """By how much the forward axes of thigh and shank disagree about it, rad."""
         return self.thigh - self.shank
+
+
+def measure_knees(calibrated: CalibratedRecording) -> dict[Side, KneeAxes]:
+    """The hinge of every knee both of whose sensors were seen in enough straight walking."""
+    recording, mounted = calibrated.recording, calibrated.calibration.segments
+    straight = np.zeros(len(recording.t_s), np.bool_)
+    for window in calibrated.calibration.walking:
+        straight[index_window(window, recording.rate_hz)] = True
+    found: dict[Side, KneeAxes] = {}
+    for side in SIDES:
+        pair = (THIGH[side], SHANK[side])
+        if not set(pair) <= set(mounted):
+            continue
+        seen = np.logical_and.reduce([straight, *(recording.sensors[s].valid for s in pair)])
+        if np.count_nonzero(seen) < KNEE_SEEN * recording.rate_hz:
+            continue
+        thigh, shank = (
+            (recording.sensors[s].gyr[seen] - mounted[s].gyro_bias) @ mounted[s].R_segment_sensor.T
+            for s in pair
+        )
+        found[side] = find_knee_axes(thigh, shank)
+    return found
 
 
 def find_knee_axes(thigh: Floats, shank: Floats) -> KneeAxes:
@@ -66,7 +104,11 @@ def find_knee_axes(thigh: Floats, shank: Floats) -> KneeAxes:
         x += step * min(1.0, LONGEST_STEP / max(size, 1e-12))
         if size < SETTLED:
             break
-    return KneeAxes(float(x[0]), float(x[2]), float(max(abs(x[1]), abs(x[3]))))
+    independent = min(len(first), INDEPENDENT)
+    # the ridge counts as much beside the measurements as it did in the fit
+    information = J.T @ J * (independent / len(first) / max(float(np.mean((e2 - e1) ** 2)), 1e-12))
+    sd = np.sqrt(np.diag(np.linalg.inv(information)) + SKIN_SD**2)
+    return KneeAxes(float(x[0]), float(x[2]), float(max(abs(x[1]), abs(x[3]))), float(sd[0]), float(sd[2]))
 
 
 def _measure_across(rate: Floats, turn: Floats) -> tuple[Floats, Floats]:

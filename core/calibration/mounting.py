@@ -7,6 +7,7 @@ outer side, its +z axis on all devices we read; "x forward" and the like name an
 from __future__ import annotations
 
 import re
+from typing import Literal
 
 import numpy as np
 
@@ -16,6 +17,8 @@ FACE = np.array([0.0, 0.0, 1.0])
 """Outward axis of a sensor's housing in sensor coordinates (Xsens MTw and DOT: z away from the skin)."""
 
 AXES = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0]), "z": FACE}
+Way = Literal["forward", "left", "back", "right"]
+
 WAYS = {"forward": 0.0, "front": 0.0, "left": 90.0, "back": 180.0, "rear": 180.0, "right": -90.0}
 """Horizontal way → angle in degrees from anterior, counter-clockwise seen from above."""
 
@@ -37,6 +40,16 @@ def read_declared_direction(text: str) -> tuple[Floats, float] | None:
         return None
     axis = AXES[(found["axis"] or "z").lower()] * (-1.0 if found["sign"] == "-" else 1.0)
     return axis, float(np.radians(WAYS[found["way"].lower()]))
+
+
+def say_other_way(text: str, way: Way) -> str:
+    """The same words with the way that they name replaced.
+
+    >>> say_other_way("sacrum, face backwards", "forward")
+    'sacrum, face forward'
+    """
+    found = _PHRASE.search(text)
+    return text if found is None else text[: found.start("way")] + way + text[found.end() :]
 
 
 def read_declared_angle(text: str, R_vertical: Floats, segment: Segment) -> float | None:

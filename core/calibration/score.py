@@ -17,7 +17,7 @@ from core.agreement import Agreement
 from core.calibration.forward import MeasureName
 from core.calibration.functional import FUNCTIONAL
 from core.calibration.gyro_pca import GOOD_AXIS, measure_main_axis
-from core.calibration.knee_axis import STEEPEST, find_knee_axes
+from core.calibration.knee_axis import KNEE_SEEN, STEEPEST, measure_knees
 from core.calibration.result import CalibratedRecording
 from core.calibration.walking import TRUNK
 from core.frames import FOOT, GRAVITY, SEGMENTS, SHANK, SIDES, THIGH, Bools, Floats, Segment
@@ -32,11 +32,6 @@ CalibrationVerdict = Literal["pass", "redo", "not_judged"]
 
 TURNED_ALL: Final = 1.0
 """Seconds of straight walking below which no axis is looked for."""
-
-KNEE_SEEN: Final = 6.0
-"""Seconds of it below which skin decides where a knee's axis comes out
-(docs/science/calibration.md, "Score")."""
-
 
 HEARD: Final = 0.2
 """Share from which a measure of forward counts: below, it is wrong altogether and was not followed."""
@@ -297,7 +292,7 @@ class _Evidence:
             for s, x in self.calibration.segments.items()
         }
         self.axes = {s: self._find_axis(s) for s in self.rates}
-        self.knees = {side: self._find_knee(THIGH[side], SHANK[side]) for side in SIDES}
+        self.knees = measure_knees(calibrated)
 
     def _seen(self, *segments: Segment) -> Bools:
         """Samples (n,) of straight walking at which all of these sensors were there."""
@@ -312,15 +307,6 @@ class _Evidence:
         found = measure_main_axis(self.rates[segment][seen][:, [0, 2]])
         heading = float(np.arctan2(found.x, found.z))
         return 0.5 * float(wrap_angle(2.0 * heading)), found.share
-
-    def _find_knee(self, thigh: Segment, shank: Segment) -> tuple[float, float] | None:
-        if thigh not in self.rates or shank not in self.rates:
-            return None
-        seen = self._seen(thigh, shank)
-        if np.count_nonzero(seen) < KNEE_SEEN * self.recording.rate_hz:
-            return None
-        found = find_knee_axes(self.rates[thigh][seen], self.rates[shank][seen])
-        return found.apart, found.steepest
 
     def _judge(self, name: CheckName, segment: Segment | None, value: float) -> CalibrationCheck:
         rule, limit = RULE_OF[name], float(getattr(self.params, name))
@@ -399,13 +385,13 @@ class _Evidence:
         side = next((s for s in SIDES if segment in (THIGH[s], SHANK[s])), None)
         if side is None:
             return self._leave("knee_axis", segment, "It is not beside a knee.")
-        found = self.knees[side]
+        found = self.knees.get(side)
         if found is None:
             return self._leave(
                 "knee_axis", segment, f"Thigh and shank were not both seen in {KNEE_SEEN:.0f} s of walking."
             )
-        apart = degrees(abs(float(wrap_angle(found[0]))))
-        if found[1] > STEEPEST:
+        apart = degrees(abs(float(wrap_angle(found.apart))))
+        if found.steepest > STEEPEST:
             return self._leave("knee_axis", segment, "Skin moves too much to see the knee's axis.", apart)
         return self._judge("knee_axis", segment, apart)
 

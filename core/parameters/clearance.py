@@ -37,10 +37,11 @@ def sole_heights(feet: FootTracks, side: Side) -> SoleHeights | None:
     body = feet.body
     if body.sole_back is None or body.sole_front is None:
         return None
+    ahead = feet.sensor_ahead.get(side, 0.0)
     return SoleHeights(
         feet.p[side][:, 2],
-        _height(feet, side, -body.sole_back, -body.ankle_height),
-        _height(feet, side, body.sole_front, (body.sole_tip_up or 0.0) - body.ankle_height),
+        _height(feet, side, ahead - body.sole_back, -body.ankle_height),
+        _height(feet, side, ahead + body.sole_front, (body.sole_tip_up or 0.0) - body.ankle_height),
     )
 
 

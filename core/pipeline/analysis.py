@@ -75,7 +75,8 @@ class TakeAnalysis:
     ----------
     source : as read from the files.
     uniform : stage timeline; samples of sensors that do not measure are not valid.
-    setup : stage agreement; what is proposed where the set-up is wrong, None = nothing is seen.
+    setup : stages agreement and calibration; what is proposed where the set-up is wrong, None = nothing is
+        seen.
     agreed : stage agreement; holds the recording with what could be repaired.
     report : stage quality.
     calibrated : stage calibration, with the mountings that each sensor shows on its own.

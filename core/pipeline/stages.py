@@ -20,6 +20,7 @@ from core.body.estimate import estimate_poses
 from core.body.l7s.inputs import free_acceleration
 from core.body.mounting import mount_sensors
 from core.body.walking_frame import in_walking_frame
+from core.calibration.declared import propose_mountings
 from core.calibration.result import CalibratedRecording
 from core.calibration.score import score_calibration
 from core.errors import Notice
@@ -114,11 +115,18 @@ def judge_signals(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
 
 def calibrate_sensors(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """How each working sensor sits on its segment."""
-    calibrated = calibration.calibrate(drop_stuck_sensors(analysis.recording), config.calibration)
+    working = drop_stuck_sensors(analysis.recording)
+    calibrated = calibration.calibrate(working, config.calibration)
+    setup = analysis.setup
+    if setup is None or setup.mounting:
+        setup = propose_mountings(working, config.calibration)
+    if setup is not None and setup.mounting:
+        notices = (*calibrated.calibration.notices, setup.tell("warning"))
+        calibrated = replace(calibrated, calibration=replace(calibrated.calibration, notices=notices))
     score = score_calibration(calibrated, config.calibration.score, analysis.agreed)
     # the poses say what could not be had for want of a sensor that failed
     calibrated = replace(calibrated, recording=analysis.recording)
-    return replace(analysis, calibrated=calibrated, calibration_score=score)
+    return replace(analysis, setup=setup, calibrated=calibrated, calibration_score=score)
 
 
 def orient_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:

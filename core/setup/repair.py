@@ -9,10 +9,11 @@ from typing import Any, Literal
 
 from core.correction import SensorCorrection
 from core.errors import Notice
+from core.formats.aliases import segment_named
 from core.formats.manifest import manifest_of
 from core.frames import Segment
 
-SetupMistake = Literal["units", "axes", "labels"]
+SetupMistake = Literal["units", "axes", "labels", "mounting"]
 
 
 @dataclass(frozen=True)
@@ -21,10 +22,11 @@ class SetupRepair:
 
     Parameters
     ----------
-    kind : units or signs of sensors, their axes, or who wears what.
+    kind : units or signs of sensors, their axes, who wears what, or how it is said to sit.
     segments : device id → segment, of all worn sensors, where labels are wrong; else empty.
-    corrections : device id → correction, of the sensors that need one. Both empty: something is wrong, and
-        what would put it right cannot be said.
+    corrections : device id → correction, of the sensors that need one. mounting : segment → words that say
+        how its sensor sits, where the declared ones are wrong. All empty: something is wrong, and what would
+        put it right cannot be said.
     evidence : sentences.
     margin : misfit as stated over that of the proposal; 1 where that is not known, infinite where physics
         refuses what is stated.
@@ -35,6 +37,7 @@ class SetupRepair:
     margin: float
     segments: Mapping[str, Segment] = field(default_factory=dict)
     corrections: Mapping[str, SensorCorrection] = field(default_factory=dict)
+    mounting: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def is_sure(self) -> bool:
@@ -47,7 +50,7 @@ class SetupRepair:
     @property
     def can_be_applied(self) -> bool:
         """Whether it says what to do."""
-        return bool(self.segments or self.corrections)
+        return bool(self.segments or self.corrections or self.mounting)
 
     def tell(self, severity: Literal["warning", "error"]) -> Notice:
         """The notice that says what is wrong and what would put it right."""
@@ -76,6 +79,11 @@ class SetupRepair:
                 d: x.follow(before.get(d.lower(), SensorCorrection())).to_json()
                 for d, x in self.corrections.items()
             }
+        if self.mounting:
+            others = {
+                k: x for k, x in (said.get("mounting") or {}).items() if segment_named(k) not in self.mounting
+            }
+            said["mounting"] = others | dict(self.mounting)
         return said
 
     def to_json(self) -> dict[str, object]:

@@ -17,6 +17,7 @@ from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import record_opening, render_page
 from server.report.body_lengths import view_lengths
 from server.report.calibration_checks import view_calibration_checks
+from server.report.sensor_places import view_sensor_places
 from server.services import analyses
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -36,5 +37,6 @@ def show_calibration(
     context["analysed"] = found is not None
     context["view"] = view_calibration_checks(stored.get("calibration_score"), stored.get("calibration"))
     context["lengths"] = view_lengths(stored.get("body"))
+    context["places"] = view_sensor_places(stored.get("sensor_places"))
     record_opening(request, who, "session", sid)
     return render_page(request, db, who, "calibration.html", "patients", **context)

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from core.agreement.joints import LEG_JOINTS
 from core.angles import JointAngles
 from core.body.health import find_worst_verdict
 from core.body.model import LENGTHS
@@ -93,6 +94,7 @@ def summarise_analysis(analysis: TakeAnalysis) -> dict[str, object]:
         "agreement": _agreement(analysis),
         "calibration": _calibration(analysis.calibration, analysis.angles),
         "calibration_score": _score_calibration(analysis),
+        "sensor_places": _sensor_places(analysis),
         "body": _body(analysis),
         "estimator": _estimator(analysis),
         "parameters": [parameter_row(p) for p in analysis.parameters],
@@ -268,6 +270,49 @@ def _body(analysis: TakeAnalysis) -> dict[str, object] | None:
     body, subject = analysis.mounted.body, analysis.recording.subject
     said = {name: {"m": float(getattr(body, name)), "measured": name in body.measured} for name in LENGTHS}
     return {"height_m": subject.height_m, "leg_m": subject.measures.leg_m, "lengths": said}
+
+
+def _sensor_places(analysis: TakeAnalysis) -> object:
+    """Where sensors sit and joints lie, in cm along the segment's axes, beside the nominal places, and the
+    knees' hinges; None where motion was not asked."""
+    arms = None if analysis.mounted is None else analysis.mounted.arms
+    if arms is None:
+        return None
+    return reduce_to_plain(
+        {
+            "sensors": {
+                s: {
+                    "guess_cm": 100.0 * x.guess,
+                    "cm": 100.0 * x.place,
+                    "sd_cm": 100.0 * x.sd,
+                    "measured": x.taken,
+                }
+                for s, x in arms.sensors.items()
+            },
+            "joints": {
+                "-".join(joint): {
+                    "joint": LEG_JOINTS[joint],
+                    "segment": joint[0],
+                    "side": "left" if joint[1].endswith("_l") else "right",
+                    "guess_cm": 100.0 * x.guess,
+                    "cm": 100.0 * x.centre,
+                    "sd_cm": 100.0 * x.sd,
+                    "measured": x.asked,
+                    "misfit": x.misfit,
+                }
+                for joint, x in arms.joints.items()
+            },
+            "knees": {
+                side: {
+                    "thigh_deg": math.degrees(k.thigh),
+                    "thigh_sd_deg": math.degrees(k.thigh_sd),
+                    "shank_deg": math.degrees(k.shank),
+                    "shank_sd_deg": math.degrees(k.shank_sd),
+                }
+                for side, k in arms.knees.items()
+            },
+        }
+    )
 
 
 def events_csv(events: GaitEvents) -> bytes:

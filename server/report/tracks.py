@@ -71,6 +71,7 @@ def tracks_parquet(tracks: Tracks) -> bytes:
             "body": dataclasses.asdict(feet.body),
             "withheld": dict(feet.withheld),
             "posture": feet.posture,
+            "sensor_ahead_m": dict(feet.sensor_ahead),
         },
     }
     return parquet_file(tracks.t_s, columns, meta)
@@ -149,6 +150,7 @@ def _feet(
             if (name := f"{FOOT[side]}_patched") in table.column_names
         },
         posture=meta.get("posture", "standing"),
+        sensor_ahead=meta.get("sensor_ahead_m", {}),
     )
 
 

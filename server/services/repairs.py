@@ -14,7 +14,7 @@ from server.services import recordings
 from server.services.analyses import REPAIRED, AnalysisRecord, file_bytes
 from server.storage.blobs import BlobStore
 
-SETUP_KEYS: Final = ("sensors", "corrections")
+SETUP_KEYS: Final = ("sensors", "corrections", "mounting")
 """What of a manifest says how sensors are worn and read."""
 
 
@@ -64,6 +64,11 @@ def _list_changes(repaired: Mapping[str, Any], before: Mapping[str, Any] | None)
     for device, correction in sorted(wanted.corrections.items()):
         if correction != known.get(device.lower()):
             changes.append(f"Of sensor {device} {correction.say()}.")
+    for place, words in sorted(wanted.mounting.items()):
+        declared = said.mounting.get(place)
+        if words != declared:
+            instead = "" if declared is None else f", not “{declared}”"
+            changes.append(f"The sensor of {place} is worn “{words}”{instead}.")
     return tuple(changes)
 
 

@@ -13,16 +13,17 @@ import numpy as np
 
 from core.angles.measure import measure_angles
 from core.body import BodyModel
+from core.body.arms import measure_arms
 from core.body.corrected import correct_signals
 from core.body.erkf.headings import align_forward_axes
 from core.body.erkf.params import ErkfParams
-from core.body.erkf.poses import ErkfRun, replace_orientations, run_erkf
+from core.body.erkf.poses import ErkfRun, foot_tracks, replace_orientations, run_erkf
 from core.body.pose_params import PoseParams
 from core.body.tree import PRESETS
 from core.calibration import calibrate
 from core.calibration.result import CalibratedRecording
 from core.events.result import StrideFlag
-from core.frames import FOOT, SIDES, SUFFIX, Floats, Segment, Side
+from core.frames import SIDES, SUFFIX, Floats, Segment, Side
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import from_matrix, multiply, rotate
@@ -67,9 +68,8 @@ class Chain:
         return angles_deg(self.orientations, self.calibrated)
 
     def ankle(self, side: Side) -> Floats:
-        """Path (n, 3) of the ankle centre, m."""
-        origin = self.run.tree.segment_origin(self.run.track.p, self.run.track.q)
-        return np.asarray(origin[:, self.run.segments.index(FOOT[side])])
+        """Path (n, 3) of the ankle centre, m, as distances are measured on it."""
+        return foot_tracks(self.run, self.orientations, BODY).p[side]
 
     def strides_cm(self) -> dict[Side, Floats]:
         return {s: 100 * stride_errors_m(s, self.ankle(s)) for s in SIDES}
@@ -91,15 +91,22 @@ def chain(
     orientations: Orientations,
     params: ErkfParams | None = None,
     agree: bool = True,
+    measured: bool = True,
 ) -> Chain:
-    """The product's chain on a calibrated take; `agree`: turn forward axes that the joints contradict."""
+    """The product's chain on a calibrated take.
+
+    Parameters
+    ----------
+    agree : turn forward axes that the joints contradict. measured : places and centres from motion.
+    """
     params = params or SHIPPED
     turned: dict[Segment, float] = {}
     if agree:
         calibrated, orientations, turned = align_forward_axes(
             calibrated, orientations, BODY, SEGMENTS, params
         )
-    run = run_erkf(calibrated, orientations, BODY, SEGMENTS, params)
+    arms = measure_arms(calibrated, orientations, BODY, SEGMENTS) if measured else None
+    run = run_erkf(calibrated, orientations, BODY, SEGMENTS, params, arms)
     return Chain(run, calibrated, replace_orientations(run, orientations), turned)
 
 

@@ -73,10 +73,10 @@ def test_the_erkf_with_smoother_is_within_the_limits() -> None:
         "ErKF and smoother on neura_walk",
         ["angle, right/left", "RMSE offset removed °", "limit", "standing zeroed °", "limit", "r", "limit"],
         rows,
-        f"Seven sensors, nominal places, height {HEIGHT_M} m, lag {lag * 10} ms; one person, one walk out "
-        "and back. Rotations of knee and ankle rest on single markers: low confidence, no limit. Straight "
-        f"strides against Vicon: {_told(strides)}; limit 2.5 ± 1.5 cm. From each foot's sensor alone: "
-        f"{_told({s: lone_strides_cm(s) for s in SIDES})}; limit 2 ± 1 cm. Joint-centre residual "
+        f"Seven sensors, places from motion, height {HEIGHT_M} m, lag {lag * 10} ms; one person, one walk "
+        "out and back. Rotations of knee and ankle rest on single markers: low confidence, no limit. "
+        f"Straight strides against Vicon: {_told(strides)}; limit 2.5 ± 1.5 cm. From each foot's sensor "
+        f"alone: {_told({s: lone_strides_cm(s) for s in SIDES})}; limit 2 ± 1 cm. Joint-centre residual "
         f"{residual.min():.0f} to {residual.max():.0f} mm, {int(made.run.track.refused.sum())} zero "
         "velocities refused. The noise figures were found on this recording (docs/science/erkf.md).",
     )

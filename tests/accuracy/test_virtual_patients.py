@@ -23,7 +23,7 @@ SEED = 7
 STEP_M, STANCE_PCT, KNEE_DEG, TIME_S = 0.025, 3.0, 3.0, 0.01
 """Limits of the errors of means: step, stance (to the last touch in truth), peak knee flexion, stride."""
 
-RATIO = 0.05
+RATIO = 0.06
 """Limit of the error of left / right in steps and stance."""
 
 FORMS = {"step_m": ".2f", "stance_pct": ".0f", "knee_deg": ".0f", "time_s": ".2f"}

@@ -8,6 +8,7 @@ from typing import cast
 
 import numpy as np
 
+from core.body.arms import MeasuredArms
 from core.body.corrected import correct_signals
 from core.body.erkf.filter import ErkfInputs, ErkfState, ErkfTrack, erkf_inputs
 from core.body.erkf.params import ErkfParams
@@ -16,6 +17,7 @@ from core.body.erkf.start import start_state
 from core.body.feet import FootTracks
 from core.body.kinematics import incomplete_legs
 from core.body.model import BodyModel
+from core.body.places import joint_places, sensor_place
 from core.body.poses import Poses
 from core.body.tree import ImuTree, person_tree
 from core.calibration.result import CalibratedRecording
@@ -24,7 +26,7 @@ from core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
 from core.fusion.orientations import Orientations
 from core.recording import UniformRecording
 from core.rest import find_runs
-from core.rotation import from_matrix, multiply
+from core.rotation import from_matrix, multiply, rotate
 
 NEAR_START_S = 1.0
 """Rest that begins so early is a standing start."""
@@ -59,15 +61,22 @@ def run_erkf(
     body: BodyModel,
     segments: Sequence[Segment],
     params: ErkfParams,
+    arms: MeasuredArms | None = None,
 ) -> ErkfRun:
     """Filter and smooth a take with the sensors of some segments; neighbours are joined, others run beside.
+
+    Parameters
+    ----------
+    arms : places of sensors and centres of joints; None = nominal.
 
     Raises
     ------
     EstimationError of `person_tree` and `smooth`.
     """
     mounts = {s: calibrated.calibration.segments[s].R_segment_sensor for s in segments}
-    tree = person_tree(body, mounts, segments)
+    tree = person_tree(
+        body, mounts, segments, None if arms is None else arms.places, None if arms is None else arms.centres
+    )
     rate = calibrated.recording.rate_hz
     # not kept by a name: the inputs are copies, and ten minutes of them 20 MB
     inputs = erkf_inputs(tree, *correct_signals(calibrated, segments), rate)
@@ -112,7 +121,8 @@ def place_figure(
     """The pelvis and every whole leg where they are in the room.
 
     Heights are levelled: between the times at which a foot rests, what its ankle is above or below its height
-    over the floor is taken off, so that a flat floor stays at z = 0; of stairs this figure knows nothing.
+    over the floor is taken off, so that a flat floor stays at z = 0; of stairs this figure knows nothing. The
+    figure has the body model's lengths, whatever centres of joints were measured.
 
     Parameters
     ----------
@@ -123,6 +133,8 @@ def place_figure(
     origin = run.tree.segment_origin(run.track.p, run.track.q)
     place = {s: origin[:, run.segments.index(s)] for s in shown}
     still = {s: run.inputs.contact[:, run.segments.index(FOOT[s])] for s in legs}
+    for side in legs:
+        place |= _hang_together(run, orientations, place, side, body)
     floor = _floor({s: place[FOOT[s]][:, 2] - body.ankle_height for s in legs}, still)
     lift = np.stack((np.zeros_like(floor), np.zeros_like(floor), floor), axis=1)
     return Poses(
@@ -159,10 +171,30 @@ def foot_tracks(run: ErkfRun, orientations: Orientations, body: BodyModel) -> Fo
         patched={}
         if patched is None
         else {s: patched[:, i] & ~run.inputs.contact[:, i] for s, i in at.items()},
+        sensor_ahead={s: float(run.tree.place[i, 0] - sensor_place(FOOT[s], body)[0]) for s, i in at.items()},
         linked=linked,
         source=LINKED_PATHS if linked else SINGLE_PATHS,
         body=body,
     )
+
+
+def _hang_together(
+    run: ErkfRun, orientations: Orientations, place: Mapping[Segment, Floats], side: Side, body: BodyModel
+) -> dict[Segment, Floats]:
+    """Origins (n, 3) of shank and thigh for a figure of the body's own lengths.
+
+    Where centres were measured, a drawn segment ends elsewhere than at its joint. From the foot up each is
+    moved until its end meets the next; what is left over lies at the hip, where nobody sees it.
+    """
+    nominal = joint_places(body)
+    joints = {(run.segments[j.proximal], run.segments[j.distal]): j for j in run.tree.joints}
+    moved, shift = {}, np.zeros(3)
+    for upper, lower in ((SHANK[side], FOOT[side]), (THIGH[side], SHANK[side])):
+        joint = joints[upper, lower]
+        used = rotate(run.tree.q_mount[joint.proximal], joint.r_proximal) + run.tree.place[joint.proximal]
+        shift = shift + rotate(orientations.q[upper], used - nominal[upper, lower][0])
+        moved[upper] = place[upper] + shift
+    return moved
 
 
 def _floor(above: Mapping[Side, Floats], still: Mapping[Side, Bools]) -> Floats:

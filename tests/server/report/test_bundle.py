@@ -48,6 +48,7 @@ def test_analysis_json_is_strict_json_of_schema_1(files: Mapping[str, bytes]) ->
         "calibration",
         "body",
         "calibration_score",
+        "sensor_places",
         "functional",
         "estimator",
         "parameters",

@@ -1,0 +1,104 @@
+"""Declared mountings that the walk contradicts, and the words that would put them right.
+
+A declaration decides signs and, without a walk, the whole axis; a wrong one leaves its sensor out or turns
+its angles. Where the walk shows the forward axis without it, and clearly, both can be compared
+(docs/science/setup.md, "Declared mountings").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import degrees, radians
+from typing import Final, get_args
+
+import numpy as np
+
+from core.calibration.calibrate import CalibrationParams, calibrate
+from core.calibration.mounting import WAYS, Way, read_declared_direction, say_other_way
+from core.calibration.result import CalibratedRecording
+from core.errors import CalibrationError, SignalError
+from core.frames import Segment
+from core.recording import UniformRecording
+from core.rotation import wrap_angle
+from core.setup.repair import SetupRepair
+
+CONTRADICTED: Final = radians(60.0)
+"""A declaration names one of four ways, so a right one is up to 45° off; from here on it is wrong (our
+choice)."""
+
+NEAREST: Final = radians(30.0)
+"""Another way is proposed where the walk is so near to it (our choice)."""
+
+CLEAR_SD: Final = radians(10.0)
+"""A forward axis known less well contradicts nobody (our choice)."""
+
+STEEPEST_AXIS: Final = 0.5
+"""Horizontal part of a declared axis below which it says nothing: within 30° of vertical."""
+
+WEAK: Final = frozenset(("calibration_sign_weak", "calibration_sign_conflict"))
+"""What makes the sign of an axis found without the declaration uncertain."""
+
+
+def propose_mountings(
+    recording: UniformRecording, params: CalibrationParams | None = None
+) -> SetupRepair | None:
+    """Words for declared mountings that the walk contradicts by a quarter turn or more; None without any.
+
+    Says nothing where a take cannot be calibrated without the declarations, nor of a sensor whose forward
+    axis the walk does not show clearly.
+    """
+    declared = {
+        s: text
+        for s, text in recording.mounting.items()
+        if s in recording.sensors and read_declared_direction(text) is not None
+    }
+    if not declared:
+        return None
+    try:
+        free = calibrate(replace(recording, mounting={}), params)
+    except (CalibrationError, SignalError):
+        return None
+    found: dict[str, str] = {}
+    evidence = []
+    for segment, text in _list_known(declared, free).items():
+        off, way = _compare(segment, text, free)
+        if way is None:
+            continue
+        found[segment] = say_other_way(text, way)
+        evidence.append(
+            f"The walk shows that the sensor of {segment} sits {degrees(abs(off)):.0f}° otherwise than "
+            f"“{text}” says; “{found[segment]}” fits."
+        )
+    return SetupRepair("mounting", tuple(evidence), np.inf, mounting=found) if found else None
+
+
+def _list_known(declared: Mapping[str, str], free: CalibratedRecording) -> dict[Segment, str]:
+    """Those whose forward axis the walk shows clearly, sign included."""
+    calibration = free.calibration
+    weak = {n.sensor for n in calibration.notices if n.code in WEAK}
+    return {
+        s: declared[s]
+        for s, x in calibration.segments.items()
+        if s in declared and s not in weak and x.forward_sd is not None and x.forward_sd <= CLEAR_SD
+    }
+
+
+def _compare(segment: Segment, text: str, free: CalibratedRecording) -> tuple[float, Way | None]:
+    """How far the declared axis points from the declared way, rad, and the way it points; None where the
+    declaration may be right or no way is near."""
+    said = read_declared_direction(text)
+    assert said is not None  # noqa: S101 (narrows the type; `propose_mountings` looked)
+    axis, declared = said
+    points = free.calibration.segments[segment].R_segment_sensor @ axis
+    # z of a segment is to the right, ways count to the left
+    if np.hypot(points[0], points[2]) < STEEPEST_AXIS:
+        return 0.0, None
+    angle = float(np.arctan2(-points[2], points[0]))
+    off = float(wrap_angle(angle - declared))
+    ways: tuple[Way, ...] = get_args(Way)
+    apart = [abs(float(wrap_angle(angle - radians(WAYS[w])))) for w in ways]
+    nearest = int(np.argmin(apart))
+    if abs(off) < CONTRADICTED or apart[nearest] > NEAREST:
+        return off, None
+    return off, ways[nearest]
