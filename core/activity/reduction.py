@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from math import ceil, floor
 from typing import Final, TypeVar
 
@@ -21,6 +20,7 @@ from core.activity.params import ActivityParams
 from core.errors import SignalError
 from core.events.lumbar import LumbarParams, detect_steps, find_moving, split_about_vertical
 from core.events.turns import Turn, find_turns
+from core.filtering import design_elliptic, filter_both_ways
 from core.frames import GRAVITY, Bools, Floats, Segment
 from core.recording import SensorSignals, Subject, UniformRecording
 from core.rest import find_runs
@@ -242,27 +242,18 @@ def _join(blocks: Sequence[SampleBlock]) -> SampleBlock:
     )
 
 
-@lru_cache(maxsize=16)
-def _gravity_filter(rate_hz: int) -> Floats:
-    """Second-order section (1, 6) of the thesis' low-pass."""
-    from scipy.signal import ellip
-
-    return np.asarray(ellip(2, RIPPLE_DB, STOP_DB, PASS_HZ / (0.5 * rate_hz), output="sos"))
-
-
 def _reduce(
     window: _Window, start: int, end: int, rate: int, segment: Segment, params: ActivityParams
 ) -> Slab:
     """One slab: points start to end of a window that has margins around them."""
     from scipy.ndimage import uniform_filter1d
-    from scipy.signal import sosfiltfilt
 
     per = rate // FRAME_HZ
     core = slice(start - window.first, end - window.first)
     if not window.valid[core].any():
         return Slab(_empty_frames(start // per, (end - start) // per), (), ())
-    reach = min(len(window.acc) - 1, params.margin_s * rate)
-    gravity = np.asarray(sosfiltfilt(_gravity_filter(rate), window.acc, axis=0, padlen=reach))
+    section = design_elliptic(RIPPLE_DB, STOP_DB, PASS_HZ, float(rate))
+    gravity = filter_both_ways(section, window.acc.T, params.margin_s * rate).T
     size = np.maximum(np.sqrt(np.einsum("ni,ni->n", gravity, gravity)), 1e-9)
     along = np.einsum("ni,ni->n", window.acc, gravity) / size
     moving = find_moving(along - size, window.valid, rate, params.steps)

@@ -13,6 +13,7 @@ from core.activity.params import TransitionParams
 from core.activity.reduction import FRAME_HZ, Frames, measure_length
 from core.activity.result import PosturalTransition, TransitionCandidate, TransitionKind, TransitionRefusal
 from core.frames import GRAVITY, Bools, Floats
+from core.peaks import find_peaks
 from core.rest import find_runs
 
 EDGE_RISE = 0.035
@@ -101,9 +102,7 @@ def _count_above(tilt: Floats, there: Bools, limit: float) -> int:
 
 def find_leans(theta: Floats, there: Bools, params: TransitionParams) -> list[Lean]:
     """Peaks of the inclination (f,) that are candidates, each with the minima beside it."""
-    from scipy.signal import find_peaks
-
-    tops, _ = find_peaks(
+    tops = find_peaks(
         np.where(there, theta, 0.0), height=params.candidate_rad, prominence=0.5 * params.prominence_rad
     )
     reach = round(params.half_s * FRAME_HZ)

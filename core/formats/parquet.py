@@ -161,7 +161,7 @@ def open_long(file: SourceFile) -> Recording:
     """
     try:
         with file.open() as opened:
-            reader = pq.ParquetFile(opened)
+            reader = pq.ParquetFile(opened, pre_buffer=False)
             meta = reader.metadata
             info = _read_info((meta.metadata or {}).get(_KEY), file.name)
             first = next(reader.iter_batches(1, columns=[_TIME]))[_TIME][0].as_py()
@@ -200,7 +200,7 @@ def _read_blocks(file: SourceFile, device: str, has_gyro: bool, first_us: int) -
     kinds = ("acc", "gyr") if has_gyro else ("acc",)
     names = [f"{device}.{name}" for kind in kinds for name in _AXES[kind]]
     with file.open() as opened:
-        reader = pq.ParquetFile(opened, page_checksum_verification=True)
+        reader = pq.ParquetFile(opened, page_checksum_verification=True, pre_buffer=False)
         for batch in reader.iter_batches(BLOCK_ROWS, columns=[_TIME, *names], use_threads=False):
             columns = [batch[name].to_numpy(zero_copy_only=False) for name in names]
             values = np.stack(columns, axis=-1).astype(np.float64)

@@ -35,13 +35,13 @@ def analyse(
     0 when at least one parameter was found, 1 when nothing could be analysed.
     """
     from core.formats import list_source_files, read_named_file
-    from server.services import analyses
+    from server.services import analysing
 
     try:
         sources = list(list_source_files(paths))
         declared = read_named_file(manifest) if manifest else None
         with _ProgressBar() as bar:
-            files = analyses.run(sources, declared, _overrides(config, estimator), bar.stage)
+            files = analysing.run(sources, declared, _overrides(config, estimator), bar.stage)
     except SagittalError as error:
         sys.stderr.write(f"Nothing analysable ({error.code}): {error.message}\n")
         return 1
