@@ -30,8 +30,8 @@ def design_butterworth(cutoff_hz: float, rate_hz: float) -> Floats:
 def design_elliptic(ripple_db: float, stop_db: float, pass_hz: float, rate_hz: float) -> Floats:
     """Section (6,) of an elliptic low-pass of second order.
 
-    The elliptic function of second order is R(x) = ((1 + t)x² − 1) / (1 − (1 − t)x²), its least value in the stop
-    band (1 + t) / (1 − t); the two ripples decide it.
+    The elliptic function of second order is R(x) = ((1 + t)x² − 1) / (1 − (1 − t)x²), its least value in the
+    stop band (1 + t) / (1 − t); the two ripples decide it.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ from core.formats.draft import signal_digest
 from core.formats.json_tree import read_json
 from core.formats.source import SourceFile
 from core.frames import Floats, Protocol, Segment
-from core.recording import BLOCK_ROWS, ImuStream, Recording, Subject
+from core.recording import ImuStream, Recording, Subject
 from core.sample_blocks import LongStream, SampleBlock
 from core.shoe import Shoe
 
@@ -42,6 +42,12 @@ DAMAGE: Final = (
     pa.ArrowException, OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError,
 )  # fmt: skip
 """What reading raises of a file that `write_recording` did not write, metadata nested without end too."""
+AHEAD: Final = 1 << 16
+"""Bytes of each column of a long file that are read at once; without it a million rows are."""
+
+LONG_BLOCK: Final = 1 << 14
+"""Rows of a long file that are decoded together."""
+
 _MAX_ROWS: Final = 50_000_000
 _MAX_BYTES: Final = 4_000_000_000
 """Declared sizes are checked before anything is allocated."""
@@ -200,10 +206,10 @@ def _read_blocks(file: SourceFile, device: str, has_gyro: bool, first_us: int) -
     kinds = ("acc", "gyr") if has_gyro else ("acc",)
     names = [f"{device}.{name}" for kind in kinds for name in _AXES[kind]]
     with file.open() as opened:
-        reader = pq.ParquetFile(opened, page_checksum_verification=True, pre_buffer=False)
-        for batch in reader.iter_batches(BLOCK_ROWS, columns=[_TIME, *names], use_threads=False):
+        reader = pq.ParquetFile(opened, page_checksum_verification=True, pre_buffer=False, buffer_size=AHEAD)
+        for batch in reader.iter_batches(LONG_BLOCK, columns=[_TIME, *names], use_threads=False):
             columns = [batch[name].to_numpy(zero_copy_only=False) for name in names]
-            values = np.stack(columns, axis=-1).astype(np.float64)
+            values = np.stack(columns, axis=-1, dtype=np.float64)
             values[~np.isfinite(values)] = np.nan
             t_s = (batch[_TIME].to_numpy() - first_us) * 1e-6
             yield SampleBlock(t_s, values[:, :3], values[:, 3:] if has_gyro else None)
