@@ -236,8 +236,8 @@ def _seconds(frames: Frames, posture: Posture, day: Window) -> Floats:
     a, b = (round(t * FRAME_HZ) - frames.first for t in day)
     firsts = np.arange(0, b - a, FRAME_HZ)
     there = posture.signed[a:b]
-    number = np.add.reduceat(there, firsts, dtype=np.int64)
-    total = np.add.reduceat(np.where(there, posture.lean[a:b], 0.0), firsts, dtype=np.float64)
+    number = np.add.reduceat(there, firsts, dtype=np.int8)
+    total = np.add.reduceat(np.where(there, posture.lean[a:b], np.float32(0.0)), firsts)
     return np.where(number > 0, np.degrees(total / np.maximum(number, 1)), np.nan)
 
 

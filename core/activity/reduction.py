@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, floor
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import numba
 import numpy as np
@@ -31,9 +31,6 @@ from core.timeline.params import TimelineParams
 Singles = NDArray[np.float32]
 
 Samples = TypeVar("Samples", Floats, Bools)
-
-PER_MINUTE_NAMES: Final = ("sd", "wobble")
-"""Fields of `Frames` that have one entry a minute."""
 
 FRAME_HZ: Final = 10
 """Frames a second: the low-passed signals have nothing above 1 Hz."""
@@ -113,14 +110,15 @@ class FrameStore:
     def __init__(self, room: int) -> None:
         """Make room for so many frames, a whole number of minutes; pages are touched when they are filled."""
         minutes = room // PER_MINUTE
-        self._arrays = {
-            "valid": np.empty(room, np.bool_),
-            "gravity": np.empty((room, 3), np.float32),
-            "up": np.empty(room, np.float32),
-            "spread": np.empty(room, np.float32),
-            "sd": np.empty((minutes, 3), np.float32),
-            "wobble": np.empty((minutes, 3), np.float32),
-        }
+        self._kept = Frames(
+            0,
+            np.empty(room, np.bool_),
+            np.empty((room, 3), np.float32),
+            np.empty(room, np.float32),
+            np.empty(room, np.float32),
+            np.empty((minutes, 3), np.float32),
+            np.empty((minutes, 3), np.float32),
+        )
         self._first = self._count = 0
 
     @property
@@ -128,30 +126,46 @@ class FrameStore:
         """Number of the frame that comes next."""
         return self._first + self._count
 
-    def append(self, frames: Frames) -> None:
+    def append(self, more: Frames) -> None:
         """Keep the frames that follow; only the last of a recording may end within a minute."""
-        for name, kept in self._arrays.items():
-            a, b = self._part(name, self._count, self._count + len(frames.valid))
-            kept[a:b] = getattr(frames, name)[: b - a]
-        self._count += len(frames.valid)
+        end = self._count + len(more.valid)
+        for kept, new in zip(_list_columns(self._kept, self._count, end), _list_columns(more), strict=True):
+            kept[:] = new[: len(kept)]
+        self._count = end
 
     def view(self, end: int) -> Frames:
         """What is kept up to frame `end`, as long as nothing is dropped."""
-        n = min(end, self.end) - self._first
-        return Frames(self._first, **{k: a[slice(*self._part(k, 0, n))] for k, a in self._arrays.items()})
+        kept, n = self._kept, min(end, self.end) - self._first
+        minutes = -(-n // PER_MINUTE)
+        return Frames(
+            self._first,
+            kept.valid[:n],
+            kept.gravity[:n],
+            kept.up[:n],
+            kept.spread[:n],
+            kept.sd[:minutes],
+            kept.wobble[:minutes],
+        )
 
     def drop_before(self, first: int) -> None:
         """Let go of the frames before a minute's first."""
         cut = min(self._count, max(0, first - self._first))
-        for name, kept in self._arrays.items():
-            a, b = self._part(name, cut, self._count)
-            kept[: b - a] = kept[a:b]
-        self._first, self._count = self._first + cut, self._count - cut
+        left = self._count - cut
+        whole = -(-left // PER_MINUTE) * PER_MINUTE
+        to, of = _list_columns(self._kept, 0, left), _list_columns(self._kept, cut, cut + whole)
+        for kept, moved in zip(to, of, strict=True):
+            kept[:] = moved[: len(kept)]
+        self._first, self._count = self._first + cut, left
 
-    @staticmethod
-    def _part(name: str, a: int, b: int) -> tuple[int, int]:
-        """Entries of a field for frames a to b, of which a begins a minute."""
-        return (a // PER_MINUTE, -(-b // PER_MINUTE)) if name in PER_MINUTE_NAMES else (a, b)
+
+def _list_columns(frames: Frames, first: int = 0, end: int | None = None) -> list[NDArray[Any]]:
+    """Columns of the frames from a minute's first to `end`, as they lie in memory."""
+    minutes = slice(first // PER_MINUTE, None if end is None else -(-end // PER_MINUTE))
+    part = slice(first, end)
+    return [
+        *(x[part] for x in (frames.valid, frames.gravity, frames.up, frames.spread)),
+        *(x[minutes] for x in (frames.sd, frames.wobble)),
+    ]
 
 
 def measure_length(x: Singles) -> Floats:

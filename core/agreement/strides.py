@@ -12,7 +12,7 @@ from core.agreement.params import SlipParams
 from core.agreement.terms import LevelMotion
 from core.filtering import low_pass
 from core.frames import Bools, Floats, Segment
-from core.peaks import find_peaks
+from core.peaks import Places, find_peaks
 from core.rotation import conjugate, exp, rotate, to_matrix
 
 SMOOTH_HZ: Final = 4.0
@@ -50,7 +50,7 @@ def find_largest_axis(moments: Floats) -> Floats:
     return np.ascontiguousarray(np.linalg.eigh(moments)[1][:, -1])
 
 
-def find_swings(rate: Floats, rate_hz: float) -> Floats:
+def find_swings(rate: Floats, rate_hz: float) -> Places:
     """Samples (k,) of the mid-swings of a leg: peaks of the rate about its main axis, the larger lobe up."""
     x = low_pass(rate @ find_main_axis(rate), SMOOTH_HZ, rate_hz)
     low, high = np.percentile(x, (2, 98))
@@ -67,7 +67,7 @@ def choose_leg(segment: Segment) -> tuple[Segment, ...]:
 
 
 def find_stride_turns(
-    motion: LevelMotion, valid: Bools, borders: Floats, rate_hz: float, params: SlipParams
+    motion: LevelMotion, valid: Bools, borders: Places, rate_hz: float, params: SlipParams
 ) -> StrideTurns:
     """Fit each stride's curve of vertical and rate to the typical one by a rotation.
 

@@ -167,11 +167,11 @@ def open_long(file: SourceFile) -> Recording:
     """
     try:
         with file.open() as opened:
-            reader = pq.ParquetFile(opened, pre_buffer=False)
+            reader = pq.ParquetFile(opened, pre_buffer=False, buffer_size=AHEAD)
             meta = reader.metadata
             info = _read_info((meta.metadata or {}).get(_KEY), file.name)
-            first = next(reader.iter_batches(1, columns=[_TIME]))[_TIME][0].as_py()
-            last = reader.read_row_group(meta.num_row_groups - 1, columns=[_TIME])[_TIME][-1].as_py()
+            first, _ = _find_ends(reader, 0)
+            _, last = _find_ends(reader, meta.num_row_groups - 1)
             there = set(reader.schema_arrow.names)
         subject, sensors = _read_subject(info), _list(info["sensors"])
         long = {}
@@ -199,6 +199,15 @@ def open_long(file: SourceFile) -> Recording:
         )
     except DAMAGE as e:
         raise FormatError("bad_parquet", f"{file.name} is a damaged recording ({e}); upload it again.") from e
+
+
+def _find_ends(reader: pq.ParquetFile, group: int) -> tuple[int, int]:
+    """First and last time of a group of rows, µs."""
+    ends: list[int] = []
+    for batch in reader.iter_batches(LONG_BLOCK, row_groups=[group], columns=[_TIME], use_threads=False):
+        if batch.num_rows:
+            ends += [batch[_TIME][0].as_py(), batch[_TIME][-1].as_py()]
+    return ends[0], ends[-1]
 
 
 def _read_blocks(file: SourceFile, device: str, has_gyro: bool, first_us: int) -> Iterator[SampleBlock]:
