@@ -6,13 +6,13 @@ that crosses a border is missed; how the postures follow from it, core/activity/
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from core.activity.params import ActivityParams
-from core.activity.reduction import FRAME_HZ, Frames, Singles, Slab, measure_length
+from core.activity.reduction import FRAME_HZ, PER_MINUTE, Frames, Singles, Slab, measure_length
 from core.activity.result import PosturalTransition, TransitionCandidate, WearPeriod
 from core.activity.stairs import measure_walking, tell_stairs
 from core.activity.transitions import (
@@ -46,8 +46,8 @@ class Posture:
     """
 
     known: Bools
-    tilt: Floats
-    lean: Floats
+    tilt: Singles
+    lean: Singles
     signed: Bools
 
 
@@ -175,7 +175,7 @@ def _find_posture(
     own = [find_upright(frames, walking, group, params.upright) for group in groups]
     sure = [axis for axis, method in own if method == "walking"]
     lent = _array(before.up) if before is not None else sure[0] if sure else None
-    tilt, known = np.zeros(n), np.zeros(n, np.bool_)
+    tilt, known = np.zeros(n, np.float32), np.zeros(n, np.bool_)
     worn = _mark(wear.worn, n) & frames.valid
     periods = []
     for (a, b), (axis, method) in zip(groups, own, strict=True):
@@ -185,10 +185,11 @@ def _find_posture(
             lent = axis
         periods.append(describe_period(offset + a / FRAME_HZ, offset + b / FRAME_HZ, axis, None, method, 0))
         if axis is not None:
-            gravity = frames.gravity[a:b]
-            size = np.maximum(measure_length(gravity), 1e-9)
             known[a:b] = worn[a:b]
-            tilt[a:b] = np.arccos(np.clip(_along(gravity, axis) / size, -1.0, 1.0))
+            for part in _cut_hours(a, b):
+                gravity = frames.gravity[part]
+                size = np.maximum(measure_length(gravity), 1e-9)
+                tilt[part] = np.arccos(np.clip(_along(gravity, axis) / size, -1.0, 1.0))
     tilt[~known] = 0.0
     return Posture(known, tilt, tilt, np.zeros(n, np.bool_)), periods
 
@@ -222,8 +223,9 @@ def _find_forward(
         forward, count = find_forward(frames.gravity, axis, at, params.upright)
         told.append(describe_period(p.start_s, p.end_s, axis, forward, p.method, count))
         if forward is not None:
-            gravity = frames.gravity[a:b]
-            lean[a:b] = np.arctan2(-_along(gravity, forward), _along(gravity, axis))
+            for part in _cut_hours(a, b):
+                gravity = frames.gravity[part]
+                lean[part] = np.arctan2(-_along(gravity, forward), _along(gravity, axis))
             signed[a:b] = posture.known[a:b]
     lean[~posture.known] = 0.0
     return Posture(posture.known, posture.tilt, lean, signed), told
@@ -232,12 +234,17 @@ def _find_forward(
 def _seconds(frames: Frames, posture: Posture, day: Window) -> Floats:
     """Mean inclination (seconds,) in degrees of every second of the day, NaN where it is not known."""
     a, b = (round(t * FRAME_HZ) - frames.first for t in day)
-    count = -(-(b - a) // FRAME_HZ)
-    values, there = np.zeros(count * FRAME_HZ), np.zeros(count * FRAME_HZ, np.bool_)
-    values[: b - a], there[: b - a] = posture.lean[a:b], posture.signed[a:b]
-    number = there.reshape(count, FRAME_HZ).sum(axis=1)
-    total = np.where(there, values, 0.0).reshape(count, FRAME_HZ).sum(axis=1)
+    firsts = np.arange(0, b - a, FRAME_HZ)
+    there = posture.signed[a:b]
+    number = np.add.reduceat(there, firsts, dtype=np.int8)
+    total = np.add.reduceat(np.where(there, posture.lean[a:b], np.float32(0.0)), firsts)
     return np.where(number > 0, np.degrees(total / np.maximum(number, 1)), np.nan)
+
+
+def _cut_hours(a: int, b: int) -> Iterator[slice]:
+    """Frames a to b an hour at a time: what is worked out of them in double precision stays small."""
+    for first in range(a, b, 60 * PER_MINUTE):
+        yield slice(first, min(b, first + 60 * PER_MINUTE))
 
 
 def _along(gravity: Singles, axis: Floats) -> Floats:

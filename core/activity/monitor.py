@@ -12,7 +12,7 @@ import numpy as np
 from core.activity.day_part import DayPart, read_day
 from core.activity.params import ActivityParams, StairParams
 from core.activity.postures import FixedStretch, decide_postures
-from core.activity.reduction import FRAME_HZ, Slab, join_slabs, reduce_stream
+from core.activity.reduction import FRAME_HZ, FrameStore, Slab, reduce_stream
 from core.activity.result import (
     ActivityBout,
     ActivityResult,
@@ -25,6 +25,7 @@ from core.activity.totals import HOUR_S, sum_days, sum_hours
 from core.body.model import NOMINAL_HEIGHT_M
 from core.errors import Notice, SignalError
 from core.events.bouts import Bout, walking_bouts
+from core.events.turns import Turn
 from core.frames import Floats, Segment
 from core.rest import Window
 from core.sample_blocks import LongStream
@@ -125,7 +126,6 @@ def _read_days(
     slabs = _tell_hours(reduce_stream(stream, segment, params), stream.duration_s, progress)
     for slab, day in _days(slabs, params):
         part = read_day(slab, day, before, thigh, params)
-        del slab  # the next day is gathered while this loop waits
         parts.append(part)
         before = next((p for p in reversed(part.periods) if p.up is not None), before)
         end_s = day[1]
@@ -146,26 +146,40 @@ def _tell_hours(slabs: Iterator[Slab], duration_s: float, progress: Progress) ->
 def _days(slabs: Iterator[Slab], params: ActivityParams) -> Iterator[tuple[Slab, Window]]:
     """Every day with what lies around it as one slab, and its range."""
     per_day, around = DAY_SLABS_S // params.slab_s, -(-AROUND_S // params.slab_s)
-    kept: list[Slab] = []
-    number, end = 0, 0.0
+    per_slab = params.slab_s * FRAME_HZ
+    kept = FrameStore((per_day + 2 * around + 1) * per_slab)
+    steps: list[float] = []
+    turns: list[Turn] = []
+    number = 0
 
-    def take(of: list[Slab]) -> tuple[Slab, Window]:
-        """The day's slab; what the next day needs stays in `kept`."""
-        nonlocal kept, number
-        day = (number * DAY_SLABS_S, min(end, (number + 1) * DAY_SLABS_S))
+    def look(until: int) -> tuple[Slab, Window]:
+        """The day and what lies around it."""
+        day = (number * DAY_SLABS_S, min(kept.end / FRAME_HZ, (number + 1) * DAY_SLABS_S))
+        frames, end_s = kept.view(until), until / FRAME_HZ
+        return Slab(
+            frames, tuple(t for t in steps if t < end_s), tuple(t for t in turns if t.start_s < end_s)
+        ), day
+
+    def drop() -> None:
+        """Only what the day after this one needs stays."""
+        nonlocal number, steps, turns
         number += 1
-        first = (number * per_day - around) * params.slab_s * FRAME_HZ
-        whole = join_slabs(of)
-        kept = [s for s in kept if s.frames.first >= first]
-        return whole, day
+        first = max(0, number * per_day - around) * per_slab
+        kept.drop_before(first)
+        steps = [t for t in steps if t >= first / FRAME_HZ]
+        turns = [t for t in turns if t.start_s >= first / FRAME_HZ]
 
     for slab in slabs:
-        kept.append(slab)
-        end = (slab.frames.first + len(slab.frames.valid)) / FRAME_HZ
-        if slab.frames.first >= ((number + 1) * per_day + around) * params.slab_s * FRAME_HZ:
-            yield take(kept[:-1])
-    while kept and number * DAY_SLABS_S < end:
-        yield take(kept)
+        kept.append(slab.frames)
+        steps += slab.steps_s
+        turns += slab.turns
+        until = ((number + 1) * per_day + around) * per_slab
+        if slab.frames.first >= until:
+            yield look(until)
+            drop()
+    while number * DAY_SLABS_S < kept.end / FRAME_HZ:
+        yield look(kept.end)
+        drop()
 
 
 def _put_together(

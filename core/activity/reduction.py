@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, floor
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import numba
 import numpy as np
@@ -56,6 +56,9 @@ STEP_RATE: Final = 50
 JOIN_S: Final = 10.0
 """Movement with shorter pauses is looked through for steps as one."""
 
+PIECE_S: Final = 30
+"""So much is laid on the axis at once."""
+
 EDGE_S: Final = 5.0
 """Samples before and after movement that go with it, so that filters have settled."""
 
@@ -94,20 +97,75 @@ class Slab:
     turns: tuple[Turn, ...]
 
 
-def join_slabs(slabs: Sequence[Slab]) -> Slab:
-    """Successive slabs as one."""
-    parts = [s.frames for s in slabs]
-    return Slab(
-        Frames(
-            parts[0].first,
-            *(
-                np.concatenate([getattr(p, name) for p in parts])
-                for name in ("valid", "gravity", "up", "spread", "sd", "wobble")
-            ),
-        ),
-        tuple(t for s in slabs for t in s.steps_s),
-        tuple(t for s in slabs for t in s.turns),
-    )
+PER_MINUTE: Final = 60 * FRAME_HZ
+"""Frames of a minute."""
+
+
+class FrameStore:
+    """Frames of a day and of what lies around it: arrays that are made once and used day after day.
+
+    Pieces that came and went, a day of them, would leave the process' memory in holes.
+    """
+
+    def __init__(self, room: int) -> None:
+        """Make room for so many frames, a whole number of minutes; pages are touched when they are filled."""
+        minutes = room // PER_MINUTE
+        self._kept = Frames(
+            0,
+            np.empty(room, np.bool_),
+            np.empty((room, 3), np.float32),
+            np.empty(room, np.float32),
+            np.empty(room, np.float32),
+            np.empty((minutes, 3), np.float32),
+            np.empty((minutes, 3), np.float32),
+        )
+        self._first = self._count = 0
+
+    @property
+    def end(self) -> int:
+        """Number of the frame that comes next."""
+        return self._first + self._count
+
+    def append(self, more: Frames) -> None:
+        """Keep the frames that follow; only the last of a recording may end within a minute."""
+        end = self._count + len(more.valid)
+        for kept, new in zip(_list_columns(self._kept, self._count, end), _list_columns(more), strict=True):
+            kept[:] = new[: len(kept)]
+        self._count = end
+
+    def view(self, end: int) -> Frames:
+        """What is kept up to frame `end`, as long as nothing is dropped."""
+        kept, n = self._kept, min(end, self.end) - self._first
+        minutes = -(-n // PER_MINUTE)
+        return Frames(
+            self._first,
+            kept.valid[:n],
+            kept.gravity[:n],
+            kept.up[:n],
+            kept.spread[:n],
+            kept.sd[:minutes],
+            kept.wobble[:minutes],
+        )
+
+    def drop_before(self, first: int) -> None:
+        """Let go of the frames before a minute's first."""
+        cut = min(self._count, max(0, first - self._first))
+        left = self._count - cut
+        whole = -(-left // PER_MINUTE) * PER_MINUTE
+        to, of = _list_columns(self._kept, 0, left), _list_columns(self._kept, cut, cut + whole)
+        for kept, moved in zip(to, of, strict=True):
+            kept[:] = moved[: len(kept)]
+        self._first, self._count = self._first + cut, left
+
+
+def _list_columns(frames: Frames, first: int = 0, end: int | None = None) -> list[NDArray[Any]]:
+    """Columns of the frames from a minute's first to `end`, as they lie in memory."""
+    minutes = slice(first // PER_MINUTE, None if end is None else -(-end // PER_MINUTE))
+    part = slice(first, end)
+    return [
+        *(x[part] for x in (frames.valid, frames.gravity, frames.up, frames.spread)),
+        *(x[minutes] for x in (frames.sd, frames.wobble)),
+    ]
 
 
 def measure_length(x: Singles) -> Floats:
@@ -129,16 +187,16 @@ def reduce_stream(stream: LongStream, segment: Segment, params: ActivityParams) 
     """
     rate = working_rate(stream.rate_hz)
     margin, size = params.margin_s * rate, params.slab_s * rate
-    window = _Window(0, np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.bool_))
+    points = _PointStore(size + 2 * margin + PIECE_S * rate)
     start = 0
-    for piece in _lay_pieces(stream, rate, size, margin):
-        window = window.extend(piece)
-        while window.end >= start + size + margin:
-            yield _reduce(window, start, start + size, rate, segment, params)
+    for piece in _lay_pieces(stream, rate):
+        points.append(piece)
+        while points.end >= start + size + margin:
+            yield _reduce(points.view(start + size + margin), start, start + size, rate, segment, params)
             start += size
-            window = window.drop_before(start - margin)
-    if window.end > start:
-        yield _reduce(window, start, window.end, rate, segment, params)
+            points.drop_before(start - margin)
+    if points.end > start:
+        yield _reduce(points.view(points.end), start, points.end, rate, segment, params)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,31 +208,46 @@ class _Window:
     gyr: Floats
     valid: Bools
 
+
+class _PointStore:
+    """The points of a slab and its margins, in arrays that are made once."""
+
+    def __init__(self, room: int) -> None:
+        self._points = _Window(0, np.empty((room, 3)), np.empty((room, 3)), np.empty(room, np.bool_))
+        self._first = self._count = 0
+
     @property
     def end(self) -> int:
-        return self.first + len(self.valid)
+        return self._first + self._count
 
-    def extend(self, more: _Window) -> _Window:
-        return _Window(
-            self.first,
-            np.concatenate((self.acc, more.acc)),
-            np.concatenate((self.gyr, more.gyr)),
-            np.concatenate((self.valid, more.valid)),
-        )
+    def append(self, more: _Window) -> None:
+        part = slice(self._count, self._count + len(more.valid))
+        kept = self._points
+        kept.acc[part], kept.gyr[part], kept.valid[part] = more.acc, more.gyr, more.valid
+        self._count = part.stop
 
-    def drop_before(self, first: int) -> _Window:
-        cut = max(0, first - self.first)
-        return _Window(self.first + cut, self.acc[cut:], self.gyr[cut:], self.valid[cut:])
+    def view(self, end: int) -> _Window:
+        part, kept = slice(0, end - self._first), self._points
+        return _Window(self._first, kept.acc[part], kept.gyr[part], kept.valid[part])
+
+    def drop_before(self, first: int) -> None:
+        cut, kept = max(0, first - self._first), self._points
+        left = self._count - cut
+        kept.acc[:left] = kept.acc[cut : self._count]
+        kept.gyr[:left] = kept.gyr[cut : self._count]
+        kept.valid[:left] = kept.valid[cut : self._count]
+        self._first, self._count = self._first + cut, left
 
 
-def _lay_pieces(stream: LongStream, rate: int, size: int, margin: int) -> Iterator[_Window]:
-    """Pieces of the axis, the first longer by the margin; the last ends with the recording.
+def _lay_pieces(stream: LongStream, rate: int) -> Iterator[_Window]:
+    """Pieces of the axis of `PIECE_S` each; the last ends with the recording.
 
     Points of a piece depend on the last sample before it, those in it, and the first behind it.
     """
     kept: list[SampleBlock] = []
     first, last_s, seen = 0, -np.inf, False
-    end = size + margin
+    size = PIECE_S * rate
+    end = size
     for raw in stream.open_blocks():
         block = _in_order(find_complete_rows(raw), last_s)
         if not len(block.t_s):
@@ -243,7 +316,7 @@ def _join(blocks: Sequence[SampleBlock]) -> SampleBlock:
 
 
 @lru_cache(maxsize=16)
-def _gravity_filter(rate_hz: int) -> Floats:
+def _design_gravity_filter(rate_hz: int) -> Floats:
     """Second-order section (1, 6) of the thesis' low-pass."""
     from scipy.signal import ellip
 
@@ -262,7 +335,7 @@ def _reduce(
     if not window.valid[core].any():
         return Slab(_empty_frames(start // per, (end - start) // per), (), ())
     reach = min(len(window.acc) - 1, params.margin_s * rate)
-    gravity = np.asarray(sosfiltfilt(_gravity_filter(rate), window.acc, axis=0, padlen=reach))
+    gravity = np.asarray(sosfiltfilt(_design_gravity_filter(rate), window.acc, axis=0, padlen=reach))
     size = np.maximum(np.sqrt(np.einsum("ni,ni->n", gravity, gravity)), 1e-9)
     along = np.einsum("ni,ni->n", window.acc, gravity) / size
     moving = find_moving(along - size, window.valid, rate, params.steps)
@@ -295,13 +368,15 @@ def _reduce(
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _turn_up(acc, rate, start, dt, keep_s, gate):  # type: ignore[no-untyped-def]
-    """Up (n, 3) in sensor axes, turned by the rates and drawn towards the specific force."""
-    n = len(acc)
-    out = np.empty((n, 3))
+def _add_up(acc, gyr, bias, start, dt, keep_s, gate, way, up):  # type: ignore[no-untyped-def]
+    """Add up, in sensor axes, turned by the rates and drawn towards the specific force, to `up` (n, 3).
+
+    way : 1 from the first sample on, −1 from the last one back.
+    """
     x, y, z = start[0], start[1], start[2]
-    for k in range(n):
-        wx, wy, wz = rate[k, 0], rate[k, 1], rate[k, 2]
+    for i in range(len(acc)):
+        k = i if way > 0 else len(acc) - 1 - i
+        wx, wy, wz = way * (gyr[k, 0] - bias[0]), way * (gyr[k, 1] - bias[1]), way * (gyr[k, 2] - bias[2])
         # the world turns the other way in the sensor's axes
         x, y, z = (
             x - dt * (wy * z - wz * y),
@@ -316,8 +391,9 @@ def _turn_up(acc, rate, start, dt, keep_s, gate):  # type: ignore[no-untyped-def
             x, y, z = x + gain * (ax / size - x), y + gain * (ay / size - y), z + gain * (az / size - z)
         length = np.sqrt(x * x + y * y + z * z)
         x, y, z = x / length, y / length, z / length
-        out[k, 0], out[k, 1], out[k, 2] = x, y, z
-    return out
+        up[k, 0] += x
+        up[k, 1] += y
+        up[k, 2] += z
 
 
 def follow_up(acc: Floats, gyr: Floats, coarse: Floats, rate_hz: float) -> Floats:
@@ -328,17 +404,17 @@ def follow_up(acc: Floats, gyr: Floats, coarse: Floats, rate_hz: float) -> Float
     coarse : (n, 3) the same without a gyroscope, to start from. The gyroscope's bias is its mean while quiet.
     """
     quiet = np.linalg.norm(gyr, axis=1) < QUIET
-    rate = gyr - gyr[quiet].mean(axis=0) if quiet.any() else gyr
-    dt = 1.0 / rate_hz
-    there = _turn_up(acc, rate, coarse[0], dt, KEEP_S, GATE)
-    back = _turn_up(acc[::-1], -rate[::-1], coarse[-1], dt, KEEP_S, GATE)[::-1]
-    up = there + back
-    return np.asarray(up / np.maximum(np.linalg.norm(up, axis=1), 1e-9)[:, None])
+    bias = gyr[quiet].mean(axis=0) if quiet.any() else np.zeros(3)
+    up = np.zeros(acc.shape)
+    for way, start in ((1, coarse[0]), (-1, coarse[-1])):
+        _add_up(acc, gyr, bias, start.copy(), 1.0 / rate_hz, KEEP_S, GATE, way, up)
+    up /= np.maximum(np.linalg.norm(up, axis=1), 1e-9)[:, None]
+    return up
 
 
 def _empty_frames(first: int, count: int) -> Frames:
     """Frames of which nothing was measured."""
-    minutes = np.full((ceil(count / (60 * FRAME_HZ)), 3), np.nan, np.float32)
+    minutes = np.full((ceil(count / PER_MINUTE), 3), np.nan, np.float32)
     nothing = np.zeros(count, np.float32)
     gravity = np.zeros((count, 3), np.float32)
     return Frames(first, np.zeros(count, np.bool_), gravity, nothing, nothing, minutes, minutes)

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from core.activity.params import StairParams
-from core.activity.reduction import FRAME_HZ
+from core.activity.reduction import FRAME_HZ, Singles
 from core.errors import ParameterError
 from core.frames import Bools, Floats
 from core.rest import find_runs
@@ -29,7 +29,7 @@ KIND_OF: tuple[StepKind, ...] = ("walking", "stairs_up", "stairs_down")
 
 
 def measure_walking(
-    theta: Floats, walking: Bools, at: Sequence[int], params: StairParams
+    theta: Singles, walking: Bools, at: Sequence[int], params: StairParams
 ) -> tuple[Floats, Floats]:
     """Standard deviation and mean of the inclination, rad, around frames.
 

@@ -10,7 +10,7 @@ from math import degrees
 import numpy as np
 
 from core.activity.params import TransitionParams
-from core.activity.reduction import FRAME_HZ, Frames, measure_length
+from core.activity.reduction import FRAME_HZ, Frames, Singles, measure_length
 from core.activity.result import PosturalTransition, TransitionCandidate, TransitionKind, TransitionRefusal
 from core.frames import GRAVITY, Bools, Floats
 from core.rest import find_runs
@@ -49,7 +49,7 @@ class Lean:
     rad: float
 
 
-def find_lying(tilt: Floats, frames: Frames, there: Bools, params: TransitionParams) -> list[Lying]:
+def find_lying(tilt: Singles, frames: Frames, there: Bools, params: TransitionParams) -> list[Lying]:
     """Stretches beyond the limit of lying.
 
     Parameters
@@ -93,13 +93,13 @@ def mark_near(lying: Sequence[Lying], close: int, n: int) -> Bools:
     return mask
 
 
-def _count_above(tilt: Floats, there: Bools, limit: float) -> int:
+def _count_above(tilt: Singles, there: Bools, limit: float) -> int:
     """Frames from the first one on that stay above a limit."""
     over = (tilt > limit) & there
     return len(over) if over.all() else int(np.argmin(over))
 
 
-def find_leans(theta: Floats, there: Bools, params: TransitionParams) -> list[Lean]:
+def find_leans(theta: Singles, there: Bools, params: TransitionParams) -> list[Lean]:
     """Peaks of the inclination (f,) that are candidates, each with the minima beside it."""
     from scipy.signal import find_peaks
 
@@ -118,7 +118,7 @@ def find_leans(theta: Floats, there: Bools, params: TransitionParams) -> list[Le
     ]
 
 
-def _edge(theta: Floats) -> int:
+def _edge(theta: Singles) -> int:
     """How far from the peak, the first of them, the inclination (n,) has fallen before it rises again."""
     low = np.minimum.accumulate(theta)
     risen = np.flatnonzero(theta > low + EDGE_RISE)
@@ -169,7 +169,7 @@ def tell_direction(size: Floats) -> float:
 
 def judge_leans(
     leans: Sequence[Lean],
-    theta: Floats,
+    theta: Singles,
     frames: Frames,
     lying: Sequence[Lying],
     walking: Bools,
@@ -180,8 +180,7 @@ def judge_leans(
     found: list[PosturalTransition] = []
     refused: list[TransitionCandidate] = []
     close = round(params.near_lying_s * FRAME_HZ)
-    size = measure_length(frames.gravity)
-    beside = mark_near(lying, close, len(size))
+    beside = mark_near(lying, close, len(frames.valid))
     for lean in leans:
         first, last = find_calm_ends(lean, frames, params)
         part = slice(first, last + 1)
@@ -189,7 +188,7 @@ def judge_leans(
         if lean.b - lean.a < 3 or not frames.valid[part].all() or amidst:
             continue
         rise = measure_rise(frames.up[part].astype(np.float64))
-        direction = tell_direction(size[part])
+        direction = tell_direction(measure_length(frames.gravity[part]))
         likely: TransitionKind = "sit_to_stand" if rise > 0.0 else "stand_to_sit"
         near = bool(beside[lean.top])
         prominent = lean.rad - max(theta[lean.a], theta[lean.b]) >= params.prominence_rad
@@ -219,7 +218,7 @@ def judge_leans(
     return found, refused
 
 
-def tell_lying(lying: Sequence[Lying], frames: Frames, tilt: Floats) -> list[PosturalTransition]:
+def tell_lying(lying: Sequence[Lying], frames: Frames, tilt: Singles) -> list[PosturalTransition]:
     """Lying down and getting up where a stretch of lying begins and ends, in the direction of the tilt."""
     found = []
     n = len(frames.valid)

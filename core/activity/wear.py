@@ -12,12 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.activity.params import UprightParams, WearParams
-from core.activity.reduction import FRAME_HZ, Frames, Singles, measure_length
+from core.activity.reduction import FRAME_HZ, PER_MINUTE, Frames, Singles, measure_length
 from core.activity.result import UprightMethod, WearPeriod
 from core.frames import Bools, Floats
 from core.rest import find_runs
-
-MINUTE = 60 * FRAME_HZ
 
 Axis = tuple[float, float, float]
 
@@ -42,10 +40,10 @@ def find_wear(frames: Frames, params: WearParams) -> Wear:
     unmoved = frames.valid & (frames.spread < params.unmoved**2)
     for a, b in find_runs(still):
         if b - a >= params.still_min:
-            first, end = a * MINUTE, min(n, b * MINUTE)
+            first, end = a * PER_MINUTE, min(n, b * PER_MINUTE)
             # it was laid down within the minute before, and taken up within the one after
-            first -= _count_while(unmoved[max(0, first - MINUTE) : first][::-1])
-            end += _count_while(unmoved[end : end + MINUTE])
+            first -= _count_while(unmoved[max(0, first - PER_MINUTE) : first][::-1])
+            end += _count_while(unmoved[end : end + PER_MINUTE])
             quiet[first:end] = True
     for a, b in gaps:
         quiet[a:b] = False
@@ -65,7 +63,7 @@ def group_periods(wear: Wear, params: WearParams) -> tuple[tuple[int, int], ...]
     """Periods of wear: worn stretches with nothing longer than `still_min` between them."""
     periods: list[tuple[int, int]] = []
     for a, b in wear.worn:
-        if periods and a - periods[-1][1] < params.still_min * MINUTE:
+        if periods and a - periods[-1][1] < params.still_min * PER_MINUTE:
             periods[-1] = (periods[-1][0], b)
         else:
             periods.append((a, b))

@@ -68,7 +68,7 @@ def choose_leg(segment: Segment) -> tuple[Segment, ...]:
 
 
 def find_stride_turns(
-    motion: LevelMotion, valid: Bools, borders: Places, rate_hz: float, params: SlipParams
+    motion: LevelMotion, valid: Bools, borders: Floats, rate_hz: float, params: SlipParams
 ) -> StrideTurns:
     """Fit each stride's curve of vertical and rate to the typical one by a rotation.
 

@@ -24,7 +24,7 @@ from core.formats.draft import signal_digest
 from core.formats.json_tree import read_json
 from core.formats.source import SourceFile
 from core.frames import Floats, Protocol, Segment
-from core.recording import BLOCK_ROWS, ImuStream, Recording, Subject
+from core.recording import ImuStream, Recording, Subject
 from core.sample_blocks import LongStream, SampleBlock
 from core.shoe import Shoe
 
@@ -42,6 +42,12 @@ DAMAGE: Final = (
     pa.ArrowException, OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError,
 )  # fmt: skip
 """What reading raises of a file that `write_recording` did not write, metadata nested without end too."""
+AHEAD: Final = 1 << 16
+"""Bytes of each column of a long file that are read at once; without it a million rows are."""
+
+LONG_BLOCK: Final = 1 << 14
+"""Rows of a long file that are decoded together."""
+
 _MAX_ROWS: Final = 50_000_000
 _MAX_BYTES: Final = 4_000_000_000
 """Declared sizes are checked before anything is allocated."""
@@ -161,11 +167,11 @@ def open_long(file: SourceFile) -> Recording:
     """
     try:
         with file.open() as opened:
-            reader = pq.ParquetFile(opened)
+            reader = pq.ParquetFile(opened, pre_buffer=False, buffer_size=AHEAD)
             meta = reader.metadata
             info = _read_info((meta.metadata or {}).get(_KEY), file.name)
-            first = next(reader.iter_batches(1, columns=[_TIME]))[_TIME][0].as_py()
-            last = reader.read_row_group(meta.num_row_groups - 1, columns=[_TIME])[_TIME][-1].as_py()
+            first, _ = _find_ends(reader, 0)
+            _, last = _find_ends(reader, meta.num_row_groups - 1)
             there = set(reader.schema_arrow.names)
         subject, sensors = _read_subject(info), _list(info["sensors"])
         long = {}
@@ -195,15 +201,24 @@ def open_long(file: SourceFile) -> Recording:
         raise FormatError("bad_parquet", f"{file.name} is a damaged recording ({e}); upload it again.") from e
 
 
+def _find_ends(reader: pq.ParquetFile, group: int) -> tuple[int, int]:
+    """First and last time of a group of rows, µs."""
+    ends: list[int] = []
+    for batch in reader.iter_batches(LONG_BLOCK, row_groups=[group], columns=[_TIME], use_threads=False):
+        if batch.num_rows:
+            ends += [batch[_TIME][0].as_py(), batch[_TIME][-1].as_py()]
+    return ends[0], ends[-1]
+
+
 def _read_blocks(file: SourceFile, device: str, has_gyro: bool, first_us: int) -> Iterator[SampleBlock]:
     """Rows of one sensor from the first one."""
     kinds = ("acc", "gyr") if has_gyro else ("acc",)
     names = [f"{device}.{name}" for kind in kinds for name in _AXES[kind]]
     with file.open() as opened:
-        reader = pq.ParquetFile(opened, page_checksum_verification=True)
-        for batch in reader.iter_batches(BLOCK_ROWS, columns=[_TIME, *names], use_threads=False):
+        reader = pq.ParquetFile(opened, page_checksum_verification=True, pre_buffer=False, buffer_size=AHEAD)
+        for batch in reader.iter_batches(LONG_BLOCK, columns=[_TIME, *names], use_threads=False):
             columns = [batch[name].to_numpy(zero_copy_only=False) for name in names]
-            values = np.stack(columns, axis=-1).astype(np.float64)
+            values = np.stack(columns, axis=-1, dtype=np.float64)
             values[~np.isfinite(values)] = np.nan
             t_s = (batch[_TIME].to_numpy() - first_us) * 1e-6
             yield SampleBlock(t_s, values[:, :3], values[:, 3:] if has_gyro else None)

@@ -117,7 +117,7 @@ def lay_signal(
     Values (g, samples, 3), before the first sample those of it; valid, filled (samples,).
     """
     t = np.concatenate(([NEVER_S], t_s))[None]
-    rows = np.concatenate((x[:1], x)).astype(np.float64)[None]
+    rows = np.concatenate((x[:1], x)).astype(np.float64, copy=False)[None]
     out = np.empty((x.shape[1] // 3, samples, 1, 3))
     valid, filled = np.empty((samples, 1), np.bool_), np.empty((samples, 1), np.bool_)
     lay_points(

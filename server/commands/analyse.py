@@ -37,7 +37,7 @@ def analyse(
     0 when at least one parameter was found, 1 when nothing could be analysed.
     """
     from core.formats import list_source_files, read_named_file
-    from server.services import analyses
+    from server.services import analysing
 
     try:
         sources = list(list_source_files(paths))
@@ -46,7 +46,7 @@ def analyse(
             if not has_compiled_filters():
                 bar.stage("compiling, once", 0.0)
                 compile_filters_once(OFFLINE)
-            files = analyses.run(sources, declared, _overrides(config, estimator), bar.stage)
+            files = analysing.run(sources, declared, _overrides(config, estimator), bar.stage)
     except SagittalError as error:
         sys.stderr.write(f"Nothing analysable ({error.code}): {error.message}\n")
         return 1

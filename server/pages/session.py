@@ -95,6 +95,7 @@ SHOWN: Final = (
     "duration_s",
     "norm_note",
     "norm_source",
+    "has_sides",
     "at_speed",
     "curve_notes",
     "used",

@@ -11,7 +11,7 @@ steps.csv       steps of a trunk sensor, where no foot carries one: time_s, side
 activity…        of daily life, in place of all but the first (server/report/activity_files.py)
 repetitions.csv squats of each leg with their measures and why one was left out, of takes of squats
 strides.csv     one row per stride with its temporal parameters and why it was left out
-repaired.json   the manifest that is proposed where the set-up is wrong (server/services/analyses.py)
+repaired.json   the manifest that is proposed where the set-up is wrong (server/services/analysing.py)
 
 Undefined is an empty cell or null, never NaN. `server.report.bundle` reads them back.
 """

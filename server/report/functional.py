@@ -6,7 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from core.norms.functional import COMFORTABLE_SPEED_SOURCE, TEST_NORMS, find_comfortable_speed, find_test_norm
+from core.norms.functional import (
+    COMFORTABLE_SPEED_SOURCE,
+    SIX_MINUTE_SOURCE,
+    TEST_NORMS,
+    find_comfortable_speed,
+    find_six_minute_norm,
+    find_test_norm,
+)
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.result import Parameter
 from server.report.bundle import Bundle
@@ -49,7 +56,6 @@ TEST_NORM_NOTE: Final = "The norm of a test, where there is one, stands below it
 """Below the table of a test's parameters."""
 
 NO_NORM: Final = "No norm: none whose source gives figures for this test."
-NO_WEIGHT: Final = "No norm: the reference equations need the body weight, which is not kept."
 NO_AGE: Final = "No norm: enter the year of birth."
 NO_SEX: Final = "No norm: enter the sex."
 OTHER_AGE: Final = "No norm for this age."
@@ -166,10 +172,12 @@ def segment_label(name: str) -> str:
 
 def norm_words(name: str, age: float | None, sex: str | None = None) -> str:
     """What healthy people reach in a test, with the source; else why no norm is shown."""
-    if name == "walk_10m_speed_mps":
-        return _speed_words(age, sex)
+    if name in ("walk_10m_speed_mps", "walk_6min_distance_m"):
+        if age is None or sex is None:
+            return NO_AGE if age is None else NO_SEX
+        return _speed_words(age, sex) if name == "walk_10m_speed_mps" else _distance_words(age, sex)
     if name not in TEST_NORMS:
-        return NO_WEIGHT if name == "walk_6min_distance_m" else NO_NORM
+        return NO_NORM
     norm = find_test_norm(name, age)
     if norm is None:
         return NO_AGE if age is None else OTHER_AGE
@@ -179,9 +187,17 @@ def norm_words(name: str, age: float | None, sex: str | None = None) -> str:
     return f"Healthy people of {people}: {mean}slower than average above {limit} s ({norm.source})."
 
 
-def _speed_words(age: float | None, sex: str | None) -> str:
-    if age is None or sex is None:
-        return NO_AGE if age is None else NO_SEX
+def _distance_words(age: float, sex: str) -> str:
+    norm = find_six_minute_norm(age, sex)
+    if norm is None:
+        return OTHER_AGE
+    people = f"{'Men' if sex == 'male' else 'Women'} of {norm.ages[0]} to {norm.ages[1]} years"
+    mean, spread = format_number(norm.mean_m, 0), format_number(norm.sd_m, 0)
+    far = f"{mean} m on average, standard deviation {spread} m"
+    return f"Healthy {people.lower()} walk {far} ({SIX_MINUTE_SOURCE})."
+
+
+def _speed_words(age: float, sex: str) -> str:
     norm = find_comfortable_speed(age, sex)
     if norm is None:
         return OTHER_AGE

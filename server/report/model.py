@@ -164,6 +164,12 @@ class ReportModel:
         return next(p for p in self.panels if p.variable.name == KEY_CURVE)
 
     @property
+    def has_sides(self) -> bool:
+        """The table has columns of left and right: all but a test of which no value is of one side."""
+        rows = [row for _, group in self.groups for row in group]
+        return self.functional is None or any(row.left or row.right for row in rows)
+
+    @property
     def at_speed(self) -> bool:
         """A band is of people at the person's speed, the line beside it of people at their own."""
         return any(p.comfortable is not None for p in self.panels)

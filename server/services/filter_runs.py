@@ -14,7 +14,7 @@ from sqlalchemy import Connection, insert, select
 from core.fusion.algorithms.choice import require_filters
 from server import audit
 from server.jobs.queue import COMPARE_FILTERS, Claim, JobQueue, JobView
-from server.services import analyses, edit_log, reference_files
+from server.services import analyses, analysing, edit_log, reference_files
 from server.services.errors import NotFound
 from server.services.provenance import CODE_VERSION
 from server.services.shown_take import submit_on_shown
@@ -71,7 +71,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progre
         *files, last = files
         reference = read_orientation_table(last.read(), last.name)
     manifest = json.dumps(params["manifest"], ensure_ascii=False).encode()
-    take = analyses.analyse_files(
+    take = analysing.analyse_files(
         files, manifest, params["config"], lambda _, share: progress("analysis", ANALYSED * share)
     )
     measured, edits = take.measured, [read_edit(e) for e in params["edits"]]

@@ -11,7 +11,8 @@ from sqlalchemy import Connection
 
 from core.formats.manifest import manifest_of
 from server.services import recordings
-from server.services.analyses import REPAIRED, AnalysisRecord, file_bytes
+from server.services.analyses import AnalysisRecord, file_bytes
+from server.services.analysing import REPAIRED
 from server.storage.blobs import BlobStore
 
 SETUP_KEYS: Final = ("sensors", "corrections", "mounting")

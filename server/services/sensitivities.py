@@ -18,7 +18,7 @@ from server import audit
 from server.jobs.queue import SENSITIVITY, Claim, JobQueue, JobView
 from server.report.bundle import read_angles
 from server.report.sensitivity import sensitivity_files, summarise_sensitivity
-from server.services import analyses, reference_files, sessions
+from server.services import analyses, analysing, reference_files, sessions
 from server.services.errors import Conflict, NotFound
 from server.services.shown_take import submit_on_shown
 from server.storage.blobs import Blob
@@ -96,7 +96,7 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], progress: Progre
         *files, last = files
         reference = read_reference(last.read(), last.name, from_standing=settings["from_standing"])
     manifest = json.dumps(params["manifest"], ensure_ascii=False).encode()
-    take = analyses.analyse_files(
+    take = analysing.analyse_files(
         files, manifest, params["config"], lambda _, share: progress("analysis", ANALYSED * share)
     )
     if take.calibrated is None or take.legs is None:

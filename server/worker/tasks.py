@@ -13,7 +13,7 @@ from sqlalchemy import Connection
 
 from server.jobs.attempt import Attempt
 from server.jobs.queue import COMPARE_FILTERS, SENSITIVITY, TUNE, Claim
-from server.services import analyses, devices, filter_runs, recordings, sensitivities, tunings
+from server.services import analyses, analysing, devices, filter_runs, recordings, sensitivities, tunings
 from server.storage.blobs import Blob
 from server.worker.task import Task, register
 
@@ -24,7 +24,7 @@ FOUND = "inspection.json"
 
 
 def _inspect(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
-    return {FOUND: analyses.inspect(files, params["manifest"], attempt.progress)}
+    return {FOUND: analysing.inspect(files, params["manifest"], attempt.progress)}
 
 
 def _publish_inspection(
@@ -36,7 +36,7 @@ def _publish_inspection(
 
 def _analyse(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
     manifest = json.dumps(params["manifest"], ensure_ascii=False).encode()
-    return analyses.run(files, manifest, params["config"], attempt.progress)
+    return analysing.run(files, manifest, params["config"], attempt.progress)
 
 
 def _publish_analysis(

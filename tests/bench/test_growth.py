@@ -51,12 +51,12 @@ ANALYSE = """
 import json, sys, time
 from pathlib import Path
 from core.formats import list_source_files
-from server.services import analyses
+from server.services import analysing
 
 def analysed(path):
     stages, began = [], time.process_time()
     progress = lambda name, share: stages.append((name, time.process_time()))
-    files = analyses.run(list(list_source_files([path])), None, None, progress)
+    files = analysing.run(list(list_source_files([path])), None, None, progress)
     ended = time.process_time()
     ends = [t for _, t in stages[1:]] + [ended]
     return files, ended - began, {name: end - start for (name, start), end in zip(stages, ends)}

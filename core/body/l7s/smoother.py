@@ -16,7 +16,6 @@ from typing import Final
 
 import numba
 import numpy as np
-from scipy.linalg import solveh_banded
 
 from core.body.l7s.constraints import project
 from core.body.l7s.filter import L7sInputs, L7sTrack
@@ -150,6 +149,8 @@ def _solve_nodes(
     heights: Floats,
 ) -> tuple[Floats, int]:  # fmt: skip
     """Places (T, 9) of the nodes by Gauss–Newton, and the passes it took; arguments as `write_equations`."""
+    from scipy.linalg import solveh_banded
+
     x = start.copy()
     bent = np.zeros_like(x)
     bent[1:-1] = free[2:] - 2.0 * free[1:-1] + free[:-2]

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from core.norms.functional import COMFORTABLE_SPEEDS, find_comfortable_speed, find_test_norm
+from core.norms.functional import (
+    COMFORTABLE_SPEEDS,
+    find_comfortable_speed,
+    find_six_minute_norm,
+    find_test_norm,
+)
+from server.report.functional import NO_AGE, NO_SEX, OTHER_AGE, norm_words
 
 
 @pytest.mark.parametrize(
@@ -33,3 +39,28 @@ def test_there_is_none_for_children_and_the_unknown() -> None:
     assert find_comfortable_speed(40, "other") is None
     assert find_test_norm("tug_duration_s", 40) is None
     assert find_test_norm("tug_duration_s", None) is None
+
+
+@pytest.mark.parametrize(
+    ("age", "sex", "expected"),
+    [
+        (21, "female", 581.4),
+        (75.9, "female", 581.4),
+        (77.9, "male", 608.7),
+        (20.9, "male", None),
+        (76, "female", None),
+    ],
+)
+def test_six_minutes_only_at_ages_that_were_measured(age: float, sex: str, expected: float | None) -> None:
+    found = find_six_minute_norm(age, sex)
+    assert (None if found is None else found.mean_m) == expected
+    assert find_six_minute_norm(40, "other") is None
+
+
+def test_six_minutes_are_told_with_their_source() -> None:
+    told = norm_words("walk_6min_distance_m", 50.0, "female")
+    assert "581 m" in told
+    assert "Respir Res" in told
+    assert norm_words("walk_6min_distance_m", None, "male") == NO_AGE
+    assert norm_words("walk_6min_distance_m", 50.0, None) == NO_SEX
+    assert norm_words("walk_6min_distance_m", 90.0, "male") == OTHER_AGE

@@ -72,6 +72,15 @@ async def test_the_card_has_total_segments_norm_and_no_last_visit_at_first(
     assert "by the sensor: pelvis" in card
 
 
+async def test_values_that_have_no_side_have_no_columns_of_sides(clinic: Clinic, visits: list[str]) -> None:
+    html = await page(clinic, f"/sessions/{visits[0]}")
+    table = html[html.index('<table class="tbl tight params">') :]
+    head = re.findall(r"<th(?: [^>]*)?>\s*(.*?)\s*</th>", table[: table.index("</thead>")], re.DOTALL)
+    assert head == ["Parameter", "Value"]
+    assert "○ right" not in html
+    assert re.search(r"Timed up and go</a>.*?<td class=\"n\">.*?>2[01]\.\d", table, re.DOTALL)
+
+
 async def test_the_second_visit_stands_beside_the_first_and_tells_the_hand(
     clinic: Clinic, visits: list[str]
 ) -> None:

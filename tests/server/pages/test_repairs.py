@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from server.services.analyses import REPAIRED
+from server.services.analysing import REPAIRED
 from tests.server import analysed
 from tests.server.clinic import Clinic, open_clinic
 

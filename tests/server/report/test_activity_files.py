@@ -17,7 +17,7 @@ from core.simulate.daily import plan_daily_life, record_daily_life, simulate_dai
 from server.report import activity_files
 from server.report.activity_files import read_activity, write_activity
 from server.report.bundle import load_bundle
-from server.services import analyses
+from server.services import analysing
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def recording() -> Recording:
 def files(recording: Recording) -> dict[str, bytes]:
     stages: list[str] = []
     source = SourceFile.of_bytes("day.parquet", write_recording(recording))
-    found = analyses.run([source], None, None, lambda stage, share: stages.append(stage))
+    found = analysing.run([source], None, None, lambda stage, share: stages.append(stage))
     assert stages == ["reading", "activity", "quality", "done"]
     return found
 
@@ -63,7 +63,7 @@ def test_without_a_sensor_on_the_trunk_it_is_said_where_one_is_needed(recording:
     (device,) = recording.streams
     manifest = json.dumps({"sensors": {device: "foot_l"}}).encode()
     with pytest.raises(SignalError, match="chest or the lower back") as error:
-        analyses.run([source], manifest, None, lambda stage, share: None)
+        analysing.run([source], manifest, None, lambda stage, share: None)
     assert error.value.code == "no_trunk_sensor"
 
 

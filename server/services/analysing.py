@@ -1,0 +1,85 @@
+"""Files of a take in, result files out: what command line and worker run, without a database."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from server.services.provenance import CODE_VERSION
+
+if TYPE_CHECKING:
+    from core.formats.source import SourceFile
+    from core.pipeline import Progress, TakeAnalysis
+
+
+REPAIRED: Final = "repaired.json"
+"""The manifest that puts a wrong set-up right, where an analysis proposes one; nobody has confirmed it."""
+
+
+def run(
+    files: Sequence[SourceFile],
+    manifest: bytes | None,
+    config: Mapping[str, Any] | None,
+    progress: Progress,
+) -> dict[str, bytes]:
+    """Files of one take in, result files out (server/report/exports.py); as `analyse_files`."""
+    from core.formats.json_tree import read_json
+    from server.report.exports import analysis_files
+
+    result = analyse_files(files, manifest, config, progress)
+    found = analysis_files(result)
+    if result.setup is not None and result.setup.can_be_applied:
+        declared = read_json(manifest) if manifest is not None else {}
+        assert isinstance(declared, dict)  # noqa: S101 - `parse_manifest` has read it
+        repaired = result.setup.complete_manifest(declared)
+        found[REPAIRED] = json.dumps(repaired, ensure_ascii=False, indent=1).encode()
+    return found
+
+
+def analyse_files(
+    files: Sequence[SourceFile],
+    manifest: bytes | None,
+    config: Mapping[str, Any] | None,
+    progress: Progress,
+) -> TakeAnalysis:
+    """Files of one take through the whole chain; pure but for `progress`.
+
+    Parameters
+    ----------
+    manifest : JSON text, None = nothing declared.
+    config : overrides of PipelineConfig by stage, {"fusion": {"k_acc": 1.0}}; None = the defaults.
+
+    Raises
+    ------
+    SagittalError
+        nothing can be analysed; the code and the sentence say why.
+    """
+    from core.formats import read_recording
+    from core.formats.manifest import parse_manifest
+    from core.pipeline import PipelineConfig, analyse
+    from core.pipeline.config import override_config
+
+    progress("reading", 0.0)
+    take = read_recording(files, parse_manifest(manifest) if manifest is not None else None)
+    chosen = override_config(PipelineConfig(), config or {})
+    return analyse(take, chosen, progress, CODE_VERSION)
+
+
+def inspect(files: Sequence[SourceFile], manifest: Mapping[str, Any] | None, progress: Progress) -> bytes:
+    """What is in the files, as JSON, before any mapping; only `sources` of the manifest is heeded.
+
+    Raises
+    ------
+    SagittalError
+        the files cannot be read; the code and the sentence say why.
+    """
+    from core import quality
+    from core.formats import read_recording
+    from core.formats.manifest import manifest_of
+
+    progress("reading", 0.0)
+    sources = (manifest or {}).get("sources")
+    take = read_recording(files, manifest_of({"sources": sources}) if sources else None)
+    progress("looking", 0.7)
+    return json.dumps(quality.describe(take).to_json(), ensure_ascii=False, allow_nan=False).encode()
