@@ -244,8 +244,8 @@ def test_goals_are_written(tmp_path: Path) -> None:
         "Goals",
         ("what", "goal", "ours", "met"),
         rows,
-        "Goals are those of a quiet machine; on one that others use, CPU time is up to a quarter longer. Pages, "
-        "imports and the figure have theirs in `tests/bench`.",
+        "Goals are those of a quiet machine; on one that others use, CPU time is up to a quarter longer. "
+        "Pages, imports and the figure have theirs in `tests/bench`.",
     )
 
 
