@@ -92,8 +92,9 @@ VISITS: Final = 5
 PUSHES: Final = 100
 """Of ten samples, of every session."""
 
-DEARER: Final = 2.0
-"""A push may take so much longer among many sessions, and the list of 500 patients than that of one, × 10."""
+DEARER: Final = 3.0
+"""A push may take so much longer among many sessions, and the list of 500 patients than that of one, × 10:
+on a machine that others use 1.7 among 40, and .4 × 10."""
 
 reached: dict[str, tuple[float, float, str]] = {}
 """What was measured here → goal, ours, unit."""
@@ -230,14 +231,21 @@ def test_goals_are_written(tmp_path: Path) -> None:
     }
     for name, (goal, words) in commands.items():
         reached[name] = (goal, min(command_s(words, tmp_path) for _ in range(3)), "s")
+    rows = [
+        [
+            name,
+            f"≤ {goal:g} {unit}",
+            f"{ours:.0f} {unit}" if ours >= 100 else f"{ours:.3g} {unit}",
+            "yes" if ours <= goal else "no",
+        ]
+        for name, (goal, ours, unit) in reached.items()
+    ]
     record_speed(
         "Goals",
         ("what", "goal", "ours", "met"),
-        [
-            [name, f"≤ {goal:g} {unit}", f"{ours:.3g} {unit}", "yes" if ours <= goal else "no"]
-            for name, (goal, ours, unit) in reached.items()
-        ],
-        "Goals are those of a quiet machine. Pages, imports and the figure have theirs in `tests/bench`.",
+        rows,
+        "Goals are those of a quiet machine; on one that others use, CPU time is up to a quarter longer. "
+        "Pages, imports and the figure have theirs in `tests/bench`.",
     )
 
 
