@@ -45,6 +45,9 @@ MARGIN_S: Final = 2.0
 ACROSS: Final = np.array([True, True, False])
 """What is taken of a thigh: not the place across, which its skin's turning about the bone hides."""
 
+TAPE_SD_M: Final = 0.005
+"""How well a tape tells how far apart the ankles stand."""
+
 
 @dataclass(frozen=True)
 class ArmParams:
@@ -194,6 +197,13 @@ def measure_arms(
         ]
     )
     N, b = np.diag(sd**-2.0), sd**-2.0 * mean
+    if body.standing_width is not None and len(nominal) == len(LEG_JOINTS):
+        # legs stand as far apart as the tape says, wherever along them the joints lie
+        apart = np.zeros(len(mean))
+        for joint in nominal:
+            apart[column[joint] + ARM - 1] = 1.0 if joint[1].endswith("_r") else -1.0
+        N += np.outer(apart, apart) / TAPE_SD_M**2
+        b += apart * (apart @ mean) / TAPE_SD_M**2
     misfits: dict[LegJoint, float] = {}
     sides, rate_hz = _view_sides(calibrated, orientations, segments, params)
     heard = set()
