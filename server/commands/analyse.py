@@ -45,7 +45,7 @@ def analyse(
         with _ProgressBar() as bar:
             if not has_compiled_filters():
                 bar.stage("compiling, once", 0.0)
-                compile_filters_once(OFFLINE)
+            compile_filters_once(OFFLINE)
             files = analysing.run(sources, declared, _overrides(config, estimator), bar.stage)
     except SagittalError as error:
         sys.stderr.write(f"Nothing analysable ({error.code}): {error.message}\n")

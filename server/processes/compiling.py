@@ -63,12 +63,10 @@ def compile_filters(orders: tuple[Order, Order] = ALL) -> None:
 
 
 def compile_filters_once(orders: tuple[Order, Order] = ALL) -> None:
-    """The same where the folder holds none; processes that ask at once wait for the one that compiles.
+    """The same where the folder holds none; processes that ask meanwhile wait for the one that compiles.
 
     What fails here is compiled where it is first called, and fails there.
     """
-    if has_compiled_filters():
-        return
     folder = Path(os.environ[VARIABLE])
     with suppress(OSError, subprocess.CalledProcessError):
         folder.mkdir(parents=True, exist_ok=True)

@@ -6,6 +6,7 @@ import importlib
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Event
 
 import pytest
 
@@ -27,6 +28,25 @@ def test_of_many_that_ask_at_once_one_compiles(tmp_path: Path, monkeypatch: pyte
         for done in [pool.submit(compiling.compile_filters_once, compiling.OFFLINE) for _ in range(4)]:
             done.result()
     assert asked == [compiling.OFFLINE]
+
+
+def test_who_comes_in_the_middle_waits_for_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = Event()
+
+    def compile_slowly(_: object) -> None:
+        (tmp_path / "first.nbi").touch()
+        begun.set()
+        time.sleep(0.05)
+        (tmp_path / "last.nbi").touch()
+
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    monkeypatch.setattr(compiling, "compile_filters", compile_slowly)
+    with ThreadPoolExecutor(1) as pool:
+        running = pool.submit(compiling.compile_filters_once)
+        assert begun.wait(10.0)
+        compiling.compile_filters_once()
+        assert (tmp_path / "last.nbi").exists()
+        running.result()
 
 
 def test_a_filter_that_does_not_compile_is_left_to_its_caller(
