@@ -26,7 +26,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from core.agreement.joints import LEG_JOINTS
 from core.angles import JointAngles
 from core.body.health import find_worst_verdict
 from core.body.model import LENGTHS
@@ -275,6 +274,9 @@ def _body(analysis: TakeAnalysis) -> dict[str, object] | None:
 def _sensor_places(analysis: TakeAnalysis) -> object:
     """Where sensors sit and joints lie, in cm along the segment's axes, beside the nominal places, and the
     knees' hinges; None where motion was not asked."""
+    # readers of results, which have nothing of this to write, do without numba
+    from core.agreement.joints import LEG_JOINTS
+
     arms = None if analysis.mounted is None else analysis.mounted.arms
     if arms is None:
         return None

@@ -6,11 +6,13 @@ class AllValues extends HTMLElement {
     const input = this.querySelector("input");
     // "toggle" does not bubble; the folds are replaced when their rows come
     this.folds.addEventListener("toggle", () => this.load(), { capture: true });
-    input.addEventListener("focus", () => this.load());
-    input.addEventListener("input", async () => {
+    const search = async () => {
       await this.load();
       this.find(input.value.toLowerCase().split(/\s+/).filter(Boolean));
-    });
+    };
+    input.addEventListener("focus", () => this.load());
+    input.addEventListener("input", search);
+    if (input.value) search(); // typed before the script was there
   }
 
   load() {
