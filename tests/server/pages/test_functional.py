@@ -74,7 +74,7 @@ async def test_the_card_has_total_segments_norm_and_no_last_visit_at_first(
 
 async def test_values_that_have_no_side_have_no_columns_of_sides(clinic: Clinic, visits: list[str]) -> None:
     html = await page(clinic, f"/sessions/{visits[0]}")
-    table = html[html.index('<table class="tbl tight params">') :]
+    table = html[html.index('<table class="tbl tight params ten click">') :]
     head = re.findall(r"<th(?: [^>]*)?>\s*(.*?)\s*</th>", table[: table.index("</thead>")], re.DOTALL)
     assert head == ["Parameter", "Value"]
     assert "○ right" not in html

@@ -164,7 +164,7 @@ async def test_the_overview_is_light_and_the_rest_comes_when_it_is_opened(clinic
     _, session = await visit(clinic, "LIGHT")
     overview = await page(clinic, f"/sessions/{session}")
     assert len(overview.encode()) < 80_000
-    assert "L and R over norm" in overview
+    assert "On the norm" in overview
     names = set(re.findall(r'class="plain" href="[^"]*/parameters/(\w+)"', overview))
     values = await page(clinic, f"/sessions/{session}/values")
     others = set(re.findall(r'class="plain" href="[^"]*/parameters/(\w+)"', values))

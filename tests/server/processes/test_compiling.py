@@ -11,7 +11,7 @@ from threading import Event
 import pytest
 
 from server.processes import compiling
-from server.processes.compile_cache import VARIABLE
+from server.processes.compile_cache import VARIABLE, has_compiled_filters
 
 
 def test_of_many_that_ask_at_once_one_compiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -54,6 +54,7 @@ def test_a_filter_that_does_not_compile_is_left_to_its_caller(
 ) -> None:
     monkeypatch.setenv(VARIABLE, str(tmp_path))
     compiling.compile_filters_once(((("core.nowhere", "compile_nothing"),), (("math", "nothing"),)))
+    assert not has_compiled_filters()
 
 
 @pytest.mark.parametrize("order", [*compiling.ALL])
