@@ -41,7 +41,7 @@ def test_a_prescription_is_written_changed_and_ended(opened: Opener, walker: str
     page.get_by_text("More: side, target").click()
     page.get_by_label("Parameter", exact=True).select_option("stride_length_m")
     expect(page.get_by_label("Left affected")).to_be_disabled()
-    expect(page.get_by_role("radio", name="Both")).to_be_checked()
+    expect(page.get_by_role("radio", name="Both", exact=True)).to_be_checked()
     expect(page.get_by_text("Both sides of a walk share it")).to_be_visible()
     page.get_by_label("Parameter", exact=True).select_option("step_length_m")
     page.get_by_label("Left affected").check()
