@@ -77,12 +77,7 @@ class ReferenceFiles extends HTMLElement {
 
   async send(file) {
     this.querySelector("[data-say]").textContent = `Uploading ${file.name}…`;
-    const answer = await fetch(this.base + encodeURIComponent(file.name), {
-      method: "PUT",
-      headers: { "Content-Type": "application/octet-stream" },
-      body: file,
-    });
-    if (!answer.ok) throw new Problem(answer.status, await answer.json().catch(() => ({})));
+    await request("PUT", this.base + encodeURIComponent(file.name), file);
   }
 }
 

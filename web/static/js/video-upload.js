@@ -1,5 +1,5 @@
 // <video-upload>: sets a video beside a take, once somebody has said that the person agreed.
-import { Problem, request, showProblem } from "./common/api.js";
+import { request, showProblem } from "./common/api.js";
 
 class VideoUpload extends HTMLElement {
   connectedCallback() {
@@ -26,8 +26,7 @@ class VideoUpload extends HTMLElement {
   async send(file) {
     this.querySelector("[data-say]").textContent = `Uploading ${file.name}…`;
     const query = new URLSearchParams({ name: file.name, consent: "true" });
-    const answer = await fetch(`${this.path()}?${query}`, { method: "PUT", headers: { "Content-Type": "application/octet-stream" }, body: file });
-    if (!answer.ok) throw new Problem(answer.status, await answer.json().catch(() => ({})));
+    await request("PUT", `${this.path()}?${query}`, file);
   }
 }
 

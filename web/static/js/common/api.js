@@ -12,15 +12,16 @@ export class Problem extends Error {
 /**
  * @param {string} method
  * @param {string} path
- * @param {object} [body] sent as JSON
+ * @param {object} [body] a file is sent as it is, all else as JSON
  * @returns {Promise<any>} what the server answers; an error is thrown as a Problem
  */
 export async function request(method, path, body) {
   /** @type {RequestInit} */
   const init = { method, headers: { Accept: "application/json" }, credentials: "same-origin" };
   if (body !== undefined) {
-    init.headers["Content-Type"] = "application/json";
-    init.body = JSON.stringify(body);
+    const isFile = body instanceof Blob;
+    init.headers["Content-Type"] = isFile ? "application/octet-stream" : "application/json";
+    init.body = isFile ? body : JSON.stringify(body);
   }
   let answer;
   try {
