@@ -25,6 +25,7 @@ from tests.accuracy.neura import SHIPPED, Chain, chain, take
 from tests.accuracy.report import record
 from tests.accuracy.test_neura_walk import scores
 from tests.accuracy.test_setup_mistakes import right
+from tests.marks import where_figures_are_written
 from tests.walks import analysed
 
 pytestmark = pytest.mark.accuracy
@@ -91,6 +92,7 @@ def real_chains() -> tuple[Chain, Chain]:
     return chain(*take(), measured=False), chain(*take())
 
 
+@where_figures_are_written
 def test_write_down_what_arms_from_motion_gain() -> None:
     rows = []
     for name, (usual, ours) in simulated_scores().items():

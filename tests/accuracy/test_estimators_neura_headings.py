@@ -28,6 +28,7 @@ from tests.accuracy.neura import (
     take,
 )
 from tests.accuracy.report import record
+from tests.marks import where_figures_are_written
 
 ALTERNATING = dict(zip(SEGMENTS, (1, -1, 1, -1, 1, -1, 1), strict=True))
 LEFT_LEG = [SEGMENTS.index(s) for s in ("thigh_l", "shank_l", "foot_l")]
@@ -89,6 +90,7 @@ def test_independent_filters_keep_the_heading_they_were_given() -> None:
     assert change[SEGMENTS.index("shank_r")] == pytest.approx(30.0, abs=0.1)
 
 
+@where_figures_are_written
 def test_write_down_the_figures() -> None:
     rows = []
     for size in (30.0, 60.0, 120.0):

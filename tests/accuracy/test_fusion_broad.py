@@ -26,6 +26,7 @@ from core.fusion.algorithms.parameters import MadgwickGains
 from core.rotation import angle_between, multiply
 from tests.accuracy.report import record
 from tests.data import data_folder
+from tests.marks import where_figures_are_written
 
 TOTAL_DEG = {"valenti_2016": 7.0, "nazarahari_2020": 3.0}
 """Limits of the slow trial 02 that are not 3°."""
@@ -101,6 +102,7 @@ def test_the_authors_sigma_points_are_one_filter_on_real_data() -> None:
         assert np.degrees(np.median(angle_between(run_trial(name, trial), base))) < 0.1
 
 
+@where_figures_are_written
 def test_every_algorithm_on_every_trial() -> None:
     vqf = pytest.importorskip("vqf", reason="vqf is a test extra without a wheel for this Python")
     rows = []

@@ -20,6 +20,7 @@ from core.frames import FOOT, SIDES, Floats
 from tests.accuracy.l7s_walks import Trial, trial, trial_scores
 from tests.accuracy.report import record
 from tests.l7s_textbook import Textbook, textbook
+from tests.marks import where_figures_are_written
 
 RATE: Final = 100.0
 
@@ -108,6 +109,7 @@ def test_a_second_projection_changes_no_angle() -> None:
     np.testing.assert_allclose(once, twice, atol=0.1)
 
 
+@where_figures_are_written
 def test_write_down_the_figures() -> None:
     rows = [
         [name, *(" / ".join(f"{rmse:.1f}" for rmse, _ in scored(name, a)) for a in get_args(Adjoint))]

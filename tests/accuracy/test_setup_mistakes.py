@@ -7,7 +7,6 @@ with `--write-figures`; otherwise a sample of them is.
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import cache, partial
@@ -20,10 +19,11 @@ from core.frames import GRAVITY, Floats, Segment
 from core.pipeline import TakeAnalysis, analyse
 from core.recording import ImuStream, Recording
 from core.simulate import PATIENTS, simulate_scenario
-from tests.accuracy.report import WRITE, record
+from tests.accuracy.report import record
 from tests.accuracy.test_events_trunk_qmt import take as qmt_take
 from tests.accuracy.test_perturbations import QMT, WORN, seven
 from tests.ipol import WALKS, ipol_recording
+from tests.marks import sample, where_figures_are_written
 from tests.setup_mistakes import MIRRORS, SIGNED, TURNS, apply_repair, change_axes, exchange_labels, look_at
 from tests.walks import neura_recording
 
@@ -33,7 +33,6 @@ SAMPLE = ("neura_walk", "hemiparetic")
 AT_MOST_DEG = 0.5
 """A repaired take may differ from the right one by so much."""
 
-FULL = bool(os.environ.get(WRITE))
 Make = Callable[[Recording], Recording]
 
 
@@ -168,7 +167,7 @@ def test_a_sample_of_mistakes_is_never_put_right_wrongly() -> None:
 
 
 def test_right_set_ups_are_accused_of_nothing() -> None:
-    told = {w: look_at(ipol_recording(w))[0] for w in (WALKS if FULL else WALKS[::5])}
+    told = {w: look_at(ipol_recording(w))[0] for w in sample(WALKS, 5)}
     assert {w: x.evidence for w, x in told.items() if x is not None} == {}
 
 
@@ -204,7 +203,7 @@ def test_a_real_take_has_its_angles_back_once_the_repair_is_confirmed(make: Make
 
 
 @pytest.mark.timeout(3600)
-@pytest.mark.skipif(not FULL, reason="ten minutes and more; run with --write-figures")
+@where_figures_are_written
 @pytest.mark.parametrize("group", ["real", "simulated"])
 def test_write_down_the_matrix(group: str) -> None:
     counts: dict[str, Counter[str]] = {}

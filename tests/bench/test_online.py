@@ -174,7 +174,8 @@ def test_memory_is_flat_over_five_minutes() -> None:
     try:
         for k, batch in enumerate(endless(rest, 3000)):
             online.push(batch)
-            online.compare_sensors()
+            if k % 10 == 9:  # once a second, as on the server
+                online.compare_sensors()
             if k % 500 == 499:
                 gc.collect()
                 held.append(tracemalloc.get_traced_memory()[0] / 1e3)

@@ -137,16 +137,16 @@ def _parents() -> dict[int, int]:
     return found
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def playwright_() -> Iterator[Playwright]:
-    # while it lives it keeps an event loop running in this thread, which other tests must not find
+    # while it lives it keeps an event loop running in this thread: pages come last (tests/conftest.py, ORDER)
     if not Path(CHROMIUM).exists():
         pytest.skip(f"no Chromium at {CHROMIUM}; set CHROMIUM to one")
     with sync_playwright() as p:
         yield p
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def flat(playwright_: Playwright) -> Iterator[Browser]:
     """Chromium without 3D."""
     browser = playwright_.chromium.launch(executable_path=CHROMIUM, args=FLAT)
@@ -154,7 +154,7 @@ def flat(playwright_: Playwright) -> Iterator[Browser]:
     browser.close()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def solid(playwright_: Playwright) -> Iterator[Browser]:
     """Chromium with software WebGL."""
     browser = playwright_.chromium.launch(executable_path=CHROMIUM, args=SOLID)
