@@ -131,6 +131,7 @@ def read_all(stream: LongStream) -> float:
 
 
 @pytest.mark.bench
+@pytest.mark.memory
 def test_a_day_at_100_hz_fits_and_needs_no_more_than_its_third(
     day: tuple[LongStream, list[SampleBlock]], tmp_path: Path
 ) -> None:
@@ -146,6 +147,7 @@ def test_a_day_at_100_hz_fits_and_needs_no_more_than_its_third(
 
 
 @pytest.mark.bench
+@pytest.mark.memory
 def test_days_of_an_axivity_are_linear_in_time_and_fit(tmp_path: Path) -> None:
     files = [write_long_cwa(tmp_path / f"{days}.cwa", days) for days in (0.05, 1, WEEK)]
     _, one, all_ = (analyse_alone(path, tmp_path / path.stem) for path in files)

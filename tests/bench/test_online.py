@@ -163,6 +163,7 @@ def endless(rest: Sequence[SampleBatch], count: int) -> Iterator[SampleBatch]:
         )  # fmt: skip
 
 
+@pytest.mark.memory
 def test_memory_is_flat_over_five_minutes() -> None:
     begun.cache_clear()
     online, rest, _ = begun(10)
