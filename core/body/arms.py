@@ -226,6 +226,7 @@ def measure_arms(
             apart = np.zeros(len(b))
             for joint in nominal:
                 apart[column[joint] + axis] = 1.0 if joint[1].endswith("_r") else -1.0
+            apart[-1] = -(apart[:-1] @ turns)
             N += np.outer(apart, apart) / spread_m**2
             b += apart * (apart[:-1] @ mean) / spread_m**2
     misfits: dict[LegJoint, float] = {}
