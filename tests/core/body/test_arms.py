@@ -92,7 +92,7 @@ def test_the_place_across_a_thigh_stays_the_usual_one() -> None:
 @pytest.mark.parametrize("turn_deg", [30.0, -30.0])
 def test_forward_axes_that_are_all_turned_alike_are_told_and_keep_the_arms(turn_deg: float) -> None:
     """No joint sees it; that sensors then seem to sit beside their places does."""
-    turned = turn_forward_axes(*walk(), dict.fromkeys(WHOLE, np.radians(turn_deg)))
+    turned = turn_forward_axes(*walk(), {s: float(np.radians(turn_deg)) for s in WHOLE})
     straight, found = measure_arms(*walk(), BODY, WHOLE), measure_arms(*turned, BODY, WHOLE)
     assert report_ahead(straight) == ()
     (notice,) = report_ahead(found)
@@ -109,7 +109,7 @@ def test_legs_end_side_by_side_as_far_as_motion_lets_them(monkeypatch: pytest.Mo
 
     def ahead_of(body_arms: MeasuredArms) -> float:
         centres = body_arms.centres
-        return sum(c[0] if joint[1].endswith("_r") else -c[0] for joint, c in centres.items())
+        return float(sum(c[0] if joint[1].endswith("_r") else -c[0] for joint, c in centres.items()))
 
     beside = ahead_of(measure_arms(*walk(), BODY, WHOLE))
     monkeypatch.setattr(arms, "BESIDE_SD_M", 10.0)
