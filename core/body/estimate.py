@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from core.body.arms import report_ahead
 from core.body.choice import WHOLE
 from core.body.corrected import correct_signals
 from core.body.erkf.filter import erkf_inputs
@@ -166,7 +167,12 @@ class _Take:
         poses = replace(
             poses,
             health=(*health, *judge_turned_axes(turned)),
-            notices=(*poses.notices, *erkf_notices(run, health), *report_turned_axes(turned)),
+            notices=(
+                *poses.notices,
+                *erkf_notices(run, health),
+                *report_turned_axes(turned),
+                *(() if self.mounted.arms is None else report_ahead(self.mounted.arms)),
+            ),
             diagnostics={"heading_error_rad": turned},
         )
         return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body))

@@ -46,6 +46,7 @@ def join_takes(takes: Sequence[Parameter]) -> Parameter:
     halves = [0.5 * (p.ci_high - p.ci_low) for p in there if p.ci_low is not None and p.ci_high is not None]
     half = _mean_of_independent(halves) if len(halves) == k else None
     own = [p.u_own for p in there if p.u_own is not None]
+    common = [p.u_common for p in there if p.u_common is not None]
     return replace(
         first,
         n=sum(p.n for p in there),
@@ -58,7 +59,8 @@ def join_takes(takes: Sequence[Parameter]) -> Parameter:
         note=None,
         uncertainty=None,
         u_own=_mean_of_independent(own) if len(own) == k else None,
-        u_common=there[0].u_common,
+        # the same error in all, in each as large as its events and sensors leave it
+        u_common=sum(common) / k if len(common) == k else None,
         estimated=any(p.estimated for p in there),
     )
 

@@ -39,6 +39,7 @@ BODY = BodyModel.from_height(1.70)
 """Only its foot is used, and that only for turning strides: the sensor's path needs no body."""
 
 OFFLINE = ErkfParams.offline()
+UNKNOWN = np.degrees(OFFLINE.moving_gyr_bias_sd)
 SETS = {"live": ErkfParams.live(), "offline": OFFLINE}
 
 
@@ -221,7 +222,7 @@ def test_write_down_the_figures() -> None:
             ("filter only, live set (9 states)", live(side, "live").p[:, 0], RATE, None),
             ("filter only, offline set (15 states)", live(side, "offline").p[:, 0], RATE, None),
             ("smoother, without the impact rule", constant.track.p[:, 0], RATE, constant),
-            ("smoother, biases unknown (0.5 °/s)", biased.track.p[:, 0], RATE, biased),
+            (f"smoother, biases unknown ({UNKNOWN:.1f} °/s)", biased.track.p[:, 0], RATE, biased),
             ("plain integration between stances", naive(side, False), RATE, None),
             ("plain integration, linear de-drift", naive(side, True), RATE, None),
         ]

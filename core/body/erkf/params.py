@@ -49,7 +49,8 @@ class ErkfParams:
         patch_gyr_sd : beside acc_sd and gyr_sd in it (docs/science/erkf.md, "Lost packets").
     start_* : of the first sample; `start_heading_sd` about the vertical, must cover the first headings'
         errors.
-    moving_* : the same where a recording starts mid-walk; the bias where it has no rest at all.
+    moving_* : the same where a recording starts mid-walk; the bias where it has no rest at all, as well as a
+        walk tells it (docs/science/erkf.md, "Start").
     """
 
     states: Literal[9, 15] = 15
@@ -82,7 +83,7 @@ class ErkfParams:
     start_acc_bias_sd: float = 0.03
     moving_velocity_sd: float = 2.0
     moving_tilt_sd: float = radians(15.0)
-    moving_gyr_bias_sd: float = radians(0.5)
+    moving_gyr_bias_sd: float = radians(0.2)
 
     def __post_init__(self) -> None:
         if self.states not in (9, 15):
@@ -105,12 +106,9 @@ class ErkfParams:
 
     @classmethod
     def people(cls) -> ErkfParams:
-        """`offline` for sensors on skin at nominal places: joint centres known to some centimetres.
-
-        docs/science/erkf.md, "Parameters". On simulated people with soft tissue and sensors 2 cm off their
-        nominal places it takes the bias of stride lengths from 2 cm to below 1 cm.
-        """
-        return cls(joint_centre_sd=0.03)
+        """`offline` for sensors on skin: joint centres known to 1.5 cm, wrong by the same in every step
+        (docs/science/erkf.md, "Joints err alike")."""
+        return cls(joint_centre_sd=0.045)
 
     @classmethod
     def live(cls) -> ErkfParams:

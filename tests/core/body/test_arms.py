@@ -8,7 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from core.body.arms import ArmParams, MeasuredArms, measure_arms
+from core.body import arms
+from core.body.arms import ArmParams, MeasuredArms, measure_arms, report_ahead
+from core.body.erkf.headings import turn_forward_axes
 from core.body.model import BodyModel
 from core.body.places import joint_places, sensor_place
 from core.body.tree import PRESETS, person_tree
@@ -17,7 +19,7 @@ from core.calibration.result import CalibratedRecording
 from core.frames import Floats, Segment
 from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
-from core.rotation import conjugate, multiply, rotate
+from core.rotation import about, conjugate, multiply, rotate, to_matrix
 from core.simulate.soft_tissue import SoftTissue, skin_motion
 from tests.walks import simulated
 
@@ -85,6 +87,36 @@ def test_the_place_across_a_thigh_stays_the_usual_one() -> None:
         assert sensor.taken.tolist() == [True, True, False]
         assert sensor.place[2] == sensor.guess[2]
         assert sensor.sd[2] == ArmParams().place_sd["thigh"][2]
+
+
+@pytest.mark.parametrize("turn_deg", [30.0, -30.0])
+def test_forward_axes_that_are_all_turned_alike_are_told_and_keep_the_arms(turn_deg: float) -> None:
+    """No joint sees it; that sensors then seem to sit beside their places does."""
+    turned = turn_forward_axes(*walk(), {s: float(np.radians(turn_deg)) for s in WHOLE})
+    straight, found = measure_arms(*walk(), BODY, WHOLE), measure_arms(*turned, BODY, WHOLE)
+    assert report_ahead(straight) == ()
+    (notice,) = report_ahead(found)
+    assert notice.code == "forward_against_places"
+    assert f"to the {'right' if turn_deg > 0.0 else 'left'}" in notice.message
+    assert abs(np.degrees(found.ahead) - turn_deg) < 10.0
+    back = to_matrix(about(1, -np.radians(turn_deg)))
+    off = [np.linalg.norm(back @ found.places[s] - straight.places[s]) for s in ("foot_r", "foot_l")]
+    assert max(off) < 0.02
+
+
+def test_legs_end_side_by_side_as_far_as_motion_lets_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One leg that ends ahead of the other makes steps uneven; people stand with their feet side by side."""
+
+    def ahead_of(body_arms: MeasuredArms) -> float:
+        centres = body_arms.centres
+        return float(sum(c[0] if joint[1].endswith("_r") else -c[0] for joint, c in centres.items()))
+
+    beside = ahead_of(measure_arms(*walk(), BODY, WHOLE))
+    monkeypatch.setattr(arms, "BESIDE_SD_M", 10.0)
+    anywhere = ahead_of(measure_arms(*walk(), BODY, WHOLE))
+    assert abs(beside) < 0.75 * abs(anywhere)
+    monkeypatch.setattr(arms, "BESIDE_SD_M", 1e-4)
+    assert abs(ahead_of(measure_arms(*walk(), BODY, WHOLE))) < 1e-3
 
 
 def assert_as_usual(found: MeasuredArms) -> None:

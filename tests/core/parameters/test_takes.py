@@ -56,6 +56,14 @@ def test_what_takes_measure_anew_averages_out_and_what_they_share_stays() -> Non
     assert join_takes([known, take([0.5, 0.6])]).u_own is None
 
 
+def test_a_shared_error_is_that_of_all_takes_and_not_of_the_first() -> None:
+    """Errors that all takes share add up: the mean of 0.01 and 0.05 times the same error is 0.03 times it."""
+    sure, vague = (take([0.5, 0.6], u_own=0.0, u_common=x) for x in (0.01, 0.05))
+    for takes in ([sure, vague], [vague, sure]):
+        assert join_takes(takes).u_common == pytest.approx(0.03)
+    assert join_takes([sure, take([0.5, 0.6])]).u_common is None
+
+
 def test_other_parameters_and_sides_are_not_joined() -> None:
     with pytest.raises(ParameterError, match="one parameter"):
         join_takes([take([0.5, 0.6]), take([0.5, 0.6], side="right")])

@@ -47,11 +47,11 @@ def test_a_standing_start_knows_tilt_velocity_and_bias() -> None:
 
 
 def test_a_bias_seen_at_a_later_rest_has_only_walked_since() -> None:
-    """hypot(0.05 °/s, 5e-5 rad/s/√s √t): 0.053 °/s after 38 s, 0.09 after 10 min, not the 0.5 of no rest."""
+    """hypot(0.05 °/s, 5e-5 rad/s/√s √t): 0.053 °/s after 38 s, 0.09 after 10 min, not the 0.2 of no rest."""
     take = mixed_walk()
     after_s = {s: start_state(take.tree, take.inputs, OFFLINE, bias_age_s=s) for s in (0.0, 38.0, 600.0)}
     assert np.allclose([bias_sd_deg(x.P) for x in after_s.values()], [0.05, 0.0530, 0.0861], atol=2e-4)
-    assert np.isclose(bias_sd_deg(start_state(take.tree, take.inputs, OFFLINE).P), 0.5)
+    assert np.isclose(bias_sd_deg(start_state(take.tree, take.inputs, OFFLINE).P), 0.2)
     moving = after_s[38.0].P
     assert np.isclose(np.sqrt(moving[3, 3]), OFFLINE.moving_velocity_sd), "velocity stays unknown"
 
