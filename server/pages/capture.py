@@ -8,6 +8,8 @@ from starlette.responses import Response
 
 from server.auth.access import require
 from server.auth.roles import Action
+from server.context import Config
+from server.http.headers import allow_camera
 from server.http.templates import TEMPLATES
 from server.pages.words import CALIBRATIONS, SEGMENT_NAMES
 from server.services.live import ALPHABET, CODE_LENGTH
@@ -19,12 +21,15 @@ PLACES = ("chest", "pelvis", "thigh_r", "thigh_l", "shank_r", "shank_l", "foot_r
 
 
 @router.get("/capture", dependencies=[require(Action.PAIR)])
-def show_capture(request: Request) -> Response:
+def show_capture(request: Request, settings: Config) -> Response:
     """Pair, place the sensors, record; knows no patient before the code is entered."""
     context = {
+        "film_limit_bytes": settings.max_file_bytes,
         "alphabet": ALPHABET,
         "code_length": CODE_LENGTH,
         "calibrations": CALIBRATIONS,
         "places": [(place, SEGMENT_NAMES[place]) for place in PLACES],
     }
-    return TEMPLATES.TemplateResponse(request, "capture.html", context)
+    # the only page that may use a camera
+    headers = {"Permissions-Policy": allow_camera("(self)")}
+    return TEMPLATES.TemplateResponse(request, "capture.html", context, headers=headers)
