@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
@@ -20,11 +22,17 @@ PLACES = ("chest", "pelvis", "thigh_r", "thigh_l", "shank_r", "shank_l", "foot_r
 """As one sees the person from the front, top to bottom."""
 
 
+FILM_BITS_PER_S: Final = 1_500_000
+"""What the page asks the browser's recorder for."""
+
+
 @router.get("/capture", dependencies=[require(Action.PAIR)])
 def show_capture(request: Request, settings: Config) -> Response:
     """Pair, place the sensors, record; knows no patient before the code is entered."""
     context = {
+        "film_bits_per_s": FILM_BITS_PER_S,
         "film_limit_bytes": settings.max_file_bytes,
+        "film_minutes": int(settings.max_file_bytes * 8 / FILM_BITS_PER_S / 60),
         "alphabet": ALPHABET,
         "code_length": CODE_LENGTH,
         "calibrations": CALIBRATIONS,

@@ -1,4 +1,4 @@
-"""The film of a take: acknowledged when it is on the disk, whole whatever breaks, aligned, gone with its person."""
+"""The film of a take: acknowledged when it is on the disk, whole, aligned, gone with its session."""
 
 from __future__ import annotations
 
@@ -105,11 +105,14 @@ async def test_without_consent_or_token_nothing_is_kept(clinic: Clinic, port: in
 async def test_what_was_acknowledged_is_there_after_a_restart_and_a_torn_piece_is_asked_for_again(
     tmp_path: Path,
 ) -> None:
-    async with open_clinic(tmp_path, live_workers=0) as clinic, serve(clinic.app) as port:
-        async with visit(clinic, port) as v:
-            await Camera(v).begin()
-            await Camera(v).add(0, PIECES[0])
-            path = films.film_path(clinic.settings.live, v.take)
+    async with (
+        open_clinic(tmp_path, live_workers=0) as clinic,
+        serve(clinic.app) as port,
+        visit(clinic, port) as v,
+    ):
+        await Camera(v).begin()
+        await Camera(v).add(0, PIECES[0])
+        path = films.film_path(clinic.settings.live, v.take)
     with path.open("ab") as file:
         file.write(b"\x40\x00\x00\x00half a piece")
     async with open_clinic(tmp_path, live_workers=0) as clinic, serve(clinic.app) as port:
@@ -123,13 +126,13 @@ async def test_a_film_is_no_larger_than_a_file_may_be(tmp_path: Path) -> None:
     async with (
         open_clinic(tmp_path, live_workers=0, max_file_bytes=2000) as clinic,
         serve(clinic.app) as port,
+        visit(clinic, port) as v,
     ):
-        async with visit(clinic, port) as v:
-            camera = Camera(v)
-            assert (await camera.begin()).json()["limit_bytes"] == 2000
-            assert (await camera.add(0, PIECES[0])).status_code == 200
-            assert code_of(await camera.add(1, PIECES[1])) == (413, "file_too_large")
-            assert (await camera.begin()).json()["next_piece"] == 1
+        camera = Camera(v)
+        assert (await camera.begin()).json()["limit_bytes"] == 2000
+        assert (await camera.add(0, PIECES[0])).status_code == 200
+        assert code_of(await camera.add(1, PIECES[1])) == (413, "file_too_large")
+        assert (await camera.begin()).json()["next_piece"] == 1
 
 
 async def test_the_film_of_a_take_that_came_to_nothing_is_discarded(clinic: Clinic, port: int) -> None:
