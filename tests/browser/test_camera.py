@@ -58,7 +58,7 @@ def test_a_take_is_filmed_though_the_line_breaks_and_plays_beside_the_figure(
         place(page, SEGMENTS)
         assert not layout_faults(page) | text_faults(page)
         start(page)
-        expect(card.locator("[data-films]")).to_have_text(re.compile(r"Filming \d+:\d\d"))
+        expect(page.locator("[data-films]")).to_have_text(re.compile(r"Filming \d+:\d\d"))
         assert (
             page.evaluate("document.querySelector('capture-page').camera.stream.getAudioTracks().length") == 0
         )

@@ -20,9 +20,10 @@ function whyNot() {
 }
 
 export class Camera {
-  constructor(card) {
-    this.card = card;
-    this.$ = (name) => card.querySelector(`[data-${name}]`);
+  // page: the sign that it films is in view wherever the page is scrolled to.
+  constructor(page) {
+    this.$ = (name) => page.querySelector(`[data-${name}]`);
+    const card = this.card = this.$("camera");
     this.limit = Number(card.dataset.limitBytes) * RESERVE;
     this.bitsPerS = Number(card.dataset.bitsPerS);
     this.front = false;

@@ -25,7 +25,7 @@ class CapturePage extends HTMLElement {
       onchange: () => this.draw(), onend: () => this.stop(), onbattery: (sensors) => this.link?.tellBattery(sensors),
     });
     this.view = new View(this, { onplaced: (sensor, segment) => this.worn.place(sensor, segment) });
-    this.camera = new Camera(this.$("camera"));
+    this.camera = new Camera(this);
     codeForm(this.$("code-form"), {
       onpaired: (paired) => this.guarded(() => this.paired(paired)), onproblem: ({ title, detail }) => this.say({ title, detail }),
     });
