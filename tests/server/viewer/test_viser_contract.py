@@ -65,7 +65,9 @@ def test_one_message_turns_and_places_a_batch_as_the_public_setters_would() -> N
         before = set(kept)
         move_copies(handle, drawn.wxyz[5], drawn.position[5])
         (sent,) = [kept[k] for k in set(kept) - before]
-        plain, ours, theirs = SceneNodeUpdateMessage(sent.name, sent.updates, sent.owner), [], []
+        plain = SceneNodeUpdateMessage(sent.name, sent.updates, sent.owner)
+        ours: list[memoryview] = []
+        theirs: list[memoryview] = []
         assert sent.as_serializable_dict() == plain.as_serializable_dict()
         assert sent.as_serializable_dict(ours) == plain.as_serializable_dict(theirs)
         assert ours == theirs
