@@ -12,6 +12,7 @@ from server.auth.throttle import Throttle
 from server.jobs.feed import JobFeed
 from server.jobs.queue import JobQueue
 from server.live.hub import Hub
+from server.services.films import FilmIntake
 from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
 from server.storage.blobs import BlobStore
@@ -59,6 +60,10 @@ def _hub(connection: HTTPConnection) -> Hub:
     return cast("Hub", connection.app.state.hub)
 
 
+def _films(connection: HTTPConnection) -> FilmIntake:
+    return cast("FilmIntake", connection.app.state.films)
+
+
 Config = Annotated[Settings, Depends(_settings)]
 Db = Annotated[Database, Depends(_db)]
 Blobs = Annotated[BlobStore, Depends(_blobs)]
@@ -66,6 +71,7 @@ Reviewed = Annotated[ReviewedAnalyses, Depends(_reviewed)]
 Queue = Annotated[JobQueue, Depends(_queue)]
 Feed = Annotated[JobFeed, Depends(_feed)]
 LiveHub = Annotated[Hub, Depends(_hub)]
+Films = Annotated[FilmIntake, Depends(_films)]
 OpenTrail = Annotated[AuditTrail, Depends(_trail)]
 OpenLogins = Annotated[Logins, Depends(_logins)]
 Failures = Annotated[Throttle, Depends(_throttle)]

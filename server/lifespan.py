@@ -17,6 +17,7 @@ from server.jobs.table import TableQueue
 from server.live.hub import Hub
 from server.services import custody, erasure
 from server.services.custody import refuse_strangers
+from server.services.films import FilmIntake
 from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
 from server.storage.blobs import BlobStore
@@ -59,6 +60,7 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     )
     keeper = MarkKeeper(db, settings.mark)
     keeper.start()
+    app.state.films = FilmIntake(settings, db, app.state.blobs)
     app.state.hub = Hub(settings, db, app.state.reviewed, app.state.queue)
     await app.state.hub.start()
     try:
@@ -66,6 +68,7 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
             yield
     finally:
         await app.state.hub.stop()
+        app.state.films.close()
         app.state.feed.close()
         await asyncio.to_thread(keeper.stop)
         db.close()

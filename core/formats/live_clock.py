@@ -72,7 +72,9 @@ class LiveClock:
         ----------
         final : False = what the batches so far say, for a stream that ended within its first second.
         """
-        if self.single:
-            return 0
+        return 0 if self.single else self.sender_offset_us(stream, final=final)
+
+    def sender_offset_us(self, stream: int, *, final: bool = True) -> int | None:
+        """The same to the sender's clock, also where there is nothing to align."""
         group = self._groups[stream]
         return group.offset_us if group.settled or not final else None

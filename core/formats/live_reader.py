@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -83,6 +83,30 @@ def read_live_log(data: bytes, source: str) -> Recording:
         segments={x.id: x.segment for x in taken.hello.sensors if x.id in streams},
         notices=(*taken.notices, *rest),
     )
+
+
+def find_start_us(records: Iterable[LogRecord]) -> int | None:
+    """Return the sender's clock at the take's time 0, its first sample; None of a log without a batch.
+
+    Source: what of `LiveClock` bounds the way of a sample; that way itself, some 10 ms, stays in.
+    """
+    clock: LiveClock | None = None
+    rates: dict[int, float] = {}
+    first: SampleBatch | None = None
+    for one in records:
+        if one.kind == "H":
+            hello = parse_hello(one.body)
+            clock, rates = LiveClock(hello), {s.stream: s.rate_hz for s in hello.streams}
+        elif one.kind == "B" and clock is not None:
+            batch = decode_batch(one.body)
+            first = first or batch
+            t = sample_times_us(batch, rates[batch.stream])
+            clock.push(batch.stream, int(t[0]), int(t[-1]), batch.sent_us)
+            if clock.sender_offset_us(first.stream) is not None:
+                break
+    if clock is None or first is None:
+        return None
+    return first.t0_us + (clock.sender_offset_us(first.stream, final=False) or 0)
 
 
 def _taken(records: Sequence[LogRecord], source: str) -> _Taken:

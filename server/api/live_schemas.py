@@ -86,6 +86,24 @@ class PairingCode(Request):
     code: Annotated[str, StringConstraints(min_length=1, max_length=40)]
 
 
+class FilmBeginning(Request):
+    """A tablet begins to film.
+
+    `began_us` is the first picture's time by the clock that stamps `sent_us` of its batches; `consent`, that
+    the person agreed to be filmed.
+    """
+
+    consent: bool
+    began_us: Annotated[int, Field(ge=0, lt=1 << 53)]
+
+
+@dataclass(frozen=True)
+class EndedFilm:
+    """What became of a film: whether it stands beside the take."""
+
+    kept: bool
+
+
 @dataclass(frozen=True)
 class PairedTablet:
     """What the tablet needs to stream; the token opens this take only, for twelve hours.

@@ -54,7 +54,8 @@ async def put_video(
     size = read_size(request, settings.max_file_bytes)
 
     def begin() -> videos.receive_video:
-        return videos.receive_video(db, blobs, settings, who, session_id, name, size, consent=consent)
+        videos.require_consent(consent)
+        return videos.receive_video(db, blobs, settings, who, session_id, name, size)
 
     return await receive_body(request, await run_in_threadpool(begin))
 

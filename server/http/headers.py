@@ -9,6 +9,13 @@ CONTENT_POLICY = (
     "default-src 'self'; frame-src 'self'; img-src 'self' data:; object-src 'none'; "
     "base-uri 'none'; form-action 'self'; frame-ancestors 'self'"
 )
+
+
+def allow_camera(origins: str) -> str:
+    """Return the policy of a page whose camera these origins may use: "()" none, "(self)" its own."""
+    return f"camera={origins}, microphone=(), geolocation=()"
+
+
 _FIXED = {
     "Content-Security-Policy": CONTENT_POLICY,
     "X-Content-Type-Options": "nosniff",
@@ -16,7 +23,7 @@ _FIXED = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "X-Frame-Options": "SAMEORIGIN",
-    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
+    "Permissions-Policy": allow_camera("()"),
     # clinical pages must not stay on a shared tablet after sign-out
     "Cache-Control": "no-store",
 }

@@ -68,6 +68,8 @@ DEEDS: Final[Mapping[str, str]] = {
     "reference.added": "added a reference file",
     "reference.removed": "removed a reference file",
     "video.added": "set a video beside the take, and said that the person agreed",
+    "video.begun": "began to film a take, and said that the person agreed",
+    "video.discarded": "discarded the film of a take that came to nothing",
     "video.aligned": "aligned the video with the take",
     "video.removed": "removed the video",
     "video.opened": "looked at the video",

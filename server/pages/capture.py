@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
 from server.auth.access import require
 from server.auth.roles import Action
+from server.context import Config
+from server.http.headers import allow_camera
 from server.http.templates import TEMPLATES
 from server.pages.words import CALIBRATIONS, SEGMENT_NAMES
 from server.services.live import ALPHABET, CODE_LENGTH
@@ -18,13 +22,22 @@ PLACES = ("chest", "pelvis", "thigh_r", "thigh_l", "shank_r", "shank_l", "foot_r
 """As one sees the person from the front, top to bottom."""
 
 
+FILM_BITS_PER_S: Final = 1_500_000
+"""What the page asks the browser's recorder for."""
+
+
 @router.get("/capture", dependencies=[require(Action.PAIR)])
-def show_capture(request: Request) -> Response:
+def show_capture(request: Request, settings: Config) -> Response:
     """Pair, place the sensors, record; knows no patient before the code is entered."""
     context = {
+        "film_bits_per_s": FILM_BITS_PER_S,
+        "film_limit_bytes": settings.max_file_bytes,
+        "film_minutes": int(settings.max_file_bytes * 8 / FILM_BITS_PER_S / 60),
         "alphabet": ALPHABET,
         "code_length": CODE_LENGTH,
         "calibrations": CALIBRATIONS,
         "places": [(place, SEGMENT_NAMES[place]) for place in PLACES],
     }
-    return TEMPLATES.TemplateResponse(request, "capture.html", context)
+    # the only page that may use a camera
+    headers = {"Permissions-Policy": allow_camera("(self)")}
+    return TEMPLATES.TemplateResponse(request, "capture.html", context, headers=headers)

@@ -29,7 +29,7 @@ CHUNK_BYTES = 1_000_000
 
 
 @dataclass(frozen=True)
-class _Opener:
+class TakeOpener:
     """The person who opened the take, on whose behalf it is stored and analysed."""
 
     user_id: str
@@ -182,7 +182,7 @@ def _publish(
         )
     )
     c.execute(update(live_take).where(live_take.c.id == take_id).values(recording_id=recording_id))
-    actor = _opener(c, take)
+    actor = find_opener(c, take)
     live_training.settle_feedback(c, actor, take)
     detail = {"session_id": take.session_id, "take_id": take_id, "sha256": blob.sha256, "size": blob.size}
     audit.record(c, actor, "recording.file_added", "recording", recording_id, detail)
@@ -198,6 +198,7 @@ def _sensors(hello: bytes) -> dict[str, Any]:
     return {sensor.id: sensor.segment for stream in parse_hello(hello).streams for sensor in stream.sensors}
 
 
-def _opener(c: Connection, take: live.LiveTakeRecord) -> _Opener | None:
+def find_opener(c: Connection, take: live.LiveTakeRecord) -> TakeOpener | None:
+    """Who opened a take, None when nobody is known who did."""
     row = c.execute(select(user.c.id, user.c.name).where(user.c.id == take.opened_by)).first()
-    return None if row is None else _Opener(row.id, row.name)
+    return None if row is None else TakeOpener(row.id, row.name)

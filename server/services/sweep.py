@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import logging
 
-from server.services import custody, erasure
+from server.services import custody, erasure, films
 from server.services.references import list_referenced
 from server.settings import Settings
 from server.storage import fs
@@ -43,6 +43,7 @@ def sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
     if doubted is not None:
         log.warning("no stored file is taken away: %s See `sagittal check`.", doubted)
         return 0
+    films.settle_abandoned(db, blobs, settings)
     trash, at, taken = Trash(settings.trash), now(), 0
     idle = [f for f in old if (f.space, f.name) not in used]
     for group in (idle[i : i + AT_ONCE] for i in range(0, len(idle), AT_ONCE)):

@@ -18,9 +18,7 @@ from server import audit
 from server.services import sessions
 from server.services.errors import NotFound, ServiceError
 from server.services.recordings import RecordedFile, StoredRecording, receive
-from server.settings import Settings
 from server.storage.blobs import Blob, BlobStore
-from server.storage.db import Database
 from server.storage.tables import now, session_video
 
 BEGINS: Final = 12
@@ -89,6 +87,15 @@ def remove(c: Connection, actor: audit.Actor | None, session_id: str) -> None:
     audit.record(c, actor, "video.removed", "session", session_id)
 
 
+def require_consent(consent: bool) -> None:
+    """Raise ServiceError no_consent unless the person agreed to be filmed."""
+    if not consent:
+        raise ServiceError(
+            "no_consent",
+            "A video is kept only of who agreed to be filmed. Ask, and say so with the upload.",
+        )
+
+
 def find_media_type(begins: bytes) -> str | None:
     """What a film is, by its first bytes: MP4 and QuickTime say "ftyp", WebM is EBML; None of any other."""
     if begins[4:8] == b"ftyp":
@@ -97,35 +104,14 @@ def find_media_type(begins: bytes) -> str | None:
 
 
 class receive_video(receive):  # noqa: N801 - as `receive`
-    """A video on its way in; as `receive`.
+    """A video on its way in; as `receive`, once `require_consent` has been asked.
 
-    Parameters
-    ----------
-    consent : the person agreed to be filmed; without it ServiceError no_consent.
-    offset_s : as of SessionVideo.
+    `offset_s` and `consent_at` are those of SessionVideo, to be set before `keep`; else not known, and now.
     """
 
-    def __init__(
-        self,
-        db: Database,
-        blobs: BlobStore,
-        settings: Settings,
-        actor: audit.Actor | None,
-        session_id: str,
-        name: str,
-        size: int = 0,
-        *,
-        consent: bool,
-        offset_s: float | None = None,
-    ) -> None:
-        if not consent:
-            raise ServiceError(
-                "no_consent",
-                "A video is kept only of who agreed to be filmed. Ask, and say so with the upload.",
-            )
-        super().__init__(db, blobs, settings, actor, session_id, name, size)
-        self._begins = b""
-        self._offset_s = offset_s
+    offset_s: float | None = None
+    consent_at: dt.datetime | None = None
+    _begins = b""
 
     def write(self, data: bytes) -> None:
         """Append bytes; raises as `receive.write`."""
@@ -153,9 +139,9 @@ class receive_video(receive):  # noqa: N801 - as `receive`
                 media_type=find_media_type(self._begins),
                 size=blob.size,
                 sha256=blob.sha256,
-                offset_s=self._offset_s,
+                offset_s=self.offset_s,
                 consent_by=None if self._actor is None else self._actor.name,
-                consent_at=now(),
+                consent_at=self.consent_at or now(),
             )
         )
         detail = {"session_id": self._session_id, "sha256": blob.sha256, "size": blob.size, "consent": True}

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
-from viser._messages import SceneNodeUpdateMessage
+from viser._messages import EntityLifecycle, SceneNodeUpdateMessage
 
 from server.viewer.body_parts import PartName
 from server.viewer.colours import GHOST, TINTS, to_linear_rgb
@@ -29,6 +29,39 @@ RAISED_M: Final = 1.0
 """Height of the origins of see-through nodes over that of the floor. The browser draws such nodes from far
 to near by their origins, and each hides what is drawn later behind it: at the floor's height they would cut
 holes into its lines."""
+
+
+_MOVED: Final = ("batched_wxyzs", "batched_positions")
+
+
+class CopiesMoved(  # type: ignore[call-arg]  # viser's types are not looked at
+    SceneNodeUpdateMessage,  # type: ignore[misc]
+    entity=EntityLifecycle("scene", "update_dict", "name"),
+    include_in_scene_serialization=True,
+):
+    """viser's message of new properties, of which it is known that they are two arrays of float32.
+
+    viser asks of every field of every message what it is: a third of the time a frame takes.
+    """
+
+    def redundancy_key(self) -> str:
+        """The newest of a node replaces the one before."""
+        return f"scene:{self.name}:moved"
+
+    def as_serializable_dict(self, binary_buffers: list[memoryview] | None = None) -> dict[str, Any]:
+        """Say the same as viser's own message."""
+        buffers = [] if binary_buffers is None else binary_buffers
+        first = len(buffers)
+        buffers += [self.updates[name].data for name in _MOVED]
+        arrays: list[Any] = buffers[first:]
+        if binary_buffers is not None:
+            arrays = [{"__binary_index": first + k, "dtype": "<f4"} for k in range(len(_MOVED))]
+        return {
+            "name": self.name,
+            "updates": dict(zip(_MOVED, arrays, strict=True)),
+            "owner": self.owner,
+            "type": "SceneNodeUpdateMessage",
+        }
 
 
 class DrawnBatch:
@@ -117,7 +150,6 @@ def move_copies(handle: viser.BatchedMeshHandle, wxyz: Single, position: Single)
     A message is what a frame costs, not its bytes; the test of viser's contract holds what this relies on.
     """
     inside = handle._impl  # noqa: SLF001
-    moved = {"batched_wxyzs": wxyz.copy(), "batched_positions": position.copy()}
-    for name, value in moved.items():
-        setattr(inside.props, name, value)
-    inside.api._queue_scene_message(SceneNodeUpdateMessage(inside.name, dict(moved)))  # noqa: SLF001
+    moved = dict(zip(_MOVED, (wxyz.copy(), position.copy()), strict=True))
+    inside.props.batched_wxyzs, inside.props.batched_positions = moved.values()
+    inside.api._queue_scene_message(CopiesMoved(inside.name, moved))  # noqa: SLF001

@@ -72,11 +72,9 @@ def match_reference(figure: ReplayMotion, strides: Strides, walk: ReferenceWalk)
         for pair in pairs.tolist()
     ]
     q, p = (np.array(x) for x in zip(*posed, strict=True))
-    placed = FigureLayout(SEGMENTS, figure.body, "").place(
-        {s: q[:, k] for k, s in enumerate(SEGMENTS)}, {s: p[:, k] for k, s in enumerate(SEGMENTS)}
-    )
+    layout = FigureLayout(SEGMENTS, figure.body, "")
     still = np.zeros((len(pairs), 2), np.float32)
-    return _lay_over(figure, placed.batches, still, frames, find_heading(figure))
+    return _lay_over(figure, layout.divide(layout.place(q, p)), still, frames, find_heading(figure))
 
 
 def _lay_over(

@@ -15,9 +15,10 @@ import numpy as np
 from core import rotation
 from core.body.model import BodyModel
 from core.estimators import BY_METHOD
-from core.frames import FOOT, R_NEUTRAL, SEGMENTS, SIDES, Floats, Segment, Side
+from core.frames import FOOT, R_NEUTRAL, SIDES, Floats, Segment, Side
 from server.viewer.body_parts import PartName, find_toe_bend, locate_ball, make_parts
 from server.viewer.colours import Tint
+from server.viewer.few_poses import find_matrices
 from server.viewer.shapes import Mesh
 from server.viewer.steps import Single
 
@@ -51,6 +52,7 @@ _PARTS: Final[Mapping[PartName, tuple[tuple[Carrier, Tint], ...]]] = {
 _NOT_GHOSTLY: Final = frozenset[PartName]({"trunk", "rings", "arms"})
 
 _NEUTRAL: Final = rotation.from_matrix(R_NEUTRAL)
+_NEUTRAL_TURNED: Final = rotation.multiply(rotation.about(2, np.pi), _NEUTRAL)
 _SOLE: Final = 0.25
 """Middle of the sole, of the foot's length in front of the ankle."""
 
@@ -80,10 +82,12 @@ class PlacedFigure:
 
     Parameters
     ----------
-    batches : name → copies of one mesh. soles : side → (m, 3) m, world.
+    wxyz : (m, c, 4), position : (m, c, 3) m, world, of the copies of all meshes; `FigureLayout.copies` says
+        which. soles : side → (m, 3) m, world.
     """
 
-    batches: Mapping[PartName, MeshBatch]
+    wxyz: Single
+    position: Single
     soles: Mapping[Side, Single]
 
 
@@ -92,14 +96,14 @@ class FigureLayout:
 
     Parameters
     ----------
-    segments : those with a pose; parts of others are left out. method : the estimator's, says which of them
-        carry a sensor.
+    segments : those with a pose, in the order in which `place` takes them; parts of others are left out.
+    method : the estimator's, says which of them carry a sensor.
     """
 
     def __init__(self, segments: Sequence[Segment], body: BodyModel, method: str) -> None:
-        self.segments = tuple(s for s in SEGMENTS if s in segments)
+        self.segments = tuple(segments)
         self._body = body
-        self._feet = tuple(side for side in SIDES if FOOT[side] in self.segments)
+        self._feet = tuple(side for side in SIDES if FOOT[side] in segments)
         self._points = np.array([locate_ball(body), (_SOLE * body.foot, -body.ankle_height, 0.0)])
         meshes, worn = make_parts(body), _WORN.get(method, self.segments)
         self._parts = {
@@ -109,48 +113,71 @@ class FigureLayout:
                 tuple(_HANGS.get(carrier, carrier) in worn for carrier, _ in copies),
             )
             for name, all_copies in _PARTS.items()
-            if (copies := tuple(x for x in all_copies if _HANGS.get(x[0], x[0]) in self.segments))
+            if (copies := tuple(x for x in all_copies if _HANGS.get(x[0], x[0]) in segments))
         }
+        # carriers in the order of `place`: segments, the trunk, toes
+        trunk: tuple[Carrier, ...] = ("trunk",) if "pelvis" in segments else ()
+        carriers = (*self.segments, *trunk, *(_TOES[side] for side in self._feet))
+        self._of_feet = [self.segments.index(FOOT[side]) for side in self._feet]
+        self._of_copies = [carriers.index(c) for _, copies, _ in self._parts.values() for c, _ in copies]
+        ends = np.cumsum([len(copies) for _, copies, _ in self._parts.values()]).tolist()
+        self.copies: Mapping[PartName, slice] = {
+            name: slice(a, b) for name, a, b in zip(self._parts, [0, *ends], ends, strict=False)
+        }
+        """Mesh → its copies among those of all meshes."""
 
-    def place(self, q: Mapping[Segment, Floats], p: Mapping[Segment, Floats]) -> PlacedFigure:
-        """Place all parts; q (m, 4) and p (m, 3) of every segment of this layout."""
-        turn: dict[Carrier, Floats] = {s: q[s] for s in self.segments}
-        at: dict[Carrier, Floats] = {s: p[s] for s in self.segments}
-        if "pelvis" in turn:
+    def place(self, q: Floats, p: Floats) -> PlacedFigure:
+        """Place all parts; q (m, s, 4) and p (m, s, 3) of the segments of this layout."""
+        turns, places = [q], [p]
+        if "pelvis" in self.segments:
+            pelvis = _column(self.segments.index("pelvis"))
             # a chest carries its parts as it is turned, a heading only knows where the front is
-            turn["trunk"] = q["chest"] if "chest" in q else _stand_up(q["pelvis"])
-            at["trunk"] = p["pelvis"]
+            chest = _column(self.segments.index("chest")) if "chest" in self.segments else None
+            turns.append(_stand_up(q[:, pelvis]) if chest is None else q[:, chest])
+            places.append(p[:, pelvis])
         soles: dict[Side, Single] = {}
         if self._feet:
             # (m, feet, 4) and of each foot two points: both feet at once
-            foot = np.stack([q[FOOT[side]] for side in self._feet], axis=1)
-            ankle = np.stack([p[FOOT[side]] for side in self._feet], axis=1)
-            points = ankle[:, :, None] + rotation.rotate(foot[:, :, None], self._points)
-            w, x, y, z = np.moveaxis(foot, -1, 0)
-            pitch = np.arcsin(np.clip(2.0 * (x * z - w * y), -1.0, 1.0))
-            bend = find_toe_bend(self._body, pitch, points[:, :, 0, 2])
-            toes = rotation.multiply(foot, rotation.about(2, bend))
-            for k, side in enumerate(self._feet):
-                turn[_TOES[side]], at[_TOES[side]] = toes[:, k], points[:, k, 0]
-                soles[side] = points[:, k, 1].astype(np.float32)
+            foot = q[:, self._of_feet]
+            matrices = find_matrices(foot)
+            points = p[:, self._of_feet, None] + self._points @ matrices.swapaxes(-1, -2)
+            pitch = np.arcsin(np.minimum(np.maximum(matrices[..., 2, 0], -1.0), 1.0))
+            bend = find_toe_bend(self._body, pitch, points[..., 0, 2])[..., None]
+            turns.append(np.cos(0.5 * bend) * foot + np.sin(0.5 * bend) * (foot[..., ::-1] * _ABOUT_Z))
+            places.append(points[:, :, 0])
+            middles = points[:, :, 1].astype(np.float32)
+            soles = {side: middles[:, k] for k, side in enumerate(self._feet)}
         return PlacedFigure(
-            {
-                name: MeshBatch(
-                    mesh,
-                    np.stack([turn[c] for c, _ in copies], axis=1, dtype=np.float32),
-                    np.stack([at[c] for c, _ in copies], axis=1, dtype=np.float32),
-                    tuple(tint for _, tint in copies),
-                    measured,
-                    name not in _NOT_GHOSTLY,
-                )
-                for name, (mesh, copies, measured) in self._parts.items()
-            },
+            np.concatenate(turns, axis=1, dtype=np.float32)[:, self._of_copies],
+            np.concatenate(places, axis=1, dtype=np.float32)[:, self._of_copies],
             soles,
         )
 
+    def divide(self, placed: PlacedFigure) -> dict[PartName, MeshBatch]:
+        """Return mesh → its copies, as they are drawn."""
+        return {
+            name: MeshBatch(
+                mesh,
+                placed.wxyz[:, self.copies[name]],
+                placed.position[:, self.copies[name]],
+                tuple(tint for _, tint in copies),
+                measured,
+                name not in _NOT_GHOSTLY,
+            )
+            for name, (mesh, copies, measured) in self._parts.items()
+        }
+
+
+_ABOUT_Z: Final = np.array([-1.0, 1.0, -1.0, 1.0])
+"""Of the reversed components of q: q ⊗ (0, 0, 0, 1)."""
+
+
+def _column(k: int) -> slice:
+    return slice(k, k + 1)
+
 
 def _stand_up(q: Floats) -> Floats:
-    """Upright axes (m, 4) that face where x of q (m, 4) points: core.rotation's yaw, in fewer steps."""
-    w, x, y, z = q.T
-    heading = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
-    return rotation.multiply(rotation.about(2, heading), _NEUTRAL)
+    """Upright axes (..., 4) that face where x of q (..., 4) points: core.rotation's yaw, in fewer steps."""
+    matrices = find_matrices(q)
+    half = 0.5 * np.arctan2(matrices[..., 1, 0], matrices[..., 0, 0])[..., None]
+    return np.cos(half) * _NEUTRAL + np.sin(half) * _NEUTRAL_TURNED

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import atan2
 from typing import Final
 
@@ -10,7 +9,7 @@ import numpy as np
 import viser
 
 from core.body.model import BodyModel
-from core.frames import FOOT, SIDES, Floats, Segment
+from core.frames import FOOT, SIDES
 from server.viewer.batches import DrawnBatch, colour_copies, draw_figure, draw_ghost
 from server.viewer.body_parts import PartName
 from server.viewer.layout import FigureLayout, PlacedFigure
@@ -60,10 +59,11 @@ class LiveFigure:
         """Show the figure standing until poses come."""
         if self._key == ("standing",):
             return
-        q, p = ({s: x[k : k + 1] for k, s in enumerate(SEGMENTS)} for x in stand_upright(self._body))
+        q, p = (x[np.newaxis] for x in stand_upright(self._body))
         self._floor.clear()
         self._path, self._t_s = LivePath(), None
-        self._draw(FigureLayout(SEGMENTS, self._body, ""), q, p, ("standing",))
+        layout = FigureLayout(SEGMENTS, self._body, "")
+        self._draw(layout, layout.place(q, p), ("standing",))
         self._room.bring(0.0, 0.0)
         self._set_grey(True)
         self._server.flush()
@@ -99,33 +99,33 @@ class LiveFigure:
         self._reference = walk
 
     def _show(self, moment: FigureMoment) -> None:
-        lead: Segment = "pelvis" if "pelvis" in moment.q else next(iter(moment.q))
+        segments = moment.segments
+        lead = segments.index("pelvis") if "pelvis" in segments else 0
         x, y, _ = moment.p[lead].tolist()
         root_x, root_y, heading = self._path.push(moment.t_s, x, y, _yaw(*moment.q[lead].tolist()))
-        q = {s: a[np.newaxis] for s, a in moment.q.items()}
-        p = {s: a[np.newaxis] for s, a in moment.p.items()}
-        ghost = self._reference is not None and all(s in q for s in SEGMENTS)
+        ghost = self._reference is not None and all(s in segments for s in SEGMENTS)
+        # the ghost is one frame more of the same layout
+        q, p = (np.stack([of] * (1 + ghost)) for of in (moment.q, moment.p))
         if ghost and self._reference is not None:
-            # the ghost is one frame more of the same layout
             other = self._reference.at(moment.phase, (x, y), heading)
-            for k, s in enumerate(SEGMENTS):
-                at = (moment.q[s], _BURIED) if other is None else (other[0][k], other[1][k])
-                q[s], p[s] = np.array([moment.q[s], at[0]]), np.array([moment.p[s], at[1]])
-            for s in q.keys() - set(SEGMENTS):
-                # a trunk that only the person has hangs on the ghost's pelvis as on the person's
-                q[s], p[s] = np.array([moment.q[s]] * 2), np.array([moment.p[s], p["pelvis"][1]])
-        key = (tuple(moment.q), moment.method, ghost)
-        if key != self._key or self._layout is None:
-            layout = FigureLayout(tuple(moment.q), self._body, moment.method)
-            placed = self._draw(layout, q, p, key, ghost=ghost)
-        else:
-            placed = self._layout.place(q, p)
-        for frame, drawn in enumerate((self._drawn, self._ghost)):
+            own = [segments.index(s) for s in SEGMENTS]
+            # a trunk that only the person has hangs on the ghost's pelvis as on the person's
+            p[1] = _BURIED if other is None else other[1][0]
+            if other is not None:
+                q[1, own], p[1, own] = other
+        key = (segments, moment.method, ghost)
+        layout = self._layout
+        if layout is None or key != self._key:
+            layout = FigureLayout(segments, self._body, moment.method)
+            self._draw(layout, layout.place(q, p), key, ghost=ghost)
+        placed, copies = layout.place(q, p), layout.copies
+        drawings = (self._drawn, self._ghost)
+        for wxyz, position, drawn in zip(placed.wxyz, placed.position, drawings, strict=False):
             for name, part in drawn.items():
-                part.move(placed.batches[name].wxyz[frame], placed.batches[name].position[frame])
+                part.move(wxyz[copies[name]], position[copies[name]])
         for side in SIDES:
             if side in placed.soles:
-                sole, foot = placed.soles[side][0], moment.q[FOOT[side]]
+                sole, foot = placed.soles[side][0], moment.q[segments.index(FOOT[side])]
                 self._floor.push(moment.t_s, side, sole, foot, moment.contact.get(side))
         self._floor.send(moment.t_s)
         self._room.bring(root_x, root_y)
@@ -133,25 +133,22 @@ class LiveFigure:
     def _draw(
         self,
         layout: FigureLayout,
-        q: Mapping[Segment, Floats],
-        p: Mapping[Segment, Floats],
+        placed: PlacedFigure,
         key: tuple[object, ...],
         *,
         ghost: bool = False,
-    ) -> PlacedFigure:
+    ) -> None:
         """Draw other parts than before."""
         for part in (*self._drawn.values(), *self._ghost.values()):
             part.handle.remove()
-        placed = layout.place(q, p)
         self._layout, self._key = layout, key
         # a new name each time: under the old one the client keeps its shader, which does not fit copies that
         # have opacities now (GL_INVALID_OPERATION, and nothing is drawn)
         self._times += 1
-        scene, suffix = self._server.scene, f"_{self._times}"
-        self._drawn = draw_figure(scene, placed.batches, suffix)
-        self._ghost = draw_ghost(scene, placed.batches, suffix) if ghost else {}
+        scene, suffix, batches = self._server.scene, f"_{self._times}", layout.divide(placed)
+        self._drawn = draw_figure(scene, batches, suffix)
+        self._ghost = draw_ghost(scene, batches, suffix) if ghost else {}
         self._paint()
-        return placed
 
     def _set_grey(self, grey: bool) -> None:
         if grey != self._grey:

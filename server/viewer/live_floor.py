@@ -6,6 +6,7 @@ The rules are those of server/viewer/steps.py, applied as the frames come.
 from __future__ import annotations
 
 from collections import deque
+from math import dist
 from typing import Final
 
 import numpy as np
@@ -16,7 +17,7 @@ from core.frames import SIDES, Floats, Side
 from server.viewer import shapes
 from server.viewer.batches import move_copies
 from server.viewer.colours import TINTS, to_linear_rgb
-from server.viewer.room import ROOM
+from server.viewer.room import ROOM, Vector
 from server.viewer.steps import CLEAR_M, PIECE_M, REST_MPS, SAME_M, Single
 
 TRAIL_S: Final = 6.0
@@ -64,9 +65,10 @@ class LiveFloor:
 
     def push(self, t_s: float, side: Side, sole: Floats, q: Floats, contact: bool | None) -> None:
         """Take in where the middle of a sole (3,) is and how the foot (4,) is turned."""
-        self._trails[side].push(t_s, sole)
+        x, y, z = sole.tolist()
+        self._trails[side].push(t_s, (x, y, max(z, CLEAR_M)))
         if contact is not None:
-            self._steps[side].push(t_s, sole, q, contact)
+            self._steps[side].push(t_s, (x, y, z), q, contact)
 
     def lose(self) -> None:
         """Break the trail and end the contact of a foot whose samples are missing."""
@@ -98,14 +100,12 @@ class _Trail:
         self._t_s = np.full(PIECES, -np.inf)
         self._pieces = np.zeros((PIECES, 2, 3), np.float32)
         self._next = 0
-        self._last: Single | None = None
+        self._last: Vector | None = None
 
-    def push(self, t_s: float, sole: Floats) -> None:
-        at = sole.astype(np.float32)
-        at[2] = max(at[2], CLEAR_M)
+    def push(self, t_s: float, at: Vector) -> None:
         if self._last is None:
             self._last = at
-        elif ((at - self._last) ** 2).sum() >= PIECE_M**2:
+        elif dist(at, self._last) >= PIECE_M:
             self._t_s[self._next] = t_s
             self._pieces[self._next] = self._last, at
             self._next = (self._next + 1) % PIECES
@@ -140,8 +140,8 @@ class _Steps:
         self._next = 0
         self._shown: int | None = None
         self._slowest = np.inf
-        self._rest: tuple[Floats, Floats] = (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
-        self._before: deque[tuple[float, Floats]] = deque()
+        self._rest: tuple[Vector, Floats] = ((0.0, 0.0, 0.0), np.array([1.0, 0.0, 0.0, 0.0]))
+        self._before: deque[tuple[float, Vector]] = deque()
 
     def clear(self) -> None:
         self._scale[:] = 0.0
@@ -153,7 +153,7 @@ class _Steps:
         self._lift()
         self._before.clear()
 
-    def push(self, t_s: float, sole: Floats, q: Floats, contact: bool) -> None:
+    def push(self, t_s: float, sole: Vector, q: Floats, contact: bool) -> None:
         self._before.append((t_s, sole))
         while len(self._before) > 1 and self._before[1][0] <= t_s - REST_S:
             self._before.popleft()
@@ -163,7 +163,7 @@ class _Steps:
         since, was = self._before[0]
         if t_s - since < 0.5 * REST_S:
             return
-        speed = float(np.linalg.norm(sole - was)) / (t_s - since)
+        speed = dist(sole, was) / (t_s - since)
         if speed < self._slowest:
             self._slowest = speed
             self._rest = sole, q

@@ -109,13 +109,14 @@ def average_curves(strides: Iterable[FeedStride]) -> dict[str, Floats]:
 def find_standing_angles(moment: FigureMoment, angles_deg: Mapping[str, float | None]) -> dict[str, float]:
     """Return angle → rad while standing: what the poses of a moment give, less its angles from standing."""
     raw: dict[str, float] = {}
-    if "pelvis" in moment.q:
-        tilt, obliquity = pelvis_angles(moment.q["pelvis"])
+    q = dict(zip(moment.segments, moment.q, strict=True))
+    if "pelvis" in q:
+        tilt, obliquity = pelvis_angles(q["pelvis"])
         raw |= {"pelvis_tilt": float(tilt), "pelvis_obliquity": float(obliquity)}
     for side in SIDES:
         for joint, proximal, distal in list_leg_joints(side):
-            if proximal in moment.q and distal in moment.q:
-                abc = cardan_zxy(multiply(conjugate(moment.q[proximal]), moment.q[distal])).tolist()
+            if proximal in q and distal in q:
+                abc = cardan_zxy(multiply(conjugate(q[proximal]), q[distal])).tolist()
                 for (name, right, left), x in zip(SIGNS[joint], abc, strict=True):
                     raw[f"{name}_{SUFFIX[side]}"] = (right if side == "right" else left) * x
     found = {

@@ -120,14 +120,12 @@ class LiveWatch:
 
 def read_moment(picture: Picture, pose: FigurePose, shown: FeedFrame) -> FigureMoment:
     """Return poses and phases of a picture; the phases of `shown` come in % and leave as 0 to 1."""
-    segments = [cast("Segment", s) for s in pose.segments]
-    q = np.frombuffer(pose.q, np.float32).reshape(-1, 4).astype(np.float64)
-    p = np.frombuffer(pose.p, np.float32).reshape(-1, 3).astype(np.float64)
     phase = {side: shown.phase.get(SUFFIX[side]) for side in SIDES}
     return FigureMoment(
         t_s=picture.t_s,
-        q=dict(zip(segments, q, strict=True)),
-        p=dict(zip(segments, p, strict=True)),
+        segments=cast("tuple[Segment, ...]", tuple(pose.segments)),
+        q=np.frombuffer(pose.q, np.float32).reshape(-1, 4).astype(np.float64),
+        p=np.frombuffer(pose.p, np.float32).reshape(-1, 3).astype(np.float64),
         valid=pose.valid,
         method=shown.method,
         contact={cast("Side", side): on for side, on in pose.contact.items()},

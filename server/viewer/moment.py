@@ -14,15 +14,16 @@ class FigureMoment:
 
     Parameters
     ----------
-    t_s : s on the take's axis. q : segment → (4,) segment to W. p : segment → (3,) m, as `Poses`.
+    t_s : s on the take's axis. segments : s of them. q : (s, 4) segment to W. p : (s, 3) m, as `Poses`.
     valid : all segments of the figure are measured. contact : side → on the floor; a side that is not known
         is missing. method : of the estimator, as `Poses.method`.
     phase : side → 0 to 1 of the running cycle, None where unknown.
     """
 
     t_s: float
-    q: Mapping[Segment, Floats]
-    p: Mapping[Segment, Floats]
+    segments: tuple[Segment, ...]
+    q: Floats
+    p: Floats
     valid: bool
     method: str
     contact: Mapping[Side, bool] = field(default_factory=dict)

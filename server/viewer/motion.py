@@ -139,12 +139,13 @@ def prepare_motion(poses: Poses) -> ReplayMotion:
     lead: Segment = "pelvis" if "pelvis" in q else next(iter(q))
     root = p["pelvis"] if "pelvis" in p else np.mean(list(p.values()), axis=0)
     rate = poses.rate_hz / (keep.step or 1)
-    placed = FigureLayout(tuple(q), poses.body, poses.method).place(q, p)
+    layout = FigureLayout(tuple(q), poses.body, poses.method)
+    placed = layout.place(*(np.stack([of[s] for s in q], axis=1) for of in (q, p)))
     in_room = poses.method not in FOR_THE_EYE
     return ReplayMotion(
         t_s=t_s,
         valid=valid,
-        batches=placed.batches,
+        batches=layout.divide(placed),
         segments=tuple(q),
         root=_smooth(root[:, :2], max(1, round(ROOT_WINDOW_S * rate))).astype(np.float32),
         prints={

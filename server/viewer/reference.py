@@ -17,15 +17,13 @@ from core.angles.inverse import leg_orientations, pelvis_orientation
 from core.body.kinematics import leg_points, sole_points
 from core.body.model import BodyModel
 from core.frames import FOOT, SHANK, SIDES, SUFFIX, THIGH, Floats, Segment, Side
+from server.viewer.few_poses import find_matrices, turn_about_z
 from server.viewer.motion import LOWER_BODY
 
 SAGITTAL: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 """Without these there is no walk to show."""
 
 SEGMENTS: Final = LOWER_BODY
-_POINTS: Final = 5
-"""Of a leg: hip, knee, ankle, heel, ball."""
-
 Phases = Mapping[Side, float | None]
 
 
@@ -51,7 +49,8 @@ class ReferenceWalk:
             sole = [ankle + rotation.rotate(leg[FOOT[side]], np.array(x)) for x in sole_points(body)]
             turn.append(np.stack([leg[s] for s in (THIGH[side], SHANK[side], FOOT[side])], axis=1))
             points.append(np.stack(np.broadcast_arrays(hip, knee, ankle, *sole), axis=1))
-        self._pelvis, self._turn, self._points = pelvis, turn, points
+        self._pelvis = [(float(w), float(x), float(y), float(z)) for w, x, y, z in pelvis]
+        self._turn, self._points = np.stack(turn), np.stack(points)
 
     def at(self, phases: Phases, place: tuple[float, float], heading: float) -> tuple[Floats, Floats] | None:
         """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS`, the lower sole on the floor.
@@ -70,18 +69,15 @@ class ReferenceWalk:
         self, left: int, right: int, place: tuple[float, float], heading: float
     ) -> tuple[Floats, Floats]:
         """As `at`, by the rows of the curves that the legs are at."""
-        rows: dict[Side, int] = {"left": left, "right": right}
-        lead = rows[self.lead]
-        pelvis = rotation.multiply(rotation.about(2, heading), self._pelvis[lead])
-        legs = [(self._turn[k], self._points[k], rows[side]) for k, side in enumerate(SIDES)]
-        q, p = np.empty((len(SEGMENTS), 4)), np.empty((len(SEGMENTS), 3))
+        pelvis = turn_about_z(heading, self._pelvis[left if self.lead == "left" else right])
+        q, p = np.empty((len(SEGMENTS), 4)), np.zeros((len(SEGMENTS), 3))
         q[0] = pelvis
         # pelvis ⊗ turn and R(pelvis) point, for all of them at once
-        q[1:] = np.concatenate([turn[row] for turn, _, row in legs]) @ _before(*pelvis.tolist())
-        points = np.concatenate([points[row] for _, points, row in legs]) @ rotation.to_matrix(pelvis).T
-        p[0] = 0.0
-        p[1:4], p[4:7] = points[:3], points[_POINTS : _POINTS + 3]
-        p += (*place, -points[:, 2].min())
+        legs = (0, 1), (left, right)
+        q[1:] = (self._turn[legs] @ _before(*pelvis)).reshape(6, 4)
+        points = self._points[legs] @ find_matrices(q[0]).T
+        p[1:] = points[:, :3].reshape(6, 3)
+        p += (*place, -points[..., 2].min())
         return q, p
 
 

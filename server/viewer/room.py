@@ -12,6 +12,7 @@ from typing import Final, Literal
 
 import numpy as np
 import viser
+from viser._messages import SetPositionMessage
 
 from core.frames import Floats
 from server.viewer.colours import BACKGROUND, FLOOR
@@ -72,6 +73,7 @@ class SceneRoom:
             SKY, sky_color=(255, 255, 255), ground_color=(200, 200, 205), intensity=2.4
         )
         self._node = scene.add_frame(ROOM, show_axes=False)
+        self._place: Vector = (0.0, 0.0, 0.0)
         self._grid = scene.add_grid(
             f"{ROOM}/floor", floor_m, floor_m, shadow_opacity=0.2, position=(*middle, 0.0)
         )
@@ -79,7 +81,13 @@ class SceneRoom:
 
     def bring(self, x: float, y: float) -> None:
         """Bring a place of the floor, m, to where the camera looks."""
-        self._node.position = (-x, -y, 0.0)
+        place = (-x, -y, 0.0)
+        if place != self._place:
+            self._place = place
+            inside = self._node._impl  # noqa: SLF001
+            # the public setter casts and compares first, which takes longer than to move a part
+            inside.position[:] = place
+            inside.api._queue_scene_message(SetPositionMessage(inside.name, place))  # noqa: SLF001
 
     def look(self, shot: CameraShot) -> None:
         """Move the cameras of all who look, and of who comes later, to a shot."""

@@ -27,8 +27,8 @@ from tests.server.viewer.pictures import POSES, RATE_HZ, picture
 LASTS_S, WINDOWS = 1.0, 6
 """Windows of walking; the first is for settling."""
 NO_DEARER: Final = 1.6
-"""Live / replay. The aim is a twentieth of a core for a figure that somebody looks at (issue 5): measured 4.0
-to 7.4 % by the state of the machine, which the replay of the same walk shares. Each further viewer: 0.7 %."""
+"""Live / replay: measured 1.1 to 1.3. The aim is 4 % of a core for a figure that somebody looks at: measured
+4.7 % on a busy machine, 2.8 % of it to pose; the replay 3.7 %. Each further viewer: 0.6 %."""
 
 DRAIN = """
 import sys, threading, viser

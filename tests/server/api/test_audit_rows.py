@@ -132,7 +132,7 @@ class Visits:
             upload.write(b"x")
             upload.keep()
         with videos.receive_video(
-            clinic.db, clinic.app.state.blobs, clinic.settings, None, this, "walk.webm", consent=True
+            clinic.db, clinic.app.state.blobs, clinic.settings, None, this, "walk.webm"
         ) as film:
             film.write(b"\x1a\x45\xdf\xa3 and pictures")
             film.keep()

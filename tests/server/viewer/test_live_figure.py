@@ -75,8 +75,9 @@ def moment(poses: Poses, i: int, *, valid: bool = True) -> FigureMoment:
     t_s = float(poses.t_s[i])
     return FigureMoment(
         t_s,
-        {s: q[i] for s, q in poses.q.items()},
-        {s: p[i] for s, p in poses.p.items()},
+        tuple(poses.q),
+        np.array([q[i] for q in poses.q.values()]),
+        np.array([poses.p[s][i] for s in poses.q]),
         valid,
         poses.method,
         {s: bool(poses.contact[FOOT[s]][i]) for s in SIDES if FOOT[s] in poses.contact},
@@ -148,7 +149,8 @@ def test_the_trails_are_the_last_seconds_of_the_soles_way(server: viser.ViserSer
     scene = Scene(server)
     i = scene.play(poses, 11.0)
     pieces = np.asarray(scene["/trails"].points)
-    soles = FigureLayout(tuple(poses.q), walk.BODY, "").place(poses.q, poses.p).soles
+    q, p = (np.stack([of[s] for s in poses.q], axis=1) for of in (poses.q, poses.p))
+    soles = FigureLayout(tuple(poses.q), walk.BODY, "").place(q, p).soles
     for side, drawn in zip(SIDES, np.split(pieces, 2), strict=True):
         seen = drawn[drawn[:, 0, 2] > -1.0]
         path = soles[side][: i + 1]
@@ -234,7 +236,7 @@ def test_the_ghost_of_the_norm_has_the_angles_of_the_norm_beside_the_person(
         at, (pelvis,) = ghost_of(scene, "pelvis")
         thighs, shanks = (ghost_of(scene, name)[1] for name in ("thighs", "shanks"))
         soles, feet = (np.concatenate(x) for x in zip(*(ghost_of(scene, n) for n in FEET), strict=True))
-        np.testing.assert_allclose(at[0, :2], now.p["pelvis"][:2], atol=1e-5)
+        np.testing.assert_allclose(at[0, :2], now.p[now.segments.index("pelvis"), :2], atol=1e-5)
         for k, side in enumerate(SIDES):
             row = round(100 * float(now.phase[side] or 0.0))
             for name, proximal, distal, sign in (
@@ -289,7 +291,7 @@ def test_the_ghost_walks_where_the_person_walks(server: viser.ViserServer, poses
 @pytest.mark.bench
 def test_a_moment_costs_little(server: viser.ViserServer, poses: Poses) -> None:
     layout = FigureLayout(tuple(poses.q), walk.BODY, "erkf")
-    q, p = ({s: a[:1] for s, a in of.items()} for of in (poses.q, poses.p))
+    q, p = (np.stack([of[s][:1] for s in poses.q], axis=1) for of in (poses.q, poses.p))
     took = []
     for _ in range(200):
         began = time.thread_time()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import viser
 from viser import _messages
+from viser._messages import SceneNodeUpdateMessage
 from viser.infra import _infra
 
 from server.viewer import pipe
@@ -64,15 +65,20 @@ def test_one_message_turns_and_places_a_batch_as_the_public_setters_would() -> N
         before = set(kept)
         move_copies(handle, drawn.wxyz[5], drawn.position[5])
         (sent,) = [kept[k] for k in set(kept) - before]
-        assert isinstance(sent, _messages.SceneNodeUpdateMessage)
+        plain = SceneNodeUpdateMessage(sent.name, sent.updates, sent.owner)
+        ours: list[memoryview] = []
+        theirs: list[memoryview] = []
+        assert sent.as_serializable_dict() == plain.as_serializable_dict()
+        assert sent.as_serializable_dict(ours) == plain.as_serializable_dict(theirs)
+        assert ours == theirs
+        assert sent.entity_state_key() == plain.entity_state_key()
+        assert isinstance(sent, SceneNodeUpdateMessage)
         assert (sent.name, set(sent.updates)) == ("/room/thighs", {"batched_wxyzs", "batched_positions"})
         np.testing.assert_array_equal(handle.batched_positions, drawn.position[5])
         # who comes later gets the newest message of a kind only, and these two always come together
         move_copies(handle, drawn.wxyz[6], drawn.position[6])
         later = [
-            m
-            for m in kept.values()
-            if isinstance(m, _messages.SceneNodeUpdateMessage) and m.name == "/room/thighs"
+            m for m in kept.values() if isinstance(m, SceneNodeUpdateMessage) and m.name == "/room/thighs"
         ]
         assert len(later) == 1
         np.testing.assert_array_equal(later[0].updates["batched_wxyzs"], drawn.wxyz[6])

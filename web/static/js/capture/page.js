@@ -1,6 +1,7 @@
 // <capture-page>: pair, place the sensors, record, hand over. States: loading, pairing, prepare, running, sending, done.
 import { Sha256 } from "../common/sha256.js";
 import { PROTOCOL, logParts, payload } from "../common/wire.js";
+import { Camera } from "./camera.js";
 import { alone, roomHours, stayAwake, tone } from "./device.js";
 import { Link } from "./link.js";
 import { remember } from "./mapping.js";
@@ -24,6 +25,7 @@ class CapturePage extends HTMLElement {
       onchange: () => this.draw(), onend: () => this.stop(), onbattery: (sensors) => this.link?.tellBattery(sensors),
     });
     this.view = new View(this, { onplaced: (sensor, segment) => this.worn.place(sensor, segment) });
+    this.camera = new Camera(this);
     codeForm(this.$("code-form"), {
       onpaired: (paired) => this.guarded(() => this.paired(paired)), onproblem: ({ title, detail }) => this.say({ title, detail }),
     });
@@ -44,6 +46,7 @@ class CapturePage extends HTMLElement {
     this.room = await roomHours(BYTES_PER_S);
     if (!(await alone())) return this.say(words.OTHER_TAB);
     setInterval(() => this.draw(), DRAW_MS);
+    await this.camera.wake();
     await this.guarded(() => this.wake());
   }
 
@@ -142,6 +145,7 @@ class CapturePage extends HTMLElement {
     this.enter("running");
     this.run();
     tone();
+    this.camera.begin(this.outbox.record);
   }
 
   run() {
@@ -165,6 +169,7 @@ class CapturePage extends HTMLElement {
   async stop() {
     if (this.dataset.state !== "running") return;
     this.worn.source?.stop();
+    this.camera.end();
     this.enter("sending");
     await this.outbox.note({ stopped: true });
     this.link.pump();
@@ -199,6 +204,7 @@ class CapturePage extends HTMLElement {
 
   async finished() {
     this.worn.source?.stop();
+    this.camera.end();
     const said = words.ending(this.outbox.made, this.link.marked);
     await this.outbox.forget();
     this.outbox = this.link = null;
@@ -216,6 +222,7 @@ class CapturePage extends HTMLElement {
       return this.say(words.linkProblem(problem, this.outbox.heldS));
     }
     this.worn.source?.stop();
+    this.camera.end();
     const rest = this.outbox.made > this.outbox.acked;
     this.say(words.linkProblem(problem, this.outbox.heldS), rest);
     this.enter("stuck");
@@ -248,6 +255,7 @@ class CapturePage extends HTMLElement {
   // Let go of the take.
   async drop({ silent = false } = {}) {
     this.link?.leave();
+    this.camera.end();
     await this.outbox.forget();
     this.outbox = this.link = null;
     this.paused = false;
@@ -265,6 +273,7 @@ class CapturePage extends HTMLElement {
 
   draw() {
     if (!this.view) return;
+    this.camera.draw(this.dataset.state);
     this.view.draw({
       state: this.dataset.state, problem: this.problem, paused: this.paused, stage: this.stage, toDo: this.toDo,
       verdict: this.verdict, room: this.room,

@@ -1,0 +1,73 @@
+"""The film of the tablet's camera, piece by piece (docs/live-protocol.md); its door is the take's token."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Path, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import ClientDisconnect
+
+from server.api import live_schemas as schemas
+from server.api.documents import PUBLIC, refusals
+from server.api.files import RAW_BODY, read_size
+from server.auth.access import require
+from server.auth.roles import Action
+from server.context import Films, Id
+from server.http.json_body import StrictJsonRoute
+from server.http.problems import Problem
+from server.services import films
+
+router = APIRouter(
+    route_class=StrictJsonRoute,
+    prefix="/live/takes/{take_id}/film",
+    tags=["live"],
+    dependencies=[require(Action.STREAM)],
+)
+Bearer = Annotated[str, Header(description="Bearer and the token that the code gave", max_length=200)]
+
+
+@router.post("", response_model=films.FilmProgress, responses=refusals(401), openapi_extra=PUBLIC)
+def begin_film(
+    take_id: Id, body: schemas.FilmBeginning, authorization: Bearer, intake: Films
+) -> films.FilmProgress:
+    """Begin the film of a take, or ask how far it is; it is kept who let the person be filmed."""
+    return intake.begin(take_id, _token(authorization), body.began_us, consent=body.consent)
+
+
+@router.put(
+    "/{number}",
+    response_model=films.FilmProgress,
+    responses=refusals(401, 409, 413),
+    openapi_extra={**PUBLIC, "requestBody": {"required": True, **RAW_BODY}},
+)
+async def add_piece(
+    take_id: Id,
+    number: Annotated[int, Path(ge=0, le=1_000_000, description="0, 1, …")],
+    request: Request,
+    authorization: Bearer,
+    intake: Films,
+) -> films.FilmProgress:
+    """Keep a piece; the answer comes when it is on the disk. A piece may come twice, a gap is refused."""
+    read_size(request, films.MOST_PIECE_BYTES)
+    piece = bytearray()
+    try:
+        async for some in request.stream():
+            piece += some
+            if len(piece) > films.MOST_PIECE_BYTES:
+                raise Problem(
+                    413, "file_too_large", f"A piece has at most {films.MOST_PIECE_BYTES} bytes; cut it."
+                )
+    except ClientDisconnect:
+        raise Problem(400, "upload_cut", "The connection broke within the piece. Send it again.") from None
+    return await run_in_threadpool(intake.add, take_id, _token(authorization), number, bytes(piece))
+
+
+@router.post("/end", response_model=schemas.EndedFilm, responses=refusals(401, 409), openapi_extra=PUBLIC)
+def end_film(take_id: Id, authorization: Bearer, intake: Films) -> schemas.EndedFilm:
+    """Set the film beside its take, once that is over; of a take that came to nothing it is discarded."""
+    return schemas.EndedFilm(kept=intake.end(take_id, _token(authorization)))
+
+
+def _token(authorization: str) -> str:
+    return authorization.removeprefix("Bearer ")

@@ -1,0 +1,189 @@
+// The tablet's camera beside the take: asked for, shown, recorded. Nothing of it may disturb the take, so whatever
+// fails is said in the camera's own card.
+import { formatClock } from "../common/words.js";
+import { FilmOutbox } from "./film.js";
+
+const PIECE_MS = 1000;
+const RESERVE = 0.98; // of the server's limit
+const FORMATS = ["video/webm;codecs=vp8", "video/webm;codecs=vp9", "video/webm", "video/mp4"];
+const REASONS = {
+  NotAllowedError: "The camera was not allowed. Allow it in the browser's settings of this page, then tick the box again.",
+  NotFoundError: "This device has no camera.",
+  NotReadableError: "Another program uses the camera. Close it, then tick the box again.",
+};
+
+// Why there is no camera here, or null.
+function whyNot() {
+  if (!window.isSecureContext) return "Filming needs the address with https.";
+  if (!navigator.mediaDevices?.getUserMedia || !window.MediaRecorder) return "This browser cannot film.";
+  return FORMATS.some((format) => MediaRecorder.isTypeSupported(format)) ? null : "This browser cannot film.";
+}
+
+export class Camera {
+  // page: the sign that it films is in view wherever the page is scrolled to.
+  constructor(page) {
+    this.$ = (name) => page.querySelector(`[data-${name}]`);
+    const card = this.card = this.$("camera");
+    this.limit = Number(card.dataset.limitBytes) * RESERVE;
+    this.bitsPerS = Number(card.dataset.bitsPerS);
+    this.front = false;
+    this.stream = this.recorder = this.outbox = null;
+    this.problem = whyNot();
+    this.$("consent").addEventListener("change", () => this.choose());
+    this.$("turn").addEventListener("click", () => this.turn());
+    this.$("hide").addEventListener("click", () => this.hide());
+    this.$("stop-film").addEventListener("click", () => this.end());
+  }
+
+  // Films of an earlier page go on to the server.
+  async wake() {
+    if (await FilmOutbox.exists()) await this.keepFilms();
+    this.draw();
+  }
+
+  async keepFilms() {
+    if (this.outbox) return;
+    try {
+      this.outbox = await FilmOutbox.open(() => this.sent());
+    } catch {
+      this.problem = "This browser keeps nothing for this page, so it cannot film.";
+    }
+  }
+
+  sent() {
+    if (this.recorder && this.outbox.lost) this.end(); // it is not wanted any more
+    this.draw();
+  }
+
+  async choose() {
+    if (!this.$("consent").checked) return this.close();
+    await this.open();
+  }
+
+  async open() {
+    this.close();
+    this.problem = null;
+    const video = { facingMode: { ideal: this.front ? "user" : "environment" }, width: { ideal: 1280 }, height: { ideal: 720 }, frameRate: { ideal: 30 } };
+    try {
+      const stream = await navigator.mediaDevices.getUserMedia({ video, audio: false });
+      if (!this.$("consent").checked) return stop(stream); // taken back while the browser asked
+      this.stream = stream;
+      await this.keepFilms();
+      stream.getVideoTracks()[0].addEventListener("ended", () => this.gone());
+      this.$("preview").srcObject = stream;
+    } catch (error) {
+      this.problem = REASONS[error.name] ?? `The camera does not work: ${error.message}`;
+      this.$("consent").checked = false;
+    }
+    this.draw();
+  }
+
+  // The camera was taken away: unplugged, or by another program.
+  async gone() {
+    this.problem = "The camera has gone. The take goes on without it.";
+    await this.end();
+  }
+
+  async turn() {
+    this.front = !this.front;
+    await this.open();
+  }
+
+  hide() {
+    this.hidden = !this.hidden;
+    this.draw();
+  }
+
+  // The take starts.
+  async begin(paired) {
+    if (!this.stream || !this.outbox) return this.close();
+    try {
+      const mimeType = FORMATS.find((format) => MediaRecorder.isTypeSupported(format));
+      const recorder = new MediaRecorder(this.stream, { mimeType, videoBitsPerSecond: this.bitsPerS });
+      let begun = null; // the film has its number before its first piece
+      recorder.addEventListener("start", () => {
+        begun = this.outbox.begin(paired, Math.round((performance.timeOrigin + performance.now()) * 1000));
+        this.beganMs = performance.now();
+        this.draw();
+      });
+      recorder.addEventListener("dataavailable", ({ data }) => begun?.then(() => this.keep(data)).catch((error) => this.full(error)));
+      recorder.addEventListener("error", () => this.gone());
+      recorder.start(PIECE_MS);
+      this.recorder = recorder;
+    } catch (error) {
+      this.problem = `The camera does not work: ${error.message}`;
+      this.close();
+    }
+    this.draw();
+  }
+
+  async keep(piece) {
+    if (!piece.size || !this.outbox.current) return;
+    if (this.outbox.bytes + piece.size <= this.limit) return this.outbox.add(piece);
+    this.problem = "The film has reached its limit and ends here. The take goes on.";
+    await this.end();
+  }
+
+  async full(error) {
+    const words = error.name === "QuotaExceededError" ? "There is no more room on this tablet." : error.message;
+    this.problem = `The film ends here: ${words} The take goes on.`;
+    await this.end();
+  }
+
+  // The take is over, or nobody is to be filmed any more.
+  async end() {
+    const { recorder } = this;
+    this.recorder = null;
+    if (recorder && recorder.state !== "inactive") {
+      const last = new Promise((ok) => recorder.addEventListener("stop", ok, { once: true }));
+      recorder.stop();
+      await last;
+    }
+    this.$("consent").checked = false;
+    this.close();
+    await this.outbox?.end();
+    this.draw();
+  }
+
+  close() {
+    if (this.stream) stop(this.stream);
+    this.stream = null;
+    this.$("preview").srcObject = null;
+    this.draw();
+  }
+
+  // state: of the page.
+  draw(state = this.state) {
+    this.state = state;
+    const films = Boolean(this.recorder), on = Boolean(this.stream), choosing = state === "prepare";
+    const said = this.problem ?? this.outbox?.lost ?? (films ? null : this.onTheWay());
+    this.card.hidden = !(choosing || films || (["running", "sending", "done", "pairing"].includes(state) && said));
+    this.$("ask").hidden = !choosing;
+    this.$("consent").disabled = Boolean(whyNot());
+    this.$("turn").hidden = !choosing || !on;
+    this.$("hide").hidden = !on;
+    set(this.$("hide"), this.hidden ? "Show the picture" : "Hide the picture");
+    this.$("preview").hidden = !on || Boolean(this.hidden);
+    this.$("stop-film").hidden = !films;
+    this.$("films").hidden = !films;
+    if (films) set(this.$("films-for"), formatClock((performance.now() - this.beganMs) / 1000 || 0, 1));
+    this.$("film-say").hidden = !said;
+    set(this.$("film-say"), said ?? "");
+  }
+
+
+  onTheWay() {
+    const { held, left } = this.outbox ?? {};
+    if (held) return `${(held / 1e6).toFixed(1)} MB of the film are on their way. Leave this page open.`;
+    if (!left) return null;
+    return this.state === "running" ? "Filming has ended. What was filmed is kept with the take." : "The film is being set beside the take.";
+  }
+}
+
+function stop(stream) {
+  for (const track of stream.getTracks()) track.stop();
+}
+
+function set(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
