@@ -7,7 +7,6 @@ the call's words are off.
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -27,10 +26,10 @@ def _run(command: str, given: dict[str, object]) -> int:
     from importlib import import_module
 
     from server.processes.compile_cache import share_compile_cache
+    from server.processes.memory import share_allocator
     from server.settings import SettingsError, load_settings
 
-    # Arrow's own allocator keeps what it has let go of: 15 MB that NumPy could use
-    os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
+    share_allocator()
     try:
         share_compile_cache(load_settings({"data_dir": given.get("data_dir")}).cache)
         run = getattr(import_module(f"server.commands.{command}"), command)
