@@ -206,9 +206,12 @@ def _lay_sensor(
 
 
 def _hold_once(laid: Floats, own: Floats) -> Floats:
-    """The stream's own memory from the first point on, where every point is a sample of it."""
+    """The stream's own memory from the first point on, where every point is a sample of it.
+
+    Not where its rows do not lie one after the other: sums over them would round otherwise.
+    """
     own = own[: len(laid)]
-    return own if np.array_equal(laid, own) else laid
+    return own if own.flags.c_contiguous and np.array_equal(laid, own) else laid
 
 
 def _lay_magnetometer(
