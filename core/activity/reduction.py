@@ -332,12 +332,8 @@ def _reduce(
         return Slab(_empty_frames(start // (rate // FRAME_HZ), (end - start) // (rate // FRAME_HZ)), (), ())
     frames, moving = _make_frames(window, core, rate, params)
     steps, turns = _find_steps_and_turns(window, moving, rate, segment, params)
-    inside = start / rate, end / rate
-    return Slab(
-        frames,
-        tuple(t for t in steps if inside[0] <= t < inside[1]),
-        tuple(t for t in turns if inside[0] <= t.start_s < inside[1]),
-    )
+    a, b = start / rate, end / rate
+    return Slab(frames, tuple(t for t in steps if a <= t < b), tuple(t for t in turns if a <= t.start_s < b))
 
 
 def _make_frames(window: _Window, core: slice, rate: int, params: ActivityParams) -> tuple[Frames, Bools]:
@@ -361,16 +357,9 @@ def _make_frames(window: _Window, core: slice, rate: int, params: ActivityParams
         return np.asarray(_cut(x[core], per).mean(axis=1), np.float32)
 
     sd, wobble = _measure_minutes(window.acc[core], window.valid[core], rate)
-    frames = Frames(
-        (window.first + core.start) // per,
-        np.asarray(_cut(window.valid[core], per).all(axis=1)),
-        mean(gravity),
-        mean(up),
-        mean(away**2),
-        sd,
-        wobble,
-    )
-    return frames, moving
+    whole = np.asarray(_cut(window.valid[core], per).all(axis=1))
+    first = (window.first + core.start) // per
+    return Frames(first, whole, mean(gravity), mean(up), mean(away**2), sd, wobble), moving
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

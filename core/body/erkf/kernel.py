@@ -93,9 +93,7 @@ class ErkfOutput(NamedTuple):
     def part(self, first: int, past: int) -> ErkfOutput:
         """Where samples first … past − 1 are written."""
         k = slice(first, past)
-        return ErkfOutput(
-            self.nominal[k], self.heading_sd[k], self.residual[k], self.refused[k], self.smoothed[k]
-        )
+        return self._make(x[k] for x in self)
 
 
 class ErkfScratch(NamedTuple):
@@ -319,12 +317,8 @@ def measure_joints(x, links, scratch, residual):  # type: ignore[no-untyped-def]
 def advance(  # type: ignore[no-untyped-def]
     memory, samples, k, links, noise, scratch, record, slot, output, row
 ):
-    """Filter sample k of a block: the one rule of a file and a stream; False if the covariance broke.
-
-    Parameters
-    ----------
-    row : of `output.nominal` that is written.
-    """
+    """Filter sample k of a block, its state into a row of `output.nominal`: the one rule of a file and a
+    stream; False if the covariance broke."""
     predict(memory, samples, k, noise, scratch, record.F[slot])
     add_noise(memory, samples, k, links, noise, record.Q[slot])
     judge_contacts(memory, samples, k, noise, scratch, record.Q[slot], output.refused[k])
