@@ -93,7 +93,7 @@ class ErkfOutput(NamedTuple):
     def part(self, first: int, past: int) -> ErkfOutput:
         """Where samples first … past − 1 are written."""
         k = slice(first, past)
-        return self._make(x[k] for x in self)
+        return ErkfOutput(*(x[k] for x in self))  # type: ignore[arg-type] # the kinds of fields are known
 
 
 class ErkfScratch(NamedTuple):
