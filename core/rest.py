@@ -146,8 +146,11 @@ def find_windows(quiet: Bools, rate_hz: float, params: RestParams | None = None)
 
 def find_runs(mask: Bools) -> list[tuple[int, int]]:
     """Half-open index ranges of the True runs of a mask (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
-    return [(a, b) for a, b in edges.reshape(-1, 2).tolist()]
+    if not len(mask):
+        return []
+    edges = (np.flatnonzero(mask[1:] != mask[:-1]) + 1).tolist()
+    edges = [*([0] if mask[0] else []), *edges, *([len(mask)] if mask[-1] else [])]
+    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def index_window(window: Window, rate_hz: float) -> slice:

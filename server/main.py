@@ -26,8 +26,10 @@ def _run(command: str, given: dict[str, object]) -> int:
     from importlib import import_module
 
     from server.processes.compile_cache import share_compile_cache
+    from server.processes.memory import share_allocator
     from server.settings import SettingsError, load_settings
 
+    share_allocator()
     try:
         share_compile_cache(load_settings({"data_dir": given.get("data_dir")}).cache)
         run = getattr(import_module(f"server.commands.{command}"), command)

@@ -234,11 +234,17 @@ def _find_forward(
 def _seconds(frames: Frames, posture: Posture, day: Window) -> Floats:
     """Mean inclination (seconds,) in degrees of every second of the day, NaN where it is not known."""
     a, b = (round(t * FRAME_HZ) - frames.first for t in day)
-    firsts = np.arange(0, b - a, FRAME_HZ)
-    there = posture.signed[a:b]
-    number = np.add.reduceat(there, firsts, dtype=np.int8)
-    total = np.add.reduceat(np.where(there, posture.lean[a:b], np.float32(0.0)), firsts)
-    return np.where(number > 0, np.degrees(total / np.maximum(number, 1)), np.nan)
+    found = np.full(-(-(b - a) // FRAME_HZ), np.nan)
+    for part in _cut_hours(a, b):
+        there = posture.signed[part]
+        firsts = np.arange(0, len(there), FRAME_HZ)
+        number = np.add.reduceat(there, firsts, dtype=np.int8)
+        total = np.add.reduceat(np.where(there, posture.lean[part], np.float32(0.0)), firsts)
+        second = (part.start - a) // FRAME_HZ
+        found[second : second + len(firsts)] = np.where(
+            number > 0, np.degrees(total / np.maximum(number, 1)), np.nan
+        )
+    return found
 
 
 def _cut_hours(a: int, b: int) -> Iterator[slice]:

@@ -327,13 +327,21 @@ def _reduce(
     window: _Window, start: int, end: int, rate: int, segment: Segment, params: ActivityParams
 ) -> Slab:
     """One slab: points start to end of a window that has margins around them."""
+    core = slice(start - window.first, end - window.first)
+    if not window.valid[core].any():
+        return Slab(_empty_frames(start // (rate // FRAME_HZ), (end - start) // (rate // FRAME_HZ)), (), ())
+    frames, moving = _make_frames(window, core, rate, params)
+    steps, turns = _find_steps_and_turns(window, moving, rate, segment, params)
+    a, b = start / rate, end / rate
+    return Slab(frames, tuple(t for t in steps if a <= t < b), tuple(t for t in turns if a <= t.start_s < b))
+
+
+def _make_frames(window: _Window, core: slice, rate: int, params: ActivityParams) -> tuple[Frames, Bools]:
+    """Frames of the points `core` of a window, and where all of its points (n,) move."""
     from scipy.ndimage import uniform_filter1d
     from scipy.signal import sosfiltfilt
 
     per = rate // FRAME_HZ
-    core = slice(start - window.first, end - window.first)
-    if not window.valid[core].any():
-        return Slab(_empty_frames(start // per, (end - start) // per), (), ())
     reach = min(len(window.acc) - 1, params.margin_s * rate)
     gravity = np.asarray(sosfiltfilt(_design_gravity_filter(rate), window.acc, axis=0, padlen=reach))
     size = np.maximum(np.sqrt(np.einsum("ni,ni->n", gravity, gravity)), 1e-9)
@@ -349,22 +357,9 @@ def _reduce(
         return np.asarray(_cut(x[core], per).mean(axis=1), np.float32)
 
     sd, wobble = _measure_minutes(window.acc[core], window.valid[core], rate)
-    frames = Frames(
-        start // per,
-        np.asarray(_cut(window.valid[core], per).all(axis=1)),
-        mean(gravity),
-        mean(up),
-        mean(away**2),
-        sd,
-        wobble,
-    )
-    steps, turns = _find_steps_and_turns(window, moving, rate, segment, params)
-    inside = start / rate, end / rate
-    return Slab(
-        frames,
-        tuple(t for t in steps if inside[0] <= t < inside[1]),
-        tuple(t for t in turns if inside[0] <= t.start_s < inside[1]),
-    )
+    whole = np.asarray(_cut(window.valid[core], per).all(axis=1))
+    first = (window.first + core.start) // per
+    return Frames(first, whole, mean(gravity), mean(up), mean(away**2), sd, wobble), moving
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

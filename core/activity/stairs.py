@@ -43,19 +43,21 @@ def measure_walking(
     """
     from scipy.ndimage import uniform_filter1d
 
-    # a second holds two steps: what bounces with each is gone
-    smooth = uniform_filter1d(theta, FRAME_HZ, mode="nearest")
     half, edge = round(0.5 * params.window_s * FRAME_HZ), round(EDGE_S * FRAME_HZ)
     rocks, lean = np.full(len(at), np.nan), np.full(len(at), np.nan)
     runs = find_runs(walking)
+    # a second holds two steps: what bounces with each is gone
+    smooth = [uniform_filter1d(theta[a:b], FRAME_HZ, mode="nearest") for a, b in runs]
     starts = [a for a, _ in runs]
     for k, i in enumerate(at):
         r = bisect_right(starts, i) - 1
         if r < 0 or i > runs[r][1]:
             continue
-        a, b = max(runs[r][0] + edge, i - half), min(runs[r][1] - edge, i + half + 1)
+        first = runs[r][0]
+        a, b = max(first + edge, i - half), min(runs[r][1] - edge, i + half + 1)
         if b - a >= 1.8 * half:
-            rocks[k], lean[k] = smooth[a:b].std(), smooth[a:b].mean()
+            own = smooth[r][a - first : b - first]
+            rocks[k], lean[k] = own.std(), own.mean()
     return rocks, lean
 
 

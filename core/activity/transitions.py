@@ -103,15 +103,21 @@ def find_leans(theta: Singles, there: Bools, params: TransitionParams) -> list[L
     """Peaks of the inclination (f,) that are candidates, each with the minima beside it."""
     from scipy.signal import find_peaks
 
-    tops, _ = find_peaks(
-        np.where(there, theta, 0.0), height=params.candidate_rad, prominence=0.5 * params.prominence_rad
-    )
+    least = 0.5 * params.prominence_rad
+    foot = max(0.0, params.candidate_rad - least)
+    tops: list[int] = []
+    # a peak stands out enough above all that lies at the foot: what lies beyond changes nothing
+    for first, last in find_runs(there & (theta > foot)):
+        part = slice(max(0, first - 1), last + 1)
+        rising = np.where(there[part], theta[part], 0.0)
+        found, _ = find_peaks(rising, height=params.candidate_rad, prominence=least)
+        tops += (part.start + found).tolist()
     reach = round(params.half_s * FRAME_HZ)
     return [
         Lean(
-            int(top) - _edge(theta[max(0, top - reach) : top + 1][::-1]),
-            int(top),
-            int(top) + _edge(theta[top : top + reach + 1]),
+            top - _edge(theta[max(0, top - reach) : top + 1][::-1]),
+            top,
+            top + _edge(theta[top : top + reach + 1]),
             float(theta[top]),
         )
         for top in tops

@@ -9,7 +9,7 @@ filtered side by side.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -157,6 +157,13 @@ class ImuTree:
                 origin[part],
             )
         return turned.reshape(q.shape), origin.reshape(p.shape)
+
+    def segment(self, i: int, p: Floats, q: Floats) -> tuple[Floats, Floats]:
+        """Orientation (T, 4) and origin (T, 3) of one segment; arguments (T, n, ·) as of `segments`."""
+        one = replace(self, imus=self.imus[i : i + 1], joints=(), feet=(), q_mount=self.q_mount[i : i + 1],
+                      place=self.place[i : i + 1], origin=self.origin[i : i + 1])  # fmt: skip
+        turned, origin = one.segments(p[:, i : i + 1], q[:, i : i + 1])
+        return turned[:, 0], origin[:, 0]
 
     def segment_q(self, q: Floats) -> Floats:
         """Segment orientations (..., n, 4) from sensor orientations (..., n, 4)."""

@@ -26,8 +26,11 @@ LABEL: Final = "Axivity CWA"
 MAGIC: Final = b"MD\xfc\x03"
 HEADER: Final = 1024
 BLOCK: Final = 512
-AT_ONCE: Final = 1024
-"""Blocks that are decoded together: half a megabyte."""
+AT_ONCE: Final = 128
+"""Blocks that are decoded together, some ten thousand samples."""
+
+TAIL: Final = 1024
+"""So many blocks at the end are looked through for the last whole one."""
 
 GAP: Final = 1.5
 """A block that begins later than so many of its own lengths after the one before follows a hole [our
@@ -142,7 +145,7 @@ def _find_last(file: BinaryIO) -> float:
     """When the last whole block begins, s of the device's clock."""
     size = file.seek(0, 2)
     blocks = max(0, (size - HEADER) // BLOCK)
-    file.seek(max(HEADER, HEADER + (blocks - AT_ONCE) * BLOCK))
+    file.seek(max(HEADER, HEADER + (blocks - TAIL) * BLOCK))
     heads, _ = _whole_blocks(file.read())
     return float(_starts(heads[-1:])[0]) if len(heads) else 0.0
 

@@ -255,7 +255,7 @@ def _read_subject(info: Mapping[str, object]) -> Subject:
 
 
 def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Recording:
-    axis = table[_TIME].to_numpy()
+    axis = table[_TIME].to_numpy() * 1e-6
     streams: dict[str, ImuStream] = {}
     segments: dict[str, object] = {}
     notices: list[Notice] = []
@@ -280,7 +280,7 @@ def _recording(table: pa.Table, info: Mapping[str, object], source: str) -> Reco
         streams[device] = ImuStream(
             device_id=device,
             source=str(sensor["source"]),
-            t_s=axis[rows] * 1e-6,
+            t_s=axis[rows],
             acc=acc,
             gyr=signals["gyr"],
             mag=signals["mag"],

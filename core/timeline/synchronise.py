@@ -194,7 +194,24 @@ def _lay_sensor(
     channels = np.concatenate((s.acc[good], s.gyr[good]), axis=1)
     (acc, gyr), valid, filled = lay_signal(s.t_s[good], channels, start_s, samples, s.rate_hz, rate, params)
     mag = _lay_magnetometer(s, start_s, samples, rate, params)
-    return SensorSignals(s.device_id, acc, gyr, mag, valid, filled)
+    first = int(np.searchsorted(s.t_s, start_s - params.on_grid / rate))
+    return SensorSignals(
+        s.device_id,
+        _hold_once(acc, s.acc[first:]),
+        _hold_once(gyr, s.gyr[first:]),
+        None if mag is None or s.mag is None else _hold_once(mag, s.mag[first:]),
+        valid,
+        filled,
+    )
+
+
+def _hold_once(laid: Floats, own: Floats) -> Floats:
+    """The stream's own memory from the first point on, where every point is a sample of it.
+
+    Not where its rows do not lie one after the other: sums over them would round otherwise.
+    """
+    own = own[: len(laid)]
+    return own if own.flags.c_contiguous and np.array_equal(laid, own) else laid
 
 
 def _lay_magnetometer(

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
+from server.processes.memory import give_memory_back
 from server.services.provenance import CODE_VERSION
 
 if TYPE_CHECKING:
@@ -60,10 +61,14 @@ def analyse_files(
     from core.pipeline import PipelineConfig, analyse
     from core.pipeline.config import override_config
 
-    progress("reading", 0.0)
+    def tell(stage: str, share: float) -> None:
+        give_memory_back()
+        progress(stage, share)
+
+    tell("reading", 0.0)
     take = read_recording(files, parse_manifest(manifest) if manifest is not None else None)
     chosen = override_config(PipelineConfig(), config or {})
-    return analyse(take, chosen, progress, CODE_VERSION)
+    return analyse(take, chosen, tell, CODE_VERSION)
 
 
 def inspect(files: Sequence[SourceFile], manifest: Mapping[str, Any] | None, progress: Progress) -> bytes:

@@ -106,7 +106,8 @@ class ErkfTrack:
 
     Parameters
     ----------
-    nominal : (T, n, 16) as in `ErkfState`. heading_sd : (T, n) rad, of the filter, about the vertical.
+    nominal : (T, n, 16) as in `ErkfState`, of the smoother (T, n, 10) without biases.
+    heading_sd : (T, n) rad, of the filter, about the vertical.
     joint_residual : (T, joints) distance of the two ends of each joint, m.
     refused : (T, n) zero velocities that the gate refused.
     """
@@ -175,7 +176,8 @@ def filter_block(
     run = prepare_run(state, inputs, tree, params)
     record = tuple(new_record(tree, params, 1))
     broke = filter_segments(*run.arguments(), record, tuple(run.output), NONE_KEPT, 0, False)
-    return ErkfTrack(*run.output), run.end(broke)
+    output = run.output
+    return ErkfTrack(output.nominal, output.heading_sd, output.residual, output.refused), run.end(broke)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,8 +213,10 @@ class ErkfPass:
         return ErkfState(*self.memory._replace(P=self.memory.P[:, :N].copy()))
 
 
-def prepare_run(state: ErkfState, inputs: ErkfInputs, tree: ImuTree, params: ErkfParams) -> ErkfPass:
-    """Check a block and lay it out for the kernels."""
+def prepare_run(
+    state: ErkfState, inputs: ErkfInputs, tree: ImuTree, params: ErkfParams, segment: int | None = None
+) -> ErkfPass:
+    """Check a block and lay it out for the kernels; `segment` as in `new_output`."""
     T, n = inputs.valid.shape
     _check(state, inputs, tree, params)
     rate = 1.0 / np.median(inputs.step_s[inputs.step_s > 0.0]) if np.any(inputs.step_s > 0.0) else 1.0
@@ -228,7 +232,11 @@ def prepare_run(state: ErkfState, inputs: ErkfInputs, tree: ImuTree, params: Erk
         np.empty((0, n)) if inputs.rolling is None else params.roll_m * inputs.rolling,
     )
     return ErkfPass(
-        memory_of(state), samples, links_of(tree, params), noise_of(params, rate), new_output(tree, T)
+        memory_of(state),
+        samples,
+        links_of(tree, params),
+        noise_of(params, rate),
+        new_output(tree, T, segment),
     )
 
 
@@ -253,14 +261,15 @@ def make_lines(*shape: int) -> Floats:
     return room[first : first + math.prod(full)].reshape(full)
 
 
-def new_output(tree: ImuTree, samples: int) -> ErkfOutput:
-    """Room for what a block of so many samples gives."""
+def new_output(tree: ImuTree, samples: int, segment: int | None = None) -> ErkfOutput:
+    """Room for what a block of so many samples gives, smoothed where segments are given."""
     n = len(tree.imus)
     return ErkfOutput(
-        nominal=np.empty((samples, n, 16)),
+        nominal=np.empty((samples if segment is None else segment, n, 16)),
         heading_sd=np.empty((samples, n)),
         residual=np.empty((samples, len(tree.joints))),
         refused=np.empty((samples, n), np.bool_),
+        smoothed=np.empty((0 if segment is None else samples, n, 10)),
     )
 
 

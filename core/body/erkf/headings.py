@@ -140,7 +140,7 @@ def heading_errors(
         walking[index_window(window, rate)] = True
     change = []
     for i, segment in enumerate(segments):
-        was, now = orientations.q[segment][part], tree.segment_q(track.q)[:, i]
+        was, now = orientations.q[segment][part], tree.segment(i, track.p, track.q)[0]
         seen = walking[part] & orientations.valid[segment][part]
         if not seen.any():
             return {}

@@ -156,6 +156,7 @@ def _start_heading(run: ErkfRun) -> HealthFinding:
 
 def _climb_pct(run: ErkfRun, foot: int) -> float:
     """How far the foot's last rest lies above or below its first, of the way between, %."""
-    p: Floats = run.tree.segment_origin(run.track.p, run.track.q)[run.inputs.contact[:, foot], foot]
+    rests = run.inputs.contact[:, foot]
+    p: Floats = run.tree.segment(foot, run.track.p[rests], run.track.q[rests])[1]
     way = float(np.linalg.norm(np.diff(p[:, :2], axis=0), axis=1).sum())
     return 100.0 * float(abs(p[-1, 2] - p[0, 2])) / max(way, CLIMB_WAY_M)

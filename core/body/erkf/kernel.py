@@ -81,17 +81,19 @@ class ErkfSamples(NamedTuple):
 
 
 class ErkfOutput(NamedTuple):
-    """What a block gives: nominal (T, n, 16) · heading_sd (T, n) · residual (T, J) · refused (T, n)."""
+    """What a block gives: nominal (T, n, 16), of one segment where states are kept · heading_sd (T, n) ·
+    residual (T, J) · refused (T, n) · smoothed (T, n, 10) without biases, or (0, n, 10)."""
 
     nominal: Floats
     heading_sd: Floats
     residual: Floats
     refused: Bools
+    smoothed: Floats
 
     def part(self, first: int, past: int) -> ErkfOutput:
         """Where samples first … past − 1 are written."""
         k = slice(first, past)
-        return ErkfOutput(self.nominal[k], self.heading_sd[k], self.residual[k], self.refused[k])
+        return ErkfOutput(*(x[k] for x in self))  # type: ignore[arg-type] # the kinds of fields are known
 
 
 class ErkfScratch(NamedTuple):
@@ -312,13 +314,16 @@ def measure_joints(x, links, scratch, residual):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
-def advance(memory, samples, k, links, noise, scratch, record, slot, output):  # type: ignore[no-untyped-def]
-    """Filter sample k of a block: the one rule of a file and a stream; False if the covariance broke."""
+def advance(  # type: ignore[no-untyped-def]
+    memory, samples, k, links, noise, scratch, record, slot, output, row
+):
+    """Filter sample k of a block, its state into a row of `output.nominal`: the one rule of a file and a
+    stream; False if the covariance broke."""
     predict(memory, samples, k, noise, scratch, record.F[slot])
     add_noise(memory, samples, k, links, noise, record.Q[slot])
     judge_contacts(memory, samples, k, noise, scratch, record.Q[slot], output.refused[k])
     good = correct(memory, samples, k, links, noise, scratch, record, slot)
-    inject(memory, noise, scratch, output.nominal[k], output.heading_sd[k])
+    inject(memory, noise, scratch, output.nominal[row], output.heading_sd[k])
     for r in range(memory.dx.shape[0]):
         good &= memory.P[r, r] > 0.0 and abs(memory.dx[r]) < 1e9
     if good:
@@ -417,18 +422,21 @@ def filter_segments(  # type: ignore[no-untyped-def]
             keep_state(memory, kept[s])
         for k in range(a, b):
             slot = k - a if smoothing else 0
-            if not advance(memory, samples, k, links, noise, scratch, record, slot, output):
+            if not advance(memory, samples, k, links, noise, scratch, record, slot, output, k - a):
                 return k
             if smoothing:
                 copy_row(memory.dx, record.dx[slot])
         if smoothing:
-            step, nominal = samples.step[a:b], output.nominal[a:b]
+            step, nominal = samples.step[a:b], output.nominal[: b - a]
             sweep_back(lam, step, record, noise.m, swept)
             # the covariance is again that before the segment
             restore_state(memory, kept[s])
             multiply_lower(memory.P, lam, d)
             move_smoothed(d, step, record, noise.m, swept, nominal)
             measure_smoothed(nominal, links, scratch, output.residual[a:b])
+            for k in range(a, b):
+                for j in range(n):
+                    copy_row(nominal[k - a, j, : output.smoothed.shape[2]], output.smoothed[k, j])
     for r in range(N):
         for c in range(r):
             memory.P[c, r] = memory.P[r, c]

@@ -110,8 +110,7 @@ def find_patches(recording: UniformRecording, segments: Sequence[Segment], longe
 
 def replace_orientations(run: ErkfRun, orientations: Orientations) -> Orientations:
     """The given orientations with those of the run's segments in their place."""
-    q = run.tree.segment_q(run.track.q)
-    found = {s: np.ascontiguousarray(q[:, i]) for i, s in enumerate(run.segments)}
+    found = {s: run.tree.segment(i, run.track.p, run.track.q)[0] for i, s in enumerate(run.segments)}
     return replace(orientations, q={**orientations.q, **found}, engine=ERKF.method)
 
 
@@ -130,8 +129,7 @@ def place_figure(
     """
     legs = [s for s in SIDES if {THIGH[s], SHANK[s], FOOT[s]} <= set(run.segments)]
     shown: list[Segment] = ["pelvis", *(x for s in legs for x in (THIGH[s], SHANK[s], FOOT[s]))]
-    origin = run.tree.segment_origin(run.track.p, run.track.q)
-    place = {s: origin[:, run.segments.index(s)] for s in shown}
+    place = {s: run.tree.segment(run.segments.index(s), run.track.p, run.track.q)[1] for s in shown}
     still = {s: run.inputs.contact[:, run.segments.index(FOOT[s])] for s in legs}
     for side in legs:
         place |= _hang_together(run, orientations, place, side, body)
@@ -157,14 +155,13 @@ def foot_tracks(run: ErkfRun, orientations: Orientations, body: BodyModel) -> Fo
     ----------
     orientations : refined by this run.
     """
-    origin = run.tree.segment_origin(run.track.p, run.track.q)
     at: dict[Side, int] = {s: run.segments.index(FOOT[s]) for s in SIDES if FOOT[s] in run.segments}
     patched = run.inputs.patched
     linked = len(at) == 2 and not ({FOOT[s] for s in at} & {run.segments[i] for i in run.tree.roots()})
     return FootTracks(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
-        p={s: np.ascontiguousarray(origin[:, i]) for s, i in at.items()},
+        p={s: run.tree.segment(i, run.track.p, run.track.q)[1] for s, i in at.items()},
         q={s: orientations.q[FOOT[s]] for s in at},
         still={s: run.inputs.contact[:, i] for s, i in at.items()},
         valid={s: orientations.valid[FOOT[s]] for s in at},

@@ -49,7 +49,7 @@ def smooth(
         segment = max(SEGMENT, math.isqrt(T // 4))
     if segment < 2:
         raise ParameterError("segment_range", f"Segments of {segment} samples; at least 2.")
-    run = prepare_run(state, inputs, tree, params)
+    run = prepare_run(state, inputs, tree, params, segment)
     kept = np.empty((-(-T // segment), row_length(n, n * params.states)))
     output = tuple(run.output)
     record = tuple(new_record(tree, params, 1))
@@ -58,4 +58,5 @@ def smooth(
     again = replace(run, memory=memory_of(final))
     record = tuple(new_record(tree, params, segment))
     filter_segments(*again.arguments(), record, output, kept, segment, True)
-    return ErkfTrack(*run.output), final
+    found = run.output
+    return ErkfTrack(found.smoothed, found.heading_sd, found.residual, found.refused), final

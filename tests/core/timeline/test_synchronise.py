@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from core.errors import Notice, SignalError
 from core.formats import SourceFile, read_recording
-from core.frames import Segment
-from core.recording import ImuStream
+from core.frames import Floats, Segment
+from core.recording import ImuStream, SensorSignals
 from core.timeline import TimelineParams, synchronise
 from tests.core.formats.making import signals, stream, take
 from tests.core.formats.test_samples import gaitmap
@@ -33,6 +33,25 @@ def test_samples_on_the_axis_are_copied_bit_for_bit() -> None:
     np.testing.assert_array_equal(u.sensors["pelvis"].gyr, GYR)
     assert u.sensors["pelvis"].valid.all()
     assert not u.sensors["pelvis"].interpolated.any()
+
+
+def test_signals_without_a_hole_are_held_once() -> None:
+    def laid(acc: Floats, t_s: Floats) -> tuple[ImuStream, SensorSignals]:
+        given = stream("a", acc, GYR, t_s=t_s)
+        return given, synchronise(take({"pelvis": given})).sensors["pelvis"]
+
+    on_axis, between = np.arange(1000) / 100.0, np.arange(1000) / 100.0 + 0.002 * (np.arange(1000) > 500)
+    given, whole = laid(ACC, on_axis)
+    assert given.gyr is not None
+    assert np.shares_memory(whole.acc, given.acc)
+    assert np.shares_memory(whole.gyr, given.gyr)
+    given, moved = laid(ACC.copy(), between)
+    assert not np.shares_memory(moved.acc, given.acc)
+    # by columns in memory: sums over the rows would round otherwise
+    given, turned = laid(np.asfortranarray(ACC), on_axis)
+    assert not np.shares_memory(turned.acc, given.acc)
+    assert turned.acc.flags.c_contiguous
+    np.testing.assert_array_equal(turned.acc, ACC)
 
 
 def test_sensors_are_aligned_on_time_not_on_rows() -> None:
