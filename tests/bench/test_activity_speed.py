@@ -76,6 +76,9 @@ def test_three_times_as_long_costs_three_times_as_much(day: tuple[LongStream, li
 MOST_MB = 300.0
 """Of a whole analysis of a day, the libraries among it: Python, NumPy, SciPy, Numba with LLVM and Arrow."""
 
+OTHERS = 1.04
+"""Libraries of another version or machine may take so much more; measured 287 to 294."""
+
 DAY_MB = 4.0
 """What is found on one more day may take so much: a transition or a candidate every minute."""
 
@@ -144,7 +147,7 @@ def test_a_day_at_100_hz_fits_and_needs_no_more_than_its_third(
     sys.stdout.write(
         f"\nmemory of `sagittal analyse` at 100 Hz: {third[0]:.0f} MB for 8 h, {whole[0]:.0f} MB for 24 h\n"
     )
-    assert max(third[0], whole[0]) <= MOST_MB
+    assert max(third[0], whole[0]) <= OTHERS * MOST_MB
     # what stays of a day: steps, and the inclination of every second
     assert whole[0] - third[0] <= 30.0
 
@@ -159,7 +162,7 @@ def test_days_of_an_axivity_are_linear_in_time_and_fit(tmp_path: Path) -> None:
         f"{all_[1]:.0f} s and {all_[0]:.0f} MB for {WEEK} days\n"
     )
     assert all_[1] <= 1.2 * WEEK * one[1]
-    assert all_[0] <= MOST_MB + DAY_MB * (WEEK - 1)
+    assert all_[0] <= OTHERS * MOST_MB + DAY_MB * (WEEK - 1)
     assert all_[1] <= 60.0 / 7 * WEEK * SLOWER
     stream = cwa.open_long("days.cwa", lambda: files[2].open("rb"))
     assert stream.duration_s == pytest.approx(WEEK * DAY, abs=5.0)
