@@ -8,7 +8,7 @@ from starlette.responses import Response
 
 from server.auth.access import require
 from server.auth.roles import Action
-from server.http.templates import TEMPLATES
+from server.http.templates import render
 from server.pages.words import CALIBRATIONS, SEGMENT_NAMES
 from server.services.live import ALPHABET, CODE_LENGTH
 
@@ -27,4 +27,4 @@ def show_capture(request: Request) -> Response:
         "calibrations": CALIBRATIONS,
         "places": [(place, SEGMENT_NAMES[place]) for place in PLACES],
     }
-    return TEMPLATES.TemplateResponse(request, "capture.html", context)
+    return render(request, "capture.html", context)
