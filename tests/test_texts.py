@@ -91,13 +91,13 @@ def test_what_stays_english_is_there() -> None:
 def test_messages_are_found_in_python() -> None:
     source = (
         '"""A docstring is none."""\n'
-        "Notice('few_steps', f'{n} step{\"\" if n == 1 else \"s\"} of the {side} foot.', 'pelvis')\n"
+        "Notice('few_steps', f'{count} step{\"\" if count == 1 else \"s\"} of the {side} foot.', 'pelvis')\n"
         "raise ValueError('An error of a program.')\n"
     )
     assert list(python_texts(source, whole=False)) == [
         "Few steps",
-        "{n} step of the {side} foot.",
-        "{n} steps of the {side} foot.",
+        "{count} step of the {side} foot.",
+        "{count} steps of the {side} foot.",
     ]
 
 

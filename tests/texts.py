@@ -314,7 +314,7 @@ def update(language: str) -> tuple[int, int]:
     catalog.header_comment = f"# {LANGUAGES[language]} texts of Sagittal (docs/languages.md)."
     messages = list_messages()
     for message, files in messages.items():
-        catalog.add(message, before.get(message, ""), locations=[(name, None) for name in files])
+        catalog.add(message, before.get(message, ""), locations=[(name, None) for name in files])  # type: ignore[misc]  # without lines
     with path.open("wb") as file:
         write_po(file, catalog, width=110, sort_by_file=False, omit_header=False)
     return len(messages), sum(not before.get(message) for message in messages)

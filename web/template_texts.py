@@ -168,7 +168,7 @@ def _variants(run: _Run) -> list[tuple[str, tuple[str, dict[str, str]]]]:
 def _name(expression: str, taken: Container[str]) -> str:
     """A name for a value: the last of its path."""
     path = re.match(r"[\w.\[\]']*", expression.lstrip("("))
-    words = re.findall(r"[A-Za-z_]+", path[0] if path else "") or ["value"]
+    words: list[str] = re.findall(r"[A-Za-z_]+", path[0] if path else "") or ["value"]
     name = words[-1]
     n = 2
     while name in taken:
