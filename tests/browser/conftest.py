@@ -193,7 +193,7 @@ def opened(flat: Browser, running: RunningServer, cookies: list[dict[str, str]])
         scheme: str = "light",
         browser: Browser = flat,
         signed_in: bool = True,
-        locale: str = "en-GB",
+        locale: str = "en-US",
     ) -> Page:
         context = browser.new_context(
             locale=locale,
