@@ -5,8 +5,15 @@ from __future__ import annotations
 import datetime as dt
 import re
 from collections.abc import Callable
+from typing import Any
 
-MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+from web.language import MONTHS
+
+
+class Verbatim(str):
+    """What a person typed: shown as it is in every language."""
+
+    __slots__ = ()
 
 
 def day(value: dt.date | dt.datetime) -> str:
@@ -52,12 +59,21 @@ def pattern(text: str) -> str:
     return re.sub(r"[\^$\\.*+?()\[\]{}|/]", r"\\\g<0>", text)
 
 
-FILTERS: dict[str, Callable[..., str]] = {
+def as_it_is(value: Any) -> Any:
+    """Return the value: nothing is translated into the language of the sources."""
+    return value
+
+
+FILTERS: dict[str, Callable[..., Any]] = {
     "day": day,
     "moment": moment,
     "filesize": filesize,
     "number": number,
     "seconds": seconds,
     "pattern": pattern,
+    "verbatim": as_it_is,
+    "spoken": as_it_is,
+    "said": as_it_is,
+    "meant": lambda text, meaning: text,
 }
 """By the name templates use."""

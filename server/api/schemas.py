@@ -102,6 +102,12 @@ class PasswordChange(Request):
     password: Password
 
 
+class LanguageChoice(Request):
+    """In which language one reads the pages."""
+
+    language: Literal["en", "de"] | None
+
+
 @dataclass(frozen=True)
 class User:
     """An account."""

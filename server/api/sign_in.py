@@ -177,6 +177,16 @@ def change_password(
         audit.record(c, who, "user.password_changed", "user", who.user_id)
 
 
+@router.put("/account/language", status_code=204)
+def choose_language(
+    body: schemas.LanguageChoice, db: Db, who: Annotated[Identity, require(Action.USE_ACCOUNT)]
+) -> None:
+    """Choose the language of the pages; null = the one the browser asks for."""
+    with db.write() as c:
+        accounts.change(c, who.user_id, {"language": body.language})
+        audit.record(c, who, "user.language_chosen", "user", who.user_id, {"language": body.language})
+
+
 @address_router.get("/sign-in/{token}", dependencies=[require(Action.SIGN_IN)])
 def sign_in_once(token: str, request: Request, db: Db, logins: OpenLogins, trail: OpenTrail) -> Response:
     """Sign in with a printed one-time address and go to the patients."""

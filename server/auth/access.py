@@ -23,6 +23,7 @@ class RouteAccess:
     def __call__(self, connection: HTTPConnection) -> Identity | None:
         """Return who is asking; raise Problem 401 without a sign-in and 403 without the right."""
         identity = identify(connection, counts=self.action is not Action.WATCH_SIGN_IN)
+        connection.state.language = None if identity is None else identity.language
         if self.action in PUBLIC:
             return identity
         if identity is None:

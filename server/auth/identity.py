@@ -13,7 +13,7 @@ class Identity:
 
     Parameters
     ----------
-    user_id, name, display_name, role : the account.
+    user_id, name, display_name, role : the account. language : of the pages, None = the browser's.
     login_id : which sign-in this is (two browsers of one person are two); the hash of its token.
     """
 
@@ -22,6 +22,7 @@ class Identity:
     display_name: str
     role: Role
     login_id: str
+    language: str | None = None
 
     def may(self, action: Action) -> bool:
         """Tell whether this person's role allows the action; pages ask it what to offer."""

@@ -173,7 +173,9 @@ class Logins:
         seen = max(login.last_seen_at, self._seen.get(login_id, login.last_seen_at))
         if login.expires_at <= at or seen <= at - self._idle:
             return None
-        identity = Identity(person.id, person.name, person.display_name, Role(person.role), login_id)
+        identity = Identity(
+            person.id, person.name, person.display_name, Role(person.role), login_id, person.language
+        )
         return dataclasses.replace(login, last_seen_at=seen), identity
 
     def _write_seen(self, login_id: str, at: dt.datetime) -> None:

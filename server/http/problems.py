@@ -21,7 +21,7 @@ from starlette.websockets import WebSocket, WebSocketState
 
 from core.errors import SagittalError
 from server.http.headers import add_security_headers
-from server.http.templates import TEMPLATES
+from server.http.templates import render
 from server.storage.refusal import refusal_of
 
 log = logging.getLogger(__name__)
@@ -104,7 +104,7 @@ def problem_response(problem: Problem, connection: HTTPConnection) -> Response:
             path = connection.url.path + (f"?{connection.url.query}" if connection.url.query else "")
             return RedirectResponse(f"/sign-in?next={quote(path)}", status_code=303)
         try:
-            return TEMPLATES.TemplateResponse(
+            return render(
                 Request(connection.scope),
                 "error.html",
                 {"problem": problem.to_json()},

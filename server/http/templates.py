@@ -1,17 +1,24 @@
-"""The templates of web/templates, with the filters and the words that all of them use."""
+"""The templates of web/templates, with the filters and the words that all of them use, in every language."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any, Final
 
+from fastapi import Request
 from jinja2 import Environment, FileSystemLoader
+from starlette.requests import HTTPConnection
+from starlette.responses import Response
 from starlette.templating import Jinja2Templates
 
 import web
 from core.body.model import NOMINAL_HEIGHT_M
 from core.condition import CHOICES
+from web.language import LANGUAGES, SOURCE, choose_language, load_catalogue, script_texts
+from web.shown import Shown
+from web.template_texts import speak_template
 from web.words import FILTERS
 
 
@@ -24,14 +31,48 @@ class FlushLeftLoader(FileSystemLoader):
         return re.sub(r"\n[ \t]+", "\n", source), name, is_newest
 
 
-def load_templates() -> Jinja2Templates:
-    """Return the environment in which every page is rendered."""
+class SpokenLoader(FlushLeftLoader):
+    """The same templates, every text of which asks the catalogue of a language."""
+
+    def get_source(self, environment: Environment, template: str) -> tuple[str, str, Callable[[], bool]]:
+        """Return source, file and whether it is still the newest."""
+        source, name, is_newest = super().get_source(environment, template)
+        return speak_template(source), name, is_newest
+
+
+def load_templates(language: str) -> Jinja2Templates:
+    """Return the environment in which every page of a language is rendered."""
     folder = Path(web.__file__).parent / "templates"
-    templates = Jinja2Templates(env=Environment(loader=FlushLeftLoader(folder), autoescape=True))
+    is_source = language == SOURCE
+    loader = FlushLeftLoader(folder) if is_source else SpokenLoader(folder)
+    templates = Jinja2Templates(env=Environment(loader=loader, autoescape=True))
     templates.env.filters.update(FILTERS)
+    if not is_source:
+        shown = Shown(load_catalogue(language))
+        templates.env.filters.update(shown.filters)
+        templates.env.globals.update(shown.functions)
+        templates.env.globals["script_texts"] = f"/texts/{language}/{script_texts(language)[0]}.json"
     templates.env.globals["conditions"] = CHOICES
+    templates.env.globals["languages"] = LANGUAGES
+    templates.env.globals["language"] = language
     templates.env.globals["ASSUMED_HEIGHT"] = f"{NOMINAL_HEIGHT_M:.2f} m"
     return templates
 
 
-TEMPLATES = load_templates()
+TEMPLATES: Final[Mapping[str, Jinja2Templates]] = {
+    language: load_templates(language) for language in LANGUAGES
+}
+
+
+def language_of(connection: HTTPConnection) -> str:
+    """The language that who is signed in has chosen, else the browser's."""
+    chosen = getattr(connection.state, "language", None)
+    return chosen or choose_language(connection.headers.get("accept-language"))
+
+
+def render(
+    request: Request, template: str, context: Mapping[str, Any], status_code: int = 200, **others: Any
+) -> Response:
+    """Render a page in the language of who asks."""
+    templates = TEMPLATES[language_of(request)]
+    return templates.TemplateResponse(request, template, dict(context), status_code=status_code, **others)

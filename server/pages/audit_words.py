@@ -20,6 +20,7 @@ DEEDS: Final[Mapping[str, str]] = {
     "user.created": "made an account",
     "user.changed": "changed an account",
     "user.password_changed": "changed the password",
+    "user.language_chosen": "chose the language of the pages",
     "patient.listed": "looked at the list of patients",
     "patient.opened": "opened the patient",
     "patient.created": "added the patient",

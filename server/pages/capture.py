@@ -12,7 +12,7 @@ from server.auth.access import require
 from server.auth.roles import Action
 from server.context import Config
 from server.http.headers import allow_camera
-from server.http.templates import TEMPLATES
+from server.http.templates import render
 from server.pages.words import CALIBRATIONS, SEGMENT_NAMES
 from server.services.live import ALPHABET, CODE_LENGTH
 
@@ -40,4 +40,4 @@ def show_capture(request: Request, settings: Config) -> Response:
     }
     # the only page that may use a camera
     headers = {"Permissions-Policy": allow_camera("(self)")}
-    return TEMPLATES.TemplateResponse(request, "capture.html", context, headers=headers)
+    return render(request, "capture.html", context, headers=headers)

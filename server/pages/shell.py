@@ -7,7 +7,7 @@ from starlette.responses import Response
 
 from server.auth.identity import Identity
 from server.auth.roles import Action
-from server.http.templates import TEMPLATES
+from server.http.templates import render
 from server.services import jobs
 from server.services.provenance import CODE_VERSION
 from server.storage.db import Database
@@ -53,4 +53,4 @@ def render_page(
         "version": CODE_VERSION,
         "may": lambda action: who.may(Action(action)),
     }
-    return TEMPLATES.TemplateResponse(request, template, shell | context)
+    return render(request, template, shell | context)

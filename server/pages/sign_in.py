@@ -14,7 +14,7 @@ from server.auth.identity import Identity
 from server.auth.passwords import MIN_LENGTH
 from server.auth.roles import Action
 from server.context import Db
-from server.http.templates import TEMPLATES
+from server.http.templates import render
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -29,7 +29,7 @@ def go_home(who: Annotated[Identity, require(Action.READ_PATIENT)]) -> Response:
 def show_sign_in(request: Request, next: Annotated[str, Query(max_length=2000)] = "/patients") -> Response:  # noqa: A002 - the name in the address
     """Ask for name and password."""
     local = next if next.startswith("/") and next[1:2] not in {"/", "\\"} else "/patients"
-    return TEMPLATES.TemplateResponse(request, "sign-in.html", {"next": local})
+    return render(request, "sign-in.html", {"next": local})
 
 
 @router.get("/set-up/{token}", dependencies=[require(Action.SET_UP)])
@@ -38,4 +38,4 @@ def show_set_up(request: Request, db: Db, token: str) -> Response:
     with db.read() as c:
         valid = one_time.is_valid(c, token, "set_up")
     context = {"token": token, "valid": valid, "min_password": MIN_LENGTH}
-    return TEMPLATES.TemplateResponse(request, "set-up.html", context, status_code=200 if valid else 404)
+    return render(request, "set-up.html", context, status_code=200 if valid else 404)

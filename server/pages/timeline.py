@@ -13,7 +13,7 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail, Reviewed
-from server.http.templates import TEMPLATES
+from server.http.templates import render
 from server.pages.charts import KEY_HEIGHT, draw_chart
 from server.pages.session import explain_emptiness, select_first
 from server.pages.session_context import lead_to_days, read_context
@@ -66,7 +66,7 @@ def show_numbers(
         edits = edit_log.edits_of(c, latest.id)
     trail.record_watched(who, "numbers.opened", "session", sid)
     numbers = view_numbers(reviewed, latest, edits, context)
-    return TEMPLATES.TemplateResponse(request, "_numbers.html", {"numbers": numbers})
+    return render(request, "_numbers.html", {"numbers": numbers})
 
 
 def view_numbers(

@@ -19,7 +19,7 @@ from core.activity.result import ActivityResult
 from core.parameters.result import Parameter
 from server.report.svg import PlotArea, find_round_ticks, format_coordinate
 from server.report.wording import format_number
-from web.words import MONTHS
+from web.language import MONTHS
 
 LONG_BOUT_S: Final = 60.0
 """Walks at home whose cadence is compared last at least so long: short ones turn and stop."""

@@ -9,7 +9,7 @@ from typing import Final
 from server.report.svg import PlotArea, find_round_ticks, format_coordinate
 from server.report.trend_chart import BOTTOM, LABEL_PX, ROOM, TOP, WIDTH_PX
 from server.report.wording import format_number
-from web.words import MONTHS
+from web.language import MONTHS
 
 HEIGHT: Final = 168
 """px with margins."""

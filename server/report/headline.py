@@ -67,6 +67,11 @@ class HeadlineSentence:
     after: str
 
     @property
+    def marked(self) -> str:
+        """The sentence with its bold part between asterisks."""
+        return f"{self.before}*{self.strong}*{self.after}"
+
+    @property
     def text(self) -> str:
         """The sentence without its bold part marked."""
         return f"{self.before}{self.strong}{self.after}"

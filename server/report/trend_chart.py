@@ -15,7 +15,7 @@ from typing import Final
 from server.report.svg import KEY, PlotArea, find_round_ticks, format_coordinate
 from server.report.trends import AnalysedVisit, Trend, TrendSeries
 from server.report.wording import format_number
-from web.words import MONTHS
+from web.language import MONTHS
 
 TOP, BOTTOM, LEFT, RIGHT = 22, 22, 44, 12
 """Margins in px, the padding of `<div class="chart trend-plot">`."""

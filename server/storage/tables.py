@@ -200,6 +200,7 @@ user = Table(
     Column("password_hash", String(255)),  # None until the set-up link was used
     Column("active", Boolean, nullable=False),
     Column("created_at", Utc, nullable=False),
+    Column("language", String(8)),  # of the pages (web/language.py); None: the browser's
     _one_of("role", ROLES),
 )
 

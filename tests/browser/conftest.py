@@ -193,8 +193,10 @@ def opened(flat: Browser, running: RunningServer, cookies: list[dict[str, str]])
         scheme: str = "light",
         browser: Browser = flat,
         signed_in: bool = True,
+        locale: str = "en-US",
     ) -> Page:
         context = browser.new_context(
+            locale=locale,
             base_url=running.url,
             viewport={"width": width, "height": height},
             color_scheme=scheme,  # type: ignore[arg-type]

@@ -30,6 +30,7 @@ ANSWERS = {
     "/": 303,
     "/patients/{pid}/compare": 303,
     "/set-up/{token}": 404,
+    "/texts/{language}/{version}.json": 404,
 }
 """Where a page answers something else than itself."""
 
@@ -63,6 +64,8 @@ async def full(
                 "other": earlier[-1],
                 "name": "stance_pct",
                 "token": "x" * 43,
+                "language": "en",
+                "version": "none",
                 "device_id": crowd.DEVICES[0],
             },
         )

@@ -1,5 +1,6 @@
 // <filter-choice>: whole engines or single filters, then one job. <reference-files>: orientations of another system.
 import { Problem, request, showProblem } from "./common/api.js";
+import { speak } from "./common/text.js";
 
 class FilterChoice extends HTMLElement {
   connectedCallback() {
@@ -30,13 +31,13 @@ class FilterChoice extends HTMLElement {
       engine.indeterminate = on > 0 && on < boxes.length;
     }
     const n = this.chosen().length;
-    this.querySelector("[data-count]").textContent = `${n} of ${this.filters.length} chosen`;
+    this.querySelector("[data-count]").textContent = speak`${n} of ${this.filters.length} chosen`;
   }
 
   async run() {
     const button = this.querySelector("[type=submit]");
     if (!this.chosen().length) {
-      showProblem(this.querySelector(".form-error"), new Problem(422, { title: "No filter chosen", detail: "Choose one or more, two to see how far they are apart." }));
+      showProblem(this.querySelector(".form-error"), new Problem(422, { title: speak`No filter chosen`, detail: speak`Choose one or more, two to see how far they are apart.` }));
       return;
     }
     button.disabled = true;
@@ -76,7 +77,7 @@ class ReferenceFiles extends HTMLElement {
   }
 
   async send(file) {
-    this.querySelector("[data-say]").textContent = `Uploading ${file.name}…`;
+    this.querySelector("[data-say]").textContent = speak`Uploading ${file.name}…`;
     await request("PUT", this.base + encodeURIComponent(file.name), file);
   }
 }

@@ -1,5 +1,7 @@
 // <cycle-charts>: one cursor in all charts inside it, tied to the clock; values of both means beside each title.
 import { clock } from "./clock.js";
+import { speak } from "./common/text.js";
+import { localise } from "./common/text.js";
 
 const degrees = (v) => (v === null || v === undefined ? "–" : `${Math.round(v) === 0 ? 0 : String(Math.round(v)).replace("-", "−")}°`);
 
@@ -53,7 +55,7 @@ class StrideStrip extends HTMLElement {
       const stride = clock.strides[mark.dataset.stride];
       if (!mark.querySelector("title")) {
         const title = document.createElementNS("http://www.w3.org/2000/svg", "title");
-        title.textContent = `${stride.side} stride, ${stride.start_s.toFixed(2)} to ${stride.end_s.toFixed(2)} s`;
+        title.textContent = speak`${stride.side} stride, ${stride.start_s.toFixed(2)} to ${stride.end_s.toFixed(2)} s`;
         mark.prepend(title);
       }
       mark.addEventListener("click", () => clock.pick(stride));
@@ -74,7 +76,7 @@ class StrideStrip extends HTMLElement {
     const link = this.querySelector("[data-timeline]");
     if (link) link.hash = `t=${clock.t.toFixed(2)}`;
     const words = this.querySelector("[data-words]");
-    if (words && now >= 0) words.textContent = `${clock.stride.side === "left" ? "Left" : "Right"}, ${clock.stride.start_s.toFixed(1)} s`;
+    if (words && now >= 0) words.textContent = `${clock.stride.side === "left" ? speak`Left` : speak`Right`}, ${localise(clock.stride.start_s.toFixed(1))} s`;
   }
 }
 

@@ -1,4 +1,5 @@
 // Pictures and videos of the figure, made by the browser from viser's canvas; nothing leaves it but as a file.
+import { speak } from "./common/text.js";
 const TYPES = ["video/webm;codecs=vp9", "video/webm", "video/mp4"];
 const FRAMES = 30; // a second
 const LONGEST_MS = 120_000;
@@ -22,7 +23,7 @@ export async function savePicture(canvas, redraw, name) {
   try {
     const frame = new Promise((done, fail) => {
       video.requestVideoFrameCallback(done);
-      setTimeout(() => fail(new Error("No picture came from the 3D view.")), PATIENCE_MS);
+      setTimeout(() => fail(new Error(speak`No picture came from the 3D view.`)), PATIENCE_MS);
     });
     redraw();
     video.play();

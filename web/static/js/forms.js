@@ -1,5 +1,6 @@
 // Forms that speak to the API, dialogs, whole-row links and back buttons: behaviour by data attributes, for every page.
 import { request, showProblem } from "./common/api.js";
+import { speak } from "./common/text.js";
 
 const LATER_MS = 20_000;
 const NOW = "#now"; // of the address of a report that is printed at once
@@ -30,7 +31,7 @@ function put(body, path, value) {
 function same(form) {
   for (const el of form.querySelectorAll("[data-same]")) {
     const ok = el.value === form.elements[el.dataset.same].value;
-    el.setCustomValidity(ok ? "" : "The two passwords differ.");
+    el.setCustomValidity(ok ? "" : speak`The two passwords differ.`);
   }
   return form.reportValidity();
 }

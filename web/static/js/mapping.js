@@ -2,6 +2,7 @@
 import { request, showProblem } from "./common/api.js";
 import { s } from "./common/elements.js";
 import { SIDE_KEY, SIDE_LETTER, sideOf } from "./common/words.js";
+import { speak } from "./common/text.js";
 
 const PLACES = {
   pelvis: [150, 236], thigh_r: [121, 312], thigh_l: [179, 312], shank_r: [123, 412], shank_l: [177, 412],
@@ -109,7 +110,7 @@ class SensorMap extends HTMLElement {
   mark(segment, x, y, row, clash) {
     const on = row && row === this.selected ? " on" : "";
     const kind = row ? `sens ${SIDE_KEY[sideOf(segment)] ?? "c"}${clash ? " warn" : ""}${on}` : "slotg";
-    const what = row ? `sensor ${row.dataset.number}` : "no sensor";
+    const what = row ? speak`sensor ${row.dataset.number}` : speak`no sensor`;
     const marks = row
       ? [
           s("rect", { x: x - 14, y: y - 14, width: 28, height: 28, rx: 7 }),
@@ -141,17 +142,17 @@ class SensorMap extends HTMLElement {
   lacks(worn) {
     if (this.done() === "squat") {
       const leg = ["l", "r"].some((side) => worn.has(`thigh_${side}`) && worn.has(`shank_${side}`));
-      return leg && worn.has("pelvis") ? "" : "; a squat needs shank, thigh and pelvis";
+      return leg && worn.has("pelvis") ? "" : speak`; a squat needs shank, thigh and pelvis`;
     }
-    return worn.has("foot_l") && worn.has("foot_r") ? "" : "; without both feet there are no strides";
+    return worn.has("foot_l") && worn.has("foot_r") ? "" : speak`; without both feet there are no strides`;
   }
 
   report(worn, clashes) {
     const clash = this.querySelector("[data-clash]");
     clash.hidden = clashes.size === 0;
     if (clashes.size) {
-      clash.querySelector("[data-title]").textContent = `Two sensors on one segment: ${[...clashes].map((segment) => this.name(segment)).join(", ")}`;
-      clash.querySelector("[data-detail]").textContent = "A segment carries one sensor. Set the other one to Not used.";
+      clash.querySelector("[data-title]").textContent = speak`Two sensors on one segment: ${[...clashes].map((segment) => this.name(segment)).join(", ")}`;
+      clash.querySelector("[data-detail]").textContent = speak`A segment carries one sensor. Set the other one to Not used.`;
     }
     if (this.ask) {
       const row = worn.get("foot_l");
@@ -164,7 +165,7 @@ class SensorMap extends HTMLElement {
     const lacks = worn.size ? this.lacks(worn) : "";
     const sum = this.querySelector("[data-sum]");
     const asked = this.ask && !this.ask.hidden;
-    sum.textContent = asked ? "First say which foot is the left one" : `${worn.size} of ${this.rows.length} sensors placed${lacks}`;
+    sum.textContent = asked ? speak`First say which foot is the left one` : speak`${worn.size} of ${this.rows.length} sensors placed${lacks}`;
     const button = this.querySelector("[data-analyse]");
     if (button) button.disabled = worn.size === 0 || clashes.size > 0 || Boolean(asked);
   }

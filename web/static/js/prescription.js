@@ -1,5 +1,7 @@
 // The form of a feedback prescription: targets of this person as one chooses, and one JSON record at the end.
 import { request, showProblem } from "./common/api.js";
+import { speak } from "./common/text.js";
+import { localise, lowered, translate } from "./common/text.js";
 
 const form = document.getElementById("prescription");
 const base = `/api/v1/patients/${form.dataset.patient}`;
@@ -35,7 +37,7 @@ function record() {
 // What is hidden is not part of the record: the server has the defaults.
 function arrange() {
   const unit = option().dataset.unit;
-  for (const el of form.querySelectorAll("[data-unit]:not(option)")) el.textContent = unit || "no unit";
+  for (const el of form.querySelectorAll("[data-unit]:not(option)")) el.textContent = unit || speak`no unit`;
   show("[data-manual]", checked("target.source")?.value === "manual");
   show("[data-fading]", form.elements["schedule.kind"].value === "fading");
   show("[data-rule]", form.elements["progression.automatic"].checked);
@@ -53,11 +55,11 @@ function arrange() {
 function summarise() {
   const side = checked("side").value;
   const target = checked("target.source");
-  const value = target?.value === "manual" ? (form.elements["target.mean"].value ? "as entered" : "to be entered under More") : target?.closest("[data-source]").querySelector("[data-value]").textContent;
-  const source = target?.closest("[data-source]").querySelector("b").textContent.toLowerCase();
-  const told = [...form.querySelectorAll('input[name="modes"]:checked')].map((m) => m.parentElement.querySelector("b").textContent.toLowerCase());
+  const value = target?.value === "manual" ? (form.elements["target.mean"].value ? speak`as entered` : speak`to be entered under More`) : target?.closest("[data-source]").querySelector("[data-value]").textContent;
+  const source = target?.closest("[data-source]").querySelector("b").textContent;
+  const told = [...form.querySelectorAll('input[name="modes"]:checked')].map((m) => lowered(m.parentElement.querySelector("b").textContent));
   const what = option().textContent.trim().split(",")[0];
-  form.querySelector("[data-summary]").textContent = `${what}, ${side || "both sides"}; target ${value || "not known yet"}${source && value ? ` (${source})` : ""}; ${told.join(" and ")}.`;
+  form.querySelector("[data-summary]").textContent = speak`${what}, ${side || speak`both sides`}; target ${(value || speak`not known yet`) + (source && value ? ` (${lowered(source)})` : "")}; ${told.join(speak` and `)}.`;
 }
 
 // A preset fills what decides; the target is the first of its sources that gives numbers for this person.
@@ -101,13 +103,13 @@ function fill({ source, mean, sd, words, reason }) {
   const tile = form.querySelector(`[data-source="${source}"]`);
   tile.querySelector("input").disabled = mean === null;
   tile.querySelector("[data-value]").textContent = mean === null ? "" : quantity(mean, sd);
-  tile.querySelector("[data-words]").textContent = words ?? reason;
+  tile.querySelector("[data-words]").textContent = translate(words ?? reason);
 }
 
 function quantity(mean, sd) {
   const { unit, digits } = option().dataset;
   const fine = Number(digits) + (sd < 5 * 10 ** -digits ? 1 : 0);
-  const text = `${mean.toFixed(fine)} ± ${sd.toFixed(fine)}`.replace("-", "−");
+  const text = localise(`${mean.toFixed(fine)} ± ${sd.toFixed(fine)}`.replace("-", "−"));
   return unit === "°" ? `${text}°` : unit ? `${text}\u202f${unit}` : text;
 }
 
@@ -122,7 +124,7 @@ form.addEventListener("change", (e) => {
 form.addEventListener("submit", async (e) => {
   e.preventDefault();
   const modes = form.querySelectorAll('input[name="modes"]');
-  modes[0].setCustomValidity([...modes].some((m) => m.checked) ? "" : "Choose at least one.");
+  modes[0].setCustomValidity([...modes].some((m) => m.checked) ? "" : speak`Choose at least one.`);
   const hiddenRule = form.querySelector("[data-rule]");
   if (!form.checkValidity() && hiddenRule.querySelector(":invalid")) hiddenRule.open = true;
   if (!form.checkValidity() || form.querySelector('[name="target.source"][value="manual"]').checked) form.querySelector("[data-more]").open = true;

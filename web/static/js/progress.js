@@ -1,5 +1,7 @@
 // <job-progress job="…" done="/where"> follows one job by server-sent events: stage names, bar, cancel.
 import { request, showProblem } from "./common/api.js";
+import { speak } from "./common/text.js";
+import { translate } from "./common/text.js";
 
 const ENDS = new Set(["done", "failed", "cancelled"]);
 
@@ -8,7 +10,7 @@ class JobProgress extends HTMLElement {
     this.started = Date.parse(this.getAttribute("since")) || Date.now();
     this.source = new EventSource(`/api/v1/jobs/${this.getAttribute("job")}/events`);
     this.source.onmessage = (e) => this.show(JSON.parse(e.data));
-    this.source.onerror = () => this.say("Connection lost, trying again…");
+    this.source.onerror = () => this.say(speak`Connection lost, trying again…`);
     this.querySelector("[data-cancel]")?.addEventListener("click", () => this.cancel());
     this.clock = setInterval(() => this.tick(), 1000);
     this.tick();
@@ -45,7 +47,7 @@ class JobProgress extends HTMLElement {
     const percent = this.querySelector("[data-percent]");
     if (percent) percent.textContent = `${Math.round(100 * fraction)} %`;
     const step = this.markStages(job);
-    this.say(job.state === "queued" ? "Waiting for the worker" : step || job.message || "Working");
+    this.say(job.state === "queued" ? speak`Waiting for the worker` : step || translate(job.message) || speak`Working`);
   }
 
   // Stages before the current one are done, it runs, the rest wait; returns its name.
@@ -64,7 +66,7 @@ class JobProgress extends HTMLElement {
   }
 
   async cancel() {
-    this.say("Stopping…");
+    this.say(speak`Stopping…`);
     try {
       await request("POST", `/api/v1/jobs/${this.getAttribute("job")}/cancel`);
     } catch (problem) {

@@ -1,5 +1,7 @@
 // <gait-view> shows the 3D figure (an iframe) and sends it the time; <time-bar> plays, pauses and seeks.
 import { clock } from "./clock.js";
+import { speak, translate } from "./common/text.js";
+import { localise } from "./common/text.js";
 
 const RATE_MS = 33; // the figure is posed at most 30 times a second (docs/data-flow.md, "The 3D figure")
 const RETRY_MS = [500, 1000, 2000, 5000];
@@ -16,13 +18,9 @@ function tabId() {
   }
 }
 
-const SEGMENTS = { pelvis: "pelvis", thigh: "thigh", shank: "lower leg", foot: "foot" };
-const SIDES = { l: "left ", r: "right " };
-
-// "thigh_l" → "left thigh"
-const words = (segment) => {
-  const [part, side] = segment.split("_");
-  return (SIDES[side] ?? "") + SEGMENTS[part];
+const SEGMENTS = {
+  pelvis: speak`pelvis`, thigh_l: speak`left thigh`, thigh_r: speak`right thigh`, shank_l: speak`left lower leg`,
+  shank_r: speak`right lower leg`, foot_l: speak`left foot`, foot_r: speak`right foot`,
 };
 
 const setting = (button) => ({ [button.dataset.switch]: button.ariaPressed === "true" });
@@ -73,7 +71,7 @@ class GaitView extends HTMLElement {
       this.dataset.state = "lost";
       this.waiting = false;
       if (e.code === 1008 || this.refused) return; // signed out or nothing to show: trying again would not help
-      this.say("Connection lost, trying again…");
+      this.say(speak`Connection lost, trying again…`);
       this.timer = setTimeout(() => this.connect(), RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)]);
     };
   }
@@ -83,7 +81,7 @@ class GaitView extends HTMLElement {
   receive(message) {
     if (message.error) {
       this.refused = message.error.code !== "bad_message";
-      this.say(message.error.detail);
+      this.say(translate(message.error.detail));
     } else if (message.src) {
       this.tries = 0;
       this.frame.src = isDark() ? `${message.src}?darkMode` : message.src;
@@ -95,7 +93,7 @@ class GaitView extends HTMLElement {
       this.options.querySelector("[data-estimated]").hidden = message.measured;
       const unseen = this.options.querySelector("[data-unseen]");
       unseen.hidden = !message.hidden.length;
-      unseen.textContent = `Not shown, no sensors there: ${message.hidden.map(words).join(", ")}.`;
+      unseen.textContent = speak`Not shown, no sensors there: ${message.hidden.map((segment) => SEGMENTS[segment]).join(", ")}.`;
       for (const b of this.switches) this.tell(setting(b));
       if (this.look.value !== "near") this.tell({ look: this.look.value });
       if (this.ghosts) this.tell({ ghost: this.ghosts.value || null });
@@ -103,12 +101,12 @@ class GaitView extends HTMLElement {
     } else if (message.ghost !== undefined) {
       this.dataset.ghostShown = message.ghost ?? "";
       const wanted = this.ghosts?.value && this.ghosts.selectedOptions[0].text.trim();
-      this.lacking = wanted && !message.ghost ? (message.why ?? `This walk has no such ghost: ${wanted}`) : "";
+      this.lacking = wanted && !message.ghost ? (translate(message.why) ?? speak`This walk has no such ghost: ${wanted}`) : "";
       this.say(this.lacking);
     } else if (message.t !== undefined) {
       this.waiting = false;
       this.dataset.shown = message.t;
-      this.say(message.valid === false ? "No data at this moment" : (this.lacking ?? ""));
+      this.say(message.valid === false ? speak`No data at this moment` : (this.lacking ?? ""));
       if (this.sent !== clock.t) this.request();
     }
   }
@@ -142,11 +140,11 @@ class GaitView extends HTMLElement {
     this.recording = recordVideo(this.canvas(), `figure-${clock.t.toFixed(2)}s`, () => {
       this.recording = null;
       button.ariaPressed = "false";
-      button.textContent = "Record video";
+      button.textContent = speak`Record video`;
       if (clock.playing) clock.toggle();
     });
     button.ariaPressed = "true";
-    button.textContent = "Stop and save";
+    button.textContent = speak`Stop and save`;
     if (!clock.playing) clock.toggle();
   }
 
@@ -179,13 +177,13 @@ class TimeBar extends HTMLElement {
   show() {
     this.range.value = clock.t;
     this.range.style.setProperty("--at", clock.duration ? clock.t / clock.duration : 0);
-    this.out.textContent = `${clock.t.toFixed(clock.duration < 100 ? 1 : 0)} s`;
+    this.out.textContent = localise(`${clock.t.toFixed(clock.duration < 100 ? 1 : 0)} s`);
     const p = clock.percent;
-    const where = p === null ? "" : `, ${Math.round(p)} percent of a ${clock.stride.side} ${clock.called}`;
-    this.range.setAttribute("aria-valuetext", `${clock.t.toFixed(1)} seconds${where}`);
+    const where = p === null ? "" : speak`, ${Math.round(p)} percent of a ${clock.stride.side} ${clock.called}`;
+    this.range.setAttribute("aria-valuetext", speak`${clock.t.toFixed(1)} seconds${where}`);
     if (this.button.dataset.on === String(clock.playing)) return;
     this.button.dataset.on = clock.playing;
-    this.button.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
+    this.button.setAttribute("aria-label", clock.playing ? speak`Pause` : speak`Play`);
     this.button.querySelector("use").setAttribute("href", clock.playing ? "#i-pause" : "#i-play");
   }
 }

@@ -1,5 +1,6 @@
 // <sensitivity-form>: which angles against what, then one job; a reference is uploaded beside it.
 import { Problem, request, showProblem } from "./common/api.js";
+import { speak } from "./common/text.js";
 
 class SensitivityForm extends HTMLElement {
   connectedCallback() {
@@ -31,7 +32,7 @@ class SensitivityForm extends HTMLElement {
 
   async add(file) {
     const say = this.querySelector("[data-say]");
-    say.textContent = `Uploading ${file.name}…`;
+    say.textContent = speak`Uploading ${file.name}…`;
     try {
       const answer = await fetch(`${this.base}/references/${encodeURIComponent(file.name)}`, {
         method: "PUT",

@@ -13,6 +13,7 @@ import { editRows, strideBox, strideRows } from "./timeline/panel.js";
 import { Review } from "./timeline/review.js";
 import { StrideBlocks } from "./timeline/strides.js";
 import { TimeWindow } from "./timeline/window.js";
+import { speak } from "./common/text.js";
 
 const FIRST_SPAN_S = 6;
 const FIRST_LANES = ["foot_pitch", "foot_rate", "knee_flexion"];
@@ -142,7 +143,7 @@ class TakeTimeline extends HTMLElement {
     for (const { blocks } of this.feet) blocks.show(win.start, win.end);
     this.brush.style.left = `${(100 * win.start) / win.duration}%`;
     this.brush.style.width = `${(100 * win.span) / win.duration}%`;
-    this.find("span").textContent = `${seconds(win.start, 1)} to ${seconds(win.end, 1)} s of ${seconds(win.duration, 1)} s`;
+    this.find("span").textContent = speak`${seconds(win.start, 1)} to ${seconds(win.end, 1)} s of ${seconds(win.duration, 1)} s`;
     this.find("axis").replaceChildren(...ticks(win, this.find("axis").clientWidth));
     this.cursor();
     clearTimeout(this.listing);
@@ -174,7 +175,7 @@ class TakeTimeline extends HTMLElement {
     for (const { handles } of this.feet) handles.renew();
     for (const side of ["left", "right"]) {
       const own = review.strides.filter((s) => s.side === side);
-      this.querySelector(`[data-counts=${side}]`).textContent = `${own.filter((s) => s.used).length} of ${own.length}`;
+      this.querySelector(`[data-counts=${side}]`).textContent = speak`${own.filter((s) => s.used).length} of ${own.length}`;
     }
     const undo = this.find("undo");
     if (undo) undo.disabled = !review.edits.length;
@@ -198,9 +199,9 @@ class TakeTimeline extends HTMLElement {
     const field = this.find("stride-box").contains(document.activeElement) ? document.activeElement.id : "";
     this.find("stride-box").replaceChildren(...strideBox(stride, acts));
     if (field) document.getElementById(field)?.focus(); // the fields are new ones, the place of the keyboard is not
-    document.getElementById("h-stride").textContent = stride ? `${stride.side === "left" ? "Left" : "Right"} stride, ${seconds(stride.start_s)} s` : "Stride";
+    document.getElementById("h-stride").textContent = stride ? stride.side === "left" ? speak`Left stride, ${seconds(stride.start_s)} s` : speak`Right stride, ${seconds(stride.start_s)} s` : speak`Stride`;
     this.find("verdict").textContent = "";
-    if (stride) this.find("verdict").append(h("span", { class: `badge plain${stride.used ? " ok" : ""}` }, stride.used ? "counts" : "left out"));
+    if (stride) this.find("verdict").append(h("span", { class: `badge plain${stride.used ? " ok" : ""}` }, stride.used ? speak`counts` : speak`left out`));
     this.list();
   }
 
@@ -237,33 +238,33 @@ class TakeTimeline extends HTMLElement {
   }
 
   leaveOut(stride, reason) {
-    return this.change({ kind: "exclude_stride", side: stride.side, time_s: middle(stride), reason }, `The ${stride.side} stride is left out.`);
+    return this.change({ kind: "exclude_stride", side: stride.side, time_s: middle(stride), reason }, speak`The ${stride.side} stride is left out.`);
   }
 
   count(stride) {
-    this.change({ kind: "include_stride", side: stride.side, time_s: middle(stride) }, `The ${stride.side} stride counts.`);
+    this.change({ kind: "include_stride", side: stride.side, time_s: middle(stride) }, speak`The ${stride.side} stride counts.`);
   }
 
   askEvent(side = clock.stride?.side ?? "left", time = clock.t) {
     if (!this.editable) return;
     const before = this.review.events.filter((e) => e.side === side && e.time_s < time).at(-1);
     const event = before?.kind === "ic" ? "tc" : "ic"; // the two take turns
-    askEvent({ side, event, time_s: time }, (edit) => this.change({ kind: "add_event", ...edit }, `${WORD[edit.event]} added.`));
+    askEvent({ side, event, time_s: time }, (edit) => this.change({ kind: "add_event", ...edit }, speak`${WORD[edit.event]} added.`));
   }
 
   move(event, to) {
-    return this.change({ kind: "move_event", side: event.side, event: event.kind, time_s: event.time_s, to_s: to }, `${event.side} ${WORD[event.kind]} moved to ${seconds(to, 3)} s.`);
+    return this.change({ kind: "move_event", side: event.side, event: event.kind, time_s: event.time_s, to_s: to }, speak`${event.side} ${WORD[event.kind]} moved to ${seconds(to, 3)} s.`);
   }
 
   remove(event) {
-    this.change({ kind: "delete_event", side: event.side, event: event.kind, time_s: event.time_s }, `${event.side} ${WORD[event.kind]} deleted.`);
+    this.change({ kind: "delete_event", side: event.side, event: event.kind, time_s: event.time_s }, speak`${event.side} ${WORD[event.kind]} deleted.`);
   }
 
   // What is held is not changed yet: it goes back where it was.
   undo() {
     const moving = this.feet.find(({ handles }) => handles.held)?.handles;
     if (moving) moving.drop(moving.held);
-    else if (this.review.edits.length) this.done(() => this.review.undo(), "The last change is undone.");
+    else if (this.review.edits.length) this.done(() => this.review.undo(), speak`The last change is undone.`);
   }
 
   change(edit, said) {
@@ -276,13 +277,13 @@ class TakeTimeline extends HTMLElement {
     await this.attempt(() => this.numbers());
     this.dataset.took = String(Math.round(performance.now() - began));
     const used = this.review.strides.filter((s) => s.used).length;
-    this.find("said").textContent = `${said} ${used} of ${this.review.strides.length} strides count.`;
+    this.find("said").textContent = speak`${said} ${used} of ${this.review.strides.length} strides count.`;
   }
 
   // The numbers are written by the server, as on the other pages.
   async numbers() {
     const answer = await fetch(`/sessions/${this.session}/timeline/numbers`, { credentials: "same-origin", headers: { "X-Sagittal-Fragment": "numbers" } });
-    if (!answer.ok) throw { title: "The numbers could not be loaded", detail: "Load the page again." };
+    if (!answer.ok) throw { title: speak`The numbers could not be loaded`, detail: speak`Load the page again.` };
     const page = new DOMParser().parseFromString(await answer.text(), "text/html");
     document.getElementById("numbers").replaceWith(page.getElementById("numbers"));
   }

@@ -1,8 +1,10 @@
 // <upload-area>: files, folders and zips to the session, two at a time, each with its own progress; then the inspection.
 import { request, showProblem, Problem } from "./common/api.js";
+import { speak } from "./common/text.js";
+import { localise } from "./common/text.js";
 
 const PARALLEL = 2;
-const mb = (n) => `${(n / 1e6).toFixed(n < 1e7 ? 1 : 0)} MB`;
+const mb = (n) => localise(`${(n / 1e6).toFixed(n < 1e7 ? 1 : 0)} MB`);
 
 // A dropped folder arrives as entries, 100 at a time; the path inside it becomes part of the file's name.
 async function entriesOf(items) {
@@ -65,8 +67,8 @@ class UploadArea extends HTMLElement {
         <progress max="1" value="0"></progress><span class="xs dim" data-say>Waiting</span></span>
         <button class="btn ghost sm icon" type="button"><svg class="ico s" aria-hidden="true"><use href="#i-x"/></svg></button>`;
       row.querySelector("b").textContent = f.name;
-      row.querySelector("progress").setAttribute("aria-label", `Uploading ${f.name}`);
-      row.querySelector("button").setAttribute("aria-label", `Cancel ${f.name}`);
+      row.querySelector("progress").setAttribute("aria-label", speak`Uploading ${f.name}`);
+      row.querySelector("button").setAttribute("aria-label", speak`Cancel ${f.name}`);
       this.list.append(row);
       this.waiting.push({ ...f, row });
     }
@@ -79,7 +81,7 @@ class UploadArea extends HTMLElement {
     const left = this.waiting.length + this.active;
     total.hidden = !(left || this.sent || this.failed);
     this.querySelector("[data-anyway]").hidden = left > 0 || !this.failed || !this.sent;
-    total.textContent = left ? `${this.sent} of ${this.sent + left + this.failed} files uploaded` : `${this.sent} files uploaded${this.failed ? `, ${this.failed} not` : ""}`;
+    total.textContent = left ? speak`${this.sent} of ${this.sent + left + this.failed} files uploaded` : this.failed ? speak`${this.sent} files uploaded, ${this.failed} not` : speak`${this.sent} files uploaded`;
     if (!left && this.sent && !this.failed) this.inspect();
   }
 
@@ -98,7 +100,7 @@ class UploadArea extends HTMLElement {
       if (ok) item.row.querySelector("use").setAttribute("href", "#i-check");
       this.pump();
     };
-    xhr.upload.onprogress = (e) => { bar.value = e.loaded / e.total; say(`${mb(e.loaded)} of ${mb(e.total)}`); };
+    xhr.upload.onprogress = (e) => { bar.value = e.loaded / e.total; say(speak`${mb(e.loaded)} of ${mb(e.total)}`); };
     xhr.onload = () => {
       if (xhr.status < 300) return over(true, mb(item.file.size));
       let body = {};
@@ -106,7 +108,7 @@ class UploadArea extends HTMLElement {
       this.retry(item, button);
       over(false, new Problem(xhr.status, body).message);
     };
-    xhr.onerror = () => { this.retry(item, button); over(false, "The connection broke. Try again."); };
+    xhr.onerror = () => { this.retry(item, button); over(false, speak`The connection broke. Try again.`); };
     xhr.onabort = () => { item.row.remove(); this.active -= 1; this.pump(); };
     button.onclick = () => xhr.abort();
     const path = item.name.split("/").map(encodeURIComponent).join("/");
@@ -117,7 +119,7 @@ class UploadArea extends HTMLElement {
 
   retry(item, button) {
     button.innerHTML = `<svg class="ico s" aria-hidden="true"><use href="#i-upload"/></svg>`;
-    button.setAttribute("aria-label", `Try ${item.name} again`);
+    button.setAttribute("aria-label", speak`Try ${item.name} again`);
     button.onclick = () => { this.failed -= 1; this.waiting.push(item); this.pump(); };
   }
 

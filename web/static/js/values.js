@@ -36,7 +36,7 @@ class AllValues extends HTMLElement {
     for (const fold of this.folds.querySelectorAll("details")) {
       let here = 0;
       for (const row of fold.querySelectorAll("tbody tr")) {
-        const name = row.cells[0].textContent.toLowerCase();
+        const name = row.cells[0].textContent.replaceAll("\u00ad", "").toLowerCase();
         row.hidden = !words.every((w) => name.includes(w));
         here += row.hidden ? 0 : 1;
       }

@@ -1,5 +1,6 @@
 // <video-upload>: sets a video beside a take, once somebody has said that the person agreed.
 import { request, showProblem } from "./common/api.js";
+import { speak } from "./common/text.js";
 
 class VideoUpload extends HTMLElement {
   connectedCallback() {
@@ -24,7 +25,7 @@ class VideoUpload extends HTMLElement {
   }
 
   async send(file) {
-    this.querySelector("[data-say]").textContent = `Uploading ${file.name}…`;
+    this.querySelector("[data-say]").textContent = speak`Uploading ${file.name}…`;
     const query = new URLSearchParams({ name: file.name, consent: "true" });
     await request("PUT", `${this.path()}?${query}`, file);
   }

@@ -1,6 +1,7 @@
 // <take-video>: a film of the walk in step with curves and figure. Aligned by one moment that both show.
 import { request, showProblem } from "./common/api.js";
 import { clock } from "./clock.js";
+import { speak } from "./common/text.js";
 
 const FRAME_S = 1 / 30;
 const APART_S = { playing: 0.08, still: 0.01 }; // a playing film is put right only when it is seen to be off
@@ -17,7 +18,7 @@ class TakeVideo extends HTMLElement {
     this.video.addEventListener("loadedmetadata", () => this.measure());
     this.video.addEventListener("durationchange", () => this.measured());
     this.video.addEventListener("timeupdate", () => this.slide());
-    this.video.addEventListener("error", () => this.say("This browser cannot play the video."));
+    this.video.addEventListener("error", () => this.say(speak`This browser cannot play the video.`));
     if (this.form) this.tools();
     this.show();
     if (this.video.readyState > 0) this.measure();
@@ -61,18 +62,18 @@ class TakeVideo extends HTMLElement {
     const again = this.querySelector("[data-realign]");
     if (again) again.hidden = this.aligning;
     if (!this.aligning) return this.follow();
-    this.say(this.form ? "" : "Not aligned with the take yet.");
+    this.say(this.form ? "" : speak`Not aligned with the take yet.`);
     this.follow();
   }
 
   follow() {
     if (this.aligning) {
       const s = clock.stride, button = this.querySelector("[data-same]");
-      if (button && s) button.textContent = `Same moment as the ${s.side} contact at ${s.start_s.toFixed(2)} s`;
+      if (button && s) button.textContent = speak`Same moment as the ${s.side} contact at ${s.start_s.toFixed(2)} s`;
       return;
     }
     const want = clock.t + this.offset, inside = want >= 0 && want <= this.length();
-    this.say(inside || !this.length() ? "" : "The video does not show this moment.");
+    this.say(inside || !this.length() ? "" : speak`The video does not show this moment.`);
     if (!inside) return this.video.pause();
     const apart = Math.abs(this.video.currentTime - want);
     if (clock.playing) {

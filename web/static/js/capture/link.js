@@ -1,6 +1,7 @@
 // The tablet's socket (docs/live-protocol.md): says hello, sends what the outbox holds from where the server stands,
 // lets go of what is acknowledged, and connects again with growing pauses until the take is finished.
 import { PROTOCOL } from "../common/wire.js";
+import { speak } from "../common/text.js";
 
 const PAUSES_S = [0.25, 0.5, 1, 2, 4, 8];
 const SILENCE_MS = 4000; // a network that is gone is noticed by missing acknowledgements, long before the browser says so
@@ -116,7 +117,7 @@ export class Link {
   }
 
   lose(next) {
-    this.problem = { code: "lost", detail: `It had acknowledged ${this.outbox.acked} batches and holds ${next}.` };
+    this.problem = { code: "lost", detail: speak`It had acknowledged ${this.outbox.acked} batches and holds ${next}.` };
     this.end("refused");
   }
 
@@ -188,10 +189,10 @@ export class Link {
     const held = this.outbox.heldS;
     const away = this.offlineSince === null ? 0 : (performance.now() - this.offlineSince) / 1000;
     const seconds = `${held < 10 ? held.toFixed(1) : Math.round(held)} s`;
-    if (this.state === "finished") return { kind: "ok", text: "On the server" };
-    if (this.state === "refused") return { kind: "bad", text: "Not connected" };
-    if (away > 10) return { kind: "bad", text: `No connection, ${seconds} kept here` };
-    if (this.state !== "open") return held > 0.5 ? { kind: "warn", text: `Keeping ${seconds} here` } : { kind: "run", text: "Connecting" };
-    return held > 2 ? { kind: "run", text: `Sending ${seconds}` } : { kind: "ok", text: "Connected" };
+    if (this.state === "finished") return { kind: "ok", text: speak`On the server` };
+    if (this.state === "refused") return { kind: "bad", text: speak`Not connected` };
+    if (away > 10) return { kind: "bad", text: speak`No connection, ${seconds} kept here` };
+    if (this.state !== "open") return held > 0.5 ? { kind: "warn", text: speak`Keeping ${seconds} here` } : { kind: "run", text: speak`Connecting` };
+    return held > 2 ? { kind: "run", text: speak`Sending ${seconds}` } : { kind: "ok", text: speak`Connected` };
   }
 }

@@ -12,6 +12,7 @@ import { whyNot as whyNoDot } from "./sources/dot.js";
 import { View } from "./view.js";
 import * as words from "./words.js";
 import { Worn } from "./worn.js";
+import { speak } from "../common/text.js";
 
 const DRAW_MS = 500;
 const TWICE_MS = 800; // a second tap on Start must not be a Stop
@@ -243,7 +244,7 @@ class CapturePage extends HTMLElement {
   }
 
   async giveUp() {
-    const sure = await this.view.sure("Delete what is on this tablet?", words.loss(this.outbox.heldS), "Delete it");
+    const sure = await this.view.sure(speak`Delete what is on this tablet?`, words.loss(this.outbox.heldS), speak`Delete it`);
     if (sure) await this.drop();
   }
 
@@ -267,7 +268,7 @@ class CapturePage extends HTMLElement {
     try {
       await act();
     } catch (error) {
-      this.say({ title: "That did not work", detail: error.message });
+      this.say({ title: speak`That did not work`, detail: error.message });
     }
   }
 

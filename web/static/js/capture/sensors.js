@@ -1,5 +1,6 @@
 // The list of sensors: where each is worn, how fast it sends, its battery and its state; a tap says where it is worn.
 import { SIDE_KEY, SIDE_LETTER, capitalise, sideOf, withoutSide } from "../common/words.js";
+import { speak } from "../common/text.js";
 
 const NEAR = 0.03;
 
@@ -17,7 +18,7 @@ export class SensorList {
 
   // Part and side apart, as "Thigh" and L; the names of the server begin with the side.
   words(segment) {
-    if (!segment) return "Not placed";
+    if (!segment) return speak`Not placed`;
     return capitalise(withoutSide(this.names[segment]));
   }
 
@@ -48,18 +49,18 @@ export class SensorList {
     set(part("rate"), `${Math.round(rate)} Hz`);
     for (const button of [part("place"), part("place-too")]) {
       button.disabled = fixed;
-      const where = sensor.segment ? this.names[sensor.segment] : "not placed";
-      button.setAttribute("aria-label", `Sensor ${sensor.id}: ${where}. Change`);
+      const where = sensor.segment ? this.names[sensor.segment] : speak`not placed`;
+      button.setAttribute("aria-label", speak`Sensor ${sensor.id}: ${where}. Change`);
       button.onclick = () => this.ask(sensor);
     }
     const known = sensor.battery !== null && sensor.battery !== undefined;
     part("bat").hidden = part("batn").hidden = !known;
     if (known) {
-      part("bat").setAttribute("aria-label", `Battery ${sensor.battery} percent`);
+      part("bat").setAttribute("aria-label", speak`Battery ${sensor.battery} percent`);
       part("bat").firstElementChild.style.width = `${sensor.battery}%`;
       set(part("batn"), `${sensor.battery} %`);
     }
-    const state = sensor.segment ? health : { kind: "none", text: "Not used" };
+    const state = sensor.segment ? health : { kind: "none", text: speak`Not used` };
     if (part("state").dataset.shown !== state.kind + state.text) {
       part("state").dataset.shown = state.kind + state.text;
       part("state").className = `state ${state.kind}`;
@@ -70,7 +71,7 @@ export class SensorList {
   ask(sensor) {
     this.asked = sensor;
     const called = sensor.label && sensor.label !== sensor.id ? `, ${sensor.label}` : "";
-    this.dialog.querySelector("[data-which]").textContent = `Sensor ${sensor.id}${called}`;
+    this.dialog.querySelector("[data-which]").textContent = speak`Sensor ${sensor.id}${called}`;
     for (const b of this.dialog.querySelectorAll(".place")) b.setAttribute("aria-pressed", b.value === sensor.segment);
     this.dialog.returnValue = "";
     this.dialog.showModal();

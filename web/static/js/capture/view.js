@@ -6,10 +6,12 @@ import { STAND_S } from "../common/standing.js";
 import { h } from "../common/elements.js";
 import { capitalise, formatClock } from "../common/words.js";
 import * as words from "./words.js";
+import { speak } from "../common/text.js";
+import { lowered } from "../common/text.js";
 
 const VERDICTS = { pass: "ok", redo: "bad", not_judged: "" }; // the look of a note
 const MOST_REASONS = 3;
-const ADD = { dot: "Add sensor", replay: "Other files" };
+const ADD = { dot: speak`Add sensor`, replay: speak`Other files` };
 
 export class View {
   constructor(root, { onplaced }) {
@@ -63,7 +65,7 @@ export class View {
     if (this.part("code").textContent !== a + b) {
       this.part("code").replaceChildren(...[a, b].map((text) => Object.assign(document.createElement("span"), { textContent: text })));
     }
-    set(this.part("paired"), `Paired with ${record.patient_code}`);
+    set(this.part("paired"), speak`Paired with ${record.patient_code}`);
     set(this.part("session-title"), record.session_title);
   }
 
@@ -77,10 +79,10 @@ export class View {
     set(this.part("add-word"), ADD[kind] ?? "");
     const worn = rows.filter(({ sensor }) => sensor.segment).length;
     const n = source?.copies?.length ?? 0;
-    const copies = n ? `, ${n} ${n === 1 ? "copy" : "copies"} left out` : "";
-    const counted = `${ready.length} of ${rows.length} ready${copies}`;
-    const recorded = paused ? `${rows.length} of ${wanted(record)} connected` : `${worn} recorded`;
-    set(this.part("sum"), !source ? "Where do they come from?" : prepare ? counted : recorded);
+    const copies = n === 1 ? speak`, 1 copy left out` : n ? speak`, ${n} copies left out` : "";
+    const counted = speak`${ready.length} of ${rows.length} ready${copies}`;
+    const recorded = paused ? speak`${rows.length} of ${wanted(record)} connected` : speak`${worn} recorded`;
+    set(this.part("sum"), !source ? speak`Where do they come from?` : prepare ? counted : recorded);
     const before = prepare ? rows.filter(({ sensor }) => sensor.segment && sensor.segment === sensor.asBefore).length : 0;
     this.part("as-before").hidden = !before;
     set(this.part("as-before-say"), words.asBefore(before));
@@ -94,15 +96,15 @@ export class View {
     if (this.part("axes").hidden) return;
     const { test, axes } = source;
     if (axes) {
-      set(this.part("axes-say"), "The axes of this device are checked");
+      set(this.part("axes-say"), speak`The axes of this device are checked`);
       const fit = Math.max(1, Math.round(axes.errorDeg));
-      set(this.part("axes-more"), `Turning it agreed with gravity within ${fit}°. This is remembered until the browser changes.`);
+      set(this.part("axes-more"), speak`Turning it agreed with gravity within ${fit}°. This is remembered until the browser changes.`);
     } else if (test.problem) {
-      set(this.part("axes-say"), "The check did not work");
+      set(this.part("axes-say"), speak`The check did not work`);
       set(this.part("axes-more"), test.problem);
     } else {
-      set(this.part("axes-say"), `${test.still.length + 1} of ${POSES.length}: ${test.pose.words}`);
-      set(this.part("axes-more"), "Hold it still for a second. Browsers disagree about the axes, so they are measured once.");
+      set(this.part("axes-say"), speak`${test.still.length + 1} of ${POSES.length}: ${test.pose.words}`);
+      set(this.part("axes-more"), speak`Hold it still for a second. Browsers disagree about the axes, so they are measured once.`);
     }
     this.part("axes-again").hidden = !axes && !test.problem;
   }
@@ -141,7 +143,7 @@ export class View {
     const bad = rows.find(({ sensor, health }) => sensor.segment && health.kind === "bad");
     if (!bad) return null;
     const { number, sensor, health } = bad;
-    return words.sensorProblem(number, this.list.names[sensor.segment].toLowerCase(), sensor, health, state === "running");
+    return words.sensorProblem(number, lowered(this.list.names[sensor.segment]), sensor, health, state === "running");
   }
 
   note(problem) {
@@ -153,23 +155,23 @@ export class View {
   button({ state, source, ready, rows, paused, room }) {
     const go = this.part("go");
     const n = ready.length;
-    const missing = !source ? "Choose where sensors come from" : rows.length ? this.reason(source) : "Add a sensor";
-    const start = n ? `Start with ${n} sensor${n === 1 ? "" : "s"}` : missing;
+    const missing = !source ? speak`Choose where sensors come from` : rows.length ? this.reason(source) : speak`Add a sensor`;
+    const start = n === 1 ? speak`Start with 1 sensor` : n ? speak`Start with ${n} sensors` : missing;
     const word = {
-      loading: "One moment", stuck: "Save or delete what is left", pairing: "Enter the code", prepare: start,
-      sending: "Sending", done: "Start another", running: paused ? "Connect the sensors again" : "Stop",
+      loading: speak`One moment`, stuck: speak`Save or delete what is left`, pairing: speak`Enter the code`, prepare: start,
+      sending: speak`Sending`, done: speak`Start another`, running: paused ? speak`Connect the sensors again` : speak`Stop`,
     }[state];
     set(this.part("go-word"), word);
     go.disabled = ["loading", "stuck", "pairing", "sending"].includes(state) || (state === "prepare" && !n);
     go.classList.toggle("stop", state === "running" && !paused);
-    const keeps = `Nothing is lost if the network drops: ${words.hours(room)}.`;
-    const hints = { prepare: `Stand still for ${STAND_S} seconds after the tone. ${keeps}`, running: keeps, sending: keeps };
+    const keeps = speak`Nothing is lost if the network drops: ${words.hours(room)}.`;
+    const hints = { prepare: speak`Stand still for ${STAND_S} seconds after the tone. ${keeps}`, running: keeps, sending: keeps };
     set(this.part("hint"), hints[state] ?? "");
   }
 
   reason(source) {
-    if (source.kind === "device_motion" && !source.axes) return "Check its axes first";
-    return "Say where the sensors are worn";
+    if (source.kind === "device_motion" && !source.axes) return speak`Check its axes first`;
+    return speak`Say where the sensors are worn`;
   }
 }
 

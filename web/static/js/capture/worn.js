@@ -4,6 +4,7 @@ import { DeviceMotion } from "./sources/device_motion.js";
 import { Dot } from "./sources/dot.js";
 import { Replay } from "./sources/replay.js";
 import { NOT_THOSE } from "./words.js";
+import { speak } from "../common/text.js";
 
 const SOURCES = { dot: Dot, device_motion: DeviceMotion, replay: Replay };
 
@@ -69,7 +70,7 @@ export class Worn {
 
   // Those that are placed and send.
   ready() {
-    const sends = ({ sensor, health }) => sensor.segment && health.kind !== "bad" && health.text !== "Check";
+    const sends = ({ sensor, health }) => sensor.segment && health.kind !== "bad" && health.text !== speak`Check`;
     return this.rows().filter(sends).map(({ sensor }) => sensor);
   }
 

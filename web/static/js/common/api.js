@@ -1,9 +1,10 @@
 // The JSON API as the pages use it. Errors are RFC 9457 problems: a title, a sentence, a stable code.
+import { speak, translate } from "./text.js";
 export class Problem extends Error {
   constructor(status, body) {
-    super(body.detail || body.title || `The server answered ${status}.`);
+    super(body.detail || body.title || speak`The server answered ${status}.`);
     this.status = status;
-    this.title = body.title || "That did not work";
+    this.title = body.title || speak`That did not work`;
     this.detail = body.detail || "";
     this.code = body.code || String(status);
   }
@@ -27,7 +28,7 @@ export async function request(method, path, body) {
   try {
     answer = await fetch(path, init);
   } catch {
-    throw new Problem(0, { title: "No connection to the server", detail: "Nothing was changed. Check the network and try again." });
+    throw new Problem(0, { title: speak`No connection to the server`, detail: speak`Nothing was changed. Check the network and try again.` });
   }
   if (answer.status === 401 && !location.pathname.startsWith("/sign-in")) {
     // a page that keeps what was typed asks to sign in on itself
@@ -47,7 +48,7 @@ export async function request(method, path, body) {
  */
 export function showProblem(note, problem) {
   note.hidden = false;
-  note.querySelector("[data-title]").textContent = problem.title || "That did not work";
-  note.querySelector("[data-detail]").textContent = problem.detail;
+  note.querySelector("[data-title]").textContent = translate(problem.title) || speak`That did not work`;
+  note.querySelector("[data-detail]").textContent = translate(problem.detail);
   note.scrollIntoView({ block: "nearest" });
 }

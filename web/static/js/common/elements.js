@@ -1,6 +1,7 @@
 // Elements made by name: `h` makes HTML, `s` SVG. An attribute that begins with "on" is a listener; null and false
 // leave an attribute out.
 import { SIDE_KEY, SIDE_LETTER } from "./words.js";
+import { translate } from "./text.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -43,4 +44,4 @@ export const icon = (name) => s("svg", { class: "ico s", "aria-hidden": "true" }
  * A side as the chip of the design system.
  * @param {import("./words.js").Side} side
  */
-export const chip = (side) => h("span", { class: `lr ${SIDE_KEY[side]}`, title: side }, SIDE_LETTER[side]);
+export const chip = (side) => h("span", { class: `lr ${SIDE_KEY[side]}`, title: translate(side) }, SIDE_LETTER[side]);

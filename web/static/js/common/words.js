@@ -15,7 +15,7 @@ export const sideOf = (segment) => (segment?.endsWith("_l") ? "left" : segment?.
  * The name of a segment without its side, "thigh" of "Left thigh".
  * @param {string} name
  */
-export const withoutSide = (name) => name.replace(/^(Left|Right) /, "");
+export const withoutSide = (name) => name.replace(/^(Left|Right) | (links|rechts)$/, "");
 
 /** @param {string} text */
 export const capitalise = (text) => (text ? text[0].toUpperCase() + text.slice(1) : "");

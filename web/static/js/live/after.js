@@ -1,6 +1,7 @@
 // What came of the take: saved, being analysed, or nothing arrived. Leads to the session when the analysis is done.
 import { request } from "../common/api.js";
 import { say } from "./words.js";
+import { speak } from "../common/text.js";
 
 export class After {
   constructor(root, session) {
@@ -12,12 +13,12 @@ export class After {
   async show(state, watched) {
     const empty = !state.count;
     const part = state.state === "closed";
-    say(this.root.querySelector("[data-over-title]"), empty ? "Nothing was recorded" : "Recording is saved");
-    say(this.root.querySelector("[data-over-words]"), empty ? "No data came before the end."
-      : part ? "It was ended here with what had arrived. Analysis is running; the session page opens when it is done."
-      : "Analysis is running; the session page opens when it is done.");
+    say(this.root.querySelector("[data-over-title]"), empty ? speak`Nothing was recorded` : speak`Recording is saved`);
+    say(this.root.querySelector("[data-over-words]"), empty ? speak`No data came before the end.`
+      : part ? speak`It was ended here with what had arrived. Analysis is running; the session page opens when it is done.`
+      : speak`Analysis is running; the session page opens when it is done.`);
     this.root.querySelector("[data-do=again]").hidden = watched && !empty;
-    if (!watched && !empty) return say(this.root.querySelector("[data-over-words]"), "This session has its recording. Another one takes its place.");
+    if (!watched && !empty) return say(this.root.querySelector("[data-over-words]"), speak`This session has its recording. Another one takes its place.`);
     if (!empty && !this.following) await this.follow();
   }
 
@@ -37,7 +38,7 @@ export class After {
     words.dataset.message = "";
     words.setAttribute("role", "status");
     bar.max = 1;
-    bar.setAttribute("aria-label", "Progress");
+    bar.setAttribute("aria-label", speak`Progress`);
     progress.append(words, bar);
     this.root.querySelector("[data-over-job]").replaceChildren(progress);
   }

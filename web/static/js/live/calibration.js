@@ -3,16 +3,18 @@ import { cell, segmentCell, setState, shape, stateOf } from "./shapes.js";
 import { STAND_S } from "../common/standing.js";
 import { capitalise } from "../common/words.js";
 import { number, say } from "./words.js";
+import { speak } from "../common/text.js";
+import { translate } from "../common/text.js";
 
 const STEPS = 8; // straight steps, or
 const WALK_S = 12; // seconds of walking
 
 const SAYS = {
-  preparing: "The walk is being recorded. Please stand still until the live estimate is ready.",
-  unknown: "The walk is being recorded, without a live estimate.",
-  waiting: "Waiting until every sensor sends data.",
-  stand: "Please stand still, feet as in walking, and look ahead.",
-  walk: "Now walk straight on at a comfortable pace.",
+  preparing: speak`The walk is being recorded. Please stand still until the live estimate is ready.`,
+  unknown: speak`The walk is being recorded, without a live estimate.`,
+  waiting: speak`Waiting until every sensor sends data.`,
+  stand: speak`Please stand still, feet as in walking, and look ahead.`,
+  walk: speak`Now walk straight on at a comfortable pace.`,
 };
 
 const BEFORE = new Set(["preparing", "unknown", "waiting"]); // nobody has looked at how the person stands
@@ -25,12 +27,12 @@ class LiveCalibration extends HTMLElement {
 
   show(stage, view, health, names) {
     const problem = view?.problem ?? null;
-    say(this.querySelector("[data-say]"), SAYS[stage] ?? "Calibrated.");
+    say(this.querySelector("[data-say]"), SAYS[stage] ?? speak`Calibrated.`);
     const stood = view?.stood_s ?? 0, walked = view?.walked_s ?? 0, steps = view?.steps ?? 0;
     this.step("stand", stage === "stand" ? "run" : BEFORE.has(stage) ? "none" : "ok", Math.min(1, stood / STAND_S),
-      stage === "stand" ? `${number(Math.min(stood, STAND_S), 1)} of ${STAND_S} seconds` : `${STAND_S} seconds, feet as in walking`);
+      stage === "stand" ? speak`${number(Math.min(stood, STAND_S), 1)} of ${STAND_S} seconds` : speak`${STAND_S} seconds, feet as in walking`);
     this.step("walk", stage === "walk" ? "run" : "none", Math.max(Math.min(1, steps / STEPS), Math.min(1, walked / WALK_S)),
-      stage === "walk" ? `${steps} of ${STEPS} steps, ${number(walked)} s` : `${STEPS} steps`);
+      stage === "walk" ? speak`${steps} of ${STEPS} steps, ${number(walked)} s` : speak`${STEPS} steps`);
     const checks = new Map((view?.checks ?? []).map((c) => [c.segment, c]));
     const used = health.filter((h) => h.segment);
     if ([...this.rows.keys()].join() !== used.map((h) => h.id).join()) this.build(used, names);
@@ -49,7 +51,7 @@ class LiveCalibration extends HTMLElement {
     this.rows.clear();
     this.body.replaceChildren(...health.map((h) => {
       const tr = document.createElement("tr");
-      const now = stateOf("none", ""), axes = stateOf("none", "not yet");
+      const now = stateOf("none", ""), axes = stateOf("none", speak`not yet`);
       const [a, b] = [cell(""), cell("")];
       a.append(now);
       b.append(axes);
@@ -62,10 +64,10 @@ class LiveCalibration extends HTMLElement {
   row(h, check) {
     const { now, axes } = this.rows.get(h.id);
     const still = check?.still ?? h.still;
-    if (h.state === "bad") setState(now, "bad", h.words || "no data");
+    if (h.state === "bad") setState(now, "bad", translate(h.words) || speak`no data`);
     else if (still === undefined || still === null) setState(now, "none", "–");
-    else setState(now, still ? "ok" : "run", still ? "still" : "moving");
-    if (check?.score === null || check?.score === undefined) setState(axes, "none", "not yet");
+    else setState(now, still ? "ok" : "run", still ? speak`still` : speak`moving`);
+    if (check?.score === null || check?.score === undefined) setState(axes, "none", speak`not yet`);
     else {
       const troubled = (check.notices ?? []).some((n) => n.severity === "bad" || n.severity === "warn");
       setState(axes, troubled ? "warn" : "ok", `${Math.round(100 * check.score)}\u2009%`);
@@ -73,7 +75,7 @@ class LiveCalibration extends HTMLElement {
   }
 
   notes(problem, notices) {
-    const wanted = [...(problem ? [{ severity: "warn", message: problem.message, title: "Calibration starts again" }] : []), ...notices];
+    const wanted = [...(problem ? [{ severity: "warn", message: problem.message, title: speak`Calibration starts again` }] : []), ...notices];
     const box = this.querySelector("[data-cal-notes]");
     const key = JSON.stringify(wanted);
     if (box.dataset.key === key) return;
@@ -82,9 +84,9 @@ class LiveCalibration extends HTMLElement {
       const note = document.createElement("div");
       note.className = `note ${n.severity === "bad" ? "bad" : n.severity === "info" ? "" : "warn"}`;
       const title = document.createElement("b");
-      title.textContent = n.title ?? n.of ?? "";
+      title.textContent = translate(n.title ?? n.of ?? "");
       const text = document.createElement("p");
-      text.textContent = capitalise(n.message ?? n.text ?? "");
+      text.textContent = capitalise(translate(n.message ?? n.text ?? ""));
       note.append(shape(n.severity === "bad" ? "bad" : "warn"), title, text);
       return note;
     }));

@@ -1,9 +1,10 @@
 // <live-feedback>: level, schedule, next probe, with against without feedback, side effects; all in words.
 import { setState } from "./shapes.js";
 import { number, say, withUnit } from "./words.js";
+import { speak } from "../common/text.js";
 
-const STOPS = { max_strides: "The number of strides is reached.", max_minutes: "The time is over.", gps_rise: "The walk as a whole changed too much." };
-const NOT_JUDGED = { too_few_strides: "too few strides yet", joint_missing: "not measured", both_sides_trained: "both are trained", no_limit: "no limit known" };
+const STOPS = { max_strides: speak`The number of strides is reached.`, max_minutes: speak`The time is over.`, gps_rise: speak`The walk as a whole changed too much.` };
+const NOT_JUDGED = { too_few_strides: speak`too few strides yet`, joint_missing: speak`not measured`, both_sides_trained: speak`both are trained`, no_limit: speak`no limit known` };
 
 class LiveFeedback extends HTMLElement {
   // prescription: content of the record | null; term: {label, unit, digits}
@@ -13,7 +14,7 @@ class LiveFeedback extends HTMLElement {
     this.querySelector("[data-has]").hidden = !prescription;
     this.querySelector("[data-on-line]").hidden = !prescription;
     this.querySelector("[data-none]").hidden = Boolean(prescription);
-    const other = { left: "Right side", right: "Left side" }[prescription?.side] ?? "Side effects";
+    const other = { left: speak`Right side`, right: speak`Left side` }[prescription?.side] ?? speak`Side effects`;
     say(this.querySelector("[data-guard-side]"), other);
   }
 
@@ -22,7 +23,7 @@ class LiveFeedback extends HTMLElement {
     const put = (name, text) => say(this.querySelector(`[data-${name}]`), text);
     const on = this.querySelector("input.switch");
     on.checked = state.on;
-    put("on-word", state.on ? "On" : "Off");
+    put("on-word", state.on ? speak`On` : speak`Off`);
     put("level", number(state.level));
     put("schedule", this.schedule(state));
     put("probe", this.probe(state));
@@ -31,22 +32,22 @@ class LiveFeedback extends HTMLElement {
     this.guard(state.guard);
     const stopped = this.querySelector("[data-stopped]");
     stopped.hidden = !state.stopped;
-    if (state.stopped) say(stopped, `Feedback has ended. ${STOPS[state.stopped] ?? ""}`);
+    if (state.stopped) say(stopped, speak`Feedback has ended. ${STOPS[state.stopped] ?? ""}`);
   }
 
   schedule(state) {
-    if (state.paused) return "paused";
-    if (state.phase === "baseline") return "first strides, without";
-    if (state.phase === "retention") return "retention test, without";
+    if (state.paused) return speak`paused`;
+    if (state.phase === "baseline") return speak`first strides, without`;
+    if (state.phase === "retention") return speak`retention test, without`;
     const kind = this.prescription.schedule?.kind;
-    if (kind === "every" || state.share_pct === 100) return "every stride";
-    return `${kind === "fading" ? "fading, " : ""}${number(state.share_pct)}\u2009% of strides`;
+    if (kind === "every" || state.share_pct === 100) return speak`every stride`;
+    return speak`${kind === "fading" ? speak`fading, ` : ""}${number(state.share_pct)}\u2009% of strides`;
   }
 
   probe(state) {
-    if (state.block_left) return `now, ${state.block_left} strides left`;
-    if (state.next_probe === null || state.next_probe === undefined) return "none";
-    return state.next_probe === 1 ? "in 1 stride" : `in ${state.next_probe} strides`;
+    if (state.block_left) return speak`now, ${state.block_left} strides left`;
+    if (state.next_probe === null || state.next_probe === undefined) return speak`none`;
+    return state.next_probe === 1 ? speak`in 1 stride` : speak`in ${state.next_probe} strides`;
   }
 
   summary(s) {
@@ -58,10 +59,10 @@ class LiveFeedback extends HTMLElement {
     if (!guard) return;
     let state = out.firstElementChild;
     if (!state) out.replaceChildren((state = document.createElement("span")));
-    if (guard.other?.beyond) setState(state, "warn", `changed by ${withUnit(guard.other.change, this.term)}`);
-    else if (guard.gps?.beyond) setState(state, "warn", `walk changed, sagittal score +${number(guard.gps.change, 1)}°`);
-    else if (guard.state === "ok") setState(state, "ok", "no side effect");
-    else setState(state, "none", NOT_JUDGED[guard.other?.reason] ?? "not known yet");
+    if (guard.other?.beyond) setState(state, "warn", speak`changed by ${withUnit(guard.other.change, this.term)}`);
+    else if (guard.gps?.beyond) setState(state, "warn", speak`walk changed, sagittal score +${number(guard.gps.change, 1)}°`);
+    else if (guard.state === "ok") setState(state, "ok", speak`no side effect`);
+    else setState(state, "none", NOT_JUDGED[guard.other?.reason] ?? speak`not known yet`);
   }
 
   // How close the next level is: "In the zone more than 14 of 20: level 3 comes next."
@@ -69,8 +70,8 @@ class LiveFeedback extends HTMLElement {
     const p = this.prescription?.progression;
     if (!p?.automatic || state.phase !== "training" || state.in_zone === null) return "";
     const needed = Math.floor(p.share * p.window + 1e-9);
-    if (state.window_n < p.window) return `A decision on the level needs ${p.window} strides; ${state.window_n} so far.`;
-    return state.level > 0 ? `More than ${needed} of ${p.window} in the zone: the next level follows.` : "The hardest level.";
+    if (state.window_n < p.window) return speak`A decision on the level needs ${p.window} strides; ${state.window_n} so far.`;
+    return state.level > 0 ? speak`More than ${needed} of ${p.window} in the zone: the next level follows.` : speak`The hardest level.`;
   }
 }
 

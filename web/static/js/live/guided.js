@@ -1,8 +1,10 @@
 // <live-test>: a guided functional test. The estimator says where it stands; here it is told, and people decide.
 import { cell, setState } from "./shapes.js";
 import { number, say, withUnit } from "./words.js";
+import { speak } from "../common/text.js";
+import { translate } from "../common/text.js";
 
-const PHASES = { get_ready: ["none", "Get ready"], ready: ["ok", "Ready"], running: ["run", "Running"], done: ["ok", "Done"] };
+const PHASES = { get_ready: ["none", speak`Get ready`], ready: ["ok", speak`Ready`], running: ["run", speak`Running`], done: ["ok", speak`Done`] };
 const DIGITS = 1; // of the running clock
 const TICK_MS = 100;
 
@@ -22,8 +24,8 @@ class LiveTest extends HTMLElement {
 
   // No estimate yet, or none at all: nobody looks whether the person moves.
   wait(preparing) {
-    setState(this.at("phase"), "none", preparing ? "Please wait" : "Not followed");
-    say(this.at("say"), preparing ? "Please wait and keep still. The live estimate is not ready yet." : "The test is recorded and measured afterwards. Press STOP at its end.");
+    setState(this.at("phase"), "none", preparing ? speak`Please wait` : speak`Not followed`);
+    say(this.at("say"), preparing ? speak`Please wait and keep still. The live estimate is not ready yet.` : speak`The test is recorded and measured afterwards. Press STOP at its end.`);
   }
 
   // found: the test of a frame; t: its time. Frames come more often than what is judged, so the clock runs on.
@@ -33,15 +35,15 @@ class LiveTest extends HTMLElement {
     this.now = { t, at: performance.now() };
     this.dataset.phase = phase;
     setState(this.at("phase"), ...PHASES[phase]);
-    say(this.at("say"), found?.say ?? this.test.say);
+    say(this.at("say"), translate(found?.say ?? this.test.say));
     this.at("problem").hidden = !found?.problem;
-    say(this.at("problem"), found?.problem ?? "");
+    say(this.at("problem"), translate(found?.problem ?? ""));
     this.at("hint").hidden = this.at("clock-line").hidden = phase === "done";
     this.at("result").hidden = phase !== "done";
     this.querySelector("[data-do=test-go]").hidden = !(this.test.go && phase === "get_ready");
     this.at("anew").hidden = phase !== "running";
     this.at("count").hidden = !this.test.rises || (phase !== "running" && phase !== "done");
-    say(this.at("count"), `${found?.rises ?? 0} of 5`);
+    say(this.at("count"), speak`${found?.rises ?? 0} of 5`);
     this.at("progress").hidden = !found?.seconds || phase !== "running";
     if (phase === "done") this.result(found);
     else this.key = null;
@@ -70,11 +72,11 @@ class LiveTest extends HTMLElement {
     const total = found.figures.find((f) => f.name === this.test.total);
     const known = total?.value !== null && total?.value !== undefined;
     say(this.at("total"), known ? number(total.value, this.term.digits) : "–");
-    say(this.at("total-note"), [known ? "" : total?.reason, known && total.plus_minus ? `± ${withUnit(total.plus_minus, this.term)}` : "", found.corrected ? "start or end set by hand" : ""].filter(Boolean).join(", "));
+    say(this.at("total-note"), [known ? "" : translate(total?.reason), known && total.plus_minus ? `± ${withUnit(total.plus_minus, this.term)}` : "", found.corrected ? speak`start or end set by hand` : ""].filter(Boolean).join(", "));
     this.at("segments-box").hidden = !found.segments.length;
     this.at("segments").replaceChildren(...found.segments.map((s) => {
       const tr = document.createElement("tr");
-      tr.append(cell(s.label), cell(number(s.start_s, 2), "n"), cell(number(s.duration_s, 2), "n"));
+      tr.append(cell(translate(s.label)), cell(number(s.start_s, 2), "n"), cell(number(s.duration_s, 2), "n"));
       return tr;
     }));
     const [start, end] = this.querySelectorAll("input");
@@ -87,7 +89,7 @@ class LiveTest extends HTMLElement {
   typed() {
     const [start, end] = [...this.querySelectorAll("input")].map((i) => i.valueAsNumber);
     const fine = end > start;
-    this.querySelector("#test-end").setCustomValidity(fine ? "" : "The end comes after the start.");
+    this.querySelector("#test-end").setCustomValidity(fine ? "" : speak`The end comes after the start.`);
     return fine ? { start_s: start, end_s: end } : null;
   }
 

@@ -1,6 +1,8 @@
 // The line of notes under the head: the tablet is lost, the server is lost, something was refused, the take was told of.
 import { h } from "../common/elements.js";
 import { shape } from "./shapes.js";
+import { speak } from "../common/text.js";
+import { translate } from "../common/text.js";
 
 const NOTICE_MS = 12000;
 const REDO_MS = 45000;
@@ -37,7 +39,7 @@ export class Notes {
 
   tablet(state) {
     if (state.state === "streaming" && state.tablet !== "connected")
-      this.put("tablet", "warn", "The tablet is not connected.", "It goes on recording and keeps everything; what is missing comes when it is back. Nothing is lost.", { do: "close", word: "End without the tablet" });
+      this.put("tablet", "warn", speak`The tablet is not connected.`, speak`It goes on recording and keeps everything; what is missing comes when it is back. Nothing is lost.`, { do: "close", word: speak`End without the tablet` });
     else this.take("tablet");
   }
 
@@ -46,23 +48,23 @@ export class Notes {
     const waits = state.state === "streaming" && state.estimate === "preparing";
     this.waitsSince = waits ? this.waitsSince ?? performance.now() : undefined;
     if (waits && performance.now() - this.waitsSince > PREPARED_MS)
-      this.put("estimate", "warn", "The live estimate is still being prepared.", "After a start of the server that takes up to a minute. The walk is recorded meanwhile, and the estimate catches up.");
+      this.put("estimate", "warn", speak`The live estimate is still being prepared.`, speak`After a start of the server that takes up to a minute. The walk is recorded meanwhile, and the estimate catches up.`);
     else this.take("estimate");
   }
 
   // STOP without a tablet: the person decides, because what the tablet still holds would stay there.
   withoutTablet() {
-    this.put("tablet", "warn", "The tablet cannot hear STOP now.", "Press STOP on the tablet, or end here with what has arrived; the rest stays on the tablet.", { do: "close", word: "End without the tablet" });
+    this.put("tablet", "warn", speak`The tablet cannot hear STOP now.`, speak`Press STOP on the tablet, or end here with what has arrived; the rest stays on the tablet.`, { do: "close", word: speak`End without the tablet` });
   }
 
   line(line) {
-    if (line === "lost") this.put("line", "bad", "No connection to the server.", "The tablet goes on recording. This page comes back by itself.");
-    else if (line === "refused") this.put("line", "bad", "You are signed out.", "Sign in again to see the walk; the recording goes on.");
+    if (line === "lost") this.put("line", "bad", speak`No connection to the server.`, speak`The tablet goes on recording. This page comes back by itself.`);
+    else if (line === "refused") this.put("line", "bad", speak`You are signed out.`, speak`Sign in again to see the walk; the recording goes on.`);
     else this.take("line");
   }
 
   problem(problem) {
-    const note = this.put("problem", "bad", problem.title || "That did not work", problem.detail);
+    const note = this.put("problem", "bad", translate(problem.title) || speak`That did not work`, translate(problem.detail));
     setTimeout(() => this.shown.get("problem") === note && this.take("problem"), NOTICE_MS);
   }
 
@@ -74,15 +76,15 @@ export class Notes {
     this.take("calibration");
     if (!verdict || verdict.verdict === "not_judged") return;
     const [first] = verdict.redo;
-    const text = first ? `${first.title}: ${first.why} ${first.todo}` : "";
-    const redo = first ? { do: "redo", word: "Redo" } : undefined;
-    const note = this.put("calibration", first ? "bad" : "ok", verdict.headline, text, redo);
+    const text = first ? `${translate(first.title)}: ${translate(first.why)} ${translate(first.todo)}` : "";
+    const redo = first ? { do: "redo", word: speak`Redo` } : undefined;
+    const note = this.put("calibration", first ? "bad" : "ok", translate(verdict.headline), text, redo);
     setTimeout(() => this.shown.get("calibration") === note && this.take("calibration"), first ? REDO_MS : NOTICE_MS);
   }
 
   notice({ severity, text, code, sensor }) {
     const key = `notice:${code ?? text}:${sensor ?? ""}`;
-    const note = this.put(key, severity === "bad" ? "bad" : severity === "warn" ? "warn" : "", "", text);
+    const note = this.put(key, severity === "bad" ? "bad" : severity === "warn" ? "warn" : "", "", translate(text));
     setTimeout(() => this.shown.get(key) === note && this.take(key), NOTICE_MS);
   }
 }

@@ -17,6 +17,7 @@ import { Notes } from "./notes.js";
 import { inOrder } from "./sensors.js";
 import { formatClock } from "../common/words.js";
 import { number, say } from "./words.js";
+import { speak } from "../common/text.js";
 
 const data = JSON.parse(document.getElementById("live-data").textContent);
 const OVER = new Set(["finished", "closed"]);
@@ -146,11 +147,11 @@ class LivePage extends HTMLElement {
     clearInterval(this.staleClock);
     if (!stale) return;
     const words = this.querySelector("[data-cover-words]");
-    say(this.querySelector("[data-cover-title]"), this.stopping ? "Stopping… saving" : "Paused: no new data");
+    say(this.querySelector("[data-cover-title]"), this.stopping ? speak`Stopping… saving` : speak`Paused: no new data`);
     const tell = () => {
-      if (this.stopping) return say(words, this.feed.state?.tablet === "connected" ? "The tablet sends what is left. This takes a moment." : "The tablet does not answer. It keeps what it measured and sends it when it is back.");
-      const lost = this.feed.line !== "open" ? "The line to the server is lost. " : this.feed.state?.tablet === "lost" ? "The tablet does not answer. " : "";
-      say(words, `${lost}The last data came ${number(this.feed.age / 1000, 1)} s ago; feedback waits. The tablet keeps what it measures.`);
+      if (this.stopping) return say(words, this.feed.state?.tablet === "connected" ? speak`The tablet sends what is left. This takes a moment.` : speak`The tablet does not answer. It keeps what it measured and sends it when it is back.`);
+      const lost = this.feed.line !== "open" ? speak`The line to the server is lost. ` : this.feed.state?.tablet === "lost" ? speak`The tablet does not answer. ` : "";
+      say(words, speak`${lost}The last data came ${number(this.feed.age / 1000, 1)} s ago; feedback waits. The tablet keeps what it measures.`);
     };
     tell();
     this.staleClock = setInterval(tell, 500);
@@ -244,7 +245,7 @@ class LivePage extends HTMLElement {
   speak() {
     if (this.dataset.view !== "run") return;
     const { delay } = this.feed;
-    const words = [this.stopping ? "Stopping, saving" : this.feed.fresh === false ? "Paused, no new data" : "", this.querySelector("[data-in-zone]").textContent, delay === undefined || delay === null ? "" : `delay ${Math.round(delay)} milliseconds`];
+    const words = [this.stopping ? speak`Stopping, saving` : this.feed.fresh === false ? speak`Paused, no new data` : "", this.querySelector("[data-in-zone]").textContent, delay === undefined || delay === null ? "" : speak`delay ${Math.round(delay)} milliseconds`];
     say(this.querySelector("[data-spoken]"), words.filter(Boolean).join(", "));
   }
 }

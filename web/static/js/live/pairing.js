@@ -2,6 +2,7 @@
 import { request, showProblem } from "../common/api.js";
 import { formatClock } from "../common/words.js";
 import { code as grouped, say } from "./words.js";
+import { speak } from "../common/text.js";
 
 const TAKEN = new Set(["pairing", "open"]);
 
@@ -40,7 +41,7 @@ export class Pairing {
     if (!TAKEN.has(state.state)) return this.show(null);
     this.show({ code: null });
     const paired = state.state === "open";
-    say(this.root.querySelector("[data-waiting]"), paired ? "The tablet is paired. Choose the sensors there and press Start." : "Waiting for the tablet");
+    say(this.root.querySelector("[data-waiting]"), paired ? speak`The tablet is paired. Choose the sensors there and press Start.` : speak`Waiting for the tablet`);
   }
 
   #code(code, expires) {
@@ -57,8 +58,8 @@ export class Pairing {
   #tick() {
     const out = this.root.querySelector("[data-code-left]");
     if (this.ends === undefined || !out) return;
-    if (this.ends === null) return say(out, "The code was shown when the take was opened. Ask for a new one.");
+    if (this.ends === null) return say(out, speak`The code was shown when the take was opened. Ask for a new one.`);
     const left = (this.ends - Date.now()) / 1000;
-    say(out, left > 0 ? `Valid for ${formatClock(left)}.` : "The code has expired. Ask for a new one.");
+    say(out, left > 0 ? speak`Valid for ${formatClock(left)}.` : speak`The code has expired. Ask for a new one.`);
   }
 }

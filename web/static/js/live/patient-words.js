@@ -1,29 +1,32 @@
 // What the patient reads: short, positive, no numbers, no jargon.
 import { capitalise } from "../common/words.js";
+import { speak } from "../common/text.js";
+import { lowered } from "../common/text.js";
 
 export function what(prescription, term) {
-  const name = term?.everyday || term?.label.toLowerCase() || "walk";
-  return capitalise(prescription.side ? `${prescription.side} ${name}` : name);
+  const name = term?.everyday || (term ? lowered(term.label) : speak`walk`);
+  if (prescription.side === "left") return capitalise(speak`left ${name}`);
+  return capitalise(prescription.side === "right" ? speak`right ${name}` : name);
 }
 
 // The way to the zone, never what was wrong: "A little longer", "Longer".
 export function wayTo(zone, term) {
-  if (zone === "in") return "Good step";
-  const [more, less] = term?.comparison ?? ["more", "less"];
+  if (zone === "in") return speak`Good step`;
+  const [more, less] = term?.comparison ?? [speak`more`, speak`less`];
   const to = zone.endsWith("low") ? more : less;
-  return zone.startsWith("near") ? `A little ${to}` : capitalise(to);
+  return zone.startsWith("near") ? speak`A little ${to}` : capitalise(to);
 }
 
 export const ends = (term) => (term?.comparison ?? ["more", "less"]).map(capitalise);
 
 export const HELD = {
-  waiting: ["One moment", "The sensors are getting ready."],
-  stand: ["Stand still", "Look straight ahead."],
-  walk: ["Walk on", "A few steps, straight ahead."],
-  stale: ["Short pause", "The picture comes back by itself."],
-  paused: ["Short pause", "Walk as you like."],
-  none: ["Walk as you like", ""],
-  stopped: ["Well done", "That was the training."],
-  over: ["Well done", "You can stop now."],
-  unopened: ["One moment", "It starts soon."],
+  waiting: [speak`One moment`, speak`The sensors are getting ready.`],
+  stand: [speak`Stand still`, speak`Look straight ahead.`],
+  walk: [speak`Walk on`, speak`A few steps, straight ahead.`],
+  stale: [speak`Short pause`, speak`The picture comes back by itself.`],
+  paused: [speak`Short pause`, speak`Walk as you like.`],
+  none: [speak`Walk as you like`, ""],
+  stopped: [speak`Well done`, speak`That was the training.`],
+  over: [speak`Well done`, speak`You can stop now.`],
+  unopened: [speak`One moment`, speak`It starts soon.`],
 };

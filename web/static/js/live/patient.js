@@ -6,6 +6,8 @@ import { Path } from "./patient-path.js";
 import { HELD, ends, wayTo, what } from "./patient-words.js";
 import { Sound } from "./sound.js";
 import { say } from "./words.js";
+import { speak } from "../common/text.js";
+import { translate } from "../common/text.js";
 
 const data = JSON.parse(document.getElementById("live-data").textContent);
 const LAST = 8;
@@ -97,7 +99,7 @@ class PatientScreen extends HTMLElement {
     const box = this.querySelector("[data-pause]");
     box.hidden = why === null;
     if (why !== null) {
-      const [title, words] = why === "test" ? [this.feed.frame.test.say, ""] : HELD[why];
+      const [title, words] = why === "test" ? [translate(this.feed.frame.test.say), ""] : HELD[why];
       say(box.querySelector("[data-pause-title]"), title);
       say(box.querySelector("[data-pause-words]"), words);
     } else if (this.feed.feedback?.on === false) this.alone();
@@ -138,7 +140,7 @@ class PatientScreen extends HTMLElement {
   alone() {
     this.dataset.faded = "";
     this.scene?.dim();
-    this.message("", "On your own");
+    this.message("", speak`On your own`);
   }
 
   message(kind, words) {

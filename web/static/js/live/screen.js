@@ -1,5 +1,6 @@
 // The patient's screen seen from here: opens its window and switches its sound. The two windows of one browser speak
 // over a channel; a patient screen on another device has its own switch.
+import { speak } from "../common/text.js";
 const ALIVE_MS = 4000;
 
 export class Screen {
@@ -34,6 +35,6 @@ export class Screen {
   show(on, there) {
     this.button.disabled = !there;
     this.button.ariaPressed = String(on);
-    this.word.textContent = there ? (on ? "Sound on" : "Sound off") : "Sound";
+    this.word.textContent = there ? (on ? speak`Sound on` : speak`Sound off`) : speak`Sound`;
   }
 }

@@ -1,6 +1,8 @@
 // <live-sensors>: one row per sensor: segment, battery, loss, and its state as shape and word.
 import { cell, segmentCell, setState, stateOf } from "./shapes.js";
 import { number, say } from "./words.js";
+import { speak } from "../common/text.js";
+import { translate } from "../common/text.js";
 
 const EVERY_MS = 500; // rows are for reading; they need not follow every frame
 const WORST = ["none", "ok", "warn", "bad"];
@@ -32,12 +34,12 @@ class LiveSensors extends HTMLElement {
       const row = this.rows.get(h.id);
       say(row.battery, h.battery_pct === null || h.battery_pct === undefined ? "–" : `${number(h.battery_pct)}\u2009%`);
       say(row.lost, h.lost_pct === null || h.lost_pct === undefined ? "–" : `${number(h.lost_pct, h.lost_pct < 10 ? 1 : 0)}\u2009%`);
-      setState(row.state, h.state, h.words || `${number(h.rate_hz)}\u2009Hz`);
+      setState(row.state, h.state, translate(h.words) || `${number(h.rate_hz)}\u2009Hz`);
     }
     const used = health.filter((h) => h.segment);
     const good = used.filter((h) => h.state === "ok").length;
     const worst = used.reduce((w, h) => (WORST.indexOf(h.state) > WORST.indexOf(w) ? h.state : w), "none");
-    setState(this.all, worst, `${good} of ${used.length} good`);
+    setState(this.all, worst, speak`${good} of ${used.length} good`);
   }
 
   build(health, names) {

@@ -2,6 +2,7 @@
 import { DASH, MEAN_PX, Plot, THIN_PX, label, trace } from "./plot.js";
 import { SIDE_KEY } from "../common/words.js";
 import { number, say } from "./words.js";
+import { speak } from "../common/text.js";
 
 const SIDES = ["left", "right"];
 const THIN = 3; // last strides drawn thin, of each side
@@ -92,7 +93,7 @@ class StrideChart extends Plot {
       label(g, `${number(a)}°`, X(0) - 7, Y(a) + 4, { colour: colour.axis, align: "right" });
     }
     for (const p of TICKS) label(g, String(p), X(p), EDGE.top + h + 15, { colour: colour.axis, align: "center" });
-    label(g, "% of gait cycle", X(100), EDGE.top + h + 30, { colour: colour.axis, align: "right" });
+    label(g, speak`% of gait cycle`, X(100), EDGE.top + h + 30, { colour: colour.axis, align: "right" });
   }
 
   strides(g, side, X, Y, colour) {

@@ -3,12 +3,13 @@ import { chip, h } from "../common/elements.js";
 import { cell } from "./shapes.js";
 import { SHOWN } from "./strip.js";
 import { withUnit } from "./words.js";
+import { speak } from "../common/text.js";
 
 const ZONE = { in: "in", near_low: "near", near_high: "near", low: "away", high: "away" };
-const ZONE_WORDS = { in: "in the zone", near_low: "just below", near_high: "just above", low: "below", high: "above" };
+const ZONE_WORDS = { in: speak`in the zone`, near_low: speak`just below`, near_high: speak`just above`, low: speak`below`, high: speak`above` };
 const WHY = {
-  baseline: "first strides", retention: "retention test", off: "off", paused: "paused", stale: "no data", stopped: "ended",
-  probe: "probe", faded: "faded out", positive_only: "not in the zone", bandwidth: "in the zone",
+  baseline: speak`first strides`, retention: speak`retention test`, off: speak`off`, paused: speak`paused`, stale: speak`no data`, stopped: speak`ended`,
+  probe: speak`probe`, faded: speak`faded out`, positive_only: speak`not in the zone`, bandwidth: speak`in the zone`,
 };
 
 // What is watched: the prescribed parameter and side, else what the therapist chose, both sides.
@@ -30,11 +31,11 @@ export function rowsOf(feed, parameter, prescription) {
 
 export function fill(body, rows, term) {
   body.replaceChildren(...[...rows].reverse().map((r, i) => {
-    const told = !r.cue ? "–" : r.cue.shown ? "yes" : `no, ${WHY[r.cue.why_not] ?? "not shown"}`;
+    const told = !r.cue ? "–" : r.cue.shown ? speak`yes` : speak`no, ${WHY[r.cue.why_not] ?? "not shown"}`;
     return h(
       "tr",
       {},
-      cell(i === 0 ? "now" : `${i} ago`, "n"),
+      cell(i === 0 ? speak`now` : speak`${i} ago`, "n"),
       h("td", {}, chip(r.side)),
       cell(withUnit(r.value, term), "n"),
       cell(r.cue ? ZONE_WORDS[r.cue.zone] : "–"),

@@ -3,6 +3,8 @@ import "./strip.js";
 import { SHOWN } from "./strip.js";
 import { fill, rowsOf } from "./strides-table.js";
 import { asymmetry, say } from "./words.js";
+import { speak } from "../common/text.js";
+import { lowered, translate } from "../common/text.js";
 
 export class StripCard {
   constructor(root, data, feed) {
@@ -28,7 +30,7 @@ export class StripCard {
   what() {
     const side = this.data.prescription?.side;
     const unit = this.term?.unit ? `, ${this.term.unit}` : "";
-    say(this.root.querySelector("[data-strip-what]"), this.data.prescription ? `${this.term?.label.toLowerCase() ?? this.parameter}${side ? `, ${side}` : ""}${unit}` : "");
+    say(this.root.querySelector("[data-strip-what]"), this.data.prescription ? `${(this.term ? lowered(this.term.label) : this.parameter)}${side ? `, ${translate(side)}` : ""}${unit}` : "");
     this.changed();
   }
 
@@ -48,7 +50,7 @@ export class StripCard {
     const rows = rowsOf(this.feed, this.parameter, this.data.prescription);
     this.strip.show(rows, this.data.prescription ? this.zone(rows) : null, this.term?.digits ?? 2);
     const judged = rows.filter((r) => r.cue), inside = judged.filter((r) => r.kind === "in").length;
-    say(this.root.querySelector("[data-in-zone]"), judged.length ? `${inside} of ${judged.length} in zone` : "");
+    say(this.root.querySelector("[data-in-zone]"), judged.length ? speak`${inside} of ${judged.length} in zone` : "");
     const of = (side) => this.feed.strides.filter((s) => s.counted && s.side === side).slice(-SHOWN / 2).map((s) => s.values?.[this.parameter]);
     say(this.root.querySelector("[data-asymmetry]"), asymmetry(of("left"), of("right"), this.term) ?? "");
     if (!this.root.querySelector("#strides-table").hidden) fill(this.root.querySelector("tbody"), rows, this.term);

@@ -2,6 +2,7 @@
 // without a target left = disc, right = ring. A petrol tick below marks a stride with feedback.
 import { Plot, label, trace } from "./plot.js";
 import { number } from "./words.js";
+import { speak } from "../common/text.js";
 
 export const SHOWN = 20;
 const EDGE = { left: 44, right: 64, top: 10, bottom: 42 };
@@ -74,7 +75,7 @@ class TargetStrip extends Plot {
       }
     });
     const under = EDGE.top + h + 30;
-    const places = { 0: `${SHOWN} ago`, 5: "15", 10: "10", 15: "5", [SHOWN - 1]: "now" };
+    const places = { 0: speak`${SHOWN} ago`, 5: "15", 10: "10", 15: "5", [SHOWN - 1]: speak`now` };
     for (const [i, text] of Object.entries(places))
       label(g, text, X(Number(i)), under, { colour: colour.axis, align: "center" });
     if (this.rows.some((r) => r.cued)) label(g, "feedback", EDGE.left + w + 8, tick + 4, { colour: colour.axis });

@@ -3,6 +3,7 @@ import { STALE_MS } from "./feed.js";
 import { setState } from "./shapes.js";
 import { formatClock } from "../common/words.js";
 import { number, say } from "./words.js";
+import { lowered, speak, translate } from "../common/text.js";
 
 // Sample to screen. Within a tenth of a second it feels at once (Card, Robertson & Mackinlay 1991, CHI: 0.1 s); from
 // STALE_MS on it is stale.
@@ -19,20 +20,20 @@ export class Top {
   // What is trained, under the name of the visit.
   given(prescription, terms) {
     const term = terms[prescription?.parameter];
-    say(this.at("given"), prescription ? ` · ${(term?.label ?? prescription.parameter).toLowerCase()}${prescription.side ? `, ${prescription.side}` : ""}` : "");
+    say(this.at("given"), prescription ? ` · ${lowered(term?.label ?? prescription.parameter)}${prescription.side ? `, ${translate(prescription.side)}` : ""}` : "");
   }
 
   state(state) {
     const running = state.state === "streaming";
     this.now = running ? { elapsed: state.elapsed_s ?? 0, at: performance.now() } : null;
     this.at("rec").hidden = !running;
-    say(this.at("rec-word"), state.stopping ? "Stopping… saving" : state.tablet === "connected" ? "Recording" : "On the tablet");
+    say(this.at("rec-word"), state.stopping ? speak`Stopping… saving` : state.tablet === "connected" ? speak`Recording` : speak`On the tablet`);
     this.at("delay").hidden = !running;
     this.button("start").hidden = !(state.state === "open" && state.tablet === "connected");
     this.button("stop").hidden = !running;
     const marks = state.marks ?? [], last = marks.at(-1);
     this.button("undo").disabled = !last;
-    say(this.at("last-mark"), last ? `Last mark: ${last.value ? `“${last.value}”, ` : ""}${formatClock(last.t_s)}` : "");
+    say(this.at("last-mark"), last ? `${speak`Last mark:`} ${last.value ? `“${last.value}”, ` : ""}${formatClock(last.t_s)}` : "");
     this.tick();
   }
 
@@ -45,7 +46,7 @@ export class Top {
   paused(feedback) {
     const button = this.button("pause");
     button.ariaPressed = String(Boolean(feedback.paused));
-    say(this.at("pause-word"), feedback.paused ? "Resume feedback" : "Pause feedback");
+    say(this.at("pause-word"), feedback.paused ? speak`Resume feedback` : speak`Pause feedback`);
     button.querySelector("use").setAttribute("href", feedback.paused ? "#i-play" : "#i-pause");
   }
 

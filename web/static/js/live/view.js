@@ -1,6 +1,7 @@
 // <live-view> shows the live figure of a session: viser's page in an iframe, loaded when it is first seen, again
 // when the theme changes and when the line to the server has come back. Viser's own client only tries again while
 // it has focus, which an iframe rarely has, so it is not waited for.
+import { speak } from "../common/text.js";
 const RETRY_MS = 5000;
 
 const isDark = () => getComputedStyle(document.documentElement).colorScheme.startsWith("dark");
@@ -41,7 +42,7 @@ class LiveView extends HTMLElement {
   async open() {
     clearTimeout(this.timer);
     this.dark = isDark();
-    this.#state("loading", "Opening the 3D view…");
+    this.#state("loading", speak`Opening the 3D view…`);
     const asked = (this.asked = Symbol("asked"));
     let problem = null;
     try {
@@ -51,7 +52,7 @@ class LiveView extends HTMLElement {
       if (answer.ok) this.#load(body.src);
       else problem = body.detail ?? body.title;
     } catch {
-      if (asked === this.asked) problem = "The 3D view cannot be reached.";
+      if (asked === this.asked) problem = speak`The 3D view cannot be reached.`;
     }
     if (problem === null) return;
     this.#state("lost", problem);

@@ -1,8 +1,9 @@
 // Numbers as the live pages write them: a real minus, no negative zero, a dash where nothing is.
+import { localise, speak } from "../common/text.js";
 export function number(value, digits = 0) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const text = value.toFixed(digits);
-  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
+  return localise(Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−"));
 }
 
 export function withUnit(value, term) {
@@ -43,12 +44,12 @@ export function asymmetry(lefts, rights, term) {
   const [known, others] = [lefts, rights].map((x) => x.filter(Number.isFinite));
   const [left, right] = [mean(known), mean(others)];
   if (left === null || right === null || !term) return null;
-  if (Math.min(known.length, others.length) < COMPARED) return "too few strides to compare";
+  if (Math.min(known.length, others.length) < COMPARED) return speak`too few strides to compare`;
   const text = number(Math.abs(left - right), term.digits);
-  if (Number(text) === 0) return "left and right equal";
-  if (!differ(known, others)) return "no clear difference";
+  if (!/[1-9]/.test(text)) return speak`left and right equal`;
+  if (!differ(known, others)) return speak`no clear difference`;
   const [more, less] = term.comparison;
-  return `left ${left > right ? more : less} by ${withUnit(Math.abs(left - right), term)}`;
+  return speak`left ${left > right ? more : less} by ${withUnit(Math.abs(left - right), term)}`;
 }
 
 // Sets text only when it changes, so that nothing is read out or laid out again for nothing.

@@ -3,6 +3,8 @@ import { clock } from "../clock.js";
 import { SIDE_KEY } from "../common/words.js";
 import { h, s } from "../common/elements.js";
 import { WORD, seconds } from "./words.js";
+import { speak } from "../common/text.js";
+import { translate } from "../common/text.js";
 
 const CLOSE_PX_PER_S = 44; // below it handles of one kind would lie on each other; the blocks alone are shown
 const APART_S = 0.051; // the server refuses less than 50 ms between two events of a foot
@@ -10,8 +12,8 @@ const STEP_S = 0.01;
 const WAIT_MS = 900;
 
 function origin(event) {
-  if (event.source === "manual") return ", placed by hand";
-  return event.confidence === null ? "" : `, found by ${Math.round(100 * event.confidence)} % of the detectors`;
+  if (event.source === "manual") return speak`, placed by hand`;
+  return event.confidence === null ? "" : speak`, found by ${Math.round(100 * event.confidence)} % of the detectors`;
 }
 
 export class EventHandles {
@@ -56,7 +58,7 @@ export class EventHandles {
       class: `ev ${event.kind} ${SIDE_KEY[this.side]}${event.source === "manual" ? " manual" : ""}`,
       role: "slider",
       tabindex: "0",
-      "aria-label": `${this.side} ${WORD[event.kind]}`,
+      "aria-label": `${translate(this.side)} ${WORD[event.kind]}`,
       "aria-valuemin": 0,
       "aria-valuemax": this.win.duration.toFixed(2),
       "aria-readonly": String(!this.editable),
@@ -73,7 +75,7 @@ export class EventHandles {
     if (!handle) return;
     handle.style.left = `${100 * this.win.place(t)}%`;
     handle.setAttribute("aria-valuenow", t.toFixed(3));
-    handle.setAttribute("aria-valuetext", `${seconds(t, 3)} seconds${origin(event)}`);
+    handle.setAttribute("aria-valuetext", speak`${seconds(t, 3)} seconds${origin(event)}`);
     handle.title = `${WORD[event.kind]}${origin(event)}`;
     handle.dataset.tip = `${seconds(t, 3)} s`;
   }

@@ -3,6 +3,7 @@ import { request } from "../common/api.js";
 import { SIDE_KEY, SIDE_LETTER } from "../common/words.js";
 import { h, s } from "../common/elements.js";
 import { seconds } from "./words.js";
+import { localise } from "../common/text.js";
 
 const MS = 1000;
 const COARSE_POINTS = 2000;
@@ -61,7 +62,7 @@ export class SignalLane {
     const room = Math.max((most - least) * 0.08, 1e-6);
     [this.bottom, this.top] = [least - room, most + room];
     const digits = most - least < 5 ? 2 : 0;
-    const text = (v) => `${v.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−")}${this.lane.unit === "°" ? "°" : ` ${this.lane.unit}`}`;
+    const text = (v) => `${localise(v.toFixed(digits)).replace(/^-(?=[0.,]*$)/, "").replace("-", "−")}${this.lane.unit === "°" ? "°" : ` ${this.lane.unit}`}`;
     this.digits = digits;
     this.high.textContent = text(most);
     this.low.textContent = text(least);

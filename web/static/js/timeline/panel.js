@@ -2,39 +2,41 @@
 import { chip, h, icon } from "../common/elements.js";
 import { reasons } from "./dialogs.js";
 import { WORD, seconds } from "./words.js";
+import { speak } from "../common/text.js";
+import { localise, lowered } from "../common/text.js";
 
 const LISTED = 40;
 
-const stance = (s) => (s.tc_s === null ? "–" : ((100 * (s.tc_s - s.start_s)) / (s.end_s - s.start_s)).toFixed(1));
+const stance = (s) => (s.tc_s === null ? "–" : localise(((100 * (s.tc_s - s.start_s)) / (s.end_s - s.start_s)).toFixed(1)));
 
 // The picked stride with its three events as fields, and whether it counts.
 export function strideBox(stride, { editable, review, onMove, onDelete, onLeaveOut, onCount }) {
-  if (!stride) return [h("p", { class: "small mut" }, "No stride here. Pick one above, or press J.")];
+  if (!stride) return [h("p", { class: "small mut" }, speak`No stride here. Pick one above, or press J.`)];
   const rows = [
-    ["ic", "Contact", stride.start_s],
-    ["tc", "Foot-off", stride.tc_s],
-    ["ic", "Next contact", stride.end_s],
+    ["ic", speak`Contact`, stride.start_s],
+    ["tc", speak`Foot-off`, stride.tc_s],
+    ["ic", speak`Next contact`, stride.end_s],
   ].map(([kind, label, time]) => eventRow(stride, kind, label, time, { editable, review, onMove, onDelete }));
-  const facts = h("p", { class: "small mut num" }, `${seconds(stride.end_s - stride.start_s)} s, stance ${stance(stride)} %`);
+  const facts = h("p", { class: "small mut num" }, speak`${seconds(stride.end_s - stride.start_s)} s, stance ${stance(stride)} %`);
   const said = stride.used
-    ? stride.flags.length ? `Counts, although a rule says: ${stride.flags.join(", ").replaceAll("_", " ")}.` : ""
-    : `Left out ${stride.excluded_by === "person" ? "by hand" : "by rule"}: ${stride.excluded}.`;
+    ? stride.flags.length ? speak`Counts, although a rule says: ${stride.flags.join(", ").replaceAll("_", " ")}.` : ""
+    : stride.excluded_by === "person" ? speak`Left out by hand: ${stride.excluded}.` : speak`Left out by rule: ${stride.excluded}.`;
   const act = stride.used
     ? whyOut((reason) => onLeaveOut(stride, reason))
-    : h("button", { class: "btn", type: "button", "data-count": true, onclick: () => onCount(stride) }, "Count it");
+    : h("button", { class: "btn", type: "button", "data-count": true, onclick: () => onCount(stride) }, speak`Count it`);
   return [facts, said ? h("p", { class: "small" }, said) : null, h("div", { class: "tl-fields" }, ...rows.flat()), editable ? act : null].filter(Boolean);
 }
 
 // One tap says why and leaves the stride out; words of one's own are asked for.
 function whyOut(answer) {
   const button = (words, reason, marks = {}) => h("button", { class: "btn", type: "button", ...marks, onclick: () => answer(reason) }, words);
-  return h("fieldset", { class: "tl-why" }, h("legend", { class: "small mut" }, "Leave it out, because"), ...reasons().map((reason) => button(reason, reason, { "data-why": reason })), button("Other…", "", { "data-out": true }));
+  return h("fieldset", { class: "tl-why" }, h("legend", { class: "small mut" }, speak`Leave it out, because`), ...reasons().map((reason) => button(reason, reason, { "data-why": reason })), button(speak`Other…`, "", { "data-out": true }));
 }
 
 function eventRow(stride, kind, label, time, { editable, review, onMove, onDelete }) {
   const id = `t-${label.replaceAll(" ", "-").toLowerCase()}`;
   const event = time === null ? null : review.at(stride.side, kind, time);
-  if (!event) return [h("span", { class: "small" }, label), h("span", { class: "small dim" }, "not found"), h("span")];
+  if (!event) return [h("span", { class: "small" }, label), h("span", { class: "small dim" }, speak`not found`), h("span")];
   const field = /** @type {HTMLInputElement} */ (h("input", { class: "input num", id, type: "number", step: "0.01", min: 0, value: event.time_s.toFixed(3), readonly: !editable }));
   field.addEventListener("change", () => {
     const to = Number(field.value);
@@ -42,7 +44,7 @@ function eventRow(stride, kind, label, time, { editable, review, onMove, onDelet
     else onMove(event, to);
   });
   const remove = editable
-    ? h("button", { class: "btn icon ghost", type: "button", "aria-label": `Delete ${label.toLowerCase()}`, title: `Delete ${label.toLowerCase()}`, onclick: () => onDelete(event) }, icon("trash"))
+    ? h("button", { class: "btn icon ghost", type: "button", "aria-label": speak`Delete ${lowered(label)}`, title: speak`Delete ${lowered(label)}`, onclick: () => onDelete(event) }, icon("trash"))
     : h("span");
   return [h("label", { class: "small", for: id }, label), h("span", { class: "row g2" }, field, h("span", { class: "unit" }, "s")), remove];
 }
@@ -50,7 +52,8 @@ function eventRow(stride, kind, label, time, { editable, review, onMove, onDelet
 // The table that says in words and numbers what the drawing above shows.
 export function strideRows(review, win, picked, onPick) {
   const seen = review.strides.map((s, i) => [s, i]).filter(([s]) => s.end_s > win.start && s.start_s < win.end);
-  const words = `${seen.length} of ${review.strides.length}${seen.length > LISTED ? `; the first ${LISTED} are listed, zoom in for the others` : ""}`;
+  const rest = seen.length > LISTED ? speak`; the first ${LISTED} are listed, zoom in for the others` : "";
+  const words = speak`${seen.length} of ${review.strides.length}${rest}`;
   const rows = seen.slice(0, LISTED).map(([s, i]) =>
     h(
       "tr",
@@ -59,8 +62,8 @@ export function strideRows(review, win, picked, onPick) {
       ...[s.start_s, s.tc_s, s.end_s].map((t) => h("td", { class: "n" }, t === null ? "–" : seconds(t))),
       h("td", { class: "n" }, seconds(s.end_s - s.start_s)),
       h("td", { class: "n" }, stance(s)),
-      h("td", {}, s.used ? "yes" : h("span", { class: "mut" }, `no: ${s.excluded}`)),
-      h("td", { class: "n" }, h("button", { class: "btn sm", type: "button", "aria-label": `Open ${s.side} stride at ${seconds(s.start_s)} s`, onclick: () => onPick(i) }, "Open")),
+      h("td", {}, s.used ? speak`yes` : h("span", { class: "mut" }, speak`no: ${s.excluded}`)),
+      h("td", { class: "n" }, h("button", { class: "btn sm", type: "button", "aria-label": speak`Open ${s.side} stride at ${seconds(s.start_s)} s`, onclick: () => onPick(i) }, speak`Open`)),
     ),
   );
   return { words, rows };
@@ -68,18 +71,18 @@ export function strideRows(review, win, picked, onPick) {
 
 // Changes that count, the newest first.
 export function editRows(edits) {
-  if (!edits.length) return [h("li", { class: "mut" }, "None. Everything is as it was detected.")];
+  if (!edits.length) return [h("li", { class: "mut" }, speak`None. Everything is as it was detected.`)];
   return edits.toReversed().map((e) => {
-    const day = new Date(e.at).toLocaleString("en-GB", { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" });
-    return h("li", {}, chip(e.side), h("span", {}, what(e), h("span", { class: "xs dim block" }, `${e.by ?? "unknown"}, ${day}`)));
+    const day = new Date(e.at).toLocaleString(document.documentElement.lang === "de" ? "de-DE" : "en-GB", { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" });
+    return h("li", {}, chip(e.side), h("span", {}, what(e), h("span", { class: "xs dim block" }, `${e.by ?? speak`unknown`}, ${day}`)));
   });
 }
 
 function what(e) {
   const at = `${seconds(e.time_s, 2)} s`;
-  if (e.kind === "move_event") return `${WORD[e.event]} moved from ${at} to ${seconds(e.to_s, 2)} s`;
-  if (e.kind === "add_event") return `${WORD[e.event]} added at ${at}`;
-  if (e.kind === "delete_event") return `${WORD[e.event]} at ${at} deleted`;
-  if (e.kind === "exclude_stride") return `stride at ${at} left out: ${e.reason}`;
-  return `stride at ${at} counted`;
+  if (e.kind === "move_event") return speak`${WORD[e.event]} moved from ${at} to ${seconds(e.to_s, 2)} s`;
+  if (e.kind === "add_event") return speak`${WORD[e.event]} added at ${at}`;
+  if (e.kind === "delete_event") return speak`${WORD[e.event]} at ${at} deleted`;
+  if (e.kind === "exclude_stride") return speak`stride at ${at} left out: ${e.reason}`;
+  return speak`stride at ${at} counted`;
 }

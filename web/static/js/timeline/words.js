@@ -1,5 +1,7 @@
 // Events and times as the parts of the timeline write them.
-export const WORD = { ic: "contact", tc: "foot-off" };
+import { localise, speak } from "../common/text.js";
+
+export const WORD = { ic: speak`contact`, tc: speak`foot-off` };
 
 // Seconds with a real minus, as many decimals as a sample needs.
-export const seconds = (t, digits = 2) => t.toFixed(digits).replace("-", "−");
+export const seconds = (t, digits = 2) => localise(t.toFixed(digits).replace("-", "−"));

@@ -1,11 +1,12 @@
 // Which way this device's sensors point, found by turning it: lying, on its left edge, upright, lying again.
 // Browsers disagree: on the sign of acceleration, on which axis alpha, beta and gamma turn about, on degrees. Gravity
 // decides: between two poses the turned-along gravity g' = g − (ω × g) dt must arrive where it is measured.
+import { speak } from "../../common/text.js";
 export const POSES = [
-  { name: "flat", axis: 2, words: "Lay the device flat, screen up" },
-  { name: "side", axis: 0, words: "Stand it on its left long edge" },
-  { name: "upright", axis: 1, words: "Stand it upright, top edge up" },
-  { name: "flat again", axis: 2, words: "Lay it flat again, screen up" },
+  { name: "flat", axis: 2, words: speak`Lay the device flat, screen up` },
+  { name: "side", axis: 0, words: speak`Stand it on its left long edge` },
+  { name: "upright", axis: 1, words: speak`Stand it upright, top edge up` },
+  { name: "flat again", axis: 2, words: speak`Lay it flat again, screen up` },
 ];
 const GRAVITY = 9.81, OFF = 1.5; // m/s²; phones read up to a tenth beside it
 const STILL_S = 0.8;
@@ -45,7 +46,7 @@ export class AxesTest {
   // One sample: t in s, acc with gravity in m/s², rate [alpha, beta, gamma] as the browser gives it. True when something changed.
   push(t, acc, rate) {
     if (!this.pose || this.problem) return false;
-    if (![...acc, ...rate].every(Number.isFinite)) return this.fail("This device gives no rate of turn, so it cannot be a sensor.");
+    if (![...acc, ...rate].every(Number.isFinite)) return this.fail(speak`This device gives no rate of turn, so it cannot be a sensor.`);
     this.rows.push({ t, acc, rate });
     let from = this.rows.length - 1;
     while (from > 0 && t - this.rows[from - 1].t <= STILL_S) from--;
@@ -54,7 +55,7 @@ export class AxesTest {
     const middle = mean(late, "acc"), norm = length(middle);
     if (late.some((row) => length(row.acc.map((v, i) => v - middle[i])) > STILL_SPREAD)) return false;
     if (Math.abs(norm - GRAVITY) > OFF) {
-      return this.fail(`Lying still it measures ${norm.toFixed(1)} m/s², not 9.8; its acceleration has no gravity in it.`);
+      return this.fail(speak`Lying still it measures ${norm.toFixed(1)} m/s², not 9.8; its acceleration has no gravity in it.`);
     }
     if (Math.abs(middle[this.pose.axis]) < ALONG * norm) return false;
     this.still.push({ from, to: this.rows.length - 1, acc: middle, rate: mean(late, "rate") });
@@ -70,7 +71,7 @@ export class AxesTest {
   decide() {
     const signs = this.still.map(({ acc }, i) => Math.sign(acc[POSES[i].axis]));
     if (signs.some((s) => s !== signs[0])) {
-      return this.fail("One edge was the wrong way round: expected the left long edge down, then the top edge up.");
+      return this.fail(speak`One edge was the wrong way round: expected the left long edge down, then the top edge up.`);
     }
     const rest = mean(this.still, "rate"); // what the rates show in rest is their offset
     const found = [...readings()].map((reading) => ({ ...reading, error: this.misfit(reading, rest) }));
@@ -78,7 +79,7 @@ export class AxesTest {
     const [best, next] = found;
     if (best.error > FITS_DEG || next.error < OTHERS_DEG) {
       const off = best.error <= 180 ? ` (${best.error.toFixed(0)}° off)` : "";
-      return this.fail(`The turns do not fit gravity${off}. Turn the device straight from one way to the next, without haste.`);
+      return this.fail(speak`The turns do not fit gravity${off}. Turn the device straight from one way to the next, without haste.`);
     }
     this.result = { accSign: signs[0], order: best.order, signs: best.signs, scale: best.scale, errorDeg: best.error };
     return true;

@@ -1,14 +1,15 @@
 // The device's own sensor (DeviceMotion): one stream, one sensor, a time with every sample.
 import { AxesTest, turned } from "./axes.js";
 import { RateMeter } from "./rate.js";
+import { speak } from "../../common/text.js";
 
 const BATCH_S = 0.05;
 const SILENT_S = 1;
 const ID_KEY = "sagittal.capture.device", AXES_KEY = "sagittal.capture.axes";
 
 export function whyNot() {
-  if (!isSecureContext) return "The device's own sensor needs https. Open this page by the server's https address.";
-  if (!("DeviceMotionEvent" in window)) return "This browser does not give its motion sensor to pages.";
+  if (!isSecureContext) return speak`The device's own sensor needs https. Open this page by the server's https address.`;
+  if (!("DeviceMotionEvent" in window)) return speak`This browser does not give its motion sensor to pages.`;
   return null;
 }
 
@@ -34,11 +35,11 @@ export class DeviceMotion {
   async add() {
     const motion = /** @type {any} */ (DeviceMotionEvent); // only iOS has to be asked
     if (motion.requestPermission && (await motion.requestPermission()) !== "granted") {
-      throw new Error("Motion was not allowed. Reload this page and allow it, or allow it in the browser's settings.");
+      throw new Error(speak`Motion was not allowed. Reload this page and allow it, or allow it in the browser's settings.`);
     }
     let id = remembered(ID_KEY);
     if (!id) remember(ID_KEY, (id = `device-${crypto.getRandomValues(new Uint32Array(1))[0].toString(16).padStart(8, "0")}`));
-    this.sensors = [{ id, label: "This device", segment: null, battery: null, rateHz: 60, meter: new RateMeter(), steps: [] }];
+    this.sensors = [{ id, label: speak`This device`, segment: null, battery: null, rateHz: 60, meter: new RateMeter(), steps: [] }];
     const axes = remembered(AXES_KEY);
     this.axes = axes?.browser === navigator.userAgent ? axes : null;
     if (!this.axes) this.check();
@@ -128,9 +129,9 @@ export class DeviceMotion {
   health(sensor) {
     const silent = sensor.meter.silentS();
     const rateHz = sensor.meter.rateHz();
-    if (silent === null || silent > SILENT_S) return { kind: "bad", text: "No data", rateHz: 0, note: "this device sends no motion" };
-    if (!this.axes) return { kind: "warn", text: "Check", rateHz, note: "its axes are not checked yet" };
-    if (rateHz < 40) return { kind: "bad", text: "Too slow", rateHz, note: "40 Hz are needed" };
-    return { kind: "ok", text: "Ready", rateHz };
+    if (silent === null || silent > SILENT_S) return { kind: "bad", text: speak`No data`, rateHz: 0, note: speak`this device sends no motion` };
+    if (!this.axes) return { kind: "warn", text: speak`Check`, rateHz, note: speak`its axes are not checked yet` };
+    if (rateHz < 40) return { kind: "bad", text: speak`Too slow`, rateHz, note: speak`40 Hz are needed` };
+    return { kind: "ok", text: speak`Ready`, rateHz };
   }
 }

@@ -1,6 +1,7 @@
 // Movella DOT sensors over Web Bluetooth: each one a stream with a clock of its own.
 import { BATTERY, CONTROL, Clock, DEVICE, INFO, MODES, SERVICES, address, control, decode, settings } from "./dot_payload.js";
 import { RateMeter } from "./rate.js";
+import { speak } from "../../common/text.js";
 
 const MODE = 21; // acceleration and rate of turn: all the estimation needs, in the fewest bytes
 const BATCH_S = 0.1;
@@ -13,9 +14,9 @@ const ACC_RANGE = 16 * 9.80665, GYR_RANGE = 2000 * (Math.PI / 180); // ±16 g an
 // Why there is no Bluetooth here, in a sentence for people; null where there is.
 export function whyNot() {
   if (navigator.bluetooth) return null;
-  if (!isSecureContext) return "Bluetooth needs https. Open this page by the server's https address.";
-  return "This browser cannot reach Bluetooth sensors. Use Chrome or Edge on Android, Windows, macOS or ChromeOS;"
-    + " on an iPad use a browser with Web Bluetooth, such as Bluefy.";
+  if (!isSecureContext) return speak`Bluetooth needs https. Open this page by the server's https address.`;
+  return speak`This browser cannot reach Bluetooth sensors. Use Chrome or Edge on Android, Windows, macOS or ChromeOS;`
+    + speak` on an iPad use a browser with Web Bluetooth, such as Bluefy.`;
 }
 
 const nowUs = () => (performance.timeOrigin + performance.now()) * 1000;
@@ -42,7 +43,7 @@ export class Dot {
       });
     } catch (error) {
       if (error.name === "NotFoundError") return; // the person closed the list
-      throw new Error(`Bluetooth did not answer (${error.message}). Switch Bluetooth on and allow it for this page.`);
+      throw new Error(speak`Bluetooth did not answer (${error.message}). Switch Bluetooth on and allow it for this page.`);
     }
     if (this.sensors.some((s) => s.device === device)) return;
     const sensor = {
@@ -55,7 +56,7 @@ export class Dot {
     } catch (error) {
       sensor.gone = true;
       device.gatt.disconnect();
-      throw new Error(`${device.name} did not answer (${error.message}). Hold it close, wake it by moving it, and try again.`);
+      throw new Error(speak`${device.name} did not answer (${error.message}). Hold it close, wake it by moving it, and try again.`);
     }
     this.sensors.push(sensor);
     this.onchange();
@@ -159,11 +160,11 @@ export class Dot {
     const silent = sensor.meter.silentS();
     const rateHz = sensor.meter.rateHz();
     if (silent === null || silent > SILENT_S) {
-      return { kind: "bad", text: "No data", rateHz: 0, note: silent === null ? "" : `last seen ${Math.round(silent)} s ago` };
+      return { kind: "bad", text: speak`No data`, rateHz: 0, note: silent === null ? "" : speak`last seen ${Math.round(silent)} s ago` };
     }
-    if (sensor.rateHz < 40) return { kind: "bad", text: "Too slow", rateHz, note: "set 60 Hz in the Movella app" };
-    if (rateHz < 0.9 * sensor.rateHz) return { kind: "warn", text: "Weak", rateHz, note: "move it closer" };
-    if (sensor.battery !== null && sensor.battery < LOW_BATTERY) return { kind: "warn", text: "Low", rateHz, note: "charge it soon" };
-    return { kind: "ok", text: "Ready", rateHz };
+    if (sensor.rateHz < 40) return { kind: "bad", text: speak`Too slow`, rateHz, note: speak`set 60 Hz in the Movella app` };
+    if (rateHz < 0.9 * sensor.rateHz) return { kind: "warn", text: speak`Weak`, rateHz, note: speak`move it closer` };
+    if (sensor.battery !== null && sensor.battery < LOW_BATTERY) return { kind: "warn", text: speak`Low`, rateHz, note: speak`charge it soon` };
+    return { kind: "ok", text: speak`Ready`, rateHz };
   }
 }

@@ -2,6 +2,7 @@
 import { decodeBatch, isLog, scanLog } from "../../common/wire.js";
 import { parseMtText, looksLikeMtText } from "./mt_text.js";
 import { parseTable, looksLikeTable } from "./table.js";
+import { speak } from "../../common/text.js";
 
 // A track: sensors that tick together. {ids, segments, rateHz, clock, tUs: Float64Array(n), values: [Float32Array(n*9)]}
 const WRAP = 65536;
@@ -34,13 +35,13 @@ export async function readFiles(files) {
     else if (looksLikeTable(text)) tracks.push(parseTable(text, file.name));
     else if (text.trimStart().startsWith("{")) Object.assign(segments, mappingOf(text, file.name));
     else {
-      throw new Error(`${file.name} is neither Xsens MT Manager text, a Sagittal live log nor a table with time and sensor`
-        + " columns. Choose such files; others can be uploaded on the session's page.");
+      throw new Error(speak`${file.name} is neither Xsens MT Manager text, a Sagittal live log nor a table with time and sensor`
+        + speak` columns. Choose such files; others can be uploaded on the session's page.`);
     }
   }
   const { unique, copies } = withoutCopies(texts);
   if (unique.length) tracks.push(counterTrack(unique));
-  if (!tracks.length) throw new Error("There is no recording among these files. Choose the sensors' files.");
+  if (!tracks.length) throw new Error(speak`There is no recording among these files. Choose the sensors' files.`);
   return { tracks, segments, copies };
 }
 
@@ -49,7 +50,7 @@ function mappingOf(text, name) {
   try {
     return JSON.parse(text).sensors ?? {};
   } catch {
-    throw new Error(`${name} is not readable JSON. Leave it out or choose it again.`);
+    throw new Error(speak`${name} is not readable JSON. Leave it out or choose it again.`);
   }
 }
 
@@ -58,7 +59,7 @@ function withoutCopies(texts) {
   const unique = [], copies = [];
   for (const one of texts) {
     if (unique.some((u) => u.id === one.id)) {
-      throw new Error(`Sensor ${one.id} comes in two files (${one.name}). Choose the files of one walk, each sensor once.`);
+      throw new Error(speak`Sensor ${one.id} comes in two files (${one.name}). Choose the files of one walk, each sensor once.`);
     }
     const same = (u) => u.values.length === one.values.length && u.values.every((v, i) => Object.is(v, one.values[i]));
     const twin = unique.find(same);
@@ -72,13 +73,13 @@ function withoutCopies(texts) {
 function counterTrack(texts) {
   const rateHz = texts.find((t) => t.rateHz)?.rateHz;
   if (!rateHz) {
-    throw new Error(`${texts[0].name} does not say its rate. Export it with "Update Rate", or upload it on the session's`
-      + " page and name the rate there.");
+    throw new Error(speak`${texts[0].name} does not say its rate. Export it with "Update Rate", or upload it on the session's`
+      + speak` page and name the rate there.`);
   }
   const other = texts.find((t) => t.rateHz && Math.abs(t.rateHz - rateHz) > 1e-6);
   if (other) {
-    throw new Error(`${other.name} has ${other.rateHz} Hz, the others ${rateHz} Hz; one packet counter cannot tick twice.`
-      + " Choose the files of one walk.");
+    throw new Error(speak`${other.name} has ${other.rateHz} Hz, the others ${rateHz} Hz; one packet counter cannot tick twice.`
+      + speak` Choose the files of one walk.`);
   }
   const reference = texts[0].counter[0];
   const counts = texts.map(({ counter }) => {
@@ -101,7 +102,7 @@ function counterTrack(texts) {
 
 function logTracks(bytes, name, segments) {
   const records = scanLog(bytes);
-  if (records[0]?.kind !== "H") throw new Error(`${name} is a live log without its first record; it cannot be played.`);
+  if (records[0]?.kind !== "H") throw new Error(speak`${name} is a live log without its first record; it cannot be played.`);
   const hello = JSON.parse(new TextDecoder().decode(records[0].body));
   const batches = records.filter((r) => r.kind === "B").map((r) => decodeBatch(r.body));
   return hello.streams.map((stream) => {

@@ -1,5 +1,6 @@
 // Xsens MT Manager text, one file per sensor: "//" lines, a header line, rows by tab, comma, semicolon or space.
 // The same rules as core/formats/xsens.py; a browser test holds the two against each other.
+import { speak } from "../../common/text.js";
 const GROUPS = [["Acc_X", "Acc_Y", "Acc_Z"], ["Gyr_X", "Gyr_Y", "Gyr_Z"], ["Mag_X", "Mag_Y", "Mag_Z"]];
 const BLANK_IN_EXPORT = /^(SampleTimeFine|Year|Month|Day|Second|UTC_\w+)$/;
 const TICK_S = 1e-4; // SampleTimeFine of MT devices counts 10 kHz ticks
@@ -32,13 +33,13 @@ export const looksLikeMtText = (text) => layoutOf(text) !== null;
 export function parseMtText(text, name) {
   const { comments, names, separator, at } = layoutOf(text);
   const lines = text.slice(at).split(/\r?\n/).filter((line) => line.trim());
-  if (!lines.length) throw new Error(`${name} has a header but no samples. Record or export it again.`);
+  if (!lines.length) throw new Error(speak`${name} has a header but no samples. Record or export it again.`);
   const columns = columnsOf(names, lines[0], separator, name);
   if (columns[0][0] === undefined) {
-    const what = names.includes("FreeAcc_X") ? "acceleration with gravity" : "acceleration";
-    throw new Error(`${name} has no ${what} (Acc_X, Acc_Y, Acc_Z). Export it again with it.`);
+    const what = names.includes("FreeAcc_X") ? speak`acceleration with gravity` : "acceleration";
+    throw new Error(speak`${name} has no ${what} (Acc_X, Acc_Y, Acc_Z). Export it again with it.`);
   }
-  if (columns[1][0] === undefined) throw new Error(`${name} has no rate of turn (Gyr_X, Gyr_Y, Gyr_Z). Export it again with it.`);
+  if (columns[1][0] === undefined) throw new Error(speak`${name} has no rate of turn (Gyr_X, Gyr_Y, Gyr_Z). Export it again with it.`);
   const wanted = columns.flat();
   const number = separator !== "," && !lines[0].includes(".") && /\d,\d/.test(lines[0]) ? (c) => value(c?.replace(",", ".")) : value;
   const counter = [], fine = [];
@@ -67,7 +68,7 @@ function columnsOf(names, first, separator, name) {
   if (separator === " " && found < names.length) {
     shift = names.length - found;
     if (names[0] !== "PacketCounter" || !names.slice(1, 1 + shift).every((n) => BLANK_IN_EXPORT.test(n))) {
-      throw new Error(`${name} is separated by spaces and has lost columns. Export it again with tab or comma.`);
+      throw new Error(speak`${name} is separated by spaces and has lost columns. Export it again with tab or comma.`);
     }
   }
   const place = (n) => {

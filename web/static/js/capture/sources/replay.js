@@ -1,6 +1,7 @@
 // Recorded files played at the speed they were recorded, as if their sensors were worn now.
 import { readFiles } from "./files.js";
 import { RateMeter } from "./rate.js";
+import { speak } from "../../common/text.js";
 
 const TICK_MS = 20;
 const BATCH_S = 0.05;
@@ -110,7 +111,7 @@ export class Replay {
   close() { this.stop(); }
 
   health(sensor) {
-    if (!this.timer) return { kind: "ok", text: "Ready", rateHz: sensor.rateHz };
-    return { kind: "ok", text: "Playing", rateHz: sensor.meter.rateHz() };
+    if (!this.timer) return { kind: "ok", text: speak`Ready`, rateHz: sensor.rateHz };
+    return { kind: "ok", text: speak`Playing`, rateHz: sensor.meter.rateHz() };
   }
 }

@@ -1,4 +1,5 @@
 // A plain table of ours: a column t_s and, per sensor, <id>.acc_x … gyr_z (m/s², rad/s), if wanted mag_x … (a.u.).
+import { speak } from "../../common/text.js";
 const CHANNELS = ["acc", "gyr", "mag"].flatMap((kind) => ["x", "y", "z"].map((axis) => `${kind}_${axis}`));
 
 function layoutOf(text) {
@@ -20,7 +21,7 @@ export function parseTable(text, name) {
   for (const id of ids) {
     const lost = CHANNELS.slice(0, 6).find((c) => !names.includes(`${id}.${c}`));
     if (lost) {
-      throw new Error(`${name} has no column ${id}.${lost}. Each sensor needs acc_x, acc_y, acc_z, gyr_x, gyr_y and gyr_z.`);
+      throw new Error(speak`${name} has no column ${id}.${lost}. Each sensor needs acc_x, acc_y, acc_z, gyr_x, gyr_y and gyr_z.`);
     }
   }
   const time = names.indexOf("t_s");
@@ -28,9 +29,9 @@ export function parseTable(text, name) {
   const lines = text.slice(at).split(/\r?\n/).filter((line) => line.trim());
   const rows = lines.map((line) => line.split(separator).map((c) => (c.trim() ? Number(c) : NaN)));
   const backwards = rows.findIndex((row, i) => !(i ? row[time] > rows[i - 1][time] : row[time] >= 0));
-  if (rows.length < 2) throw new Error(`${name} has no samples. Choose another one.`);
+  if (rows.length < 2) throw new Error(speak`${name} has no samples. Choose another one.`);
   if (backwards >= 0) {
-    throw new Error(`${name}: t_s does not grow in row ${backwards + 2}. Times are in seconds, each later than the one before.`);
+    throw new Error(speak`${name}: t_s does not grow in row ${backwards + 2}. Times are in seconds, each later than the one before.`);
   }
   const tUs = Float64Array.from(rows, (row) => Math.round(row[time] * 1e6));
   const steps = Array.from(tUs.subarray(1), (t, i) => t - tUs[i]).sort((a, b) => a - b);

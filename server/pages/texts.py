@@ -1,0 +1,30 @@
+"""The texts that scripts say in another language than that of their sources."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path
+from starlette.responses import Response
+
+from server.auth.access import require
+from server.auth.roles import Action
+from server.http.problems import SENTENCES, Problem
+from web.language import LANGUAGES, SOURCE, script_texts
+
+router = APIRouter(include_in_schema=False)
+
+KEPT = "public, max-age=31536000, immutable"
+"""The address carries a hash of what it answers."""
+
+
+@router.get("/texts/{language}/{version}.json", dependencies=[require(Action.LOAD_ASSET)])
+def load_texts(
+    language: Annotated[str, Path(max_length=8)], version: Annotated[str, Path(max_length=64)]
+) -> Response:
+    """Answer with the catalogue of one language; the address of an earlier version gets the present one."""
+    if language not in LANGUAGES or language == SOURCE:
+        raise Problem(404, "not_found", SENTENCES["not_found"])
+    present, content = script_texts(language)
+    kept = KEPT if version == present else "no-cache"
+    return Response(content, media_type="application/json", headers={"Cache-Control": kept})

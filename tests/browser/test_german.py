@@ -1,0 +1,86 @@
+"""The pages in German: every text of them, and their layout with its longer words."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import pytest
+from playwright.sync_api import Page
+
+from tests.browser.conftest import Filled, Opener
+from tests.browser.design import layout_faults, text_faults
+from tests.browser.test_look import OUT, PAGES
+from web.language import PLACEHOLDER, load_catalogue
+
+pytestmark = pytest.mark.browser
+
+SIZES: Final = ((1280, 800), (820, 1180))
+
+SHOWN: Final = """() => {
+  const said = [], walk = document.createTreeWalker(document.documentElement, NodeFilter.SHOW_TEXT);
+  for (let node; (node = walk.nextNode());)
+    if (!node.parentElement.closest("script, style, template, [lang=en], option[value]"))
+      said.push(node.data);
+  for (const name of ["title", "aria-label", "placeholder", "alt"])
+    for (const e of document.querySelectorAll(`[${name}]`)) said.push(e.getAttribute(name));
+  return said.map((text) => text.trim().replace(/\\s+/g, " ")).filter(Boolean);
+}"""
+"""Every text of a page and every attribute that people read."""
+
+TYPED: Final = frozenset({"Walk", "Note"})
+"""What the clinic of these tests typed, and what is a message too."""
+
+
+def left_english(page: Page) -> list[str]:
+    """Texts of the page that are English messages with another German text."""
+    messages = load_catalogue("de").messages
+    return sorted({text for text in page.evaluate(SHOWN) if messages.get(text, text) != text} - TYPED)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_is_german_and_keeps_to_the_design(name: str, opened: Opener, filled: Filled) -> None:
+    for width, height in SIZES:
+        page = opened(
+            PAGES[name](filled), signed_in=name not in OUT, locale="de-DE", width=width, height=height
+        )
+        page.wait_for_load_state()
+        assert page.locator("html").get_attribute("lang") == "de"
+        assert left_english(page) == []
+        assert not layout_faults(page) | text_faults(page), f"{width}"
+        page.close()
+
+
+def test_the_check_can_fail(opened: Opener) -> None:
+    page = opened("/patients", locale="de-DE")
+    page.evaluate("() => { document.querySelector('h1').textContent = 'Skip to content'; }")
+    assert left_english(page) == ["Skip to content"]
+
+
+def test_scripts_speak_german_and_write_decimal_commas(opened: Opener) -> None:
+    page = opened("/capture", signed_in=False, locale="de-DE")
+    page.get_by_role("button", name="Code eingeben").wait_for()
+    said = page.evaluate(
+        """async () => {
+          const { speak, translate } = await import("/static/js/common/text.js");
+          const rest = speak`${(1.25).toFixed(2)} s are still on this tablet only.`;
+          return [rest, translate("Stand still."), speak`Stop`];
+        }"""
+    )
+    assert said == ["1,25 s sind noch allein auf diesem Tablet.", "Stehen Sie still.", "Stopp"]
+
+
+def test_an_account_keeps_its_language_whatever_the_browser_asks(opened: Opener) -> None:
+    page = opened("/account", locale="de-DE")
+    page.get_by_label("Sprache").select_option("en")
+    page.get_by_role("button", name="Speichern").click()
+    page.locator("html[lang=en]").wait_for(state="attached")
+    assert page.get_by_role("heading", name="Change password").is_visible()
+    page.get_by_label("Language").select_option("")
+    page.get_by_role("button", name="Save").click()
+    page.locator("html[lang=de]").wait_for(state="attached")
+
+
+def test_placeholders_are_filled(opened: Opener, filled: Filled) -> None:
+    page = opened(f"/sessions/{filled.done}", locale="de-DE")
+    page.wait_for_load_state()
+    assert [text for text in page.evaluate(SHOWN) if PLACEHOLDER.search(text)] == []

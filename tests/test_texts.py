@@ -1,0 +1,191 @@
+"""The catalogues in web/texts: every message of the sources has its text, and nothing is left behind."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+import pytest
+from babel.messages.pofile import read_po
+
+from server.report.headline_phrases import BOTH_STEPS, PELVIS_RISES, PHRASES, SHORT_AND_QUICK
+from tests.data import ROOT
+from tests.texts import STAYS_ENGLISH, list_messages, python_texts, script_texts
+from web.language import (
+    LANGUAGES,
+    PLACEHOLDER,
+    SOURCE,
+    Catalogue,
+    catalogue_path,
+    choose_language,
+    load_catalogue,
+)
+from web.language import script_texts as script_catalogue
+from web.shown import Shown
+from web.template_texts import list_texts, speak_template
+from web.words import Verbatim
+
+OTHERS: Final = [language for language in LANGUAGES if language != SOURCE]
+
+MOST_OF_HEADLINE: Final = 95
+"""Characters of a sentence that a person reads first."""
+
+HINT: Final = "python -m tests.texts brings the catalogue up to date; then give each new message its text"
+
+
+def entries(language: str) -> dict[str, str]:
+    with catalogue_path(language).open("rb") as file:
+        return {str(entry.id): str(entry.string) for entry in read_po(file) if entry.id}
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_every_message_of_the_sources_has_a_text(language: str) -> None:
+    known = entries(language)
+    assert [message for message in list_messages() if not known.get(message)] == [], HINT
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_no_text_is_left_of_a_message_that_is_gone(language: str) -> None:
+    messages = list_messages()
+    assert [message for message in entries(language) if message not in messages] == [], HINT
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_texts_have_the_placeholders_of_their_messages(language: str) -> None:
+    differ = {
+        message: said
+        for message, said in entries(language).items()
+        if set(PLACEHOLDER.findall(message)) != set(PLACEHOLDER.findall(said))
+        or message.count("*") != said.count("*")
+    }
+    assert differ == {}
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_headline_sentences_are_read_at_a_glance(language: str) -> None:
+    patterns = [SHORT_AND_QUICK, BOTH_STEPS, PELVIS_RISES]
+    for phrases in PHRASES.values():
+        patterns += [text for text in vars(phrases).values() if isinstance(text, str) and "*" in text]
+    values = {
+        "side": "left",
+        "other": "right",
+        "word": "longer",
+        "l": "−12.3",
+        "r": "−10.4",
+        "cm": "12",
+        "c": "128",
+    }
+    catalogue = load_catalogue(language)
+    said = [
+        catalogue.translate(PLACEHOLDER.sub(lambda m: values.get(m[1], "0.65"), text)).replace("*", "")
+        for text in patterns
+    ]
+    assert len(said) > 90
+    assert [text for text in said if len(text) > MOST_OF_HEADLINE] == []
+
+
+def test_what_stays_english_is_there() -> None:
+    assert [place for place in STAYS_ENGLISH if not (ROOT / place).exists()] == []
+
+
+def test_messages_are_found_in_python() -> None:
+    source = (
+        '"""A docstring is none."""\n'
+        "Notice('few_steps', f'{count} step{\"\" if count == 1 else \"s\"} of the {side} foot.', 'pelvis')\n"
+        "raise ValueError('An error of a program.')\n"
+    )
+    assert list(python_texts(source, whole=False)) == [
+        "Few steps",
+        "{count} step of the {side} foot.",
+        "{count} steps of the {side} foot.",
+    ]
+
+
+def test_messages_are_found_in_templates() -> None:
+    source = (
+        "<p title=\"A title\">In all {{ n }} visit{{ '' if n == 1 else 's' }}\n  <b>{{ name }}</b></p>"
+        '<a class="tbl tight">{{ ico("x") }}Open</a>'
+    )
+    found = list(list_texts(source))
+    assert {"A title", "In all {n} visits", "In all {n} visit", "Open"} <= set(found)
+    spoken = speak_template(source)
+    assert 'title="{{ say_plain_message("A title") }}"' in spoken
+    assert "<b>{{ say(name) }}</b>" in spoken
+
+
+def test_messages_are_found_in_scripts() -> None:
+    assert list(script_texts("a = speak`Sensor ${n + 1} is ready`; b = `not this ${one}`;")) == [
+        "Sensor {0} is ready"
+    ]
+
+
+DE: Final = load_catalogue("de")
+
+
+@pytest.mark.parametrize(
+    ("english", "german"),
+    [
+        ("Step length", "Schrittlänge"),
+        ("step length", "Schrittlänge"),
+        ("12.3 ± 0.4", "12,3 ± 0,4"),
+        ("0.98 m/s", "0,98 m/s"),
+        ("18 Nov 2026", "18.11.2026"),
+        ("left longer by 0.04 s", "links länger um 0,04 s"),
+        ("112 strides used, 56 left and 56 right.", "112 Doppelschritte verwendet, 56 links und 56 rechts."),
+        (
+            "The left step is *0.04 m shorter* than the right",
+            "Der Schritt links ist *0,04 m kürzer* als rechts",
+        ),
+        ("Knee flexion, swing peak, from standing", "Knieflexion, Gipfel der Schwungphase, vom Stand aus"),
+        (
+            "within measurement error; includes how the person stood",
+            "innerhalb des Messfehlers; enthält, wie die Person stand",
+        ),
+    ],
+)
+def test_what_was_made_from_a_message_is_found_again(english: str, german: str) -> None:
+    assert DE.translate(english) == german
+
+
+def test_an_unknown_sentence_stays_english_and_says_so() -> None:
+    said = "The <cat> sat on the mat."
+    assert DE.find(said) is None
+    assert str(Shown(DE).say(said)) == '<span lang="en">The &lt;cat&gt; sat on the mat.</span>'
+
+
+def test_what_a_person_typed_stays_as_it_is() -> None:
+    shown = Shown(DE)
+    assert shown.say(Verbatim("Left")) == "Left"
+    assert shown.say("Left") == "Links"
+    assert "(patient.code) | verbatim" in speak_template("<p>Type {{ patient.code }} to confirm</p>")
+
+
+def test_a_long_text_costs_no_more_than_its_sentences() -> None:
+    """A text of many parts is looked for in sentences; patterns on all of it would take minutes."""
+    text = "The cat sat, and the dog; and a fox, or a hen: no, " * 100
+    assert DE.find(text) is None
+
+
+def test_english_says_what_the_sources_say() -> None:
+    empty = Catalogue("de", {})
+    assert empty.translate("No message") == "No message"
+
+
+@pytest.mark.parametrize(
+    ("accepted", "chosen"),
+    [
+        ("de", "de"),
+        ("de-AT,de;q=0.9,en;q=0.8", "de"),
+        ("fr, en;q=0.5", "en"),
+        ("de;q=0", "en"),
+        ("de;q=x", "en"),
+    ],
+)
+def test_the_browser_says_which_language(accepted: str, chosen: str) -> None:
+    assert choose_language(accepted) == chosen
+
+
+def test_scripts_are_handed_what_they_say() -> None:
+    version, content = script_catalogue("de")
+    assert re.fullmatch(r"[0-9a-f]{16}", version)
+    assert '"Stop":"Stopp"' in content.decode()

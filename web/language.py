@@ -1,0 +1,376 @@
+"""The languages of the pages: English is written in the sources, the others are catalogues in web/texts.
+
+A message is an English text with `{placeholders}`: what a template, a page module or `core` says. A sentence
+that was made from it, now or in a result stored years ago, is found again by the pattern of the message; what
+stands in its placeholders is translated by itself, numbers and dates by the locale (docs/languages.md).
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import functools
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Final
+
+from babel import Locale
+from babel.dates import format_date
+from babel.messages.pofile import read_po
+from babel.numbers import format_decimal
+
+LANGUAGES: Final[Mapping[str, str]] = {"en": "English", "de": "Deutsch"}
+"""Code of a language → its own name; the first is that of the sources."""
+
+SOURCE: Final = next(iter(LANGUAGES))
+
+MONTHS: Final = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+
+PLACEHOLDER: Final = re.compile(r"\{(\w*)\}")
+
+LONGEST: Final = 500
+"""Characters up to which a text is looked for as a whole; a longer one by its sentences."""
+
+MOST_PARTS: Final = 12
+
+STRONG: Final = 12
+"""Letters of its own from which on a message is not mistaken for another."""
+
+_DECIMAL: Final = re.compile(r"(?<![\w.,])(?<!BY )(\d+)\.(\d+)(?![\d.])")
+_DATE: Final = re.compile(rf"\b(\d{{1,2}}) ({'|'.join(MONTHS)})(?: (\d{{4}}))?\b")
+_MEASURED: Final = re.compile(
+    r"([−+±≤≥<>]?\d[\d.,−±–\u2009\u202f ]*?)([\u2009\u202f ]?)([^\d\s.,].*)", re.DOTALL
+)
+"""A number with its unit."""
+_NUMBERED: Final = re.compile(
+    r"(.*[^\W\d_])((?:[\u2009\u202f ][±−+]?[\u2009\u202f ]?\d[\d.]*[ \u2009\u202f]?[°%]?)+)", re.DOTALL
+)
+"""A word with its number."""
+_SENTENCE: Final = re.compile(r"(?<=[.!?…])\s+(?=[A-Z0-9“])")
+_JOINS: Final = ("; ", " · ", " → ", " | ", ": ", ", ", " – ", " and ")
+"""What pages put between parts that are messages of their own, the strongest first."""
+
+CITED: Final = re.compile(
+    r"\b(19|20)\d\d\b.*(:|\d\(\d|Proc\.|Conf|Sens|IEEE)|^[A-Z][a-z]+(Martin)?(19|20)\d\d|et al\. (19|20)\d\d$"
+)
+"""References to papers stay as they are written."""
+
+
+def choose_language(accepted: str | None) -> str:
+    """The language of the pages that a browser's Accept-Language asks for first.
+
+    >>> choose_language("fr-CH, de-CH;q=0.9, en;q=0.8"), choose_language("de;q=0.2, en")
+    ('de', 'en')
+    """
+    asked: list[tuple[float, str]] = []
+    for part in (accepted or "").split(","):
+        tag, _, quality = part.strip().partition(";q=")
+        try:
+            weight = float(quality or 1)
+        except ValueError:
+            continue
+        asked.append((-weight, tag.split("-")[0].strip().lower()))
+    return next(
+        (tag for weight, tag in sorted(asked, key=lambda a: a[0]) if weight and tag in LANGUAGES), SOURCE
+    )
+
+
+class Catalogue:
+    """The texts of one language.
+
+    Parameters
+    ----------
+    messages : English text with {placeholders} → text of the language with the same, or some of them.
+    """
+
+    def __init__(self, language: str, messages: Mapping[str, str]) -> None:
+        self.language = language
+        self.messages = messages
+        self._locale = Locale.parse(language)
+        self._folded = {text.casefold(): said for text, said in messages.items()}
+        self._patterns = [_Pattern(text, said) for text, said in messages.items() if PLACEHOLDER.search(text)]
+        # of two that fit, the one with more words of its own
+        self._patterns.sort(key=lambda p: -p.literal)
+        self._known = functools.lru_cache(maxsize=20_000)(self._find)
+
+    def fill(self, message: str, values: Mapping[str, str]) -> str:
+        """The text of a message with values that are said already; English where the catalogue has none."""
+        return _fill(self.messages.get(message, message), values)
+
+    def find(self, text: str) -> str | None:
+        """A text in this language; None where no part of it is made from a message."""
+        known = self._known(text)
+        return self._loosely(text.strip()) if known is None else known
+
+    def translate(self, text: str) -> str:
+        """A text in this language, English where it is made from no message."""
+        known = self.find(text)
+        return text if known is None else known
+
+    def _loosely(self, text: str) -> str | None:
+        """A sentence with words of somebody else in it, or sentences of which some are known."""
+        made = self._by_pattern(text, strong=True, loose=True) if len(text) <= LONGEST else None
+        made = made or self._by_sentences(_SENTENCE.split(text), partly=True)
+        return text if made is None and CITED.search(text) else made
+
+    def _find(self, text: str) -> str | None:
+        inner = text.strip()
+        if not inner:
+            return text
+        said = (
+            self._exact(inner)
+            or self._plain(inner)
+            or (self._made(inner) if len(inner) <= LONGEST else None)
+            or self._by_sentences(_SENTENCE.split(inner), partly=False)
+        )
+        return None if said is None else text.replace(inner, said, 1)
+
+    def _exact(self, text: str) -> str | None:
+        said = self.messages.get(text)
+        if said is None:
+            folded = self._folded.get(text.casefold())
+            said = None if folded is None else _with_case(text, folded)
+        return said
+
+    def _made(self, text: str) -> str | None:
+        return (
+            self._by_pattern(text, strong=True)
+            or self._before_stop(text)
+            or self._by_parts(text)
+            or self._by_pattern(text, strong=False)
+            or self._measured(text)
+        )
+
+    def _before_stop(self, text: str) -> str | None:
+        """A message after which a page has set a full stop."""
+        if text[-1] not in ".:;" or len(text) < 2:
+            return None
+        before = self._known(text[:-1])
+        return None if before is None else before + text[-1]
+
+    def _plain(self, text: str) -> str | None:
+        """A date, a number, or a name of capitals."""
+        date = _DATE.fullmatch(text)
+        if date:
+            return self._date(date)
+        found = _MEASURED.fullmatch(text)
+        if found and found[3] in self.messages:
+            return f"{self._localise(found[1])}{found[2]}{self.messages[found[3]]}"
+        if not re.search(r"[a-zäöüß]", re.sub(r"(?<![^\W\d_])[^\W\d_](?![^\W\d_])", "", text)):
+            # numbers, single letters, names of capitals
+            said = self._by_pattern(text, strong=False) if re.search(r"[^\W\d_]", text) else None
+            return self._localise(text) if said is None else said
+        return None
+
+    def _measured(self, text: str) -> str | None:
+        """A number and its unit, or a word and its number."""
+        numbered = _NUMBERED.fullmatch(text)
+        if numbered and (word := self._known(numbered[1])) is not None:
+            return word + self._localise(numbered[2])
+        found = _MEASURED.fullmatch(text)
+        if not found:
+            return None
+        unit = self._exact(found[3]) or self._by_pattern(found[3], strong=False)
+        if unit is None and re.fullmatch(r"\S{1,7}", found[3]):
+            unit = found[3]  # m/s, kHz, MB
+        return None if unit is None else f"{self._localise(found[1])}{found[2]}{unit}"
+
+    def _date(self, found: re.Match[str]) -> str:
+        day, month, year = found.groups()
+        value = dt.date(int(year or 2000), MONTHS.index(month) + 1, int(day))
+        return self.day(value) if year else str(format_date(value, "d. MMM", locale=self._locale))
+
+    def _by_pattern(self, text: str, *, strong: bool, loose: bool = False) -> str | None:
+        """A sentence that was made from a message; `loose` = whatever stands in its placeholders."""
+        for pattern in self._patterns:
+            if pattern.is_strong != strong:
+                continue
+            for values in pattern.match(text):
+                spoken = values.values()
+                if all(map(self._stands_alone, spoken)) or (loose and not any(map(_SENTENCE.search, spoken))):
+                    said = {key: self._value(value) for key, value in values.items()}
+                    # a number may stand in two placeholders side by side
+                    return _with_case(text, self._localise(_fill(pattern.said, said)))
+        return None
+
+    def _stands_alone(self, value: str) -> bool:
+        """Whether a value is a word or a message by itself, not a piece of another sentence."""
+        return (
+            not re.search(r"\s", value.strip())
+            or self._known(value) is not None
+            or (not _SENTENCE.search(value) and CITED.search(value) is not None)
+        )
+
+    def _value(self, text: str) -> str:
+        known = self._known(text)
+        return self._localise(text) if known is None else known
+
+    def _by_parts(self, text: str) -> str | None:
+        """A text of parts that are messages."""
+        for join in _JOINS:
+            if text.count(join) >= MOST_PARTS:
+                continue
+            at = text.rfind(join)
+            while at > 0:
+                said = self._join(text[:at], join, text[at + len(join) :])
+                if said is not None:
+                    return said
+                at = text.rfind(join, 0, at)
+        return None
+
+    def _join(self, first: str, join: str, second: str) -> str | None:
+        if not first or not second:
+            return None
+        # "; and so on" may be a message with what joins it
+        tail = self.messages.get(f"{join}{second}".strip()) or self._by_pattern(
+            f"{join}{second}".strip(), strong=True
+        )
+        head = self._known(first)
+        if head is None:
+            head = self.messages.get(f"{first}{join.rstrip()}")
+            if head is not None and (rest := self._known(second)) is not None:
+                return f"{head} {rest}"
+            return None
+        if tail is not None:
+            return f"{head}{tail}" if tail[0] in ",;:" else f"{head} {tail}"
+        rest = self._known(second)
+        if rest is None:
+            return None
+        return (
+            f"{head} {self.messages.get('and', 'and')} {rest}" if join == " and " else f"{head}{join}{rest}"
+        )
+
+    def _by_sentences(self, sentences: list[str], *, partly: bool) -> str | None:
+        """Sentences one after another, those of one message together; `partly` = some may stay."""
+        said: list[str] = []
+        found = False
+        while sentences and (len(sentences) > 1 or said):
+            for n in range(len(sentences), 0, -1):
+                whole = " ".join(sentences[:n])
+                known = self._exact(whole)
+                if known is None and len(whole) <= LONGEST:
+                    known = self._by_pattern(whole, strong=True, loose=partly)
+                if known is None and n == 1:
+                    known = self._known(whole)
+                if known is None and n == 1 and not partly:
+                    return None
+                if known is not None or n == 1:
+                    said.append(whole if known is None else known)
+                    found = found or known is not None
+                    sentences = sentences[n:]
+                    break
+        return " ".join(said) if found else None
+
+    def _localise(self, text: str) -> str:
+        """Numbers and dates inside a text as this language writes them."""
+        mark = format_decimal(0.1, locale=self._locale)[1]
+        return _DECIMAL.sub(rf"\1{mark}\2", _DATE.sub(self._date, text))
+
+    def day(self, value: dt.date | dt.datetime) -> str:
+        """A date as "18.11.2026"."""
+        return str(format_date(value, "medium", locale=self._locale))
+
+
+class _Pattern:
+    """How the sentences of one message look."""
+
+    def __init__(self, text: str, said: str) -> None:
+        self.said = said
+        pieces = PLACEHOLDER.split(text)
+        self.names = pieces[1::2]
+        literals = pieces[::2]
+        self.literal = sum(len(piece.strip()) for piece in literals)
+        self.is_strong = len(re.findall(r"[^\W\d_]", "".join(literals))) >= STRONG
+        self._stops = not literals[-1] or literals[-1].endswith(".")
+        if not literals[-1] and literals[-2] and not literals[-2].rstrip().endswith((".", ":")):
+            self._stops = False  # what stands last is no sentence
+        self._longest = max(literals, key=len).casefold()
+        self._forms = [
+            re.compile(value.join(re.escape(piece) for piece in literals), re.DOTALL | re.IGNORECASE)
+            for value in ("(.+?)", "(.+)")
+        ]
+
+    def match(self, text: str) -> Iterator[dict[str, str]]:
+        """What may stand in the placeholders; nothing if the text is not made from this message."""
+        if (text.endswith(".") and not self._stops) or self._longest not in text.casefold():
+            return
+        before: tuple[str, ...] = ()
+        for form in self._forms:
+            found = form.fullmatch(text)
+            if found is not None and found.groups() != before:
+                before = found.groups()
+                yield dict(zip(self.names, before, strict=True))
+
+
+def _fill(said: str, values: Mapping[str, str]) -> str:
+    return PLACEHOLDER.sub(lambda m: values.get(m[1], m[0]), said)
+
+
+def _with_case(text: str, said: str) -> str:
+    """A capital where the English begins with one; German nouns keep theirs."""
+    return said[:1].upper() + said[1:] if text[:1].isupper() else said
+
+
+def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:
+    """Message, text and the files it comes from, of every translated message of a .po file."""
+    with path.open("rb") as file:
+        for entry in read_po(file):
+            if entry.id and entry.string:
+                yield str(entry.id), str(entry.string), frozenset(name for name, _ in entry.locations)
+
+
+def catalogue_path(language: str) -> Path:
+    """Where the texts of a language are."""
+    return Path(__file__).parent / "texts" / f"{language}.po"
+
+
+SCRIPTS: Final = "web/static/js/"
+
+SCRIPT_PLACES: Final = (
+    SCRIPTS,
+    "core/agreement/tell_live.py",
+    "core/calibration/score.py",
+    "core/online/",
+    "core/parameters/catalogue/",
+    "server/http/",
+    "server/live/",
+    "server/auth/",
+    "server/api/",
+    "server/services/targets.py",
+    "server/report/calibration_checks.py",
+    "server/report/change_words.py",
+    "server/report/guided_words.py",
+    "server/report/wording.py",
+    "server/pages/session_context.py",
+    "server/pages/words.py",
+    "tests/texts.py",
+)
+"""Where the messages come from that scripts say, or are sent to say."""
+
+
+@functools.cache
+def script_texts(language: str) -> tuple[str, bytes]:
+    """What the scripts say in a language as JSON, and the hash of it that its address carries."""
+    said = {
+        text: words
+        for text, words, files in read_messages(catalogue_path(language))
+        if any(name.startswith(SCRIPT_PLACES) for name in files)
+    }
+    content = json.dumps(said, ensure_ascii=False, separators=(",", ":")).encode()
+    return hashlib.sha256(content).hexdigest()[:16], content
+
+
+@functools.cache
+def load_catalogue(language: str) -> Catalogue:
+    """The catalogue of a language other than that of the sources, read once."""
+    return Catalogue(
+        language,
+        {
+            text: said
+            for text, said, files in read_messages(catalogue_path(language))
+            # the sentences of scripts are made in the browser
+            if not (PLACEHOLDER.search(text) and all(name.startswith(SCRIPTS) for name in files))
+        },
+    )

@@ -1,0 +1,108 @@
+"""What the templates of a language call: every text and every value that a page shows goes through here."""
+
+from __future__ import annotations
+
+import datetime as dt
+import html
+import re
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from markupsafe import Markup, escape
+
+from web.language import Catalogue
+from web.words import Verbatim, number
+
+SPOKEN_KEYS: Final = frozenset(
+    {
+        "comparison", "detail", "down", "everyday", "headline", "hint", "label", "name_words", "say", "text",
+        "title", "todo", "unit", "up", "why", "word", "words",
+    }
+)  # fmt: skip
+"""Members of what a page hands to its scripts that are words for people."""
+
+SPOKEN_MAPS: Final = frozenset({"segments"})
+"""The same, of which every member is."""
+
+_FIGURE_TEXT: Final = re.compile(
+    r"(<(?:text|title|tspan)\b[^>]*>)([^<]+)(?=<)|((?:aria-label|title)=\")([^\"]+)(?=\")"
+)
+
+
+class Shown:
+    """Texts and values as one language shows them.
+
+    Parameters
+    ----------
+    catalogue : of the language.
+    """
+
+    def __init__(self, catalogue: Catalogue) -> None:
+        self._catalogue = catalogue
+
+    @property
+    def functions(self) -> dict[str, Callable[..., object]]:
+        """What `web.template_texts.speak_template` calls, by name."""
+        return {
+            "say": self.say,
+            "say_plain": self.say_plain,
+            "say_message": self.say_message,
+            "say_plain_message": self.say_message,
+        }
+
+    @property
+    def filters(self) -> dict[str, Callable[..., object]]:
+        """The filters that this language has in its own way."""
+        return {
+            "day": lambda value: Verbatim(self._catalogue.day(value)),
+            "moment": self._moment,
+            "number": lambda value, digits=0: Verbatim(self._catalogue.translate(number(value, digits))),
+            "safe": lambda value: Markup(self.say_figure(str(value))),  # noqa: S704 - drawn by us
+            "spoken": self.say_members,
+            "said": self.say_plain,
+            "meant": lambda text, meaning: Verbatim(self._catalogue.translate(f"{text} ({meaning})")),
+            "verbatim": lambda value: Verbatim(value) if isinstance(value, str) else value,
+        }
+
+    def _moment(self, value: dt.datetime) -> Verbatim:
+        utc = value.astimezone(dt.UTC)
+        return Verbatim(f"{self._catalogue.day(utc)}, {utc:%H:%M}")
+
+    def say_plain(self, value: object) -> object:
+        """A value in an attribute."""
+        if not isinstance(value, str) or isinstance(value, Verbatim) or hasattr(value, "__html__"):
+            return value
+        return self._catalogue.translate(value)
+
+    def say(self, value: object) -> object:
+        """A value between tags; a sentence that no message is known for stays English, marked as such."""
+        if not isinstance(value, str) or isinstance(value, Verbatim) or hasattr(value, "__html__"):
+            return value
+        known = self._catalogue.find(value)
+        if known is None and re.search(r"[^\W\d_]{2}\s+[^\W\d_]{2}", value):
+            return Markup('<span lang="en">{}</span>').format(value)
+        return value if known is None else known
+
+    def say_message(self, message: str, **values: object) -> Markup:
+        """A text of a template, which may hold entities, with values; they are escaped here."""
+        said = {name: str(escape(self.say_plain(value))) for name, value in values.items()}
+        return Markup(self._catalogue.fill(message, said))  # noqa: S704 - templates are ours, values escaped
+
+    def say_figure(self, drawn: str) -> str:
+        """A figure with its labels and titles in the language."""
+
+        def speak(found: re.Match[str]) -> str:
+            opening, text = (found[1], found[2]) if found[1] else (found[3], found[4])
+            return f"{opening}{escape(self._catalogue.translate(html.unescape(text)))}"
+
+        return _FIGURE_TEXT.sub(speak, drawn)
+
+    def say_members(self, value: Any, key: str = "") -> Any:
+        """What a page hands to its scripts, the words for people in the language."""
+        if isinstance(value, Mapping):
+            return {k: self.say_members(v, key if key in SPOKEN_MAPS else str(k)) for k, v in value.items()}
+        if isinstance(value, list | tuple):
+            return [self.say_members(v, key) for v in value]
+        if isinstance(value, str) and key in SPOKEN_KEYS | SPOKEN_MAPS:
+            return self.say_plain(value)
+        return value

@@ -1,0 +1,212 @@
+"""The texts of a template: what stands between tags and in the attributes that people read.
+
+Templates are written in English without marks. For another language `speak_template` puts a call around every
+text and every value shown there; `list_texts` gives the same messages to the catalogue. What a person typed
+carries `| verbatim` and is shown as it is.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Container, Iterator
+from typing import Final
+
+from jinja2 import Environment, nodes
+
+from web.language import PLACEHOLDER
+
+READ_ATTRIBUTES: Final = frozenset({"alt", "aria-label", "aria-description", "label", "placeholder", "title"})
+
+TYPED: Final = re.compile(r"(patient\.(code|note)|session\.(title|note))\b(?!.*~)", re.DOTALL)
+"""Values that a person typed, wherever they are shown; others carry `| verbatim`."""
+
+_TOKEN: Final = re.compile(
+    r"(\{#.*?#\}|\{%.*?%\}|\{\{.*?\}\}|<!.*?>|<(?:[^<>{]|\{\{.*?\}\}|\{%.*?%\}|\{)*>)", re.DOTALL
+)
+_ATTRIBUTE: Final = re.compile(r'(?<=\s)([\w-]+)="((?:[^"{]|\{\{.*?\}\}|\{%.*?%\}|\{)*)"', re.DOTALL)
+_EITHER: Final = re.compile(r"'([^']*)' if (.+?)(?: else '([^']*)')?", re.DOTALL)
+_ENTITY: Final = re.compile(r"&\w+;")
+_PARSER: Final = Environment()  # noqa: S701 - only reads expressions
+
+
+def speak_template(source: str) -> str:
+    """The source with each text and shown value inside a call of `say` or, in attributes, `say_plain`."""
+    return "".join(_walk(source, lambda run, how: _speak(run, how)))
+
+
+def list_texts(source: str) -> Iterator[str]:
+    """Every message of a template: its texts, and the strings in its expressions that read like one."""
+    found: list[str] = []
+
+    def keep(run: str, how: str) -> str:
+        found.extend(message for message, _ in _variants(_Run(run)))
+        return run
+
+    for _ in _walk(source, keep):
+        pass
+    yield from (m for m in found if has_words(m))
+    for node in _PARSER.parse(source).find_all((nodes.Const, nodes.Concat)):
+        yield from _strings(node)
+
+
+def has_words(message: str) -> bool:
+    """Whether something of a message is to be translated."""
+    return re.search(r"[^\W\d_]{2}", PLACEHOLDER.sub(" ", _ENTITY.sub(" ", message))) is not None
+
+
+class _Run:
+    """What stands between two tags or statements: text and `{{ expressions }}` in turn.
+
+    `lead` and `trail` are the white space around; `pieces` are text (even) and expressions (odd).
+    """
+
+    def __init__(self, run: str) -> None:
+        pieces: list[str] = [""]
+        for part in re.split(r"(\{\{.*?\}\})", run, flags=re.DOTALL):
+            if part.startswith("{{"):
+                inner = part[2:-2]
+                if inner.startswith("-"):
+                    pieces[-1] = pieces[-1].rstrip()
+                pieces += [inner.strip("-").strip(), "\0" if inner.endswith("-") else ""]
+            else:
+                pieces[-1] = part.lstrip() if pieces[-1] == "\0" else part
+        pieces = [
+            piece if i % 2 else re.sub(r"\s+", " ", piece.strip("\0")) for i, piece in enumerate(pieces)
+        ]
+        self.lead = " " if pieces[0].startswith(" ") else ""
+        self.trail = " " if pieces[-1].endswith(" ") else ""
+        pieces[0] = pieces[0].lstrip()
+        pieces[-1] = pieces[-1].rstrip()
+        self.pieces = pieces
+
+
+def _walk(source: str, speak: Callable[[str, str], str]) -> Iterator[str]:
+    """The source in order, each run of text and values through `speak`, those of attributes too."""
+    run = ""
+    for part in _TOKEN.split(source):
+        if part.startswith("{{") and not _is_markup(part):
+            run += part
+        elif part.startswith(("{{", "{%", "{#", "<")):
+            yield speak(run, "say") if run else ""
+            run = ""
+            yield _ATTRIBUTE.sub(lambda m: _attribute(m, speak), part) if part.startswith("<") else part
+        else:
+            run += part
+    yield speak(run, "say") if run else ""
+
+
+def _attribute(found: re.Match[str], speak: Callable[[str, str], str]) -> str:
+    name, value = found.groups()
+    if name not in READ_ATTRIBUTES:
+        return found[0]
+    return f'{name}="{"".join(_walk(value, lambda run, _: speak(run, "say_plain")))}"'
+
+
+def _is_markup(expression: str) -> bool:
+    """Whether an expression is a macro's call, or HTML made elsewhere: no part of a sentence."""
+    inner = expression[2:-2].strip("-").strip()
+    return re.match(r"\w+\(", inner) is not None or re.search(r"\|\s*(safe|tojson)\s*$", inner) is not None
+
+
+def _speak(text: str, how: str) -> str:
+    run = _Run(text)
+    if not any(has_words(piece) for piece in run.pieces[::2]):
+        # the white space of values alone stays as it is written
+        return re.sub(
+            r"\{\{(-?)(.*?)(-?)\}\}",
+            lambda m: f"{{{{{m[1]} {how}({_value(m[2].strip())}) {m[3]}}}}}",
+            text,
+            flags=re.DOTALL,
+        )
+    (message, call), *others = _variants(run)
+    said = _call(message, call, how)
+    for other, (condition, values) in others:
+        said = f"{_call(other, (condition, values), how)} if ({condition}) else ({said})"
+    return f"{run.lead}{{{{ {said} }}}}{run.trail}"
+
+
+def _call(message: str, call: tuple[str, dict[str, str]], how: str) -> str:
+    values = "".join(f", {name}=({_value(value)})" for name, value in call[1].items())
+    return f"{how}_message({_quote(message)}{values})"
+
+
+def _value(expression: str) -> str:
+    return f"({expression}) | verbatim" if TYPED.match(expression) else expression
+
+
+def _quote(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+def _variants(run: _Run) -> list[tuple[str, tuple[str, dict[str, str]]]]:
+    """Messages of a run with their conditions and values; several where a word depends on a condition.
+
+    The first is that of every condition being false.
+    """
+    found: list[tuple[str, list[str], dict[str, str]]] = [("", [], {})]
+    for i, piece in enumerate(run.pieces):
+        if i % 2 == 0:
+            found = [(message + piece, conditions, values) for message, conditions, values in found]
+            continue
+        either = _EITHER.fullmatch(piece)
+        grown = []
+        if either:
+            true, condition, false = either[1], either[2], either[3] or ""
+            for message, conditions, values in found:
+                grown.append((message + false, [*conditions, f"not ({condition})"], values))
+            for message, conditions, values in found:
+                grown.append((message + true, [*conditions, condition], values))
+        else:
+            for message, conditions, values in found:
+                name = _name(piece, values)
+                grown.append((f"{message}{{{name}}}", conditions, {**values, name: piece}))
+        found = grown
+    return [(" ".join(m.split()), (" and ".join(f"({c})" for c in cs), vs)) for m, cs, vs in found]
+
+
+def _name(expression: str, taken: Container[str]) -> str:
+    """A name for a value: the last of its path."""
+    path = re.match(r"[\w.\[\]']*", expression.lstrip("("))
+    words: list[str] = re.findall(r"[A-Za-z_]+", path[0] if path else "") or ["value"]
+    name = words[-1]
+    n = 2
+    while name in taken:
+        name = f"{words[-1]}{n}"
+        n += 1
+    return name
+
+
+def _strings(node: nodes.Node) -> Iterator[str]:
+    if isinstance(node, nodes.Const):
+        if isinstance(node.value, str) and reads_like_text(node.value):
+            yield " ".join(node.value.split())
+        return
+    parts: list[str] = []
+    values: set[str] = set()
+    for part in node.iter_child_nodes():
+        if isinstance(part, nodes.Const):
+            parts.append(str(part.value))
+        else:
+            name = (
+                part.attr
+                if isinstance(part, nodes.Getattr)
+                else part.name
+                if isinstance(part, nodes.Name)
+                else "value"
+            )
+            name = _name(name, values)
+            values.add(name)
+            parts.append(f"{{{name}}}")
+    message = "".join(parts)
+    if reads_like_text(message):
+        yield message
+
+
+def reads_like_text(text: str) -> bool:
+    """Whether a string of a program reads like words for people: a capital or a space, and no code."""
+    plain = PLACEHOLDER.sub("x", text)
+    return (
+        re.search(r"[a-z]{2} \w|\w [a-z]{2}|^[A-Z][a-z]", plain) is not None
+        and re.search(r"[=<>_\\^$]|^/|/api|^(GET|POST|PUT|PATCH|DELETE)\b|://|-\w+-", plain) is None
+    )
