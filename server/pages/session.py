@@ -333,8 +333,11 @@ def view_profile(
     if score is None:
         return None, bars
     was = None if earlier is None else earlier.score
+    matched = model.profile.score_at_speed
     return {
         **_print_sides(score),
+        "title": score.title,
+        "at_speed": None if matched is None else _print_sides(matched),
         "healthy": None if score.p95 is None else format_number(score.p95, 1),
         "before": None if was is None else tuple(_print_sides(was).values()),
         "change": () if was is None else _change_score(was, score),
