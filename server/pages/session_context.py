@@ -9,7 +9,10 @@ from sqlalchemy import Connection
 from starlette.responses import RedirectResponse
 
 from server.pages.job_views import find_newest_job, view_job
-from server.services import controls, live, patients, sessions
+from server.pages.words import TEST_NAMES
+from server.services import analyses, controls, live, patients, sessions
+from server.services.analyses import AnalysisRecord
+from server.services.sessions import Session
 
 STAGE_NAMES: Final[Mapping[str, str]] = {
     "reading": "Read the files",
@@ -40,10 +43,12 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
     patient = patients.get(c, session.patient_id)
     job = find_newest_job(c, session_id)
     take = live.current(c, session_id)
+    analysed = analyses.latest(c, session_id)
     return {
         "session": session,
         "patient": patient,
         "controls": controls.list_visits(c, patient, session),
+        "curves": _may_have_curves(session, analysed),
         "recording": session.state != "empty",
         "job": None if job is None else view_job(job),
         "stages": list((STAGES_OF_DAYS if session.protocol == "activity" else STAGE_NAMES).items()),
@@ -51,6 +56,18 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
         "damages": live.list_damages(c, session_id),
         "report": None,
     }
+
+
+def _may_have_curves(session: Session, analysed: AnalysisRecord | None) -> bool:
+    """Whether pages of curves over the stride and of filters have something to show, now or once analysed.
+
+    Squats have their own curves, and of a test often only its times are measured.
+    """
+    if session.protocol == "squat":
+        return False
+    if session.protocol not in TEST_NAMES:
+        return True
+    return analysed is not None and "angles.parquet" in analysed.files
 
 
 def lead_to_days(context: Mapping[str, Any]) -> RedirectResponse | None:

@@ -41,6 +41,8 @@ NEARLY: Final = 0.8
 LARGEST: Final = 5.0
 """Sizes are cut here: what is further off is not told first for being absurd."""
 
+AT_SPEED: Final = "people at this speed"
+
 MOST: Final = 6
 """Sentences on the page, changes among them."""
 
@@ -56,7 +58,7 @@ class HeadlineSentence:
     ----------
     name : parameter that proves it. side : leg spoken of, None = both or none.
     kind : what the figure was held against. size : how often it is beyond what varies by itself.
-    relevant : a change that is clinically relevant.
+    against : whom the figure was held against, in words. relevant : a change that is clinically relevant.
     """
 
     name: str
@@ -67,6 +69,7 @@ class HeadlineSentence:
     before: str
     strong: str
     after: str
+    against: str
     relevant: bool = False
 
     @property
@@ -113,6 +116,13 @@ class Headline:
         return self.stands_out[: MOST - len(self.shown_changes)]
 
     @property
+    def compared_with(self) -> str:
+        """Whom the sentences shown hold the figures against; empty without a sentence."""
+        *before, last = dict.fromkeys(s.against for s in self.shown) or ("",)
+        said = f"{', '.join(before)} and {last}" if before else last
+        return f"against {said}" if said else ""
+
+    @property
     def ranks(self) -> dict[str, int]:
         """Parameter → place of the sentence that it proves; the number stands before its row."""
         return {s.name: rank for rank, s in enumerate(self.shown, 1)}
@@ -127,7 +137,12 @@ class Headline:
     def changes_left(self) -> tuple[ChangeLeft, ...]:
         """Real changes that no sentence shown tells."""
         return tuple(
-            ChangeLeft(find_term(c.name, c.unit).label, c.side, words.size, words.verdict)
+            ChangeLeft(
+                find_term(c.name, c.unit).label,
+                name_fact(c.name, c.side)[1] and c.side,
+                words.size,
+                words.verdict,
+            )
             for fact in self.changes.real
             if not any(_tells(s, fact) for s in self.shown_changes)
             for c, words in ((fact.change, change_words(fact.change)),)
@@ -266,7 +281,14 @@ def _against_norm(
     spoken = row.both if row.both is not None else _cell(row, side)
     if spoken is not None:
         words["v"] = _number(row, spoken.value)
-    yield _sentence(row.name, p.family, "norm", z / BEYOND_SD, pattern, words, side)
+    yield _sentence(row.name, p.family, "norm", z / BEYOND_SD, pattern, words, side, _people(row, p.family))
+
+
+def _people(row: ParameterRow, family: Family) -> str:
+    """Of whom a norm is: speed itself cannot be held against people at this speed."""
+    if family == "speed":
+        return "people of this age"
+    return AT_SPEED if family == "step" or row.comfortable is not None else "healthy people"
 
 
 def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence | None:
@@ -317,7 +339,8 @@ def _join_steps(found: list[HeadlineSentence], rows: Mapping[str, ParameterRow])
     }
     size = max(-min(z), quick) / BEYOND_SD
     others = [s for s in found if s.name not in ("step_length_m", "cadence_spm")]
-    return [*others, _sentence("step_length_m", "step", "norm", size, SHORT_AND_QUICK, words, None)]
+    told = _sentence("step_length_m", "step", "norm", size, SHORT_AND_QUICK, words, None, AT_SPEED)
+    return [*others, told]
 
 
 def _of_flags(flags: Sequence[Flag]) -> list[HeadlineSentence]:
@@ -369,10 +392,12 @@ def _sentence(
     pattern: str,
     words: Mapping[str, str],
     side: Side | None,
+    people: str = "",
 ) -> HeadlineSentence:
+    against = people or {"sides": "the other side", "limit": "limits"}.get(kind, "")
     legs = {} if side is None else {"side": side, "other": OTHER[side]}
     before, strong, after = pattern.format(**words, **legs).split("*")
-    return HeadlineSentence(name, side, family, kind, min(size, LARGEST), before, strong, after)
+    return HeadlineSentence(name, side, family, kind, min(size, LARGEST), before, strong, after, against)
 
 
 def _cell(row: ParameterRow, side: Side | None) -> TableCell | None:

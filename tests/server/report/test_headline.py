@@ -105,6 +105,16 @@ def test_a_value_that_is_hardly_known_is_not_called_unusual() -> None:
     assert said(norms, *(replace(p, uncertainty=4.3) for p in sure)) == []
 
 
+def test_the_caption_says_whom_the_sentences_compare_with() -> None:
+    slow = norm("gait_speed_mps", 1.25, 0.16)
+    alone = find_standouts(parameter_rows((measured("gait_speed_mps", None, 0.80),), slow), slow)[0]
+    assert Headline("", alone).compared_with == "against people of this age"
+    uneven = find_standouts(parameter_rows(both_sides("foot_pitch_ic_deg", 5.0, 20.0)), Norms(None, None))[0]
+    assert Headline("", uneven).compared_with == "against the other side"
+    assert Headline("", (*alone, *uneven)).compared_with == "against people of this age and the other side"
+    assert Headline("").compared_with == ""
+
+
 def test_few_strides_are_compared_with_nobody() -> None:
     few = measured("knee_flexion_rom_deg", "left", 20.0, n=3), measured("knee_flexion_rom_deg", "right", 60.0)
     assert said(Norms(None, None), *few) == []
