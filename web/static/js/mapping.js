@@ -1,6 +1,7 @@
 // <sensor-map>: which sensor is on which segment. The selects are the truth; the body is a second way to set them.
 import { request, showProblem } from "./common/api.js";
 import { s } from "./common/elements.js";
+import { letGo } from "./common/unsaved.js";
 import { SIDE_KEY, SIDE_LETTER, sideOf } from "./common/words.js";
 
 const PLACES = {
@@ -185,6 +186,7 @@ class SensorMap extends HTMLElement {
     try {
       if (this.done() !== this.getAttribute("protocol")) await request("PATCH", `/api/v1/sessions/${session}`, { protocol: this.done() });
       await request("POST", `/api/v1/sessions/${session}/analyses`, { manifest: this.manifest() });
+      letGo();
       location.assign(`/sessions/${session}`);
     } catch (problem) {
       button.disabled = false;

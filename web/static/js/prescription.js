@@ -1,5 +1,6 @@
 // The form of a feedback prescription: targets of this person as one chooses, and one JSON record at the end.
 import { request, showProblem } from "./common/api.js";
+import { letGo } from "./common/unsaved.js";
 
 const form = document.getElementById("prescription");
 const base = `/api/v1/patients/${form.dataset.patient}`;
@@ -57,7 +58,7 @@ function summarise() {
   const source = target?.closest("[data-source]").querySelector("b").textContent.toLowerCase();
   const told = [...form.querySelectorAll('input[name="modes"]:checked')].map((m) => m.parentElement.querySelector("b").textContent.toLowerCase());
   const what = option().textContent.trim().split(",")[0];
-  form.querySelector("[data-summary]").textContent = `${what}, ${side || "both sides"}; target ${value || "not known yet"}${source && value ? ` (${source})` : ""}; ${told.join(" and ")}.`;
+  form.querySelector("[data-summary]").textContent = `${what}, ${side || "both sides"}; target ${value || "not known yet"}${source && value ? ` (${source})` : ""}; told by ${told.join(" and ") || "nothing yet"}.`;
 }
 
 // A preset fills what decides; the target is the first of its sources that gives numbers for this person.
@@ -131,6 +132,7 @@ form.addEventListener("submit", async (e) => {
   button.disabled = true;
   try {
     await request("POST", `${base}/prescriptions`, record());
+    letGo();
     location.assign(`/patients/${form.dataset.patient}`);
   } catch (problem) {
     button.disabled = false;
