@@ -48,7 +48,12 @@ def test_a_visit_being_made_is_asked_for_and_goes_when_it_is_sent(opened: Opener
     page.get_by_label("Note").press_sequentially("Tired today")
     assert leave(page) == ["beforeunload"]
     asked: list[str] = []
-    page.on("dialog", lambda d: (asked.append(d.type), d.accept()))
+
+    def go(dialog: Dialog) -> None:
+        asked.append(dialog.type)
+        dialog.accept()
+
+    page.on("dialog", go)
     page.get_by_role("button", name="Upload a recording").click()
     page.wait_for_url("**/upload")
     assert asked == []

@@ -66,10 +66,11 @@ document.addEventListener("submit", (e) => {
   if (same(form)) send(form, e.submitter?.dataset.then ?? form.dataset.then);
 });
 // A choice that names the thing: its name stands in a field as long as nobody wrote another one there.
-document.addEventListener("change", (e) => {
-  const { names, name } = e.target.dataset ?? {};
-  const field = names && e.target.form.elements[names];
-  if (field && [...e.target.form.querySelectorAll(`[data-names="${names}"]`)].some((o) => o.dataset.name === field.value.trim())) field.value = name;
+document.addEventListener("change", ({ target }) => {
+  const { form, dataset } = /** @type {HTMLInputElement} */ (target);
+  const field = /** @type {HTMLInputElement | undefined} */ (form?.elements[dataset.names]);
+  const given = field && [...form.querySelectorAll("[data-name]")].map((choice) => choice.dataset.name);
+  if (given?.includes(field.value.trim())) field.value = dataset.name;
 });
 document.addEventListener("input", (e) => e.target.matches("[data-same]") && e.target.setCustomValidity(""));
 
