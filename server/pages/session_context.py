@@ -11,7 +11,6 @@ from starlette.responses import RedirectResponse
 from server.pages.job_views import find_newest_job, view_job
 from server.pages.words import TEST_NAMES
 from server.services import analyses, controls, live, patients, sessions
-from server.services.analyses import AnalysisRecord
 from server.services.sessions import Session
 
 STAGE_NAMES: Final[Mapping[str, str]] = {
@@ -43,12 +42,11 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
     patient = patients.get(c, session.patient_id)
     job = find_newest_job(c, session_id)
     take = live.current(c, session_id)
-    analysed = analyses.latest(c, session_id)
     return {
         "session": session,
         "patient": patient,
         "controls": controls.list_visits(c, patient, session),
-        "curves": _may_have_curves(session, analysed),
+        "curves": _may_have_curves(c, session),
         "recording": session.state != "empty",
         "job": None if job is None else view_job(job),
         "stages": list((STAGES_OF_DAYS if session.protocol == "activity" else STAGE_NAMES).items()),
@@ -58,7 +56,7 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
     }
 
 
-def _may_have_curves(session: Session, analysed: AnalysisRecord | None) -> bool:
+def _may_have_curves(c: Connection, session: Session) -> bool:
     """Whether pages of curves over the stride and of filters have something to show, now or once analysed.
 
     Squats have their own curves, and of a test often only its times are measured.
@@ -67,6 +65,7 @@ def _may_have_curves(session: Session, analysed: AnalysisRecord | None) -> bool:
         return False
     if session.protocol not in TEST_NAMES:
         return True
+    analysed = analyses.latest(c, session.id)
     return analysed is not None and "angles.parquet" in analysed.files
 
 
