@@ -27,9 +27,9 @@ class SensorMap extends HTMLElement {
     });
     this.ask = this.querySelector("[data-ask]");
     // the page comes with its buttons off: a tap before the script is there would be lost
-    const swap = this.querySelector("[data-swap]");
-    swap.addEventListener("click", () => this.swap());
-    swap.disabled = false;
+    const swap = this.querySelector("[data-swap]"); // only for who may analyse
+    swap?.addEventListener("click", () => this.swap());
+    if (swap) swap.disabled = false;
     const clear = this.querySelector("[data-clear]");
     clear?.addEventListener("click", () => this.clear());
     if (clear) clear.disabled = false;
