@@ -1,5 +1,6 @@
 """Across visits: limits of change, and the verdict on a difference (docs/science/change.md)."""
 
+from core.change.facts import ChangedFact, SortedChanges, name_fact, sort_changes
 from core.change.limits import (
     ChangeLimit,
     Repeatability,
@@ -24,14 +25,18 @@ __all__ = [
     "UNLIKE",
     "Change",
     "ChangeLimit",
+    "ChangedFact",
     "Repeatability",
+    "SortedChanges",
     "detectable_ratio",
     "estimate_repeatability",
     "find_detectable_change",
     "find_relevant_change",
+    "name_fact",
     "parameter_changes",
     "ratio_changes",
     "score_changes",
     "score_name",
+    "sort_changes",
     "withdraw_verdicts",
 ]

@@ -39,6 +39,6 @@ def add_note(patient_id: Id, body: schemas.NoteNew, db: Db, who: Writer) -> note
 
 @router.delete("/notes/{note_id}", status_code=204)
 def remove_note(note_id: Id, db: Db, who: Writer) -> None:
-    """Remove a note for good; the audit log keeps that there was one."""
+    """Remove a note for good, one's own or as an administrator; the audit log keeps that there was one."""
     with db.write() as c:
-        notes.remove(c, who, note_id)
+        notes.remove(c, who, note_id, of_others=who.may(Action.MANAGE_USERS))

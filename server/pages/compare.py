@@ -10,6 +10,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
+from core.change import sort_changes
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
@@ -85,13 +86,20 @@ def view_comparison(reviewed: ReviewedAnalyses, found: SessionPair) -> dict[str,
     for row in rows:
         for sentence in row.words.limits:
             sources.setdefault(sentence, []).append(row.title)
-    judged = [r for r in rows if r.words.mark in {"up", "down"}]
+    facts = sort_changes([row.change for row in rows])
+    row_of = {(row.change.name, row.side): row for row in rows}
+    real = [
+        (row_of[fact.change.name, fact.change.side], [row_of[c.name, c.side] for c in fact.same])
+        for fact in facts.real
+    ]
     return {
         "charts": charts,
         "groups": [(name, _pairs(mine)) for name, mine in groups.items() if name not in SECONDARY],
         "more": [(name, _pairs(mine)) for name, mine in groups.items() if name in SECONDARY],
         "limits": [(", ".join(dict.fromkeys(titles)), s) for s, titles in sources.items()],
-        "real": judged,
+        "real": real,
+        "within": facts.within,
+        "unjudged": facts.unjudged,
         "comparable": found.comparable,
         "cautions": found.cautions,
         "replay": shown.replay,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
@@ -37,6 +37,9 @@ from server.storage.blobs import IntegrityError
 from server.storage.tables import now
 from web.words import number
 
+WALKS: Final = ("walk", "treadmill")
+"""Protocols that say how a person walks."""
+
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 
@@ -63,12 +66,12 @@ def show_patient(
         trained = next((w.content for w in written if w.ended_at is None), None)
         history = histories.read_history(reviewed, patient, done, plans)
         trend = draw_figures(history, None if trained is None else trained.parameter)
-    walked = histories.baseline(done)
+    walked = histories.baseline([a for a in done if a.session.protocol in WALKS])
     return render_page(
         request, db, who, "patient.html", "patients",
         patient=view_patient(patient), visits=rows, today=now().date(),
         facts=list_facts(patient, None if walked is None else walked.condition.words),
-        notes=list_notes(written_down, rows),
+        notes=list_notes(written_down, rows, who),
         programme=view_programme(plans[0], now().date()) if plans else None,
         trend=trend, comparable=len(done) > 1 and results, feedback=make_card(written),
     )  # fmt: skip
@@ -77,7 +80,7 @@ def show_patient(
 def list_facts(patient: patients.Patient, walks: str | None) -> list[tuple[str, str]]:
     """Who it is and how the person walks, in a line."""
     facts = [
-        ("Condition", patient.note),
+        ("Note", patient.note),
         ("Affected side", patient.affected_side or ""),
         ("Walks", walks or ""),
         ("Height", "" if patient.height_m is None else f"{patient.height_m:.2f}\u202fm"),
@@ -87,10 +90,20 @@ def list_facts(patient: patients.Patient, walks: str | None) -> list[tuple[str, 
 
 
 def list_notes(
-    written: Sequence[notes.PatientNote], rows: Sequence[Mapping[str, Any]]
+    written: Sequence[notes.PatientNote], rows: Sequence[Mapping[str, Any]], who: Identity
 ) -> list[dict[str, Any]]:
     """Notes about the patient and those of visits, the latest day first."""
-    found = [{"id": n.id, "day": n.written_on, "by": n.by, "text": n.content} for n in written]
+    writes, others = who.may(Action.WRITE_PATIENT), who.may(Action.MANAGE_USERS)
+    found: list[dict[str, Any]] = [
+        {
+            "id": n.id,
+            "day": n.written_on,
+            "by": n.by,
+            "text": n.content,
+            "removable": writes and notes.may_remove(n, who, of_others=others),
+        }
+        for n in written
+    ]
     found += [
         {"id": None, "day": row["day"], "visit": take["title"], "href": take["href"], "text": take["note"]}
         for row in rows

@@ -155,7 +155,7 @@ def show_print(
     sid: Id,
     who: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
-    """Two sheets of A4 for the browser's own print."""
+    """Sheets of A4 for the browser's own print: in short, all values, curves."""
     return _show_report(request, db, reviewed, sid, who, PAPER)
 
 
@@ -233,17 +233,18 @@ def _draw_report(
         reviewed, found, this.edits, patient, session, context.get("before"), context["controls"]
     )
     used, total = sum(model.used.values()), len(model.strides)
-    score, bars = view_profile(reviewed, model, context) if overview else (None, [])
+    score, bars = view_profile(reviewed, model, context) if overview or paper else (None, [])
     return {
         **{name: getattr(model, name) for name in SHOWN},
         "daily": daily.draw_daily(model.daily),
         "estimator": model.estimator,
         "groups": select_groups(model, paper=paper),
-        "since": None if paper else model.since,
+        "since": model.since,
         "not_compared": _not_compared(session, model),
         "first": (first := select_first(model)[: FIRST_ROWS - (score is not None)]),
         "score": score,
         "bars": bars,
+        "others": select_others(model, first) if paper else [],
         "folds": fold_groups(model, first),
         "ranks": {} if model.headline is None else model.headline.ranks,
         "missing": [
@@ -333,8 +334,11 @@ def view_profile(
     if score is None:
         return None, bars
     was = None if earlier is None else earlier.score
+    matched = model.profile.score_at_speed
     return {
         **_print_sides(score),
+        "title": score.title,
+        "at_speed": None if matched is None else _print_sides(matched),
         "healthy": None if score.p95 is None else format_number(score.p95, 1),
         "before": None if was is None else tuple(_print_sides(was).values()),
         "change": () if was is None else _change_score(was, score),
@@ -417,6 +421,18 @@ def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[P
     left_out = {*NOT_ON_PAPER, *known}
     short = (
         (name, tuple(r for r in rows if r.reason is None and r.name not in left_out)) for name, rows in groups
+    )
+    return [(name, rows) for name, rows in short if rows]
+
+
+def select_others(
+    model: ReportModel, first: Sequence[ParameterRow]
+) -> list[tuple[str, tuple[ParameterRow, ...]]]:
+    """The rows of paper that are not among the first ones."""
+    shown = {row.name for row in first}
+    short = (
+        (name, tuple(r for r in rows if r.name not in shown))
+        for name, rows in select_groups(model, paper=True)
     )
     return [(name, rows) for name, rows in short if rows]
 

@@ -9,7 +9,9 @@ from sqlalchemy import Connection
 from starlette.responses import RedirectResponse
 
 from server.pages.job_views import find_newest_job, view_job
-from server.services import controls, live, patients, sessions
+from server.pages.words import TEST_NAMES
+from server.services import analyses, controls, live, patients, sessions
+from server.services.sessions import Session
 
 STAGE_NAMES: Final[Mapping[str, str]] = {
     "reading": "Read the files",
@@ -44,6 +46,7 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
         "session": session,
         "patient": patient,
         "controls": controls.list_visits(c, patient, session),
+        "curves": _may_have_curves(c, session),
         "recording": session.state != "empty",
         "job": None if job is None else view_job(job),
         "stages": list((STAGES_OF_DAYS if session.protocol == "activity" else STAGE_NAMES).items()),
@@ -51,6 +54,19 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
         "damages": live.list_damages(c, session_id),
         "report": None,
     }
+
+
+def _may_have_curves(c: Connection, session: Session) -> bool:
+    """Whether pages of curves over the stride and of filters have something to show, now or once analysed.
+
+    Squats have their own curves, and of a test often only its times are measured.
+    """
+    if session.protocol == "squat":
+        return False
+    if session.protocol not in TEST_NAMES:
+        return True
+    analysed = analyses.latest(c, session.id)
+    return analysed is not None and "angles.parquet" in analysed.files
 
 
 def lead_to_days(context: Mapping[str, Any]) -> RedirectResponse | None:

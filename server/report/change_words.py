@@ -44,6 +44,7 @@ class ChangeWords:
     size : "+0.22" or "0.00" in the unit of the figure. mark : "up" or "down" beyond the measurement error,
         "" within it, "none" where no verdict is possible.
     verdict : in words. limits : the limits behind it with their sources, in sentences.
+    about : what changed where that is not the number beside it, else "".
     """
 
     side: str | None
@@ -51,6 +52,7 @@ class ChangeWords:
     mark: str
     verdict: str
     limits: tuple[str, ...]
+    about: str = ""
 
     @property
     def short(self) -> str:

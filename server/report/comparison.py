@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 from core.change import NOT_MEASURED_ALIKE, Change, parameter_changes, withdraw_verdicts
 from core.frames import Side
@@ -11,10 +12,14 @@ from core.norms import Norms, NormValue
 from core.parameters.catalogue import CATALOGUE
 from server.report.change_words import SCORE_TERMS, ChangeWords, change_words, find_term
 from server.report.columns import write_csv
+from server.report.level import from_standing
 from server.report.numbers import Numbers
 from server.report.table import ParameterRow
 from server.report.trends import collect_figures
 from server.report.wording import format_number, reason_words
+
+STANDING: Final = "from standing"
+"""Of what a change is whose row stands for another zero."""
 
 Group = tuple[str, tuple[ParameterRow, ...]]
 
@@ -81,16 +86,22 @@ def compare_rows(
 def add_changes(groups: Sequence[Group], found: Sequence[Change]) -> tuple[Group, ...]:
     """Rows of a session's table with their change since an earlier one, where both have a number.
 
-    Of a number that is not measured alike it says so.
+    Of a number that is not measured alike it says so. A level from the anatomical zero shows the change of
+    the same one from standing, which every visit has.
     """
     words: dict[str, list[ChangeWords]] = {}
     for c in found:
         if c.difference is not None or c.reason == NOT_MEASURED_ALIKE:
             words.setdefault(c.name, []).append(change_words(c))
-    return tuple(
-        (name, tuple(replace(row, change=tuple(words.get(row.name, ()))) for row in rows))
-        for name, rows in groups
-    )
+
+    def of(row: ParameterRow) -> tuple[ChangeWords, ...]:
+        measured = from_standing(row.name)
+        if measured is None:
+            return tuple(words.get(row.name, ()))
+        there = {side for side, cell in (("left", row.left), ("right", row.right)) if cell is not None}
+        return tuple(replace(w, about=STANDING) for w in words.get(measured, ()) if w.side in {None, *there})
+
+    return tuple((name, tuple(replace(row, change=of(row)) for row in rows)) for name, rows in groups)
 
 
 def comparison_csv(rows: Sequence[ComparedRow]) -> bytes:

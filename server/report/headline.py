@@ -8,11 +8,11 @@ that tell the same thing the largest speaks (docs/science/headline.md).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from math import hypot
 from typing import Final, Literal
 
-from core.change import Change
+from core.change import Change, ChangedFact, SortedChanges, name_fact
 from core.errors import Notice
 from core.events.result import COMPARED, Strides
 from core.flags import Flag
@@ -20,6 +20,7 @@ from core.frames import SIDES, Side
 from core.norms.lookup import Norms
 from core.parameters.flats import OTHER
 from core.parameters.variability import NORMAL_95
+from server.report.change_words import change_words, find_term
 from server.report.headline_phrases import (
     BOTH_STEPS,
     PELVIS_RISES,
@@ -40,11 +41,13 @@ NEARLY: Final = 0.8
 LARGEST: Final = 5.0
 """Sizes are cut here: what is further off is not told first for being absurd."""
 
+AT_SPEED: Final = "people at this speed"
+
 MOST: Final = 6
 """Sentences on the page, changes among them."""
 
-FEW: Final = 4
-"""With fewer sentences on what stands out, a third change has room; else two."""
+KEPT: Final = 2
+"""Of them for changes, however much stands out; they also take what it leaves free."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,7 @@ class HeadlineSentence:
     ----------
     name : parameter that proves it. side : leg spoken of, None = both or none.
     kind : what the figure was held against. size : how often it is beyond what varies by itself.
+    against : whom the figure was held against, in words. relevant : a change that is clinically relevant.
     """
 
     name: str
@@ -65,6 +69,8 @@ class HeadlineSentence:
     before: str
     strong: str
     after: str
+    against: str
+    relevant: bool = False
 
     @property
     def marked(self) -> str:
@@ -78,6 +84,16 @@ class HeadlineSentence:
 
 
 @dataclass(frozen=True)
+class ChangeLeft:
+    """A real change that no sentence had room for: its figure, by how much, and the verdict in words."""
+
+    title: str
+    side: Side | None
+    size: str
+    verdict: str
+
+
+@dataclass(frozen=True)
 class Headline:
     """What a person reads first.
 
@@ -85,20 +101,19 @@ class Headline:
     ----------
     badge : how many strides count and what to do first, in one sentence.
     stands_out, changed : all sentences, largest first. looked_at : figures that could have spoken.
-    within, unlimited : changes within measurement error, and changes that no known limit judges.
+    changes : every change since the visit before, by its verdict.
     """
 
     badge: str
     stands_out: tuple[HeadlineSentence, ...] = ()
     changed: tuple[HeadlineSentence, ...] = ()
     looked_at: int = 0
-    within: int = 0
-    unlimited: int = 0
+    changes: SortedChanges = field(default_factory=SortedChanges)
 
     @property
     def shown_changes(self) -> tuple[HeadlineSentence, ...]:
         """Changes that have room."""
-        return self.changed[: 3 if len(self.stands_out) < FEW else 2]
+        return self.changed[: max(KEPT, MOST - len(self.stands_out))]
 
     @property
     def shown(self) -> tuple[HeadlineSentence, ...]:
@@ -106,17 +121,46 @@ class Headline:
         return self.stands_out[: MOST - len(self.shown_changes)]
 
     @property
+    def compared_with(self) -> str:
+        """Whom the sentences shown hold the figures against; empty without a sentence."""
+        *before, last = dict.fromkeys(s.against for s in self.shown) or ("",)
+        said = f"{', '.join(before)} and {last}" if before else last
+        return f"against {said}" if said else ""
+
+    @property
     def ranks(self) -> dict[str, int]:
         """Parameter → place of the sentence that it proves; the number stands before its row."""
         return {s.name: rank for rank, s in enumerate(self.shown, 1)}
 
     @property
-    def more(self) -> tuple[str, ...]:
-        """Labels of what has no room."""
-        left = (*self.stands_out[len(self.shown) :], *self.changed[len(self.shown_changes) :])
+    def standouts_left(self) -> tuple[str, ...]:
+        """Labels of what stands out and has no room."""
+        left = self.stands_out[len(self.shown) :]
+        return tuple(dict.fromkeys(parameter_term(from_standing(s.name) or s.name).label for s in left))
+
+    @property
+    def changes_left(self) -> tuple[ChangeLeft, ...]:
+        """Real changes that no sentence shown tells."""
         return tuple(
-            dict.fromkeys(parameter_term(from_standing(s.name) or s.name).label.lower() for s in left)
+            ChangeLeft(
+                find_term(c.name, c.unit).label,
+                name_fact(c.name, c.side)[1] and c.side,
+                words.size,
+                words.verdict,
+            )
+            for fact in self.changes.real
+            if not any(_tells(s, fact) for s in self.shown_changes)
+            for c, words in ((fact.change, change_words(fact.change)),)
         )
+
+
+def _tells(sentence: HeadlineSentence, fact: ChangedFact) -> bool:
+    """Whether a sentence says a changed fact; one without a side speaks of both."""
+    return any(
+        sentence.name == c.name
+        and (sentence.side is None or name_fact(c.name, sentence.side) == name_fact(c.name, c.side))
+        for c in (fact.change, *fact.same)
+    )
 
 
 def say_badge(kind: str, strides: Strides, notices: Sequence[Notice]) -> str:
@@ -164,26 +208,26 @@ def find_standouts(
     return _largest_of_families(found), looked_at
 
 
-def find_changes(changes: Sequence[Change]) -> tuple[tuple[HeadlineSentence, ...], int, int]:
-    """Changes beyond the measurement error, largest first; how many are within it, and how many unjudged."""
+def find_changes(changes: SortedChanges) -> tuple[HeadlineSentence, ...]:
+    """Sentences on the real changes: what is clinically relevant first, then the largest."""
     real: dict[str, list[tuple[Change, float]]] = {}
-    within = unlimited = 0
-    for c in changes:
-        if c.difference is None or c.name not in PHRASES:
-            continue
-        if c.verdict is None or not c.limit:
-            unlimited += 1
-        elif c.verdict == "within_measurement_error":
-            within += 1
-        else:
+    relevant: set[str] = set()
+    for fact in changes.real:
+        c = next((c for c in (fact.change, *fact.same) if c.name in PHRASES), None)
+        if c is not None and c.difference is not None and c.limit:
             real.setdefault(c.name, []).append((c, min(abs(c.difference) / c.limit, LARGEST)))
+            relevant |= {c.name} if fact.relevant else set()
     found = [s for group in real.values() for s in _of_change(group)]
-    return _largest_of_families(found), within, unlimited
+    return _largest_of_families([replace(s, relevant=s.name in relevant) for s in found])
 
 
 def _largest_of_families(found: Sequence[HeadlineSentence]) -> tuple[HeadlineSentence, ...]:
     order = {name: i for i, name in enumerate(PHRASES)}
-    ranked = sorted(found, key=lambda s: (-s.size, order.get(from_standing(s.name) or s.name, len(order))))
+
+    def place(s: HeadlineSentence) -> tuple[bool, float, int]:
+        return not s.relevant, -s.size, order.get(from_standing(s.name) or s.name, len(order))
+
+    ranked = sorted(found, key=place)
     largest: dict[str, HeadlineSentence] = {}
     for s in ranked:
         largest.setdefault(s.family, s)
@@ -242,7 +286,14 @@ def _against_norm(
     spoken = row.both if row.both is not None else _cell(row, side)
     if spoken is not None:
         words["v"] = _number(row, spoken.value)
-    yield _sentence(row.name, p.family, "norm", z / BEYOND_SD, pattern, words, side)
+    yield _sentence(row.name, p.family, "norm", z / BEYOND_SD, pattern, words, side, _people(row, p.family))
+
+
+def _people(row: ParameterRow, family: Family) -> str:
+    """Of whom a norm is: speed itself cannot be held against people at this speed."""
+    if family == "speed":
+        return "people of this age"
+    return AT_SPEED if family == "step" or row.comfortable is not None else "healthy people"
 
 
 def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence | None:
@@ -293,7 +344,8 @@ def _join_steps(found: list[HeadlineSentence], rows: Mapping[str, ParameterRow])
     }
     size = max(-min(z), quick) / BEYOND_SD
     others = [s for s in found if s.name not in ("step_length_m", "cadence_spm")]
-    return [*others, _sentence("step_length_m", "step", "norm", size, SHORT_AND_QUICK, words, None)]
+    told = _sentence("step_length_m", "step", "norm", size, SHORT_AND_QUICK, words, None, AT_SPEED)
+    return [*others, told]
 
 
 def _of_flags(flags: Sequence[Flag]) -> list[HeadlineSentence]:
@@ -345,10 +397,12 @@ def _sentence(
     pattern: str,
     words: Mapping[str, str],
     side: Side | None,
+    people: str = "",
 ) -> HeadlineSentence:
+    against = people or {"sides": "the other side", "limit": "limits"}.get(kind, "")
     legs = {} if side is None else {"side": side, "other": OTHER[side]}
     before, strong, after = pattern.format(**words, **legs).split("*")
-    return HeadlineSentence(name, side, family, kind, min(size, LARGEST), before, strong, after)
+    return HeadlineSentence(name, side, family, kind, min(size, LARGEST), before, strong, after, against)
 
 
 def _cell(row: ParameterRow, side: Side | None) -> TableCell | None:

@@ -36,7 +36,7 @@ from server.report.notes import curve_notes, norm_note
 from server.report.panels import CurvePanel, SideCurve, curve_panels
 from server.report.profile import ProfileView, profile_view
 from server.report.quality_box import QualityBox, quality_box
-from server.report.squat import NORM_NOTE, SquatView, squat_view
+from server.report.squat import NORM_NOTE, UNSURE_FIGURES, SquatView, squat_view
 from server.report.table import ParameterRow, group_rows, parameter_rows
 from server.report.wording import explain_exclusion, place_words, speak_places
 
@@ -265,7 +265,8 @@ def report_model(
     if own is not None:
         compared = {name: v for name, v in norms.values.items() if v.comparable or name not in own.values}
         norms = replace(norms, values={**own.values, **compared})
-    rows = parameter_rows(bundle.parameters, norms, list_estimated_variables(bundle.estimator), affected)
+    unsure = {*list_estimated_variables(bundle.estimator), *UNSURE_FIGURES}
+    rows = parameter_rows(bundle.parameters, norms, unsure, affected)
     curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
     panels = curve_panels(bundle, curves, norms, own)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg

@@ -9,6 +9,7 @@ from typing import Final, cast
 from core.frames import SIDES, Side
 from core.norms.profile import Mode
 from core.scores import Score, Scores
+from server.report.change_words import SCORE_TERMS
 from server.report.svg import draw_bar, format_coordinate
 from server.report.wording import VARIABLES, format_number, reason_words
 
@@ -75,8 +76,9 @@ class ProfileView:
     Parameters
     ----------
     at_speed : the reference people were asked to walk at the person's speed.
-    bars : of the curves with high confidence. score : the sagittal profile score over them, levels removed;
-        None where too many curves miss.
+    bars : of the curves with high confidence. score : the sagittal profile score over them, levels removed,
+        from people at their comfortable speed, as over the visits; None where too many curves miss.
+    score_at_speed : the same from people at the person's speed, None where nobody walked so.
     """
 
     rows: tuple[ProfileRow, ...]
@@ -85,6 +87,7 @@ class ProfileView:
     at_speed: bool = False
     bars: tuple[ProfileBar, ...] = ()
     score: ProfileBar | None = None
+    score_at_speed: ProfileBar | None = None
 
 
 def profile_view(comfortable: Scores, matched: Scores | None = None) -> ProfileView | None:
@@ -112,15 +115,21 @@ def profile_view(comfortable: Scores, matched: Scores | None = None) -> ProfileV
         if any(s.value is not None for s in both.values()):
             row = _row(title, both, low=name == "gps_deg", total=True)
             rows.append(_beside(row, comfortable, scores, name, mode))
-    total = _numbers("Sagittal score", {side: scores.find("gps_sagittal_deg", MODE, side) for side in SIDES})
     return ProfileView(
         tuple(rows),
-        _index(scores),
+        _index(comfortable),
         _note(scores),
         scores.speed_matched,
         tuple(bars),
-        total if total.values else None,
+        _total(comfortable),
+        None if matched is None else _total(matched),
     )
+
+
+def _total(scores: Scores) -> ProfileBar | None:
+    found = {side: scores.find("gps_sagittal_deg", MODE, side) for side in SIDES}
+    total = _numbers(SCORE_TERMS["gps_sagittal_deg"].label, found)
+    return total if total.values else None
 
 
 def bar_svg(bar: ProfileBar, before: ProfileBar | None) -> str:
@@ -201,7 +210,8 @@ def _index(scores: Scores) -> str:
         if s.value is not None:
             parts.append(f"{side} {format_number(s.value)}")
     return (
-        f"GDI*, sagittal: {', '.join(parts)} (100 is the middle of healthy adults, 10 is one SD)."
+        f"GDI*, sagittal: {', '.join(parts)} (100 is the middle of healthy adults at their own speed, "
+        "10 is one SD)."
         if parts
         else ""
     )

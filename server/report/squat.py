@@ -42,6 +42,10 @@ SURE: Final = ("knee_flexion", "hip_flexion", "ankle_dorsiflexion")
 """Of the others the level is not, or less surely, known (docs/science/squat.md, "Limits")."""
 
 
+UNSURE_FIGURES: Final = ("squat_knee_valgus", "squat_hip_adduction", "squat_hip_rotation")
+"""Beginnings of the figures that are read from these others."""
+
+
 @dataclass(frozen=True)
 class RepetitionRow:
     """One squat in words; `excluded` says why it does not count, and then the numbers are empty.

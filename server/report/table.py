@@ -229,7 +229,7 @@ def _norm_text(norm: NormValue | None, term: Term) -> str | None:
 
 
 def _unsure(row: ParameterRow) -> ParameterRow:
-    """An estimated angle is not held against anybody."""
+    """An angle of low confidence is not held against anybody, nor against the other side."""
 
     def bare(cell: TableCell | None) -> TableCell | None:
         return None if cell is None else replace(cell, z=None, percentile=None)
@@ -250,6 +250,8 @@ def _unsure(row: ParameterRow) -> ParameterRow:
         comfortable_sd=None,
         comfortable_source=None,
         comfortable_group=None,
+        difference=None,
+        symmetry=None,
         low_confidence=True,
     )
 

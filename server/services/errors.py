@@ -1,5 +1,6 @@
 """What a use case may refuse, beside the errors of core; `status` is the HTTP status that says the same.
 
+403 not_yours
 404 not_found · 409 code_taken, name_taken, no_files, not_confirmed · 413 file_too_large, set_too_large,
 too_many_files · 422 bad_value · 507 disk_full · 500 blob_damaged, blob_missing
 """
@@ -22,6 +23,12 @@ class NotFound(ServiceError):  # noqa: N818 - the name of the HTTP status
 
     def __init__(self, what: str, identity: str) -> None:
         super().__init__("not_found", f"There is no {what} '{identity}', or it has been deleted.")
+
+
+class NotAllowed(ServiceError):  # noqa: N818 - the name of the HTTP status
+    """The role allows it, but not of this one."""
+
+    status = 403
 
 
 class Conflict(ServiceError):  # noqa: N818 - the name of the HTTP status

@@ -9,7 +9,7 @@ from sqlalchemy import Connection, delete, insert, select
 
 from server import audit
 from server.services import patients
-from server.services.errors import NotFound, ServiceError
+from server.services.errors import NotAllowed, NotFound, ServiceError
 from server.storage.tables import new_id, now, patient_note, user
 
 MOST_CHARACTERS = 10_000
@@ -17,7 +17,7 @@ MOST_CHARACTERS = 10_000
 
 @dataclass(frozen=True)
 class PatientNote:
-    """A note; `by` = name of who wrote it, None = the program."""
+    """A note; `by`, `by_id` = name and account of who wrote it, None = the program."""
 
     id: str
     patient_id: str
@@ -25,6 +25,7 @@ class PatientNote:
     content: str
     created_at: dt.datetime
     by: str | None
+    by_id: str | None
 
 
 def add(
@@ -54,9 +55,23 @@ def add(
     return get(c, note_id)
 
 
-def remove(c: Connection, actor: audit.Actor | None, note_id: str) -> None:
-    """Remove a note for good; raises NotFound."""
+def may_remove(note: PatientNote, actor: audit.Actor | None, *, of_others: bool) -> bool:
+    """Whether somebody who may write notes may remove this one: their own, or others' if so allowed."""
+    return of_others or actor is None or note.by_id in {None, actor.user_id}
+
+
+def remove(c: Connection, actor: audit.Actor | None, note_id: str, *, of_others: bool = False) -> None:
+    """Remove a note for good; raises NotFound, NotAllowed not_yours.
+
+    Parameters
+    ----------
+    of_others : a note that somebody else wrote too.
+    """
     found = get(c, note_id)
+    if not may_remove(found, actor, of_others=of_others):
+        raise NotAllowed(
+            "not_yours", f"{found.by} wrote this note. Ask that person or an administrator to remove it."
+        )
     c.execute(delete(patient_note).where(patient_note.c.id == note_id))
     audit.record(c, actor, "note.removed", "patient", found.patient_id, {"note_id": note_id})
 
@@ -83,4 +98,5 @@ _QUERY = select(
     patient_note.c.content,
     patient_note.c.created_at,
     user.c.name.label("by"),
+    patient_note.c.created_by.label("by_id"),
 ).outerjoin(user, user.c.id == patient_note.c.created_by)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from core.change import sort_changes
 from server.report.behind import ParameterStrides, open_row
 from server.report.bundle import Bundle
 from server.report.comparison import add_changes, compare_figures
@@ -58,8 +59,8 @@ def read(
     since = PreviousVisit(before.session.id, before.session.performed_on)
     headline = model.headline
     if headline is not None and model.quality.kind != "bad":
-        told, within, unlimited = find_changes(changed)
-        headline = replace(headline, changed=told, within=within, unlimited=unlimited)
+        facts = sort_changes(changed)
+        headline = replace(headline, changed=find_changes(facts), changes=facts)
     groups = add_changes(model.groups, changed)
     test = None if model.functional is None else model.functional.compare_with(old.parameters)
     return bundle, replace(model, groups=groups, since=since, headline=headline, functional=test)

@@ -24,7 +24,7 @@ import math
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final, cast
+from typing import Annotated, Any, cast
 
 import viser
 from fastapi import APIRouter, FastAPI, Query, Request, WebSocket
@@ -41,6 +41,7 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.http.problems import Problem, as_problem
 from server.report.bundle import read_poses
+from server.report.no_figure import explain_no_figure
 from server.services import analyses, comparisons, edit_log, patients, sessions
 from server.services.histories import AnalysedSession
 from server.services.patients import Patient
@@ -89,11 +90,6 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         app.state.views = views
         yield
 
-
-NO_FIGURE: Final = (
-    "This take has no figure: it needs sensors on the pelvis and a leg, on pelvis and feet or on both feet."
-)
-"""Of an analysis that is done and has no poses: another one will not bring them."""
 
 router = APIRouter(lifespan=_lifespan, include_in_schema=False)
 
@@ -202,8 +198,11 @@ async def _open(
 
     def why_nothing() -> str:
         with db.read() as c:
-            done = analyses.latest(c, sid) is not None
-        return NO_FIGURE if done else "There is nothing to replay: nothing is analysed yet."
+            found = analyses.latest(c, sid)
+            edits = None if found is None else edit_log.edits_of(c, found.id)
+        if found is None or edits is None:
+            return "There is nothing to replay: nothing is analysed yet."
+        return explain_no_figure(reviewed.read_bundle(found, edits))
 
     this, before, patient = await asyncio.to_thread(latest)
     for seen in (this, before):

@@ -162,6 +162,7 @@ def test_an_assistant_sees_uploads_but_no_results(
     page.goto(f"/sessions/{filled.unmapped}/upload")
     expect(page.locator("upload-area")).to_be_visible()
     assert page.locator("[data-analyse]").count() == 0
+    assert page.locator("[data-swap]").count() == 0
 
 
 def test_light_and_dark_can_be_chosen_and_are_remembered(opened: Opener) -> None:

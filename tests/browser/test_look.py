@@ -123,7 +123,7 @@ def sheets(page: Page) -> int:
     return pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ")
 
 
-def test_ctrl_p_prints_the_report_of_two_sheets_and_elsewhere_a_clean_page(
+def test_ctrl_p_prints_the_report_of_three_sheets_and_elsewhere_a_clean_page(
     opened: Opener, filled: Filled
 ) -> None:
     page = opened("/patients")
@@ -138,7 +138,7 @@ def test_ctrl_p_prints_the_report_of_two_sheets_and_elsewhere_a_clean_page(
     page.keyboard.press("Control+p")
     page.wait_for_url(re.compile(r"/print$"))
     page.wait_for_function("() => window.printed")
-    assert sheets(page) == 2
+    assert sheets(page) == 3
 
 
 @pictures

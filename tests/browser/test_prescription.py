@@ -32,7 +32,7 @@ def test_a_prescription_is_written_changed_and_ended(opened: Opener, walker: str
     page.get_by_role("link", name="Prescribe").click()
     # one choice says it all; the rest waits behind "More"
     expect(page.locator("[data-summary]")).to_have_text(
-        re.compile(r"Step length, left; target 0\.\d+ ± 0\.\d+\s?m \(own better side\); zone\.")
+        re.compile(r"Step length, left; target 0\.\d+ ± 0\.\d+\s?m \(own better side\); told by zone\.")
     )
     expect(page.get_by_label("Probe after")).to_be_hidden()
     page.get_by_role("radio", name="Heel first").check()

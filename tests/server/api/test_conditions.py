@@ -268,3 +268,22 @@ async def test_the_take_that_counts_says_whether_there_was_feedback(clinic: Clin
     with clinic.db.write() as c:
         live_training.note_feedback(c, [take.id for take in live.takes_of(c, session)])
         assert sessions.get(c, session).feedback is True
+
+
+async def test_paper_has_the_sentences_that_its_numbers_refer_to_the_changes_and_the_score(
+    clinic: Clinic,
+) -> None:
+    patient = feedback.person(clinic)
+    first, later = feedback.walked(clinic, patient, 0, **OWN), feedback.walked(clinic, patient, 7, **OWN)
+    screen, paper = [await _get(clinic, f"/sessions/{later}{page}") for page in ("", "/print")]
+    for words in ("What stands out", "Changed since 2 Mar 2026", "Sagittal profile score"):
+        assert words in paper
+        assert words in screen
+    sentences = paper[paper.index('class="r-short"') : paper.index("<h2>Parameters</h2>")]
+    table = paper[paper.index("<h2>Parameters</h2>") :]
+    told, marked = (
+        set(re.findall(r'class="rank" aria-hidden="true">(\d)', part)) for part in (sentences, table)
+    )
+    assert marked <= told
+    assert f"/compare/{first}" not in paper
+    assert re.search(r"\d+ within error, \d+ not judged", sentences)

@@ -119,3 +119,21 @@ async def test_a_new_visit_offers_the_tests(clinic: Clinic) -> None:
         html = (await client.get(f"/patients/{made.json()['id']}/sessions/new")).text
     for name in ("tug", "five_sit_to_stand", "walk_10m", "walk_6min", "standing_eyes_open"):
         assert f'value="{name}"' in html
+
+
+async def test_a_test_without_curves_has_no_tab_and_no_sheet_of_them(
+    clinic: Clinic, visits: list[str]
+) -> None:
+    overview = await page(clinic, f"/sessions/{visits[0]}")
+    tabs = overview[overview.index('class="tabs"') :]
+    tabs = tabs[: tabs.index("</nav>")]
+    assert "Kinematics" not in tabs
+    assert "Algorithms" not in tabs
+    assert "Timeline" in tabs
+    assert "<gait-view" not in overview
+    assert "This test has no curves" in await page(clinic, f"/sessions/{visits[0]}/kinematics")
+    assert "Filters are compared on walks" in await page(clinic, f"/sessions/{visits[0]}/algorithms")
+    paper = await page(clinic, f"/sessions/{visits[0]}/print")
+    assert paper.count('class="sheet paper"') == 1
+    assert "<h1>Timed up and go</h1>" in paper
+    assert "mean of 0" not in paper

@@ -169,7 +169,7 @@ async def test_the_overview_is_light_and_the_rest_comes_when_it_is_opened(clinic
     values = await page(clinic, f"/sessions/{session}/values")
     others = set(re.findall(r'class="plain" href="[^"]*/parameters/(\w+)"', values))
     assert len(names) == 9
-    assert 'kinematics#h-map">Sagittal score' in overview, "the tenth"
+    assert 'kinematics#h-map">Sagittal profile score' in overview, "the tenth"
     assert others > {"swing_time_s", "turning_angle_deg"}
     assert not names & others
 

@@ -9,6 +9,10 @@ from typing import Any
 
 import pytest
 
+from server.auth import accounts
+from server.auth.identity import Identity
+from server.auth.roles import Role
+from server.services import notes, patients
 from tests.server import analysed
 from tests.server.clinic import Clinic
 
@@ -134,3 +138,38 @@ async def test_notes_stand_by_date_beside_those_of_visits_and_go_with_the_patien
         assert (
             await client.post(f"{API}/patients/{patient}/notes", json={"content": "x"})
         ).status_code == 403
+
+
+async def test_a_note_is_removed_by_who_wrote_it_or_an_administrator(clinic: Clinic) -> None:
+    with clinic.db.write() as c:
+        other = accounts.create(c, "colleague", None, Role.CLINICIAN, "x").id
+        patient = patients.create(c, None, code="V-NOTES").id
+        colleague = Identity(other, "colleague", "", Role.CLINICIAN, "")
+        theirs = notes.add(c, colleague, patient, "Written by a colleague.").id
+    async with clinic.client("clinician") as client:
+        mine = (await client.post(f"{API}/patients/{patient}/notes", json={"content": "My own."})).json()[
+            "id"
+        ]
+        html = (await client.get(f"/patients/{patient}")).text
+        assert f'data-open="remove-note-{mine}"' in html
+        assert "Remove this note?" in html
+        assert theirs not in html
+        refused = await client.delete(f"{API}/notes/{theirs}")
+        assert (refused.status_code, refused.json()["code"]) == (403, "not_yours")
+        assert "colleague wrote this note" in refused.json()["detail"]
+        assert (await client.delete(f"{API}/notes/{mine}")).status_code == 204
+    async with clinic.client("admin") as client:
+        assert theirs in (await client.get(f"/patients/{patient}")).text
+        assert (await client.delete(f"{API}/notes/{theirs}")).status_code == 204
+
+
+async def test_who_may_not_plan_or_map_is_not_led_there(clinic: Clinic) -> None:
+    patient, session = await walked(clinic, "V-ROLES", [("2026-03-02", 0.60, {})])
+    async with clinic.client("viewer") as client:
+        assert "Plan a programme" not in (await client.get(f"/patients/{patient}")).text
+        assert "A clinician starts it." in (await client.get(f"/patients/{patient}/programme")).text
+        data = (await client.get(f"/sessions/{session}/data")).text
+        assert "Change mapping" not in data
+    async with clinic.client("clinician") as client:
+        assert "Plan a programme" in (await client.get(f"/patients/{patient}")).text
+        assert "Change mapping" in (await client.get(f"/sessions/{session}/data")).text

@@ -149,3 +149,21 @@ async def test_the_sensitivity_is_a_tab_of_squats(clinic: Clinic, both: str) -> 
     form = await page(clinic, f"/sessions/{both}/sensitivity")
     assert "How sure are these angles?" in form
     assert "Run on this take" in form
+
+
+async def test_squats_have_no_norm_columns_and_a_low_confidence_names_no_larger_side(
+    clinic: Clinic, both: str
+) -> None:
+    html = await page(clinic, f"/sessions/{both}")
+    values = html[html.index('id="rows"') : html.index('id="h-squats"')]
+    assert "On the norm" not in values
+    assert "grey box" not in values
+    async with clinic.client("admin") as client:
+        found = (await client.get(f"/api/v1/sessions/{both}/report")).json()
+    rows = {p["name"]: p for p in found["parameters"]}
+    valgus = rows["squat_knee_valgus_bottom_deg"]
+    assert valgus["low_confidence"]
+    assert (valgus["difference"], valgus["symmetry"]) == (None, None)
+    assert not rows["squat_depth_deg"]["low_confidence"]
+    tabs = html[html.index('class="tabs"') :]
+    assert "Kinematics" not in tabs[: tabs.index("</nav>")]

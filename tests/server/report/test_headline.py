@@ -7,7 +7,7 @@ from string import Formatter
 
 import pytest
 
-from core.change import Change
+from core.change import Change, sort_changes
 from core.change.verdict import Verdict
 from core.frames import Side
 from core.norms.lookup import Norms
@@ -105,6 +105,16 @@ def test_a_value_that_is_hardly_known_is_not_called_unusual() -> None:
     assert said(norms, *(replace(p, uncertainty=4.3) for p in sure)) == []
 
 
+def test_the_caption_says_whom_the_sentences_compare_with() -> None:
+    slow = norm("gait_speed_mps", 1.25, 0.16)
+    alone = find_standouts(parameter_rows((measured("gait_speed_mps", None, 0.80),), slow), slow)[0]
+    assert Headline("", alone).compared_with == "against people of this age"
+    uneven = find_standouts(parameter_rows(both_sides("foot_pitch_ic_deg", 5.0, 20.0)), Norms(None, None))[0]
+    assert Headline("", uneven).compared_with == "against the other side"
+    assert Headline("", (*alone, *uneven)).compared_with == "against people of this age and the other side"
+    assert Headline("").compared_with == ""
+
+
 def test_few_strides_are_compared_with_nobody() -> None:
     few = measured("knee_flexion_rom_deg", "left", 20.0, n=3), measured("knee_flexion_rom_deg", "right", 60.0)
     assert said(Norms(None, None), *few) == []
@@ -131,18 +141,48 @@ def change(name: str, side: Side | None, by: float, limit: float, verdict: Verdi
 
 
 def test_changes_beyond_their_limit_are_told_and_the_others_counted() -> None:
-    found, within, unlimited = find_changes([
+    facts = sort_changes([
         change("gait_speed_mps", None, 0.22, 0.1, "real_change"),
         change("step_length_m", "left", 0.11, 0.05, "real_change"),
         change("step_length_m", "right", 0.12, 0.05, "clinically_relevant"),
         change("stance_pct", "left", 0.4, 2.0, "within_measurement_error"),
         replace(change("circumduction_m", "left", 0.1, 1.0, None), limit=None),
     ])  # fmt: skip
-    assert [s.text for s in found] == [
+    assert [s.text for s in find_changes(facts)] == [
         "Both steps are longer: left by 0.11 m, right by 0.12 m",
         "Walks faster: by 0.22 m/s",
     ]
-    assert (within, unlimited) == (1, 1)
+    assert (len(facts.real), facts.within, facts.unjudged) == (3, 1, 1)
+
+
+def test_a_clinically_relevant_change_is_told_before_a_larger_one() -> None:
+    facts = sort_changes([
+        change("gait_speed_mps", None, 0.5, 0.1, "real_change"),
+        change("knee_flexion_max_swing_deg", "left", 11.7, 3.0, "real_change"),
+        change("knee_flexion_rom_deg", "left", 11.7, 5.2, "clinically_relevant"),
+    ])  # fmt: skip
+    told = find_changes(facts)
+    assert [s.name for s in told] == ["knee_flexion_rom_deg", "gait_speed_mps"]
+    headline = Headline("", changed=told, changes=facts)
+    assert [(c.title, c.side, c.size) for c in headline.changes_left] == [
+        ("Knee flexion, swing peak, from standing", "left", "+11.7")
+    ]
+
+
+def test_every_real_change_is_a_sentence_or_named_with_its_size() -> None:
+    facts = sort_changes([
+        change("step_length_m", "left", 0.11, 0.05, "real_change"),
+        change("step_length_m", "right", 0.12, 0.05, "real_change"),
+        change("stance_pct", "right", -6.2, 4.2, "real_change"),
+        change("swing_pct", "right", 6.2, 4.2, "real_change"),
+        change("swing_time_s", "left", 0.2, 0.1, "real_change"),
+        change("max_heel_clearance_m", "left", 0.09, 0.04, "real_change"),
+    ])  # fmt: skip
+    headline = Headline("", changed=find_changes(facts), changes=facts)
+    assert [s.name for s in headline.shown_changes] == ["step_length_m", "stance_pct"]
+    left = [(c.title, c.side) for c in headline.changes_left]
+    assert left == [("Swing time", "left"), (CATALOGUE["max_heel_clearance_m"].label, "left")]
+    assert len(facts.real) == 5
 
 
 def test_at_most_six_sentences_and_the_rest_is_named() -> None:
@@ -158,9 +198,10 @@ def test_at_most_six_sentences_and_the_rest_is_named() -> None:
         for p in both_sides(name, left, right, sd=0.01)
     ]  # fmt: skip
     found, _ = find_standouts(parameter_rows(parameters, norms), norms)
-    changed, _, _ = find_changes([change("gait_speed_mps", None, 0.22, 0.1, "real_change")])
-    headline = Headline("", found, changed)
+    facts = sort_changes([change("gait_speed_mps", None, 0.22, 0.1, "real_change")])
+    headline = Headline("", found, find_changes(facts), changes=facts)
     assert len(found) == 8
     assert max(s.size for s in found) == LARGEST
     assert len(headline.shown) + len(headline.shown_changes) == MOST
-    assert len(headline.more) == 3
+    assert len(headline.standouts_left) == 3
+    assert headline.changes_left == ()

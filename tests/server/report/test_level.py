@@ -6,11 +6,14 @@ from dataclasses import replace
 
 import pytest
 
+from core.change import parameter_changes
+from core.frames import SIDES
 from core.norms import Norms, look_up_norms
 from core.parameters import cycle_curves
 from core.parameters.anatomical_zero import anatomical_variables
-from core.parameters.result import CycleCurves
+from core.parameters.result import CycleCurves, Parameter
 from server.report.bundle import Bundle
+from server.report.comparison import add_changes
 from server.report.level import GROUP, level_rows
 from server.report.model import report_model
 from tests.server import walk
@@ -68,3 +71,16 @@ def test_the_report_shows_the_table_where_something_was_entered(bundle: Bundle) 
     assert len(groups[GROUP]) == 4
     before = {r.name: r for rows in groups.values() for r in rows}["knee_flexion_max_swing_deg"]
     assert before.norm is None, "from standing it stays what it was"
+
+
+def test_a_level_shows_the_change_from_standing_and_says_so() -> None:
+    standing = {"knee_flexion_l": 4.0, "knee_flexion_r": 4.0}
+    groups = ((GROUP, level_rows(curves(), standing, norms(standing))),)
+    before = [Parameter("knee_flexion_max_swing_deg", s, 30, 40.0, 1.0, "deg") for s in SIDES]
+    now = [replace(p, mean=51.7) for p in before]
+    rows = {r.name: r for _, found in add_changes(groups, parameter_changes(before, now)) for r in found}
+    told = rows["knee_flexion_max_swing_anatomical_deg"].change
+    assert [(w.side, w.size, w.about) for w in told] == [
+        ("left", "+11.7", "from standing"), ("right", "+11.7", "from standing")
+    ]  # fmt: skip
+    assert rows["knee_flexion_ic_anatomical_deg"].change == ()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from server.report.change_words import find_term
 from server.report.model import report_model
+from server.report.numbers import numbers_of
 from server.report.profile import TOTALS, profile_view
+from server.report.trends import collect_figures
 from tests.server.report.conftest import MakeBundle
 from tests.server.report.test_estimator import section
 
@@ -39,6 +42,19 @@ def test_estimated_angles_are_not_scored(make_bundle: MakeBundle) -> None:
     assert profile is not None
     assert "Knee flexion" not in [row.title for row in profile.rows]
     assert not any("profile score" in row.title for row in profile.rows)
+
+
+def test_the_score_is_that_of_patient_page_and_trends(make_bundle: MakeBundle) -> None:
+    bundle = make_bundle()
+    followed = {p.side: p.mean for p in collect_figures(numbers_of(bundle)) if p.name == "gps_sagittal_deg"}
+    profile = report_model(bundle, age=40, speed_mps=0.6, height_m=1.75).profile
+    assert profile is not None
+    assert profile.score is not None
+    assert profile.score_at_speed is not None
+    assert profile.at_speed
+    assert dict(profile.score.values) == followed
+    assert profile.score.title == find_term("gps_sagittal_deg").label
+    assert profile.score_at_speed.values != profile.score.values
 
 
 def test_without_angles_there_is_none(make_bundle: MakeBundle) -> None:

@@ -12,7 +12,7 @@ import pytest
 from server.report.exports import poses_parquet
 from server.services import analyses, patients, recordings, sessions
 from server.viewer.motion import ReplayMotion, prepare_motion
-from tests.server import walk
+from tests.server import analysed, walk
 from tests.server.clinic import Clinic, open_clinic
 from tests.server.serving import serve
 
@@ -49,7 +49,8 @@ async def open_ward(folder: Path) -> AsyncIterator[Ward]:
             patient_id = patients.create(c, None, code="V-1").id
             session_id, empty_id, trunk_id = (sessions.create(c, None, patient_id).id for _ in range(3))
         _finish_analysis(clinic, patient_id, session_id, {"poses.parquet": poses_parquet(walk.poses())})
-        _finish_analysis(clinic, patient_id, trunk_id, {"steps.csv": b"time_s,side\n"})
+        no_figure = {name: x for name, x in analysed.files().items() if name != "poses.parquet"}
+        _finish_analysis(clinic, patient_id, trunk_id, no_figure)
         yield Ward(clinic, port, session_id, empty_id, trunk_id)
 
 

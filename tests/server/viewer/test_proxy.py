@@ -16,8 +16,8 @@ from websockets.typing import Subprotocol
 
 from server.auth.identity import Identity
 from server.auth.roles import Role
+from server.report.no_figure import FEW_SENSORS
 from server.viewer import pipe
-from server.viewer.proxy import NO_FIGURE
 from server.viewer.room import VIEWS
 from server.viewer.views import FigureView, FigureViews
 from tests.server.viewer.conftest import Ward
@@ -98,8 +98,8 @@ async def test_a_session_without_poses_says_so(ward: Ward) -> None:
 async def test_an_analysis_without_a_figure_does_not_read_as_pending(ward: Ward) -> None:
     async with replaying(ward, ward.cookie(), ward.trunk_session_id) as (_, answer):
         assert answer["error"]["code"] == "no_poses"  # type: ignore[index]
-        assert NO_FIGURE in str(answer["error"])
-        assert "yet" not in NO_FIGURE
+        assert FEW_SENSORS in str(answer["error"])
+        assert "yet" not in FEW_SENSORS
 
 
 async def test_a_tab_gets_its_own_view_and_a_reload_the_same(ward: Ward) -> None:

@@ -1,6 +1,7 @@
 // Forms that speak to the API, dialogs, whole-row links and back buttons: behaviour by data attributes, for every page.
 import { request, showProblem } from "./common/api.js";
 import { speak } from "./common/text.js";
+import { letGo } from "./common/unsaved.js";
 
 const LATER_MS = 20_000;
 const NOW = "#now"; // of the address of a report that is printed at once
@@ -48,6 +49,7 @@ async function send(form, then = form.dataset.then) {
   form.setAttribute("aria-busy", "true");
   try {
     const data = await request(method, path, method === "DELETE" ? undefined : values(form));
+    letGo();
     if (then === "reload" || !then) location.reload();
     else location.assign(fill(then, data));
   } catch (problem) {
@@ -63,6 +65,13 @@ document.addEventListener("submit", (e) => {
   if (!form.dataset.api) return;
   e.preventDefault();
   if (same(form)) send(form, e.submitter?.dataset.then ?? form.dataset.then);
+});
+// A choice that names the thing: its name stands in a field as long as nobody wrote another one there.
+document.addEventListener("change", ({ target }) => {
+  const { form, dataset } = /** @type {HTMLInputElement} */ (target);
+  const field = /** @type {HTMLInputElement | undefined} */ (form?.elements[dataset.names]);
+  const given = field && [...form.querySelectorAll("[data-name]")].map((choice) => choice.dataset.name);
+  if (given?.includes(field.value.trim())) field.value = dataset.name;
 });
 document.addEventListener("input", (e) => e.target.matches("[data-same]") && e.target.setCustomValidity(""));
 

@@ -1,6 +1,7 @@
 // <sensor-map>: which sensor is on which segment. The selects are the truth; the body is a second way to set them.
 import { request, showProblem } from "./common/api.js";
 import { s } from "./common/elements.js";
+import { letGo } from "./common/unsaved.js";
 import { SIDE_KEY, SIDE_LETTER, sideOf } from "./common/words.js";
 import { speak } from "./common/text.js";
 
@@ -27,9 +28,9 @@ class SensorMap extends HTMLElement {
     });
     this.ask = this.querySelector("[data-ask]");
     // the page comes with its buttons off: a tap before the script is there would be lost
-    const swap = this.querySelector("[data-swap]");
-    swap.addEventListener("click", () => this.swap());
-    swap.disabled = false;
+    const swap = this.querySelector("[data-swap]"); // only for who may analyse
+    swap?.addEventListener("click", () => this.swap());
+    if (swap) swap.disabled = false;
     const clear = this.querySelector("[data-clear]");
     clear?.addEventListener("click", () => this.clear());
     if (clear) clear.disabled = false;
@@ -186,6 +187,7 @@ class SensorMap extends HTMLElement {
     try {
       if (this.done() !== this.getAttribute("protocol")) await request("PATCH", `/api/v1/sessions/${session}`, { protocol: this.done() });
       await request("POST", `/api/v1/sessions/${session}/analyses`, { manifest: this.manifest() });
+      letGo();
       location.assign(`/sessions/${session}`);
     } catch (problem) {
       button.disabled = false;

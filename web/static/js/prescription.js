@@ -2,6 +2,7 @@
 import { request, showProblem } from "./common/api.js";
 import { speak } from "./common/text.js";
 import { localise, lowered, translate } from "./common/text.js";
+import { letGo } from "./common/unsaved.js";
 
 const form = document.getElementById("prescription");
 const base = `/api/v1/patients/${form.dataset.patient}`;
@@ -59,7 +60,8 @@ function summarise() {
   const source = target?.closest("[data-source]").querySelector("b").textContent;
   const told = [...form.querySelectorAll('input[name="modes"]:checked')].map((m) => lowered(m.parentElement.querySelector("b").textContent));
   const what = option().textContent.trim().split(",")[0];
-  form.querySelector("[data-summary]").textContent = speak`${what}, ${side || speak`both sides`}; target ${(value || speak`not known yet`) + (source && value ? ` (${lowered(source)})` : "")}; ${told.join(speak` and `)}.`;
+  const wanted = (value || speak`not known yet`) + (source && value ? ` (${lowered(source)})` : "");
+  form.querySelector("[data-summary]").textContent = speak`${what}, ${side || speak`both sides`}; target ${wanted}; told by ${told.join(speak` and `) || speak`nothing yet`}.`;
 }
 
 // A preset fills what decides; the target is the first of its sources that gives numbers for this person.
@@ -133,6 +135,7 @@ form.addEventListener("submit", async (e) => {
   button.disabled = true;
   try {
     await request("POST", `${base}/prescriptions`, record());
+    letGo();
     location.assign(`/patients/${form.dataset.patient}`);
   } catch (problem) {
     button.disabled = false;

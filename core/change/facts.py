@@ -1,0 +1,91 @@
+"""Which changes say something new: figures that are one fact by their definition count once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from core.change.verdict import Change
+from core.frames import Side
+from core.parameters.catalogue import CATALOGUE
+from core.parameters.flats import OTHER
+
+Fact = tuple[str, Side | None]
+"""What changed: the figure that stands for it, and the side."""
+
+SAME_AS: Final[Mapping[str, tuple[str, Literal["own", "other", "take"]]]] = {
+    "swing_pct": ("stance_pct", "own"),
+    "single_support_pct": ("stance_pct", "other"),
+    "terminal_double_support_pct": ("initial_double_support_pct", "other"),
+    "single_support_s": ("swing_time_s", "other"),
+    "terminal_double_support_s": ("initial_double_support_s", "other"),
+    "stride_time_s": ("cadence_spm", "take"),
+}
+"""Figure → the one that says the same by its definition, of which leg; "take": of both together.
+
+The rest of a stride is swing, a foot stands alone while the other swings, and two steps are a stride.
+"""
+
+
+@dataclass(frozen=True)
+class ChangedFact:
+    """A change beyond the measurement error.
+
+    Parameters
+    ----------
+    change : of the figure that stands for it. same : real changes that say the same, in the order given.
+    """
+
+    change: Change
+    same: tuple[Change, ...] = ()
+
+    @property
+    def relevant(self) -> bool:
+        """Some figure of it is clinically relevant."""
+        return any(c.verdict == "clinically_relevant" for c in (self.change, *self.same))
+
+
+@dataclass(frozen=True)
+class SortedChanges:
+    """The changes between two sessions, each fact once.
+
+    Parameters
+    ----------
+    real : beyond the measurement error, in the order given. within : facts inside it.
+    unjudged : facts with a difference and no verdict.
+    """
+
+    real: tuple[ChangedFact, ...] = ()
+    within: int = 0
+    unjudged: int = 0
+
+
+def name_fact(name: str, side: Side | None) -> Fact:
+    """The fact that a figure of a side says; what both sides share has none."""
+    to, of = SAME_AS.get(name, (name, "own"))
+    entry = CATALOGUE.get(to)
+    if of == "take" or side is None or (entry is not None and entry.shared):
+        return to, None
+    return to, OTHER[side] if of == "other" else side
+
+
+def sort_changes(changes: Sequence[Change]) -> SortedChanges:
+    """Sort changes by their verdict; a fact is real where any figure of it is.
+
+    Changes without a difference are left out.
+    """
+    facts: dict[Fact, list[Change]] = {}
+    for c in changes:
+        if c.difference is not None:
+            facts.setdefault(name_fact(c.name, c.side), []).append(c)
+    real, within, unjudged = [], 0, 0
+    for said in facts.values():
+        beyond = [c for c in said if c.verdict in {"real_change", "clinically_relevant"}]
+        if beyond:
+            real.append(ChangedFact(beyond[0], tuple(beyond[1:])))
+        elif any(c.verdict is not None for c in said):
+            within += 1
+        else:
+            unjudged += 1
+    return SortedChanges(tuple(real), within, unjudged)

@@ -1,0 +1,60 @@
+"""Figures that say the same by their definition count as one change."""
+
+from __future__ import annotations
+
+import pytest
+
+from core.change import Change, name_fact, sort_changes
+from core.change.facts import SAME_AS
+from core.change.verdict import Verdict
+from core.frames import Side
+from core.parameters.catalogue import CATALOGUE
+
+
+def change(name: str, side: Side | None, by: float, verdict: Verdict | None = "real_change") -> Change:
+    return Change(
+        name, side, "", 50.0, 50.0 + by, by, verdict, 4.2, "a table", None, None, None, None, None, None
+    )
+
+
+@pytest.mark.parametrize(
+    "same",
+    [
+        (("stance_pct", "right"), ("swing_pct", "right"), ("single_support_pct", "left")),
+        (("double_support_pct", "left"), ("double_support_pct", "right")),
+        (("initial_double_support_pct", "left"), ("terminal_double_support_pct", "right")),
+        (("swing_time_s", "left"), ("single_support_s", "right")),
+        (("cadence_spm", None), ("stride_time_s", "left"), ("stride_time_s", "right")),
+    ],
+)
+def test_what_one_definition_makes_equal_is_one_fact(same: tuple[tuple[str, Side | None], ...]) -> None:
+    found = sort_changes([change(name, side, 6.2) for name, side in same])
+    assert len(found.real) == 1
+    assert found.real[0].change.name == same[0][0]
+    assert [(c.name, c.side) for c in found.real[0].same] == list(same[1:])
+
+
+def test_legs_and_figures_that_differ_are_facts_of_their_own() -> None:
+    found = sort_changes([
+        change("stance_pct", "left", 6.2),
+        change("stance_pct", "right", 6.2),
+        change("step_length_m", "left", 0.1),
+    ])  # fmt: skip
+    assert len(found.real) == 3
+
+
+def test_a_fact_is_real_where_any_figure_of_it_is() -> None:
+    found = sort_changes([
+        change("stance_pct", "left", 4.1, "within_measurement_error"),
+        change("swing_pct", "left", -4.3),
+        change("step_length_m", "left", 0.01, "within_measurement_error"),
+        change("circumduction_m", "left", 0.01, None),
+    ])  # fmt: skip
+    assert [f.change.name for f in found.real] == ["swing_pct"]
+    assert (found.within, found.unjudged) == (1, 1)
+
+
+def test_only_figures_of_the_catalogue_are_the_same() -> None:
+    for name, (to, of) in SAME_AS.items():
+        assert {name, to} <= set(CATALOGUE)
+        assert name_fact(name, "left") == name_fact(to, {"own": "left", "other": "right", "take": None}[of])
