@@ -1,7 +1,6 @@
 // The form of a feedback prescription: targets of this person as one chooses, and one JSON record at the end.
 import { request, showProblem } from "./common/api.js";
-import { speak } from "./common/text.js";
-import { localise, lowered, translate } from "./common/text.js";
+import { localise, lowered, speak, translate } from "./common/text.js";
 import { letGo } from "./common/unsaved.js";
 
 const form = document.getElementById("prescription");

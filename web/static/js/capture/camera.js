@@ -1,5 +1,6 @@
 // The tablet's camera beside the take: asked for, shown, recorded. Nothing of it may disturb the take, so whatever
 // fails is said in the camera's own card.
+import { speak } from "../common/text.js";
 import { formatClock } from "../common/words.js";
 import { FilmOutbox } from "./film.js";
 
@@ -7,16 +8,16 @@ const PIECE_MS = 1000;
 const RESERVE = 0.98; // of the server's limit
 const FORMATS = ["video/webm;codecs=vp8", "video/webm;codecs=vp9", "video/webm", "video/mp4"];
 const REASONS = {
-  NotAllowedError: "The camera was not allowed. Allow it in the browser's settings of this page, then tick the box again.",
-  NotFoundError: "This device has no camera.",
-  NotReadableError: "Another program uses the camera. Close it, then tick the box again.",
+  NotAllowedError: speak`The camera was not allowed. Allow it in the browser's settings of this page, then tick the box again.`,
+  NotFoundError: speak`This device has no camera.`,
+  NotReadableError: speak`Another program uses the camera. Close it, then tick the box again.`,
 };
 
 // Why there is no camera here, or null.
 function whyNot() {
-  if (!window.isSecureContext) return "Filming needs the address with https.";
-  if (!navigator.mediaDevices?.getUserMedia || !window.MediaRecorder) return "This browser cannot film.";
-  return FORMATS.some((format) => MediaRecorder.isTypeSupported(format)) ? null : "This browser cannot film.";
+  if (!window.isSecureContext) return speak`Filming needs the address with https.`;
+  if (!navigator.mediaDevices?.getUserMedia || !window.MediaRecorder) return speak`This browser cannot film.`;
+  return FORMATS.some((format) => MediaRecorder.isTypeSupported(format)) ? null : speak`This browser cannot film.`;
 }
 
 export class Camera {
@@ -46,7 +47,7 @@ export class Camera {
     try {
       this.outbox = await FilmOutbox.open(() => this.sent());
     } catch {
-      this.problem = "This browser keeps nothing for this page, so it cannot film.";
+      this.problem = speak`This browser keeps nothing for this page, so it cannot film.`;
     }
   }
 
@@ -72,7 +73,7 @@ export class Camera {
       stream.getVideoTracks()[0].addEventListener("ended", () => this.gone());
       this.$("preview").srcObject = stream;
     } catch (error) {
-      this.problem = REASONS[error.name] ?? `The camera does not work: ${error.message}`;
+      this.problem = REASONS[error.name] ?? speak`The camera does not work: ${error.message}`;
       this.$("consent").checked = false;
     }
     this.draw();
@@ -80,7 +81,7 @@ export class Camera {
 
   // The camera was taken away: unplugged, or by another program.
   async gone() {
-    this.problem = "The camera has gone. The take goes on without it.";
+    this.problem = speak`The camera has gone. The take goes on without it.`;
     await this.end();
   }
 
@@ -111,7 +112,7 @@ export class Camera {
       recorder.start(PIECE_MS);
       this.recorder = recorder;
     } catch (error) {
-      this.problem = `The camera does not work: ${error.message}`;
+      this.problem = speak`The camera does not work: ${error.message}`;
       this.close();
     }
     this.draw();
@@ -120,13 +121,13 @@ export class Camera {
   async keep(piece) {
     if (!piece.size || !this.outbox.current) return;
     if (this.outbox.bytes + piece.size <= this.limit) return this.outbox.add(piece);
-    this.problem = "The film has reached its limit and ends here. The take goes on.";
+    this.problem = speak`The film has reached its limit and ends here. The take goes on.`;
     await this.end();
   }
 
   async full(error) {
-    const words = error.name === "QuotaExceededError" ? "There is no more room on this tablet." : error.message;
-    this.problem = `The film ends here: ${words} The take goes on.`;
+    const words = error.name === "QuotaExceededError" ? speak`There is no more room on this tablet.` : error.message;
+    this.problem = speak`The film ends here: ${words} The take goes on.`;
     await this.end();
   }
 
@@ -162,7 +163,7 @@ export class Camera {
     this.$("consent").disabled = Boolean(whyNot());
     this.$("turn").hidden = !choosing || !on;
     this.$("hide").hidden = !on;
-    set(this.$("hide"), this.hidden ? "Show the picture" : "Hide the picture");
+    set(this.$("hide"), this.hidden ? speak`Show the picture` : speak`Hide the picture`);
     this.$("preview").hidden = !on || Boolean(this.hidden);
     this.$("stop-film").hidden = !films;
     this.$("films").hidden = !films;
@@ -174,9 +175,9 @@ export class Camera {
 
   onTheWay() {
     const { held, left } = this.outbox ?? {};
-    if (held) return `${(held / 1e6).toFixed(1)} MB of the film are on their way. Leave this page open.`;
+    if (held) return speak`${(held / 1e6).toFixed(1)} MB of the film are on their way. Leave this page open.`;
     if (!left) return null;
-    return this.state === "running" ? "Filming has ended. What was filmed is kept with the take." : "The film is being set beside the take.";
+    return this.state === "running" ? speak`Filming has ended. What was filmed is kept with the take.` : speak`The film is being set beside the take.`;
   }
 }
 
