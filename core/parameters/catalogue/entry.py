@@ -124,6 +124,7 @@ class ParameterEntry:
     curve : how it is read from a cycle curve; such a parameter needs no code of its own.
     trainable : a prescription may train it. everyday : what a patient reads in place of the label.
     shared : both sides of a steady walk have the same value, so neither is trained alone.
+    better : of two sides the one that the other is trained towards (our choice); None = neither by itself.
     is_length : the patient's screen may show it as a way on the floor.
     plausible : least and greatest value that a person can have; beyond, it is an error of detection.
     norm : its reference, None without one. change : its limits of change (core/change/limits.py), None
@@ -147,6 +148,7 @@ class ParameterEntry:
     trainable: bool = False
     everyday: str = ""
     shared: bool = False
+    better: Literal["higher", "lower"] | None = None
     is_length: bool = False
     plausible: tuple[float, float] = (-inf, inf)
     norm: NormKey | None = None
