@@ -88,4 +88,4 @@ def test_a_sensor_without_a_joint_to_the_others_is_heard_alone() -> None:
     both = weigh_forward_axes({"chest": pair, "pelvis": (says("velocity", 0.0),)}, [], {})
     assert both["chest"].angle == pytest.approx(alone.angle)
     assert both["chest"].sd == pytest.approx(alone.sd)
-    assert both["pelvis"].angle == pytest.approx(0.0, abs=1e-6)
+    assert both["pelvis"].angle == pytest.approx(0.0, abs=0.01)

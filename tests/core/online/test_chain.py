@@ -133,6 +133,11 @@ def test_the_worn_sensors_decide_what_is_shown(name: str) -> None:
     codes = {n.code for f in frames for n in f.notices}
     assert ("no_live_figure" in codes) == (name not in METHODS)
     assert bool(last.p) == (name in METHODS)
+    assert bool(last.contact) == (name != "without feet")
+    if last.method != "none":
+        assert last.valid
+        heights = [float(last.p[s][2]) for s in last.p if s.startswith("foot")]
+        assert max(heights) < 0.3
 
 
 def test_a_chest_sensor_beside_the_seven_stops_neither_calibration_nor_strides() -> None:
@@ -140,11 +145,6 @@ def test_a_chest_sensor_beside_the_seven_stops_neither_calibration_nor_strides()
     frames = live(replace(take, sensors={**take.sensors, "chest": take.sensors["pelvis"]}))[1]
     assert (frames[-1].stage, frames[-1].method) == ("running", "erkf")
     assert len(told(frames).strides) == len(streamed("seven")[1].strides)
-    assert bool(last.contact) == (name != "without feet")
-    if last.method != "none":
-        assert last.valid
-        heights = [float(last.p[s][2]) for s in last.p if s.startswith("foot")]
-        assert max(heights) < 0.3
 
 
 @pytest.mark.slow
