@@ -106,7 +106,7 @@ def list_analysed(c: Connection, patient_id: str) -> list[AnalysedSession]:
 def baseline(done: Sequence[AnalysedSession]) -> AnalysedSession | None:
     """The newest visit that says how somebody walks: at own pace where there is one, never with feedback.
 
-    Tests and squats only where nobody walked over ground or on a belt, daily life where there is nothing else.
+    Tests and squats only without a walk over ground or on a belt, daily life where there is nothing else.
 
     Parameters
     ----------
