@@ -161,6 +161,17 @@ class ParameterEntry:
         return unit_of(self.name)
 
     @property
+    def target_range(self) -> tuple[float, float]:
+        """Least and greatest value that may be entered as a target.
+
+        The plausible ones; where none are declared, the range bar and as much again to either side (our
+        choice), below 0 only where the bar goes there.
+        """
+        low, high = self.scale
+        least, most = 2 * low - high, 2 * high - low
+        return max(self.plausible[0], least if low < 0 else 0.0), min(self.plausible[1], most)
+
+    @property
     def printed_unit(self) -> str:
         """Unit as printed."""
         return UNITS.get(_ending(self.name), ("", ""))[1]

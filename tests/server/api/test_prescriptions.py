@@ -90,6 +90,8 @@ async def test_a_prescription_is_ended_once(clinic: Clinic) -> None:
         ({"schedule": {"shares_pct": [0, 100]}}, "Expected no share above the one before"),
         ({"schedule": {"speed": 1}}, "schedule.speed"),
         ({"parameter": "stride_length_m"}, "is the same for both sides of a walk"),
+        ({"target": {"source": "manual", "mean": 1000.0, "sd": 2.0}}, "Expected 0 to 110"),
+        ({"target": {"source": "manual", "mean": 62.0, "sd": 1000.0}}, "Expected at most 110"),
         ({"band_sd": 0}, "band_sd is 0.0. Expected a number from 0.1 to 5"),
     ],
 )
