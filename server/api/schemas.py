@@ -17,6 +17,7 @@ from server.report.behind import StrideValue
 from server.services.notes import MOST_CHARACTERS
 from server.services.recordings import RecordedFile, RecordingState
 from server.services.tunings import MOST_OF_SWARM, Scheme
+from server.storage.tables import now
 
 _HIDDEN = "\u00ad\u200b-\u200f\u202a-\u202e\u2060-\u206f\ufeff"
 """What is not seen or turns the text beside it round (Unicode, category Cf)."""
@@ -35,7 +36,7 @@ SignInName = Annotated[
 Note = Annotated[str, StringConstraints(max_length=10_000, pattern=_TEXT)] | None
 Password = Annotated[str, StringConstraints(min_length=MIN_LENGTH, max_length=MAX_LENGTH)]
 Height = Annotated[float, Field(ge=0.5, le=2.5, allow_inf_nan=False, description="m")]
-BirthYear = Annotated[int, Field(ge=1850, le=2200)]
+BirthYear = Annotated[int, Field(ge=1850, le=now().year)]
 Sex = Literal["female", "male"]
 Side = Literal["left", "right"]
 HexId = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{32}$")]
