@@ -20,8 +20,8 @@ from tests.server.clinic import Clinic
 
 EXAMPLES = 12
 # beyond a schema, so 422 for what it allows: rules between the parts of a manifest (two sensors on one
-# segment) or of an edit (only a move says where to), names that lead elsewhere, filters that nobody has, films
-# that are none or that nobody agreed to, and days of a mistyped year
+# segment) or of an edit (only a move says where to), names that lead elsewhere, filters that nobody has,
+# films that are none or that nobody agreed to, and days of a mistyped year
 BEYOND_SCHEMA = (
     "manifest", "analyses", "edits", "{name}", "prescriptions", "targets", "tunings", "video", "notes",
     "programmes", "planned-visits",
