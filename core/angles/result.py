@@ -64,7 +64,6 @@ class JointAngles:
 
     @property
     def estimated(self) -> frozenset[str]:
-        """Variables, without the side, that no two sensors measure on some side."""
+        """Angles, with their side, that no two sensors measure."""
         told = self.diagnostics.get("estimated", ())
-        names = [str(name) for name in told] if isinstance(told, (tuple, list)) else []
-        return frozenset(name.removesuffix("_l").removesuffix("_r") for name in names)
+        return frozenset(str(name) for name in told) if isinstance(told, (tuple, list)) else frozenset()

@@ -176,7 +176,8 @@ def _find_marginals(
 ) -> Iterator[tuple[Segment, Floats]]:
     """Every sensor's posterior (cells,), unnormalised: sums over all the others (sum-product, exact).
 
-    Left and right of a level are one pair of angles, so that the chain has no loop.
+    Left and right of a level are one pair of angles, so that the chain has no loop. A sensor outside it, on
+    the chest, has no joint here to any other and is heard alone.
     """
     links = {j.distal: _link(j) for j in joints}
     open_link = np.ones((CELLS, CELLS))
@@ -210,6 +211,9 @@ def _find_marginals(
         if i:
             below = LEVELS[i - 1]
             down = _scale(link(below["left"]).T @ (pairs[i] * down) @ link(below["right"]))
+    chained = {"pelvis", *(s for level in LEVELS for s in level.values())}
+    for outside in measures.keys() - chained:
+        yield outside, own(outside)
 
 
 def _link(joint: JointMeasure) -> Floats:

@@ -36,7 +36,7 @@ class Target:
     Parameters
     ----------
     source : norm = healthy people at this person's speed; own_better_side, own_baseline = the person's other
-        or same side in an earlier session; manual = entered.
+        side, where that is the better one, or same side in an earlier session; manual = entered.
     mean, sd : in the unit of the parameter; None until a take resolves them. A level is as wide as `sd`.
     words : who or what is behind them, as printed. session_id : the session they are taken from.
     """

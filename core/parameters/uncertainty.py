@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from core.events.result import MANUAL, EventKind, GaitEvents
-from core.frames import SIDES, Side
+from core.frames import SIDES, SUFFIX, Side
 from core.parameters.catalogue import CATALOGUE
 from core.parameters.catalogue.errors import ContactWeights
 from core.parameters.flats import OTHER
@@ -87,7 +87,8 @@ def state_uncertainty(
     Parameters
     ----------
     parameters : of one take. events : that they were measured on, for what its contacts are known to.
-    estimated : variables that no two sensors measure. goniometer : a standing angle was added to the levels.
+    estimated : angles, with their side, that no two sensors measure.
+    goniometer : a standing angle was added to the levels.
     feet_lag_s : what one foot's clock may be late by, standard, where nothing between the feet shows it.
     """
     contacts = {side: _contact_errors(events, side) for side in SIDES}
@@ -98,9 +99,17 @@ def state_uncertainty(
     )
 
 
-def mark_estimated(parameters: Sequence[Parameter], variables: Collection[str]) -> tuple[Parameter, ...]:
-    """The parameters, those read from one of these variables marked as estimated."""
-    return tuple(replace(p, estimated=True) if _variable(p.name) in variables else p for p in parameters)
+def mark_estimated(parameters: Sequence[Parameter], angles: Collection[str]) -> tuple[Parameter, ...]:
+    """The parameters, those read from one of these angles marked as estimated: the other side is its own."""
+    return tuple(replace(p, estimated=True) if _is_of(p, angles) else p for p in parameters)
+
+
+def _is_of(p: Parameter, angles: Collection[str]) -> bool:
+    """Whether a parameter is read from one of these angles; those of the pelvis have no side."""
+    variable = _variable(p.name)
+    if variable is None:
+        return False
+    return variable in angles or (p.side is not None and f"{variable}_{SUFFIX[p.side]}" in angles)
 
 
 def _variable(name: str) -> str | None:
@@ -128,7 +137,7 @@ def _stated(
         return p
     errors = entry.errors
     variable = _variable(p.name)
-    if variable is not None and variable in estimated:
+    if variable is not None and p.estimated:
         joint = variable.partition("_")[0]
         known = FEET_ALONE_DEG if "pelvis_tilt" in estimated else ESTIMATED_DEG
         if known is FEET_ALONE_DEG and entry.curve is not None and entry.curve.statistic == "at":

@@ -40,8 +40,13 @@ class Movement:
 
 MOVEMENTS: Mapping[str, Movement] = MappingProxyType(
     {
-        "squats": Movement("Five squats on the right leg", Squats()),
-        "squats_left": Movement("Five squats on the left leg", Squats(side="left")),
+        "squats": Movement(
+            "Five squats on the right leg, sensors put on anyhow: no analysis of squats takes them", Squats()
+        ),
+        "squats_left": Movement(
+            "Five squats on the left leg, sensors put on anyhow: no analysis of squats takes them",
+            Squats(side="left"),
+        ),
         "squats_agreed": Movement(
             "Six squats on the right leg, sensors put on as agreed", Squats(hinged=True, repetitions=6), True
         ),

@@ -17,18 +17,26 @@ from server.report.behind import StrideValue
 from server.services.notes import MOST_CHARACTERS
 from server.services.recordings import RecordedFile, RecordingState
 from server.services.tunings import MOST_OF_SWARM, Scheme
+from server.storage.tables import now
 
+_HIDDEN = "\u00ad\u200b-\u200f\u202a-\u202e\u2060-\u206f\ufeff"
+"""What is not seen or turns the text beside it round (Unicode, category Cf)."""
+_NO_LINE = f"\\x00-\\x1f\\x7f{_HIDDEN}"
 # one line of text: starts and ends with something visible, no control characters
-_LINE = r"^[^\s\x00-\x1f\x7f]([^\x00-\x1f\x7f]*[^\s\x00-\x1f\x7f])?$"
+_LINE = f"^[^\\s{_NO_LINE}]([^{_NO_LINE}]*[^\\s{_NO_LINE}])?$"
+_NO_TEXT = f"\\x00-\\x08\\x0b\\x0c\\x0e-\\x1f\\x7f{_HIDDEN}"
+# text of many lines
+_TEXT = f"^[^{_NO_TEXT}]*$"
+_SOME_TEXT = f"^[^{_NO_TEXT}]*[^\\s{_NO_TEXT}][^{_NO_TEXT}]*$"
 Line = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=_LINE)]
 Code = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=_LINE)]
 SignInName = Annotated[
     str, StringConstraints(min_length=1, max_length=64, pattern=r"^[a-z0-9][a-z0-9._@-]*$")
 ]
-Note = Annotated[str, StringConstraints(max_length=10_000)] | None
+Note = Annotated[str, StringConstraints(max_length=10_000, pattern=_TEXT)] | None
 Password = Annotated[str, StringConstraints(min_length=MIN_LENGTH, max_length=MAX_LENGTH)]
 Height = Annotated[float, Field(ge=0.5, le=2.5, allow_inf_nan=False, description="m")]
-BirthYear = Annotated[int, Field(ge=1850, le=2200)]
+BirthYear = Annotated[int, Field(ge=1850, le=now().year)]
 Sex = Literal["female", "male"]
 Side = Literal["left", "right"]
 HexId = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{32}$")]
@@ -178,7 +186,14 @@ class PatientChange(PatientNew):
 class NoteNew(Request):
     """A note about a patient, of today unless said otherwise."""
 
-    content: Annotated[str, StringConstraints(min_length=1, max_length=MOST_CHARACTERS, pattern=r"\S")]
+    content: Annotated[
+        str,
+        StringConstraints(
+            min_length=1,
+            max_length=MOST_CHARACTERS,
+            pattern=f"^[^{_NO_TEXT}]*[^\\s{_NO_TEXT}][^{_NO_TEXT}]*$",
+        ),
+    ]
     written_on: dt.date = dt.date.min
 
 

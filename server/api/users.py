@@ -15,7 +15,7 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.passwords import hash_password
 from server.auth.roles import Action, Role
-from server.context import Db, Id, OpenLogins
+from server.context import Db, Failures, Id, OpenLogins
 from server.http.json_body import StrictJsonRoute
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/users", tags=["users"])
@@ -41,7 +41,7 @@ def add_user(body: schemas.UserNew, db: Db, who: Admin) -> schemas.User:
 
 @router.patch("/{user_id}", response_model=schemas.User, responses=refusals(409))
 def change_user(
-    user_id: Id, body: schemas.UserChange, db: Db, logins: OpenLogins, who: Admin
+    user_id: Id, body: schemas.UserChange, db: Db, logins: OpenLogins, failures: Failures, who: Admin
 ) -> schemas.User:
     """Change role, shown name, password, or close the account; sign-ins end with a new role."""
     values = body.model_dump(exclude_unset=True, mode="json")
@@ -54,6 +54,8 @@ def change_user(
         if "password_hash" in values or (row.role, row.active) != (before.role, before.active):
             logins.end_all(c, user_id, but=who.login_id)
         audit.record(c, who, "user.changed", "user", user_id, {"fields": fields, "role": row.role})
+    if "password_hash" in values:
+        failures.forgive(row.name)
     return user_answer(row)
 
 

@@ -59,6 +59,12 @@ class Throttle:
         with self._lock:
             self._failures.pop((account, address), None)
 
+    def forgive(self, account: str) -> None:
+        """Forget all failures of an account: an administrator has given it a new password."""
+        with self._lock:
+            for key in [k for k in self._failures if k[0] == account]:
+                del self._failures[key]
+
     def _wait(self, key: Key, limit: int, now: float) -> float:
         failures = self._failures.get(key)
         if failures is None:

@@ -12,14 +12,26 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
+import msgspec
+
 from server.live.messages import Picture
 
 QUEUE: Final = 200
 """Strides, cues and notices kept for a browser that does not read: two minutes of walking."""
-SHOWN: Final = 20
-"""Strides and cues that a new browser gets (the page's strip has the last 20 strides)."""
+KEPT: Final = 60
+"""Strides and cues that a new browser gets, as many as one that was there holds (web/static/js/live/feed.js):
+the page's strip has the last 20 of a side that is trained alone, some of which do not count."""
 STATES: Final = ("state", "feedback", "frame")
 """Kinds of which only the newest counts, in the order in which a new browser gets them."""
+
+
+class StrideNumber(msgspec.Struct, frozen=True):
+    """What names a stride in what is told of it."""
+
+    n: int
+
+
+_number = msgspec.json.Decoder(StrideNumber).decode
 
 
 class BrowserQueue:
@@ -79,17 +91,22 @@ class Room:
         for viewer in self.viewers:
             viewer.put(kind, body)
 
-    def keep_stride(self, k: int, body: bytes) -> None:
-        """Keep the `k`th telling of a stride for those who come later."""
-        _keep(self._strides, k, body, 3 * SHOWN)  # told three times each
+    def keep_stride(self, body: bytes) -> None:
+        """Keep what was told last of a stride for those who come later."""
+        _keep(self._strides, _number(body).n, body)
+
+    def forget_strides(self) -> None:
+        """Calibrated anew: what was told belongs to the old axes, and strides are counted from 0 again."""
+        self._strides.clear()
+        self._cues.clear()
 
     def keep_cue(self, k: int, body: bytes) -> None:
         """Keep the `k`th cue for those who come later."""
-        _keep(self._cues, k, body, SHOWN)
+        _keep(self._cues, k, body)
 
     @property
     def strides(self) -> tuple[bytes, ...]:
-        """What was told of the last strides, in order."""
+        """What was told last of each of the last strides, in order."""
         return tuple(self._strides[k] for k in sorted(self._strides))
 
     def show(self, picture: Picture) -> None:
@@ -129,7 +146,7 @@ class Room:
             self._watchers.remove(watcher)
 
 
-def _keep(kept: dict[int, bytes], k: int, body: bytes, most: int) -> None:
+def _keep(kept: dict[int, bytes], k: int, body: bytes) -> None:
     kept[k] = body
-    while len(kept) > most:
+    while len(kept) > KEPT:
         del kept[min(kept)]

@@ -225,6 +225,8 @@ class ActiveTake:
     def show(self, picture: Picture) -> None:
         """Pass a picture on."""
         self.t_s = picture.t_s
+        if self.stage == "running" and picture.stage != "running":
+            self.room.forget_strides()
         if (picture.stage, picture.say) != (self.stage, self.say):
             self.stage, self.say = picture.stage, picture.say
             self.tell_stage()
@@ -246,7 +248,7 @@ class ActiveTake:
     def tell(self, item: FeedItem) -> None:
         """Pass on what happens once; what a new process says again is known already."""
         if item.kind == "stride":
-            self.room.keep_stride(item.k, item.body)
+            self.room.keep_stride(item.body)
         elif item.kind == "cue":
             self.room.keep_cue(item.k, item.body)
         elif item.kind == "calibration":

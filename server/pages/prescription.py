@@ -38,7 +38,7 @@ MODES: Final = (
 
 SOURCES: Final = (
     ("norm", "Norm", "healthy people at this person's speed"),
-    ("own_better_side", "Own better side", "the other side in the last walk"),
+    ("own_better_side", "Own better side", "the other side, where it is better, in the last walk"),
     ("own_baseline", "Own baseline", "the same side in the last walk"),
     ("manual", "Entered", "mean and SD as typed"),
 )

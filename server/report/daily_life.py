@@ -396,13 +396,13 @@ def _describe_event(found: ActivityResult, e: PosturalTransition | TransitionCan
 
 
 def _describe_leans(found: ActivityResult) -> tuple[LeanRow, ...]:
-    """Median and the middle 90 % of inclination in each kind."""
+    """Median and the middle 90 % of inclination in each kind; not of lying: on a side none is forward."""
     values, kinds = found.inclination_deg, label_seconds(found)
     rows = []
     for i, kind in enumerate(KINDS):
         own = values[kinds == i]
         own = own[np.isfinite(own)]
-        if not len(own) or kind in {"unknown", "non_wear", "gap"}:
+        if not len(own) or kind in {"lying", "unknown", "non_wear", "gap"}:
             continue
         low, median, high = (format_number(float(x), 0) for x in np.percentile(own, (5, 50, 95)))
         rows.append(LeanRow(KIND_LABELS[kind], format_hours(len(own) / 60.0), median, low, high))

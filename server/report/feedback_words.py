@@ -11,7 +11,7 @@ from server.report.wording import Term, format_number, parameter_term
 
 SOURCE_WORDS: Final = {
     "norm": "healthy people at this person's speed",
-    "own_better_side": "the person's other side",
+    "own_better_side": "the person's better side",
     "own_baseline": "the person's own baseline",
     "manual": "entered",
 }

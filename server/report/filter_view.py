@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -123,19 +123,23 @@ def view_comparison(
     has_cycles = any(s["cycle_sd"] for s in found["spreads"])
     over = over if has_cycles else "time"
     ran = sum(f["to_median"] is not None for f in found["filters"]) - 1
+    rows = tuple(_row(f) for f in found["filters"])
+    drawn: Mapping[str, Any] = spreads
+    if ran < 2:  # a single filter is its own median: 0° everywhere, which would read as agreement
+        rows, drawn = tuple(replace(row, to_median=("", "")) for row in rows), {}
     return ComparisonView(
         headline=_headline(spreads, ran, len(found["segments"])),
         sentences=(*_notes(found, has_cycles), *(n["message"] for n in found["notices"])),
-        rows=tuple(_row(f) for f in found["filters"]),
+        rows=rows,
         over=over,
         groups=(
-            ("Joint angles", _panels([(v.label, _sides(spreads, v.name, "")) for v in VARIABLES], over, end)),
+            ("Joint angles", _panels([(v.label, _sides(drawn, v.name, "")) for v in VARIABLES], over, end)),
             *(
-                (title, _panels([(p.capitalize(), _sides(spreads, p, f"_{q}")) for p in PARTS], over, end))
+                (title, _panels([(p.capitalize(), _sides(drawn, p, f"_{q}")) for p in PARTS], over, end))
                 for q, title in QUANTITIES.items()
             ),
         ),
-        table=tuple(row for s in found["spreads"] for row in _spread_rows(s)),
+        table=tuple(row for s in drawn.values() for row in _spread_rows(s)),
         reference=None if found["reference"] is None else _reference(found, of, filter_name),
     )
 
@@ -150,6 +154,8 @@ def _headline(spreads: Mapping[str, Any], ran: int, sensors: int) -> str:
         if found and ran > 1:
             values = " and ".join(f"{format_number(s['rms'], 1)}° {side or ''}" for side, s in found.items())
             return f"{filters} on {worn}: their {words} differs by {values.strip()} (standard deviation)."
+    if ran == 1:
+        return f"{filters} on {worn}: it has no other to differ from. It is held against Sagittal's own."
     return f"{filters} on {worn}."
 
 

@@ -23,11 +23,17 @@ from core.norms.profile import CurveReference
 from core.parameters import cycle_curves
 from core.parameters.anatomical_zero import anatomical_variables
 from core.parameters.result import CycleCurves
+from core.parameters.uncertainty import mark_estimated
 from core.scores import Scores, score_curves
 from server.report.bundle import Bundle
 from server.report.columns import reduce_to_plain
 from server.report.daily_life import DailyLifeView, daily_life_view
-from server.report.estimator import EstimatorView, estimator_view, list_estimated_variables
+from server.report.estimator import (
+    EstimatorView,
+    estimator_view,
+    list_estimated_angles,
+    list_estimated_variables,
+)
 from server.report.functional import TEST_NORM_NOTE, FunctionalView, functional_view
 from server.report.headline import Headline, find_standouts, say_badge
 from server.report.level import level_rows
@@ -265,8 +271,9 @@ def report_model(
     if own is not None:
         compared = {name: v for name, v in norms.values.items() if v.comparable or name not in own.values}
         norms = replace(norms, values={**own.values, **compared})
-    unsure = {*list_estimated_variables(bundle.estimator), *UNSURE_FIGURES}
-    rows = parameter_rows(bundle.parameters, norms, unsure, affected)
+    marked = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
+    marked = tuple(replace(p, estimated=True) if p.name.startswith(UNSURE_FIGURES) else p for p in marked)
+    rows = parameter_rows(marked, norms, affected)
     curves = None if bundle.angles is None else cycle_curves(bundle.angles, bundle.strides)
     panels = curve_panels(bundle, curves, norms, own)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg

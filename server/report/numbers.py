@@ -13,7 +13,7 @@ from core.parameters.result import Parameter
 from core.parameters.uncertainty import mark_estimated
 from core.scores import Score, score_curves
 from server.report.bundle import Bundle, read_warnings
-from server.report.estimator import list_estimated_variables
+from server.report.estimator import list_estimated_angles, list_estimated_variables
 from server.report.quality_box import data_verdict
 
 
@@ -38,7 +38,7 @@ def read_numbers(content: bytes) -> Numbers | None:
     if "scores" not in data:
         return None
     # the files of earlier versions say only of the angles which are estimated
-    unsure = list_estimated_variables(data.get("estimator"))
+    unsure = list_estimated_angles(data.get("estimator"))
     parameters = mark_estimated([Parameter(**row) for row in data["parameters"]], unsure)
     judged = data_verdict(
         data["quality"], data.get("estimator"), {n.severity for n in read_warnings(data)}, parameters
@@ -50,7 +50,7 @@ def read_numbers(content: bytes) -> Numbers | None:
 def numbers_of(bundle: Bundle) -> Numbers:
     """The numbers of an analysis that was read with its curves."""
     unsure = list_estimated_variables(bundle.estimator)
-    parameters = mark_estimated(bundle.parameters, unsure)
+    parameters = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
     judged = data_verdict(
         bundle.quality, bundle.estimator, {n.severity for n in bundle.warnings}, bundle.parameters
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import hypot, sqrt
 from typing import Final
@@ -84,7 +84,8 @@ class ParameterRow:
     comfortable : norm of people at their comfortable speed, with its figures, where `norm` is of people at
         the person's own; else None.
     reason : words in place of all numbers, None if there is any.
-    low_confidence : of an angle that the estimator's model gives; it has no norm.
+    low_confidence : of an angle that the estimator's model gives; it has no norm. low_side : the only side of
+        which that is so, empty where it is of all that have a value.
     symmetry : left against right in numbers, None unless both sides have one of enough strides.
     change : since the visit before, of every side that has one; empty without such a visit.
     """
@@ -112,6 +113,7 @@ class ParameterRow:
     comfortable_source: str | None = None
     comfortable_group: str | None = None
     low_confidence: bool = False
+    low_side: str = ""
     symmetry: Symmetry | None = None
 
     @property
@@ -155,7 +157,6 @@ class ParameterRow:
 def parameter_rows(
     parameters: Sequence[Parameter],
     norms: Norms = NOBODY,
-    estimated: Collection[str] = (),
     affected: Side | None = None,
     zero: Zero = "standing",
 ) -> tuple[ParameterRow, ...]:
@@ -164,7 +165,6 @@ def parameter_rows(
     Parameters
     ----------
     affected : side that ratios are taken of, None = left over right.
-    estimated : variables that no two sensors measure; what is derived from them has low confidence.
     zero : what the levels of joint angles are measured from.
     """
     found: dict[str, dict[str | None, Parameter]] = {}
@@ -173,7 +173,7 @@ def parameter_rows(
     known = [name for name in CATALOGUE if name in found]
     other = [name for name in found if name not in CATALOGUE]
     rows = (_row(name, found[name], norms, affected, zero) for name in (*known, *other))
-    return tuple(_unsure(r) if any(r.name.startswith(f"{v}_") for v in estimated) else r for r in rows)
+    return tuple(_unsure(row, found[row.name]) for row in rows)
 
 
 def group_rows(rows: Sequence[ParameterRow]) -> tuple[tuple[str, tuple[ParameterRow, ...]], ...]:
@@ -228,17 +228,29 @@ def _norm_text(norm: NormValue | None, term: Term) -> str | None:
     return f"{format_number(norm.mean, term.digits)} ± {format_number(norm.sd, _sd_digits(term))}"
 
 
-def _unsure(row: ParameterRow) -> ParameterRow:
-    """An angle of low confidence is not held against anybody, nor against the other side."""
+def _unsure(row: ParameterRow, sides: Mapping[str | None, Parameter]) -> ParameterRow:
+    """An angle of low confidence is held against nobody, nor against the other side; a measured side is."""
+    unsure = tuple(side for side, p in sides.items() if p.estimated and p.mean is not None)
+    if not unsure:
+        return row
 
-    def bare(cell: TableCell | None) -> TableCell | None:
-        return None if cell is None else replace(cell, z=None, percentile=None)
+    def bare(side: Side | None, cell: TableCell | None) -> TableCell | None:
+        return cell if cell is None or side not in unsure else replace(cell, z=None, percentile=None)
 
-    return replace(
+    told = replace(
         row,
-        both=bare(row.both),
-        left=bare(row.left),
-        right=bare(row.right),
+        both=bare(None, row.both),
+        left=bare("left", row.left),
+        right=bare("right", row.right),
+        low_confidence=True,
+        low_side="" if len(unsure) > 1 else unsure[0] or "",
+        difference=None,
+        symmetry=None,
+    )
+    if any(p.mean is not None for side, p in sides.items() if side not in unsure):
+        return told
+    return replace(
+        told,
         norm=None,
         norm_mean=None,
         norm_sd=None,
@@ -250,9 +262,7 @@ def _unsure(row: ParameterRow) -> ParameterRow:
         comfortable_sd=None,
         comfortable_source=None,
         comfortable_group=None,
-        difference=None,
-        symmetry=None,
-        low_confidence=True,
+        low_side="",
     )
 
 

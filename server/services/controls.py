@@ -13,7 +13,7 @@ from core.condition import WalkingCondition
 from core.norms.controls import ControlGroup, ControlSession, control_group, mean_curves
 from core.parameters import cycle_curves
 from core.parameters.uncertainty import mark_estimated
-from server.report.estimator import list_estimated_variables
+from server.report.estimator import list_estimated_angles, list_estimated_variables
 from server.services import analyses, edit_log
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
@@ -86,7 +86,7 @@ def _session(reviewed: ReviewedAnalyses, visit: ControlVisit) -> ControlSession:
         angles = bundle.angles if stood else None
         unsure = list_estimated_variables(bundle.estimator)
         curves = {} if angles is None else mean_curves(cycle_curves(angles, bundle.strides), unsure)
-        parameters = mark_estimated(bundle.parameters, unsure)
+        parameters = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
         age = None if visit.birth_year is None else float(visit.performed_on.year - visit.birth_year)
         return ControlSession(visit.person, age, visit.sex, parameters, curves)  # type: ignore[arg-type]
 

@@ -106,14 +106,15 @@ def list_analysed(c: Connection, patient_id: str) -> list[AnalysedSession]:
 def baseline(done: Sequence[AnalysedSession]) -> AnalysedSession | None:
     """The newest visit that says how somebody walks: at own pace where there is one, never with feedback.
 
-    Daily life only where there is nothing else.
+    Tests and squats only without a walk over ground or on a belt, daily life where there is nothing else.
 
     Parameters
     ----------
     done : oldest first.
     """
     untold = [a for a in reversed(done) if not a.session.feedback]
-    untold = [a for a in untold if a.session.protocol != "activity"] or untold
+    walks = [a for a in untold if a.session.protocol in sessions.WALKS]
+    untold = walks or [a for a in untold if a.session.protocol != "activity"] or untold
     return next((a for a in untold if a.condition.is_at_own_pace), untold[0] if untold else None)
 
 

@@ -9,6 +9,7 @@ from sqlalchemy import Connection, delete, insert, select
 
 from server import audit
 from server.services import patients
+from server.services.calendar_days import require_day
 from server.services.errors import NotAllowed, NotFound, ServiceError
 from server.storage.tables import new_id, now, patient_note, user
 
@@ -45,7 +46,7 @@ def add(
         insert(patient_note).values(
             id=note_id,
             patient_id=patient_id,
-            written_on=written_on or now().date(),
+            written_on=require_day(written_on or now().date()),
             content=text,
             created_at=now(),
             created_by=None if actor is None else actor.user_id,

@@ -6,6 +6,7 @@ import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
+from unicodedata import normalize
 
 from sqlalchemy import Connection, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
@@ -69,8 +70,10 @@ def create(
         "is_control": is_control,
         "note": note,
     }
+    checked = _checked(values)
+    _refuse_alike(c, str(checked["code"]))
     with _explained(code):
-        c.execute(insert(patient).values(id=patient_id, created_at=now(), **_checked(values)))
+        c.execute(insert(patient).values(id=patient_id, created_at=now(), **checked))
     audit.record(c, actor, "patient.created", "patient", patient_id)
     return get(c, patient_id)
 
@@ -82,6 +85,8 @@ def change(
     before = get(c, patient_id)
     checked = _checked(values)
     changed = {name: value for name, value in checked.items() if getattr(before, name) != value}
+    if "code" in changed:
+        _refuse_alike(c, str(changed["code"]), patient_id)
     if changed:
         with _explained(str(changed.get("code"))):
             c.execute(update(patient).where(patient.c.id == patient_id).values(**changed))
@@ -152,11 +157,21 @@ def _checked(values: Mapping[str, object]) -> dict[str, Any]:
         raise ServiceError("bad_value", f"A patient has no {', '.join(sorted(unknown))}.")
     checked = dict(values)
     if "code" in checked:
-        code = str(checked["code"]).strip()
+        code = normalize("NFKC", str(checked["code"])).strip()
         if not 1 <= len(code) <= 64:
             raise ServiceError("bad_value", "A patient's code has 1 to 64 characters.")
         checked["code"] = code
+    born, year = checked.get("birth_year"), now().year
+    if isinstance(born, int) and born > year:
+        raise ServiceError("bad_value", f"The year of birth is {born}. Expected {year} or earlier.")
     return checked
+
+
+def _refuse_alike(c: Connection, code: str, own: str | None = None) -> None:
+    """Raise Conflict code_taken where another's code differs in case or in the form of letters only."""
+    for other_id, other in c.execute(select(patient.c.id, patient.c.code)):
+        if other_id != own and normalize("NFKC", other).casefold() == code.casefold():
+            raise Conflict("code_taken", f"The code '{other}' belongs to another patient; choose a new one.")
 
 
 class _explained:  # noqa: N801 - reads as a word: with _explained(code)

@@ -56,9 +56,9 @@ def write(
 
     Raises
     ------
-    NotFound: the patient. ParameterError bad_prescription: a field is not as expected. ServiceError
-    no_target: its source gives no numbers for this person; the sentence says why. both_sides: a side is named
-    of what both share.
+    NotFound: the patient. ParameterError, ServiceError bad_prescription: a field is not as expected.
+    ServiceError no_target: its source gives no numbers for this person; the sentence says why. both_sides: a
+    side is named of what both share.
     """
     patient = patients.get(c, patient_id)
     asked = Prescription.from_json(content)
@@ -212,6 +212,7 @@ def _with_target(
 ) -> Prescription:
     source = asked.target.source
     if source == "manual":
+        _refuse_impossible(asked)
         return replace(asked, target=replace(asked.target, words="entered", session_id=None))
     chosen = None if source == "norm" else asked.target.session_id
     walk = targets.last_walk(c, reviewed, patient, session_id=chosen)
@@ -219,6 +220,22 @@ def _with_target(
     if found.target is None:
         raise ServiceError("no_target", found.reason or "")
     return replace(asked, target=replace(found.target, source=source))
+
+
+def _refuse_impossible(asked: Prescription) -> None:
+    """Raise ServiceError bad_prescription for an entered target that nobody walks with: 60 typed for 0.60."""
+    entry, mean, sd = CATALOGUE[asked.parameter], asked.target.mean, asked.target.sd
+    low, high = entry.target_range
+    unit = f" {entry.printed_unit}" if entry.printed_unit else ""
+    if mean is not None and not low <= mean <= high:
+        raise ServiceError(
+            "bad_prescription",
+            f"target.mean is {mean:g}{unit}. Expected {low:g} to {high:g}{unit} for {entry.label.lower()}.",
+        )
+    if sd is not None and sd > high - low:
+        raise ServiceError(
+            "bad_prescription", f"target.sd is {sd:g}{unit}. Expected at most {high - low:g}{unit}."
+        )
 
 
 def _baseline(

@@ -12,6 +12,7 @@ from sqlalchemy import ColumnElement, Connection, delete, insert, select, update
 
 from server import audit
 from server.services import patients, sessions
+from server.services.calendar_days import require_day
 from server.services.course import COURSES, SIX_WEEKS, VisitKind
 from server.services.errors import Conflict, NotFound, ServiceError
 from server.storage.tables import new_id, now, planned_visit, programme, session
@@ -87,10 +88,7 @@ def start(
     if template not in COURSES:
         raise ServiceError("bad_value", f"The programme is one of {', '.join(COURSES)}, not '{template}'.")
     course = COURSES[template]
-    try:
-        days = course.days(starts_on)
-    except OverflowError:
-        raise ServiceError("bad_value", f"No calendar reaches a programme from {starts_on}.") from None
+    days = course.days(require_day(starts_on))
     for other in of_patient(c, patient_id):
         if min(days) <= other.ends_on and other.visits[0].planned_on <= max(days):
             raise Conflict(
@@ -162,6 +160,8 @@ def change_visit(
     unknown = values.keys() - {"planned_on", "session_id"}
     if unknown or ("planned_on" in values and values["planned_on"] is None):
         raise ServiceError("bad_value", "A planned visit has a day planned_on and perhaps a session_id.")
+    if isinstance(planned_on := values.get("planned_on"), dt.date):
+        require_day(planned_on)
     if values.get("session_id") is not None:
         _check_session(c, row, values["session_id"])
     changed = {name: value for name, value in values.items() if getattr(row, name) != value}

@@ -15,6 +15,7 @@ from core.feedback.prescription import TargetSource
 from core.frames import SIDES, Side
 from core.norms import Norms, NormValue
 from core.norms.values import is_angle
+from core.parameters.catalogue import CATALOGUE
 from core.parameters.result import Parameter
 from server.report.numbers import Numbers
 from server.report.wording import GROUPS, NO_NORM
@@ -22,7 +23,7 @@ from server.services import comparisons, controls, histories
 from server.services.histories import AnalysedSession
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
-from server.services.sessions import Session
+from server.services.sessions import WALKS, Session
 from web.words import day
 
 FEWEST: Final = 5
@@ -73,7 +74,7 @@ def last_walk(
     found = [
         a
         for a in histories.list_analysed(c, patient.id)
-        if a.session.protocol in {"walk", "treadmill"}
+        if a.session.protocol in WALKS
         and session_id in {None, a.session.id}
         and (before is None or _earlier(a, before))
     ]
@@ -113,7 +114,7 @@ def offer(walk: AnalysedWalk | None, source: TargetSource, parameter: str, side:
         return _own(walk, parameter, side)
     if side is None:
         return Offer(None, "Both sides are trained. Choose the one that is, the other is then the target.")
-    return _own(walk, parameter, opposite_side(side))
+    return _better(walk, parameter, side)
 
 
 def opposite_side(side: Side) -> Side:
@@ -128,6 +129,29 @@ def find_usual_value(walk: AnalysedWalk, parameter: str, side: Side | None) -> P
         return found
     sides = [p for s in SIDES if (p := _mean(walk.numbers, parameter, s)) is not None]
     return _together(sides) if sides else None
+
+
+def _better(walk: AnalysedWalk, parameter: str, side: Side) -> Offer:
+    """The other side, where the parameter's direction says that it is the better one."""
+    entry = CATALOGUE[parameter]
+    if entry.better is None:
+        return Offer(
+            None,
+            f"{entry.label}: neither higher nor lower is better by itself. Choose another source, or enter a "
+            "target.",
+        )
+    other = _own(walk, parameter, opposite_side(side))
+    own = find_usual_value(walk, parameter, side)
+    if other.target is None or other.target.mean is None or own is None or own.mean is None:
+        return other
+    ahead = other.target.mean - own.mean
+    if (ahead if entry.better == "higher" else -ahead) > 0.0:
+        return other
+    return Offer(
+        None,
+        f"The {side} side is the better one on {day(walk.session.performed_on)}. Train the other side, or "
+        "choose another source.",
+    )
 
 
 def _norm(walk: AnalysedWalk, parameter: str) -> Offer:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -474,3 +475,31 @@ def _until(done: Callable[[], bool], page: Page) -> None:
             return
         page.wait_for_timeout(20)
     raise AssertionError("the page did not open its feed")
+
+
+def test_a_test_whose_estimate_has_ended_shows_no_running_clock_and_nothing_to_begin(
+    told: Opener, running: RunningServer
+) -> None:
+    with running.client() as client:
+        patient = filling.add(client, "/patients", code="P-0069", height_m=1.7)["id"]
+        session = filling.add_session(client, patient, "Up and go", protocol="tug")
+    this = told(f"/sessions/{session}/live")
+    test, page = this.page.locator("live-test"), this.page
+    begun = {
+        "phase": "running", "say": "Walk three metres", "start_s": 1.0, "end_s": None, "seconds": None,
+        "rises": 0, "problem": None, "figures": [], "segments": [], "corrected": False,
+    }  # fmt: skip
+    this.say(feed.state(), json.dumps(json.loads(feed.frame(4.0)) | {"test": begun}))
+    expect(test.locator("[data-phase]").first).to_have_text("Running")
+    expect(test.get_by_role("button", name="Begin again")).to_be_visible()
+    this.say(feed.state(estimate="failed"))
+    expect(test.locator("[data-phase]").first).to_have_text("Live view stopped")
+    expect(test.locator("[data-say]")).to_contain_text("measured afterwards")
+    expect(test.get_by_role("button", name="Begin again")).to_be_hidden()
+    expect(test.locator("[data-clock]")).to_have_css("text-decoration-line", "line-through")
+    shown = test.locator("[data-clock]").inner_text()
+    expect(page.locator("[data-note=estimate]")).to_contain_text("The live view has stopped.")
+    page.wait_for_timeout(13_000)  # longer than a notice stays
+    this.say(feed.state(estimate="failed"))
+    expect(page.locator("[data-note=estimate]")).to_be_visible()
+    expect(test.locator("[data-clock]")).to_have_text(shown)

@@ -124,6 +124,7 @@ class ParameterEntry:
     curve : how it is read from a cycle curve; such a parameter needs no code of its own.
     trainable : a prescription may train it. everyday : what a patient reads in place of the label.
     shared : both sides of a steady walk have the same value, so neither is trained alone.
+    better : of two sides the one that the other is trained towards (our choice); None = neither by itself.
     is_length : the patient's screen may show it as a way on the floor.
     plausible : least and greatest value that a person can have; beyond, it is an error of detection.
     norm : its reference, None without one. change : its limits of change (core/change/limits.py), None
@@ -147,6 +148,7 @@ class ParameterEntry:
     trainable: bool = False
     everyday: str = ""
     shared: bool = False
+    better: Literal["higher", "lower"] | None = None
     is_length: bool = False
     plausible: tuple[float, float] = (-inf, inf)
     norm: NormKey | None = None
@@ -157,6 +159,17 @@ class ParameterEntry:
     def unit(self) -> str:
         """Unit in files, "" for a ratio or a number of things."""
         return unit_of(self.name)
+
+    @property
+    def target_range(self) -> tuple[float, float]:
+        """Least and greatest value that may be entered as a target.
+
+        The plausible ones; where none are declared, the range bar and as much again to either side (our
+        choice), below 0 only where the bar goes there.
+        """
+        low, high = self.scale
+        least, most = 2 * low - high, 2 * high - low
+        return max(self.plausible[0], least if low < 0 else 0.0), min(self.plausible[1], most)
 
     @property
     def printed_unit(self) -> str:

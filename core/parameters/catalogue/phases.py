@@ -89,6 +89,7 @@ ENTRIES: Final = (
         definition="From the other foot's foot-off to its contact, as a share of the stride.",
         needs=("other_foot", "foot_off"),
         trainable=True,
+        better="higher",
         everyday="standing on one foot",
         norm=NormKey("walkway", "single_support_pct"),
         change="share",

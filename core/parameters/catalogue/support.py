@@ -55,6 +55,7 @@ ENTRIES: Final = (
         definition="From the other foot's foot-off to its contact.",
         needs=("other_foot", "foot_off"),
         trainable=True,
+        better="higher",
         errors=errors.SINGLE,
     ),
 )

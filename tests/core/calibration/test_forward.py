@@ -80,3 +80,12 @@ def test_left_mirrors_right() -> None:
     sure, open_ = (says("velocity", 0.0, 2.0, 0.0),), (says("velocity", -20.0, 20.0, 0.0),)
     found = weigh_forward_axes({"shank_l": open_, "shank_r": sure}, [], axes)
     assert np.degrees(found["shank_l"].angle) == pytest.approx(0.0, abs=2.5)
+
+
+def test_a_sensor_without_a_joint_to_the_others_is_heard_alone() -> None:
+    pair = (says("velocity", 30.0, sd=3.0), says("acceleration", 36.0, sd=6.0))
+    alone = weigh_forward_axes({"pelvis": pair}, [], {})["pelvis"]
+    both = weigh_forward_axes({"chest": pair, "pelvis": (says("velocity", 0.0),)}, [], {})
+    assert both["chest"].angle == pytest.approx(alone.angle)
+    assert both["chest"].sd == pytest.approx(alone.sd)
+    assert both["pelvis"].angle == pytest.approx(0.0, abs=0.01)

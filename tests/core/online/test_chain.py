@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 
 import numpy as np
@@ -138,6 +138,13 @@ def test_the_worn_sensors_decide_what_is_shown(name: str) -> None:
         assert last.valid
         heights = [float(last.p[s][2]) for s in last.p if s.startswith("foot")]
         assert max(heights) < 0.3
+
+
+def test_a_chest_sensor_beside_the_seven_stops_neither_calibration_nor_strides() -> None:
+    take = worn("seven")
+    frames = live(replace(take, sensors={**take.sensors, "chest": take.sensors["pelvis"]}))[1]
+    assert (frames[-1].stage, frames[-1].method) == ("running", "erkf")
+    assert len(told(frames).strides) == len(streamed("seven")[1].strides)
 
 
 @pytest.mark.slow

@@ -111,9 +111,11 @@ def test_what_is_not_declared_is_not_stated() -> None:
 def test_angles_without_two_sensors_and_levels_of_a_goniometer_are_known_less_well() -> None:
     knee = figure("knee_flexion_max_swing_deg", 55.0, 2.0, 20)
     (measured,) = state_uncertainty([knee])
-    (modelled,) = state_uncertainty([knee], estimated=("knee_flexion",))
-    (feet_alone,) = state_uncertainty([knee], estimated=("knee_flexion", "pelvis_tilt"))
+    (modelled,) = state_uncertainty([knee], estimated=("knee_flexion_l",))
+    (feet_alone,) = state_uncertainty([knee], estimated=("knee_flexion_l", "pelvis_tilt"))
+    (other,) = state_uncertainty([knee], estimated=("knee_flexion_r",))
     (level,) = state_uncertainty([knee], goniometer=True)
+    assert other == measured, "the sensors of a side say nothing less because one of the other has failed"
     assert (measured.u_own, modelled.u_own, feet_alone.u_own) == (2.0, 10.5, 11.0)
     assert level.u_own == pytest.approx(hypot(2.0, 3.0))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import degrees, radians
 
 import numpy as np
@@ -16,7 +17,8 @@ from core.parameters.smoothness import NAME as SPARC
 from core.parameters.trunk import NAMES as TRUNK_NAMES
 from core.pipeline import TakeAnalysis, analyse
 from core.recording import UniformRecording
-from core.simulate import simulate_scenario
+from core.rotation import to_matrix
+from core.simulate import simulate_scenario, simulate_tug
 from tests.walks import analysed
 
 OFF_DEG = 20.0
@@ -71,3 +73,15 @@ def test_the_mounting_that_is_told_is_the_one_that_was_used(right: TakeAnalysis,
     now = off.calibration.segments["pelvis"].R_segment_sensor
     turn = degrees(np.arccos(np.clip((np.trace(was @ now.T) - 1.0) / 2.0, -1.0, 1.0)))
     assert turn < 3.0
+
+
+def test_a_chest_sensor_worn_on_a_walk_gets_an_axis_of_its_own() -> None:
+    made = simulate_tug()
+    walked = replace(made.recording, protocol="walk")
+    found = analyse(walked)
+    assert found.calibration is not None
+    chest = found.calibration.segments["chest"].R_segment_sensor
+    off = chest @ to_matrix(made.truth.mounts["chest"].q_segment_sensor).T
+    assert degrees(np.arccos((np.trace(off) - 1.0) / 2.0)) < 12.0
+    without = {d: None if s == "chest" else s for d, s in walked.segments.items()}
+    assert len(found.parameters) == len(analyse(replace(walked, segments=without)).parameters)

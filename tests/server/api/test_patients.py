@@ -41,6 +41,25 @@ async def test_a_patient_is_made_changed_found_and_deleted_with_everything(clini
     assert not any(p.is_file() for p in clinic.settings.blobs.rglob("*"))
 
 
+async def test_codes_that_look_alike_belong_to_one_patient(clinic: Clinic) -> None:
+    async with clinic.client("clinician") as client:
+        assert (await client.post(f"{API}/patients", json={"code": "RACE-1"})).status_code == 201
+        for alike in ("race-1", "\uff32ace-1"):
+            again = await client.post(f"{API}/patients", json={"code": alike})
+            assert (again.status_code, again.json()["code"]) == (409, "code_taken"), alike
+        for hidden in ("RACE\u200b-1", "RACE\u202e-2"):
+            assert (await client.post(f"{API}/patients", json={"code": hidden})).status_code == 422, hidden
+        other = (await client.post(f"{API}/patients", json={"code": "RACE-2"})).json()["id"]
+        assert (await client.patch(f"{API}/patients/{other}", json={"code": "race-2"})).status_code == 200
+        assert (await client.patch(f"{API}/patients/{other}", json={"code": "race-1"})).status_code == 409
+        turned = await client.patch(f"{API}/patients/{other}", json={"note": "left \u202e right"})
+        assert turned.status_code == 422
+        assert (await client.patch(f"{API}/patients/{other}", json={"note": "a\x00b"})).status_code == 422
+        assert (await client.patch(f"{API}/patients/{other}", json={"note": "a\nb"})).status_code == 200
+        born = await client.patch(f"{API}/patients/{other}", json={"birth_year": 2200})
+        assert born.status_code == 422
+
+
 async def test_a_code_belongs_to_one_patient(clinic: Clinic) -> None:
     async with clinic.client("clinician") as client:
         assert (await client.post(f"{API}/patients", json={"code": "Twice"})).status_code == 201

@@ -90,6 +90,8 @@ async def test_a_prescription_is_ended_once(clinic: Clinic) -> None:
         ({"schedule": {"shares_pct": [0, 100]}}, "Expected no share above the one before"),
         ({"schedule": {"speed": 1}}, "schedule.speed"),
         ({"parameter": "stride_length_m"}, "is the same for both sides of a walk"),
+        ({"target": {"source": "manual", "mean": 1000.0, "sd": 2.0}}, "Expected 0 to 110"),
+        ({"target": {"source": "manual", "mean": 62.0, "sd": 1000.0}}, "Expected at most 110"),
         ({"band_sd": 0}, "band_sd is 0.0. Expected a number from 0.1 to 5"),
     ],
 )
@@ -122,8 +124,7 @@ async def test_targets_are_the_persons_own_numbers_or_a_norm_at_their_speed(clin
         both = {o["source"]: o for o in (await client.get(path.replace("&side=left", ""))).json()}
         stance = (await client.get(f"{API}/patients/{patient}/targets?parameter=stance_pct&side=left")).json()
         unknown = await client.get(f"{API}/patients/{patient}/targets?parameter=beauty")
-    right, left = (_numbers(clinic, patient, "stride_time_s", side) for side in ("right", "left"))
-    assert [offers["own_better_side"][k] for k in ("mean", "sd")] == [right.mean, right.sd]
+    left = _numbers(clinic, patient, "stride_time_s", "left")
     assert [offers["own_baseline"][k] for k in ("mean", "sd")] == [left.mean, left.sd]
     assert offers["own_baseline"]["words"] == f"left side, {left.n} strides on 2 Mar 2026"
     assert "Enter mean and SD" in offers["manual"]["reason"]
@@ -131,6 +132,31 @@ async def test_targets_are_the_persons_own_numbers_or_a_norm_at_their_speed(clin
     norm = next(o for o in stance if o["source"] == "norm")
     assert 55.0 < norm["mean"] < 68.0, "contacts are those of a walkway"
     assert unknown.status_code == 422
+
+
+@pytest.mark.parametrize("parameter", ["step_length_m", "circumduction_m"])
+async def test_the_better_side_is_a_target_for_the_other_one_only(clinic: Clinic, parameter: str) -> None:
+    patient = feedback.person(clinic)
+    feedback.walked(clinic, patient, 0)
+    means = {side: _numbers(clinic, patient, parameter, side).mean or 0.0 for side in ("left", "right")}
+    worse, better = sorted(means, key=lambda s: means[s], reverse=parameter == "circumduction_m")
+    async with clinic.client("viewer") as client:
+        path = f"{API}/patients/{patient}/targets?parameter={parameter}&side="
+        offers = [(await client.get(path + side)).json() for side in (worse, better)]
+    given, refused = (next(o for o in found if o["source"] == "own_better_side") for found in offers)
+    assert given["mean"] == means[better]
+    assert refused["mean"] is None
+    assert f"The {better} side is the better one" in refused["reason"]
+
+
+async def test_a_parameter_without_a_better_end_has_no_better_side(clinic: Clinic) -> None:
+    patient = feedback.person(clinic)
+    feedback.walked(clinic, patient, 0)
+    async with clinic.client("clinician") as client:
+        own = {"parameter": "stance_pct", "side": "left", "target": {"source": "own_better_side"}}
+        answer = await client.post(f"{API}/patients/{patient}/prescriptions", json=own)
+    assert answer.status_code == 422
+    assert "neither higher nor lower is better by itself" in answer.json()["detail"]
 
 
 async def test_a_prescribed_norm_has_its_numbers_and_its_people(clinic: Clinic) -> None:
@@ -148,13 +174,13 @@ async def test_a_prescribed_norm_has_its_numbers_and_its_people(clinic: Clinic) 
 async def test_a_take_gets_target_baseline_and_the_limit_of_the_other_side(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
     before = feedback.walked(clinic, patient, 0)
-    own = {"parameter": "stance_pct", "side": "left", "target": {"source": "own_better_side"}}
+    own = {"parameter": "stance_pct", "side": "left", "target": {"source": "own_baseline"}}
     async with clinic.client("clinician") as client:
         answer = await client.post(f"{API}/patients/{patient}/prescriptions", json=own)
         assert answer.status_code == 201, answer.text
     given, baseline = _for_take(clinic, feedback.visit(clinic, patient, 7))
-    right, left = (_numbers(clinic, patient, "stance_pct", side) for side in ("right", "left"))
-    assert (given.target.source, given.target.mean) == ("own_better_side", right.mean)
+    left = _numbers(clinic, patient, "stance_pct", "left")
+    assert (given.target.source, given.target.mean) == ("own_baseline", left.mean)
     assert (baseline.mean, baseline.sd, baseline.n) == (left.mean, left.sd, left.n)
     assert (baseline.session_id, baseline.after_training) == (before, False)
     assert baseline.other_mdc == 4.2

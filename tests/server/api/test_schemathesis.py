@@ -20,9 +20,12 @@ from tests.server.clinic import Clinic
 
 EXAMPLES = 12
 # beyond a schema, so 422 for what it allows: rules between the parts of a manifest (two sensors on one
-# segment) or of an edit (only a move says where to), names that lead elsewhere, filters that nobody has, and
-# films that are none or that nobody agreed to
-BEYOND_SCHEMA = ("manifest", "analyses", "edits", "{name}", "prescriptions", "targets", "tunings", "video")
+# segment) or of an edit (only a move says where to), names that lead elsewhere, filters that nobody has,
+# films that are none or that nobody agreed to, and days of a mistyped year
+BEYOND_SCHEMA = (
+    "manifest", "analyses", "edits", "{name}", "prescriptions", "targets", "tunings", "video", "notes",
+    "programmes", "planned-visits",
+)  # fmt: skip
 BEYOND = [schemathesis.checks.positive_data_acceptance]
 PARTS = 24
 """The operations are dealt out to so many tests: their names are known when the application is there."""

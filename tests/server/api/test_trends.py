@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from core.frames import Protocol
 from server.services import patients, sessions
 from server.storage.tables import new_id
 from tests.server import analysed, walk
@@ -52,6 +53,20 @@ async def test_visits_come_oldest_first_with_their_change_against_the_first(
     assert lines[0]["points"][1]["change"]["verdict"] == "within_measurement_error"
     assert "Kesar" in lines[0]["points"][1]["change"]["limit_source"]
     assert {line["side"] for line in _trend(answer, "gps_sagittal_deg")["lines"]} == {"left", "right"}
+
+
+@pytest.mark.parametrize("protocol", ["tug", "squat", "walk_6min", "activity"])
+async def test_a_later_test_does_not_hide_how_somebody_walks(
+    clinic: Clinic, patient: str, protocol: Protocol
+) -> None:
+    walked = _add(clinic, patient, 0)
+    _add(clinic, patient, 7, protocol)
+    async with clinic.client("viewer") as client:
+        answer = (await client.get(f"{API}/patients/{patient}/trends")).json()
+        page = (await client.get(f"/patients/{patient}")).text
+    assert [v["session_id"] for v in answer["visits"]] == [walked]
+    assert answer["protocol"] == "walk"
+    assert "How it goes" in page
 
 
 async def test_an_edit_moves_the_point_of_its_visit(clinic: Clinic, patient: str) -> None:

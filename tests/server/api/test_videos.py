@@ -44,6 +44,20 @@ async def test_nobody_is_filmed_without_having_agreed(clinic: Clinic) -> None:
     assert (kept["name"], kept["consent_by"], kept["offset_s"]) == ("a.webm", "clinician", None)
 
 
+async def test_a_video_has_the_limit_of_a_file_and_its_alignment_that_of_a_request(clinic: Clinic) -> None:
+    patient, session = await session_of(clinic, "F-6")
+    path = f"{API}/sessions/{session}/video"
+    film = FILM + bytes(3_000_000)
+    async with clinic.client("clinician") as client:
+        made = await client.put(f"{path}?name=a.webm&consent=true", content=film)
+        assert made.status_code == 201, made.text
+        assert [p.stat().st_size for p in blobs(clinic, patient)] == [len(film)]
+        declared = {"content-length": str(clinic.settings.max_file_bytes + 1)}
+        refused = await client.put(f"{path}?name=a.webm&consent=true", content=FILM, headers=declared)
+        assert refused.status_code == 413
+        assert (await client.patch(path, content=b" " * 1_000_001)).status_code == 413
+
+
 async def test_what_no_browser_plays_is_refused(clinic: Clinic) -> None:
     _, session = await session_of(clinic, "F-2")
     path = f"{API}/sessions/{session}/video?name=walk.avi&consent=true"

@@ -65,6 +65,16 @@ def test_a_person_is_stopped_after_ten_failures_and_may_try_again_later() -> Non
     throttle.check("anna", "10.0.0.1")
 
 
+def test_a_new_password_from_an_administrator_opens_an_account_at_once() -> None:
+    throttle = Throttle(Clock())
+    for i in range(MAX_PER_ACCOUNT):
+        throttle.fail("anna", f"10.0.0.{i % 3}")
+    throttle.fail("berta", "10.0.0.9")
+    throttle.forgive("anna")
+    for i in range(3):
+        throttle.check("anna", f"10.0.0.{i + 3}")
+
+
 def test_an_account_is_closed_after_failures_from_many_addresses() -> None:
     throttle = Throttle(Clock())
     for i in range(MAX_PER_ACCOUNT):

@@ -173,6 +173,14 @@ async def test_guessing_a_password_is_stopped_and_says_when_to_try_again(clinic:
     assert [a.status_code for a in answers] == [401] * MAX_PER_PAIR + [429]
     assert right.status_code == 429
     assert int(right.headers["retry-after"]) > 0
+    async with clinic.client("admin") as admin:
+        users = (await admin.get("/api/v1/users")).json()
+        dora = next(u["id"] for u in users if u["name"] == "dora")
+        new = {"password": "a password that is new"}
+        assert (await admin.patch(f"/api/v1/users/{dora}", json=new)).status_code == 200
+    async with clinic.client() as client:
+        opened = await client.post("/api/v1/sign-in", json={"name": "dora"} | new)
+    assert opened.status_code == 200
     clinic.app.state.throttle = Throttle()
 
 

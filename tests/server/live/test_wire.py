@@ -7,6 +7,7 @@ import json
 from dataclasses import replace
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -15,7 +16,7 @@ from core.errors import Notice
 from core.online.frame import AngleTrail, CalibrationView, LiveFrame, SegmentCheck, SensorHealth
 from core.parameters.live_stride import LiveStride
 from server.live import wire
-from server.live.room import QUEUE, SHOWN, Room
+from server.live.room import KEPT, QUEUE, Room
 
 GOOD = SensorHealth("A1", "pelvis", 99.87, 0.0, 0.0, 0.01, False)
 STRIDE = LiveStride(
@@ -147,14 +148,19 @@ def test_who_comes_later_gets_the_last_strides_and_cues_and_nothing_of_another_t
 
     room = Room()
     for k in range(100):
-        room.keep_stride(k, b"stride %d" % k)
+        for telling in range(3):
+            room.keep_stride(b'{"n":%d,"telling":%d}' % (k, telling))
         room.keep_cue(k, b"cue %d" % k)
     room.keep_cue(99, b"cue 99")  # said again by a new estimator
     room.say("feedback", b"feedback")
     got = asyncio.run(first())
-    assert [m for m in got if m.startswith(b"cue")] == [b"cue %d" % k for k in range(100 - SHOWN, 100)]
-    assert got[0] == b"stride %d" % (100 - 3 * SHOWN)  # each is told three times
+    assert [m for m in got if m.startswith(b"cue")] == [b"cue %d" % k for k in range(100 - KEPT, 100)]
+    told = [msgspec.json.decode(m) for m in got if m.startswith(b"{")]
+    assert told == [{"n": n, "telling": 2} for n in range(100 - KEPT, 100)], "each as it was told last"
     assert got[-1] == b"feedback"
+    room.forget_strides()
+    room.keep_stride(b'{"n":0}')
+    assert asyncio.run(first()) == [b'{"n":0}', b"feedback"]
     room.clear()
     room.say("state", b"state")
     assert asyncio.run(first()) == [b"state"]

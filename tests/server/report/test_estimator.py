@@ -115,7 +115,9 @@ def test_angles_of_the_model_are_marked_on_their_curves(make_bundle: MakeBundle)
 def test_an_angle_of_the_model_has_no_norm(make_bundle: MakeBundle) -> None:
     measured = report_model(make_bundle(estimator=section()), age=40, speed_mps=1.2)
     guessed = report_model(
-        make_bundle(estimator=section(estimated_angles=["knee_flexion_r"])), age=40, speed_mps=1.2
+        make_bundle(estimator=section(estimated_angles=["knee_flexion_l", "knee_flexion_r"])),
+        age=40,
+        speed_mps=1.2,
     )
     norms = [
         {r.name: r.norm for _, group in m.groups for r in group}["knee_flexion_rom_deg"]
@@ -129,3 +131,16 @@ def test_a_reduced_take_is_said_in_the_quality_box(make_bundle: MakeBundle) -> N
     model = report_model(make_bundle(estimator=section(reduced="sensor_failed")))
     (item,) = (i for i in model.quality.items if i.label == "Poses by")
     assert (item.kind, item.extra) == ("warn", "reduced: a sensor failed in this take")
+
+
+def test_the_side_that_sensors_measure_keeps_its_own_confidence(make_bundle: MakeBundle) -> None:
+    models = [
+        report_model(make_bundle(estimator=section(estimated_angles=angles)), age=40, speed_mps=1.2)
+        for angles in ([], ["knee_flexion_r"])
+    ]
+    whole, half = ({r.name: r for _, g in m.groups for r in g}["knee_flexion_rom_deg"] for m in models)
+    assert (half.low_confidence, half.low_side) == (True, "right")
+    assert half.left == whole.left
+    assert half.norm == whole.norm
+    assert half.right is not None
+    assert half.right.z is None

@@ -81,17 +81,26 @@ function show(selector, on) {
 let asked = 0;
 async function offer() {
   const turn = ++asked;
-  const side = checked("side").value;
-  const query = new URLSearchParams({ parameter: option().value, ...(side && { side }) });
+  const parameter = option().value;
+  const ask = (side) => request("GET", `${base}/targets?${new URLSearchParams({ parameter, ...(side && { side }) })}`);
+  const gives = (found, source) => found.some((o) => o.source === source && o.mean !== null);
+  let side = checked("side").value;
   let offers;
   try {
-    offers = await request("GET", `${base}/targets?${query}`);
+    offers = await ask(side);
+    // a preset trains the side that has something to gain: the other one is the better
+    for (const other of ["left", "right"]) {
+      if (turn !== asked || wanted[0] !== "own_better_side" || gives(offers, wanted[0])) break;
+      const found = other === side ? offers : await ask(other);
+      if (gives(found, wanted[0])) [side, offers] = [other, found];
+    }
   } catch (problem) {
     return showProblem(form.querySelector(".form-error"), problem);
   }
   if (turn !== asked) return; // something else was chosen meanwhile
+  form.querySelector(`input[name="side"][value="${side}"]`).checked = true;
   for (const found of offers) fill(found);
-  const first = wanted.find((source) => offers.some((o) => o.source === source && o.mean !== null));
+  const first = wanted.find((source) => gives(offers, source));
   if (first) form.querySelector(`input[name="target.source"][value="${first}"]`).checked = true;
   wanted = [];
   const chosen = checked("target.source");

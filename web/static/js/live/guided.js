@@ -28,9 +28,19 @@ class LiveTest extends HTMLElement {
     say(this.at("say"), preparing ? speak`Please wait and keep still. The live estimate is not ready yet.` : speak`The test is recorded and measured afterwards. Press STOP at its end.`);
   }
 
+  // The estimate has ended in mid-test: what the clock shows is no result, and nothing here can begin it again.
+  stop() {
+    this.found = null;
+    this.toggleAttribute("data-stopped", true);
+    setState(this.at("phase"), "bad", "Live view stopped");
+    say(this.at("say"), "Go on with the test. It is recorded and measured afterwards. Press STOP at its end.");
+    for (const hidden of [this.querySelector("[data-do=test-go]"), this.at("anew"), this.at("problem"), this.at("progress"), this.at("count")]) hidden.hidden = true;
+  }
+
   // found: the test of a frame; t: its time. Frames come more often than what is judged, so the clock runs on.
   show(found, t) {
     const phase = found?.phase ?? "get_ready";
+    this.toggleAttribute("data-stopped", false);
     this.found = found;
     this.now = { t, at: performance.now() };
     this.dataset.phase = phase;
@@ -59,6 +69,7 @@ class LiveTest extends HTMLElement {
   }
 
   tick() {
+    if (this.hasAttribute("data-stopped")) return;
     const { elapsed, found } = this;
     say(this.at("clock"), number(found?.seconds ? Math.min(elapsed, found.seconds) : elapsed, DIGITS));
     if (found?.seconds) this.at("progress").value = Math.min(1, elapsed / found.seconds);

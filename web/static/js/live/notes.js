@@ -45,6 +45,8 @@ export class Notes {
 
   // A server that has just started still loads, at its first start compiles, the filters.
   estimate(state) {
+    if (state.state === "streaming" && state.estimate === "failed")
+      return this.put("estimate", "bad", "The live view has stopped.", "The walk is recorded all the same. Its result comes after the analysis.");
     const waits = state.state === "streaming" && state.estimate === "preparing";
     this.waitsSince = waits ? this.waitsSince ?? performance.now() : undefined;
     if (waits && performance.now() - this.waitsSince > PREPARED_MS)

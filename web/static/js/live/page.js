@@ -98,6 +98,7 @@ class LivePage extends HTMLElement {
     if (state.state === "streaming") {
       this.view(this.streaming(this.feed.frame));
       if (!this.feed.frame) this.recorded(state);
+      else if (state.estimate === "failed" && this.test?.dataset.phase !== "done") this.test?.stop();
     } else {
       this.view("pair");
       this.pairing.state(state);

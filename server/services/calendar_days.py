@@ -1,0 +1,23 @@
+"""Which days a programme, a planned visit or a note may have: a mistyped year is refused."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Final
+
+from server.services.errors import ServiceError
+from server.storage.tables import now
+
+FIRST: Final = dt.date(1900, 1, 1)
+AHEAD: Final = dt.timedelta(days=3653)
+"""Nobody plans further ahead than ten years (our choice)."""
+
+
+def require_day(day: dt.date) -> dt.date:
+    """Return the day; raises ServiceError bad_value for one before 1900 or more than ten years ahead."""
+    last = now().date() + AHEAD
+    if FIRST <= day <= last:
+        return day
+    raise ServiceError(
+        "bad_value", f"The day is {day.isoformat()}. Expected one from {FIRST} to {last}; check the year."
+    )

@@ -1,0 +1,36 @@
+"""A mistyped year of a plan or a note is refused."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from server.services import notes, patients, programmes
+from server.services.errors import ServiceError
+from server.storage.db import Database
+from server.storage.migrate import upgrade
+
+
+@pytest.fixture
+def db(tmp_path: Path) -> Iterator[Database]:
+    upgrade(tmp_path / "sagittal.db")
+    opened = Database(tmp_path / "sagittal.db")
+    yield opened
+    opened.close()
+
+
+@pytest.mark.parametrize("day", [dt.date(1, 1, 1), dt.date(9998, 12, 1)])
+def test_a_day_that_nobody_means_is_refused(db: Database, day: dt.date) -> None:
+    with db.write() as c:
+        patient = patients.create(c, None, code="DAY-1").id
+        plan = programmes.start(c, None, patient, starts_on=dt.date(2026, 3, 2))
+    for act in (
+        lambda c: programmes.start(c, None, patient, starts_on=day),
+        lambda c: programmes.change_visit(c, None, plan.visits[0].id, {"planned_on": day}),
+        lambda c: notes.add(c, None, patient, "Seen.", day),
+    ):
+        with db.write() as c, pytest.raises(ServiceError, match="check the year"):
+            act(c)
