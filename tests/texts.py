@@ -241,6 +241,8 @@ def _no_texts(tree: ast.AST) -> Iterator[int]:
         match node:
             case ast.Expr():
                 parts = [node.value]
+            case ast.Assign(targets=[ast.Name(id="__all__")]):
+                parts = [*ast.walk(node.value)]
             case ast.Call() if _name(node.func) in _CODE:
                 parts = [*ast.walk(node)]
             case ast.Raise(exc=ast.Call(func=func)) if SAID.match(_name(func)):

@@ -79,7 +79,7 @@ def _train(clinic: Clinic, earlier: list[str], last: str) -> None:
         for i in range(MANY):
             sessions.create(c, None, of.patient_id, performed_on=of.performed_on - dt.timedelta(days=1))
             written = prescriptions.write(c, clinic.app.state.reviewed, None, of.patient_id, TRAINED)
-            programmes.start(c, None, of.patient_id, starts_on=dt.date(2010 + i, 1, 4))
+            programmes.start(c, None, of.patient_id, starts_on=dt.date(1990 + i, 1, 4))
         took = c.execute(
             select(recording.c.id).join(analysis).where(recording.c.session_id == last)
         ).scalar_one()
