@@ -45,9 +45,9 @@ MARKED: Final = ("accuracy", "bench", "browser", "faults")
 FIRST: Final = "pytest.mark.first"
 """Written in the files of long folders that have a test for every run; the others are not imported then."""
 ORDER: Final = ("core", "server", "web", "test_", "accuracy", "acceptance", "faults", "bench", "browser")
-"""Which tests come first: what a change breaks is seen in the first seconds. Pages are last: while Chromium is
-driven an event loop runs in its thread, which others must not find."""
-LONGEST: Final = ("test_perturbations.py",)
+"""Which tests come first: what a change breaks is seen in the first seconds. Pages are last: while Chromium
+is driven an event loop runs in its thread, which others must not find."""
+LONGEST: Final = ("test_german.py", "test_look.py", "test_replay.py")
 """Files of minutes: first in their room, so that no process is left alone with one at the end."""
 
 
