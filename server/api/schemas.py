@@ -19,17 +19,24 @@ from server.services.recordings import RecordedFile, RecordingState
 from server.services.tunings import MOST_OF_SWARM, Scheme
 from server.storage.tables import now
 
-_HIDDEN = "\u00ad\u200b-\u200f\u202a-\u202e\u2060-\u206f\ufeff"
+_HIDDEN = "\u00ad\u200b\u200e\u200f\u202a-\u202e\u2060-\u206f\ufeff"
 """What is not seen or turns the text beside it round (Unicode, category Cf)."""
-_NO_LINE = f"\\x00-\\x1f\\x7f{_HIDDEN}"
-# one line of text: starts and ends with something visible, no control characters
-_LINE = f"^[^\\s{_NO_LINE}]([^{_NO_LINE}]*[^\\s{_NO_LINE}])?$"
+_JOINERS = "\u200c\u200d"
+"""Not seen either, but words of some scripts and emoji need them; a patient's code does not."""
+
+
+def _one_line(refused: str) -> str:
+    """The pattern of a text that starts and ends with something visible, without control characters."""
+    no = f"\\x00-\\x1f\\x7f{refused}"
+    return f"^[^\\s{no}]([^{no}]*[^\\s{no}])?$"
+
+
 _NO_TEXT = f"\\x00-\\x08\\x0b\\x0c\\x0e-\\x1f\\x7f{_HIDDEN}"
 # text of many lines
 _TEXT = f"^[^{_NO_TEXT}]*$"
 _SOME_TEXT = f"^[^{_NO_TEXT}]*[^\\s{_NO_TEXT}][^{_NO_TEXT}]*$"
-Line = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=_LINE)]
-Code = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=_LINE)]
+Line = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=_one_line(_HIDDEN))]
+Code = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=_one_line(_HIDDEN + _JOINERS))]
 SignInName = Annotated[
     str, StringConstraints(min_length=1, max_length=64, pattern=r"^[a-z0-9][a-z0-9._@-]*$")
 ]
