@@ -159,7 +159,7 @@ def list_messages() -> dict[str, list[str]]:
     for path in sorted((ROOT / "web" / "templates").glob("*.html")):
         keep(list_texts(path.read_text("utf-8")), path)
     for path in sorted((ROOT / "web" / "static" / "js").rglob("*.js")):
-        if path.name != "text.js":
+        if path.parts[-2:] != ("common", "words.js"):  # what it says of `speak` itself
             keep(script_texts(path.read_text("utf-8")), path)
     for part in ("core", "server", "web"):
         for path in sorted((ROOT / part).rglob("*.py")):

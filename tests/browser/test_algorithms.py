@@ -42,6 +42,7 @@ def test_filters_are_chosen_run_and_compared_with_a_reference(
     page.get_by_role("button", name="Run on this take").click()
     expect(page.locator("filter-choice .form-error")).to_be_visible()
     page.get_by_label("Mahony2008").check()
+    page.get_by_label("Hua2014").check()
     page.get_by_label("Martin2010").check()
     page.get_by_label("Use the magnetometer where a filter can").uncheck()
     page.get_by_label("Compare with a reference").select_option("optical.csv")

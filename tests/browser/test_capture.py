@@ -307,7 +307,8 @@ def test_every_state_of_the_page_obeys_the_design_system(
                 faults.extend([f"{name} {width} {scheme}: {found}"] if found else [])
                 small = page.evaluate(
                     "() => [...document.querySelectorAll('button, input')]"
-                    ".filter((e) => e.offsetHeight && e.offsetHeight < 56).map((e) => e.outerHTML)"
+                    ".filter((e) => e.offsetHeight && (e.closest('label.check') ?? e).offsetHeight < 56)"
+                    ".map((e) => e.outerHTML)"
                 )
                 assert not small, f"{name}: under 56 px: {small}"
         page.set_viewport_size({"width": 810, "height": 1080})

@@ -110,6 +110,7 @@ def test_a_live_recording_with_known_sensors_starts_by_ten_clicks(
         device.wait_for_timeout(1500)
         device.locator("[data-go]").click()
         expect(device.locator("[data-done]")).to_have_text("Recording is on the server", timeout=60_000)
+        page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), wait_until="commit")  # it goes on by itself
         device.close()
 
 

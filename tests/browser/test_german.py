@@ -61,7 +61,7 @@ def test_scripts_speak_german_and_write_decimal_commas(opened: Opener) -> None:
     page.get_by_role("button", name="Code eingeben").wait_for()
     said = page.evaluate(
         """async () => {
-          const { speak, translate } = await import("/static/js/common/text.js");
+          const { speak, translate } = await import("/static/js/common/words.js");
           const rest = speak`${(1.25).toFixed(2)} s are still on this tablet only.`;
           return [rest, translate("Stand still."), speak`Stop`];
         }"""

@@ -1,6 +1,6 @@
 // <filter-choice>: whole engines or single filters, then one job. <reference-files>: orientations of another system.
 import { Problem, request, showProblem } from "./common/api.js";
-import { speak } from "./common/text.js";
+import { speak } from "./common/words.js";
 
 class FilterChoice extends HTMLElement {
   connectedCallback() {

@@ -1,7 +1,6 @@
 // <cycle-charts>: one cursor in all charts inside it, tied to the clock; values of both means beside each title.
 import { clock } from "./clock.js";
-import { speak } from "./common/text.js";
-import { localise } from "./common/text.js";
+import { localise, speak } from "./common/words.js";
 
 const degrees = (v) => (v === null || v === undefined ? "–" : `${Math.round(v) === 0 ? 0 : String(Math.round(v)).replace("-", "−")}°`);
 

@@ -1,5 +1,5 @@
 // Two visits are compared: the button waits for exactly two ticks.
-import { speak } from "./common/text.js";
+import { speak } from "./common/words.js";
 const parts = [...document.getElementById("compare").elements];
 const button = parts.find((e) => e.matches("button"));
 const boxes = parts.filter((e) => e.name === "visit");

@@ -1,5 +1,5 @@
 // Pictures and videos of the figure, made by the browser from viser's canvas; nothing leaves it but as a file.
-import { speak } from "./common/text.js";
+import { speak } from "./common/words.js";
 const TYPES = ["video/webm;codecs=vp9", "video/webm", "video/mp4"];
 const FRAMES = 30; // a second
 const LONGEST_MS = 120_000;

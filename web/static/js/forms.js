@@ -1,7 +1,6 @@
 // Forms that speak to the API, dialogs, whole-row links and back buttons: behaviour by data attributes, for every page.
 import { request, showProblem } from "./common/api.js";
-import { speak } from "./common/text.js";
-import { letGo } from "./common/unsaved.js";
+import { speak } from "./common/words.js";
 
 const LATER_MS = 20_000;
 const NOW = "#now"; // of the address of a report that is printed at once
@@ -105,4 +104,26 @@ document.addEventListener("keydown", (e) => {
 if (location.hash === NOW && document.querySelector("[data-print]")) {
   history.replaceState(null, "", location.pathname);
   window.print();
+}
+
+// Work that was typed and not sent: the browser asks before the page goes. Every form for the API, and what a page
+// marks with data-unsaved; no form with a password, and no dialog that was closed.
+const WORK = "form[data-api], [data-unsaved]";
+const touched = new Set();
+let free = false;
+
+document.addEventListener("input", (e) => {
+  const work = e.isTrusted && e.target.closest(WORK);
+  if (work && !work.querySelector("input[type=password]")) touched.add(work);
+});
+
+const waits = (work) => work.isConnected && (work.closest("dialog")?.open ?? true);
+
+addEventListener("beforeunload", (e) => {
+  if (!free && [...touched].some(waits)) e.preventDefault();
+});
+
+// What was sent, or must not stay on the screen, goes without a question.
+export function letGo() {
+  free = true;
 }

@@ -1,9 +1,8 @@
 // <sensor-map>: which sensor is on which segment. The selects are the truth; the body is a second way to set them.
 import { request, showProblem } from "./common/api.js";
 import { s } from "./common/elements.js";
-import { letGo } from "./common/unsaved.js";
-import { SIDE_KEY, SIDE_LETTER, sideOf } from "./common/words.js";
-import { speak } from "./common/text.js";
+import { letGo } from "./forms.js";
+import { SIDE_KEY, SIDE_LETTER, sideOf, speak } from "./common/words.js";
 
 const PLACES = {
   pelvis: [150, 236], thigh_r: [121, 312], thigh_l: [179, 312], shank_r: [123, 412], shank_l: [177, 412],

@@ -1,7 +1,7 @@
 // The form of a feedback prescription: targets of this person as one chooses, and one JSON record at the end.
 import { request, showProblem } from "./common/api.js";
-import { localise, lowered, speak, translate } from "./common/text.js";
-import { letGo } from "./common/unsaved.js";
+import { localise, lowered, speak, translate } from "./common/words.js";
+import { letGo } from "./forms.js";
 
 const form = document.getElementById("prescription");
 const base = `/api/v1/patients/${form.dataset.patient}`;

@@ -1,7 +1,6 @@
 // <job-progress job="…" done="/where"> follows one job by server-sent events: stage names, bar, cancel.
 import { request, showProblem } from "./common/api.js";
-import { speak } from "./common/text.js";
-import { translate } from "./common/text.js";
+import { speak, translate } from "./common/words.js";
 
 const ENDS = new Set(["done", "failed", "cancelled"]);
 

@@ -1,7 +1,6 @@
 // <gait-view> shows the 3D figure (an iframe) and sends it the time; <time-bar> plays, pauses and seeks.
 import { clock } from "./clock.js";
-import { speak, translate } from "./common/text.js";
-import { localise } from "./common/text.js";
+import { localise, speak, translate } from "./common/words.js";
 
 const RATE_MS = 33; // the figure is posed at most 30 times a second (docs/data-flow.md, "The 3D figure")
 const RETRY_MS = [500, 1000, 2000, 5000];

@@ -1,6 +1,6 @@
 // <sensitivity-form>: which angles against what, then one job; a reference is uploaded beside it.
 import { Problem, request, showProblem } from "./common/api.js";
-import { speak } from "./common/text.js";
+import { speak } from "./common/words.js";
 
 class SensitivityForm extends HTMLElement {
   connectedCallback() {

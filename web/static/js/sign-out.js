@@ -1,7 +1,7 @@
 // The end of a sign-in: told two minutes before, and when it came the page is covered, not left, so that what was
 // typed is still there after signing in again.
 import { request, showProblem } from "./common/api.js";
-import { letGo } from "./common/unsaved.js";
+import { letGo } from "./forms.js";
 import { formatClock } from "./common/words.js";
 
 const SOON_S = 120;

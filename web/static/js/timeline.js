@@ -13,7 +13,7 @@ import { editRows, strideBox, strideRows } from "./timeline/panel.js";
 import { Review } from "./timeline/review.js";
 import { StrideBlocks } from "./timeline/strides.js";
 import { TimeWindow } from "./timeline/window.js";
-import { speak } from "./common/text.js";
+import { speak } from "./common/words.js";
 
 const FIRST_SPAN_S = 6;
 const FIRST_LANES = ["foot_pitch", "foot_rate", "knee_flexion"];

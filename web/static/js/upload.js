@@ -1,7 +1,6 @@
 // <upload-area>: files, folders and zips to the session, two at a time, each with its own progress; then the inspection.
 import { request, showProblem, Problem } from "./common/api.js";
-import { speak } from "./common/text.js";
-import { localise } from "./common/text.js";
+import { localise, speak } from "./common/words.js";
 
 const PARALLEL = 2;
 const mb = (n) => localise(`${(n / 1e6).toFixed(n < 1e7 ? 1 : 0)} MB`);

@@ -1,6 +1,6 @@
 // <video-upload>: sets a video beside a take, once somebody has said that the person agreed.
 import { request, showProblem } from "./common/api.js";
-import { speak } from "./common/text.js";
+import { speak } from "./common/words.js";
 
 class VideoUpload extends HTMLElement {
   connectedCallback() {

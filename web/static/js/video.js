@@ -1,7 +1,7 @@
 // <take-video>: a film of the walk in step with curves and figure. Aligned by one moment that both show.
 import { request, showProblem } from "./common/api.js";
 import { clock } from "./clock.js";
-import { speak } from "./common/text.js";
+import { speak } from "./common/words.js";
 
 const FRAME_S = 1 / 30;
 const APART_S = { playing: 0.08, still: 0.01 }; // a playing film is put right only when it is seen to be off

@@ -1,7 +1,6 @@
 // The tablet's camera beside the take: asked for, shown, recorded. Nothing of it may disturb the take, so whatever
 // fails is said in the camera's own card.
-import { speak } from "../common/text.js";
-import { formatClock } from "../common/words.js";
+import { formatClock, speak } from "../common/words.js";
 import { FilmOutbox } from "./film.js";
 
 const PIECE_MS = 1000;

@@ -12,7 +12,7 @@ import { whyNot as whyNoDot } from "./sources/dot.js";
 import { View } from "./view.js";
 import * as words from "./words.js";
 import { Worn } from "./worn.js";
-import { speak } from "../common/text.js";
+import { speak } from "../common/words.js";
 
 const DRAW_MS = 500;
 const TWICE_MS = 800; // a second tap on Start must not be a Stop

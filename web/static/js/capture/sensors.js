@@ -1,6 +1,5 @@
 // The list of sensors: where each is worn, how fast it sends, its battery and its state; a tap says where it is worn.
-import { SIDE_KEY, SIDE_LETTER, capitalise, sideOf, withoutSide } from "../common/words.js";
-import { speak } from "../common/text.js";
+import { SIDE_KEY, SIDE_LETTER, capitalise, sideOf, speak, withoutSide } from "../common/words.js";
 
 const NEAR = 0.03;
 

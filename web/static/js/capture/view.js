@@ -4,10 +4,8 @@ import { POSES } from "./sources/axes.js";
 import { SensorList } from "./sensors.js";
 import { STAND_S } from "../common/standing.js";
 import { h } from "../common/elements.js";
-import { capitalise, formatClock } from "../common/words.js";
+import { capitalise, formatClock, lowered, speak } from "../common/words.js";
 import * as words from "./words.js";
-import { speak } from "../common/text.js";
-import { lowered } from "../common/text.js";
 
 const VERDICTS = { pass: "ok", redo: "bad", not_judged: "" }; // the look of a note
 const MOST_REASONS = 3;

@@ -1,7 +1,6 @@
 // What the page says: what to do now, and one sentence for what is wrong.
 import { STAND_S } from "../common/standing.js";
-import { speak } from "../common/text.js";
-import { translate } from "../common/text.js";
+import { speak, translate } from "../common/words.js";
 
 // By the stage the server is at (its "state" messages); before the first one, by the time since the start.
 // toDo: what the person of a guided test does now, in the server's words.

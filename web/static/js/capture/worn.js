@@ -4,7 +4,7 @@ import { DeviceMotion } from "./sources/device_motion.js";
 import { Dot } from "./sources/dot.js";
 import { Replay } from "./sources/replay.js";
 import { NOT_THOSE } from "./words.js";
-import { speak } from "../common/text.js";
+import { speak } from "../common/words.js";
 
 const SOURCES = { dot: Dot, device_motion: DeviceMotion, replay: Replay };
 

@@ -1,5 +1,5 @@
 // The JSON API as the pages use it. Errors are RFC 9457 problems: a title, a sentence, a stable code.
-import { speak, translate } from "./text.js";
+import { speak, translate } from "./words.js";
 export class Problem extends Error {
   constructor(status, body) {
     super(body.detail || body.title || speak`The server answered ${status}.`);

@@ -1,7 +1,6 @@
 // Elements made by name: `h` makes HTML, `s` SVG. An attribute that begins with "on" is a listener; null and false
 // leave an attribute out.
-import { SIDE_KEY, SIDE_LETTER } from "./words.js";
-import { translate } from "./text.js";
+import { SIDE_KEY, SIDE_LETTER, translate } from "./words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 

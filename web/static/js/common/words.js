@@ -1,4 +1,89 @@
-// Sides, names and times as all pages write them.
+// Words as all pages write them. The texts of the scripts in the language of the page. English stands in the sources, marked by the tag `speak`;
+// another language is a catalogue that the page names: English with {0}, {1} … for values → the language.
+
+const LANGUAGE = document.documentElement.lang || "en";
+const address = document.documentElement.dataset.texts;
+
+/** @type {Record<string, string>} */
+const CATALOGUE = address ? await fetch(address).then((answer) => answer.json(), () => ({})) : {};
+
+const PLACEHOLDER = /\{(\w*)\}/;
+const PATTERNS = Object.entries(CATALOGUE).filter(([message]) => PLACEHOLDER.test(message)).map(([message, said]) => {
+  const pieces = message.split(PLACEHOLDER);
+  const literals = pieces.filter((_, i) => i % 2 === 0);
+  const escaped = literals.map((piece) => piece.replace(/[\\^$.*+?()[\]{}|]/g, "\\$&"));
+  return {
+    said, names: pieces.filter((_, i) => i % 2), form: new RegExp(`^${escaped.join("(.+?)")}$`, "s"),
+    words: literals.reduce((sum, piece) => sum + piece.trim().length, 0),
+  };
+}).sort((a, b) => b.words - a.words); // of two that fit, the one with more words of its own
+const FOLDED = new Map(Object.entries(CATALOGUE).map(([message, said]) => [message.toLowerCase(), said]));
+const MARK = new Intl.NumberFormat(LANGUAGE).format(0.5)[1];
+
+/** @param {string} said @param {Record<string, string>} values */
+const fill = (said, values) => said.replace(/\{(\w*)\}/g, (whole, name) => values[name] ?? whole);
+
+/**
+ * Numbers inside a text with the decimal mark of the language.
+ * @param {string} value
+ */
+export const localise = (value) => (MARK === "." ? value : value.replace(/(?<![\w.,])(\d+)\.(\d+)(?![\d.])/g, `$1${MARK}$2`));
+
+/**
+ * What the server or a person said, in the language of the page: a message of the catalogue, or a sentence that was
+ * made from one; all else stays as it is, numbers apart.
+ * @param {string} value
+ * @returns {string}
+ */
+export function translate(value) {
+  if (!address || !value) return value;
+  const before = SAID.get(value);
+  if (before !== undefined) return before;
+  if (SAID.size >= MOST_SAID) SAID.clear();
+  const found = find(value);
+  SAID.set(value, found);
+  return found;
+}
+
+const SAID = new Map(); // live pages say the same many times a second
+const MOST_SAID = 2000;
+
+/** @param {string} value */
+function find(value) {
+  if (!/\p{L}{2}/u.test(value)) return localise(value);
+  const inner = value.trim();
+  const known = CATALOGUE[inner] ?? recase(inner, FOLDED.get(inner.toLowerCase()));
+  if (known !== undefined) return value.replace(inner, () => known);
+  for (const { said, names, form } of PATTERNS) {
+    const found = form.exec(inner);
+    if (found) return value.replace(inner, () => fill(said, Object.fromEntries(names.map((name, i) => [name, translate(found[i + 1])]))));
+  }
+  const sentences = inner.split(/(?<=[.!?…])\s+(?=[A-Z0-9“])/);
+  return sentences.length > 1 ? sentences.map(translate).join(" ") : localise(value);
+}
+
+/** @param {string} value @param {string | undefined} said */
+const recase = (value, said) => (said && /^\p{Lu}/u.test(value) ? said[0].toUpperCase() + said.slice(1) : said);
+
+/**
+ * The tag of every text for people: speak`Sensor ${n} is ready`. Values that are words are translated too.
+ * @param {TemplateStringsArray} strings
+ * @param {...any} values
+ * @returns {string}
+ */
+export function speak(strings, ...values) {
+  const shown = values.map((value) => (address ? translate(String(value)) : String(value)));
+  if (!address) return strings.reduce((said, piece, i) => said + shown[i - 1] + piece);
+  const message = strings.reduce((said, piece, i) => `${said}{${i - 1}}${piece}`);
+  const inner = message.trim();
+  return message.replace(inner, () => fill(CATALOGUE[inner] ?? inner, Object.fromEntries(shown.map((value, i) => [String(i), value]))));
+}
+
+/**
+ * The name of a value inside a sentence: small in English, as it is where nouns are written with a capital.
+ * @param {string} name
+ */
+export const lowered = (name) => (LANGUAGE === "de" ? name : name.toLowerCase());
 
 /** @typedef {"left" | "right"} Side */
 

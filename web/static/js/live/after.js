@@ -1,7 +1,7 @@
 // What came of the take: saved, being analysed, or nothing arrived. Leads to the session when the analysis is done.
 import { request } from "../common/api.js";
 import { say } from "./words.js";
-import { speak } from "../common/text.js";
+import { speak } from "../common/words.js";
 
 export class After {
   constructor(root, session) {

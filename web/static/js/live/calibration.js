@@ -1,10 +1,8 @@
 // <live-calibration>: stand, then walk; what is waited for, how still each sensor is, what its axes came out as.
 import { cell, segmentCell, setState, shape, stateOf } from "./shapes.js";
 import { STAND_S } from "../common/standing.js";
-import { capitalise } from "../common/words.js";
+import { capitalise, speak, translate } from "../common/words.js";
 import { number, say } from "./words.js";
-import { speak } from "../common/text.js";
-import { translate } from "../common/text.js";
 
 const STEPS = 8; // straight steps, or
 const WALK_S = 12; // seconds of walking

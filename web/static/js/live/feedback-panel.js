@@ -1,7 +1,7 @@
 // <live-feedback>: level, schedule, next probe, with against without feedback, side effects; all in words.
 import { setState } from "./shapes.js";
 import { number, say, withUnit } from "./words.js";
-import { speak } from "../common/text.js";
+import { speak } from "../common/words.js";
 
 const STOPS = { max_strides: speak`The number of strides is reached.`, max_minutes: speak`The time is over.`, gps_rise: speak`The walk as a whole changed too much.` };
 const NOT_JUDGED = { too_few_strides: speak`too few strides yet`, joint_missing: speak`not measured`, both_sides_trained: speak`both are trained`, no_limit: speak`no limit known` };

@@ -1,8 +1,7 @@
 // <live-test>: a guided functional test. The estimator says where it stands; here it is told, and people decide.
 import { cell, setState } from "./shapes.js";
 import { number, say, withUnit } from "./words.js";
-import { speak } from "../common/text.js";
-import { translate } from "../common/text.js";
+import { speak, translate } from "../common/words.js";
 
 const PHASES = { get_ready: ["none", speak`Get ready`], ready: ["ok", speak`Ready`], running: ["run", speak`Running`], done: ["ok", speak`Done`] };
 const DIGITS = 1; // of the running clock

@@ -1,8 +1,7 @@
 // The line of notes under the head: the tablet is lost, the server is lost, something was refused, the take was told of.
 import { h } from "../common/elements.js";
 import { shape } from "./shapes.js";
-import { speak } from "../common/text.js";
-import { translate } from "../common/text.js";
+import { speak, translate } from "../common/words.js";
 
 const NOTICE_MS = 12000;
 const REDO_MS = 45000;

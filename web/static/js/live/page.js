@@ -15,9 +15,8 @@ import { Top } from "./top.js";
 import { After } from "./after.js";
 import { Notes } from "./notes.js";
 import { inOrder } from "./sensors.js";
-import { formatClock } from "../common/words.js";
+import { formatClock, speak } from "../common/words.js";
 import { number, say } from "./words.js";
-import { speak } from "../common/text.js";
 
 const data = JSON.parse(document.getElementById("live-data").textContent);
 const OVER = new Set(["finished", "closed"]);

@@ -1,8 +1,7 @@
 // The take before anything streams: open it, show its code, count down, ask for a new one.
 import { request, showProblem } from "../common/api.js";
-import { formatClock } from "../common/words.js";
+import { formatClock, speak } from "../common/words.js";
 import { code as grouped, say } from "./words.js";
-import { speak } from "../common/text.js";
 
 const TAKEN = new Set(["pairing", "open"]);
 

@@ -1,7 +1,5 @@
 // What the patient reads: short, positive, no numbers, no jargon.
-import { capitalise } from "../common/words.js";
-import { speak } from "../common/text.js";
-import { lowered } from "../common/text.js";
+import { capitalise, lowered, speak } from "../common/words.js";
 
 export function what(prescription, term) {
   const name = term?.everyday || (term ? lowered(term.label) : speak`walk`);

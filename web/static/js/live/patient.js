@@ -6,8 +6,7 @@ import { Path } from "./patient-path.js";
 import { HELD, ends, wayTo, what } from "./patient-words.js";
 import { Sound } from "./sound.js";
 import { say } from "./words.js";
-import { speak } from "../common/text.js";
-import { translate } from "../common/text.js";
+import { speak, translate } from "../common/words.js";
 
 const data = JSON.parse(document.getElementById("live-data").textContent);
 const LAST = 8;

@@ -1,6 +1,6 @@
 // The patient's screen seen from here: opens its window and switches its sound. The two windows of one browser speak
 // over a channel; a patient screen on another device has its own switch.
-import { speak } from "../common/text.js";
+import { speak } from "../common/words.js";
 const ALIVE_MS = 4000;
 
 export class Screen {

@@ -1,8 +1,7 @@
 // <live-sensors>: one row per sensor: segment, battery, loss, and its state as shape and word.
 import { cell, segmentCell, setState, stateOf } from "./shapes.js";
 import { number, say } from "./words.js";
-import { speak } from "../common/text.js";
-import { translate } from "../common/text.js";
+import { speak, translate } from "../common/words.js";
 
 const EVERY_MS = 500; // rows are for reading; they need not follow every frame
 const WORST = ["none", "ok", "warn", "bad"];

@@ -1,8 +1,7 @@
 // <stride-chart>: the stride being walked with the last ones, left solid, right dashed, the last thin.
 import { DASH, MEAN_PX, Plot, THIN_PX, label, trace } from "./plot.js";
-import { SIDE_KEY } from "../common/words.js";
+import { SIDE_KEY, speak } from "../common/words.js";
 import { number, say } from "./words.js";
-import { speak } from "../common/text.js";
 
 const SIDES = ["left", "right"];
 const THIN = 3; // last strides drawn thin, of each side

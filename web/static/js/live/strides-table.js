@@ -3,7 +3,7 @@ import { chip, h } from "../common/elements.js";
 import { cell } from "./shapes.js";
 import { SHOWN } from "./strip.js";
 import { withUnit } from "./words.js";
-import { speak } from "../common/text.js";
+import { speak } from "../common/words.js";
 
 const ZONE = { in: "in", near_low: "near", near_high: "near", low: "away", high: "away" };
 const ZONE_WORDS = { in: speak`in the zone`, near_low: speak`just below`, near_high: speak`just above`, low: speak`below`, high: speak`above` };

@@ -3,8 +3,7 @@ import "./strip.js";
 import { SHOWN } from "./strip.js";
 import { fill, rowsOf } from "./strides-table.js";
 import { asymmetry, say } from "./words.js";
-import { speak } from "../common/text.js";
-import { lowered, translate } from "../common/text.js";
+import { lowered, speak, translate } from "../common/words.js";
 
 export class StripCard {
   constructor(root, data, feed) {

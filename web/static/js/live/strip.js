@@ -2,7 +2,7 @@
 // without a target left = disc, right = ring. A petrol tick below marks a stride with feedback.
 import { Plot, label, trace } from "./plot.js";
 import { number } from "./words.js";
-import { speak } from "../common/text.js";
+import { speak } from "../common/words.js";
 
 export const SHOWN = 20;
 const EDGE = { left: 44, right: 64, top: 10, bottom: 42 };

@@ -1,9 +1,8 @@
 // The bar on top and the one below: recording time, delay, Start, STOP, pause, the last mark.
 import { STALE_MS } from "./feed.js";
 import { setState } from "./shapes.js";
-import { formatClock } from "../common/words.js";
+import { formatClock, lowered, speak, translate } from "../common/words.js";
 import { number, say } from "./words.js";
-import { lowered, speak, translate } from "../common/text.js";
 
 // Sample to screen. Within a tenth of a second it feels at once (Card, Robertson & Mackinlay 1991, CHI: 0.1 s); from
 // STALE_MS on it is stale.

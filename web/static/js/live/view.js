@@ -1,7 +1,7 @@
 // <live-view> shows the live figure of a session: viser's page in an iframe, loaded when it is first seen, again
 // when the theme changes and when the line to the server has come back. Viser's own client only tries again while
 // it has focus, which an iframe rarely has, so it is not waited for.
-import { speak } from "../common/text.js";
+import { speak } from "../common/words.js";
 const RETRY_MS = 5000;
 
 const isDark = () => getComputedStyle(document.documentElement).colorScheme.startsWith("dark");

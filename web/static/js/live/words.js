@@ -1,5 +1,5 @@
 // Numbers as the live pages write them: a real minus, no negative zero, a dash where nothing is.
-import { localise, speak } from "../common/text.js";
+import { localise, speak } from "../common/words.js";
 export function number(value, digits = 0) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const text = value.toFixed(digits);

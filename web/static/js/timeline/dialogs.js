@@ -1,6 +1,6 @@
 // The two questions of the timeline: why a stride is left out, and which event is added where.
 import { seconds } from "./words.js";
-import { speak } from "../common/text.js";
+import { speak } from "../common/words.js";
 
 // What strides are left out for, as the question offers it.
 export const reasons = () => [...document.querySelectorAll("#why option")].map((o) => o.value).filter(Boolean);

@@ -1,10 +1,8 @@
 // Event handles of one foot: drag, arrow keys, Delete. A handle is a slider whose value is a time.
 import { clock } from "../clock.js";
-import { SIDE_KEY } from "../common/words.js";
+import { SIDE_KEY, speak, translate } from "../common/words.js";
 import { h, s } from "../common/elements.js";
 import { WORD, seconds } from "./words.js";
-import { speak } from "../common/text.js";
-import { translate } from "../common/text.js";
 
 const CLOSE_PX_PER_S = 44; // below it handles of one kind would lie on each other; the blocks alone are shown
 const APART_S = 0.051; // the server refuses less than 50 ms between two events of a foot

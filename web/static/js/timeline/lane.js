@@ -1,9 +1,8 @@
 // One signal over time. The whole take is loaded once, thinned; a closer look loads its own window with margins.
 import { request } from "../common/api.js";
-import { SIDE_KEY, SIDE_LETTER } from "../common/words.js";
+import { SIDE_KEY, SIDE_LETTER, localise } from "../common/words.js";
 import { h, s } from "../common/elements.js";
 import { seconds } from "./words.js";
-import { localise } from "../common/text.js";
 
 const MS = 1000;
 const COARSE_POINTS = 2000;

@@ -2,8 +2,7 @@
 import { chip, h, icon } from "../common/elements.js";
 import { reasons } from "./dialogs.js";
 import { WORD, seconds } from "./words.js";
-import { speak } from "../common/text.js";
-import { localise, lowered } from "../common/text.js";
+import { localise, lowered, speak } from "../common/words.js";
 
 const LISTED = 40;
 

@@ -1,7 +1,6 @@
 // Strides as blocks over time: stance full, swing pale, left out crossed. Drawn once, moved by the viewBox.
-import { SIDE_KEY } from "../common/words.js";
+import { SIDE_KEY, speak } from "../common/words.js";
 import { s } from "../common/elements.js";
-import { speak } from "../common/text.js";
 
 const MS = 1000; // the x axis of the drawing is in milliseconds, so that rounding is never seen
 

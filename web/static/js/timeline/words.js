@@ -1,5 +1,5 @@
 // Events and times as the parts of the timeline write them.
-import { localise, speak } from "../common/text.js";
+import { localise, speak } from "../common/words.js";
 
 export const WORD = { ic: speak`contact`, tc: speak`foot-off` };
 

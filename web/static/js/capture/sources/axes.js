@@ -1,7 +1,7 @@
 // Which way this device's sensors point, found by turning it: lying, on its left edge, upright, lying again.
 // Browsers disagree: on the sign of acceleration, on which axis alpha, beta and gamma turn about, on degrees. Gravity
 // decides: between two poses the turned-along gravity g' = g − (ω × g) dt must arrive where it is measured.
-import { speak } from "../../common/text.js";
+import { speak } from "../../common/words.js";
 export const POSES = [
   { name: "flat", axis: 2, words: speak`Lay the device flat, screen up` },
   { name: "side", axis: 0, words: speak`Stand it on its left long edge` },

@@ -1,7 +1,7 @@
 // The device's own sensor (DeviceMotion): one stream, one sensor, a time with every sample.
 import { AxesTest, turned } from "./axes.js";
 import { RateMeter } from "./rate.js";
-import { speak } from "../../common/text.js";
+import { speak } from "../../common/words.js";
 
 const BATCH_S = 0.05;
 const SILENT_S = 1;

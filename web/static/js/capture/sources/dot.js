@@ -1,7 +1,7 @@
 // Movella DOT sensors over Web Bluetooth: each one a stream with a clock of its own.
 import { BATTERY, CONTROL, Clock, DEVICE, INFO, MODES, SERVICES, address, control, decode, settings } from "./dot_payload.js";
 import { RateMeter } from "./rate.js";
-import { speak } from "../../common/text.js";
+import { speak } from "../../common/words.js";
 
 const MODE = 21; // acceleration and rate of turn: all the estimation needs, in the fewest bytes
 const BATCH_S = 0.1;

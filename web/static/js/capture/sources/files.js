@@ -2,7 +2,7 @@
 import { decodeBatch, isLog, scanLog } from "../../common/wire.js";
 import { parseMtText, looksLikeMtText } from "./mt_text.js";
 import { parseTable, looksLikeTable } from "./table.js";
-import { speak } from "../../common/text.js";
+import { speak } from "../../common/words.js";
 
 // A track: sensors that tick together. {ids, segments, rateHz, clock, tUs: Float64Array(n), values: [Float32Array(n*9)]}
 const WRAP = 65536;

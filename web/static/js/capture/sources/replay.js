@@ -1,7 +1,7 @@
 // Recorded files played at the speed they were recorded, as if their sensors were worn now.
 import { readFiles } from "./files.js";
 import { RateMeter } from "./rate.js";
-import { speak } from "../../common/text.js";
+import { speak } from "../../common/words.js";
 
 const TICK_MS = 20;
 const BATCH_S = 0.05;

@@ -1,5 +1,5 @@
 // A plain table of ours: a column t_s and, per sensor, <id>.acc_x … gyr_z (m/s², rad/s), if wanted mag_x … (a.u.).
-import { speak } from "../../common/text.js";
+import { speak } from "../../common/words.js";
 const CHANNELS = ["acc", "gyr", "mag"].flatMap((kind) => ["x", "y", "z"].map((axis) => `${kind}_${axis}`));
 
 function layoutOf(text) {
