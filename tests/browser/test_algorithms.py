@@ -51,6 +51,7 @@ def test_filters_are_chosen_run_and_compared_with_a_reference(
     expect(page.get_by_text(re.compile("Martin2010 needs a magnetometer"))).to_be_visible()
     expect(page.get_by_role("heading", name="Against the reference")).to_be_visible()
     expect(page.locator("circle.ba").first).to_be_attached()
+    page.wait_for_load_state()  # its script sends the choice
     page.get_by_label("Plot of").select_option("mahony_2008")
     expect(page.get_by_text("Left shank, heading · Mahony2008")).to_be_visible()
     page.get_by_role("link", name="Time", exact=True).click()

@@ -46,6 +46,8 @@ def test_a_page_is_german_and_keeps_to_the_design(name: str, opened: Opener, fil
             PAGES[name](filled), signed_in=name not in OUT, locale="de-DE", width=width, height=height
         )
         page.wait_for_load_state()
+        # a button that its script has just allowed is on its way to its colours
+        page.wait_for_function("() => document.getAnimations().every((a) => a.playState !== 'running')")
         assert page.locator("html").get_attribute("lang") == "de"
         assert left_english(page) == []
         assert not layout_faults(page) | text_faults(page), f"{width}"

@@ -1,6 +1,19 @@
-// Forms that speak to the API, dialogs, whole-row links and back buttons: behaviour by data attributes, for every page.
+// The theme, forms that speak to the API, dialogs, whole-row links and back buttons: behaviour by data attributes, for every page.
 import { request, showProblem } from "./common/api.js";
 import { speak } from "./common/words.js";
+
+// Light, dark or as the system says; the choice is remembered on this device.
+const root = document.documentElement;
+const THEME = "sagittal.theme";
+const apply = (t) => { if (t) root.dataset.theme = t; else delete root.dataset.theme; };
+try { apply(localStorage.getItem(THEME)); } catch { /* storage refused: follow the system */ }
+document.addEventListener("click", (e) => {
+  if (!e.target.closest("[data-theme-toggle]")) return;
+  const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+  const next = dark ? "light" : "dark";
+  apply(next);
+  try { localStorage.setItem(THEME, next); } catch { /* as above */ }
+});
 
 const LATER_MS = 20_000;
 const NOW = "#now"; // of the address of a report that is printed at once
