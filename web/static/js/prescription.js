@@ -125,7 +125,8 @@ function quantity(mean, sd) {
 
 form.addEventListener("change", (e) => {
   if (e.target.matches("[name=preset]")) preset(e.target);
-  else if (e.target.matches("[name=parameter], [name=modes]")) for (const p of form.querySelectorAll("[name=preset]")) p.checked = false;
+  else if (e.target.matches("[name=parameter], [name=side]")) wanted = []; // who chooses is not put right by a preset
+  if (e.target.matches("[name=parameter], [name=modes]")) for (const p of form.querySelectorAll("[name=preset]")) p.checked = false;
   if (e.target.matches("[name=parameter]")) arrange(); // another parameter may belong to both sides
   if (e.target.matches("[name=parameter], [name=side], [name=preset]")) offer();
   arrange();
