@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -19,10 +18,10 @@ from core.formats.draft import signal_digest
 from core.recording import ImuStream, Recording
 from core.sample_blocks import LongStream, SampleBlock
 from core.simulate.daily import plan_daily_life, simulate_daily_life
-from tests.accuracy.report import WRITE
 from tests.bench.long_cwa import write_long_cwa
 from tests.bench.pairs import cpu_s, in_pairs, plain_python
 from tests.data import ROOT
+from tests.marks import WRITES
 
 RATE = 100.0
 HOUR = 3600.0
@@ -85,7 +84,7 @@ DAY_MB = 4.0
 SLOWER = 2.0
 """A machine may be so much slower than the goal's."""
 
-WEEK = 7 if WRITE in os.environ else 2
+WEEK = 7 if WRITES else 2
 """Days of the longest recording: the whole week where figures are written."""
 
 

@@ -19,11 +19,12 @@ import numpy as np
 import pytest
 
 from core.online import OnlineSession, compile_live_kernels
-from tests.accuracy.report import WRITE, record_speed
+from tests.accuracy.report import record_speed
 from tests.bench.test_erkf import FIFTEEN, best, smoothed
 from tests.core.body.erkf.walks import mixed_walk
 from tests.data import ROOT
 from tests.live_walks import batches, hello_of
+from tests.marks import WRITES, where_figures_are_written
 from tests.server import crowd
 from tests.server.clinic import open_clinic
 from tests.walks import simulated
@@ -74,8 +75,6 @@ print(json.dumps({
     "parameters": sum(p["mean"] is not None for p in result["parameters"]),
 }))
 """
-
-WRITES: Final = WRITE in os.environ
 
 LAPS: Final = {1: 57.0, 14: 623.0} | ({84: 3668.0} if WRITES else {})
 """Laps of 43.5 s → about the take's length in s: 1, 10 and 60 min."""
@@ -217,7 +216,7 @@ async def test_the_list_of_patients_grows_slower_than_their_number(tmp_path: Pat
     assert ms[500] <= 10.0 * DEARER * ms[1]
 
 
-@pytest.mark.skipif(not WRITES, reason="measured where figures are written; limits stand in the other tests")
+@where_figures_are_written
 def test_goals_are_written(tmp_path: Path) -> None:
     inputs = mixed_walk().inputs
     smoothed(inputs.part(0, 300), FIFTEEN)

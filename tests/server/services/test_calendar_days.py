@@ -3,23 +3,12 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from server.services import notes, patients, programmes
 from server.services.errors import ServiceError
 from server.storage.db import Database
-from server.storage.migrate import upgrade
-
-
-@pytest.fixture
-def db(tmp_path: Path) -> Iterator[Database]:
-    upgrade(tmp_path / "sagittal.db")
-    opened = Database(tmp_path / "sagittal.db")
-    yield opened
-    opened.close()
 
 
 @pytest.mark.parametrize("day", [dt.date(1, 1, 1), dt.date(9998, 12, 1)])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,18 +15,9 @@ from server.services.reviewed import ReviewedAnalyses
 from server.settings import Settings
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
-from server.storage.migrate import upgrade
 from server.storage.tables import audit, now, planned_visit
 
 MONDAY = dt.date(2026, 3, 2)
-
-
-@pytest.fixture
-def db(tmp_path: Path) -> Iterator[Database]:
-    upgrade(tmp_path / "sagittal.db")
-    opened = Database(tmp_path / "sagittal.db")
-    yield opened
-    opened.close()
 
 
 def _patient(db: Database, code: str = "P-1") -> str:

@@ -1,19 +1,12 @@
 // What the camera has filmed and the server does not have yet (docs/live-protocol.md, "The film"). Every piece is in
 // IndexedDB before it is sent and until it is acknowledged, so that neither a line nor a page that breaks loses one.
+import { done, finished } from "./stored.js";
+
 const NAME = "sagittal-film";
 const PIECE_BYTES = 1 << 19; // of one request; the server takes twice as much
 const PAUSES_S = [0.5, 1, 2, 4, 8];
 const WAITING_S = 1; // until the take is over and stored
 const GIVEN_UP = [401, 404, 422]; // the token has expired, the take was erased, no browser plays it
-
-const done = (request) => new Promise((ok, no) => {
-  request.onsuccess = () => ok(request.result);
-  request.onerror = () => no(request.error);
-});
-const finished = (transaction) => new Promise((ok, no) => {
-  transaction.oncomplete = () => ok();
-  transaction.onerror = transaction.onabort = () => no(transaction.error);
-});
 
 function open() {
   const request = indexedDB.open(NAME, 1);

@@ -1,20 +1,12 @@
 // What the tablet holds of one take, in IndexedDB: every batch is stored before it is sent and kept until the server
 // has acknowledged it; the running hash is stored with it, so that a reload can go on and finish.
+import { done, finished } from "./stored.js";
 import { encodeBatch, payload } from "../common/wire.js";
 import { Sha256 } from "../common/sha256.js";
 
 const NAME = "sagittal-capture";
 const IN_MEMORY = 512; // batches kept besides, so that sending need not read back what was just written
 const RETRY_MS = 1000;
-
-const done = (request) => new Promise((ok, no) => {
-  request.onsuccess = () => ok(request.result);
-  request.onerror = () => no(request.error);
-});
-const finished = (transaction) => new Promise((ok, no) => {
-  transaction.oncomplete = () => ok();
-  transaction.onerror = transaction.onabort = () => no(transaction.error);
-});
 
 function open() {
   const request = indexedDB.open(NAME, 1);
