@@ -103,6 +103,7 @@ PHRASES: Final = (
     "{side} stride, {start_s} to {end_s} s, left out: {why}",
     "knee-ankle-foot orthosis",
     "Change (noun)",
+    "the other side",
     "M, {age} y",
     "F, {age} y",
     "{age} y",

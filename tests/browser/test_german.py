@@ -54,6 +54,15 @@ def test_a_page_is_german_and_keeps_to_the_design(name: str, opened: Opener, fil
         page.close()
 
 
+def test_a_printed_report_is_german_and_stays_on_its_sheets(opened: Opener, filled: Filled) -> None:
+    page = opened(PAGES["print"](filled), locale="de-DE")
+    page.wait_for_load_state()
+    assert page.locator(".r-short").count() == 1
+    assert page.locator(".r-short [lang=en]").count() == 0
+    wide = "() => [...document.querySelectorAll('.sheet')].map((s) => s.scrollWidth - s.clientWidth)"
+    assert max(page.evaluate(wide)) <= 0
+
+
 def test_the_check_can_fail(opened: Opener) -> None:
     page = opened("/patients", locale="de-DE")
     page.evaluate("() => { document.querySelector('h1').textContent = 'Skip to content'; }")

@@ -18,6 +18,7 @@ const PATTERNS = Object.entries(CATALOGUE).filter(([message]) => PLACEHOLDER.tes
   };
 }).sort((a, b) => b.words - a.words); // of two that fit, the one with more words of its own
 const FOLDED = new Map(Object.entries(CATALOGUE).map(([message, said]) => [message.toLowerCase(), said]));
+const WORDY = /\p{L}{3}.*\s\p{L}{3}.*\s\p{L}{3}/su; // a sentence that nobody knows, a citation: as it is
 const MARK = new Intl.NumberFormat(LANGUAGE).format(0.5)[1];
 
 /** @param {string} said @param {Record<string, string>} values */
@@ -59,7 +60,7 @@ function find(value) {
     if (found) return value.replace(inner, () => fill(said, Object.fromEntries(names.map((name, i) => [name, translate(found[i + 1])]))));
   }
   const sentences = inner.split(/(?<=[.!?…])\s+(?=[A-Z0-9“])/);
-  return sentences.length > 1 ? sentences.map(translate).join(" ") : localise(value);
+  return sentences.length > 1 ? sentences.map(translate).join(" ") : WORDY.test(value) ? value : localise(value);
 }
 
 /** @param {string} value @param {string | undefined} said */
