@@ -131,6 +131,11 @@ DE: Final = load_catalogue("de")
         ("0.98 m/s", "0,98 m/s"),
         ("18 Nov 2026", "18.11.2026"),
         ("left longer by 0.04 s", "links länger um 0,04 s"),
+        ("left shorter by 4.8 points", "links kürzer um 4,8 Punkte"),
+        (
+            "against the other side and people at this speed",
+            "gegen die andere Seite und Menschen in diesem Tempo",
+        ),
         ("112 strides used, 56 left and 56 right.", "112 Doppelschritte verwendet, 56 links und 56 rechts."),
         (
             "The left step is *0.04 m shorter* than the right",

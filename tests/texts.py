@@ -68,7 +68,8 @@ WORDS: Final = frozenset(
         r"\S+",
         """
     above acceleration active admin affected after ago anatomical and ankle assessment assessments
-    assistant bad bar barefoot bars baseline before below both bouts cane chest clinician copies copy
+    consistent inconsistent points assistant bad bar barefoot bars baseline before below both bouts cane chest
+    clinician copies copy
     crutch days early ended estimated exact fading failed fast faster feet female flexion foot frontal
     good gravity harness heading higher hip inclination inside insoles inward kinematic knee larger late
     left less longer low lower male mean measured median months more moving narrower no none norm norms

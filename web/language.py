@@ -287,10 +287,16 @@ class _Pattern:
         if not literals[-1] and literals[-2] and not literals[-2].rstrip().endswith((".", ":")):
             self._stops = False  # what stands last is no sentence
         self._longest = max(literals, key=len).casefold()
-        self._forms = [
-            re.compile(value.join(re.escape(piece) for piece in literals), re.DOTALL | re.IGNORECASE)
-            for value in ("(.+?)", "(.+)")
+        first, *rest = map(re.escape, literals)
+        # of two values without a word between, the one before is a number and the other its unit
+        forms = [
+            first
+            + "".join(
+                (value if piece or i == len(rest) else before) + piece for i, piece in enumerate(rest, 1)
+            )
+            for value, before in (("(.+?)", r"([−+-]?\d+(?:\.\d+)?)"), ("(.+?)", "(.+?)"), ("(.+)", "(.+)"))
         ]
+        self._forms = [re.compile(form, re.DOTALL | re.IGNORECASE) for form in dict.fromkeys(forms)]
 
     def match(self, text: str) -> Iterator[dict[str, str]]:
         """What may stand in the placeholders; nothing if the text is not made from this message."""
