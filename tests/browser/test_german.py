@@ -84,9 +84,11 @@ def test_scripts_speak_german_and_write_decimal_commas(opened: Opener) -> None:
 
 def test_an_account_keeps_its_language_whatever_the_browser_asks(opened: Opener) -> None:
     page = opened("/account", locale="de-DE")
+    page.wait_for_load_state()  # the script that sends the form is there
     page.get_by_label("Sprache").select_option("en")
     page.get_by_role("button", name="Speichern").click()
     page.locator("html[lang=en]").wait_for(state="attached")
+    page.wait_for_load_state()
     assert page.get_by_role("heading", name="Change password").is_visible()
     page.get_by_label("Language").select_option("")
     page.get_by_role("button", name="Save").click()
