@@ -24,8 +24,8 @@ from server.viewer.replay_figure import ReplayFigure
 from tests.server import walk
 from tests.server.viewer.pictures import POSES, RATE_HZ, picture
 
-LASTS_S, WINDOWS = 1.0, 6
-"""Windows of walking; the first is for settling."""
+PICTURES, WINDOWS = round(RATE_HZ), 8
+"""Of a window of walking, a second; how many windows: the first is for settling."""
 NO_DEARER: Final = 1.6
 """Live / replay: measured 1.1 to 1.3. The aim is 4 % of a core for a figure that somebody looks at: measured
 4.7 % on a busy machine, 2.8 % of it to pose; the replay 3.7 %. Each further viewer: 0.6 %."""
@@ -67,18 +67,14 @@ def watched(server: viser.ViserServer, viewers: int) -> Iterator[None]:
             browsers.kill()
 
 
-def cost(show: Callable[[int], object]) -> Cost:
-    """CPU time per second of showing 30 frames a second."""
-    spent = []
-    for window in range(WINDOWS):
-        process, thread, began = time.process_time(), time.thread_time(), time.perf_counter()
-        for i in range(round(LASTS_S * RATE_HZ)):
-            show(window * round(LASTS_S * RATE_HZ) + i)
-            time.sleep(max(0.0, began + (i + 1) / RATE_HZ - time.perf_counter()))
-        took = time.perf_counter() - began
-        spent.append(Cost((time.process_time() - process) / took, (time.thread_time() - thread) / took))
-    # other work on this machine only ever adds
-    return min(spent[1:], key=lambda x: x.process)
+def cost(show: Callable[[int], object], first: int) -> Cost:
+    """CPU time per second of showing 30 frames a second for a window, from the picture `first` on."""
+    process, thread, began = time.process_time(), time.thread_time(), time.perf_counter()
+    for i in range(PICTURES):
+        show(first + i)
+        time.sleep(max(0.0, began + (i + 1) / RATE_HZ - time.perf_counter()))
+    took = time.perf_counter() - began
+    return Cost((time.process_time() - process) / took, (time.thread_time() - thread) / took)
 
 
 @contextmanager
@@ -117,18 +113,18 @@ def replay(server: viser.ViserServer) -> Callable[[int], object]:
 def test_a_live_figure_costs_little_more_than_a_replayed_one(
     viewers: int,
 ) -> None:
-    found = {}
-    for name, made in (("live", live), ("replay", replay)):
-        with view() as server:
-            show = made(server)
-            with watched(server, viewers):
-                found[name] = cost(show)
-    a, b = found["live"], found["replay"]
+    with view() as ours, view() as theirs, watched(ours, viewers), watched(theirs, viewers):
+        show_live, show_replay = live(ours), replay(theirs)
+        # one window of each after the other: a machine that is slower for a while is slower for both
+        pairs = [(cost(show_live, i * PICTURES), cost(show_replay, i * PICTURES)) for i in range(WINDOWS)][1:]
+    ratio = float(np.median([a.process / b.process for a, b in pairs]))
+    # other work on this machine only ever adds
+    a, b = (min(costs, key=lambda x: x.process) for costs in zip(*pairs, strict=True))
     sys.stdout.write(
         f"{viewers} viewers: live {a.process:.2%} of a core (posing {a.posing:.2%}), replay {b.process:.2%} "
-        f"(posing {b.posing:.2%}); live / replay {a.process / b.process:.2f}\n"
+        f"(posing {b.posing:.2%}); live / replay {ratio:.2f}\n"
     )
-    assert a.process <= NO_DEARER * b.process
+    assert ratio <= NO_DEARER
 
 
 def test_what_a_picture_takes_to_be_posed() -> None:

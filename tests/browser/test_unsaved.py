@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Dialog, Page, expect
 
 from tests.browser import filling
-from tests.browser.conftest import Opener, RunningServer
+from tests.browser.conftest import Filled, Opener, RunningServer
 
 
 @pytest.fixture(scope="module")
@@ -79,3 +79,25 @@ def test_a_note_of_one_long_word_breaks_no_page(opened: Opener, running: Running
         filling.add(client, f"/patients/{patient}/notes", content="x" * 9000)
     page = opened(f"/patients/{patient}")
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_a_page_that_follows_a_job_waits_for_the_dialog_that_is_in_use(
+    opened: Opener, running: RunningServer, filled: Filled
+) -> None:
+    with running.client() as client:
+        (job, *_) = [j["id"] for j in client.get("/api/v1/jobs").json() if j["state"] == "done"]
+    page = opened("/patients")
+    page.get_by_role("button", name="New patient").click()
+    code = page.locator("dialog[open]").get_by_label("Code")
+    code.press_sequentially("P-0778")
+    page.evaluate(
+        "(job) => document.querySelector('h1').insertAdjacentHTML('beforeend',"
+        " `<job-progress job='${job}' done='reload'><span data-message></span></job-progress>`)",
+        job,
+    )
+    expect(page.locator("h1")).to_contain_text("Done")
+    expect(code).to_have_value("P-0778")
+    page.keyboard.press("Escape")
+    page.evaluate("document.activeElement.blur()")
+    expect(page.locator("job-progress")).to_have_count(0)  # now it has loaded itself anew
+    expect(page.locator("h1")).to_have_text("Patients")

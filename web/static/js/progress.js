@@ -4,6 +4,19 @@ import { speak, translate } from "./common/words.js";
 
 const ENDS = new Set(["done", "failed", "cancelled"]);
 
+const TYPING = "textarea, input:not([type=checkbox], [type=radio], [type=range], [type=file])";
+
+// Nobody loses the field or the dialog that is in use: the page waits for it.
+function whenHandsAreFree(go) {
+  const busy = () => document.querySelector("dialog[open]") || document.activeElement?.matches(TYPING);
+  if (!busy()) return go();
+  const wait = setInterval(() => {
+    if (busy()) return;
+    clearInterval(wait);
+    go();
+  }, 500);
+}
+
 class JobProgress extends HTMLElement {
   connectedCallback() {
     this.started = Date.parse(this.getAttribute("since")) || Date.now();
@@ -36,8 +49,8 @@ class JobProgress extends HTMLElement {
       clearInterval(this.clock);
       this.dispatchEvent(new CustomEvent("job-end", { bubbles: true, detail: job }));
       const target = this.getAttribute(job.state === "done" ? "done" : "failed") ?? this.getAttribute("done");
-      if (target === "reload" || target === location.pathname) location.reload();
-      else if (target) location.assign(target);
+      if (job.state === "done") this.say(speak`Done`);
+      if (target) whenHandsAreFree(() => (target === "reload" || target === location.pathname ? location.reload() : location.assign(target)));
       return;
     }
     const fraction = job.fraction ?? 0;
