@@ -9,6 +9,8 @@ CONTENT_POLICY = (
     "default-src 'self'; frame-src 'self'; img-src 'self' data:; object-src 'none'; "
     "base-uri 'none'; form-action 'self'; frame-ancestors 'self'"
 )
+KEPT = "public, max-age=31536000, immutable"
+"""Cache-Control of an answer whose address carries a hash of it."""
 
 
 def allow_camera(origins: str) -> str:

@@ -9,13 +9,11 @@ from starlette.responses import Response
 
 from server.auth.access import require
 from server.auth.roles import Action
+from server.http.headers import KEPT
 from server.http.problems import SENTENCES, Problem
 from web.language import LANGUAGES, SOURCE, script_texts
 
 router = APIRouter(include_in_schema=False)
-
-KEPT = "public, max-age=31536000, immutable"
-"""The address carries a hash of what it answers."""
 
 
 @router.get("/texts/{language}/{version}.json", dependencies=[require(Action.LOAD_ASSET)])

@@ -9,7 +9,8 @@
             "placed": positions are where the person was, "measured": sensors support all of the figure,
             "hidden": segments without a pose}, which are not drawn,
             then {"t": shown, "valid": bool} for every {"t"}
-    GET /views/{view}/   viser's own client page, for an iframe
+    GET /views/{view}/   for an iframe: leads to viser's own client page, which takes this address again
+    GET /views/client/{version}   that page, the same for all views, which browsers therefore keep
     WS  /views/{view}    the pipe; the client finds it from its own address
 
 A view can be seen by the sign-in that opened it only.
@@ -20,6 +21,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
+import hashlib
 import math
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import replace
@@ -28,7 +30,7 @@ from typing import Annotated, Any, cast
 
 import viser
 from fastapi import APIRouter, FastAPI, Query, Request, WebSocket
-from fastapi.responses import HTMLResponse
+from fastapi.responses import HTMLResponse, RedirectResponse
 from sqlalchemy import Connection
 from starlette.status import WS_1008_POLICY_VIOLATION
 from starlette.websockets import WebSocketDisconnect
@@ -39,6 +41,7 @@ from core.formats.json_tree import read_json
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
+from server.http.headers import KEPT
 from server.http.problems import Problem, as_problem
 from server.report.bundle import read_poses
 from server.report.no_figure import explain_no_figure
@@ -72,6 +75,8 @@ browser's console says so once.
 """
 
 _HIDE_PANEL = "<style>.mantine-Paper-root,.mantine-Notifications-root{display:none!important}</style>"
+_TAKE_ADDRESS = "<script>history.replaceState(null, '', `/views/${location.hash.slice(1)}/`)</script>"
+"""Before viser's scripts: the page is the same for all views; its client asks for the pipe at its address."""
 _GONE = 4404
 """Close code: the view is not there (any more); the page around should connect again."""
 
@@ -99,18 +104,34 @@ def client_page() -> str:
     """Viser's client page from its wheel, without the control panel, which has no switch of its own."""
     page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
     head, found, body = page.partition("</head>")
-    if not found:
-        raise RuntimeError("viser's client page has no </head>; this version of viser is not supported.")
-    return f"{head}{_HIDE_PANEL}{found}{body}"
+    start, opened, scripts = head.partition("<head>")
+    if not (found and opened):
+        raise RuntimeError("viser's client page has no head; this version of viser is not supported.")
+    return f"{start}{opened}{_TAKE_ADDRESS}{scripts}{_HIDE_PANEL}{found}{body}"
 
 
-@router.get("/views/{view_id}/", response_class=HTMLResponse)
-def page(view_id: str, who: Reader, request: Request) -> HTMLResponse:
-    """The document of the 3D view."""
+@functools.cache
+def client_version() -> str:
+    """What stands in the address of the client page: another one when the page is."""
+    return hashlib.sha256(client_page().encode()).hexdigest()[:16]
+
+
+@router.get("/views/{view_id}/")
+def page(view_id: str, who: Reader, request: Request) -> RedirectResponse:
+    """Lead to the document of the 3D view, which learns from its fragment which view it shows."""
     if _views(request).find(view_id, who.login_id, who.role) is None:
         raise Problem(404, "view_not_found", "This 3D view has ended. Reload the session page.")
+    return RedirectResponse(
+        f"/views/client/{client_version()}#{view_id}", headers={"Cache-Control": "no-store"}
+    )
+
+
+@router.get("/views/client/{version}", dependencies=[require(Action.LOAD_ASSET)])
+def client(version: str) -> HTMLResponse:
+    """The document of every 3D view; the address of an earlier version gets the present one."""
+    kept = KEPT if version == client_version() else "no-cache"
     return HTMLResponse(
-        client_page(), headers={"Content-Security-Policy": CONTENT_POLICY, "Cache-Control": "no-store"}
+        client_page(), headers={"Content-Security-Policy": CONTENT_POLICY, "Cache-Control": kept}
     )
 
 

@@ -121,8 +121,13 @@ async def test_page_is_served_to_its_own_sign_in_only_and_with_its_own_policy(wa
         httpx.AsyncClient(base_url=f"http://127.0.0.1:{ward.port}", trust_env=False) as client,
     ):
         src = str(opened["src"])
-        page = await client.get(src, headers=headers)
-        assert page.status_code == 200
+        led = await client.get(src, headers=headers)
+        assert led.headers["location"].endswith(f"#{opened['view']}")
+        page = await client.get(led.headers["location"])  # no data of anybody: kept by browsers
+        assert page.headers["cache-control"].endswith("immutable")
+        older = await client.get("/views/client/0123")
+        assert older.headers["cache-control"] == "no-cache"
+        assert older.text == page.text
         assert "frame-ancestors 'self'" in page.headers["content-security-policy"]
         assert "http" not in page.headers["content-security-policy"]
         assert ".mantine-Paper-root" in page.text
