@@ -64,7 +64,7 @@ class Bundle:
     ----------
     repetitions : of a take of squats, None of any other. functional : of a functional test, as in
         analysis.json; None of any other. activity : of a take of daily life, None of any other.
-    quality, calibration, estimator, provenance : the JSON of analysis.json. warnings : its notices but for
+    quality, calibration, calibration_score, estimator, provenance : the JSON of analysis.json. warnings : its notices but for
         those that the upload page has told.
     """
 
@@ -73,6 +73,7 @@ class Bundle:
     parameters: tuple[Parameter, ...]
     warnings: tuple[Notice, ...]
     provenance: Mapping[str, Any]
+    calibration_score: Mapping[str, Any] | None = None
     estimator: Mapping[str, Any] | None = None
     angles: JointAngles | None = None
     events: GaitEvents = field(default_factory=lambda: GaitEvents(()))
@@ -104,6 +105,7 @@ def load_bundle(files: Mapping[str, bytes]) -> Bundle:
         parameters=tuple(Parameter(**row) for row in data["parameters"]),
         warnings=read_warnings(data),
         provenance=data["provenance"],
+        calibration_score=data.get("calibration_score"),
         estimator=data.get("estimator"),
         angles=read_angles(files["angles.parquet"]) if "angles.parquet" in files else None,
         events=read_events(files["events.csv"]) if "events.csv" in files else GaitEvents(()),

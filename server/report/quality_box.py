@@ -72,6 +72,7 @@ def quality_box(bundle: Bundle) -> QualityBox:
         *_signals(bundle.quality, rest=bundle.activity is None),
         *_calibration(
             bundle.calibration,
+            bundle.calibration_score,
             needed=bundle.activity is None
             and (
                 bool(bundle.strides.strides)
@@ -221,16 +222,24 @@ def _signals(quality: Mapping[str, Any], *, rest: bool) -> list[QualityItem]:
     return items
 
 
-def _calibration(calibration: Mapping[str, Any] | None, *, needed: bool) -> list[QualityItem]:
+def _calibration(
+    calibration: Mapping[str, Any] | None, score: Mapping[str, Any] | None, *, needed: bool
+) -> list[QualityItem]:
+    """How it was done and how many of its checks it passes, and what an angle of zero is."""
     if calibration is None:
         # steps of a trunk sensor are read from it as it sits
         return [] if not needed else [QualityItem("Calibration", "not reached", kind="bad")]
-    scores = [float(s["score"]) for s in calibration["segments"].values() if s.get("score") is not None]
     method = CALIBRATION_METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
     if calibration.get("posture") == "walking" and calibration["method"] == "walking_direction":
         method = "from walking alone"
-    value = f"{format_number(100 * min(scores))}" if scores else method
-    items = [QualityItem("Calibration", value, f"/ 100, {method}" if scores else "")]
+    judged = [c["verdict"] for c in (score or {"checks": ()})["checks"] if c["verdict"] != "not_judged"]
+    if judged:
+        passed = judged.count("pass")
+        kind = None if passed == len(judged) else "warn"
+        value = f"{passed} of {len(judged)} checks"
+        items = [QualityItem("Calibration", value, method, kind=kind, page="calibration")]
+    else:
+        items = [QualityItem("Calibration", method)]
     if calibration.get("posture", "standing") == "walking":
         items.append(QualityItem("Posture", "from walking", "no usable standing", kind="warn"))
     if calibration.get("angle_zero") is not None:

@@ -169,8 +169,16 @@ def test_box_counts_strides_and_names_the_worst_sensor(bundle: Bundle) -> None:
     used = len(bundle.strides.select_used("left"))
     assert (strides.left, strides.left_of) == (used, used + 1)
     assert (items["Lost samples"].value, items["Lost samples"].extra) == ("0.3 %", "at most, right shank")
-    assert items["Calibration"].value == "92"
+    assert (items["Calibration"].value, items["Calibration"].kind) == ("from standing and walking", None)
     assert items["Angle zero"].value == "standing"
+
+
+def test_box_says_how_many_checks_of_the_calibration_fail(make_bundle: MakeBundle) -> None:
+    verdicts = ("pass", "redo", "pass", "not_judged")
+    score = {"checks": [{"verdict": v} for v in verdicts]}
+    items = {i.label: i for i in report_model(make_bundle(calibration_score=score)).quality.items}
+    told = items["Calibration"]
+    assert (told.value, told.kind, told.page) == ("2 of 3 checks", "warn", "calibration")
 
 
 @pytest.mark.parametrize(
