@@ -16,6 +16,7 @@ from server.context import Blobs, Db, Id
 from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import record_opening, render_page
 from server.report.body_lengths import view_lengths
+from server.report.bundle import read_warnings
 from server.report.calibration_checks import view_calibration_checks
 from server.report.sensor_places import view_sensor_places
 from server.services import analyses
@@ -35,7 +36,9 @@ def show_calibration(
         found = analyses.latest(c, sid)
     stored = {} if found is None else json.loads(analyses.file_bytes(blobs, found, "analysis.json"))
     context["analysed"] = found is not None
-    context["view"] = view_calibration_checks(stored.get("calibration_score"), stored.get("calibration"))
+    context["view"] = view_calibration_checks(
+        stored.get("calibration_score"), stored.get("calibration"), read_warnings(stored) if stored else ()
+    )
     context["lengths"] = view_lengths(stored.get("body"))
     context["places"] = view_sensor_places(stored.get("sensor_places"))
     record_opening(request, who, "session", sid)

@@ -64,8 +64,8 @@ class Bundle:
     ----------
     repetitions : of a take of squats, None of any other. functional : of a functional test, as in
         analysis.json; None of any other. activity : of a take of daily life, None of any other.
-    quality, calibration, calibration_score, estimator, provenance : the JSON of analysis.json. warnings : its notices but for
-        those that the upload page has told.
+    quality, calibration, calibration_score, estimator, provenance : the JSON of analysis.json.
+    warnings : its notices but for those that the upload page has told.
     """
 
     quality: Mapping[str, Any]

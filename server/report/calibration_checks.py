@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from core.errors import Notice
 from core.frames import SEGMENTS
 from server.report.quality_box import CALIBRATION_METHODS
-from server.report.wording import format_number, place_words
+from server.report.wording import format_number, place_words, speak_places
 
 VERDICT_WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "pass": ("ok", "pass"),
@@ -41,7 +42,8 @@ class CheckedSegment:
     Parameters
     ----------
     id : segment, or `WHOLE`. method : how its forward axis was found, empty where it was not.
-    sigma : uncertainty of that axis as text; empty where the calibration does not say it.
+    sigma : uncertainty of that axis as text; empty where the calibration does not say it. told : warnings of
+        the analysis about this sensor, such as that it slipped after the calibration.
     """
 
     id: str
@@ -51,6 +53,7 @@ class CheckedSegment:
     method: str
     sigma: str
     rows: tuple[CheckRow, ...]
+    told: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -68,16 +71,21 @@ class CalibrationChecks:
 
 
 def view_calibration_checks(
-    score: Mapping[str, Any] | None, calibration: Mapping[str, Any] | None
+    score: Mapping[str, Any] | None, calibration: Mapping[str, Any] | None, warnings: Sequence[Notice]
 ) -> CalibrationChecks | None:
-    """View of `calibration_score` and `calibration` in analysis.json; None where there is no score."""
+    """View of `calibration_score`, `calibration` and notices of analysis.json; None without a score."""
     if score is None:
         return None
+    told: dict[str | None, list[str]] = {}
+    for notice in warnings:
+        if notice.severity != "info":
+            told.setdefault(notice.sensor, []).append(speak_places(notice.message))
     checks: Sequence[Mapping[str, Any]] = score["checks"]
     worn = [s for s in SEGMENTS if s in score["segments"]]
     mounted = {} if calibration is None else calibration["segments"]
     whole = [c for c in checks if c["segment"] is None]
     segments = [_view_segment(s, score["segments"][s], checks, mounted.get(s, {})) for s in worn]
+    segments = [replace(s, told=tuple(told.get(s.id, ()))) for s in segments]
     if whole:
         kinds = {c["verdict"] for c in whole}
         verdict = next((v for v in ("redo", "pass") if v in kinds), "not_judged")

@@ -9,6 +9,7 @@ import pytest
 
 from core.calibration import calibrate
 from core.calibration.score import score_calibration
+from core.errors import Notice
 from server.report.calibration_checks import view_calibration_checks
 from tests.server import analysed
 from tests.server.clinic import Clinic
@@ -61,6 +62,8 @@ async def test_a_failed_check_says_why_and_what_to_do(clinic: Clinic, walk: dict
     check = next(c for c in score["checks"] if c["segment"] == "shank_l" and c["name"] == "knee_axis")
     check |= {"verdict": "redo", "value": 21.3, "why": "Thigh and shank disagree.", "todo": "Fasten both."}
     sd = stored["calibration"]["segments"]["shank_l"]["forward_sd_deg"]
+    slipped = Notice("sensor_slipped", "The sensor on thigh_r slipped by 12°.", "thigh_r", 9.0)
+    stored["warnings"] = [slipped.to_json()]
     html = await show(clinic, "BAD", files | {"analysis.json": json.dumps(stored).encode()})
     assert "Calibrate again: 1 of" in html
     assert "at the left shank." in html
@@ -69,6 +72,8 @@ async def test_a_failed_check_says_why_and_what_to_do(clinic: Clinic, walk: dict
     assert "Thigh and shank disagree." in html
     assert "Fasten both." in html
     assert "21.3°" in html
+    right = html.partition('id="checks-thigh_r"')[2]
+    assert "The sensor on the right thigh slipped by 12°." in right.partition("</section>")[0]
     assert 1.0 < sd < 8.0
     assert f"forward axis ± {sd:.1f}°" in html
 
@@ -83,4 +88,4 @@ async def test_nothing_to_judge_yet(clinic: Clinic, walk: dict[str, bytes]) -> N
 
 
 def test_no_score_no_view() -> None:
-    assert view_calibration_checks(None, None) is None
+    assert view_calibration_checks(None, None, ()) is None
