@@ -73,7 +73,7 @@ async def test_a_failed_check_says_why_and_what_to_do(clinic: Clinic, walk: dict
     assert "Fasten both." in html
     assert "21.3°" in html
     right = html.partition('id="checks-thigh_r"')[2]
-    assert "The sensor on the right thigh slipped by 12°." in right.partition("</section>")[0]
+    assert "The sensor on right thigh slipped by 12°." in right.partition("</section>")[0]
     assert 1.0 < sd < 8.0
     assert f"forward axis ± {sd:.1f}°" in html
 
