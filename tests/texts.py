@@ -38,6 +38,7 @@ WHOLE: Final = (
     "server/http/problems.py",
     "server/live/pairing.py",
     "server/live/sensors.py",
+    "server/live/wire.py",
     "server/pages",
     "server/report",
     "server/services/comparisons.py",
@@ -73,8 +74,8 @@ WORDS: Final = frozenset(
     crutch days early ended estimated exact fading failed fast faster feet female flexion foot frontal
     good gravity harness heading higher hip inclination inside insoles inward kinematic knee larger late
     left less longer low lower male mean measured median months more moving narrower no none norm norms
-    now off outward paused pelvis points poor probe reconstruction repetitions right rollator sagittal
-    shank shoes shorter silent slow slower smaller socks squat squats steps steps/min stick still
+    now off outward pace paused pelvis points poor probe push-off reconstruction repetitions rhythm
+    right rollator sagittal shank shoes shorter silent slow slower smaller socks squat squats step steps steps/min stick still
     straighter stride strides tests thigh threshold training trainings transverse treadmill trunk turns
     unaffected unknown usable viewer walk walking week wider yes
         """,
@@ -103,6 +104,7 @@ PHRASES: Final = (
     "{side} stride, {start_s} to {end_s} s",
     "{side} stride, {start_s} to {end_s} s, left out: {why}",
     "knee-ankle-foot orthosis",
+    "{value} % lost",
     "Change (noun)",
     "the other side",
     "M, {age} y",

@@ -16,6 +16,7 @@ from tests.browser import feed, filling
 from tests.browser.conftest import RunningServer, is_ours
 from tests.browser.design import layout_faults, text_faults
 from tests.browser.feed import Told
+from tests.browser.test_german import left_english
 
 Opener = Callable[..., Told]
 
@@ -84,10 +85,12 @@ def told(flat: Browser, running: RunningServer, cookies: list[dict[str, str]]) -
     """Opens a page whose feed the test speaks; a script error fails the test at its end."""
     contexts, errors = [], []
 
-    def open_(path: str, *, width: int = 1280, height: int = 800, scheme: str = "light") -> Told:
+    def open_(
+        path: str, *, width: int = 1280, height: int = 800, scheme: str = "light", locale: str = "en-US"
+    ) -> Told:
         context = flat.new_context(
             base_url=running.url, viewport={"width": width, "height": height}, color_scheme=scheme,  # type: ignore[arg-type]
-            reduced_motion="reduce",
+            reduced_motion="reduce", locale=locale,
         )  # fmt: skip
         contexts.append(context)
         context.add_cookies(cookies)  # type: ignore[arg-type]
@@ -440,6 +443,21 @@ def test_every_state_obeys_the_design_system(
     screen.say(feed.cue(0, 0.49, "near_low"))
     faults["patient"] = _faults(screen.page)
     assert not {k: v for k, v in faults.items() if v}
+
+
+def test_a_running_take_is_german(told: Opener, trained: tuple[str, str, str]) -> None:
+    faults = {}
+    this = told(f"/sessions/{trained[0]}/live", locale="de-DE")
+    this.say(feed.state(), feed.frame(2.0, "walk"))
+    faults["walk"] = left_english(this.page), _faults(this.page)
+    this.walk([0.53, 0.49], ["in", "near_low"])
+    faults["run"] = left_english(this.page), _faults(this.page)
+    screen = told(f"/sessions/{trained[0]}/live/patient", width=810, height=1080, locale="de-DE")
+    screen.page.get_by_role("button", name="Ohne Ton").click()
+    screen.say(feed.state(), feed.feedback(), feed.frame(100.0, contact="r"), feed.cue(0, 0.49, "near_low"))
+    expect(screen.page.locator("[data-what]")).to_have_text("Schritt links")
+    faults["patient"] = left_english(screen.page), _faults(screen.page)
+    assert faults == dict.fromkeys(faults, ([], {}))
 
 
 def _faults(page: Page) -> dict[str, Any]:

@@ -31,8 +31,8 @@ class LiveTest extends HTMLElement {
   stop() {
     this.found = null;
     this.toggleAttribute("data-stopped", true);
-    setState(this.at("phase"), "bad", "Live view stopped");
-    say(this.at("say"), "Go on with the test. It is recorded and measured afterwards. Press STOP at its end.");
+    setState(this.at("phase"), "bad", speak`Live view stopped`);
+    say(this.at("say"), speak`Go on with the test. It is recorded and measured afterwards. Press STOP at its end.`);
     for (const hidden of [this.querySelector("[data-do=test-go]"), this.at("anew"), this.at("problem"), this.at("progress"), this.at("count")]) hidden.hidden = true;
   }
 

@@ -5,7 +5,7 @@ import { number } from "./words.js";
 import { speak } from "../common/words.js";
 
 export const SHOWN = 20;
-const EDGE = { left: 44, right: 64, top: 10, bottom: 42 };
+const EDGE = { left: 44, right: 84, top: 10, bottom: 42 };
 const MARK = 6.5;
 
 class TargetStrip extends Plot {
@@ -78,7 +78,7 @@ class TargetStrip extends Plot {
     const places = { 0: speak`${SHOWN} ago`, 5: "15", 10: "10", 15: "5", [SHOWN - 1]: speak`now` };
     for (const [i, text] of Object.entries(places))
       label(g, text, X(Number(i)), under, { colour: colour.axis, align: "center" });
-    if (this.rows.some((r) => r.cued)) label(g, "feedback", EDGE.left + w + 8, tick + 4, { colour: colour.axis });
+    if (this.rows.some((r) => r.cued)) label(g, speak`feedback`, EDGE.left + w + 8, tick + 4, { colour: colour.axis });
   }
 
   target(g, Y, w, colour) {
@@ -90,7 +90,7 @@ class TargetStrip extends Plot {
     g.lineWidth = 1.25;
     for (const end of [0, 1]) trace(g, zones.flatMap((z, i) => [[X(i), Y(z[end])], [X(i + 1), Y(z[end])]]));
     const [low, high] = zones[SHOWN - 1];
-    label(g, "target", EDGE.left + w + 8, Y((low + high) / 2) + 4, { colour: colour.ink, bold: true });
+    label(g, speak`target`, EDGE.left + w + 8, Y((low + high) / 2) + 4, { colour: colour.ink, bold: true });
   }
 }
 

@@ -39,7 +39,7 @@ export class Top {
   delay(ms) {
     say(this.at("delay-ms"), ms === null ? "–" : `${number(ms)}\u2009ms`);
     const kind = ms === null ? "none" : ms <= AT_ONCE_MS ? "ok" : ms <= STALE_MS ? "warn" : "bad";
-    setState(this.at("delay-state"), kind, { none: "", ok: "good", warn: "slow", bad: "late" }[kind]);
+    setState(this.at("delay-state"), kind, { none: "", ok: speak`good`, warn: speak`slow`, bad: speak`late` }[kind]);
   }
 
   paused(feedback) {
