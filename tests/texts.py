@@ -55,6 +55,7 @@ STAYS_ENGLISH: Final[Mapping[str, str]] = {
     "server/main.py": "the command line is English",
     "server/settings.py": "what is wrong with the settings is read in the server's log",
     "server/storage": "faults of the disk and the database are read in the server's log",
+    "server/report/analysis_json.py": "files that leave the server are English",
     "server/report/exports.py": "files that leave the server are English",
     "server/report/activity_files.py": "files that leave the server are English",
     "server/report/filter_files.py": "files that leave the server are English",
