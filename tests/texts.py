@@ -57,6 +57,7 @@ STAYS_ENGLISH: Final[Mapping[str, str]] = {
     "server/settings.py": "what is wrong with the settings is read in the server's log",
     "server/storage": "faults of the disk and the database are read in the server's log",
     "server/export/content.py": "why a file was refused; shown as English",
+    "server/export/opensim.py": "why a file was refused; shown as English",
     "server/export/sheets.py": "files that leave the server are English",
     "server/report/analysis_json.py": "files that leave the server are English",
     "server/report/exports.py": "files that leave the server are English",

@@ -100,6 +100,11 @@ class ExportContent:
         """Segment poses; raises FormatError `export_not_possible` where there are none."""
         return read_poses(self.read_needed(POSES))
 
+    @property
+    def has_poses(self) -> bool:
+        """Whether segment poses are among the files."""
+        return POSES in self.files
+
     @cached_property
     def signals(self) -> tuple[pa.Table, dict[str, Any]]:
         """What the sensors measured, on one axis, and what is said of it; raises as `poses`."""

@@ -9,7 +9,7 @@ from typing import Final, Literal, get_args
 from core.errors import InputError
 from server.export.content import ExportContent
 
-ExportName = Literal["xlsx", "csv"]
+ExportName = Literal["xlsx", "csv", "opensim"]
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,13 @@ KINDS: Final[tuple[ExportKind, ...]] = (
         "zip",
         "Tables for statistics",
         "One row per stride and value as CSV, the same wide, and a data dictionary",
+    ),
+    ExportKind(
+        "opensim",
+        "zip",
+        "OpenSim",
+        "Joint angles as .mot, orientations of the sensors for OpenSense as .sto",
+        ("angles.parquet",),
     ),
 )
 """In the order in which they are offered."""
@@ -77,3 +84,7 @@ def write_export(name: str, content: ExportContent) -> bytes:
             from server.export.tidy import write_tidy
 
             return write_tidy(content)
+        case "opensim":
+            from server.export.opensim import write_opensim
+
+            return write_opensim(content)

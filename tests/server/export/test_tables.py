@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import zipfile
-from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
@@ -15,16 +14,10 @@ import pytest
 from core.errors import FormatError, InputError
 from core.events.edits import Edit
 from core.parameters.catalogue import CATALOGUE
-from server.export.content import ExportContent, VisitFacts, open_content
+from server.export.content import ExportContent
 from server.export.kinds import write_export
 from tests.server import analysed
-
-FACTS = VisitFacts("s1", "=HYPERLINK(1)", "v1", "2026-03-02", sex="female", age_years=60, height_m=1.7)
-
-
-def open_walk(*edits: Edit, files: Mapping[str, bytes] | None = None) -> ExportContent:
-    given = analysed.files() if files is None else files
-    return open_content({name: lambda x=x: x for name, x in given.items()}, FACTS, edits)  # type: ignore[misc]
+from tests.server.export.opened import open_walk
 
 
 @cache
