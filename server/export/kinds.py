@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
 from core.errors import InputError
-from server.export.content import ExportContent
+from server.export.content import POSES, ExportContent
 
-ExportName = Literal["xlsx", "csv", "opensim"]
+ExportName = Literal["xlsx", "csv", "opensim", "c3d"]
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,9 @@ KINDS: Final[tuple[ExportKind, ...]] = (
         "OpenSim",
         "Joint angles as .mot, orientations of the sensors for OpenSense as .sto",
         ("angles.parquet",),
+    ),
+    ExportKind(
+        "c3d", "zip", "C3D", "Joint centres, joint angles and contacts for motion-capture programs", (POSES,)
     ),
 )
 """In the order in which they are offered."""
@@ -88,3 +91,7 @@ def write_export(name: str, content: ExportContent) -> bytes:
             from server.export.opensim import write_opensim
 
             return write_opensim(content)
+        case "c3d":
+            from server.export.c3d import write_c3d
+
+            return write_c3d(content)
