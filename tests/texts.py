@@ -56,6 +56,7 @@ STAYS_ENGLISH: Final[Mapping[str, str]] = {
     "server/main.py": "the command line is English",
     "server/settings.py": "what is wrong with the settings is read in the server's log",
     "server/storage": "faults of the disk and the database are read in the server's log",
+    "server/export/bids.py": "files that leave the server are English",
     "server/export/c3d.py": "why a file was refused; shown as English",
     "server/export/content.py": "why a file was refused; shown as English",
     "server/export/opensim.py": "why a file was refused; shown as English",

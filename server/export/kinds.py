@@ -8,8 +8,9 @@ from typing import Final, Literal, get_args
 
 from core.errors import InputError
 from server.export.content import POSES, ExportContent
+from server.report import signals
 
-ExportName = Literal["xlsx", "csv", "opensim", "c3d"]
+ExportName = Literal["xlsx", "csv", "opensim", "c3d", "bids"]
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,13 @@ KINDS: Final[tuple[ExportKind, ...]] = (
     ),
     ExportKind(
         "c3d", "zip", "C3D", "Joint centres, joint angles and contacts for motion-capture programs", (POSES,)
+    ),
+    ExportKind(
+        "bids",
+        "zip",
+        "BIDS data set",
+        "What the sensors measured, contacts and strides as BIDS-motion, without a date",
+        (signals.NAME,),
     ),
 )
 """In the order in which they are offered."""
@@ -95,3 +103,7 @@ def write_export(name: str, content: ExportContent) -> bytes:
             from server.export.c3d import write_c3d
 
             return write_c3d(content)
+        case "bids":
+            from server.export.bids import write_bids
+
+            return write_bids(content)
