@@ -59,6 +59,7 @@ STAYS_ENGLISH: Final[Mapping[str, str]] = {
     "server/export/bids.py": "files that leave the server are English",
     "server/export/c3d.py": "why a file was refused; shown as English",
     "server/export/content.py": "why a file was refused; shown as English",
+    "server/export/fhir.py": "files that leave the server are English",
     "server/export/opensim.py": "why a file was refused; shown as English",
     "server/export/sheets.py": "files that leave the server are English",
     "server/report/analysis_json.py": "files that leave the server are English",

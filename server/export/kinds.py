@@ -10,7 +10,7 @@ from core.errors import InputError
 from server.export.content import POSES, ExportContent
 from server.report import signals
 
-ExportName = Literal["xlsx", "csv", "opensim", "c3d", "bids"]
+ExportName = Literal["xlsx", "csv", "opensim", "c3d", "bids", "fhir"]
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,9 @@ KINDS: Final[tuple[ExportKind, ...]] = (
         "BIDS data set",
         "What the sensors measured, contacts and strides as BIDS-motion, without a date",
         (signals.NAME,),
+    ),
+    ExportKind(
+        "fhir", "json", "FHIR bundle", "Every value for a hospital's system, FHIR R4, marked preliminary"
     ),
 )
 """In the order in which they are offered."""
@@ -107,3 +110,7 @@ def write_export(name: str, content: ExportContent) -> bytes:
             from server.export.bids import write_bids
 
             return write_bids(content)
+        case "fhir":
+            from server.export.fhir import write_fhir
+
+            return write_fhir(content)
