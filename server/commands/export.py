@@ -19,6 +19,7 @@ def export(folder: Path, kind: str, out: Path | None, code: str) -> int:
     from server.export.content import VisitFacts, open_content
     from server.export.kinds import find_kind, write_export
     from server.services.provenance import CODE_VERSION
+    from server.viewer import recorded_walk  # noqa: F401 - registers what is drawn
 
     try:
         readers = {path.name: path.read_bytes for path in sorted(folder.glob("*")) if path.is_file()}

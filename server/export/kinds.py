@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
@@ -10,7 +10,7 @@ from core.errors import InputError
 from server.export.content import POSES, ExportContent
 from server.report import signals
 
-ExportName = Literal["xlsx", "csv", "opensim", "c3d", "bids", "fhir"]
+ExportName = Literal["xlsx", "csv", "opensim", "c3d", "bids", "fhir", "walk"]
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,9 @@ KINDS: Final[tuple[ExportKind, ...]] = (
     ExportKind(
         "fhir", "json", "FHIR bundle", "Every value for a hospital's system, FHIR R4, marked preliminary"
     ),
+    ExportKind(
+        "walk", "html", "3D walk", "The moving figure as one page that opens without a server", (POSES,)
+    ),
 )
 """In the order in which they are offered."""
 
@@ -85,6 +88,10 @@ def name_file(kind: ExportKind, job_id: str) -> str:
 def list_possible(files: Collection[str]) -> tuple[ExportKind, ...]:
     """The formats that can be written from an analysis with these result files."""
     return tuple(kind for kind in KINDS if all(name in files for name in kind.needs))
+
+
+DRAWN: Final[dict[str, Callable[[ExportContent], bytes]]] = {}
+"""Formats that a room above this one draws, by name; it registers its writer."""
 
 
 def write_export(name: str, content: ExportContent) -> bytes:
@@ -114,3 +121,5 @@ def write_export(name: str, content: ExportContent) -> bytes:
             from server.export.fhir import write_fhir
 
             return write_fhir(content)
+        case drawn:
+            return DRAWN[drawn](content)
