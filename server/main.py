@@ -67,6 +67,11 @@ def _parser() -> argparse.ArgumentParser:
         help="pose estimator; auto = the best for the sensors worn (docs/estimators.md lists them)",
     )
     p.add_argument("--config", type=Path, help='JSON: parameters by stage, {"poses": {"least_valid": 0.7}}')
+    p = add("export", "Write the results of an analysis for another program (docs/exports.md).")
+    p.add_argument("folder", type=Path, metavar="DIR", help="results of `sagittal analyse`")
+    p.add_argument("--as", dest="kind", required=True, metavar="FORMAT", help="xlsx, csv … (docs/exports.md)")
+    p.add_argument("--out", type=Path, metavar="FILE", help="default: export.<ending> beside the results")
+    p.add_argument("--code", default="", help="pseudonym of the person, letters and digits")
     p = add("stairs", "Measure a person's own limits of stairs in daily life (docs/science/activity.md).")
     p.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files, folders or zips of one take")
     p.add_argument("--manifest", type=Path, help="JSON: which sensor sits where, units (docs/formats.md)")

@@ -47,7 +47,7 @@ class Settings:
     child_memory_bytes : address space of the computing child (RLIMIT_AS; libraries alone map 1 GB), 0 = none.
     sweep_grace_s : age from which a file that nothing refers to goes to the trash.
     idle_minutes, absolute_hours : life of a sign-in.
-    task_modules : modules whose import registers kinds of jobs.
+    task_modules : modules whose import registers kinds of jobs, and what they draw.
     """
 
     data_dir: Path = field(default_factory=lambda: Path.home() / ".sagittal")
@@ -69,7 +69,7 @@ class Settings:
     sweep_grace_s: float = 3600.0
     idle_minutes: float = 15.0
     absolute_hours: float = 12.0
-    task_modules: tuple[str, ...] = ("server.worker.tasks",)
+    task_modules: tuple[str, ...] = ("server.worker.tasks", "server.viewer.recorded_walk")
 
     def __post_init__(self) -> None:
         _require(0 <= self.port <= 65535, "port", self.port, "0 to 65535 (0 = any free port)")

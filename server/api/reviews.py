@@ -18,7 +18,8 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail, Reviewed
 from server.http.json_body import StrictJsonRoute
-from server.report.exports import events_csv, parameter_row, strides_csv
+from server.report.analysis_json import parameter_row
+from server.report.exports import events_csv, strides_csv
 from server.report.wording import explain_exclusion
 from server.services import analyses, edit_log, reviews, signals
 from server.services.reviewed import ReviewedAnalyses

@@ -25,7 +25,8 @@ Publish = Callable[[Connection], None]
 TUNE: Final = "tune"
 COMPARE_FILTERS: Final = "compare_filters"
 SENSITIVITY: Final = "sensitivity"
-BESIDE: Final = (TUNE, COMPARE_FILTERS, SENSITIVITY)
+EXPORT: Final = "export"
+BESIDE: Final = (TUNE, COMPARE_FILTERS, SENSITIVITY, EXPORT)
 """Kinds of jobs beside a visit's analysis: it stays what pages show, whatever becomes of them."""
 
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]

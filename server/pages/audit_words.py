@@ -74,6 +74,8 @@ DEEDS: Final[Mapping[str, str]] = {
     "video.aligned": "aligned the video with the take",
     "video.removed": "removed the video",
     "video.opened": "looked at the video",
+    "export.requested": "asked for a file for another program",
+    "exports.opened": "listed the files for other programs",
     "sensitivity.requested": "asked how angles depend on the set-up",
     "sensitivities.opened": "listed the studies of the set-up",
     "sensitivity.opened": "opened a study of the set-up",

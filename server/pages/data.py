@@ -16,12 +16,14 @@ from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Blobs, Db, Id
+from server.export.kinds import EXPORTED
+from server.pages.job_views import follow_few, view_job
 from server.pages.session_context import read_context
 from server.pages.shell import record_opening, render_page
 from server.pages.words import SEGMENT_NAMES
 from server.report.estimator import choice_label, estimator_view
 from server.report.sensor_checks import sensor_checks
-from server.services import analyses, recordings, repairs, videos
+from server.services import analyses, exports, recordings, repairs, videos
 from server.storage.blobs import BlobStore
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -68,6 +70,7 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
     shown = found[0] if found else None
     stored = {} if shown is None else json.loads(analyses.file_bytes(blobs, shown, "analysis.json"))
     files = [] if shown is None else [(shown.id, name, blob.size) for name, blob in shown.files.items()]
+    written = [] if shown is None else _list_exports(c, session_id)
     return {
         "analysis": shown,
         "estimator": estimator_view(stored.get("estimator")),
@@ -89,7 +92,9 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
                 "href": f"/api/v1/analyses/{analysis_id}/files/{quote(name)}",
             }
             for analysis_id, name, size in files
+            if not name.startswith(EXPORTED)
         ],
+        "exports": written,
         "originals": [
             {**vars(f), "href": f"/api/v1/sessions/{session_id}/files/{quote(f.name)}" if results else None}
             for f in (this.files if this else ())
@@ -97,6 +102,20 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
         "provenance": _provenance(shown) if shown else [],
         "mapping": _mapping(shown.manifest if shown else None),
     }
+
+
+def _list_exports(c: Connection, session_id: str) -> list[dict[str, Any]]:
+    """The formats for other programs: to download, at work, or to be asked for."""
+    found = [
+        {
+            **vars(offer),
+            "job": None if offer.job is None else view_job(offer.job),
+            "href": offer.file and f"/api/v1/analyses/{offer.analysis_id}/files/{quote(offer.file)}",
+        }
+        for offer in exports.list_offers(c, session_id)
+    ]
+    follow_few([offer["job"] for offer in found])
+    return found
 
 
 def _describe_file(name: str) -> str:

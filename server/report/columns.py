@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 SCHEMA = 1
 """Version of analysis.json and of the columns beside it; readers refuse a newer one."""
 
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+"""First characters of a text that make a spreadsheet calculate it."""
+
 
 def reduce_to_plain(value: object) -> object:
     """Reduce mappings, sequences and numpy values to what JSON knows; non-finite numbers become null."""
@@ -95,7 +98,10 @@ def bools_of(table: pa.Table, name: str) -> Bools:
 
 
 def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
-    """UTF-8 comma-separated text with a header; None and non-finite numbers are empty, numbers to 1e-6."""
+    """UTF-8 comma-separated text with a header; None and non-finite numbers are empty, numbers to 1e-6.
+
+    Text that a spreadsheet would take for a formula gets an apostrophe before it (OWASP, "CSV injection").
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
@@ -108,4 +114,6 @@ def _cell(value: object) -> object:
         value = value.item()
     if isinstance(value, float):
         return repr(round(value, 6) + 0.0) if math.isfinite(value) else ""
+    if isinstance(value, str) and value.startswith(FORMULA_STARTS):
+        return f"'{value}"
     return "" if value is None else value

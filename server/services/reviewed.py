@@ -17,6 +17,7 @@ from core.measure import MeasuredGait, Tracks, measure_gait
 from core.norms.controls import ControlSession
 from core.parameters.result import Parameter
 from core.parameters.rows import Column
+from server.export.kinds import EXPORTED
 from server.report import signals, tracks
 from server.report.bundle import Bundle, apply_review, load_bundle, read_columns
 from server.report.numbers import Numbers, numbers_of, read_numbers
@@ -84,7 +85,7 @@ class ReviewedAnalyses:
         """Return an analysis as it is stored, read once while it is at work; raises IntegrityError."""
 
         def read() -> StoredAnalysis:
-            names = [name for name in found.files if name not in NOT_READ]
+            names = [n for n in found.files if n not in NOT_READ and not n.startswith(EXPORTED)]
             files = {name: analyses.file_bytes(self.blobs, found, name) for name in names}
             stored = load_bundle(files)
             if tracks.NAME not in files:

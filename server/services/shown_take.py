@@ -1,7 +1,8 @@
-"""Jobs on the analysis that a session shows: its recording, mapping, settings, and a reference."""
+"""Jobs on the analysis that a session shows: on its recording as it was analysed, or on its result files."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from sqlalchemy import Connection
@@ -40,9 +41,22 @@ def submit_on_shown(
         "analysis_id": found.id,
         **own,
     }
+    return submit_for(c, queue, actor, found, kind, action, params)
+
+
+def submit_for(
+    c: Connection,
+    queue: JobQueue,
+    actor: audit.Actor | None,
+    found: analyses.AnalysisRecord,
+    kind: str,
+    action: str,
+    params: Mapping[str, Any],
+) -> JobView:
+    """Ask for a job on an analysis; the same one is done once."""
     view = queue.submit(
         c,
-        key=f"{found.id}:{kind}:{analyses.digest_json(params)}:{CODE_VERSION}",
+        key=make_key(found, kind, params),
         kind=kind,
         params=params,
         recording_id=found.recording_id,
@@ -50,3 +64,8 @@ def submit_on_shown(
     )
     audit.record(c, actor, action, "session", found.session_id, {"job_id": view.id})
     return view
+
+
+def make_key(found: analyses.AnalysisRecord, kind: str, params: Mapping[str, Any]) -> str:
+    """What names a job on an analysis: equal keys give equal results."""
+    return f"{found.id}:{kind}:{analyses.digest_json(params)}:{CODE_VERSION}"

@@ -1,6 +1,7 @@
 """The kinds of job of this version.
 
-Look into a recording, analyse it, run filters on it, tune one, see how sure the angles of squats are.
+Look into a recording, analyse it, run filters on it, tune one, see how sure the angles of squats are, write
+a file for another program.
 """
 
 from __future__ import annotations
@@ -12,8 +13,17 @@ from typing import TYPE_CHECKING, Any
 from sqlalchemy import Connection
 
 from server.jobs.attempt import Attempt
-from server.jobs.queue import COMPARE_FILTERS, SENSITIVITY, TUNE, Claim
-from server.services import analyses, analysing, devices, filter_runs, recordings, sensitivities, tunings
+from server.jobs.queue import COMPARE_FILTERS, EXPORT, SENSITIVITY, TUNE, Claim
+from server.services import (
+    analyses,
+    analysing,
+    devices,
+    exports,
+    filter_runs,
+    recordings,
+    sensitivities,
+    tunings,
+)
 from server.storage.blobs import Blob
 from server.worker.task import Task, register
 
@@ -81,6 +91,16 @@ def _publish_sensitivity(
     sensitivities.publish(c, claim, blobs)
 
 
+def _export(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
+    return exports.run(files, params)
+
+
+def _publish_export(
+    c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
+) -> None:
+    exports.publish(c, claim, blobs)
+
+
 def _warm() -> None:
     """Import readers and pipeline, compile the kernels or load them from the cache."""
     import server.report.exports  # noqa: F401
@@ -102,3 +122,4 @@ register(Task(recordings.ANALYSE, _analyse, _publish_analysis, keeps_files=True,
 register(Task(TUNE, _tune, _publish_tuning, keeps_files=False))
 register(Task(COMPARE_FILTERS, _compare_filters, _publish_filters, keeps_files=True))
 register(Task(SENSITIVITY, _analyse_sensitivity, _publish_sensitivity, keeps_files=True))
+register(Task(EXPORT, _export, _publish_export, keeps_files=True))

@@ -91,6 +91,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     f"POST {SESSION}/tunings": {"json": {"algorithm": "mahony_2008", "validation": ["judge"]}},
     f"POST {SESSION}/filter-runs": {"json": {"filters": ["mahony_2008"]}},
     f"POST {SESSION}/sensitivities": {"json": {"from_standing": False}},
+    f"POST {SESSION}/exports": {"json": {"kind": "csv"}},
     f"PUT {SESSION}/references/{{name:path}}": {"content": b"x"},
     f"DELETE {SESSION}/references/{{name:path}}": {},
     f"PUT {SESSION}/video": {"content": b"\x1a\x45\xdf\xa3 and pictures"},

@@ -1,0 +1,46 @@
+"""Exports of a visit for other programs: listed, asked for; downloaded as files of the analysis."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter
+from pydantic import Field
+
+from server.api import schemas
+from server.api.documents import refusals
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db, Id, OpenTrail, Queue
+from server.export.kinds import ExportName
+from server.http.json_body import StrictJsonRoute
+from server.jobs.queue import JobView
+from server.services import exports
+
+router = APIRouter(route_class=StrictJsonRoute, tags=["exports"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+
+
+class ExportNew(schemas.Request):
+    """Which format is wanted."""
+
+    kind: Annotated[ExportName, Field(description="as docs/exports.md names them")]
+
+
+@router.post(
+    "/sessions/{session_id}/exports", status_code=202, response_model=JobView, responses=refusals(404, 409)
+)
+def start(session_id: Id, body: ExportNew, db: Db, queue: Queue, who: Reader) -> JobView:
+    """Write the shown analysis for another program, with the edits that count; the same is written once."""
+    with db.write() as c:
+        return exports.submit(c, queue, who, session_id, kind=body.kind)
+
+
+@router.get("/sessions/{session_id}/exports", response_model=list[exports.ExportOffer])
+def list_exports(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[exports.ExportOffer]:
+    """The formats of the shown analysis; one with a `file` can be downloaded among the analysis's files."""
+    with db.read() as c:
+        offers = exports.list_offers(c, session_id)
+    trail.record_watched(who, "exports.opened", "session", session_id)
+    return offers

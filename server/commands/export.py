@@ -1,0 +1,37 @@
+"""`sagittal export`: the results of an analysis as a file for another program."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from core.errors import SagittalError
+from server.storage import fs
+
+
+def export(folder: Path, kind: str, out: Path | None, code: str) -> int:
+    """Write the results in `folder`, of `sagittal analyse`, in one format; 1 = not possible.
+
+    Parameters
+    ----------
+    out : file to write, None = `export.<ending>` in that folder. code : pseudonym of the person.
+    """
+    from server.export.content import VisitFacts, open_content
+    from server.export.kinds import find_kind, write_export
+    from server.services.provenance import CODE_VERSION
+    from server.viewer import recorded_walk  # noqa: F401 - registers what is drawn
+
+    try:
+        readers = {path.name: path.read_bytes for path in sorted(folder.glob("*")) if path.is_file()}
+        content = open_content(
+            readers, VisitFacts(subject=code or "anonymous", code=code, version=CODE_VERSION)
+        )
+        written = write_export(kind, content)
+    except SagittalError as error:
+        sys.stderr.write(f"No export ({error.code}): {error.message}\n")
+        return 1
+    target = folder / f"export.{find_kind(kind).ending}" if out is None else out
+    fs.make_folder(target.parent)
+    fs.write_file(target, written)
+    sys.stdout.write(f"Written: {target}\n")
+    return 0

@@ -1,0 +1,166 @@
+"""What an export is written from: files of an analysis, a person's edits, and who walked, by pseudonym."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cached_property
+from typing import Any, Self
+
+import pyarrow as pa
+
+from core.body.poses import Poses
+from core.errors import FormatError
+from core.events.edits import Edit
+from core.frames import Protocol, Side
+from core.measure import measure_gait
+from core.parameters.rows import Column
+from server.report import signals, tracks
+from server.report.bundle import Bundle, apply_review, load_bundle, read_columns, read_poses
+from server.report.columns import read_table
+
+POSES = "poses.parquet"
+LATER = (POSES, signals.NAME, tracks.NAME)
+"""Files that are read only where an export needs them."""
+
+
+@dataclass(frozen=True)
+class VisitFacts:
+    """Who walked and how, as far as an export says it. No name, no birthday.
+
+    Parameters
+    ----------
+    subject : stable pseudonym for data sets, letters and digits. code : the clinic's own pseudonym.
+    visit : stable name of the visit for data sets. day : ISO date of the visit, None = not told.
+    age_years, height_m, sex, affected_side : None where not known.
+    condition : how it was walked, in words. version : of the software that writes the export.
+    """
+
+    subject: str = "anonymous"
+    code: str = ""
+    visit: str = "1"
+    day: str | None = None
+    protocol: Protocol = "walk"
+    sex: str | None = None
+    age_years: int | None = None
+    height_m: float | None = None
+    affected_side: Side | None = None
+    condition: str = ""
+    version: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """As parameters of a job."""
+        return asdict(self)
+
+    @classmethod
+    def of_json(cls, values: Mapping[str, Any]) -> Self:
+        """From parameters of a job; members of other versions are left out."""
+        known = {f.name for f in fields(cls)}
+        return cls(**{k: v for k, v in values.items() if k in known})
+
+
+@dataclass(frozen=True)
+class CycleRow:
+    """A stride, or a squat, with its parameters.
+
+    Parameters
+    ----------
+    number : from 1, in order of the list. turn_deg : None where not known. values : parameter → number or
+        None where undefined. flags : rules that it meets. excluded : why it does not count, None = it counts.
+    """
+
+    number: int
+    side: Side
+    start_s: float
+    end_s: float
+    tc_s: float | None
+    values: Mapping[str, float | None]
+    flags: tuple[str, ...]
+    excluded: str | None
+
+
+@dataclass(frozen=True, eq=False)
+class ExportContent:
+    """A finished analysis as it counts.
+
+    Parameters
+    ----------
+    files : of `server.report.exports`, name → reader of its bytes. bundle : with the edits applied.
+    columns : parameters of every stride of the list. edits : of a person, that count.
+    """
+
+    visit: VisitFacts
+    files: Mapping[str, Callable[[], bytes]]
+    bundle: Bundle
+    columns: Mapping[str, Column] = field(default_factory=dict)
+    edits: tuple[Edit, ...] = ()
+
+    @cached_property
+    def poses(self) -> Poses:
+        """Segment poses; raises FormatError `export_not_possible` where there are none."""
+        return read_poses(self.read_needed(POSES))
+
+    @property
+    def has_poses(self) -> bool:
+        """Whether segment poses are among the files."""
+        return POSES in self.files
+
+    @cached_property
+    def signals(self) -> tuple[pa.Table, dict[str, Any]]:
+        """What the sensors measured, on one axis, and what is said of it; raises as `poses`."""
+        return read_table(self.read_needed(signals.NAME))
+
+    @cached_property
+    def cycles(self) -> tuple[CycleRow, ...]:
+        """Every stride of the list, or every squat, counted or not."""
+        if self.bundle.repetitions is not None:
+            return tuple(
+                CycleRow(i + 1, r.side, r.start_s, r.end_s, None, r.values, (), r.excluded)
+                for i, r in enumerate(self.bundle.repetitions)
+            )
+        return tuple(
+            CycleRow(
+                i + 1,
+                s.side,
+                s.start_s,
+                s.end_s,
+                s.tc_s,
+                {name: column[i] for name, column in self.columns.items()},
+                s.flags,
+                s.excluded_reason,
+            )
+            for i, s in enumerate(self.bundle.strides.strides)
+        )
+
+    def read_needed(self, name: str) -> bytes:
+        """Bytes of a result file; raises FormatError `export_not_possible`."""
+        if name not in self.files:
+            raise FormatError(
+                "export_not_possible",
+                f"This analysis has no {name}, which the export is made from. Run the analysis again, or "
+                "choose another format.",
+            )
+        return self.files[name]()
+
+
+def open_content(
+    files: Mapping[str, Callable[[], bytes]], visit: VisitFacts, edits: Sequence[Edit] = ()
+) -> ExportContent:
+    """Read an analysis and measure it with a person's edits.
+
+    Parameters
+    ----------
+    files : name → reader of its bytes.
+
+    Raises
+    ------
+    FormatError `no_analysis`, `newer_analysis`; `export_not_possible` where edits cannot be measured.
+    """
+    stored = load_bundle({name: read() for name, read in files.items() if name not in LATER})
+    content = ExportContent(visit, files, stored, edits=tuple(edits))
+    if not edits:
+        columns = read_columns(files["strides.csv"]()) if "strides.csv" in files else {}
+        return replace(content, columns=columns)
+    known = tracks.read_tracks(content.read_needed(tracks.NAME), stored.events, stored.angles)
+    measured = measure_gait(known, edits)
+    return replace(content, bundle=apply_review(stored, measured, edits), columns=measured.columns)

@@ -1,0 +1,197 @@
+"""A FHIR R4 bundle: a report with one observation per value, units by UCUM, codes of our own catalogue.
+
+Observations and report are "preliminary": nobody has signed them. There is no LOINC code for most gait
+parameters; `LOINC` has the one whose meaning is the same.
+"""
+
+from __future__ import annotations
+
+import json
+import uuid
+from typing import Any, Final
+
+from core.frames import Side
+from core.parameters.catalogue import CATALOGUE
+from core.parameters.result import Parameter
+from server.export.content import ExportContent
+from server.report.wording import reason_words
+
+CODES: Final = "urn:sagittal:gait-parameters"
+"""System of our codes: names of the catalogue, which the bundle's CodeSystem defines."""
+
+SUBJECTS: Final = "urn:sagittal:subjects"
+"""System of the clinic's pseudonyms."""
+
+LOINC: Final = {
+    "tug_duration_s": (
+        "89423-8",
+        "Time to rise from chair, walk 10 feet and back, and return to sitting [TUG]",
+    ),
+}
+"""Parameter → LOINC code and its name, of the same measurement."""
+
+UCUM: Final = {
+    "": "1",
+    "m/s": "m/s",
+    "steps/min": "{steps}/min",
+    "deg": "deg",
+    "%": "%",
+    "deg/s": "deg/s",
+    "min": "min",
+    "m/s2": "m/s2",
+    "m2/s4": "m2/s4",
+    "m2/s5": "m2/s5",
+    "Hz": "Hz",
+    "m": "m",
+    "s": "s",
+}
+"""Unit of the catalogue → UCUM."""
+
+SIDE_WORDS: Final[dict[Side | None, str]] = {"left": "Left leg", "right": "Right leg"}
+
+SPREAD: Final = {
+    "strides_behind": ("Strides, steps or tests behind the mean", "{count}"),
+    "standard_deviation": ("Standard deviation over them", None),
+    "uncertainty_95": ("The value ± this holds the true one with 95 %", None),
+}
+"""Components of an observation → words, and their UCUM unit where it is not the value's."""
+
+REPORT: Final = ("gait_analysis", "Gait analysis by body-worn inertial sensors")
+PANEL: Final = ("gait_parameters", "Gait parameters of one take")
+
+
+def write_fhir(content: ExportContent) -> bytes:
+    """Write the bundle as JSON."""
+    v = content.visit
+    patient, device, panel = (_address(content, name) for name in ("patient", "device", "panel"))
+    shared = {
+        "status": "preliminary",
+        "subject": {"reference": patient},
+        **({} if v.day is None else {"effectiveDateTime": v.day}),
+    }
+    values = [p for p in content.bundle.parameters if p.unit in UCUM]
+    observations = {
+        _address(content, f"{p.name} {p.side}"): _observe(p) | shared | {"device": {"reference": device}}
+        for p in values
+    }
+    members = [{"reference": address} for address in observations]
+    left_out = sum(c.excluded is not None for c in content.cycles)
+    resources = {
+        patient: _describe_patient(content),
+        device: {
+            "resourceType": "Device",
+            "deviceName": [{"name": "Sagittal", "type": "model-name"}],
+            "version": [{"value": v.version or "unknown"}],
+        },
+        _address(content, "codes"): _define_codes(values),
+        panel: {"resourceType": "Observation", "code": _code(*PANEL), **shared}
+        | ({"hasMember": members} if members else {"dataAbsentReason": _absent("no value")}),
+        **observations,
+        _address(content, "report"): {
+            "resourceType": "DiagnosticReport",
+            "code": _code(*REPORT),
+            **shared,
+            "result": [{"reference": panel}],
+            "conclusion": " ".join(
+                text
+                for text in (
+                    f"Protocol: {v.protocol}.",
+                    f"Condition: {v.condition}." if v.condition else "",
+                    f"{len(content.cycles) - left_out} of {len(content.cycles)} strides count.",
+                    f"{len(content.edits)} changes by hand.",
+                    "Research and documentation software, not a medical device, not for diagnosis.",
+                )
+                if text
+            ),
+        },
+    }
+    bundle = {
+        "resourceType": "Bundle",
+        "type": "collection",
+        "entry": [{"fullUrl": url, "resource": resource} for url, resource in resources.items()],
+    }
+    return json.dumps(bundle, ensure_ascii=False, allow_nan=False, indent=1).encode()
+
+
+def _address(content: ExportContent, name: str) -> str:
+    """Where a resource stands in the bundle; the same for the same visit."""
+    return (
+        f"urn:uuid:{uuid.uuid5(uuid.NAMESPACE_OID, f'{content.visit.subject} {content.visit.visit} {name}')}"
+    )
+
+
+def _code(code: str, words: str) -> dict[str, Any]:
+    """One of our own codes, with its LOINC code where there is one."""
+    coding = [{"system": CODES, "code": code, "display": words}]
+    if code in LOINC:
+        number, display = LOINC[code]
+        coding.append({"system": "http://loinc.org", "code": number, "display": display})
+    return {"coding": coding, "text": words}
+
+
+def _quantity(value: float, unit: str, ucum: str) -> dict[str, Any]:
+    return {
+        "value": round(value, 6),
+        "unit": unit or ucum,
+        "system": "http://unitsofmeasure.org",
+        "code": ucum,
+    }
+
+
+def _absent(why: str) -> dict[str, Any]:
+    system = "http://terminology.hl7.org/CodeSystem/data-absent-reason"
+    return {"coding": [{"system": system, "code": "unknown"}], "text": why}
+
+
+def _observe(p: Parameter) -> dict[str, Any]:
+    """One value with its spread, or the reason why there is none."""
+    entry = CATALOGUE.get(p.name)
+    found: dict[str, Any] = {
+        "resourceType": "Observation",
+        "code": _code(p.name, p.name if entry is None else entry.label),
+    }
+    if p.side is not None:
+        found["bodySite"] = {"text": SIDE_WORDS[p.side]}
+    if p.mean is None:
+        return found | {"dataAbsentReason": _absent(reason_words(p.reason))}
+    found["valueQuantity"] = _quantity(p.mean, p.unit, UCUM[p.unit])
+    given = {"strides_behind": p.n, "standard_deviation": p.sd, "uncertainty_95": p.uncertainty}
+    found["component"] = [
+        {
+            "code": _code(name, SPREAD[name][0]),
+            "valueQuantity": _quantity(value, p.unit if own is None else "", own or UCUM[p.unit]),
+        }
+        for name, value in given.items()
+        if value is not None
+        for own in (SPREAD[name][1],)
+    ]
+    if p.estimated:
+        found["note"] = [{"text": "From a model of the leg; no two sensors measure this angle."}]
+    return found
+
+
+def _describe_patient(content: ExportContent) -> dict[str, Any]:
+    v = content.visit
+    found = {
+        "resourceType": "Patient",
+        "identifier": [{"system": SUBJECTS, "value": v.code or v.subject}],
+    }
+    return found | ({} if v.sex is None else {"gender": v.sex})
+
+
+def _define_codes(values: list[Parameter]) -> dict[str, Any]:
+    """The part of our catalogue that the bundle uses."""
+    words = dict((REPORT, PANEL)) | {name: text for name, (text, _) in SPREAD.items()}
+    concepts: list[dict[str, str]] = [{"code": code, "display": text} for code, text in words.items()]
+    for name in dict.fromkeys(p.name for p in values):
+        entry = CATALOGUE.get(name)
+        more = {} if entry is None else {"display": entry.label, "definition": entry.definition}
+        concepts.append({"code": name, **more})
+    return {
+        "resourceType": "CodeSystem",
+        "url": CODES,
+        "name": "SagittalGaitParameters",
+        "status": "active",
+        "content": "fragment",
+        "concept": concepts,
+    }

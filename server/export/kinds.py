@@ -1,0 +1,125 @@
+"""The formats an analysis can be exported to: what each is called, needs, and is written by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Final, Literal, get_args
+
+from core.errors import InputError
+from server.export.content import POSES, ExportContent
+from server.report import signals
+
+ExportName = Literal["xlsx", "csv", "opensim", "c3d", "bids", "fhir", "walk"]
+
+
+@dataclass(frozen=True)
+class ExportKind:
+    """One format.
+
+    Parameters
+    ----------
+    ending : of its file. label : what it is called. what : what is in it, for whom.
+    needs : result files without which it cannot be written.
+    """
+
+    name: ExportName
+    ending: str
+    label: str
+    what: str
+    needs: tuple[str, ...] = ()
+
+
+KINDS: Final[tuple[ExportKind, ...]] = (
+    ExportKind(
+        "xlsx", "xlsx", "Excel workbook", "Values, strides, mean curves, contacts, notices, data dictionary"
+    ),
+    ExportKind(
+        "csv",
+        "zip",
+        "Tables for statistics",
+        "One row per stride and value as CSV, the same wide, and a data dictionary",
+    ),
+    ExportKind(
+        "opensim",
+        "zip",
+        "OpenSim",
+        "Joint angles as .mot, orientations of the sensors for OpenSense as .sto",
+        ("angles.parquet",),
+    ),
+    ExportKind(
+        "c3d", "zip", "C3D", "Joint centres, joint angles and contacts for motion-capture programs", (POSES,)
+    ),
+    ExportKind(
+        "bids",
+        "zip",
+        "BIDS data set",
+        "What the sensors measured, contacts and strides as BIDS-motion, without a date",
+        (signals.NAME,),
+    ),
+    ExportKind(
+        "fhir", "json", "FHIR bundle", "Every value for a hospital's system, FHIR R4, marked preliminary"
+    ),
+    ExportKind(
+        "walk", "html", "3D walk", "The moving figure as one page that opens without a server", (POSES,)
+    ),
+)
+"""In the order in which they are offered."""
+
+EXPORTED: Final = "export-"
+"""Begin of the name of an export among the files of its analysis."""
+
+NAMES: Final[tuple[str, ...]] = get_args(ExportName)
+
+
+def find_kind(name: str) -> ExportKind:
+    """A format by its name; raises InputError `unknown_export`."""
+    for kind in KINDS:
+        if kind.name == name:
+            return kind
+    raise InputError("unknown_export", f"'{name}' is no export; choose one of {', '.join(NAMES)}.")
+
+
+def name_file(kind: ExportKind, job_id: str) -> str:
+    """Name of an export among the files of its analysis, by the job that wrote it."""
+    return f"{EXPORTED}{kind.name}-{job_id[:8]}.{kind.ending}"
+
+
+def list_possible(files: Collection[str]) -> tuple[ExportKind, ...]:
+    """The formats that can be written from an analysis with these result files."""
+    return tuple(kind for kind in KINDS if all(name in files for name in kind.needs))
+
+
+DRAWN: Final[dict[str, Callable[[ExportContent], bytes]]] = {}
+"""Formats that a room above this one draws, by name; it registers its writer."""
+
+
+def write_export(name: str, content: ExportContent) -> bytes:
+    """Write one format; raises InputError `unknown_export`, and SagittalError where it cannot be written."""
+    match find_kind(name).name:
+        case "xlsx":
+            from server.export.workbook import write_workbook
+
+            return write_workbook(content)
+        case "csv":
+            from server.export.tidy import write_tidy
+
+            return write_tidy(content)
+        case "opensim":
+            from server.export.opensim import write_opensim
+
+            return write_opensim(content)
+        case "c3d":
+            from server.export.c3d import write_c3d
+
+            return write_c3d(content)
+        case "bids":
+            from server.export.bids import write_bids
+
+            return write_bids(content)
+        case "fhir":
+            from server.export.fhir import write_fhir
+
+            return write_fhir(content)
+        case drawn:
+            return DRAWN[drawn](content)

@@ -1,0 +1,126 @@
+"""Joint angles as OpenSim coordinates (.mot) and orientations as OpenSense takes them (.sto).
+
+Coordinates and signs are those of the model of Rajagopal et al. 2016 (doi:10.1109/TBME.2016.2586891); files
+are text as OpenSim 4 writes it. OpenSim's ground has x forward, y up, z to the right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Final
+
+import numpy as np
+
+from core.angles import JointAngles
+from core.angles.cardan import cardan_zxy
+from core.body.poses import Poses
+from core.errors import FormatError
+from core.frames import SIDES, SUFFIX, Floats, Segment
+from core.rotation import about, multiply
+from server.export import sheets
+from server.export.content import ExportContent
+from server.export.zipping import zip_files
+from server.report.columns import write_csv
+
+LEG: Final = (
+    ("hip_flexion", "hip_flexion"),
+    ("hip_adduction", "hip_adduction"),
+    ("hip_rotation", "hip_rotation"),
+    ("knee_flexion", "knee_angle"),
+    ("ankle_dorsiflexion", "ankle_angle"),
+)
+"""Our joint angle → its coordinate; the signs are the same on both sides."""
+
+IMU_NAMES: Final[Mapping[Segment, str]] = {
+    "pelvis": "pelvis_imu",
+    "thigh_r": "femur_r_imu",
+    "shank_r": "tibia_r_imu",
+    "foot_r": "calcn_r_imu",
+    "thigh_l": "femur_l_imu",
+    "shank_l": "tibia_l_imu",
+    "foot_l": "calcn_l_imu",
+    "chest": "torso_imu",
+}
+"""Segment → the frame that OpenSense looks for in the model."""
+
+
+def write_opensim(content: ExportContent) -> bytes:
+    """Write angles.mot, orientations.sto where there are poses, and which strides count."""
+    angles = content.bundle.angles
+    if angles is None:
+        raise FormatError("export_not_possible", "This analysis has no joint angles; OpenSim takes nothing.")
+    files = {"angles.mot": write_motion(angles)}
+    if content.has_poses:
+        worn = (content.bundle.calibration or {}).get("segments", IMU_NAMES)
+        files["orientations.sto"] = write_orientations(content.poses, worn)
+    for name, table in (("strides", sheets.list_cycles(content)), ("about", sheets.list_about(content))):
+        files[f"{name}.csv"] = write_csv(table.header, table.rows)
+    return zip_files(files)
+
+
+def write_motion(angles: JointAngles) -> bytes:
+    """Write coordinates in degrees over time; a moment at which one of them is not known is left out."""
+    columns = {n: np.degrees(x) for n, x in find_coordinates(angles).items() if np.isfinite(x).any()}
+    if not columns:
+        raise FormatError("export_not_possible", "No joint angle of this analysis is an OpenSim coordinate.")
+    table = np.column_stack((angles.t_s, *columns.values()))
+    table = table[np.isfinite(table).all(axis=1)]
+    head = (
+        f"Coordinates\nversion=1\nnRows={len(table)}\nnColumns={table.shape[1]}\ninDegrees=yes\nendheader\n"
+    )
+    lines = ["\t".join(("time", *columns)), *("\t".join(f"{x:.6f}" for x in row) for row in table.tolist())]
+    return (head + "\n".join(lines) + "\n").encode()
+
+
+def find_coordinates(angles: JointAngles) -> dict[str, Floats]:
+    """Coordinate → (n,) rad, NaN where not known.
+
+    The pelvis turns in OpenSim about z, x, y of ground (tilt, list, rotation), not about y, x, z as in ours.
+    Its rotation is that of its own heading, from 0 at the mean.
+    """
+    given = angles.angles
+    found: dict[str, Floats] = {}
+    if "pelvis_tilt" in given:
+        heading = angles.headings.get("pelvis")
+        turned = np.zeros(len(angles.t_s)) if heading is None else heading - _mean(heading)
+        q = multiply(about(1, turned), about(0, -given["pelvis_obliquity"]))
+        tilt, side_down, rotation = cardan_zxy(multiply(q, about(2, -given["pelvis_tilt"]))).T
+        found |= {"pelvis_tilt": tilt, "pelvis_list": side_down}
+        if heading is not None:
+            known = np.isfinite(rotation)
+            rotation[known] = np.unwrap(rotation[known])
+            found["pelvis_rotation"] = rotation
+    for side in reversed(SIDES):
+        k = SUFFIX[side]
+        found |= {f"{name}_{k}": given[f"{ours}_{k}"] for ours, name in LEG if f"{ours}_{k}" in given}
+    return found
+
+
+def _mean(heading: Floats) -> float:
+    known = heading[np.isfinite(heading)]
+    return float(known.mean()) if len(known) else 0.0
+
+
+def write_orientations(poses: Poses, worn: Collection[str]) -> bytes:
+    """Write one quaternion "w,x,y,z" per segment with a sensor and moment; moments with a loss are left out.
+
+    Each is the sensor put straight onto its segment: x forward, y up, z to the right while standing, in a
+    world with z up. OpenSense's usual `sensor_to_opensim_rotations` of −π/2 0 0 makes standing the identity.
+
+    Parameters
+    ----------
+    worn : segments that carry a sensor.
+    """
+    kept = [s for s in IMU_NAMES if s in poses.q and s in worn]
+    ok = poses.valid & np.all([np.isfinite(poses.q[s]).all(axis=1) for s in kept], axis=0)
+    cells = []
+    for segment in kept:
+        q = poses.q[segment][ok]
+        # neighbours on one side of the sphere, so that who interpolates stays on it
+        flips = np.cumprod(np.where((q[1:] * q[:-1]).sum(axis=1) < 0.0, -1.0, 1.0))
+        q = q * np.concatenate(([1.0], flips))[:, None] if len(q) else q
+        cells.append([",".join(f"{x:.9f}" for x in row) for row in q.tolist()])
+    head = f"DataRate={poses.rate_hz:.6f}\nDataType=Quaternion\nversion=3\nendheader\n"
+    lines = ["\t".join(("time", *(IMU_NAMES[s] for s in kept)))]
+    lines += ["\t".join((f"{t:.6f}", *row)) for t, *row in zip(poses.t_s[ok].tolist(), *cells, strict=True)]
+    return (head + "\n".join(lines) + "\n").encode()

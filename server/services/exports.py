@@ -1,0 +1,160 @@
+"""Exports of an analysis for other programs: offered, asked for, written in the child, published.
+
+The file of an export is a file of its analysis, named by the job; so it lives and goes with it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from sqlalchemy import Connection, insert, select
+
+from core.events.edits import read_edit
+from server import audit
+from server.export import kinds
+from server.export.content import VisitFacts, open_content
+from server.export.kinds import EXPORTED, ExportKind, name_file
+from server.jobs.queue import EXPORT, VIEW_COLUMNS, Claim, JobQueue, JobView, job_view
+from server.services import analyses, edit_log, patients, sessions
+from server.services.errors import Conflict
+from server.services.histories import AnalysedSession
+from server.services.provenance import CODE_VERSION
+from server.services.shown_take import make_key, submit_for
+from server.storage.blobs import Blob
+from server.storage.tables import analysis_file, job
+
+if TYPE_CHECKING:
+    from core.formats.source import SourceFile
+
+
+@dataclass(frozen=True)
+class ExportOffer:
+    """A format that the shown analysis can be written in, as it counts now.
+
+    Parameters
+    ----------
+    kind : its name. label, what : in words. job : that writes it, None = not asked for since the last change.
+    analysis_id, file : where it can be downloaded, file None until it is written.
+    """
+
+    kind: str
+    label: str
+    what: str
+    job: JobView | None
+    analysis_id: str
+    file: str | None
+
+
+def list_offers(c: Connection, session_id: str) -> list[ExportOffer]:
+    """Every format that can be written of the analysis that a session shows, and how far it is.
+
+    What was written before the last edit, or before person or visit were corrected, is offered anew.
+
+    Raises
+    ------
+    NotFound
+        the session, its analysis.
+    """
+    found = analyses.get_shown(c, session_id)
+    possible = kinds.list_possible(found.files)
+    params = _collect_params(c, found)
+    keys = {kind.name: make_key(found, EXPORT, {**params, "kind": kind.name}) for kind in possible}
+    rows = c.execute(select(*VIEW_COLUMNS, job.c.key).where(job.c.key.in_(keys.values())).order_by(job.c.seq))
+    newest = {row.key: job_view(row) for row in rows}
+    return [_offer(found, kind, newest.get(keys[kind.name])) for kind in possible]
+
+
+def _offer(found: analyses.AnalysisRecord, kind: ExportKind, made: JobView | None) -> ExportOffer:
+    name = None if made is None else name_file(kind, made.id)
+    return ExportOffer(
+        kind.name, kind.label, kind.what, made, found.id, name if name in found.files else None
+    )
+
+
+def submit(
+    c: Connection, queue: JobQueue, actor: audit.Actor | None, session_id: str, *, kind: str
+) -> JobView:
+    """Ask for an export of the analysis that the session shows, with the edits that count; done once.
+
+    Raises
+    ------
+    NotFound
+        the session, its analysis. InputError unknown_export. Conflict export_not_possible.
+    """
+    chosen = kinds.find_kind(kind)
+    found = analyses.get_shown(c, session_id)
+    if chosen not in kinds.list_possible(found.files):
+        lacking = ", ".join(name for name in chosen.needs if name not in found.files)
+        raise Conflict(
+            "export_not_possible", f"This analysis has no {lacking}, which “{chosen.label}” is made from."
+        )
+    params = {**_collect_params(c, found), "kind": kind}
+    return submit_for(c, queue, actor, found, EXPORT, "export.requested", params)
+
+
+def run(files: Sequence[SourceFile], params: Mapping[str, Any]) -> dict[str, bytes]:
+    """Write an export; pure.
+
+    Parameters
+    ----------
+    files : result files of the analysis.
+
+    Raises
+    ------
+    SagittalError
+        it cannot be written; the code and the sentence say why.
+    """
+    readers = {file.name: file.read for file in files}
+    edits = [read_edit(e) for e in params["edits"]]
+    content = open_content(readers, VisitFacts.of_json(params["visit"]), edits)
+    return {params["kind"]: kinds.write_export(params["kind"], content)}
+
+
+def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob]) -> None:
+    """Write the file of a result, in the transaction that marks its job done."""
+    for kind, blob in stored.items():
+        name = name_file(kinds.find_kind(kind), claim.job_id)
+        row = {"name": name, "size": blob.size, "sha256": blob.sha256}
+        c.execute(insert(analysis_file).values(analysis_id=claim.params["analysis_id"], **row))
+
+
+def _collect_params(c: Connection, found: analyses.AnalysisRecord) -> dict[str, Any]:
+    """What an export is written from, fixed at submission."""
+    edits = edit_log.edits_of(c, found.id)
+    return {
+        "space": found.patient_id,
+        "files": [
+            {"name": name, "size": blob.size, "sha256": blob.sha256}
+            for name, blob in found.files.items()
+            if not name.startswith(EXPORTED)
+        ],
+        "analysis_id": found.id,
+        "edits": [e.to_json() for e in edits.edits],
+        "visit": _describe_visit(c, found, edits).to_json(),
+    }
+
+
+def _describe_visit(c: Connection, found: analyses.AnalysisRecord, edits: edit_log.EditHistory) -> VisitFacts:
+    session = sessions.get(c, found.session_id)
+    patient = patients.get(c, found.patient_id)
+    return VisitFacts(
+        subject=_digest(patient.id),
+        code=patient.code,
+        visit=_digest(session.id),
+        day=session.performed_on.isoformat(),
+        protocol=session.protocol,
+        sex=patient.sex,
+        age_years=session.performed_on.year - patient.birth_year if patient.birth_year else None,
+        height_m=session.height_m if session.height_m is not None else patient.height_m,
+        affected_side=patient.affected_side,
+        condition=AnalysedSession(session, found, edits).condition.words,
+        version=CODE_VERSION,
+    )
+
+
+def _digest(identity: str) -> str:
+    """A stable name that leads back to nobody without the database: 12 hex digits."""
+    return hashlib.sha256(identity.encode()).hexdigest()[:12]

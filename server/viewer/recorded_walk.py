@@ -1,0 +1,51 @@
+"""A walk as one HTML file: viser's client with the recorded scene inside, opened without a server.
+
+It registers itself as the export "walk": drawing stands in this room, exports stand below it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from server.export.content import ExportContent
+from server.export.kinds import DRAWN
+
+if TYPE_CHECKING:
+    from core.body.poses import Poses
+
+RATE_HZ: Final = 25.0
+"""Pictures a second, as films have."""
+
+TITLE: Final = ("<title>Viser</title>", "<title>Sagittal</title>")
+"""What the client calls itself, and what the file is called: nothing of whose walk it is."""
+
+
+def write_walk(content: ExportContent) -> bytes:
+    """Write the figure of an analysis as HTML; raises SagittalError where there is nothing to draw."""
+    return record_walk(content.poses)
+
+
+def record_walk(poses: Poses) -> bytes:
+    """Draw a walk moment by moment, followed from the right, with footprints and trails."""
+    # a worker that draws nothing does without viser
+    from server.viewer.motion import prepare_motion
+    from server.viewer.replay_figure import ReplayFigure
+    from server.viewer.scene_server import start_scene_server, stop_scene_server
+
+    motion = prepare_motion(poses)
+    server = start_scene_server()
+    try:
+        figure = ReplayFigure(server, motion)
+        recorded = server.get_scene_serializer()
+        for t in np.arange(motion.t_s[0], motion.t_s[-1], 1.0 / RATE_HZ).tolist():
+            figure.pose(t)
+            recorded.insert_sleep(1.0 / RATE_HZ)
+        page: str = recorded.as_html()
+    finally:
+        stop_scene_server(server)
+    return page.replace(*TITLE, 1).encode()
+
+
+DRAWN["walk"] = write_walk

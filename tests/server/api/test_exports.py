@@ -1,0 +1,103 @@
+"""Exports over the API and on the page: asked for, written as the worker does, downloaded, offered anew."""
+
+from __future__ import annotations
+
+import csv
+import io
+import zipfile
+from typing import Any
+
+import pytest
+
+from core.formats.source import SourceFile
+from server.commands.export import export
+from server.jobs.queue import EXPORT
+from server.services import analyses, exports
+from tests.server import analysed
+from tests.server.clinic import Clinic
+
+pytestmark = pytest.mark.anyio
+
+API = "/api/v1"
+
+
+async def visit(clinic: Clinic, code: str) -> str:
+    async with clinic.client("clinician") as client:
+        patient = (await client.post(f"{API}/patients", json={"code": code})).json()["id"]
+        asked = {"title": "Walk", "performed_on": "2026-03-02"}
+        session: str = (await client.post(f"{API}/patients/{patient}/sessions", json=asked)).json()["id"]
+    analysed.finish(clinic, patient, session, analysed.files())
+    return session
+
+
+def work(clinic: Clinic, session: str) -> None:
+    """What a worker and its child do with the next job, in this process."""
+    state = clinic.app.state
+    claim = state.queue.claim("tester", [EXPORT])
+    with clinic.db.read() as c:
+        space = analyses.get_shown(c, session).patient_id
+    files = [
+        SourceFile(f["name"], f["size"], lambda f=f: state.blobs.read(space, f["sha256"]))  # type: ignore[misc]
+        for f in claim.params["files"]
+    ]
+    results = exports.run(files, claim.params)
+    stored = {name: state.blobs.put(space, content) for name, content in results.items()}
+    assert state.queue.finish(claim, lambda c: exports.publish(c, claim, stored))
+
+
+async def test_an_export_is_written_once_and_anew_after_an_edit(clinic: Clinic) -> None:
+    session = await visit(clinic, "exported")
+    path = f"{API}/sessions/{session}"
+    async with clinic.client("viewer") as client:
+
+        async def offered() -> dict[str, Any]:
+            return {offer["kind"]: offer for offer in (await client.get(f"{path}/exports")).json()}
+
+        async def strides() -> list[dict[str, str]]:
+            offer = (await offered())["csv"]
+            answer = await client.get(f"{API}/analyses/{offer['analysis_id']}/files/{offer['file']}")
+            text = zipfile.ZipFile(io.BytesIO(answer.content)).read("strides_wide.csv").decode()
+            return list(csv.DictReader(io.StringIO(text)))
+
+        assert (await offered())["csv"]["job"] is None
+        asked = await client.post(f"{path}/exports", json={"kind": "csv"})
+        assert (asked.status_code, asked.json()["kind"]) == (202, "export")
+        assert (await client.post(f"{path}/exports", json={"kind": "csv"})).json()["id"] == asked.json()["id"]
+        assert 'job="' in (await client.get(f"/sessions/{session}/data")).text
+        work(clinic, session)
+        before = await strides()
+        page = (await client.get(f"/sessions/{session}/data")).text
+        assert "For other programs" in page
+        assert page.count((await offered())["csv"]["file"]) == 1, "not among the results, too"
+
+        counted = next(row for row in before if row["counted"] == "1")
+        edit = {"kind": "exclude_stride", "side": counted["side"], "reason": "stumbled"}
+        edit["time_s"] = (float(counted["start_s"]) + float(counted["end_s"])) / 2  # type: ignore[assignment]
+        async with clinic.client("clinician") as clinician:
+            assert (await clinician.post(f"{path}/edits", json=edit)).status_code == 201
+        assert (await offered())["csv"]["job"] is None, "the one before the edit is not offered"
+        await client.post(f"{path}/exports", json={"kind": "csv"})
+        work(clinic, session)
+        left_out = [row["cycle"] for row in await strides() if row["excluded_reason"] == "manual:stumbled"]
+        assert left_out == [counted["cycle"]]
+
+    async with clinic.client("assistant") as client:
+        assert (await client.post(f"{path}/exports", json={"kind": "csv"})).status_code == 403
+
+
+async def test_what_cannot_be_exported_is_refused(clinic: Clinic) -> None:
+    session = await visit(clinic, "refused")
+    async with clinic.client("clinician") as client:
+        answer = await client.post(f"{API}/sessions/{session}/exports", json={"kind": "docx"})
+        assert answer.status_code == 422
+        assert (await client.get(f"{API}/sessions/{'0' * 32}/exports")).status_code == 404
+
+
+def test_the_command_line_writes_the_same_from_a_folder(tmp_path: Any, capsys: Any) -> None:
+    for name, content in analysed.files().items():
+        (tmp_path / name).write_bytes(content)
+    assert export(tmp_path, "csv", None, "p1") == 0
+    names = zipfile.ZipFile(tmp_path / "export.zip").namelist()
+    assert "strides_long.csv" in names
+    assert export(tmp_path / "nowhere", "csv", None, "p1") == 1
+    assert "analysis.json is missing" in capsys.readouterr().err

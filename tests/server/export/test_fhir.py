@@ -1,0 +1,84 @@
+"""The FHIR bundle, read by a library of the standard's R4 models."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from core.parameters.catalogue import CATALOGUE
+from core.parameters.result import Parameter
+from server.export.content import ExportContent
+from server.export.fhir import CODES, LOINC, UCUM, write_fhir
+from tests.server.export.opened import open_walk
+
+models = pytest.importorskip("fhir.resources.R4B.bundle")
+
+
+def resources(content: ExportContent) -> dict[str, dict[str, Any]]:
+    data = write_fhir(content)
+    models.Bundle.model_validate_json(data)
+    return {entry["fullUrl"]: entry["resource"] for entry in json.loads(data)["entry"]}
+
+
+def references(value: Any) -> list[str]:
+    if isinstance(value, dict):
+        own = [value["reference"]] if isinstance(value.get("reference"), str) else []
+        return own + [r for x in value.values() for r in references(x)]
+    return [r for x in value for r in references(x)] if isinstance(value, list) else []
+
+
+def codes(value: Any) -> set[str]:
+    if isinstance(value, dict):
+        own = {value["code"]} if value.get("system") == CODES else set()
+        return own.union(*(codes(x) for x in value.values()))
+    return set().union(*(codes(x) for x in value)) if isinstance(value, list) else set()
+
+
+def test_the_bundle_is_valid_whole_and_holds_every_value() -> None:
+    content = open_walk()
+    found = resources(content)
+    assert set(references(list(found.values()))) <= set(found)
+    (system,) = [r for r in found.values() if r["resourceType"] == "CodeSystem"]
+    assert codes([r for r in found.values() if r is not system]) <= {c["code"] for c in system["concept"]}
+    (report,) = [r for r in found.values() if r["resourceType"] == "DiagnosticReport"]
+    panel = found[report["result"][0]["reference"]]
+    members = [found[m["reference"]] for m in panel["hasMember"]]
+    assert len(members) == len(content.bundle.parameters)
+    for member, p in zip(members, content.bundle.parameters, strict=True):
+        assert member["code"]["coding"][0] == {
+            "system": CODES,
+            "code": p.name,
+            "display": CATALOGUE[p.name].label,
+        }
+        assert member.get("bodySite", {}).get("text") == (p.side and f"{p.side.capitalize()} leg")
+        if p.mean is None:
+            assert "valueQuantity" not in member
+            assert member["dataAbsentReason"]["text"]
+        else:
+            assert member["valueQuantity"]["value"] == pytest.approx(p.mean, abs=1e-6)
+            assert member["valueQuantity"]["code"] == UCUM[p.unit]
+
+
+def test_it_tells_a_pseudonym_a_day_and_that_nobody_signed() -> None:
+    found = resources(open_walk()).values()
+    (patient,) = [r for r in found if r["resourceType"] == "Patient"]
+    assert set(patient) == {"resourceType", "identifier", "gender"}
+    for r in found:
+        if r["resourceType"] in ("Observation", "DiagnosticReport"):
+            assert (r["status"], r["effectiveDateTime"]) == ("preliminary", "2026-03-02")
+
+
+def test_every_unit_of_the_catalogue_has_its_ucum_code_and_loinc_stands_beside_ours() -> None:
+    assert {entry.unit for entry in CATALOGUE.values()} <= set(UCUM)
+    assert set(LOINC) <= set(CATALOGUE)
+    content = open_walk()
+    tug = Parameter("tug_duration_s", None, 1, 11.25, None, "s")
+    timed = replace(content, bundle=replace(content.bundle, parameters=(tug,)))
+    (one,) = [r for r in resources(timed).values() if "valueQuantity" in r]
+    assert [c["system"] for c in one["code"]["coding"]] == [CODES, "http://loinc.org"]
+    assert (one["code"]["coding"][1]["code"], one["valueQuantity"]["code"]) == ("89423-8", "s")
+    nothing = replace(content, bundle=replace(content.bundle, parameters=()))
+    assert len(resources(nothing)) == 5

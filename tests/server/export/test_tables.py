@@ -1,0 +1,117 @@
+"""Workbook and CSV tables, opened by what they are for; edits count in them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import zipfile
+from functools import cache
+from typing import Any
+
+import openpyxl
+import pytest
+
+from core.errors import FormatError, InputError
+from core.events.edits import Edit
+from core.parameters.catalogue import CATALOGUE
+from server.export.content import ExportContent
+from server.export.kinds import write_export
+from tests.server import analysed
+from tests.server.export.opened import open_walk
+
+
+@cache
+def left_out() -> tuple[Edit, ExportContent]:
+    """A person leaves the first counted stride out."""
+    first = next(c for c in open_walk().cycles if c.excluded is None)
+    edit = Edit("exclude_stride", first.side, (first.start_s + first.end_s) / 2, reason="=stumbled")
+    return edit, open_walk(edit)
+
+
+def tables(content: ExportContent) -> dict[str, list[dict[str, str]]]:
+    archive = zipfile.ZipFile(io.BytesIO(write_export("csv", content)))
+    return {n: list(csv.DictReader(io.StringIO(archive.read(n).decode()))) for n in archive.namelist()}
+
+
+def sheet(book: Any, name: str) -> list[dict[str, Any]]:
+    header, *rows = book[name].iter_rows(values_only=True)
+    return [dict(zip(header, row, strict=True)) for row in rows]
+
+
+def test_long_and_wide_tables_hold_the_same_numbers_and_every_column_is_explained() -> None:
+    content = open_walk()
+    found = tables(content)
+    wide = {row["cycle"]: row for row in found["strides_wide.csv"]}
+    long = found["strides_long.csv"]
+    assert len(long) == sum(len(c.values) for c in content.cycles) > 0
+    for row in long:
+        assert row["value"] == wide[row["cycle"]][row["parameter"]]
+        assert row["unit"] == CATALOGUE[row["parameter"]].unit
+    explained = {row["name"]: row for row in found["data_dictionary.csv"]}
+    asked = {name for n in ("strides_long.csv", "strides_wide.csv", "parameters.csv") for name in found[n][0]}
+    asked |= {row["parameter"] for n in ("strides_long.csv", "parameters.csv") for row in found[n]}
+    assert asked <= set(explained)
+    assert explained["stride_time_s"]["definition"] == CATALOGUE["stride_time_s"].definition
+
+
+def test_a_stride_that_a_person_left_out_is_told_and_counts_in_no_mean() -> None:
+    edit, content = left_out()
+    before, after = tables(open_walk()), tables(content)
+    rows = [row for row in after["strides_long.csv"] if row["excluded_reason"] == "manual:=stumbled"]
+    assert {row["parameter"] for row in rows} == set(content.columns)
+    assert {(row["side"], row["counted"]) for row in rows} == {(edit.side, "0")}
+
+    def n(found: dict[str, list[dict[str, str]]]) -> int:
+        return next(
+            int(r["n"])
+            for r in found["parameters.csv"]
+            if (r["parameter"], r["side"]) == ("stride_time_s", edit.side)
+        )
+
+    assert n(after) == n(before) - 1
+    assert {r["what"]: r["value"] for r in after["about.csv"]}["edits"] == "1"
+
+
+def test_nothing_that_a_person_typed_becomes_a_formula() -> None:
+    _, content = left_out()
+    assert {r["what"]: r["value"] for r in tables(content)["about.csv"]}["code"] == "'=HYPERLINK(1)"
+    book = openpyxl.load_workbook(io.BytesIO(write_export("xlsx", content)))
+    cells = [c for s in book for row in s.iter_rows() for c in row if c.value is not None]
+    assert {c.data_type for c in cells} == {"s", "n"}
+    assert any(c.value == "=HYPERLINK(1)" for c in cells)
+
+
+def test_the_workbook_holds_the_numbers_of_the_analysis() -> None:
+    content = open_walk()
+    data = write_export("xlsx", content)
+    assert data == write_export("xlsx", open_walk())
+    book = openpyxl.load_workbook(io.BytesIO(data))
+    assert book.sheetnames == [
+        "About",
+        "Parameters",
+        "Strides",
+        "Curves",
+        "Contacts",
+        "Notices",
+        "Dictionary",
+    ]
+    named = {(r["parameter"], r["side"]): r["mean"] for r in sheet(book, "Parameters")}
+    assert named == {
+        (p.name, p.side): None if p.mean is None else pytest.approx(p.mean) for p in content.bundle.parameters
+    }
+    assert [r["cycle"] for r in sheet(book, "Strides")] == [c.number for c in content.cycles]
+    curves = sheet(book, "Curves")
+    assert len(curves) == 101
+    knee = [row["knee_flexion_left_mean_deg"] for row in curves]
+    assert 55.0 < max(knee) < 65.0
+
+
+def test_what_cannot_be_written_says_why() -> None:
+    with pytest.raises(InputError, match="choose one of xlsx"):
+        write_export("docx", open_walk())
+    files = {name: x for name, x in analysed.files().items() if name != "tracks.parquet"}
+    edit, _ = left_out()
+    with pytest.raises(FormatError, match=r"no tracks\.parquet"):
+        open_walk(edit, files=files)
+    alone = open_walk(files={"analysis.json": analysed.files()["analysis.json"]})
+    assert tables(alone)["strides_long.csv"] == []
