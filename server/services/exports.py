@@ -62,7 +62,8 @@ def list_offers(c: Connection, session_id: str) -> list[ExportOffer]:
     possible = kinds.list_possible(found.files)
     params = _collect_params(c, found)
     keys = {kind.name: make_key(found, EXPORT, {**params, "kind": kind.name}) for kind in possible}
-    rows = c.execute(select(*VIEW_COLUMNS, job.c.key).where(job.c.key.in_(keys.values())).order_by(job.c.seq))
+    query = select(*VIEW_COLUMNS, job.c.key).where(job.c.key.in_(keys.values())).order_by(job.c.seq)
+    rows: list[Any] = list(c.execute(query))
     newest = {row.key: job_view(row) for row in rows}
     return [_offer(found, kind, newest.get(keys[kind.name])) for kind in possible]
 
