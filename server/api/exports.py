@@ -16,7 +16,7 @@ from server.context import Db, Id, OpenTrail, Queue
 from server.export.kinds import ExportName
 from server.http.json_body import StrictJsonRoute
 from server.jobs.queue import JobView
-from server.services import exports
+from server.services import analyses, exports, patients, sessions
 
 router = APIRouter(route_class=StrictJsonRoute, tags=["exports"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -41,6 +41,8 @@ def start(session_id: Id, body: ExportNew, db: Db, queue: Queue, who: Reader) ->
 def list_exports(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[exports.ExportOffer]:
     """The formats of the shown analysis; one with a `file` can be downloaded among the analysis's files."""
     with db.read() as c:
-        offers = exports.list_offers(c, session_id)
+        found = analyses.get_shown(c, session_id)
+        session, patient = sessions.get(c, session_id), patients.get(c, found.patient_id)
+        offers = exports.list_offers(c, patient, session, found)
     trail.record_watched(who, "exports.opened", "session", session_id)
     return offers

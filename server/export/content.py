@@ -14,8 +14,10 @@ from core.errors import FormatError
 from core.events.edits import Edit
 from core.frames import Protocol, Side
 from core.measure import measure_gait
+from core.parameters.result import Parameter
 from core.parameters.rows import Column
 from server.report import signals, tracks
+from server.report.analysis_json import parameter_row
 from server.report.bundle import Bundle, apply_review, load_bundle, read_columns, read_poses
 from server.report.columns import read_table
 
@@ -163,4 +165,8 @@ def open_content(
         return replace(content, columns=columns)
     known = tracks.read_tracks(content.read_needed(tracks.NAME), stored.events, stored.angles)
     measured = measure_gait(known, edits)
-    return replace(content, bundle=apply_review(stored, measured, edits), columns=measured.columns)
+    reviewed = apply_review(stored, measured, edits)
+    # as an analysis stores them: what is not finite is undefined
+    rows: list[dict[str, Any]] = [parameter_row(p) for p in reviewed.parameters]
+    reviewed = replace(reviewed, parameters=tuple(Parameter(**row) for row in rows))
+    return replace(content, bundle=reviewed, columns=measured.columns)

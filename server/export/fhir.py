@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import uuid
+from collections.abc import Sequence
 from typing import Any, Final
 
 from core.frames import Side
@@ -69,7 +70,7 @@ def write_fhir(content: ExportContent) -> bytes:
         "subject": {"reference": patient},
         **({} if v.day is None else {"effectiveDateTime": v.day}),
     }
-    values = [p for p in content.bundle.parameters if p.unit in UCUM]
+    values = content.bundle.parameters
     observations = {
         _address(content, f"{p.name} {p.side}"): _observe(p) | shared | {"device": {"reference": device}}
         for p in values
@@ -138,6 +139,11 @@ def _quantity(value: float, unit: str, ucum: str) -> dict[str, Any]:
     }
 
 
+def _ucum(unit: str) -> str:
+    """A unit in UCUM; one that it does not know is an annotation."""
+    return UCUM.get(unit, f"{{{unit}}}")
+
+
 def _absent(why: str) -> dict[str, Any]:
     system = "http://terminology.hl7.org/CodeSystem/data-absent-reason"
     return {"coding": [{"system": system, "code": "unknown"}], "text": why}
@@ -154,12 +160,12 @@ def _observe(p: Parameter) -> dict[str, Any]:
         found["bodySite"] = {"text": SIDE_WORDS[p.side]}
     if p.mean is None:
         return found | {"dataAbsentReason": _absent(reason_words(p.reason))}
-    found["valueQuantity"] = _quantity(p.mean, p.unit, UCUM[p.unit])
+    found["valueQuantity"] = _quantity(p.mean, p.unit, _ucum(p.unit))
     given = {"strides_behind": p.n, "standard_deviation": p.sd, "uncertainty_95": p.uncertainty}
     found["component"] = [
         {
             "code": _code(name, SPREAD[name][0]),
-            "valueQuantity": _quantity(value, p.unit if own is None else "", own or UCUM[p.unit]),
+            "valueQuantity": _quantity(value, p.unit if own is None else "", own or _ucum(p.unit)),
         }
         for name, value in given.items()
         if value is not None
@@ -179,7 +185,7 @@ def _describe_patient(content: ExportContent) -> dict[str, Any]:
     return found | ({} if v.sex is None else {"gender": v.sex})
 
 
-def _define_codes(values: list[Parameter]) -> dict[str, Any]:
+def _define_codes(values: Sequence[Parameter]) -> dict[str, Any]:
     """The part of our catalogue that the bundle uses."""
     words = dict((REPORT, PANEL)) | {name: text for name, (text, _) in SPREAD.items()}
     concepts: list[dict[str, str]] = [{"code": code, "display": text} for code, text in words.items()]

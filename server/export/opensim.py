@@ -76,13 +76,13 @@ def find_coordinates(angles: JointAngles) -> dict[str, Floats]:
     """Coordinate → (n,) rad, NaN where not known.
 
     The pelvis turns in OpenSim about z, x, y of ground (tilt, list, rotation), not about y, x, z as in ours.
-    Its rotation is that of its own heading, from 0 at the mean.
+    Its rotation is that of its own heading, from 0 where the take begins.
     """
     given = angles.angles
     found: dict[str, Floats] = {}
     if "pelvis_tilt" in given:
         heading = angles.headings.get("pelvis")
-        turned = np.zeros(len(angles.t_s)) if heading is None else heading - _mean(heading)
+        turned = np.zeros(len(angles.t_s)) if heading is None else heading - _find_first(heading)
         q = multiply(about(1, turned), about(0, -given["pelvis_obliquity"]))
         tilt, side_down, rotation = cardan_zxy(multiply(q, about(2, -given["pelvis_tilt"]))).T
         found |= {"pelvis_tilt": tilt, "pelvis_list": side_down}
@@ -96,9 +96,9 @@ def find_coordinates(angles: JointAngles) -> dict[str, Floats]:
     return found
 
 
-def _mean(heading: Floats) -> float:
+def _find_first(heading: Floats) -> float:
     known = heading[np.isfinite(heading)]
-    return float(known.mean()) if len(known) else 0.0
+    return float(known[0]) if len(known) else 0.0
 
 
 def write_orientations(poses: Poses, worn: Collection[str]) -> bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import io
+from math import isfinite
 from typing import Final
 
 import xlsxwriter
@@ -41,7 +42,7 @@ def write_workbook(content: ExportContent) -> bytes:
             for j, value in enumerate(row):
                 if isinstance(value, str):
                     sheet.write_string(i, j, value)
-                elif isinstance(value, (int, float)):
+                elif isinstance(value, (int, float)) and isfinite(value):
                     sheet.write_number(i, j, value)
         sheet.freeze_panes(1, 0)
         if table.rows:

@@ -58,7 +58,9 @@ def show_data(
     with db.read() as c:
         context = read_context(c, sid)
         context |= list_downloads(c, blobs, sid, results=who.may(Action.READ_RESULT))
-        context["video"] = videos.find(c, sid) if who.may(Action.READ_RESULT) else None
+        context["exports"] = _list_exports(c, context)
+        seen = who.may(Action.READ_RESULT) and context["session"].has_video
+        context["video"] = videos.find(c, sid) if seen else None
     record_opening(request, who, "session", sid)
     return render_page(request, db, who, "data.html", "patients", **context)
 
@@ -70,7 +72,6 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
     shown = found[0] if found else None
     stored = {} if shown is None else json.loads(analyses.file_bytes(blobs, shown, "analysis.json"))
     files = [] if shown is None else [(shown.id, name, blob.size) for name, blob in shown.files.items()]
-    written = [] if shown is None else _list_exports(c, session_id)
     return {
         "analysis": shown,
         "estimator": estimator_view(stored.get("estimator")),
@@ -94,7 +95,6 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
             for analysis_id, name, size in files
             if not name.startswith(EXPORTED)
         ],
-        "exports": written,
         "originals": [
             {**vars(f), "href": f"/api/v1/sessions/{session_id}/files/{quote(f.name)}" if results else None}
             for f in (this.files if this else ())
@@ -104,15 +104,19 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
     }
 
 
-def _list_exports(c: Connection, session_id: str) -> list[dict[str, Any]]:
-    """The formats for other programs: to download, at work, or to be asked for."""
+def _list_exports(c: Connection, context: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The formats for other programs: to download, at work, or to be asked for; none without an analysis."""
+    shown = context["analysis"]
+    if shown is None:
+        return []
+    offers = exports.list_offers(c, context["patient"], context["session"], shown)
     found = [
         {
             **vars(offer),
             "job": None if offer.job is None else view_job(offer.job),
             "href": offer.file and f"/api/v1/analyses/{offer.analysis_id}/files/{quote(offer.file)}",
         }
-        for offer in exports.list_offers(c, session_id)
+        for offer in offers
     ]
     follow_few([offer["job"] for offer in found])
     return found

@@ -21,7 +21,9 @@ from server.jobs.queue import EXPORT, VIEW_COLUMNS, Claim, JobQueue, JobView, jo
 from server.services import analyses, edit_log, patients, sessions
 from server.services.errors import Conflict
 from server.services.histories import AnalysedSession
+from server.services.patients import Patient
 from server.services.provenance import CODE_VERSION
+from server.services.sessions import Session
 from server.services.shown_take import make_key, submit_for
 from server.storage.blobs import Blob
 from server.storage.tables import analysis_file, job
@@ -48,21 +50,18 @@ class ExportOffer:
     file: str | None
 
 
-def list_offers(c: Connection, session_id: str) -> list[ExportOffer]:
-    """Every format that can be written of the analysis that a session shows, and how far it is.
+def list_offers(
+    c: Connection, patient: Patient, session: Session, found: analyses.AnalysisRecord
+) -> list[ExportOffer]:
+    """Every format that an analysis of a session can be written in, and how far it is.
 
     What was written before the last edit, or before person or visit were corrected, is offered anew.
-
-    Raises
-    ------
-    NotFound
-        the session, its analysis.
     """
-    found = analyses.get_shown(c, session_id)
     possible = kinds.list_possible(found.files)
-    params = _collect_params(c, found)
+    params = _collect_params(c, patient, session, found)
     keys = {kind.name: make_key(found, EXPORT, {**params, "kind": kind.name}) for kind in possible}
-    rows = c.execute(select(*VIEW_COLUMNS, job.c.key).where(job.c.key.in_(keys.values())).order_by(job.c.seq))
+    query = select(*VIEW_COLUMNS, job.c.key).where(job.c.key.in_(keys.values())).order_by(job.c.seq)
+    rows: list[Any] = list(c.execute(query))
     newest = {row.key: job_view(row) for row in rows}
     return [_offer(found, kind, newest.get(keys[kind.name])) for kind in possible]
 
@@ -91,7 +90,8 @@ def submit(
         raise Conflict(
             "export_not_possible", f"This analysis has no {lacking}, which “{chosen.label}” is made from."
         )
-    params = {**_collect_params(c, found), "kind": kind}
+    session, patient = sessions.get(c, session_id), patients.get(c, found.patient_id)
+    params = {**_collect_params(c, patient, session, found), "kind": kind}
     return submit_for(c, queue, actor, found, EXPORT, "export.requested", params)
 
 
@@ -121,7 +121,9 @@ def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob]) -> None:
         c.execute(insert(analysis_file).values(analysis_id=claim.params["analysis_id"], **row))
 
 
-def _collect_params(c: Connection, found: analyses.AnalysisRecord) -> dict[str, Any]:
+def _collect_params(
+    c: Connection, patient: Patient, session: Session, found: analyses.AnalysisRecord
+) -> dict[str, Any]:
     """What an export is written from, fixed at submission."""
     edits = edit_log.edits_of(c, found.id)
     return {
@@ -133,13 +135,12 @@ def _collect_params(c: Connection, found: analyses.AnalysisRecord) -> dict[str, 
         ],
         "analysis_id": found.id,
         "edits": [e.to_json() for e in edits.edits],
-        "visit": _describe_visit(c, found, edits).to_json(),
+        "visit": _describe_visit(patient, AnalysedSession(session, found, edits)).to_json(),
     }
 
 
-def _describe_visit(c: Connection, found: analyses.AnalysisRecord, edits: edit_log.EditHistory) -> VisitFacts:
-    session = sessions.get(c, found.session_id)
-    patient = patients.get(c, found.patient_id)
+def _describe_visit(patient: Patient, analysed: AnalysedSession) -> VisitFacts:
+    session = analysed.session
     return VisitFacts(
         subject=_digest(patient.id),
         code=patient.code,
@@ -150,7 +151,7 @@ def _describe_visit(c: Connection, found: analyses.AnalysisRecord, edits: edit_l
         age_years=session.performed_on.year - patient.birth_year if patient.birth_year else None,
         height_m=session.height_m if session.height_m is not None else patient.height_m,
         affected_side=patient.affected_side,
-        condition=AnalysedSession(session, found, edits).condition.words,
+        condition=analysed.condition.words,
         version=CODE_VERSION,
     )
 

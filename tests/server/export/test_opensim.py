@@ -45,7 +45,7 @@ def moved(seed: int) -> dict[Segment, Floats]:
 
     def swing(size: float) -> Floats:
         rates, phases = rng.uniform(0.3, 1.5, (2, 3))
-        return size * np.sin(2.0 * np.pi * np.outer(t, rates) + phases)
+        return np.asarray(size * np.sin(2.0 * np.pi * np.outer(t, rates) + phases))
 
     neutral = from_matrix(R_NEUTRAL)
     q: dict[Segment, Floats] = {"pelvis": multiply(about(2, 1.2 * t), multiply(neutral, exp(swing(0.15))))}
@@ -67,7 +67,7 @@ def measure(q: dict[Segment, Floats]) -> JointAngles:
                 found[f"{name}_{SUFFIX[side]}"] = (right if side == "right" else left) * part
     n = len(tilt)
     oriented = SimpleNamespace(t_s=np.arange(n) / 50.0, q=q, valid=dict.fromkeys(q, np.ones(n, bool)))
-    return JointAngles(oriented.t_s, found, {}, headings=compute_headings(oriented))  # type: ignore[arg-type]
+    return JointAngles(oriented.t_s, found, {}, headings=compute_headings(oriented))
 
 
 def test_the_models_axes_turned_by_the_coordinates_give_the_segments() -> None:
