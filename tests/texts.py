@@ -69,12 +69,14 @@ WORDS: Final = frozenset(
         """
     above acceleration active admin affected after ago anatomical and ankle assessment assessments
     consistent inconsistent points assistant bad bar barefoot bars baseline before below both bouts cane chest
-    clinician copies copy
-    crutch days early ended estimated exact fading failed fast faster feet female flexion foot frontal
+    centimetres clinician copies copy
+    crutch days degrees early ended estimated exact fading failed fast faster feet female flexion foot frontal
+    further
     good gravity harness heading higher hip inclination inside insoles inward kinematic knee larger late
     left less longer low lower male mean measured median months more moving narrower no none norm norms
-    now off outward paused pelvis points poor probe reconstruction repetitions right rollator sagittal
-    shank shoes shorter silent slow slower smaller socks squat squats steps steps/min stick still
+    now off outward pace paused pelvis points poor probe push-off reconstruction repetitions rhythm right
+    rollator sagittal
+    shank shoes shorter silent slow slower smaller socks squat squats step steps steps/min stick still
     straighter stride strides tests thigh threshold training trainings transverse treadmill trunk turns
     unaffected unknown usable viewer walk walking week wider yes
         """,
