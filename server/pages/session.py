@@ -9,6 +9,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
+from core.events.result import Strides
 from core.frames import SIDES
 from core.parameters.catalogue.entry import SQUAT
 from core.parameters.result import Parameter
@@ -37,6 +38,7 @@ from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import FRAGMENT, record_opening, render_page, render_sheets
 from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
 from server.report import level
+from server.report.bundle import read_poses
 from server.report.change_words import NO_LIMIT, ChangeWords, find_term, format_difference
 from server.report.curves import GLANCE_STRIDES, strip_svg
 from server.report.model import ReportModel
@@ -44,6 +46,7 @@ from server.report.profile import ProfileBar, bar_svg
 from server.report.table import ParameterRow
 from server.report.wording import format_number, speak_places
 from server.services import (
+    analyses,
     comparisons,
     feedback,
     histories,
@@ -59,6 +62,7 @@ from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
 from server.storage.db import Database
+from server.viewer.still import draw_still
 from web.words import day, seconds
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -277,6 +281,7 @@ def _draw_report(
             for p in model.panels
             if (overview or paper) and p.variable.name in FIRST_CURVES and p.sides
         ],
+        "still": _draw_still(reviewed, this, bundle.strides, patient) if paper and used else None,
         "strip": strip_svg(bundle.strides, model.duration_s) if 0 < total <= STRIP_STRIDES else "",
         "drawn": "some strides" if overview and max(model.used.values()) > GLANCE_STRIDES else "",
         "stride_words": f"{used} of {total} used",
@@ -293,6 +298,21 @@ def _draw_report(
         ),
         "has_poses": "poses.parquet" in found.files,
     }
+
+
+def _draw_still(
+    reviewed: ReviewedAnalyses, this: AnalysedSession, strides: Strides, patient: Patient
+) -> dict[str, str] | None:
+    """The figure at a contact in the middle of the walk, with its caption; None where it has no poses."""
+    if "poses.parquet" not in this.found.files:
+        return None
+    counted = [s for s in strides.strides if s.excluded_reason is None]
+    mine = [s for s in counted if s.side == patient.affected_side] or counted
+    middle = mine[len(mine) // 2]
+    caption = f"Contact, {middle.side} foot"
+    poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))
+    svg = draw_still(poses, middle.start_s, middle.side, caption)
+    return None if svg is None else {"svg": svg, "caption": caption}
 
 
 def view_takes(

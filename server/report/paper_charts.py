@@ -17,7 +17,7 @@ SVG: Final = "{http://www.w3.org/2000/svg}"
 
 SHEET_PX: Final = 703
 """Width of a sheet between its margins (web/static/css/pdf.css): 210 mm without 2 × 12 mm."""
-WIDTHS_PX: Final = {"r-kin": 230, "r-map": 130, "r-trends": 342}
+WIDTHS_PX: Final = {"r-glance": 197, "r-kin": 230, "r-map": 130, "r-trends": 342, "dayrow": 627}
 """Width of a chart by what it stands in."""
 
 LABEL_PX: Final = 12
@@ -58,8 +58,9 @@ def read_chart_styles(styles: str) -> ChartStyles:
             s.strip().removeprefix(".chart ") for s in selectors.split(",") if s.strip().startswith(".chart ")
         ]
         if inside and not any("halo" in s for s in inside):
-            said = [d for d in body.split(";") if d.strip() and d.split(":")[0].strip() not in _NOT_HERE]
-            rules.append(f"{', '.join(inside)} {{ {_write_out(';'.join(said), tokens)} }}")
+            said = [d.strip() for d in body.split(";") if d.strip()]
+            said = [d for d in said if d.split(":")[0] not in _NOT_HERE]
+            rules.append(f"{', '.join(inside)} {{ {_write_out('; '.join(said), tokens)} }}")
         margin = re.search(r"padding:([^;]+)", body)
         if margin is not None and (chart := re.fullmatch(r"\.chart\.([\w-]+)", selectors.strip())):
             margins[chart[1]] = _read_margin(margin[1])
@@ -74,12 +75,13 @@ def prepare_figures(page: Element, styles: ChartStyles) -> None:
     """Rewrite every figure of a page in its tree."""
     parents = {child: parent for parent in page.iter() for child in parent}
     symbols = {s.get("id"): s for s in page.iter(f"{SVG}symbol")}
+    patterns = list(page.iter(f"{SVG}pattern"))
     for figure in [f for f in page.iter(f"{SVG}svg") if not parents[f].tag.startswith(SVG)]:
         above = [figure]
         while above[-1] in parents:
             above.append(parents[above[-1]])
         classes = [_classes(e) for e in above]
-        if "sprite" in classes[0]:
+        if classes[0] & {"sprite", "patterns"}:
             parents[figure].remove(figure)
             continue
         _inline_symbol(figure, symbols)
@@ -90,6 +92,8 @@ def prepare_figures(page: Element, styles: ChartStyles) -> None:
                 shape.set("stroke", styles.tokens[f"--{badge}-bg" if badge else "--surface"])
         if "chart" in classes[0] | classes[1]:
             _draw_chart(figure, classes, styles)
+            if any(value.startswith("url(#") for shape in figure.iter() for value in shape.attrib.values()):
+                SubElement(figure, f"{SVG}defs").extend(patterns)
 
 
 def _draw_chart(figure: Element, classes: list[set[str]], styles: ChartStyles) -> None:
@@ -178,7 +182,7 @@ def _classes(element: Element) -> set[str]:
 
 def _write_out(text: str, tokens: Mapping[str, str]) -> str:
     while (found := re.search(r"var\((--[\w-]+)\)", text)) is not None:
-        text = text.replace(found[0], tokens[found[1]])
+        text = text.replace(found[0], tokens.get(found[1], "inherit"))
     return text
 
 

@@ -28,7 +28,7 @@ PAGES = sorted(
     r.path
     for router in ROUTERS
     for r in router.routes
-    if isinstance(r, APIRoute) and "GET" in r.methods and not r.path.endswith(".pdf")
+    if isinstance(r, APIRoute) and "GET" in (r.methods or ()) and not r.path.endswith(".pdf")
 )
 QUERIES = {"/patients/{pid}/compare": "?visit={sid}&visit={other}"}
 ANSWERS = {
