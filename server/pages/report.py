@@ -132,12 +132,13 @@ def show_shared(
     address = address_of(request)
     throttle.check(SHARED, address)
     try:
-        with db.write() as c:
-            link = report_links.open_by_token(c, token, address)
+        with db.read() as c:
+            link = report_links.find_by_token(c, token)
     except LinkNotFound:
         throttle.fail(SHARED, address)
         trail.record_refused("report_link.refused", "session", None, address)
         raise
+    report_links.note_opening(db, link, address)
     return show_document(_open_signed(db, blobs, link.report_id, PSEUDONYMISED), is_shared=True)
 
 

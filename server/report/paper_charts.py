@@ -7,6 +7,7 @@ part of the figure, and the rules for charts go into it with their colours writt
 
 from __future__ import annotations
 
+import copy
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -93,7 +94,8 @@ def prepare_figures(page: Element, styles: ChartStyles) -> None:
         if "chart" in classes[0] | classes[1]:
             _draw_chart(figure, classes, styles)
             if any(value.startswith("url(#") for shape in figure.iter() for value in shape.attrib.values()):
-                SubElement(figure, f"{SVG}defs").extend(patterns)
+                # its own: the renderer changes what it draws
+                SubElement(figure, f"{SVG}defs").extend(copy.deepcopy(patterns))
 
 
 def _draw_chart(figure: Element, classes: list[set[str]], styles: ChartStyles) -> None:

@@ -17,10 +17,13 @@ from server import audit
 from server.auth.tokens import new_token, token_hash
 from server.services import signed_reports
 from server.services.errors import Conflict, NotFound, ServiceError
+from server.storage.db import Database
 from server.storage.tables import new_id, now, report_link, signed_report
 
 MOST_DAYS: Final = 90
 USUAL_DAYS: Final = 14
+QUIET: Final = dt.timedelta(minutes=1)
+"""Openings of a link within this time are one."""
 
 
 @dataclass(frozen=True)
@@ -113,21 +116,28 @@ def reopen_report(
     return found
 
 
-def open_by_token(c: Connection, token: str, address: str) -> ReportLink:
-    """The link of an address that somebody opened, counted and written down; raises LinkNotFound."""
+def find_by_token(c: Connection, token: str) -> ReportLink:
+    """The link of an address that leads to a report; raises LinkNotFound."""
     row = c.execute(select(*_COLUMNS).where(report_link.c.token_sha256 == token_hash(token))).first()
     found = None if row is None else ReportLink(**row._asdict())
     if found is None or not found.is_open:
         raise LinkNotFound
-    session_id = signed_reports.get(c, found.report_id).session_id
-    c.execute(
-        update(report_link)
-        .where(report_link.c.id == found.id)
-        .values(openings=report_link.c.openings + 1, opened_at=now())
-    )
-    detail = {"report_id": found.report_id, "link_id": found.id, "address": address[:64]}
-    audit.record(c, None, "report_link.opened", "session", session_id, detail)
     return found
+
+
+def note_opening(db: Database, link: ReportLink, address: str) -> None:
+    """Count and write down that somebody opened a link; once a minute, so that nobody fills the audit log."""
+    if link.opened_at is not None and now() - link.opened_at < QUIET:
+        return
+    with db.write() as c:
+        session_id = signed_reports.get(c, link.report_id).session_id
+        c.execute(
+            update(report_link)
+            .where(report_link.c.id == link.id)
+            .values(openings=report_link.c.openings + 1, opened_at=now())
+        )
+        detail = {"report_id": link.report_id, "link_id": link.id, "address": address[:64]}
+        audit.record(c, None, "report_link.opened", "session", session_id, detail)
 
 
 def get(c: Connection, link_id: str) -> ReportLink:

@@ -10,12 +10,13 @@ import json
 import re
 import select
 import socket
+import sys
 
 import pypdfium2
 import pytest
 import sqlalchemy as sa
 
-from server.report.pdf import render_pdf
+from server.report.pdf import PdfMissing, render_pdf
 from server.services import report_links
 from server.storage.tables import audit, now, report_link
 from tests.server import analysed
@@ -106,8 +107,8 @@ async def test_a_link_opens_one_report_without_account_or_code_until_it_ends(cli
     url, token = made.json()["url"], made.json()["url"].rpartition("/")[2]
     assert made.json()["qr"].startswith("data:image/svg+xml")
     async with clinic.client() as stranger:
-        answer = await stranger.get(url)
-    assert answer.status_code == 200
+        answer, again = await stranger.get(url), await stranger.get(url)
+    assert answer.status_code == again.status_code == 200
     for secret in ("S-3-CODE", "Jane", patient, session, token):
         assert secret not in answer.text
     assert answer.headers["referrer-policy"] == "no-referrer"
@@ -149,6 +150,13 @@ async def test_a_link_opens_one_report_without_account_or_code_until_it_ends(cli
         assert report_links.of_session(c, session) == []
     async with clinic.client("clinician") as client:
         assert (await client.get(f"/signed-reports/{report}")).status_code == 404
+
+
+def test_without_the_library_the_answer_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
+    with pytest.raises(PdfMissing, match=r"sagittal\[pdf\].*libpango") as refused:
+        render_pdf("<p>Nothing</p>")
+    assert refused.value.status == 501
 
 
 @pytest.mark.slow
