@@ -8,9 +8,12 @@ COPY sagittal sagittal
 COPY server server
 COPY web web
 COPY migrations migrations
-RUN python -m venv /opt/sagittal && /opt/sagittal/bin/pip install --no-cache-dir '.[c3d]'
+RUN python -m venv /opt/sagittal && /opt/sagittal/bin/pip install --no-cache-dir '.[c3d,pdf]'
 
 FROM python:3.13-slim
+# Pango lays out the text of PDFs
+RUN apt-get update && apt-get install -y --no-install-recommends libpango-1.0-0 libpangoft2-1.0-0 fonts-liberation \
+    && rm -rf /var/lib/apt/lists/*
 RUN useradd --uid 10001 --create-home --shell /usr/sbin/nologin sagittal \
     && mkdir /data && chown sagittal:sagittal /data
 COPY --from=build /opt/sagittal /opt/sagittal

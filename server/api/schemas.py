@@ -16,6 +16,7 @@ from server.jobs.queue import JobView
 from server.report.behind import StrideValue
 from server.services.notes import MOST_CHARACTERS
 from server.services.recordings import RecordedFile, RecordingState
+from server.services.report_links import MOST_DAYS, USUAL_DAYS
 from server.services.tunings import MOST_OF_SWARM, Scheme
 from server.storage.tables import now
 
@@ -188,6 +189,24 @@ class PatientChange(PatientNew):
     """What to change of a patient; members left out stay as they are."""
 
     code: Code = ""
+
+
+class Assessment(Request):
+    """The therapist's text on a report; empty or null = none."""
+
+    content: Note
+
+
+class Reopening(Request):
+    """Why a signed report is taken out of force."""
+
+    reason: Annotated[str, StringConstraints(min_length=1, max_length=MOST_CHARACTERS, pattern=_SOME_TEXT)]
+
+
+class ReportLinkNew(Request):
+    """How long somebody may read a report by a link."""
+
+    days: Annotated[int, Field(ge=1, le=MOST_DAYS)] = USUAL_DAYS
 
 
 class NoteNew(Request):

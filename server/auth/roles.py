@@ -37,6 +37,10 @@ class Action(StrEnum):
     READ_RESULT = "read_result"
     REVIEW = "review"
     """Changes events and decides which strides count."""
+    SIGN_REPORT = "sign_report"
+    """Writes the therapist's text, signs, reopens, makes and revokes links."""
+    READ_SHARED = "read_shared"
+    """Reads one signed report; the token in the address is the door."""
     RUN_LIVE = "run_live"
     """Opens a live take, looks at it and gives feedback."""
     PAIR = "pair"
@@ -59,6 +63,7 @@ PUBLIC: frozenset[Action] = frozenset(
         Action.LOAD_ASSET,
         Action.PAIR,
         Action.STREAM,
+        Action.READ_SHARED,
     }
 )
 """Actions that need no sign-in; all others do."""
@@ -83,6 +88,7 @@ POLICY: dict[Action, frozenset[Role]] = {
     Action.ANALYSE: _CLINICAL,
     Action.READ_RESULT: _READERS,
     Action.REVIEW: _CLINICAL,
+    Action.SIGN_REPORT: _CLINICAL,
     Action.RUN_LIVE: _CLINICAL,
     Action.READ_JOB: _ALL,
     Action.CANCEL_JOB: _UPLOADERS,

@@ -18,6 +18,14 @@ def allow_camera(origins: str) -> str:
     return f"camera={origins}, microphone=(), geolocation=()"
 
 
+def lock_document(style_sha256: str) -> str:
+    """Return the policy of a document that stands alone: one style in it, base64 of its hash, and no more."""
+    return (
+        f"default-src 'none'; style-src 'sha256-{style_sha256}'; img-src data:; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+
+
 _FIXED = {
     "Content-Security-Policy": CONTENT_POLICY,
     "X-Content-Type-Options": "nosniff",

@@ -47,6 +47,17 @@ DEEDS: Final[Mapping[str, str]] = {
     "analysis.file_opened": "downloaded a file of an analysis",
     "analysis.requested": "asked for an analysis",
     "report.opened": "read the report",
+    "assessment.written": "wrote the assessment on the report",
+    "signed_report.signed": "signed the report",
+    "signed_report.reopened": "reopened the signed report",
+    "signed_report.opened": "read the signed report",
+    "signed_reports.opened": "listed the signed reports",
+    "leaflet.opened": "opened the leaflet for the patient",
+    "course.opened": "opened the report over the visits",
+    "report_link.made": "made a link to the signed report",
+    "report_link.revoked": "revoked a link to the signed report",
+    "report_link.refused": "opened an address that leads to no report",
+    "report_link.opened": "read the signed report by a link",
     "numbers.opened": "looked at the values",
     "parameter.opened": "looked at the strides behind a value",
     "signals.opened": "looked at the signals",
@@ -108,6 +119,7 @@ DEEDS: Final[Mapping[str, str]] = {
 
 NOBODY: Final = "The system"
 STRANGER: Final = "Somebody"
+BY_STRANGERS: Final = ("sign_in.failed", "report_link.opened", "report_link.refused")
 
 
 @dataclass(frozen=True)
@@ -155,4 +167,4 @@ def describe_deed(action: str) -> str:
 def _name(row: Row[Any]) -> str:
     if row.user_name:
         return str(row.user_name)
-    return STRANGER if row.action == "sign_in.failed" else NOBODY
+    return STRANGER if row.action in BY_STRANGERS else NOBODY

@@ -16,7 +16,7 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import HEX_ID, Db, Id, Reviewed
 from server.pages.charts import COLUMNS, PAGE_HEIGHTS, caption_chart
-from server.pages.session import SECONDARY
+from server.pages.report_rows import SECONDARY
 from server.pages.shell import record_opening, render_page
 from server.report.comparison import ComparedRow
 from server.report.curves import cycle_svg

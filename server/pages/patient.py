@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
@@ -37,7 +37,6 @@ from server.storage.blobs import IntegrityError
 from server.storage.tables import now
 from web.words import number
 
-WALKS: Final = ("walk", "treadmill")
 """Protocols that say how a person walks."""
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -66,7 +65,7 @@ def show_patient(
         trained = next((w.content for w in written if w.ended_at is None), None)
         history = histories.read_history(reviewed, patient, done, plans)
         trend = draw_figures(history, None if trained is None else trained.parameter)
-    walked = histories.baseline([a for a in done if a.session.protocol in WALKS])
+    walked = histories.baseline([a for a in done if a.session.protocol in sessions.WALKS])
     return render_page(
         request, db, who, "patient.html", "patients",
         patient=view_patient(patient), visits=rows, today=now().date(),

@@ -2,39 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
+from core.events.result import Strides
 from core.frames import SIDES
-from core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
+from core.parameters.catalogue.entry import SQUAT
 from core.parameters.result import Parameter
 from server.auth.access import require
 from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Db, Id, Reviewed
 from server.pages import daily
-from server.pages.charts import COLUMNS, KEY_HEIGHT, PAGE_HEIGHTS, PAPER_HEIGHTS, draw_chart
+from server.pages.charts import (
+    COLUMNS,
+    GLANCE_HEIGHT,
+    KEY_HEIGHT,
+    PAGE_HEIGHTS,
+    PAPER_HEIGHTS,
+    draw_chart,
+)
+from server.pages.report_rows import (
+    FIRST_ROWS,
+    SECONDARY,
+    fold_groups,
+    select_first,
+    select_groups,
+    select_others,
+)
 from server.pages.session_context import lead_to_days, read_context
-from server.pages.shell import FRAGMENT, record_opening, render_page
+from server.pages.shell import FRAGMENT, record_opening, render_page, render_sheets
 from server.pages.words import PROTOCOL_NAMES, TEST_NAMES, describe_person
 from server.report import level
+from server.report.bundle import read_poses
 from server.report.change_words import NO_LIMIT, ChangeWords, find_term, format_difference
 from server.report.curves import GLANCE_STRIDES, strip_svg
 from server.report.model import ReportModel
 from server.report.profile import ProfileBar, bar_svg
-from server.report.table import BEYOND_SD, ParameterRow
+from server.report.table import ParameterRow
 from server.report.wording import format_number, speak_places
-from server.services import comparisons, feedback, histories, repairs, reports, videos, visits
+from server.services import (
+    analyses,
+    comparisons,
+    feedback,
+    histories,
+    repairs,
+    reports,
+    signed_reports,
+    videos,
+    visits,
+)
 from server.services.controls import ControlVisit
 from server.services.histories import AnalysedSession
 from server.services.patients import Patient
 from server.services.reviewed import ReviewedAnalyses
 from server.services.sessions import Session
 from server.storage.db import Database
+from server.viewer.still import draw_still
 from web.words import day, seconds
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -44,49 +72,12 @@ SEVERITIES: Final = ("bad", "warn", "info")
 NO_STRIDE_CODES: Final = ("foot_missing", "no_strides", "few_steps")
 """Notices that explain a take without strides."""
 
-SECONDARY: Final = (
-    "Parts of stance and swing",
-    "Walking and turning",
-    "Regularity of the trunk",
-    "Support in seconds",
-)
-"""Groups for those who look closer: folded on the page, not on paper."""
-
-MATTERING: Final = (
-    "gait_speed_mps",
-    "cadence_spm",
-    "step_length_m",
-    "stance_pct",
-    "double_support_pct",
-    "knee_flexion_max_swing_deg",
-    "hip_flexion_min_deg",
-    "ankle_dorsiflexion_ic_deg",
-    "foot_pitch_ic_deg",
-    "pci_pct",
-    "foot_pitch_tc_deg",
-    "max_heel_clearance_m",
-    "circumduction_m",
-    "stride_time_s",
-    "step_time_s",
-    "step_regularity_v",
-    "stride_regularity_v",
-    "harmonic_ratio_v",
-    "step_count",
-    "walking_duration_min",
-)
-"""What a therapist reads first, of what the sensors can give."""
-
-FIRST_ROWS: Final = 10
-
 OVERVIEW, PAPER, VALUES = "session.html", "print.html", "_values.html"
 
 STRIP_STRIDES: Final = 150
 """A longer walk has too many strides to be told apart beside the figure; the timeline shows them."""
 
 FIRST_CURVES: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
-
-NOT_ON_PAPER: Final = ("swing_pct", "swing_time_s", "turning_angle_deg")
-"""What the rest of a stride leaves, and what a straight walk has none of."""
 
 SHOWN: Final = (
     "problem",
@@ -167,9 +158,45 @@ def _show_report(
     who: Identity,
     template: str,
 ) -> Response:
+    context = gather_report(db, reviewed, sid, who, template)
+    if context["report"] is None and template == PAPER:
+        return RedirectResponse(f"/sessions/{sid}", status_code=303)
+    if template == "kinematics.html" and (elsewhere := lead_to_days(context)):
+        return elsewhere
+    if template == VALUES:
+        request.app.state.trail.record_watched(who, "numbers.opened", "session", sid)
+    else:
+        record_opening(request, who, "session", sid)
+    shown = choose_template(template, context)
+    if template == PAPER:
+        return render_sheets(request, who, shown, **context)
+    return render_page(request, db, who, shown, "patients", **context)
+
+
+def choose_template(template: str, context: Mapping[str, Any]) -> str:
+    """The template of a page, of daily life its own."""
+    is_daily = context["session"].protocol == "activity"
+    return daily.TEMPLATES.get(template, template) if is_daily else template
+
+
+def gather_report(
+    db: Database,
+    reviewed: ReviewedAnalyses,
+    sid: str,
+    who: Identity,
+    template: str,
+    hide: Callable[[dict[str, Any]], None] = lambda context: None,
+) -> dict[str, Any]:
+    """What a page or the sheets of a session's report show; `report` is None where nothing is analysed.
+
+    Parameters
+    ----------
+    hide : takes out of patient and session what is not to be shown.
+    """
     paper = template == PAPER
     with db.read() as c:
         context = read_context(c, sid)
+        hide(context)
         patient = context["patient"]
         done = histories.list_analysed(c, patient.id) if who.may(Action.READ_RESULT) else []
         this = next((a for a in done if a.session.id == sid), None)
@@ -186,22 +213,15 @@ def _show_report(
                 if repair is not None:
                     context["repair_says"] = [speak_places(s) for s in repair.evidence]
                     context["repair_changes"] = [speak_places(s) for s in repair.changes]
-    if this is None and paper:
-        return RedirectResponse(f"/sessions/{sid}", status_code=303)
+        if paper:
+            context["assessment"] = signed_reports.read_assessment(c, sid)
     if this is not None:
         context["report"] = view_report(reviewed, this, context, page=template)
+        context["analysis"] = this.found
         if template == OVERVIEW:
             context["takes"] = view_takes(reviewed, done, sid, context["report"]["first"])
         context["feedback"] = feedback.view(reviewed, trained)
-    if template == "kinematics.html" and (elsewhere := lead_to_days(context)):
-        return elsewhere
-    if context["session"].protocol == "activity":
-        template = daily.TEMPLATES.get(template, template)
-    if template == VALUES:
-        request.app.state.trail.record_watched(who, "numbers.opened", "session", sid)
-    else:
-        record_opening(request, who, "session", sid)
-    return render_page(request, db, who, template, "patients", **context)
+    return context
 
 
 def view_report(
@@ -257,19 +277,42 @@ def _draw_report(
         "replay": _list_for_clock(model, FIRST_CURVES) if overview else model.replay,
         "curves": [] if overview else _draw_panels(model, PAPER_HEIGHTS if paper else PAGE_HEIGHTS),
         "sagittal": [
-            draw_chart(p, KEY_HEIGHT, x_unit=True, glance=True)
+            draw_chart(p, GLANCE_HEIGHT if paper else KEY_HEIGHT, x_unit=overview, glance=True)
             for p in model.panels
-            if overview and p.variable.name in FIRST_CURVES and p.sides
+            if (overview or paper) and p.variable.name in FIRST_CURVES and p.sides
         ],
+        "still": _draw_still(reviewed, this, bundle.strides, patient) if paper and used else None,
         "strip": strip_svg(bundle.strides, model.duration_s) if 0 < total <= STRIP_STRIDES else "",
         "drawn": "some strides" if overview and max(model.used.values()) > GLANCE_STRIDES else "",
         "stride_words": f"{used} of {total} used",
         "empty_reason": explain_emptiness(model),
         "identity": _identity(patient, session, model.condition),
-        "provenance_line": f"Sagittal {found.code_version} · settings {found.config_sha256[:8]} · "
-        f"input {found.input_sha256[:8]} · {day(found.created_at)}",
+        "provenance_line": " · ".join(
+            (
+                f"Sagittal {found.code_version}",
+                *(() if model.estimator is None else (model.estimator.name,)),
+                f"settings {found.config_sha256[:8]}",
+                f"input {found.input_sha256[:8]}",
+                day(found.created_at),
+            )
+        ),
         "has_poses": "poses.parquet" in found.files,
     }
+
+
+def _draw_still(
+    reviewed: ReviewedAnalyses, this: AnalysedSession, strides: Strides, patient: Patient
+) -> dict[str, str] | None:
+    """The figure at a contact in the middle of the walk, with its caption; None where it has no poses."""
+    if "poses.parquet" not in this.found.files:
+        return None
+    counted = [s for s in strides.strides if s.excluded_reason is None]
+    mine = [s for s in counted if s.side == patient.affected_side] or counted
+    middle = mine[len(mine) // 2]
+    caption = f"Contact, {middle.side} foot"
+    poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))
+    svg = draw_still(poses, middle.start_s, middle.side, caption)
+    return None if svg is None else {"svg": svg, "caption": caption}
 
 
 def view_takes(
@@ -373,68 +416,6 @@ def _list_for_clock(model: ReportModel, variables: Sequence[str]) -> dict[str, A
     spans: Sequence[Mapping[str, Any]] = model.replay["strides"]  # type: ignore[assignment]
     strides = [[s["side"], s["start_s"], s["end_s"], int(s["used"])] for s in spans]
     return {**model.replay, "strides": strides, "curves": {v: curves[v] for v in variables if v in curves}}
-
-
-def select_first(model: ReportModel) -> tuple[ParameterRow, ...]:
-    """The ten rows that matter most of what these sensors gave, in fixed order; of squats and tests all.
-
-    An angle from the anatomical zero stands in for the same one from standing.
-    """
-    rows = {row.name: row for _, group in model.groups for row in group}
-    if model.squats is not None:
-        return tuple(row for row in rows.values() if row.group == SQUAT)
-    if model.functional is not None and not model.strides:
-        return tuple(row for row in rows.values() if row.group in FUNCTIONAL and row.reason is None)
-    from_zero = {level.from_standing(name): row for name, row in rows.items()}
-    found = (from_zero.get(name) or rows.get(name) for name in MATTERING)
-    return tuple(row for row in found if row is not None and row.reason is None)[:FIRST_ROWS]
-
-
-def fold_groups(model: ReportModel, first: Sequence[ParameterRow]) -> list[dict[str, Any]]:
-    """All other rows by group; the head of each says how many are beyond the norm, so that none hides."""
-    shown = {row.name for row in first}
-    groups = ((name, [row for row in rows if row.name not in shown]) for name, rows in model.groups)
-    return [{"name": name, "rows": rows, "words": _count_beyond(rows)} for name, rows in groups if rows]
-
-
-def _count_beyond(rows: Sequence[ParameterRow]) -> str:
-    beyond = sum(
-        any(c is not None and c.z is not None and abs(c.z) > BEYOND_SD for c in (r.both, r.left, r.right))
-        for r in rows
-    )
-    values = f"{len(rows)} value{'' if len(rows) == 1 else 's'}"
-    return f"{values}, {beyond} beyond {BEYOND_SD:g} SD" if beyond else values
-
-
-def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[ParameterRow, ...]]]:
-    """The parameter table; empty when not one number was found, because then one sentence says more.
-
-    On paper only what was measured has a row; `missing` says the rest in one line.
-    """
-    groups = [(name, rows) for name, rows in model.groups if name not in SECONDARY]
-    if all(row.reason for _, rows in groups for row in rows):
-        return []
-    if not paper:
-        return groups
-    # a level from the anatomical zero says more than the same one from standing
-    known = {level.from_standing(r.name) for name, rows in groups if name == level.GROUP for r in rows}
-    left_out = {*NOT_ON_PAPER, *known}
-    short = (
-        (name, tuple(r for r in rows if r.reason is None and r.name not in left_out)) for name, rows in groups
-    )
-    return [(name, rows) for name, rows in short if rows]
-
-
-def select_others(
-    model: ReportModel, first: Sequence[ParameterRow]
-) -> list[tuple[str, tuple[ParameterRow, ...]]]:
-    """The rows of paper that are not among the first ones."""
-    shown = {row.name for row in first}
-    short = (
-        (name, tuple(r for r in rows if r.name not in shown))
-        for name, rows in select_groups(model, paper=True)
-    )
-    return [(name, rows) for name, rows in short if rows]
 
 
 def explain_emptiness(model: ReportModel) -> str:

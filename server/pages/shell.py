@@ -45,10 +45,12 @@ def render_page(
     """Render a page; `here` = its entry in the navigation."""
     with db.read() as c:
         running = jobs.count_active(c)
+    return render_sheets(request, who, template, nav=NAVIGATION, here=here, running=running, **context)
+
+
+def render_sheets(request: Request, who: Identity, template: str, **context: object) -> Response:
+    """Render sheets of paper: a page without navigation."""
     shell = {
-        "nav": NAVIGATION,
-        "here": here,
-        "running": running,
         "signed_in": who.name,
         "version": CODE_VERSION,
         "may": lambda action: who.may(Action(action)),

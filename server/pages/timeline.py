@@ -15,7 +15,8 @@ from server.auth.roles import Action
 from server.context import Db, Id, OpenTrail, Reviewed
 from server.http.templates import render
 from server.pages.charts import KEY_HEIGHT, draw_chart
-from server.pages.session import explain_emptiness, select_first
+from server.pages.report_rows import select_first
+from server.pages.session import explain_emptiness
 from server.pages.session_context import lead_to_days, read_context
 from server.pages.shell import FRAGMENT, record_opening, render_page
 from server.services import analyses, edit_log, reports, signals

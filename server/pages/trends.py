@@ -169,8 +169,13 @@ def _pick_side(trend: Trend, affected: Side | None) -> TrendSeries:
     return max(trend.lines, key=lambda line: abs(line.points[-1].value - norm.mean))
 
 
-def view_trends(history: PatientHistory, chosen: Sequence[str]) -> dict[str, Any]:
-    """The trends page: charts of the chosen figures, the choice, limits with sources, and the table."""
+def view_trends(history: PatientHistory, chosen: Sequence[str], height: int = 196) -> dict[str, Any]:
+    """The trends page: charts of the chosen figures, the choice, limits with sources, and the table.
+
+    Parameters
+    ----------
+    height : of a chart in px.
+    """
     there = names_in(history.visits)
     names = [n for n in there if n in chosen] or [n for n in PRIMARY if n in there]
     names = names or list(there[: len(PRIMARY)])
@@ -182,7 +187,7 @@ def view_trends(history: PatientHistory, chosen: Sequence[str]) -> dict[str, Any
             {"name": name, "title": term.label, "unit": term.unit, "on": name in names}
         )
     return {
-        **_shown(history, found, height=196),
+        **_shown(history, found, height),
         "groups": list(groups.items()),
         "query": "&".join(f"show={name}" for name in names),
         "condition": None if history.condition is None else history.condition.words,

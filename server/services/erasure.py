@@ -31,6 +31,7 @@ from server.storage.db import Database
 from server.storage.tables import (
     analysis,
     analysis_file,
+    assessment,
     device_check,
     edit,
     filter_run,
@@ -47,8 +48,11 @@ from server.storage.tables import (
     recording,
     recording_file,
     reference_file,
+    report_file,
+    report_link,
     session,
     session_video,
+    signed_report,
     tuning,
 )
 from server.storage.tables import audit as audit_table
@@ -120,6 +124,11 @@ def _erase_session_rows(c: Connection, session_id: str) -> list[str]:
     c.execute(delete(filter_run).where(filter_run.c.analysis_id.in_(analyses)))
     c.execute(delete(reference_file).where(reference_file.c.session_id == session_id))
     c.execute(delete(session_video).where(session_video.c.session_id == session_id))
+    signed = select(signed_report.c.id).where(signed_report.c.session_id == session_id).scalar_subquery()
+    c.execute(delete(report_link).where(report_link.c.report_id.in_(signed)))
+    c.execute(delete(report_file).where(report_file.c.report_id.in_(signed)))
+    c.execute(delete(signed_report).where(signed_report.c.session_id == session_id))
+    c.execute(delete(assessment).where(assessment.c.session_id == session_id))
     c.execute(delete(edit).where(edit.c.analysis_id.in_(analyses)))
     c.execute(delete(analysis_file).where(analysis_file.c.analysis_id.in_(analyses)))
     c.execute(delete(analysis).where(analysis.c.recording_id.in_(recordings)))

@@ -14,8 +14,10 @@ from server.storage.tables import (
     recording,
     recording_file,
     reference_file,
+    report_file,
     session,
     session_video,
+    signed_report,
 )
 
 
@@ -30,6 +32,7 @@ def list_referenced(c: Connection, session_id: str | None = None) -> set[tuple[s
         (analysis_file.c.sha256, of_analysis.join(analysis_file)),
         (reference_file.c.sha256, of_session.join(reference_file)),
         (session_video.c.sha256, of_session.join(session_video)),
+        (report_file.c.sha256, of_session.join(signed_report).join(report_file)),
         (filter_run_file.c.sha256, of_run.join(filter_run_file)),
         # what a run was held against stays, also when the file was replaced
         (filter_run.c.reference_sha256, of_run),

@@ -7,7 +7,9 @@ patient ─< session ─< recording ─< recording_file          user ─< login
         │          │      ├──< job ─── analysis ─< edit (append-only, undo is a row too)
         │          │      │               └──< filter_run ─< filter_run_file
         │          │      └──< device_check (of the session's last published analysis)
-        │          └──< reference_file, session_video (at most one)
+        │          ├──< reference_file, session_video (at most one), assessment (at most one)
+        │          └──< signed_report ─< report_file
+        │                             └──< report_link
         ├──< patient_note
         ├──< programme ─< planned_visit ─── session (at most one each)
         └──< prescription ─< live_take >── session, recording (the one it became)
@@ -16,33 +18,32 @@ patient ─< session ─< recording ─< recording_file          user ─< login
 
 from __future__ import annotations
 
-import datetime as dt
-import uuid
-from collections.abc import Sequence
-
 from sqlalchemy import (
     DDL,
-    JSON,
     Boolean,
     CheckConstraint,
     Column,
     Date,
-    DateTime,
-    Dialect,
     Float,
     ForeignKey,
     Index,
     Integer,
-    MetaData,
     String,
     Table,
     Text,
-    TypeDecorator,
     UniqueConstraint,
     event,
     false,
     text,
 )
+
+from server.storage.columns import Json, Utc
+from server.storage.columns import id_column as _id
+from server.storage.columns import metadata as metadata
+from server.storage.columns import new_id as new_id
+from server.storage.columns import now as now
+from server.storage.columns import one_of as _one_of
+from server.storage.columns import reference as _ref
 
 SEXES = ("female", "male")
 SIDES = ("left", "right")
@@ -58,65 +59,6 @@ LIVE_EVENT_KINDS = (
     "ghost", "test", "prescription", "stale", "calibration", "cue", "guard", "notice",
 )  # fmt: skip
 EDIT_KINDS = ("move_event", "add_event", "delete_event", "exclude_stride", "include_stride", "undo")
-
-
-def new_id() -> str:
-    """A fresh random id: 32 hex digits of a uuid4."""
-    return uuid.uuid4().hex
-
-
-def now() -> dt.datetime:
-    """The time as tables keep it: aware, UTC."""
-    return dt.datetime.now(dt.UTC)
-
-
-class Utc(TypeDecorator[dt.datetime]):
-    """An aware time, stored as UTC; naive times are refused."""
-
-    impl = DateTime(timezone=True)
-    cache_ok = True
-
-    def process_bind_param(self, value: dt.datetime | None, dialect: Dialect) -> dt.datetime | None:
-        """Refuse a naive time, store UTC."""
-        if value is None:
-            return None
-        if value.tzinfo is None:
-            raise ValueError(f"{value} has no time zone; give an aware time.")
-        utc = value.astimezone(dt.UTC)
-        return utc.replace(tzinfo=None) if dialect.name == "sqlite" else utc
-
-    def process_result_value(self, value: dt.datetime | None, dialect: Dialect) -> dt.datetime | None:
-        """Give back an aware UTC time."""
-        if value is None:
-            return None
-        return value.replace(tzinfo=dt.UTC) if value.tzinfo is None else value.astimezone(dt.UTC)
-
-
-metadata = MetaData(
-    naming_convention={
-        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
-        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
-        "ck": "ck_%(table_name)s_%(constraint_name)s",
-        "fk": "fk_%(table_name)s_%(column_0_N_name)s_%(referred_table_name)s",
-        "pk": "pk_%(table_name)s",
-    }
-)
-
-Json = JSON(none_as_null=True)
-
-
-def _id() -> Column[str]:
-    return Column("id", String(32), primary_key=True)
-
-
-def _ref(name: str, target: str, *, nullable: bool = False, index: bool = True) -> Column[str]:
-    key = ForeignKey(f"{target}.id", ondelete="RESTRICT")
-    return Column(name, String(32), key, nullable=nullable, index=index)
-
-
-def _one_of(column: str, values: Sequence[str]) -> CheckConstraint:
-    quoted = ", ".join(f"'{v}'" for v in values)
-    return CheckConstraint(f"{column} IN ({quoted})", name=column)
 
 
 patient = Table(
@@ -325,6 +267,58 @@ session_video = Table(
     Column("consent_by", String(64)),  # who said that the person agreed; no key, as accounts may go
     Column("consent_at", Utc, nullable=False),
     CheckConstraint("size >= 0", name="size"),
+)
+
+assessment = Table(
+    "assessment",
+    metadata,
+    Column("session_id", ForeignKey("session.id", ondelete="RESTRICT"), primary_key=True),
+    Column("content", Text, nullable=False),  # of the therapist, on the report
+    Column("changed_at", Utc, nullable=False),
+)
+
+signed_report = Table(
+    "signed_report",
+    metadata,
+    _id(),
+    _ref("session_id", "session"),
+    Column("number", Integer, nullable=False),  # version of the session's report, from 1
+    Column("analysis_id", String(32), nullable=False),  # what it was made from; no key: it stands by itself
+    Column("language", String(8), nullable=False),
+    Column("signed_by", String(200)),  # the name it bears; no key, as accounts may go
+    Column("signed_at", Utc, nullable=False),
+    Column("reopened_by", String(200)),
+    Column("reopened_at", Utc),  # None: in force
+    Column("reopened_because", Text),
+    UniqueConstraint("session_id", "number"),
+    CheckConstraint("(reopened_at IS NULL) = (reopened_because IS NULL)", name="reopened"),
+)
+
+report_file = Table(
+    "report_file",
+    metadata,
+    Column("report_id", ForeignKey("signed_report.id", ondelete="RESTRICT"), primary_key=True),
+    Column("name", String(32), primary_key=True),
+    Column("size", Integer, nullable=False),
+    Column("sha256", String(64), nullable=False, index=True),
+    CheckConstraint("size >= 0", name="size"),
+)
+
+report_link = Table(
+    "report_link",
+    metadata,
+    _id(),
+    _ref("report_id", "signed_report"),
+    Column(
+        "token_sha256", String(64), nullable=False, unique=True
+    ),  # the token itself is only in the address
+    Column("made_by", String(200)),
+    Column("made_at", Utc, nullable=False),
+    Column("expires_at", Utc, nullable=False),
+    Column("revoked_at", Utc),
+    Column("openings", Integer, nullable=False),
+    Column("opened_at", Utc),  # last
+    CheckConstraint("openings >= 0", name="openings"),
 )
 
 filter_run = Table(

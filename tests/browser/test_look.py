@@ -43,6 +43,9 @@ PAGES: dict[str, Address] = {
     "algorithms": lambda f: f"/sessions/{f.done}/algorithms",
     "data": lambda f: f"/sessions/{f.done}/data",
     "print": lambda f: f"/sessions/{f.done}/print",
+    "report": lambda f: f"/sessions/{f.done}/report",
+    "leaflet": lambda f: f"/sessions/{f.done}/leaflet",
+    "course": lambda f: f"/patients/{f.patient}/course",
     "jobs": lambda f: "/jobs",
     "sensors": lambda f: "/sensors",
     "users": lambda f: "/users",
@@ -52,7 +55,7 @@ PAGES: dict[str, Address] = {
 }
 """Name of a screenshot → address."""
 
-PAPER = {"print"}
+PAPER = {"print", "leaflet", "course"}
 """A sheet of A4 has its own width; it scrolls inside the page on small screens."""
 
 OUT = {"sign-in", "set-up", "capture"}
@@ -123,7 +126,7 @@ def sheets(page: Page) -> int:
     return pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ")
 
 
-def test_ctrl_p_prints_the_report_of_three_sheets_and_elsewhere_a_clean_page(
+def test_ctrl_p_prints_the_report_of_four_sheets_and_elsewhere_a_clean_page(
     opened: Opener, filled: Filled
 ) -> None:
     page = opened("/patients")
@@ -138,7 +141,7 @@ def test_ctrl_p_prints_the_report_of_three_sheets_and_elsewhere_a_clean_page(
     page.keyboard.press("Control+p")
     page.wait_for_url(re.compile(r"/print$"))
     page.wait_for_function("() => window.printed")
-    assert sheets(page) == 3
+    assert sheets(page) == 4
 
 
 @pictures

@@ -24,11 +24,17 @@ MOST = 20
 MANY = 30
 """Of everything that a page of the full clinic lists or looks through."""
 
-PAGES = sorted(r.path for router in ROUTERS for r in router.routes if isinstance(r, APIRoute))
+PAGES = sorted(
+    r.path
+    for router in ROUTERS
+    for r in router.routes
+    if isinstance(r, APIRoute) and "GET" in (r.methods or ()) and not r.path.endswith(".pdf")
+)
 QUERIES = {"/patients/{pid}/compare": "?visit={sid}&visit={other}"}
 ANSWERS = {
     "/": 303,
     "/patients/{pid}/compare": 303,
+    "/r/{token}": 404,
     "/set-up/{token}": 404,
     "/texts/{language}/{version}.json": 404,
 }
@@ -56,6 +62,8 @@ async def full(
             clinic.user("viewer", f"viewer-{i}")
         with clinic.db.read() as c:
             pid = sessions.get(c, last).patient_id
+        async with clinic.client("admin") as client:
+            report_id = (await client.post(f"/sessions/{last}/report/sign", json={})).json()["id"]
         yield (
             clinic,
             {
@@ -63,6 +71,7 @@ async def full(
                 "sid": last,
                 "other": earlier[-1],
                 "name": "stance_pct",
+                "report_id": report_id,
                 "token": "x" * 43,
                 "language": "en",
                 "version": "none",

@@ -1,0 +1,95 @@
+"""The therapist's text on a report, the versions that were signed, and the links to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import segno
+from fastapi import APIRouter, Request
+
+from server.api import schemas
+from server.api.documents import refusals
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Db, Id, OpenTrail
+from server.http.json_body import StrictJsonRoute
+from server.services import report_links, sessions, signed_reports
+from server.services.report_links import ReportLink
+from server.services.signed_reports import SignedReport
+
+router = APIRouter(route_class=StrictJsonRoute, tags=["report"])
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+Signer = Annotated[Identity, require(Action.SIGN_REPORT)]
+
+
+@dataclass(frozen=True)
+class NewReportLink:
+    """A link that was just made: its address is told this once.
+
+    Parameters
+    ----------
+    url : for whoever is to read the report. qr : the same as a picture, an address `data:image/svg+xml`.
+    """
+
+    link: ReportLink
+    url: str
+    qr: str
+
+
+@router.put("/sessions/{session_id}/assessment", status_code=204, responses=refusals(409))
+def write_assessment(session_id: Id, body: schemas.Assessment, db: Db, who: Signer) -> None:
+    """Write the therapist's text on the report; empty = none."""
+    with db.write() as c:
+        signed_reports.write_assessment(c, who, session_id, body.content or "")
+
+
+@router.get("/sessions/{session_id}/signed-reports", response_model=list[SignedReport])
+def list_signed(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[SignedReport]:
+    """All versions that were signed, the newest first."""
+    with db.read() as c:
+        sessions.get(c, session_id)
+        found = signed_reports.of_session(c, session_id)
+    trail.record_opened(who, "signed_reports.opened", "session", session_id)
+    return found
+
+
+@router.post("/signed-reports/{report_id}/reopen", response_model=SignedReport, responses=refusals(409))
+def reopen(report_id: Id, body: schemas.Reopening, db: Db, who: Signer) -> SignedReport:
+    """Take a signed report out of force with a reason, and end its links; it stays and can be read."""
+    with db.write() as c:
+        return report_links.reopen_report(c, who, report_id, body.reason, who.display_name)
+
+
+@router.get("/sessions/{session_id}/report-links", response_model=list[ReportLink])
+def list_links(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[ReportLink]:
+    """The links to the signed reports of a session, the newest first; their addresses are not known."""
+    with db.read() as c:
+        sessions.get(c, session_id)
+        found = report_links.of_session(c, session_id)
+    trail.record_opened(who, "signed_reports.opened", "session", session_id)
+    return found
+
+
+@router.post(
+    "/signed-reports/{report_id}/links",
+    status_code=201,
+    response_model=NewReportLink,
+    responses=refusals(409),
+)
+def make_link(
+    report_id: Id, body: schemas.ReportLinkNew, request: Request, db: Db, who: Signer
+) -> NewReportLink:
+    """Make a link by which somebody without an account reads this report, without the patient's code."""
+    with db.write() as c:
+        link, token = report_links.make(c, who, report_id, body.days, who.display_name)
+    url = f"{request.base_url}r/{token}"
+    return NewReportLink(link, url, segno.make(url, micro=False).svg_data_uri(scale=4, border=2))
+
+
+@router.delete("/report-links/{link_id}", response_model=ReportLink)
+def revoke_link(link_id: Id, db: Db, who: Signer) -> ReportLink:
+    """End a link now."""
+    with db.write() as c:
+        return report_links.revoke(c, who, link_id)

@@ -1,0 +1,69 @@
+"""Documents that stand alone: the sheets of a page with their styles in them, without scripts."""
+
+from __future__ import annotations
+
+import base64
+import functools
+import hashlib
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+from markupsafe import Markup
+from starlette.responses import Response
+
+from server.http.headers import allow_camera, lock_document
+from server.http.templates import TEMPLATES
+from server.pages.assets import STATIC
+from server.pages.words import PROTOCOL_NAMES
+
+SHEETS: Final = ("tokens", "base", "pages", "visits", "daily", "paper")
+"""Style sheets of paper, in their order."""
+
+_STYLE: Final = re.compile(r"<style>(.*?)</style>", re.DOTALL)
+
+
+@functools.cache
+def read_styles() -> str:
+    """The style sheets of paper in one."""
+    return "\n".join((STATIC / "css" / f"{name}.css").read_text("utf-8") for name in SHEETS)
+
+
+def write_document(language: str, template: str, context: Mapping[str, Any]) -> bytes:
+    """Write a document that stands alone: a signed report, or what a PDF is made of."""
+    page = TEMPLATES[language].get_template(template)
+    return page.render({**context, "styles": Markup(read_styles())}).encode()  # noqa: S704 - ours
+
+
+def hide_person(context: dict[str, Any], number: str) -> None:
+    """Take out of a report's patient and session what leads to the person; a number stands for the code."""
+    patient, session = context["patient"], context["session"]
+    context["patient"] = replace(patient, code=number, note="")
+    title = PROTOCOL_NAMES.get(session.protocol, session.protocol)
+    context["session"] = replace(session, patient_code=number, title=title, note="")
+
+
+def show_document(content: bytes, *, is_shared: bool = False) -> Response:
+    """Answer with a document that stands alone: nothing is loaded, no script runs.
+
+    Parameters
+    ----------
+    is_shared : it is for somebody without an account; no page learns from where it was opened.
+    """
+    found = _STYLE.search(content.decode())
+    digest = hashlib.sha256((found[1] if found else "").encode()).digest()
+    headers = {
+        "Content-Security-Policy": lock_document(base64.b64encode(digest).decode()),
+        "Permissions-Policy": allow_camera("()"),
+        "X-Robots-Tag": "noindex, nofollow, noarchive",
+    }
+    if is_shared:
+        headers["Referrer-Policy"] = "no-referrer"
+    return Response(content, media_type="text/html; charset=utf-8", headers=headers)
+
+
+def show_pdf(content: bytes, name: str) -> Response:
+    """Answer with a PDF that the browser shows."""
+    headers = {"Content-Disposition": f'inline; filename="{name}"'}
+    return Response(content, media_type="application/pdf", headers=headers)

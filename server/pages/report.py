@@ -1,0 +1,160 @@
+"""A session's report as a document: its PDF, signing, its versions, and who may read it by a link."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse
+from starlette.responses import Response
+
+from server.auth.access import require
+from server.auth.identity import Identity
+from server.auth.roles import Action
+from server.context import Blobs, Config, Db, Failures, Id, OpenTrail, Reviewed, address_of
+from server.http.json_body import StrictJsonRoute
+from server.http.templates import language_of
+from server.pages.paper import hide_person, show_document, show_pdf, write_document
+from server.pages.session import PAPER, choose_template, gather_report
+from server.pages.session_context import read_context
+from server.pages.shell import record_opening, render_page
+from server.services import analyses, pdfs, report_links, signed_reports
+from server.services.errors import NotFound
+from server.services.report_links import LinkNotFound
+from server.services.reviewed import ReviewedAnalyses
+from server.services.signed_reports import DOCUMENT, PSEUDONYMISED
+from server.storage.blobs import BlobStore
+from server.storage.db import Database
+from server.storage.tables import new_id
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse, route_class=StrictJsonRoute)
+
+SHARED = "report_link"
+"""Whose failed attempts are counted when somebody guesses addresses of reports."""
+
+Reader = Annotated[Identity, require(Action.READ_RESULT)]
+
+
+@router.get("/sessions/{sid}/report")
+def show_desk(request: Request, db: Db, sid: Id, who: Reader) -> Response:
+    """The therapist's text, signing, the versions that were signed, the links to them."""
+    with db.read() as c:
+        context = read_context(c, sid)
+        if analyses.latest(c, sid) is None:
+            return RedirectResponse(f"/sessions/{sid}", status_code=303)
+        context["assessment"] = signed_reports.read_assessment(c, sid)
+        context["versions"] = signed_reports.of_session(c, sid)
+        context["in_force"] = next((r for r in context["versions"] if r.in_force), None)
+        context["links"] = report_links.of_session(c, sid)
+    context["numbers"] = {r.id: r.number for r in context["versions"]}
+    context |= {"usual_days": report_links.USUAL_DAYS, "most_days": report_links.MOST_DAYS}
+    record_opening(request, who, "session", sid)
+    return render_page(request, db, who, "report.html", "patients", **context)
+
+
+@router.get("/sessions/{sid}/report.pdf")
+def make_draft(
+    request: Request,
+    db: Db,
+    reviewed: Reviewed,
+    trail: OpenTrail,
+    settings: Config,
+    sid: Id,
+    who: Reader,
+) -> Response:
+    """The report as it stands now, as PDF; it says that it is not signed."""
+    context = _gather(db, reviewed, sid, who)
+    trail.record_opened(who, "report.opened", "session", sid)
+    document = write_document(language_of(request), choose_template(PAPER, context), context)
+    return show_pdf(pdfs.make_pdf(settings, document), f"report-{sid[:8]}.pdf")
+
+
+@router.post("/sessions/{sid}/report/sign", status_code=201, response_class=JSONResponse)
+def sign(
+    request: Request,
+    db: Db,
+    reviewed: Reviewed,
+    blobs: Blobs,
+    sid: Id,
+    who: Annotated[Identity, require(Action.SIGN_REPORT)],
+) -> dict[str, str]:
+    """Sign the report as it stands now: its document is made once, kept, and locked."""
+    report_id, language = new_id(), language_of(request)
+    with db.read() as c:
+        signature = signed_reports.prepare_signature(c, sid, report_id, who.display_name)
+    written: dict[str, bytes] = {}
+    hides: Mapping[str, Callable[[dict[str, Any]], None]] = {
+        DOCUMENT: lambda context: None,
+        PSEUDONYMISED: lambda context: hide_person(context, f"R-{report_id[:8]}"),
+    }
+    context: dict[str, Any] = {}
+    for name, hide in hides.items():
+        context = _gather(db, reviewed, sid, who, hide) | {"signature": signature}
+        written[name] = write_document(language, choose_template(PAPER, context), context)
+    space = context["session"].patient_id
+    stored = {name: blobs.put(space, content) for name, content in written.items()}
+    with db.write() as c:
+        for blob in stored.values():
+            blobs.require(space, blob.sha256)
+        shown = context["analysis"].id
+        found = signed_reports.keep_signed(c, who, signature, sid, shown, language, stored)
+    return {"id": found.id, "sha256": found.sha256}
+
+
+@router.get("/signed-reports/{report_id}")
+def show_signed(db: Db, blobs: Blobs, trail: OpenTrail, report_id: Id, who: Reader) -> Response:
+    """A signed report, byte by byte as it was signed."""
+    content = _open_signed(db, blobs, report_id)
+    with db.read() as c:
+        session_id = signed_reports.get(c, report_id).session_id
+    trail.record_opened(who, "signed_report.opened", "session", session_id, {"report_id": report_id})
+    return show_document(content)
+
+
+@router.get("/signed-reports/{report_id}/report.pdf")
+def show_signed_pdf(
+    db: Db, blobs: Blobs, trail: OpenTrail, settings: Config, report_id: Id, who: Reader
+) -> Response:
+    """The same as PDF."""
+    with db.read() as c:
+        found = signed_reports.get(c, report_id)
+    trail.record_opened(who, "signed_report.opened", "session", found.session_id, {"report_id": report_id})
+    content = pdfs.read_signed_pdf(db, blobs, settings, report_id)
+    return show_pdf(content, f"report-{found.session_id[:8]}-version-{found.number}.pdf")
+
+
+@router.get("/r/{token}", dependencies=[require(Action.READ_SHARED)])
+def show_shared(
+    request: Request, db: Db, blobs: Blobs, trail: OpenTrail, throttle: Failures, token: str
+) -> Response:
+    """The report that a link leads to, for who has its address; without the patient's code."""
+    address = address_of(request)
+    throttle.check(SHARED, address)
+    try:
+        with db.read() as c:
+            link = report_links.find_by_token(c, token)
+    except LinkNotFound:
+        throttle.fail(SHARED, address)
+        trail.record_refused("report_link.refused", "session", None, address)
+        raise
+    report_links.note_opening(db, link, address)
+    return show_document(_open_signed(db, blobs, link.report_id, PSEUDONYMISED), is_shared=True)
+
+
+def _open_signed(db: Database, blobs: BlobStore, report_id: str, name: str = DOCUMENT) -> bytes:
+    with db.read() as c:
+        return signed_reports.read_document(c, blobs, report_id, name)
+
+
+def _gather(
+    db: Database,
+    reviewed: ReviewedAnalyses,
+    sid: str,
+    who: Identity,
+    hide: Callable[[dict[str, Any]], None] = lambda context: None,
+) -> dict[str, Any]:
+    context = gather_report(db, reviewed, sid, who, PAPER, hide)
+    if context["report"] is None:
+        raise NotFound("analysis of session", sid)
+    return context

@@ -1,0 +1,69 @@
+"""A document that stands alone as PDF, by WeasyPrint (BSD-3-Clause; needs the system's Pango).
+
+Nothing is fetched: styles are in the document, pictures in `data:` addresses; any other address is refused.
+Imported by a process of its own only (server/services/paper_child.py): the library takes a second and 130 MB.
+"""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Final
+from xml.etree.ElementTree import Element, SubElement
+
+from core.errors import SagittalError
+from server.report.paper_charts import prepare_figures, read_chart_styles
+
+STYLES: Final = Path(__file__).parents[2] / "web" / "static" / "css" / "pdf.css"
+
+MISSING: Final = (
+    "This server makes no PDF: WeasyPrint or the system library Pango is missing. Install 'sagittal[pdf]' "
+    "and libpango-1.0-0, libpangoft2-1.0-0; or print the page and choose PDF as the printer."
+)
+
+
+class PdfMissing(SagittalError):  # noqa: N818 - says what is missing
+    """The library that makes PDFs is not installed."""
+
+    status = 501
+
+    def __init__(self) -> None:
+        super().__init__("pdf_missing", MISSING)
+
+
+def render_pdf(html: str) -> bytes:
+    """Render a document; the same document gives the same bytes.
+
+    Raises
+    ------
+    PdfMissing
+    """
+    try:
+        from weasyprint import HTML
+        from weasyprint.urls import URLFetcher
+    except (ImportError, OSError) as error:  # OSError: Pango is not there
+        logging.getLogger(__name__).warning("no PDF can be made: %s", error)
+        raise PdfMissing from error
+    # it says of every rule for screens that paper does not know it
+    logging.getLogger("weasyprint").setLevel(logging.ERROR)
+    logging.getLogger("weasyprint.progress").setLevel(logging.ERROR)
+    document = HTML(string=html, url_fetcher=URLFetcher(allowed_protocols={"data"}))
+    page: Element = document.etree_element
+    styles = "".join(style.text or "" for style in page.iter("style"))
+    prepare_figures(page, read_chart_styles(styles))
+    _move_foot(page)
+    # the last one, so that it goes before those of the document
+    SubElement(next(page.iter("head")), "style").text = STYLES.read_text("utf-8")
+    content: bytes = document.write_pdf()
+    return content
+
+
+def _move_foot(page: Element) -> None:
+    """The foot of the first sheet goes to the start, from where each page takes it; the others go."""
+    parents = {child: parent for parent in page.iter() for child in parent}
+    feet = [e for e in page.iter("footer") if "r-foot" in e.get("class", "").split()]
+    for foot in feet:
+        parents[foot].remove(foot)
+    if feet:
+        body = next(page.iter("body"))
+        body.insert(0, feet[0])

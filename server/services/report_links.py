@@ -1,0 +1,158 @@
+"""Links by which somebody without an account reads one signed report: they expire and can be revoked.
+
+Whoever has the address may read, so the address holds a random token of 256 bits that is shown once. The
+database keeps its hash and finds it by that: how long this takes tells nothing of the token. What a link
+opens bears a number instead of the patient's code. Who reopens a report ends its links.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from typing import Final
+
+from sqlalchemy import Connection, insert, select, update
+
+from server import audit
+from server.auth.tokens import new_token, token_hash
+from server.services import signed_reports
+from server.services.errors import Conflict, NotFound, ServiceError
+from server.storage.db import Database
+from server.storage.tables import new_id, now, report_link, signed_report
+
+MOST_DAYS: Final = 90
+USUAL_DAYS: Final = 14
+QUIET: Final = dt.timedelta(minutes=1)
+"""Openings of a link within this time are one."""
+
+
+@dataclass(frozen=True)
+class ReportLink:
+    """A link as people may see it; its address is not known any more.
+
+    Parameters
+    ----------
+    openings, opened_at : how often it was opened, and when last.
+    """
+
+    id: str
+    report_id: str
+    made_by: str | None
+    made_at: dt.datetime
+    expires_at: dt.datetime
+    revoked_at: dt.datetime | None
+    openings: int
+    opened_at: dt.datetime | None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether its address still leads to the report."""
+        return self.revoked_at is None and self.expires_at > now()
+
+
+class LinkNotFound(ServiceError):  # noqa: N818 - as NotFound
+    """No report under this address: unknown, expired, revoked; which one is not said."""
+
+    status = 404
+
+    def __init__(self) -> None:
+        super().__init__(
+            "link_not_valid",
+            "This address leads to no report any more. Ask the clinic for a new one.",
+        )
+
+
+def make(
+    c: Connection, actor: audit.Actor | None, report_id: str, days: int, name: str
+) -> tuple[ReportLink, str]:
+    """Make a link; the token is told here and never again.
+
+    Raises
+    ------
+    NotFound
+        the report. ServiceError: bad_value. Conflict: not_in_force, of a report that was reopened.
+    """
+    found = signed_reports.get(c, report_id)
+    if not found.in_force:
+        raise Conflict("not_in_force", f"Version {found.number} was reopened. Share the one that is signed.")
+    if not 1 <= days <= MOST_DAYS:
+        raise ServiceError("bad_value", f"A link lives {days} days, expected 1 to {MOST_DAYS}.")
+    token, link_id, time = new_token(), new_id(), now()
+    c.execute(
+        insert(report_link).values(
+            id=link_id,
+            report_id=report_id,
+            token_sha256=token_hash(token),
+            made_by=name,
+            made_at=time,
+            expires_at=time + dt.timedelta(days=days),
+            openings=0,
+        )
+    )
+    detail = {"report_id": report_id, "link_id": link_id, "days": days}
+    audit.record(c, actor, "report_link.made", "session", found.session_id, detail)
+    return get(c, link_id), token
+
+
+def revoke(c: Connection, actor: audit.Actor | None, link_id: str) -> ReportLink:
+    """End a link now; one that has ended stays as it is. Raises NotFound."""
+    found = get(c, link_id)
+    if found.revoked_at is None:
+        c.execute(update(report_link).where(report_link.c.id == link_id).values(revoked_at=now()))
+        session_id = signed_reports.get(c, found.report_id).session_id
+        detail = {"report_id": found.report_id, "link_id": link_id}
+        audit.record(c, actor, "report_link.revoked", "session", session_id, detail)
+    return get(c, link_id)
+
+
+def reopen_report(
+    c: Connection, actor: audit.Actor | None, report_id: str, reason: str, name: str
+) -> signed_reports.SignedReport:
+    """Take a signed report out of force and end its links; raises as `signed_reports.reopen`."""
+    found = signed_reports.reopen(c, actor, report_id, reason, name)
+    for link in of_session(c, found.session_id):
+        if link.report_id == report_id and link.is_open:
+            revoke(c, actor, link.id)
+    return found
+
+
+def find_by_token(c: Connection, token: str) -> ReportLink:
+    """The link of an address that leads to a report; raises LinkNotFound."""
+    row = c.execute(select(*_COLUMNS).where(report_link.c.token_sha256 == token_hash(token))).first()
+    found = None if row is None else ReportLink(**row._asdict())
+    if found is None or not found.is_open:
+        raise LinkNotFound
+    return found
+
+
+def note_opening(db: Database, link: ReportLink, address: str) -> None:
+    """Count and write down that somebody opened a link; once a minute, so that nobody fills the audit log."""
+    if link.opened_at is not None and now() - link.opened_at < QUIET:
+        return
+    with db.write() as c:
+        session_id = signed_reports.get(c, link.report_id).session_id
+        c.execute(
+            update(report_link)
+            .where(report_link.c.id == link.id)
+            .values(openings=report_link.c.openings + 1, opened_at=now())
+        )
+        detail = {"report_id": link.report_id, "link_id": link.id, "address": address[:64]}
+        audit.record(c, None, "report_link.opened", "session", session_id, detail)
+
+
+def get(c: Connection, link_id: str) -> ReportLink:
+    """One link; raises NotFound."""
+    row = c.execute(select(*_COLUMNS).where(report_link.c.id == link_id)).first()
+    if row is None:
+        raise NotFound("link", link_id)
+    return ReportLink(**row._asdict())
+
+
+def of_session(c: Connection, session_id: str) -> list[ReportLink]:
+    """The links to all versions of a session's report, the newest first."""
+    query = select(*_COLUMNS).join(signed_report).where(signed_report.c.session_id == session_id)
+    rows = c.execute(query.order_by(report_link.c.made_at.desc()))
+    return [ReportLink(**row._asdict()) for row in rows]
+
+
+_COLUMNS = tuple(report_link.c[name] for name in ReportLink.__dataclass_fields__)

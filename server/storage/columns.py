@@ -1,0 +1,80 @@
+"""What tables are made of: ids, times, JSON, references the rule of a few values, their names."""
+
+from __future__ import annotations
+
+import datetime as dt
+import uuid
+from collections.abc import Sequence
+
+from sqlalchemy import (
+    JSON,
+    CheckConstraint,
+    Column,
+    DateTime,
+    Dialect,
+    ForeignKey,
+    MetaData,
+    String,
+    TypeDecorator,
+)
+
+metadata = MetaData(
+    naming_convention={
+        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+        "ck": "ck_%(table_name)s_%(constraint_name)s",
+        "fk": "fk_%(table_name)s_%(column_0_N_name)s_%(referred_table_name)s",
+        "pk": "pk_%(table_name)s",
+    }
+)
+
+Json = JSON(none_as_null=True)
+
+
+def new_id() -> str:
+    """A fresh random id: 32 hex digits of a uuid4."""
+    return uuid.uuid4().hex
+
+
+def now() -> dt.datetime:
+    """The time as tables keep it: aware, UTC."""
+    return dt.datetime.now(dt.UTC)
+
+
+class Utc(TypeDecorator[dt.datetime]):
+    """An aware time, stored as UTC; naive times are refused."""
+
+    impl = DateTime(timezone=True)
+    cache_ok = True
+
+    def process_bind_param(self, value: dt.datetime | None, dialect: Dialect) -> dt.datetime | None:
+        """Refuse a naive time, store UTC."""
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError(f"{value} has no time zone; give an aware time.")
+        utc = value.astimezone(dt.UTC)
+        return utc.replace(tzinfo=None) if dialect.name == "sqlite" else utc
+
+    def process_result_value(self, value: dt.datetime | None, dialect: Dialect) -> dt.datetime | None:
+        """Give back an aware UTC time."""
+        if value is None:
+            return None
+        return value.replace(tzinfo=dt.UTC) if value.tzinfo is None else value.astimezone(dt.UTC)
+
+
+def id_column() -> Column[str]:
+    """The column of a table's own id."""
+    return Column("id", String(32), primary_key=True)
+
+
+def reference(name: str, target: str, *, nullable: bool = False, index: bool = True) -> Column[str]:
+    """A column of ids of another table, whose rows cannot go while this one refers to them."""
+    key = ForeignKey(f"{target}.id", ondelete="RESTRICT")
+    return Column(name, String(32), key, nullable=nullable, index=index)
+
+
+def one_of(column: str, values: Sequence[str]) -> CheckConstraint:
+    """The rule that a column holds one of these values."""
+    quoted = ", ".join(f"'{v}'" for v in values)
+    return CheckConstraint(f"{column} IN ({quoted})", name=column)

@@ -1,0 +1,92 @@
+"""One moment of the figure as a drawing for paper: its parts in outline, seen from the side of one leg."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from typing import Final
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, QhullError
+
+from core.body.poses import Poses
+from core.frames import Floats, Side
+from server.viewer.colours import Tint
+from server.viewer.few_poses import find_matrices
+from server.viewer.layout import FigureLayout
+from server.viewer.shapes import Mesh
+
+HEIGHT_PX: Final = 116
+WIDEST_PX: Final = 92
+CSS: Final[dict[Tint, str]] = {"left": "st-l", "right": "st-r", "body": "st-b", "ring": "st-g"}
+
+
+def draw_still(poses: Poses, t_s: float, near: Side, title: str) -> str | None:
+    """Draw the figure at a moment; None where a sensor was lost then, or nothing has a pose.
+
+    Parameters
+    ----------
+    near : leg that is in front. title : for those who hear the page.
+    """
+    frame = min(int(np.searchsorted(poses.t_s, t_s)), len(poses.t_s) - 1)
+    segments = tuple(poses.q)
+    if not segments or not poses.valid[frame]:
+        return None
+    q = np.array([[poses.q[s][frame] for s in segments]])
+    p = np.array([[poses.p[s][frame] for s in segments]])
+    if not (np.isfinite(q).all() and np.isfinite(p).all()):
+        return None
+    front = find_matrices(q[0, segments.index("pelvis") if "pelvis" in segments else 0])[:2, 0]
+    layout = FigureLayout(segments, poses.body, poses.method)
+    parts = []
+    for batch in layout.divide(layout.place(q, p)).values():
+        turns = find_matrices(batch.wxyz[0].astype(np.float64))
+        for k, (tint, measured) in enumerate(zip(batch.tint, batch.measured, strict=True)):
+            for points in _split(batch.mesh):
+                outline, depth = _project(points @ turns[k].T + batch.position[0, k], front, near)
+                parts.append((depth, CSS[tint] + ("" if measured else " st-f"), outline))
+    parts.sort(key=lambda part: -part[0])
+    return _write([(css, outline) for _, css, outline in parts if len(outline)], title)
+
+
+def _split(mesh: Mesh) -> Iterator[Floats]:
+    """The vertices of each closed surface of a mesh."""
+    vertices, faces = mesh
+    a, b = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
+    joined = coo_array((np.ones(len(a)), (a, b)), shape=(len(vertices), len(vertices)))
+    count, which = connected_components(joined, directed=False)
+    for k in range(count):
+        yield vertices[which == k].astype(np.float64)
+
+
+def _project(points: Floats, front: Floats, near: Side) -> tuple[Floats, float]:
+    """Outline (n, 2) m, to the right and up, and how far from who looks; a surface on edge has none."""
+    along = front / np.linalg.norm(front) * (1.0 if near == "right" else -1.0)
+    away = np.array([-along[1], along[0]])  # to the left of who looks along `along`
+    flat = np.column_stack((points[:, :2] @ along, points[:, 2]))
+    try:
+        outline = flat[ConvexHull(flat).vertices]
+    except QhullError:
+        outline = flat[:0]
+    return outline, float((points[:, :2] @ away).mean())
+
+
+def _write(parts: list[tuple[str, Floats]], title: str) -> str:
+    every = np.concatenate([outline for _, outline in parts])
+    (left, low), (right, high) = every.min(axis=0), every.max(axis=0)
+    low = min(low, 0.0)
+    scale = min((HEIGHT_PX - 4) / (high - low), (WIDEST_PX - 4) / (right - left))
+    width, height = scale * (right - left) + 4, scale * (high - low) + 4
+    drawn = []
+    for css, outline in parts:
+        x, y = 2 + scale * (outline[:, 0] - left), 2 + scale * (high - outline[:, 1])
+        path = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x, y, strict=True))
+        drawn.append(f'<path class="{css}" d="M{path}z"/>')
+    floor = 2 + scale * high
+    return (
+        f'<svg class="chart still" width="{width:.0f}" height="{height:.0f}" '
+        f'viewBox="0 0 {width:.1f} {height:.1f}" role="img"><title>{escape(title)}</title>'
+        f'<line class="ax" x1="0" x2="{width:.1f}" y1="{floor:.1f}" y2="{floor:.1f}"/>{"".join(drawn)}</svg>'
+    )
