@@ -44,12 +44,21 @@ def keep(make: Callable[P, R]) -> Callable[P, R]:
 
     Parameters
     ----------
-    make : gives the same for the same arguments; what it gives is never changed, and can be pickled.
+    make : gives the same for the same arguments, and reads no recording; what it gives is never changed, and
+        can be pickled.
     """
+    return _keep(make, "")
 
+
+def keep_recorded(make: Callable[P, R]) -> Callable[P, R]:
+    """As `keep`, of what a function makes of real recordings: others, or none, have values of their own."""
+    return _keep(make, os.environ.get("SAGITTAL_DATA", ""))
+
+
+def _keep(make: Callable[P, R], recordings: str) -> Callable[P, R]:
     @functools.lru_cache(IN_MEMORY)
     def kept(*args: P.args, **kwargs: P.kwargs) -> R:
-        said = f"{make.__module__}.{make.__qualname__}{args}{sorted(kwargs.items())}"
+        said = f"{make.__module__}.{make.__qualname__}{args}{sorted(kwargs.items())}{recordings}"
         path = folder() / hashlib.sha256(said.encode()).hexdigest()[:32]
         with _locked(path.with_suffix(".lock")):
             if not path.exists():
@@ -80,8 +89,8 @@ def folder() -> Path:
 
 @functools.cache
 def hash_sources() -> str:
-    """16 hexadecimal digits that change with every source and with the folder of the recordings."""
-    digest = hashlib.sha256(os.environ.get("SAGITTAL_DATA", "").encode())
+    """16 hexadecimal digits that change with every source."""
+    digest = hashlib.sha256()
     for name in SOURCES:
         for path in sorted((ROOT / name).rglob("*")):
             if path.suffix in (".py", ".csv", ".json"):

@@ -22,7 +22,7 @@ from core.simulate.script import Script, SingleSteps
 from core.simulate.walker import SIGN, Walker
 from core.timeline import synchronise
 from tests.data import data_folder
-from tests.kept import keep
+from tests.kept import keep, keep_recorded
 
 NEURA = {
     "00B40B91": "pelvis", "00B40C45": "thigh_l", "00B40C3C": "thigh_r", "00B40BA5": "shank_l",
@@ -59,13 +59,13 @@ def neura_recording() -> Recording:
     return read_recording(files, manifest)
 
 
-@keep
+@keep_recorded
 def neura_walk() -> UniformRecording:
     """The same on the uniform axis."""
     return synchronise(neura_recording())
 
 
-@keep
+@keep_recorded
 def neura_analysis() -> TakeAnalysis:
     """What the product makes of it."""
     return analyse(neura_recording())

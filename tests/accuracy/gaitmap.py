@@ -16,7 +16,7 @@ from core.frames import SIDES, Floats, Side
 from core.pipeline import TakeAnalysis, analyse
 from core.recording import Recording
 from tests.data import data_folder
-from tests.kept import keep
+from tests.kept import keep_recorded
 
 RATE = 204.8
 COPIES = ("imu_sample.csv", "imu_sample_not_rotated.csv")
@@ -77,7 +77,7 @@ def recording_of(x: Floats, rate_hz: float) -> Recording:
     return read_recording([SourceFile(name, len(data), lambda: data)], manifest)
 
 
-@keep
+@keep_recorded
 def analysed() -> TakeAnalysis:
     """What the product makes of the first copy."""
     return analyse(recording_of(signals(COPIES[0]), RATE))

@@ -17,7 +17,7 @@ from core.frames import GRAVITY, Floats
 from core.recording import ImuStream, Recording, UniformRecording
 from core.timeline import synchronise
 from tests.data import data_folder
-from tests.kept import keep
+from tests.kept import keep_recorded
 
 TRIALS = (("Test5", "Trial1"), ("Test5", "Trial2"), ("Test11", "Trial1"))
 """Two straight walks of 5 m, and daily life for two minutes: one healthy older adult."""
@@ -73,7 +73,7 @@ def recording(trial: tuple[str, str]) -> Recording:
     return Recording({"LowerBack": stream}, {"LowerBack": "pelvis"})
 
 
-@keep
+@keep_recorded
 def uniform(trial: tuple[str, str]) -> UniformRecording:
     """The same on the uniform axis."""
     return synchronise(recording(trial))

@@ -28,7 +28,7 @@ from core.fusion.mahony import estimate_orientations
 from core.fusion.orientations import Orientations
 from core.rotation import from_matrix, multiply, rotate
 from tests.data import data_folder
-from tests.kept import keep
+from tests.kept import keep_recorded
 from tests.walks import neura_walk
 
 HEIGHT_M = 1.70
@@ -79,7 +79,7 @@ class Chain:
         return np.asarray(1000 * np.sqrt(np.mean(self.run.track.joint_residual[WALK] ** 2, axis=0)))
 
 
-@keep
+@keep_recorded
 def take() -> tuple[CalibratedRecording, Orientations]:
     """The walk calibrated, and its orientations from six axes."""
     calibrated = calibrate(neura_walk())
@@ -110,7 +110,7 @@ def chain(
     return Chain(run, calibrated, replace_orientations(run, orientations), turned)
 
 
-@keep
+@keep_recorded
 def healthy() -> Chain:
     return chain(*take())
 

@@ -33,10 +33,12 @@ expect.set_options(timeout=30_000)  # beside other tests a page may take long; n
 NAME, PASSWORD = "anna", "correct horse battery"
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or "/usr/bin/chromium"
 FLAGS = ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
-         "--disable-component-update", "--disable-sync"]  # fmt: skip
+         "--disable-component-update", "--disable-sync", "--process-per-site"]  # fmt: skip
 FLAT = [*FLAGS, "--disable-gpu"]
-SOLID = [*FLAGS, "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-"""Without 3D (fast 2D) and with software WebGL, which slows flat pages down to a few frames a second."""
+SOLID = [*FLAGS, "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+         "--disable-gpu-rasterization"]  # fmt: skip
+"""Without 3D (fast 2D) and with software WebGL, which slows pages down to a few frames a second; all of a page
+but the figure is then drawn as without 3D."""
 PACED = """
 if (window !== window.top) {
   const draw = window.requestAnimationFrame.bind(window);
@@ -45,6 +47,17 @@ if (window !== window.top) {
 }
 """
 """A figure drawn by software as often as it can takes all processors from the server that is to be tested."""
+WITHOUT_FIGURE = "if (location.pathname.startsWith('/views/')) location.replace('about:blank');"
+"""Without 3D nobody sees the figure: its megabytes of script, which would draw it all the same, are not run."""
+FORGET = """async () => {
+  localStorage.clear();
+  await Promise.all((await indexedDB.databases()).map(({ name }) => new Promise((done) => {
+    const asked = indexedDB.deleteDatabase(name);
+    asked.onsuccess = asked.onerror = done;
+  })));
+}"""
+
+RECORDS_ONLY = {"SAGITTAL_WORKERS": "0", "SAGITTAL_LIVE_WORKERS": "0"}
 
 
 @dataclass(frozen=True)
@@ -76,8 +89,13 @@ class RunningServer:
 
 
 @contextlib.contextmanager
-def serve(folder: Path) -> Iterator[RunningServer]:
-    """Run `sagittal serve` on a data folder; what it says is in server.log there."""
+def serve(folder: Path, *, records_only: bool = False) -> Iterator[RunningServer]:
+    """Run `sagittal serve` on a data folder; what it says is in server.log there.
+
+    Parameters
+    ----------
+    records_only : it takes files and live takes, and has no processes that analyse or estimate.
+    """
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
         port = s.getsockname()[1]
@@ -86,6 +104,7 @@ def serve(folder: Path) -> Iterator[RunningServer]:
     process = subprocess.Popen(
         [sys.executable, "-m", "server.main", "serve", "--data", str(folder), "--port", str(port)],
         cwd=ROOT, stdout=log, stderr=subprocess.STDOUT, start_new_session=True,
+        env={**os.environ, **(RECORDS_ONLY if records_only else {})},
     )  # fmt: skip
     url = f"http://127.0.0.1:{port}"
     try:
@@ -176,11 +195,62 @@ def cookies(running: RunningServer) -> list[dict[str, str]]:
         return [{"name": k, "value": v, "url": running.url} for k, v in client.cookies.items()]
 
 
+class KeptContexts:
+    """Signed-in contexts that all tests share, one for a browser and a language.
+
+    A page in a context of its own costs a second of processor time more: for a new process, and for every
+    script and style that it loads and compiles again. What a test leaves behind is taken out after it.
+    """
+
+    def __init__(self, url: str, cookies: list[dict[str, str]]) -> None:
+        self._url, self._cookies = url, cookies
+        self._all: dict[tuple[Browser, str], BrowserContext] = {}
+        self._used: set[BrowserContext] = set()
+
+    def take(self, browser: Browser, script: str, locale: str = "en-US") -> BrowserContext:
+        """The one of this browser and language, made at its first use; the script runs in all its documents."""
+        if (browser, locale) not in self._all:
+            made = browser.new_context(
+                locale=locale, base_url=self._url, viewport={"width": 1280, "height": 800}
+            )
+            made.set_default_timeout(60_000)
+            made.add_init_script(script)
+            made.add_cookies(self._cookies)  # type: ignore[arg-type]
+            made.new_page().goto("/health/live")  # stays, and with it the process of its pages
+            self._all[browser, locale] = made
+        found = self._all[browser, locale]
+        self._used.add(found)
+        return found
+
+    def clean(self) -> None:
+        """Close the pages of a test, and forget what they stored."""
+        for context in self._used:
+            first, *others = context.pages
+            for page in others:
+                page.close()
+            first.evaluate(FORGET)
+            context.clear_cookies()
+            context.add_cookies(self._cookies)  # type: ignore[arg-type]
+        self._used.clear()
+
+
+@pytest.fixture(scope="session")
+def all_kept(running: RunningServer, cookies: list[dict[str, str]]) -> KeptContexts:
+    return KeptContexts(running.url, cookies)
+
+
+@pytest.fixture
+def kept(all_kept: KeptContexts) -> Iterator[KeptContexts]:
+    """The shared contexts, clean for the next test."""
+    yield all_kept
+    all_kept.clean()
+
+
 Opener = Callable[..., Page]
 
 
 @pytest.fixture
-def opened(flat: Browser, running: RunningServer, cookies: list[dict[str, str]]) -> Iterator[Opener]:
+def opened(flat: Browser, running: RunningServer, kept: KeptContexts) -> Iterator[Opener]:
     """Opens pages signed in; a script error or a refused style fails the test at its end."""
     contexts: list[BrowserContext] = []
     said: list[str] = []
@@ -195,19 +265,15 @@ def opened(flat: Browser, running: RunningServer, cookies: list[dict[str, str]])
         signed_in: bool = True,
         locale: str = "en-US",
     ) -> Page:
-        context = browser.new_context(
-            locale=locale,
-            base_url=running.url,
-            viewport={"width": width, "height": height},
-            color_scheme=scheme,  # type: ignore[arg-type]
-        )
-        contexts.append(context)
-        context.set_default_timeout(60_000)
-        if browser is not flat:
-            context.add_init_script(PACED)
         if signed_in:
-            context.add_cookies(cookies)  # type: ignore[arg-type]
+            context = kept.take(browser, WITHOUT_FIGURE if browser is flat else PACED, locale)
+        else:
+            context = browser.new_context(locale=locale, base_url=running.url)
+            context.set_default_timeout(60_000)
+            contexts.append(context)
         page = context.new_page()
+        page.set_viewport_size({"width": width, "height": height})
+        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
         page.on("pageerror", lambda e: said.append(f"{path}: {e}") if is_ours(str(e)) else None)
         page.on("console", lambda m: said.append(f"{path}: {m.text}") if _matters(m.type, m.text) else None)
         page.goto(path)

@@ -39,6 +39,15 @@
   text: () => {
   const lum = (c) => { const f = (v) => { v /= 255; return v <= .04045 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4; }; return .2126 * f(c[0]) + .7152 * f(c[1]) + .0722 * f(c[2]); };
   const rgb = (s) => { const m = s.match(/[\d.]+/g); return m ? m.map(Number) : null; };
+  // what is behind an element, asked once: texts of a table share it
+  const grounds = new Map([[null, [255, 255, 255]]]);
+  const groundOf = (e) => {
+    if (!grounds.has(e)) {
+      const c = rgb(getComputedStyle(e).backgroundColor);
+      grounds.set(e, c && (c.length < 4 || c[3] > .99) ? c : groundOf(e.parentElement));
+    }
+    return grounds.get(e);
+  };
   const bad = {};
   const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walk.nextNode()) {
@@ -46,11 +55,7 @@
     if (!text || !e.getClientRects().length || e.closest('title,desc,.vh,.skip,[disabled],[aria-disabled=true],option,script,style')) continue;
     const cs = getComputedStyle(e), fg = rgb(e.namespaceURI.includes('svg') ? cs.fill : cs.color);
     if (!fg) continue;
-    let ground = [255, 255, 255];
-    for (let b = e; b; b = b.parentElement) {
-      const c = rgb(getComputedStyle(b).backgroundColor);
-      if (c && (c.length < 4 || c[3] > .99)) { ground = c; break; }
-    }
+    const ground = groundOf(e);
     const [hi, lo] = [lum(fg), lum(ground)].sort((p, q) => q - p), ratio = (hi + .05) / (lo + .05);
     const size = parseFloat(cs.fontSize), big = size >= 24 || (size >= 18.66 && +cs.fontWeight >= 600);
     const name = e.className.baseVal ?? e.className;

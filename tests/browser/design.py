@@ -15,7 +15,8 @@ AXE: Final = Path(os.environ.get("SAGITTAL_AXE") or ROOT / "node_modules" / "axe
 
 TAGS: Final = ("wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa")
 
-RUN_AXE = """async (tags) => (await axe.run(document, { runOnly: { type: 'tag', values: tags } })).violations
+RUN_AXE = """async (tags) => (await axe.run(document, {
+    runOnly: { type: 'tag', values: tags }, resultTypes: ['violations'] })).violations
   .map((v) => `${v.id} (${v.impact}): ${v.nodes.map((n) => n.target.join(' ')).slice(0, 3).join('; ')}`)"""
 
 CHECKS = (Path(__file__).parent / "design.js").read_text()

@@ -150,7 +150,7 @@ def test_a_server_that_dies_in_the_middle_has_everything_in_the_end(flat: Browse
     lines = [",".join(["t_s", *columns]), *(",".join(map(str, row)) for row in rows)]
     table = "\n".join(lines)
     with contextlib.ExitStack() as servers:
-        server = servers.enter_context(serve(tmp_path))
+        server = servers.enter_context(serve(tmp_path, records_only=True))
         client = servers.enter_context(server.client())
         patient = filling.add(client, "/patients", code="CAP-K9")["id"]
         session = filling.add_session(client, patient, "Walk")
@@ -164,7 +164,7 @@ def test_a_server_that_dies_in_the_middle_has_everything_in_the_end(flat: Browse
             until(page, "page.outbox.acked > 40")
             os.kill(server.pid, signal.SIGKILL)
             expect(page.locator("[data-link]")).to_contain_text("Keeping", timeout=10_000)
-            server = servers.enter_context(serve(tmp_path))
+            server = servers.enter_context(serve(tmp_path, records_only=True))
             network.lead_to(server.url)
             expect(page.locator("[data-done]")).to_have_text("Recording is on the server", timeout=60_000)
         with server.client() as again:

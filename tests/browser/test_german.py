@@ -41,17 +41,15 @@ def left_english(page: Page) -> list[str]:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_a_page_is_german_and_keeps_to_the_design(name: str, opened: Opener, filled: Filled) -> None:
+    page = opened(PAGES[name](filled), signed_in=name not in OUT, locale="de-DE")
+    page.wait_for_load_state()
+    assert page.locator("html").get_attribute("lang") == "de"
     for width, height in (DESK, TABLET) if name in BOTH else (TABLET,):
-        page = opened(
-            PAGES[name](filled), signed_in=name not in OUT, locale="de-DE", width=width, height=height
-        )
-        page.wait_for_load_state()
+        page.set_viewport_size({"width": width, "height": height})
         # a button that its script has just allowed is on its way to its colours
         page.wait_for_function("() => document.getAnimations().every((a) => a.playState !== 'running')")
-        assert page.locator("html").get_attribute("lang") == "de"
         assert left_english(page) == []
         assert not layout_faults(page) | text_faults(page), f"{width}"
-        page.close()
 
 
 def test_a_printed_report_is_german_and_stays_on_its_sheets(opened: Opener, filled: Filled) -> None:

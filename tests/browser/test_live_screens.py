@@ -13,8 +13,8 @@ from playwright.sync_api import Browser, Locator, Page, Route, expect
 
 from core.online.frame import Stage
 from tests.browser import feed, filling
-from tests.browser.conftest import RunningServer, is_ours
-from tests.browser.design import layout_faults, text_faults
+from tests.browser.conftest import WITHOUT_FIGURE, KeptContexts, RunningServer, is_ours
+from tests.browser.design import SIZES, layout_faults, text_faults
 from tests.browser.feed import Told
 from tests.browser.test_german import left_english
 
@@ -81,21 +81,17 @@ def prescribe(client: httpx.Client, patient_id: str, **changed: Any) -> None:
 
 
 @pytest.fixture
-def told(flat: Browser, running: RunningServer, cookies: list[dict[str, str]]) -> Iterator[Opener]:
+def told(flat: Browser, kept: KeptContexts) -> Iterator[Opener]:
     """Opens a page whose feed the test speaks; a script error fails the test at its end."""
-    contexts, errors = [], []
+    errors: list[str] = []
 
     def open_(
         path: str, *, width: int = 1280, height: int = 800, scheme: str = "light", locale: str = "en-US"
     ) -> Told:
-        context = flat.new_context(
-            base_url=running.url, viewport={"width": width, "height": height}, color_scheme=scheme,  # type: ignore[arg-type]
-            reduced_motion="reduce", locale=locale,
-        )  # fmt: skip
-        contexts.append(context)
-        context.add_cookies(cookies)  # type: ignore[arg-type]
-        context.add_init_script(f"({HEARD})()")
-        page = context.new_page()
+        page = kept.take(flat, WITHOUT_FIGURE, locale).new_page()
+        page.set_viewport_size({"width": width, "height": height})
+        page.emulate_media(color_scheme=scheme, reduced_motion="reduce")  # type: ignore[arg-type]
+        page.add_init_script(f"({HEARD})()")
         page.on("pageerror", lambda e: errors.append(str(e)) if is_ours(str(e)) else None)
         this = Told.of(page)
         page.goto(path)
@@ -104,8 +100,6 @@ def told(flat: Browser, running: RunningServer, cookies: list[dict[str, str]]) -
         return this
 
     yield open_
-    for context in contexts:
-        context.close()
     assert not errors, errors
 
 
@@ -423,45 +417,51 @@ def test_the_therapist_switches_the_sound_of_the_patient_screen(
     expect(screen.locator("[data-settings] use")).to_have_attribute("href", "#i-mute")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [(1280, 800), (1024, 768), (810, 1080), (360, 740)])
-def test_every_state_obeys_the_design_system(
-    size: tuple[int, int], scheme: str, told: Opener, trained: tuple[str, str, str]
-) -> None:
-    width, height = size
-    this = told(f"/sessions/{trained[0]}/live", width=width, height=height, scheme=scheme)
-    faults = {}
+def test_every_state_obeys_the_design_system(told: Opener, trained: tuple[str, str, str]) -> None:
+    faults: dict[str, dict[str, Any]] = {}
+    this = told(f"/sessions/{trained[0]}/live")
     this.say(feed.state("pairing", "none"))
-    faults["pair"] = _faults(this.page)
-    this.say(feed.state(), feed.frame(1.0, "stand"))
-    faults["stand"] = _faults(this.page)
+    faults["pair"] = _faults_everywhere(this)
+    this.say(feed.state())
+    faults["stand"] = _faults_everywhere(this, feed.frame(1.0, "stand"))
     this.walk([0.53, 0.49], ["in", "near_low"])
-    faults["run"] = _faults(this.page)
-    this.page.wait_for_timeout(600)
-    faults["stale"] = _faults(this.page)
-    screen = _patient(told, trained[0], width=width, height=height, scheme=scheme)
+    faults["run"] = _faults_everywhere(this, feed.frame(100.0))
+    expect(this.page.locator("[data-cover]")).to_be_visible()
+    faults["stale"] = _faults_everywhere(this)
+    screen = _patient(told, trained[0])
     screen.say(feed.cue(0, 0.49, "near_low"))
-    faults["patient"] = _faults(screen.page)
+    faults["patient"] = _faults_everywhere(screen, feed.frame(100.0))
     assert not {k: v for k, v in faults.items() if v}
 
 
 def test_a_running_take_is_german(told: Opener, trained: tuple[str, str, str]) -> None:
-    faults = {}
     this = told(f"/sessions/{trained[0]}/live", locale="de-DE")
-    this.say(feed.state(), feed.frame(2.0, "walk"))
-    faults["walk"] = left_english(this.page), _faults(this.page)
+    this.say(feed.state())
+    faults = {"walk": _faults_everywhere(this, feed.frame(2.0, "walk"))}
+    assert left_english(this.page) == []
     this.walk([0.53, 0.49], ["in", "near_low"])
-    faults["run"] = left_english(this.page), _faults(this.page)
-    screen = told(f"/sessions/{trained[0]}/live/patient", width=810, height=1080, locale="de-DE")
+    faults["run"] = _faults_everywhere(this, feed.frame(100.0))
+    assert left_english(this.page) == []
+    screen = told(f"/sessions/{trained[0]}/live/patient", locale="de-DE")
     screen.page.get_by_role("button", name="Ohne Ton").click()
     screen.say(feed.state(), feed.feedback(), feed.frame(100.0, contact="r"), feed.cue(0, 0.49, "near_low"))
     expect(screen.page.locator("[data-what]")).to_have_text("Schritt links")
-    faults["patient"] = left_english(screen.page), _faults(screen.page)
-    assert faults == dict.fromkeys(faults, ([], {}))
+    faults["patient"] = _faults_everywhere(screen, feed.frame(100.0))
+    assert left_english(screen.page) == []
+    assert not {k: v for k, v in faults.items() if v}
 
 
-def _faults(page: Page) -> dict[str, Any]:
-    return {**layout_faults(page), **text_faults(page)}
+def _faults_everywhere(this: Told, *messages: str) -> dict[str, Any]:
+    """Faults of a state in every size, light and dark; what is said again each time keeps it from going old."""
+    found = {}
+    for width, height in SIZES:
+        this.page.set_viewport_size({"width": width, "height": height})
+        for scheme in ("light", "dark"):
+            this.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+            this.say(*messages)
+            faults = {**layout_faults(this.page), **text_faults(this.page)}
+            found |= {f"{width} {scheme}": faults} if faults else {}
+    return found
 
 
 def _therapist(told: Opener, session: str) -> Page:

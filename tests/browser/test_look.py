@@ -135,7 +135,7 @@ def test_ctrl_p_prints_the_report_of_four_sheets_and_elsewhere_a_clean_page(
     expect(page.locator(".rail")).to_be_hidden()
     expect(page.get_by_role("button", name="New patient")).to_be_hidden()
     page.emulate_media(media="null")  # as it is: a sheet is printed as print
-    page.context.add_init_script("window.print = () => { window.printed = true; }")
+    page.add_init_script("window.print = () => { window.printed = true; }")
     page.goto(PAGES["session"](filled))
     page.wait_for_load_state()  # the script that listens is there
     page.keyboard.press("Control+p")

@@ -3,22 +3,52 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from uuid import uuid4
 
 import numpy as np
+import pytest
 from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 
 from core.frames import SIDES
 from server.viewer.colours import TINTS
 from tests.browser import filling
-from tests.browser.conftest import Filled, Opener, RunningServer
+from tests.browser.conftest import PACED, Filled, Opener, RunningServer, is_ours
 from tests.browser.picture import wait_for_picture, wait_until_still
 from tests.data import data_folder
 from tests.server.viewer.seeing import pixels_of
 from tests.walks import NEURA
+
+
+@pytest.fixture(scope="module")
+def figure_page(
+    solid: Browser, running: RunningServer, cookies: list[dict[str, str]], filled: Filled
+) -> Iterator[tuple[Page, list[str]]]:
+    """A session with its figure, opened once: software takes seconds until the figure stands; script errors."""
+    context = solid.new_context(base_url=running.url, viewport={"width": 1280, "height": 800})
+    context.add_cookies(cookies)  # type: ignore[arg-type]
+    context.add_init_script(PACED)
+    page, said = context.new_page(), list[str]()
+    page.on("pageerror", lambda e: said.append(str(e)) if is_ours(str(e)) else None)
+    page.goto(f"/sessions/{filled.done}")
+    _wait_until_drawn(page)
+    yield page, said
+    context.close()
+
+
+@pytest.fixture
+def figure(figure_page: tuple[Page, list[str]]) -> Iterator[Page]:
+    """The same for one test, which leaves it as it was opened."""
+    page, said = figure_page
+    yield page
+    switched = page.locator("[data-switch][aria-pressed=false]")
+    while switched.count():
+        switched.first.click()
+    page.get_by_label("Look from").select_option("near")
+    _seek(page, 0)
+    assert not said, said
 
 
 def test_the_figure_has_two_legs_and_follows_the_clock(
@@ -82,34 +112,27 @@ def test_the_figure_goes_dark_with_the_page(opened: Opener, solid: Browser, fill
     assert dark["orange"] > 0
 
 
-def test_the_view_follows_the_walker(opened: Opener, solid: Browser, filled: Filled) -> None:
-    page = _open(opened, solid, filled.done)
-    _switch(page, "ground")
+def test_the_view_follows_the_walker(figure: Page) -> None:
+    _switch(figure, "ground")
     for t_s in (12, 45):
-        _seek(page, t_s)
-        assert 0.35 < wait_until_still(page)["x"] < 0.65
+        _seek(figure, t_s)
+        assert 0.35 < wait_until_still(figure)["x"] < 0.65
 
 
-def test_from_where_the_view_stands_still_the_walk_goes_on(
-    opened: Opener, solid: Browser, filled: Filled
-) -> None:
-    page = _open(opened, solid, filled.done)
-    _switch(page, "follow")
+def test_from_where_the_view_stands_still_the_walk_goes_on(figure: Page) -> None:
+    _switch(figure, "follow")
     across = []
     for t_s in (15, 30, 45):
-        _seek(page, t_s)
-        across.append(wait_until_still(page)["x"])
+        _seek(figure, t_s)
+        across.append(wait_until_still(figure)["x"])
     assert across[0] + 0.05 < across[1] < across[2] - 0.03
 
 
-def test_steps_and_trails_are_left_behind_and_can_be_hidden(
-    opened: Opener, solid: Browser, filled: Filled
-) -> None:
-    page = _open(opened, solid, filled.done)
-    _seek(page, 30)
-    shown = wait_until_still(page)
-    _switch(page, "ground")
-    hidden = wait_for_picture(page, lambda now: shown["orange"] > now["orange"] + 150)
+def test_steps_and_trails_are_left_behind_and_can_be_hidden(figure: Page) -> None:
+    _seek(figure, 30)
+    shown = wait_until_still(figure)
+    _switch(figure, "ground")
+    hidden = wait_for_picture(figure, lambda now: shown["orange"] > now["orange"] + 150)
     assert shown["blue"] > hidden["blue"] + 150
     assert min(hidden["orange"], hidden["blue"]) > 200, "the figure is hidden too"
 
@@ -141,44 +164,41 @@ def test_a_take_of_two_feet_says_which_parts_are_estimated(
         assert 30 < faint[colour] < 0.6 * full[colour]
 
 
-def test_the_figure_is_looked_at_from_every_side(opened: Opener, solid: Browser, filled: Filled) -> None:
-    page = _open(opened, solid, filled.done)
-    _switch(page, "ground")
-    _seek(page, 12)
-    seen = [wait_until_still(page)]
+def test_the_figure_is_looked_at_from_every_side(figure: Page) -> None:
+    _switch(figure, "ground")
+    _seek(figure, 12)
+    seen = [wait_until_still(figure)]
     for view in ("right", "front", "top"):
-        page.get_by_label("Look from").select_option(view)
-        wait_for_picture(page, lambda now: now != seen[-1])
-        seen.append(wait_until_still(page))
+        figure.get_by_label("Look from").select_option(view)
+        wait_for_picture(figure, lambda now: now != seen[-1])
+        seen.append(wait_until_still(figure))
     assert [x for x in seen if not 0.3 < x["x"] < 0.7] == []
     # of legs seen from above less is seen than from the side
     assert seen[3]["orange"] + seen[3]["blue"] < 0.7 * (seen[0]["orange"] + seen[0]["blue"])
 
 
-def test_a_picture_of_the_figure_can_be_saved(opened: Opener, solid: Browser, filled: Filled) -> None:
-    page = _open(opened, solid, filled.done)
-    _seek(page, 12)
-    wait_until_still(page)
-    with page.expect_download(timeout=30_000) as waiting:
-        page.get_by_role("button", name="Save picture").click()
+def test_a_picture_of_the_figure_can_be_saved(figure: Page) -> None:
+    _seek(figure, 12)
+    wait_until_still(figure)
+    with figure.expect_download(timeout=30_000) as waiting:
+        figure.get_by_role("button", name="Save picture").click()
     assert re.fullmatch(r"figure-[\d.]+s\.png", waiting.value.suggested_filename)
     found = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
     for side in SIDES:
         assert pixels_of(found, TINTS[False][side]).sum() > 200, side
 
 
-def test_a_video_of_the_walking_figure_can_be_saved(opened: Opener, solid: Browser, filled: Filled) -> None:
-    page = _open(opened, solid, filled.done)
-    with page.expect_download(timeout=60_000) as waiting:
-        page.get_by_role("button", name="Record video").click()
-        expect(page.locator("time-bar [data-play]")).to_have_attribute("aria-label", "Pause")
-        page.wait_for_timeout(2500)
-        page.get_by_role("button", name="Stop and save").click()
+def test_a_video_of_the_walking_figure_can_be_saved(figure: Page) -> None:
+    with figure.expect_download(timeout=60_000) as waiting:
+        figure.get_by_role("button", name="Record video").click()
+        expect(figure.locator("time-bar [data-play]")).to_have_attribute("aria-label", "Pause")
+        figure.wait_for_timeout(2500)
+        figure.get_by_role("button", name="Stop and save").click()
     assert re.fullmatch(r"figure-[\d.]+s\.webm", waiting.value.suggested_filename)
     film = Path(waiting.value.path()).read_bytes()
     assert film[:4] == b"\x1a\x45\xdf\xa3"  # EBML
     assert len(film) > 5_000
-    expect(page.get_by_role("button", name="Record video")).to_be_visible()
+    expect(figure.get_by_role("button", name="Record video")).to_be_visible()
 
 
 def test_positions_for_the_eye_only_offer_no_view_of_the_whole_walk(
@@ -219,9 +239,13 @@ def _analysed(
 
 def _open(opened: Opener, solid: Browser, session_id: str) -> Page:
     page = opened(f"/sessions/{session_id}", browser=solid)
+    _wait_until_drawn(page)
+    return page
+
+
+def _wait_until_drawn(page: Page) -> None:
     page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
     wait_for_picture(page, lambda now: min(now["orange"], now["blue"]) > 0)
-    return page
 
 
 def _seek(page: Page, t_s: float) -> None:

@@ -177,11 +177,11 @@ def _replays(page: Page, url: str) -> None:
 
 
 def test_a_file_that_is_no_recording_is_said_in_a_sentence(
-    solid: Browser, running: RunningServer, tmp_path: Path
+    flat: Browser, running: RunningServer, tmp_path: Path
 ) -> None:
     picture = tmp_path / "walk 🚶.jpg"
     picture.write_bytes(b"\xff\xd8\xff\xe0 no recording")
-    context = solid.new_context(base_url=running.url)
+    context = flat.new_context(base_url=running.url)
     page = context.new_page()
     _sign_in(page)
     with running.client() as client:
@@ -199,12 +199,12 @@ def test_a_file_that_is_no_recording_is_said_in_a_sentence(
 
 
 def test_a_file_that_breaks_off_can_be_tried_again(
-    solid: Browser, running: RunningServer, tmp_path: Path
+    flat: Browser, running: RunningServer, tmp_path: Path
 ) -> None:
     files = {"one.txt": b"first", "two.txt": b"second"}
     for name, content in files.items():
         (tmp_path / name).write_bytes(content)
-    context = solid.new_context(base_url=running.url)
+    context = flat.new_context(base_url=running.url)
     page = context.new_page()
     _sign_in(page)
     with running.client() as client:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from io import BytesIO
 
 import numpy as np
@@ -35,10 +36,14 @@ class TurningSensors:
         )
 
 
+@cache
 def turning(
     seconds: float, *, rate_hz: float = 100.0, sensors: int = 2, speed: float = 1.0, noise: float = 1.0
 ) -> TurningSensors:
-    """Sensors in sums of sines of angular rate (rad/s, times `speed`), with white noise times `noise`."""
+    """Sensors in sums of sines of angular rate (rad/s, times `speed`), with white noise times `noise`.
+
+    Made once, for a sample at a time takes seconds: nobody writes into it.
+    """
     rng = np.random.default_rng(7)
     n = round(seconds * rate_hz)
     t = np.arange(n)[:, None, None] / rate_hz

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import fields, replace
-from functools import cache
 from math import inf
 
 import numpy as np
@@ -30,7 +29,6 @@ BIAS = np.radians([0.6, -0.4, 0.5])
 """rad/s."""
 
 
-@cache
 def moving() -> TurningSensors:
     return turning(60.0)
 
