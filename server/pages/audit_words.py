@@ -100,6 +100,8 @@ DEEDS: Final[Mapping[str, str]] = {
     "job.listed": "looked at the list of jobs",
     "job.opened": "looked at a job",
     "job.cancelled": "cancelled a job",
+    "backup.made": "made a backup of everything",
+    "backup.restored": "put a backup back",
     "database.accepted": "accepted this database as the clinic's own",
 }
 """Action → what was done, to follow the name of who did it."""

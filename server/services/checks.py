@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from sqlalchemy.exc import DatabaseError
@@ -31,8 +32,17 @@ class StorageDefect:
     message: str
 
 
-def check(db: Database, blobs: BlobStore, settings: Settings) -> list[StorageDefect]:
-    """Check database, stored files by their hash, live logs, trash and audit chain."""
+def check(
+    db: Database,
+    blobs: BlobStore,
+    settings: Settings,
+    *,
+    known_missing: Collection[tuple[str, str]] = (),
+) -> list[StorageDefect]:
+    """Check database, stored files by their hash, live logs, trash and audit chain.
+
+    `known_missing`: files (space, sha256) of which it is known already that they are not there.
+    """
     try:
         found = [StorageDefect("database", text) for text in db.problems()]
         with db.read() as c:
@@ -47,8 +57,10 @@ def check(db: Database, blobs: BlobStore, settings: Settings) -> list[StorageDef
     trash = list(Trash(settings.trash).files())
     waiting = {(one.space, one.name) for one in trash}
     for space, sha256 in used:
+        if (space, sha256) in known_missing:
+            continue
         try:
-            blobs.read(space, sha256)
+            blobs.open(space, sha256).close()
         except SagittalError as error:
             text = f"patient {space}: {error.message}"
             if (space, sha256) in waiting:

@@ -57,6 +57,7 @@ from server.storage.trash import Trash
 log = logging.getLogger(__name__)
 
 ERASED = "patient.erased"
+SESSION_ERASED = "session.erased"
 _ID = re.compile(r"[0-9a-f]{32}")
 
 
@@ -102,7 +103,7 @@ def erase_session(
         found = sessions.get(c, session_id)
         own = _files_of(c, session_id, found.patient_id)
         takes = _erase_session_rows(c, session_id)
-        audit.record(c, actor, "session.erased", "session", session_id, {"patient_id": found.patient_id})
+        audit.record(c, actor, SESSION_ERASED, "session", session_id, {"patient_id": found.patient_id})
         _note(settings, files=sorted(own), takes=takes)
     reviewed.forget()
     finish(db, reviewed.blobs, settings)
