@@ -30,6 +30,7 @@ def create_app(settings: Settings) -> FastAPI:
     from server.http.cross_site import CrossSiteGuard
     from server.http.headers import SecurityHeaders
     from server.http.hosts import HostGuard
+    from server.http.requests import RequestObserver
     from server.lifespan import run_installation
     from server.pages.assets import STATIC, Assets
     from server.pages.routes import ROUTERS
@@ -46,8 +47,9 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
         lifespan=run_installation,
         middleware=[
+            Middleware(RequestObserver, line=settings.log_format == "json"),
             Middleware(Compression),
-            Middleware(SecurityHeaders),
+            Middleware(SecurityHeaders, behind_tls=settings.behind_tls),
             Middleware(HostGuard, allowed=settings.hosts),
             Middleware(CrossSiteGuard),
             Middleware(BodyLimit),

@@ -142,9 +142,9 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--seed", type=_whole, default=0)
     for name in ("particles", "iterations", "rounds", "random-rounds"):
         p.add_argument(f"--{name}", type=int, metavar="N", help="of the swarm (default: the thesis')")
-    _data_option(
-        add("check", "Check the database, every stored file by its hash, live logs, trash, the audit chain.")
-    )
+    p = add("check", "Check the database, every stored file by its hash, live logs, trash, the audit chain.")
+    _data_option(p)
+    p.add_argument("--head", type=Path, metavar="JSON", help="newest audit row as it was, kept elsewhere")
     p = add("backup", "Write database, stored files and live logs into one file, while the service runs.")
     _data_option(p)
     p.add_argument("target", type=Path, metavar="DIR|FILE", help="a folder of backups, or the file to write")

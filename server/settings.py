@@ -175,6 +175,11 @@ class Settings:
         return self.data_dir / "restoring"
 
     @property
+    def second_factor_key(self) -> Path:
+        """The key that opens the secrets of second factors (server/auth/second_factor.py)."""
+        return self.data_dir / "second-factor.key"
+
+    @property
     def lock(self) -> Path:
         """The file whose lock says that a server is running on this data folder."""
         return self.data_dir / "server.lock"

@@ -25,9 +25,11 @@ from server.api import (
     programmes,
     reports,
     reviews,
+    second_factors,
     sensitivities,
     sessions,
     sign_in,
+    tokens,
     trends,
     tunings,
     users,
@@ -48,6 +50,8 @@ def build_api(app: FastAPI) -> APIRouter:
     api = APIRouter(prefix="/api/v1")
     for part in (
         sign_in,
+        tokens,
+        second_factors,
         patients,
         notes,
         prescriptions,

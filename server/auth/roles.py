@@ -49,6 +49,8 @@ class Action(StrEnum):
     """Looks at the clinic's sensors; says nothing of who wore them."""
     MANAGE_USERS = "manage_users"
     READ_AUDIT = "read_audit"
+    READ_SYSTEM = "read_system"
+    """Looks at how the installation is, and reads its metrics."""
 
 
 PUBLIC: frozenset[Action] = frozenset(
@@ -89,6 +91,7 @@ POLICY: dict[Action, frozenset[Role]] = {
     Action.READ_DEVICE: _UPLOADERS,
     Action.MANAGE_USERS: _ADMIN,
     Action.READ_AUDIT: _ADMIN,
+    Action.READ_SYSTEM: _ADMIN,
 }
 
 

@@ -63,8 +63,10 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
         lock.release()
         return 1
     workers, keeper = Workers(settings), BackupKeeper(settings)
+    app = create_app(settings)
+    app.state.workers = workers
     limits = ConnectionLimits(most=make_room(settings.max_connections))
-    server = build_server(create_app(settings), settings, limits)
+    server = build_server(app, settings, limits)
     host = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{host}:{listener.getsockname()[1]}"
     threading.Thread(target=_when_started, args=(server, lambda: announce(address)), daemon=True).start()

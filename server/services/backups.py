@@ -198,6 +198,8 @@ def _write(
             with db.read() as c:
                 erased = find_tombstones(c)
             content.missing = [one for one in content.missing if one[0] not in erased.patients]
+            if settings.second_factor_key.exists():
+                _add(archive, settings.second_factor_key.name, settings.second_factor_key, content)
             manifest = {
                 "format": FORMAT,
                 "created_at": at.isoformat(),

@@ -35,10 +35,13 @@ from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.high_water import HighWater, read_newest, set_mark
 from server.storage.migrate import MigrationError, upgrade
-from server.storage.tables import login_session, one_time_token, patient, session
+from server.storage.tables import api_token, login_session, one_time_token, patient, session
 
 RESTORED: Final = "backup.restored"
-_OURS: Final = re.compile(r"blobs/[0-9a-f]{32}/[0-9a-f]{64}|live/[0-9a-f]{32}\.(log|\d+\.damaged)")
+_OURS: Final = re.compile(
+    r"blobs/[0-9a-f]{32}/[0-9a-f]{64}|live/[0-9a-f]{32}\.(log|\d+\.damaged)"
+    r"|second-factor\.key"
+)
 _MOST_MANIFEST: Final = 500_000_000
 _MAY_BE_THERE: Final = {"lost+found", "cache", "server.lock"}
 """What an empty data folder may hold."""
@@ -154,7 +157,8 @@ def _require_empty(settings: Settings) -> None:
             # the folder was empty when this was written, so these are the restore's own
             for folder in (settings.blobs, settings.live):
                 fs.remove_tree(folder)
-            fs.remove_file(settings.mark)
+            for path in (settings.mark, settings.second_factor_key):
+                fs.remove_file(path)
             fs.sync_folder(settings.data_dir)
         fs.remove_tree(stage)
     found = sorted(path.name for path in settings.data_dir.iterdir() if path.name not in _MAY_BE_THERE)
@@ -192,8 +196,9 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
             raise RestoreError(f"{archive.name}: {defects[0].area}: {defects[0].message}")
         again = _erase_again(db, blobs, stage, gone | manifest.erased)
         with db.write() as c:
-            # who had signed in then has not signed in here
+            # who had signed in then has not signed in here; what was revoked since must not work again
             c.execute(delete(login_session))
+            c.execute(delete(api_token))
             c.execute(delete(one_time_token))
             detail = {"created_at": manifest.created_at.isoformat(), "erased_again": again}
             audit.record(c, None, RESTORED, "database", None, detail)
@@ -294,6 +299,7 @@ def _put_in_place(settings: Settings, stage: Settings) -> None:
         (stage.blobs, settings.blobs),
         (stage.live, settings.live),
         (stage.mark, settings.mark),
+        (stage.second_factor_key, settings.second_factor_key),
         (stage.database, settings.database),
     ):
         if source.exists():
