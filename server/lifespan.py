@@ -16,6 +16,7 @@ from server.auth.throttle import Throttle
 from server.jobs.feed import JobFeed
 from server.jobs.table import TableQueue
 from server.live.hub import Hub
+from server.metrics import StateCollector
 from server.processes.supervisor import Workers
 from server.services import custody, erasure
 from server.services.custody import refuse_strangers
@@ -81,10 +82,13 @@ async def run_installation(app: FastAPI) -> AsyncIterator[None]:
     await app.state.hub.start()
     parts = {"workers": partial(_say_workers, app), "estimators": partial(_say_estimators, app)}
     app.state.readiness = Readiness(settings, db, app.state.blobs, parts=parts)
+    figures = StateCollector(settings, db, app.state.readiness.checks)
+    app.state.metrics.registry.register(figures)
     try:
         async with app.state.trail.run():
             yield
     finally:
+        app.state.metrics.registry.unregister(figures)
         await app.state.hub.stop()
         app.state.films.close()
         app.state.feed.close()

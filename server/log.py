@@ -20,9 +20,9 @@ request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
 _STANDARD: Final = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", "request_id"}
 
 
-def start_log(settings: Settings) -> None:
+def start_log(settings: Settings, handler: logging.Handler | None = None) -> None:
     """Log to stderr in the format of the settings: what we do, and of the migrations only what goes wrong."""
-    handler = logging.StreamHandler()
+    handler = handler or logging.StreamHandler()
     handler.addFilter(_add_request_id)
     handler.setFormatter(JsonLines() if settings.log_format == "json" else _Lines())
     logging.basicConfig(level=logging.INFO, handlers=[handler])

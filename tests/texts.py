@@ -76,7 +76,7 @@ WORDS: Final = frozenset(
     now off outward paused pelvis points poor probe reconstruction repetitions right rollator sagittal
     shank shoes shorter silent slow slower smaller socks squat squats steps steps/min stick still
     straighter stride strides tests thigh threshold training trainings transverse treadmill trunk turns
-    unaffected unknown usable viewer walk walking week wider yes
+    unaffected unknown usable viewer walk walking week wider works yes
         """,
     )
 )

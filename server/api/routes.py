@@ -19,6 +19,7 @@ from server.api import (
     jobs,
     live,
     live_feed,
+    metrics,
     notes,
     patients,
     prescriptions,
@@ -41,7 +42,7 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.live import tablet
 
-BESIDE: tuple[APIRouter, ...] = (sign_in.address_router, health.router, live_feed.router)
+BESIDE: tuple[APIRouter, ...] = (sign_in.address_router, health.router, metrics.router, live_feed.router)
 """Routes outside /api/v1."""
 
 

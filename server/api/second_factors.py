@@ -42,7 +42,7 @@ def confirm(
     body: schemas.CodeProof, db: Db, settings: Config, failures: Failures, who: Self
 ) -> schemas.RecoveryCodes:
     """Ask for codes from now on; the answer has the recovery codes, this once."""
-    with accounts.counted(failures, who.user_id), db.write() as c:
+    with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
         codes = second_factor.confirm(c, settings.second_factor_key, who.user_id, body.code)
         audit.record(c, who, "user.second_factor_on", "user", who.user_id)
     return schemas.RecoveryCodes("\n".join(codes))
@@ -51,7 +51,7 @@ def confirm(
 @router.post("/remove", status_code=204, responses=refusals(429))
 def remove(body: schemas.CodeProof, db: Db, settings: Config, failures: Failures, who: Self) -> None:
     """Ask for no code any more; needs one, or a recovery code."""
-    with accounts.counted(failures, who.user_id), db.write() as c:
+    with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
         if not second_factor.use(c, settings.second_factor_key, who.user_id, body.code):
             raise second_factor.CodeWrong(403)
         second_factor.remove(c, who.user_id)

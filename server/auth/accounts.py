@@ -127,7 +127,7 @@ def check_code(
             return False
     if not (code or "").strip():
         raise second_factor.CodeNeeded
-    with counted(throttle, user_id):
+    with count_wrong_codes(throttle, user_id):
         with db.write() as c:
             before = second_factor.count_recovery(c, user_id)
             is_right = second_factor.use(c, key_file, user_id, code or "")
@@ -139,7 +139,7 @@ def check_code(
 
 
 @contextlib.contextmanager
-def counted(throttle: Throttle, user_id: str) -> Iterator[None]:
+def count_wrong_codes(throttle: Throttle, user_id: str) -> Iterator[None]:
     """Count a wrong code of an account, from wherever it comes; ten in a quarter of an hour."""
     key = f"code of {user_id}"
     begun = throttle.begin(key, key)

@@ -13,7 +13,7 @@ def backup(data_dir: Path | None, target: Path, key: Path | None, prune: bool) -
     """Make one backup; 1 when there is none, or when a stored file was already gone or damaged."""
     from server.services import backups
     from server.services.tombstones import TombstoneError
-    from server.storage.archive import ArchiveError, read_key
+    from server.storage.archive import BackupFileError, read_key
     from server.storage.db import Database
     from server.storage.migrate import MigrationError, require_current
 
@@ -27,7 +27,7 @@ def backup(data_dir: Path | None, target: Path, key: Path | None, prune: bool) -
         with closing(Database(settings.database)) as db:
             made = backups.make_backup(db, settings, target.absolute(), clinic_key)
         gone = backups.prune(made.path.parent) if prune else []
-    except (ArchiveError, TombstoneError, backups.BackupError, MigrationError) as error:
+    except (BackupFileError, TombstoneError, backups.BackupError, MigrationError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
     head = "none" if made.head is None else f"{made.head.seq}:{made.head.hash}"

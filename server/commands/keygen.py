@@ -8,11 +8,11 @@ from pathlib import Path
 
 def keygen(path: Path) -> int:
     """Write a new key pair; 1 when the file exists."""
-    from server.storage.archive import ArchiveError, make_key
+    from server.storage.archive import BackupFileError, make_key
 
     try:
         public = make_key(path.absolute())
-    except (ArchiveError, OSError) as error:
+    except (BackupFileError, OSError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
     sys.stdout.write(

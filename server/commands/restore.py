@@ -12,7 +12,7 @@ def restore(data_dir: Path | None, archive: Path, key: Path | None, erased: Path
     """Restore a backup, everything verified first; 1 when nothing was put in place."""
     from server.services import restoring
     from server.services.tombstones import TombstoneError, read_tombstones
-    from server.storage.archive import ArchiveError, read_key
+    from server.storage.archive import BackupFileError, read_key
 
     settings = load_settings({"data_dir": data_dir})
     try:
@@ -22,7 +22,7 @@ def restore(data_dir: Path | None, archive: Path, key: Path | None, erased: Path
         else:
             gone = None if erased is None else read_tombstones(erased)
             found = restoring.restore(archive.absolute(), settings, clinic_key, gone)
-    except (ArchiveError, TombstoneError, restoring.RestoreError) as error:
+    except (BackupFileError, TombstoneError, restoring.RestoreError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
     sys.stdout.write(

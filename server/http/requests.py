@@ -20,6 +20,8 @@ log = logging.getLogger(__name__)
 
 NO_ROUTE: Final = "none"
 """In the place of the pattern where an address has none."""
+_PREFIXES: Final = ("/api/v1", "/static")
+"""What routes are mounted under: a route's own pattern does not have it."""
 
 
 class RequestObserver:
@@ -60,9 +62,17 @@ class RequestObserver:
             request_id.reset(token)
 
     def _tell(self, scope: Scope, status: int, took_s: float) -> None:
-        pattern = getattr(scope.get("route"), "path", NO_ROUTE)
+        pattern = _find_pattern(scope)
         if self._observe is not None:
             self._observe(scope["method"], pattern, status, took_s)
         if self._line:
             told = {"method": scope["method"], "route": pattern, "status": status, "took_s": round(took_s, 4)}
             log.info("request", extra=told)
+
+
+def _find_pattern(scope: Scope) -> str:
+    prefix = next((one for one in _PREFIXES if scope["path"].startswith(f"{one}/")), "")
+    own = getattr(scope.get("route"), "path", None)
+    if own is None:
+        return prefix if prefix == "/static" else NO_ROUTE
+    return str(own) if own.startswith(prefix) else f"{prefix}{own}"

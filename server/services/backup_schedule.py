@@ -20,7 +20,7 @@ from server.services.restoring import RestoreError, try_restore
 from server.services.tombstones import TombstoneError
 from server.settings import Settings
 from server.storage import fs
-from server.storage.archive import ArchiveError, ClinicKey, read_key
+from server.storage.archive import BackupFileError, ClinicKey, read_key
 from server.storage.db import Database
 from server.storage.migrate import MigrationError, require_current
 from server.storage.tables import now
@@ -123,7 +123,7 @@ def run(settings: Settings) -> BackupState:
             else ""
         )
         backup = Outcome(now(), not made.missing, made.path.name, said, made.size)
-    except (ArchiveError, BackupError, MigrationError, TombstoneError, OSError) as error:
+    except (BackupFileError, BackupError, MigrationError, TombstoneError, OSError) as error:
         log.error("no backup was made: %s", error)
         backup = Outcome(now(), False, "", str(error))
     good = backup if backup.size else state.good
@@ -145,7 +145,7 @@ def _test(settings: Settings, folder: Path, key: ClinicKey | None) -> Outcome:
         return Outcome(now(), None, newest.name, NOT_TESTED)
     try:
         found = try_restore(newest, settings, key)
-    except (ArchiveError, RestoreError, TombstoneError) as error:
+    except (BackupFileError, RestoreError, TombstoneError) as error:
         log.error("the newest backup could not be restored: %s", error)
         return Outcome(now(), False, newest.name, str(error))
     said = f"{found.patients} patients, {found.sessions} visits, {found.files} files."

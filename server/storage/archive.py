@@ -32,7 +32,7 @@ _MAGIC: Final = b"age-encryption.org/"
 _SECRET: Final = "AGE-SECRET-KEY-1"  # noqa: S105 - how a private key of age begins
 
 
-class ArchiveError(Exception):
+class BackupFileError(Exception):
     """The archive or its key cannot be used; the message says why and what to do."""
 
 
@@ -62,9 +62,9 @@ class ClinicKey:
 
 
 def make_key(path: Path) -> str:
-    """Write a new key pair for its owner only and return the public one; raise ArchiveError over a file."""
+    """Write a new key pair for its owner only and return the public one; raise BackupFileError over one."""
     if path.exists():
-        raise ArchiveError(f"{path} exists; a key is never written over another one.")
+        raise BackupFileError(f"{path} exists; a key is never written over another one.")
     private = pyrage.x25519.Identity.generate()
     public = str(private.to_public())
     fs.write_file(path, f"# public key: {public}\n{private}\n".encode())
@@ -76,13 +76,13 @@ def read_key(path: Path) -> ClinicKey:
 
     Raises
     ------
-    ArchiveError
+    BackupFileError
         there is no such file, or it holds no key.
     """
     try:
         lines = [line.strip() for line in path.read_text("utf-8").splitlines()]
     except (OSError, UnicodeDecodeError) as error:
-        raise ArchiveError(f"The key {path} cannot be read ({error}).") from error
+        raise BackupFileError(f"The key {path} cannot be read ({error}).") from error
     text = next((line for line in lines if line and not line.startswith("#")), "")
     try:
         if text.startswith(_SECRET):
@@ -90,7 +90,7 @@ def read_key(path: Path) -> ClinicKey:
             return ClinicKey(private.to_public(), private)
         return ClinicKey(pyrage.x25519.Recipient.from_str(text), None)
     except (pyrage.IdentityError, pyrage.RecipientError) as error:
-        raise ArchiveError(
+        raise BackupFileError(
             f"{path} holds no key. Expected a line AGE-SECRET-KEY-1… or age1…; `sagittal keygen FILE` makes "
             "one."
         ) from error
@@ -119,7 +119,7 @@ class ArchivedFile:
         self._content, self._archive = content, archive
 
     def read(self, size: int) -> bytes:
-        """The next bytes, none at the end; raises ArchiveError where the archive is cut."""
+        """The next bytes, none at the end; raises BackupFileError where the archive is cut."""
         try:
             return self._content.read(size)
         except (tarfile.TarError, EOFError) as error:
@@ -158,7 +158,7 @@ def read_archive(path: Path, key: ClinicKey | None) -> Generator[tuple[str, int,
 
     Raises
     ------
-    ArchiveError
+    BackupFileError
         it is none, is damaged or cut, or needs another key. Seen at the latest at its end: nothing of it may
         be used before.
     """
@@ -169,7 +169,9 @@ def read_archive(path: Path, key: ClinicKey | None) -> Generator[tuple[str, int,
             yield from _members(path, file)
             return
         if key is None or key.private is None:
-            raise ArchiveError(f"{path.name} is encrypted; give the file with the private key (--key FILE).")
+            raise BackupFileError(
+                f"{path.name} is encrypted; give the file with the private key (--key FILE)."
+            )
         yield from _decrypted(path, file, key.private)
 
 
@@ -188,7 +190,7 @@ def _decrypted(
         pipe.close()
         worker.end()
         raise
-    except ArchiveError as error:
+    except BackupFileError as error:
         pipe.close()
         worker.end()
         raise _refused(path, worker.error) from error
@@ -198,14 +200,14 @@ def _decrypted(
         raise _refused(path, worker.error)
 
 
-def _refused(path: Path, error: BaseException | None) -> ArchiveError:
+def _refused(path: Path, error: BaseException | None) -> BackupFileError:
     if isinstance(error, pyrage.DecryptError):
-        return ArchiveError(f"{path.name} was encrypted for another key ({error}). Give the clinic's own.")
+        return BackupFileError(f"{path.name} was encrypted for another key ({error}). Give the clinic's own.")
     return _damaged(path)
 
 
-def _damaged(path: Path) -> ArchiveError:
-    return ArchiveError(f"{path.name} is damaged or was cut; use another backup.")
+def _damaged(path: Path) -> BackupFileError:
+    return BackupFileError(f"{path.name} is damaged or was cut; use another backup.")
 
 
 def _members(path: Path, file: BinaryIO) -> Generator[tuple[str, int, ArchivedFile], None, None]:
@@ -215,7 +217,9 @@ def _members(path: Path, file: BinaryIO) -> Generator[tuple[str, int, ArchivedFi
                 tar.members = []  # type: ignore[attr-defined]  # it would remember each for ever
                 content = tar.extractfile(member) if member.isreg() else None
                 if content is None:
-                    raise ArchiveError(f"{path.name} holds {member.name}, which is no file; it is not ours.")
+                    raise BackupFileError(
+                        f"{path.name} holds {member.name}, which is no file; it is not ours."
+                    )
                 yield member.name, member.size, ArchivedFile(content, path)
     except (tarfile.TarError, EOFError) as error:
         raise _damaged(path) from error

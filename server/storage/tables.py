@@ -12,7 +12,7 @@ patient ─< session ─< recording ─< recording_file          user ─< login
         ├──< programme ─< planned_visit ─── session (at most one each)
         └──< prescription ─< live_take >── session, recording (the one it became)
                                  └──< live_event (append-only)
-user ─< api_token, second_factor (at most one)
+user ─< api_token, second_factor (storage/access_tables.py)
 """
 
 from __future__ import annotations
@@ -34,7 +34,6 @@ from sqlalchemy import (
     ForeignKey,
     Index,
     Integer,
-    LargeBinary,
     MetaData,
     String,
     Table,
@@ -225,29 +224,6 @@ one_time_token = Table(
     Column("expires_at", Utc, nullable=False),
     Column("used_at", Utc),
     _one_of("purpose", TOKEN_PURPOSES),
-)
-
-api_token = Table(
-    "api_token",
-    metadata,
-    _id(),
-    _ref("user_id", "user"),
-    Column("name", String(40), nullable=False),
-    Column("token_sha256", String(64), nullable=False, unique=True),  # the token itself was shown once
-    Column("scopes", Json, nullable=False),
-    Column("created_at", Utc, nullable=False),
-    Column("expires_at", Utc, nullable=False),
-    Column("used_at", Utc),
-)
-
-second_factor = Table(
-    "second_factor",
-    metadata,
-    Column("user_id", ForeignKey("user.id", ondelete="RESTRICT"), primary_key=True),
-    Column("secret", LargeBinary, nullable=False),  # encrypted (server/auth/second_factor.py)
-    Column("recovery", Json, nullable=False),  # hashes of the codes that have not been used
-    Column("last_step", Integer, nullable=False),  # of the newest code that was taken: none is taken twice
-    Column("confirmed_at", Utc),  # None: set up, and not yet proved by a code
 )
 
 job = Table(

@@ -40,6 +40,7 @@ OF_NO_PATIENT = {
     Action.READ_DEVICE,  # serial numbers and days, nobody who wore them
     Action.MANAGE_USERS,
     Action.READ_AUDIT,
+    Action.READ_SYSTEM,
     Action.PAIR,  # its row is "live.paired" (test_tablet.py)
     Action.STREAM,  # a tablet sends, and is told nothing but numbers of batches
 }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import time
 
 import httpx
 import pyotp
@@ -13,7 +12,7 @@ from sqlalchemy import select
 from server.auth import second_factor
 from server.auth.throttle import Throttle
 from server.commands import user as user_command
-from server.storage.tables import second_factor as table
+from server.storage.access_tables import second_factor as table
 from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio
@@ -118,7 +117,3 @@ async def test_it_is_removed_by_oneself_an_administrator_or_the_console(
     monkeypatch.setattr("sys.stdin", io.StringIO(f"{PASSWORD}\n"))
     assert user_command.user(clinic.settings.data_dir, "assistant", "assistant") == 0
     assert (await sign_in(clinic, "assistant")).status_code == 200
-
-
-def test_the_clock_that_is_asked_is_the_real_one() -> None:
-    assert second_factor.time is time

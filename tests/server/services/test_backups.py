@@ -24,7 +24,7 @@ from server.services.sweep import sweep
 from server.services.tombstones import Tombstones
 from server.settings import Settings, SettingsError
 from server.storage import fs
-from server.storage.archive import ArchiveError, ClinicKey, make_key, read_archive, read_key
+from server.storage.archive import BackupFileError, ClinicKey, make_key, read_archive, read_key
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.tables import audit as audit_table
@@ -196,7 +196,7 @@ def test_what_is_damaged_or_cut_is_refused_and_nothing_is_put_in_place(
     for content in spoiled:
         bad = tmp_path / "bad.tar"
         bad.write_bytes(content)
-        with pytest.raises((RestoreError, ArchiveError)):
+        with pytest.raises((RestoreError, BackupFileError)):
             restore(bad, home, key)
         assert [p.name for p in home.data_dir.iterdir()] == ["server.lock"]
     restore(made.path, home, key)
@@ -210,13 +210,13 @@ def test_a_key_opens_only_its_own_and_a_public_one_only_encrypts(clinic: Clinic,
     (tmp_path / "public.key").write_text(f"# of the clinic\n{public}\n")
     (tmp_path / "none.key").write_text("hunter2\n")
     assert (tmp_path / "clinic.key").stat().st_mode & 0o077 == 0
-    with pytest.raises(ArchiveError, match="never written over"):
+    with pytest.raises(BackupFileError, match="never written over"):
         make_key(tmp_path / "clinic.key")
-    with pytest.raises(ArchiveError, match="holds no key"):
+    with pytest.raises(BackupFileError, match="holds no key"):
         read_key(tmp_path / "none.key")
     made = make(clinic, read_key(tmp_path / "public.key"))
     for name, words in (("other", "another key"), ("public", "private key"), (None, "private key")):
-        with pytest.raises(ArchiveError, match=words):
+        with pytest.raises(BackupFileError, match=words):
             try_restore(made.path, clinic.settings, read_key(tmp_path / f"{name}.key") if name else None)
     assert try_restore(made.path, clinic.settings, read_key(tmp_path / "clinic.key")).patients == 1
 
@@ -236,7 +236,7 @@ def test_what_a_backup_of_another_make_may_not_do(clinic: Clinic, tmp_path: Path
                     member.type, member.linkname, member.size = tarfile.SYMTYPE, "/etc/passwd", 0
                 tar.addfile(member, io.BytesIO(data))
         words = {"newer": "reads 1", "outside": "no backup does", "link": "which is no file"}[change]
-        with pytest.raises((RestoreError, ArchiveError), match=words):
+        with pytest.raises((RestoreError, BackupFileError), match=words):
             try_restore(bad, clinic.settings, None)
 
 
