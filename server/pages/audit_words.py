@@ -31,6 +31,7 @@ DEEDS: Final[Mapping[str, str]] = {
     "patient.opened": "opened the patient",
     "patient.created": "added the patient",
     "patient.changed": "changed what is said of the patient",
+    "patient.exported": "took along everything that is stored of the patient",
     "patient.erased": "deleted the patient with all recordings",
     "note.added": "wrote a note",
     "note.removed": "removed a note",
