@@ -52,6 +52,7 @@ class Settings:
     backup_dir : folder outside the data folder in which `sagittal serve` keeps backups, "" = it makes none.
     backup_at : when, HH:MM in the machine's own time.
     backup_key : file with the key that encrypts them (`sagittal keygen`), "" = they are not encrypted.
+    retention_years : patients without a visit for longer are listed on the page System, 0 = none are.
     log_format : "text" for people or "json", one object a line with a line for each request.
     task_modules : modules whose import registers kinds of jobs.
     """
@@ -78,6 +79,7 @@ class Settings:
     backup_dir: str = ""
     backup_at: str = "02:30"
     backup_key: str = ""
+    retention_years: int = 0
     log_format: str = "text"
     task_modules: tuple[str, ...] = ("server.worker.tasks",)
 
@@ -93,6 +95,8 @@ class Settings:
             _require(getattr(self, name) >= 0, name, getattr(self, name), "0 or more")
         for proxy in self.trusted_proxies:
             _require(_is_some_network(proxy), "trusted_proxies", f"'{proxy}'", PROXY_DOMAIN)
+        years = self.retention_years
+        _require(0 <= years <= 200, "retention_years", years, "0 to 200 (0 = no list)")
         _require(_CLOCK.fullmatch(self.backup_at) is not None, "backup_at", f"'{self.backup_at}'", "HH:MM")
         _require(self.log_format in {"text", "json"}, "log_format", f"'{self.log_format}'", "text or json")
         for name in ("backup_dir", "backup_key"):

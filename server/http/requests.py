@@ -43,7 +43,8 @@ class RequestObserver:
             await self.app(scope, receive, send)
             return
         own = secrets.token_hex(8)
-        token = request_id.set(own)
+        # never taken back: what a server logs of a failed request comes after this, in the same task
+        request_id.set(own)
         began = time.perf_counter()
         status = 500  # nothing was answered
 
@@ -59,7 +60,6 @@ class RequestObserver:
         finally:
             if scope["type"] == "http":
                 self._tell(scope, status, time.perf_counter() - began)
-            request_id.reset(token)
 
     def _tell(self, scope: Scope, status: int, took_s: float) -> None:
         pattern = _find_pattern(scope)

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
+from sqlalchemy import Connection
 from starlette.responses import Response
 
 from server.auth.access import require
@@ -14,8 +15,10 @@ from server.auth.identity import Identity
 from server.auth.roles import Action
 from server.context import Config, Db
 from server.pages.shell import render_page
-from server.services import backup_schedule
+from server.services import backup_schedule, patients
 from server.services.backup_schedule import BackupState, Outcome
+from server.services.calendar_days import move_years
+from server.services.patients import Patient
 from server.storage.high_water import read_newest
 from server.storage.tables import now
 
@@ -39,6 +42,7 @@ def show_system(
     checks = request.app.state.readiness.checks()
     with db.read() as c:
         head = read_newest(c)
+        overdue = _list_overdue(c, settings.retention_years)
     parts = [(PART_WORDS[name], None if said == "ok" else said) for name, said in checks.items()]
     state = backup_schedule.read_state(settings)
     upcoming = backup_schedule.next_time(settings, dt.datetime.now().astimezone())
@@ -46,7 +50,15 @@ def show_system(
         request, db, who, "system.html", "system",
         parts=parts, head=head, folder=settings.backup_dir, encrypted=bool(settings.backup_key),
         backups=describe_backups(state, now()), upcoming=upcoming,
+        years=settings.retention_years, overdue=overdue,
     )  # fmt: skip
+
+
+def _list_overdue(c: Connection, years: int) -> list[Patient]:
+    """Patients whose newest visit, or who themselves, are older than so many years; 0 = nobody is asked for."""
+    if not years:
+        return []
+    return patients.list_older(c, move_years(now().date(), -years))
 
 
 def describe_backups(state: BackupState, at: dt.datetime) -> list[dict[str, Any]]:

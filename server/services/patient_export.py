@@ -2,8 +2,8 @@
 
     for piece in export_patient(db, blobs, patient_id): ...        # in pieces, whatever the size
 
-`patient.json` has every row that belongs to the patient, by table, with the names of who wrote it, `audit.json`
-who opened or changed what of it, `files/<table>/<id>/<name>` the files, recordings as they were uploaded.
+`patient.json` has every row that belongs to the patient, by table, with the names of who wrote it,
+`audit.json` who opened or changed what of it, `files/<table>/<id>/<name>` the files, recordings as uploaded.
 What belongs to a patient is found by the references of the tables, so a new table is in it by itself.
 """
 

@@ -11,7 +11,10 @@ import pytest
 from server.pages.system import describe_backups
 from server.services import backup_schedule
 from server.services.backup_schedule import BackupState, Outcome
+from server.services.calendar_days import move_years
+from server.settings import Settings, SettingsError
 from server.storage.readiness import Readiness
+from server.storage.tables import now
 from tests.server.clinic import open_clinic
 
 pytestmark = pytest.mark.anyio
@@ -62,3 +65,20 @@ async def test_every_answer_has_an_id_and_a_secure_one_forbids_plain_http(tmp_pa
         ids = {a.headers["x-request-id"] for a in answers}
         assert len(ids) == 3
         assert all(re.fullmatch(r"[0-9a-f]{16}", one) for one in ids)
+
+
+async def test_who_has_not_come_for_years_is_listed(tmp_path: Path) -> None:
+    async with open_clinic(tmp_path, retention_years=10) as clinic, clinic.client("admin") as admin:
+        assert "Nobody." in (await admin.get("/system")).text
+        today = now().date()
+        for code, visit in (("OLD", move_years(today, -11)), ("NEW", move_years(today, -9)), ("NONE", None)):
+            made = (await admin.post("/api/v1/patients", json={"code": code})).json()["id"]
+            if visit is not None:
+                body = {"title": "Walk", "performed_on": visit.isoformat()}
+                await admin.post(f"/api/v1/patients/{made}/sessions", json=body)
+        html = (await admin.get("/system")).text
+        assert "Without a visit for 10 years" in html
+        assert [code for code in ("OLD", "NEW", "NONE") if f">{code}</a>" in html] == ["OLD"]
+    assert move_years(dt.date(2024, 2, 29), -1) == dt.date(2023, 2, 28)
+    with pytest.raises(SettingsError, match="0 to 200"):
+        Settings(data_dir=tmp_path, retention_years=-1)

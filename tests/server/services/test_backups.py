@@ -102,6 +102,7 @@ def test_a_backup_under_load_comes_back_whole(clinic: Clinic, key: ClinicKey | N
             number += 1
             upload(clinic, clinic.session.id, "a.txt", b"walk %d" % number)
 
+    make_key(clinic.settings.second_factor_key)
     writer = threading.Thread(target=work)
     writer.start()
     try:
@@ -116,8 +117,10 @@ def test_a_backup_under_load_comes_back_whole(clinic: Clinic, key: ClinicKey | N
     found, again = put_back(clinic, made, key)
     assert (found.patients, found.sessions, found.erased_again, found.missing) == (1, 1, 0, 0)
     assert sorted(p.name for p in again.folder.iterdir()) == [
-        "audit.mark", "blobs", "live", "sagittal.db", "server.lock",
+        "audit.mark", "blobs", "live", "sagittal.db", "second-factor.key", "server.lock",
     ]  # fmt: skip
+    second = again.settings.second_factor_key
+    assert second.read_bytes() == clinic.settings.second_factor_key.read_bytes()
     assert defects(again) == []
     log = f"{'a' * 32}.log"
     assert (again.settings.live / log).read_bytes() == (clinic.settings.live / log).read_bytes()
