@@ -1,4 +1,4 @@
-"""Tokens for programs, and a second factor beside the password."""
+"""Tokens for programs, a second factor beside the password, and what a patient has agreed to."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -37,8 +37,32 @@ def upgrade() -> None:
         ),
         sa.PrimaryKeyConstraint("user_id", name=op.f("pk_second_factor")),
     )
+    op.create_table(
+        "consent",
+        sa.Column("id", sa.String(length=32), nullable=False),
+        sa.Column("patient_id", sa.String(length=32), nullable=False),
+        sa.Column("purpose", sa.String(length=16), nullable=False),
+        sa.Column("given_on", sa.Date(), nullable=False),
+        sa.Column("evidence", sa.String(length=200), nullable=False),
+        sa.Column("withdrawn_on", sa.Date(), nullable=True),
+        sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
+        sa.Column("created_by", sa.String(length=32), nullable=True),
+        sa.CheckConstraint(
+            "purpose IN ('recording', 'research', 'teaching', 'sharing')", name=op.f("ck_consent_purpose")
+        ),
+        sa.CheckConstraint("withdrawn_on >= given_on", name=op.f("ck_consent_withdrawn")),
+        sa.ForeignKeyConstraint(
+            ["patient_id"], ["patient.id"], name=op.f("fk_consent_patient_id_patient"), ondelete="RESTRICT"
+        ),
+        sa.ForeignKeyConstraint(
+            ["created_by"], ["user.id"], name=op.f("fk_consent_created_by_user"), ondelete="RESTRICT"
+        ),
+        sa.PrimaryKeyConstraint("id", name=op.f("pk_consent")),
+    )
+    op.create_index(op.f("ix_consent_patient_id"), "consent", ["patient_id"], unique=False)
 
 
 def downgrade() -> None:
+    op.drop_table("consent")
     op.drop_table("second_factor")
     op.drop_table("api_token")

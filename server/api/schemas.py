@@ -140,6 +140,14 @@ class CodeProof(Request):
     code: Annotated[str, StringConstraints(min_length=1, max_length=40)]
 
 
+class ConsentNew(Request):
+    """What a patient agreed to, when, and where that is written."""
+
+    purpose: Literal["recording", "research", "teaching", "sharing"]
+    evidence: Line
+    given_on: dt.date | None = None
+
+
 class LanguageChoice(Request):
     """In which language one reads the pages."""
 

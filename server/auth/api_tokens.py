@@ -22,8 +22,8 @@ from server.auth.identity import Identity
 from server.auth.roles import Action, Role
 from server.auth.tokens import new_token, token_hash
 from server.http.problems import Problem
-from server.storage.access_tables import api_token
 from server.storage.db import Database
+from server.storage.person_tables import api_token
 from server.storage.refusal import refusal_of
 from server.storage.tables import new_id, now, user
 

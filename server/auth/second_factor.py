@@ -20,8 +20,8 @@ from sqlalchemy import Connection, delete, insert, select, update
 
 from server.auth.tokens import token_hash
 from server.http.problems import Problem
-from server.storage.access_tables import second_factor
 from server.storage.archive import ClinicKey, make_key, read_key
+from server.storage.person_tables import second_factor
 from server.storage.tables import now
 
 STEP_S: Final = 30

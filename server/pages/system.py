@@ -55,7 +55,7 @@ def show_system(
 
 
 def _list_overdue(c: Connection, years: int) -> list[Patient]:
-    """Patients whose newest visit, or who themselves, are older than so many years; 0 = nobody is asked for."""
+    """Patients without a visit for so many years; 0 = nobody is asked for."""
     if not years:
         return []
     return patients.list_older(c, move_years(now().date(), -years))

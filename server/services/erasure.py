@@ -28,6 +28,7 @@ from server.settings import Settings
 from server.storage import fs
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
+from server.storage.person_tables import consent
 from server.storage.tables import (
     analysis,
     analysis_file,
@@ -88,6 +89,7 @@ def erase_patient(
         c.execute(delete(programme).where(programme.c.patient_id == patient_id))
         c.execute(delete(prescription).where(prescription.c.patient_id == patient_id))
         c.execute(delete(patient_note).where(patient_note.c.patient_id == patient_id))
+        c.execute(delete(consent).where(consent.c.patient_id == patient_id))
         c.execute(delete(patient).where(patient.c.id == patient_id))
         audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": found.sessions})
         _note(settings, spaces=[patient_id], takes=takes)

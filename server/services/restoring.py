@@ -30,12 +30,12 @@ from server.services.tombstones import NAME as TOMBSTONES
 from server.services.tombstones import Tombstones, parse_tombstones, read_tombstones
 from server.settings import Settings
 from server.storage import fs
-from server.storage.access_tables import api_token
 from server.storage.archive import PIECE, ArchivedFile, ClinicKey, read_archive
 from server.storage.blobs import BlobStore
 from server.storage.db import Database
 from server.storage.high_water import HighWater, read_newest, set_mark
 from server.storage.migrate import MigrationError, upgrade
+from server.storage.person_tables import api_token
 from server.storage.tables import login_session, one_time_token, patient, session
 
 RESTORED: Final = "backup.restored"

@@ -12,7 +12,7 @@ from sqlalchemy import select, update
 
 from server.auth.api_tokens import SCOPES, Scope
 from server.auth.roles import POLICY, Action
-from server.storage.access_tables import api_token
+from server.storage.person_tables import api_token
 from server.storage.tables import audit, now
 from tests.server.clinic import PASSWORD, Clinic
 

@@ -12,7 +12,7 @@ from sqlalchemy import select
 from server.auth import second_factor
 from server.auth.throttle import Throttle
 from server.commands import user as user_command
-from server.storage.access_tables import second_factor as table
+from server.storage.person_tables import second_factor as table
 from tests.server.clinic import PASSWORD, Clinic
 
 pytestmark = pytest.mark.anyio

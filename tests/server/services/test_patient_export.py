@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import insert
 
-from server.services import notes, patients, recordings, sessions
+from server.services import consents, notes, patients, recordings, sessions
 from server.services.errors import NotFound
 from server.services.patient_export import PIECE, export_patient
 from server.services.references import list_referenced
@@ -26,6 +26,8 @@ def test_everything_of_one_patient_and_nothing_else(tmp_path: Path) -> None:
             upload.write(content)
             upload.keep()
     with clinic.db.write() as c:
+        agreed = consents.give(c, None, clinic.patient.id, purpose="research", evidence="form 12")
+        consents.withdraw(c, None, agreed.id)
         notes.add(c, None, clinic.patient.id, content="Walks to the bakery.")
         c.execute(
             insert(live_take).values(
@@ -55,6 +57,7 @@ def test_everything_of_one_patient_and_nothing_else(tmp_path: Path) -> None:
     rows = about["rows"]
     assert {row["sha256"] for row in rows["recording_file"]} == used
     assert rows["patient_note"][0]["content"] == "Walks to the bakery."
+    assert rows["consent"][0]["withdrawn_on"] is not None
     assert rows["live_event"][0]["kind"] == "mark"
     assert {"patient.created", "session.created", "recording.file_added"} <= {row["action"] for row in trail}
     text = json.dumps([about, trail])

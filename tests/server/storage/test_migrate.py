@@ -17,8 +17,8 @@ from alembic import command
 from alembic.script import ScriptDirectory
 
 from server.storage import (
-    access_tables,  # noqa: F401 - its tables are in the metadata
     migrate,
+    person_tables,  # noqa: F401 - its tables are in the metadata
 )
 from server.storage.db import Database
 from server.storage.tables import metadata

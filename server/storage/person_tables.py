@@ -1,10 +1,30 @@
-"""Tables of what opens an account besides its password; by the rules of storage/tables.py."""
+"""Tables of what opens an account besides its password, and of what a patient has agreed to.
+
+By the rules of storage/tables.py.
+"""
 
 from __future__ import annotations
 
-from sqlalchemy import Column, ForeignKey, Integer, LargeBinary, String, Table
+from sqlalchemy import CheckConstraint, Column, Date, ForeignKey, Integer, LargeBinary, String, Table
 
 from server.storage.tables import Json, Utc, metadata
+
+CONSENT_PURPOSES = ("recording", "research", "teaching", "sharing")
+
+consent = Table(
+    "consent",
+    metadata,
+    Column("id", String(32), primary_key=True),
+    Column("patient_id", ForeignKey("patient.id", ondelete="RESTRICT"), nullable=False, index=True),
+    Column("purpose", String(16), nullable=False),
+    Column("given_on", Date, nullable=False),
+    Column("evidence", String(200), nullable=False),  # where it is written: "signed form, file 12"
+    Column("withdrawn_on", Date),
+    Column("created_at", Utc, nullable=False),
+    Column("created_by", ForeignKey("user.id", ondelete="RESTRICT")),
+    CheckConstraint(f"purpose IN ({', '.join(repr(one) for one in CONSENT_PURPOSES)})", name="purpose"),
+    CheckConstraint("withdrawn_on >= given_on", name="withdrawn"),
+)
 
 api_token = Table(
     "api_token",
