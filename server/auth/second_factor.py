@@ -95,6 +95,12 @@ def is_on(c: Connection, user_id: str) -> bool:
     return c.execute(query).scalar() is not None
 
 
+def list_users(c: Connection) -> set[str]:
+    """The accounts that need a code."""
+    query = select(second_factor.c.user_id).where(second_factor.c.confirmed_at.is_not(None))
+    return set(c.execute(query).scalars())
+
+
 def use(c: Connection, key_file: Path, user_id: str, code: str, at_s: float | None = None) -> bool:
     """Take a code of this moment or a recovery code, once; False when it is neither (writes)."""
     return _take_code(c, key_file, user_id, code, at_s) or _take_recovery(c, user_id, code)

@@ -25,7 +25,7 @@ def show_users(request: Request, db: Db, who: Annotated[Identity, require(Action
     """Who may sign in, and as what."""
     with db.read() as c:
         rows = accounts.list_accounts(c)
-        with_factor = {row.id for row in rows if second_factor.is_on(c, row.id)}
+        with_factor = second_factor.list_users(c)
     roles = [(role.value, ROLE_WORDS[role]) for role in Role]
     options = [(role.value, role.value) for role in Role]
     return render_page(
